@@ -11,24 +11,206 @@ compiler and compiling no collision library.
 
 from __future__ import annotations
 
-from typing import NewType
+from typing import cast
 
-from rrtik_ompl.kernels.record import Doubles
+from rrtik_ompl.kernels.record import Doubles, Floats, Ints, Record, Tables
 
 ALIGNMENT = 64  # [bytes] of every array that whole vectors are read from
 INT_BYTES, FLOAT_BYTES, DOUBLE_BYTES = 4, 4, 8
 FREE, UNDECIDED, COLLIDING = 0, 1, 2  # answers
 UNSOUND = -1  # what an entry returns in place of a count if a table holds what no kernel knows
 
-# Addresses of tables.
-WorldTable = NewType("WorldTable", int)
-ArmTable = NewType("ArmTable", int)
-BallTable = NewType("BallTable", int)
-PrimitiveTable = NewType("PrimitiveTable", int)
-SolidTable = NewType("SolidTable", int)
-ScratchTable = NewType("ScratchTable", int)
-ProbeTable = NewType("ProbeTable", int)
-BoundTable = NewType("BoundTable", int)
+
+class Frame(Floats):
+    """Lanes of the rotation row by row, then of the origin."""
+
+
+class Centre(Floats):
+    """Points: lanes of x, of y and of z each."""
+
+
+class PrimitiveList(Ints):
+    """Numbers of primitives."""
+
+
+class LikelyBall(Ints):
+    """Balls that met something lately, the likeliest first; see below."""
+
+
+class Marks(Ints):
+    """For each pair of bodies the lanes in which it is in doubt, moving and standing bodies first."""
+
+
+class Watch(Floats):
+    """For each group, then each pair of groups, of outer balls one number.
+
+    It is by how much [m] bounds are widened for the configurations of a motion that are yet to be checked; CLEAR if
+    nothing can be met at any of them.
+    """
+
+
+class Placement(Floats):
+    """The rotation row by row, then the origin."""
+
+
+class ArmTable(Record):
+    """The joints of an arm."""
+
+    joint_count: int
+    parents: Ints  # frame that carries each joint
+    joint_kinds: Ints
+    placements: Placement  # of each joint in its parent's frame
+    phases: Doubles  # what is added to each value
+
+
+class Ball(Floats):
+    """The centre in the joint's frame, then the radius."""
+
+
+class Group(Ints):
+    """All that a joint carries; see below."""
+
+
+class Cluster(Ints):
+    """Balls of a body that are neighbours; see below."""
+
+
+class MovingBody(Ints):
+    """A run of clusters; see below."""
+
+
+class PairGroup(Ints):
+    """Pairs between the same two groups; see below."""
+
+
+class Pair(Ints):
+    """Two bodies that must not touch; see below."""
+
+
+class BallTable(Record):
+    """The balls of the outer cover, or inner ones, in three levels: groups of clusters of balls."""
+
+    group_count: int
+    groups: Group
+    group_balls: Ball  # around each group
+    clusters: Cluster
+    cluster_balls: Ball  # around each cluster
+    balls: Ball
+    bodies: MovingBody
+    body_balls: Ball  # around each body
+    pair_group_count: int
+    pair_groups: PairGroup
+    pairs: Pair
+    cluster_count: int
+    body_count: int
+    pair_count: int
+    self_margin: Floats  # one number: how far two bodies must stay apart [m]
+
+
+class PrimitiveHead(Ints):
+    """The kind of a primitive, and what belongs to it; see below."""
+
+
+class PrimitiveShape(Floats):
+    """The numbers of a primitive, by its kind; see below."""
+
+
+class Plane(Floats):
+    """The outward normal, then the offset."""
+
+
+class PrimitiveTable(Record):
+    """What stands still: primitives around the bodies, or inside them."""
+
+    count: int
+    padded_count: int
+    boxes: Floats  # around each, in ``BOX_RUNS`` of ``padded_count``
+    shapes: PrimitiveShape
+    heads: PrimitiveHead
+    planes: Plane
+    standing_count: int  # bodies
+    checked: Ints  # for each moving and standing body 0 to ignore that pair
+    excluding: Ints  # for each moving body whether it has a pair to ignore
+    own: Ints  # for each standing body the primitive that has its formula, or any of its balls, -1 if it has none
+    clouds: Tables
+    block_count: int  # 0 where primitives are few
+    block_boxes: Floats  # as ``boxes``, around each ``BLOCK`` primitives
+
+
+class Span(Ints):
+    """The frame of a body and its solids; see below."""
+
+
+class Solid(Ints):
+    """The kind of a solid and its corners; see below."""
+
+
+class SolidSizes(Doubles):
+    """See below."""
+
+
+class Corners(Floats):
+    """Blocks of ``WIDTH`` numbers of x, of y, of z."""
+
+
+class SolidTable(Record):
+    """Solids around and inside bodies: moving ones, or those that stand still."""
+
+    spans: Span
+    solids: Solid
+    sizes: SolidSizes
+    corners: Corners
+
+
+class BoundTable(Record):
+    """How far joints can move what is watched."""
+
+    blocks: int  # of lanes in a row
+    # The first row has the last frame that each needs. The second one is added to the sum of the others, one for each
+    # joint, times what the joints move.
+    rows: Floats
+
+
+class ScratchTable(Record):
+    """The memory that a check computes in."""
+
+    values: Doubles  # wide lanes of joint values
+    frames: Frame
+    group_centres: Centre  # of balls
+    centres: Centre
+    placed: Ints  # flags of the clusters whose balls are placed
+    found: PrimitiveList
+    near: PrimitiveList
+    met: PrimitiveList
+    marks: Marks
+    waiting: Ints  # configurations that wait for a second check
+    outer_likely: LikelyBall
+    inner_likely: LikelyBall
+    note: Floats  # lanes
+    watch: Watch
+
+
+class ProbeTable(Record):
+    """What distances are measured in."""
+
+    best: Floats  # lanes of the smallest distance so far
+    which: Ints  # the pair that has it, for each lane
+    gaps: Floats  # lanes of distances of listed primitives
+
+
+class WorldTable(Record):
+    """All that a check needs."""
+
+    arm: ArmTable
+    outer_balls: BallTable
+    inner_balls: BallTable
+    outer_primitives: PrimitiveTable
+    inner_primitives: PrimitiveTable
+    scratch: ScratchTable
+    moving_solids: SolidTable
+    standing_solids: SolidTable
+    wider_solids: SolidTable  # the moving ones, each with the margin around it that the arm keeps from itself
+    motion_bounds: BoundTable
 
 
 class Configuration(Doubles):
@@ -39,49 +221,6 @@ class JointValues(Doubles):
     """Rows of one number for each joint."""
 
 
-# Addresses of arrays, by what they hold.
-BallArray = NewType("BallArray", int)
-HeadArray = NewType("HeadArray", int)
-ShapeArray = NewType("ShapeArray", int)
-PlaneArray = NewType("PlaneArray", int)
-CloudArray = NewType("CloudArray", int)  # addresses of tables, int64
-GroupArray = NewType("GroupArray", int)
-PairGroupArray = NewType("PairGroupArray", int)
-PairArray = NewType("PairArray", int)
-FrameArray = NewType("FrameArray", int)
-CentreArray = NewType("CentreArray", int)  # of points, lanes of x, of y and of z each
-CornerArray = NewType("CornerArray", int)
-PrimitiveList = NewType("PrimitiveList", int)  # numbers of primitives, int32
-Marks = NewType("Marks", int)  # for each pair of bodies the lanes in which it is in doubt, int32
-NO_MARKS = Marks(0)
-Watch = NewType("Watch", int)  # for each group, then each pair of groups, of outer balls one float
-NO_WATCH = Watch(0)
-
-# Addresses of records.
-Placement = NewType("Placement", int)
-Frame = NewType("Frame", int)
-Group = NewType("Group", int)
-Cluster = NewType("Cluster", int)
-MovingBody = NewType("MovingBody", int)
-PairGroup = NewType("PairGroup", int)
-Pair = NewType("Pair", int)
-PrimitiveHead = NewType("PrimitiveHead", int)
-PrimitiveShape = NewType("PrimitiveShape", int)
-Plane = NewType("Plane", int)
-Span = NewType("Span", int)
-Solid = NewType("Solid", int)
-SolidSizes = NewType("SolidSizes", int)
-LikelyBalls = NewType("LikelyBalls", int)
-LikelyBall = NewType("LikelyBall", int)
-
-# World: addresses of the tables that a check needs.
-ARM, OUTER, INNER, OUTER_PRIMITIVES, INNER_PRIMITIVES, SCRATCH, MOVING_SOLIDS, STANDING_SOLIDS = range(8)
-WIDER_SOLIDS = 8  # the moving solids, each with the margin around it that the arm keeps from itself
-MOTION_BOUNDS = 9
-
-# Arm. PARENTS: frame that carries each joint · JOINT_KINDS · PLACEMENTS: of each joint in its parent's frame ·
-# PHASES: what is added to each value
-JOINT_COUNT, PARENTS, JOINT_KINDS, PLACEMENTS, PHASES = range(5)
 # Kinds of joints. FIRST_TURN: its parent is the world. ALIGNED_TURN: its placement turns about x alone.
 TURN, SLIDE, FIRST_TURN, ALIGNED_TURN = range(4)
 # Placement (of floats) and frame (of lanes): the rotation row by row, then the origin.
@@ -89,11 +228,6 @@ AXES = 3  # numbers of a point, rows of a rotation
 POSE_NUMBERS = 12
 ROTATION, ORIGIN = 0, 9
 
-# Balls (of the outer cover, or inner ones) in three levels: groups (all that a joint carries) of clusters of balls;
-# a body is a run of clusters too. GROUP_BALLS, CLUSTER_BALLS, BODY_BALLS: a ball around each group, cluster, body ·
-# SELF_MARGIN: one float, how far two bodies must stay apart
-GROUP_COUNT, GROUPS, GROUP_BALLS, CLUSTERS, CLUSTER_BALLS, BALLS, BODIES, BODY_BALLS = range(8)
-PAIR_GROUP_COUNT, PAIR_GROUPS, PAIRS, CLUSTER_COUNT, BODY_COUNT, PAIR_COUNT, SELF_MARGIN = range(8, 15)
 # Ball (floats): centre in the joint frame, radius.
 BALL_FLOATS = 4
 CENTRE, RADIUS = 0, 3
@@ -113,17 +247,6 @@ PAIR_GROUP_ONE, PAIR_GROUP_OTHER, PAIR_GROUP_FIRST, PAIR_GROUP_END = range(4)
 PAIR_INTS = 2
 PAIR_ONE, PAIR_OTHER = range(2)
 
-# Bounds of what is watched: BOUND_BLOCKS of lanes in a row of BOUNDS. The first row has the last frame that it needs.
-# The second one is added to the sum of the others, one for each joint, times what the joints move.
-BOUND_BLOCKS, BOUNDS = range(2)
-
-# Primitives: what stands still. BOXES: BOX_RUNS of PADDED_COUNT floats · NUMBERS: the heads · PRIMITIVES: the
-# shapes · CHECKED: one int for each moving and standing body, 0 to ignore that pair ·
-# EXCLUDING: for each moving body whether it has a pair to ignore · OWN: for each standing body the primitive that has
-# its formula, or any of its balls, -1 if it has none · CLOUDS: addresses of the tables of clouds · BLOCK_BOXES: as
-# BOXES, around each BLOCK primitives, BLOCK_COUNT of them; 0 where primitives are few
-PRIMITIVE_COUNT, PADDED_COUNT, BOXES, PRIMITIVES, NUMBERS, PLANES, STANDING_COUNT, CHECKED, EXCLUDING, OWN = range(10)
-CLOUDS, BLOCK_COUNT, BLOCK_BOXES = range(10, 13)
 BLOCK = 16  # primitives: boxes are compared this many at a time, or half as many
 LOW_X, HIGH_X, LOW_Y, HIGH_Y, LOW_Z, HIGH_Z = BOX_RUNS = range(6)
 # Head of a primitive (ints): kind, number of its standing body, planes from, to (of a cloud: its number among these).
@@ -147,8 +270,6 @@ HALF_SPACE_NORMAL, HALF_SPACE_OFFSET = 0, 3  # outward
 CLOUD_AXES, CLOUD_RADIUS = 3, 12  # a cloud's centre is the origin of its frame
 CONVEX_SHARE = 0  # 1 if a ball meets it that reaches behind all planes, 0 if the ball's centre must lie behind them
 
-# Solids of bodies, moving ones or those that stand still. CORNERS: blocks of WIDTH floats of x, of y, of z
-SPANS, SOLIDS, SIZES, CORNERS = range(4)
 # Span of a body (ints): frame, solids around the body from, to, solids inside it from, to.
 SPAN_INTS = 5
 SPAN_FRAME, AROUND_FIRST, AROUND_END, INSIDE_FIRST, INSIDE_END = range(5)
@@ -162,19 +283,9 @@ CLOUD_SOLID = 4  # stands for one point after the other, which a kernel puts int
 SIZE_COUNT = 10
 DISC, AXIS, ROUND, SLACK, BOUND_CENTRE, BOUND_RADIUS = 0, 1, 4, 5, 6, 9
 
-# Scratch memory. VALUES: wide lanes of joint values · FRAMES · GROUP_CENTRES, CENTRES: of balls · PLACED: flags of the
-# clusters whose balls are placed · FOUND, NEAR, MET: lists of primitives · MARKS: see above, moving and standing bodies
-# first · WAITING: configurations that wait for a second check · OUTER_LIKELY, INNER_LIKELY: balls that met something
-# lately · NOTE: lanes · WATCH: see below
-VALUES, FRAMES, GROUP_CENTRES, CENTRES, PLACED, FOUND, NEAR, MET, MARKS, WAITING = range(10)
-OUTER_LIKELY, INNER_LIKELY, NOTE, WATCH = range(10, 14)
-# Watch (floats): by how much [m] bounds are widened for the configurations of a motion that are yet to be checked;
-# CLEAR if nothing can be met at any of them.
-CLEAR = -1.0
+NO_MARKS = cast(Marks, 0)
+NO_WATCH = cast(Watch, 0)
+CLEAR = -1.0  # of what is watched
 # Likely ball (ints): its number (-1: none yet), its frame, its body. There are so many, the likeliest first.
 LIKELY_INTS, LIKELY_COUNT = 3, 3
 LIKELY_NUMBER, LIKELY_FRAME, LIKELY_BODY = range(3)
-
-# Probe, for distances. BEST: lanes of the smallest distance so far · WHICH: ints of the pair that has it · GAPS: lanes
-# of distances of listed primitives
-BEST, WHICH, GAPS = range(3)

@@ -17,9 +17,10 @@ That is all there is to say of a table. Both sides use its names::
     curve.along[2], curve.count
 
 In memory a table is a row of words of 8 bytes, one a field in the order of the class: a whole number, a float64, the
-address of an array, or the address of another table. A kernel is given the address of a table and knows its class by
-the annotation of its argument (:mod:`rrtik_ompl.kernels.simd.records`), so that a field is one load or store with a
-constant offset, and an element of an array one more. There are no bounds checks: whoever packs guarantees every index.
+address of an array, the address of another table, or that of an array of addresses of tables. A kernel is given the
+address of a table and knows its class by the annotation of its argument (:mod:`rrtik_ompl.kernels.simd.records`), so
+that a field is one load or store with a constant offset, and an element of an array one more. There are no bounds
+checks: whoever packs guarantees every index.
 
 In Python an object of the class owns the memory. Its numbers are read and written in place, its arrays are those of
 numpy whose addresses the table holds, and its tables are objects like itself; all live as long as it does. The pages
@@ -66,6 +67,12 @@ class Ints(View):
 
 class Wholes(View):
     """Whole numbers of 64 bits, or addresses."""
+
+    scalar = "int64"
+
+
+class Tables(View):
+    """Addresses of tables. In Python the field is these tables, and the table that has it keeps them."""
 
     scalar = "int64"
 
@@ -122,6 +129,11 @@ def holds_table(kind: Any) -> bool:
     return isinstance(kind, type) and issubclass(kind, Record)
 
 
+def holds_tables(kind: Any) -> bool:
+    """Whether a field of this kind is the address of an array of addresses of tables."""
+    return isinstance(kind, type) and issubclass(kind, Tables)
+
+
 def word(kind: Any, number: float) -> int:
     """A number as the whole number that stands in a field of this kind."""
     return int(np.float64(number).view(np.int64)) if kind is float else int(number)
@@ -129,6 +141,8 @@ def word(kind: Any, number: float) -> int:
 
 def _member(kind: Any, place: int) -> property:
     """The field in Python."""
+    if holds_tables(kind):
+        return _tables(place)
     if holds_array(kind):
         return _array(place)
     if holds_table(kind):
@@ -165,6 +179,13 @@ def _array(place: int) -> property:
         record._wholes[place] = array.ctypes.data
 
     return property(read, write)
+
+
+def _tables(place: int) -> property:
+    def read(record: Record) -> Any:
+        return record.tables.get(place, ())
+
+    return property(read)
 
 
 def _table(place: int) -> property:

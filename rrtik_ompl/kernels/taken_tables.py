@@ -7,7 +7,6 @@ from collections.abc import Callable
 
 from rrtik_ompl.geometry.collision.bodies import Body
 from rrtik_ompl.kernels.checks.fast_world import FastWorld
-from rrtik_ompl.kernels.layout import INNER_PRIMITIVES, OUTER_PRIMITIVES, STANDING_SOLIDS
 from rrtik_ompl.kernels.tables.moved_rows import MovedRows
 from rrtik_ompl.kernels.tables.robot_tables import Spheres
 from rrtik_ompl.kernels.tables.solid_tables import convex_solids
@@ -59,8 +58,8 @@ class TakenTables:
             if fast is None or self._lent or fast.pinned or fast.address == 0:
                 return None
             if self._rows is None or self._places is None:
-                own = fast.tables
-                self._rows = MovedRows(own[OUTER_PRIMITIVES], own[INNER_PRIMITIVES], own[STANDING_SOLIDS])
+                own = fast.table
+                self._rows = MovedRows(own.outer_primitives, own.inner_primitives, own.standing_solids)
                 self._places = {standing: place for place, standing in enumerate(fast.standing)}
             place = self._places.get(number)
             if place is not None and not self._rows.put(place, body, spheres, convex_solids(body.geometry)):

@@ -21,7 +21,7 @@ from rrtik_ompl.ik.numeric.kernel_call import call_table
 from rrtik_ompl.ik.serial_chain import limb_of
 from rrtik_ompl.kernels import FastWorld, layout
 from rrtik_ompl.kernels.ik import ik_layout
-from rrtik_ompl.kernels.record import holds_table
+from rrtik_ompl.kernels.record import Record, holds_table
 from rrtik_ompl.kernels.search import connect_layout, shortcut_layout, tree_layout
 from rrtik_ompl.kernels.search.connect import ConnectSearch
 from rrtik_ompl.kernels.search.crdt import layout as crdt_layout
@@ -68,6 +68,13 @@ LAYOUTS: dict[str, ModuleType] = {
     "shortcut": shortcut_layout,
     "crdt": crdt_layout,
     "ik": ik_layout,
+}
+# Tables of the checks: their fields have names that repeat.
+TABLES: dict[str, type[Record]] = {
+    "world": layout.WorldTable,
+    "balls": layout.BallTable,
+    "primitives": layout.PrimitiveTable,
+    "solids": layout.SolidTable,
 }
 
 
@@ -256,14 +263,20 @@ def _names(world: World, numbers: Iterable[int]) -> str:
 
 
 def layout_numbers() -> dict[str, dict[str, int]]:
-    """The whole numbers that the layouts of these tables name, and the places of their fields, by layout."""
+    """The whole numbers that the layouts of these tables name, and the places of fields, by layout or table."""
+
+    def places(table: type[Record]) -> dict[str, int]:
+        return {name.upper(): place for name, place in table.places.items()}
 
     def numbers(module: ModuleType) -> dict[str, int]:
         named = {name: value for name, value in vars(module).items() if name.isupper() and type(value) is int}
-        own = [each for each in vars(module).values() if holds_table(each) and getmodule(each) is module]
-        return named | {name.upper(): place for record in own for name, place in record.places.items()}
+        for table in vars(module).values():
+            if holds_table(table) and getmodule(table) is module and module is not layout:
+                named |= places(table)
+        return named
 
-    return {name: numbers(module) for name, module in LAYOUTS.items()}
+    by_layout = {name: numbers(module) for name, module in LAYOUTS.items()}
+    return by_layout | {name: places(table) for name, table in TABLES.items()}
 
 
 def page_tables(problem: Problem, world: World, motions: FastMotions) -> tuple[MemoryImage, dict[str, int]]:
@@ -278,14 +291,13 @@ def page_tables(problem: Problem, world: World, motions: FastMotions) -> tuple[M
         InputError: If joints go farther than the kernels cover.
     """
     image = MemoryImage(BASE)
-    fast = motions.fast
-    for each in fast.tables:
-        image.add(each)
+    world_table = motions.fast.table
+    primitives = (world_table.outer_primitives, world_table.inner_primitives)
 
     places = {
-        "world": image.add(fast.table, links=dict(enumerate(fast.tables))),
-        "motions": image.add(motions.table, links={motions.table.places["world"]: fast.table}),
-        "probe": image.add(probe_table(fast.tables[layout.OUTER_PRIMITIVES : layout.INNER_PRIMITIVES + 1])),
+        "world": image.add(world_table),
+        "motions": image.add(motions.table),
+        "probe": image.add(probe_table(primitives)),
         "pathRows": PATH_ROWS,
     }
 

@@ -94,8 +94,9 @@ def test_the_rows_of_a_box_are_those_that_packing_makes(queries, monkeypatch):
 
 
 def rows_after(world, pose):
-    tables = world.with_scene(replace(world.scene)).moved("box", pose).checks.checker.fast.tables
-    return [array.copy() for table in (tables[3], tables[4], tables[7]) for array in table.arrays.values()]
+    table = world.with_scene(replace(world.scene)).moved("box", pose).checks.checker.fast.table
+    scene = (table.outer_primitives, table.inner_primitives, table.standing_solids)
+    return [array.copy() for each in scene for array in each.memory.arrays.values()]
 
 
 def test_nothing_is_packed_anew(queries, monkeypatch):

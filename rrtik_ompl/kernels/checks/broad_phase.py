@@ -14,7 +14,6 @@ from rrtik_ompl.kernels.layout import PrimitiveList, PrimitiveTable
 from rrtik_ompl.kernels.record import Floats
 from rrtik_ompl.kernels.simd.compiled import WIDTH, inlined, kernel
 from rrtik_ompl.kernels.simd.lanes import bits, first_bit, float_at, highest, lanes_at, larger, lowest, set_int, spread
-from rrtik_ompl.kernels.tables.accessors import block_boxes_of, block_count_of, boxes_of, padded_count_of
 
 ZERO = np.float32(0.0)
 
@@ -60,18 +59,18 @@ def primitives_in_reach(primitives: PrimitiveTable, x: Any, y: Any, z: Any, radi
     """
     low = (lowest(x) - radius, lowest(y) - radius, lowest(z) - radius)
     high = (highest(x) + radius, highest(y) + radius, highest(z) + radius)
-    boxes, run, count = boxes_of(primitives), padded_count_of(primitives) // WIDTH, 0
-    blocks = block_count_of(primitives) // WIDTH
+    boxes, run, count = primitives.boxes, primitives.padded_count // WIDTH, 0
+    blocks = primitives.block_count // WIDTH
     if blocks == 0:
         for k in range(run):
             count = listed(found, count, k * WIDTH, boxes_that_meet(boxes, run, k, low, high))
         return count
     for k in range(blocks):
-        left = boxes_that_meet(block_boxes_of(primitives), blocks, k, low, high)
+        left = boxes_that_meet(primitives.block_boxes, blocks, k, low, high)
         while left != 0:
             block = k * WIDTH + first_bit(left)
             left &= left - 1
-            if not block_in_reach(block_boxes_of(primitives), blocks, block, x, y, z, radius):
+            if not block_in_reach(primitives.block_boxes, blocks, block, x, y, z, radius):
                 continue
             block *= layout.BLOCK // WIDTH
             for part in range(block, block + layout.BLOCK // WIDTH):

@@ -26,7 +26,7 @@ from rrtik_ompl.kernels.layout import (
     UNSOUND,
     BallTable,
     JointValues,
-    LikelyBalls,
+    LikelyBall,
     PrimitiveTable,
     Watch,
     WorldTable,
@@ -45,22 +45,7 @@ from rrtik_ompl.kernels.simd.lanes import (
     smaller,
 )
 from rrtik_ompl.kernels.tables.accessors import (
-    arm_of,
-    body_count_of,
-    inner_balls_of,
-    inner_likely_of,
-    inner_primitives_of,
-    joint_count_of,
     joint_row,
-    outer_balls_of,
-    outer_likely_of,
-    outer_primitives_of,
-    pair_count_of,
-    scratch_of,
-    standing_count_of,
-    values_of,
-    waiting_of,
-    watch_of,
 )
 
 TO_WHOLE = 1.5 * 2.0**52  # added and taken away again it leaves whole numbers
@@ -72,7 +57,7 @@ def in_collision(
     balls: BallTable,
     primitives: PrimitiveTable,
     wanted: int,
-    likely: LikelyBalls,
+    likely: LikelyBall,
     one: bool,
     watch: Watch,
     joints: int,
@@ -81,7 +66,7 @@ def in_collision(
 
     What is watched no more may be carried by other joints than the first ``joints``.
     """
-    scratch = scratch_of(world)
+    scratch = world.scratch
     prepare(balls, scratch, joints)
     found = scene_collision(balls, primitives, scratch, wanted, NO_MARKS, one, likely, watch)
     if found == 0:
@@ -94,33 +79,33 @@ def in_collision(
 @inlined
 def outer_collision(world: WorldTable, wanted: int, one: bool, watch: Watch, joints: int) -> Any:
     """Lanes that the outer balls cannot prove free, for the frames in the scratch memory."""
-    likely = outer_likely_of(scratch_of(world))
-    return in_collision(world, outer_balls_of(world), outer_primitives_of(world), wanted, likely, one, watch, joints)
+    likely = world.scratch.outer_likely
+    return in_collision(world, world.outer_balls, world.outer_primitives, wanted, likely, one, watch, joints)
 
 
 @inlined
 def inner_collision(world: WorldTable, wanted: int, one: bool) -> Any:
     """Lanes that the inner balls prove colliding, for the frames in the scratch memory."""
-    likely = inner_likely_of(scratch_of(world))
-    balls, primitives, joints = inner_balls_of(world), inner_primitives_of(world), joint_count_of(arm_of(world))
+    likely = world.scratch.inner_likely
+    balls, primitives, joints = world.inner_balls, world.inner_primitives, world.arm.joint_count
     return in_collision(world, balls, primitives, wanted, likely, one, NO_WATCH, joints)
 
 
 @kernel
 def likely_in_collision(world: WorldTable, wanted: int, inner: bool) -> int:
     """Lanes in which an outer or inner ball that met something lately does so again; 0 says nothing."""
-    scratch = scratch_of(world)
-    balls, primitives, likely = outer_balls_of(world), outer_primitives_of(world), outer_likely_of(scratch)
+    scratch = world.scratch
+    balls, primitives, likely = world.outer_balls, world.outer_primitives, scratch.outer_likely
     if inner:
-        balls, primitives, likely = inner_balls_of(world), inner_primitives_of(world), inner_likely_of(scratch)
+        balls, primitives, likely = world.inner_balls, world.inner_primitives, scratch.inner_likely
     return likely_collision(balls, primitives, scratch, wanted, likely)
 
 
 @inlined
 def load_row(world: WorldTable, rows: JointValues, row: int, lane: int) -> None:
     """Set the joint values of a lane to a row of an array of float64."""
-    joints = joint_count_of(arm_of(world))
-    values = values_of(scratch_of(world))
+    joints = world.arm.joint_count
+    values = world.scratch.values
     for joint in range(joints):
         set_double(values, joint * WIDTH + lane, double_at(rows, row * joints + joint))
 
@@ -128,16 +113,16 @@ def load_row(world: WorldTable, rows: JointValues, row: int, lane: int) -> None:
 @inlined
 def sound_count(world: WorldTable, count: int) -> int:
     """``count``, or UNSOUND if a table holds a primitive of an unknown kind."""
-    return count if kinds_known(outer_primitives_of(world)) and kinds_known(inner_primitives_of(world)) else UNSOUND
+    return count if kinds_known(world.outer_primitives) and kinds_known(world.inner_primitives) else UNSOUND
 
 
 @kernel
 def resolve_doubtful(world: WorldTable, rows: JointValues, waiting: int, answers: Ints) -> None:
     """Answer what a second check finds for the rows that wait: by their inner balls, then by the narrow phase."""
-    queue = waiting_of(scratch_of(world))
+    queue = world.scratch.waiting
     for lane in range(WIDTH):
         load_row(world, rows, int_at(queue, min(lane, waiting - 1)), lane)
-    forward_kinematics(arm_of(world), scratch_of(world))
+    forward_kinematics(world.arm, world.scratch)
     wanted = ALL_LANES >> (WIDTH - waiting)
     colliding, open_ = inner_collision(world, wanted, waiting < 0), 0
     if colliding != wanted:
@@ -155,12 +140,12 @@ def classify(world: WorldTable, rows: JointValues, count: int, answers: Ints, re
     Rows that are not proven free wait until there are enough of them to fill all lanes of a second check. Returns
     ``count``, or UNSOUND.
     """
-    queue, waiting, joints = waiting_of(scratch_of(world)), 0, joint_count_of(arm_of(world))
+    queue, waiting, joints = world.scratch.waiting, 0, world.arm.joint_count
     for start in range(0, count, WIDTH):
         filled = min(WIDTH, count - start)
         for lane in range(WIDTH):
             load_row(world, rows, start + min(lane, filled - 1), lane)
-        forward_kinematics(arm_of(world), scratch_of(world))
+        forward_kinematics(world.arm, world.scratch)
         doubtful = outer_collision(world, ALL_LANES >> (WIDTH - filled), filled < 0, NO_WATCH, joints)
         for lane in range(filled):
             open_ = (doubtful >> lane) & 1
@@ -179,11 +164,11 @@ def classify(world: WorldTable, rows: JointValues, count: int, answers: Ints, re
 @inlined
 def place(world: WorldTable, start: JointValues, end: JointValues, share: Any, joints: int) -> None:
     """Frames of the first joints at some shares, in wide lanes, of a motion between two rows of joint values."""
-    scratch = scratch_of(world)
+    scratch = world.scratch
     for joint in range(joints):
         value = (1.0 - share) * double_at(start, joint) + share * double_at(end, joint)
-        set_wide_lanes(values_of(scratch), joint, value)
-    first_frames(arm_of(world), scratch, joints)
+        set_wide_lanes(scratch.values, joint, value)
+    first_frames(world.arm, scratch, joints)
 
 
 @inlined
@@ -221,7 +206,7 @@ def check_part(
     The lanes of the first block are spread over the whole part, so that a collision anywhere shows early; what keeps
     its distance there from all that lies between is watched no more. Without ``resolve`` the outer balls alone decide.
     """
-    scratch, joints = scratch_of(world), joint_count_of(arm_of(world))
+    scratch, joints = world.scratch, world.arm.joint_count
     blocks = (count + WIDTH - 1) // WIDTH
     every = bits(lane_numbers() >= 0.0)  # a number: for a constant numba would compile all that is called apart
     answer, middle, watch, left = FREE, blocks // 2, NO_WATCH, joints
@@ -234,7 +219,7 @@ def check_part(
                 answer = COLLIDING if resolve else UNDECIDED
                 break
             if blocks > 1:
-                watch = watch_of(scratch)
+                watch = scratch.watch
                 watch_motion(world, start, end, float(middle) / float(last))
         doubtful = outer_collision(world, every, not resolve, watch, left)
         if doubtful != 0 and left < joints:
@@ -276,7 +261,7 @@ def classify_edges(
 
     Returns ``count``, or UNSOUND.
     """
-    joints = joint_count_of(arm_of(world))
+    joints = world.arm.joint_count
     for k in range(count):
         start, end = joint_row(starts, joints, k), joint_row(ends, joints, k)
         set_int(answers, k, check_edge(world, start, end, int_at(steps, k), resolve != 0))
@@ -289,11 +274,11 @@ def mark_pairs(world: WorldTable, row: JointValues, count: int) -> int:
 
     Returns the number of marks, or UNSOUND.
     """
-    scratch, wanted = scratch_of(world), ALL_LANES >> (WIDTH - count)
+    scratch, wanted = world.scratch, ALL_LANES >> (WIDTH - count)
     for lane in range(WIDTH):
         load_row(world, row, min(lane, count - 1), lane)
-    forward_kinematics(arm_of(world), scratch)
+    forward_kinematics(world.arm, scratch)
     narrow_phase(world, wanted)
-    balls = outer_balls_of(world)
-    crossing = body_count_of(balls) * standing_count_of(outer_primitives_of(world))
-    return sound_count(world, crossing + pair_count_of(balls))
+    balls = world.outer_balls
+    crossing = balls.body_count * world.outer_primitives.standing_count
+    return sound_count(world, crossing + balls.pair_count)

@@ -14,14 +14,14 @@ import numpy as np
 from rrtik_ompl.kernels import layout
 from rrtik_ompl.kernels.checks.gjk import SHORTEST, Frames, compare, dot, farthest, minus, scaled
 from rrtik_ompl.kernels.checks.sphere_kernels import place_cluster
-from rrtik_ompl.kernels.clouds.accessors import blocks_of, point_at
+from rrtik_ompl.kernels.clouds.accessors import point_at
 from rrtik_ompl.kernels.clouds.kernels import next_block, points_below, points_in_reach
 from rrtik_ompl.kernels.clouds.primitive_kernels import in_cloud, table_of
 from rrtik_ompl.kernels.layout import (
     COLLIDING,
     FREE,
     UNDECIDED,
-    CentreArray,
+    Centre,
     PrimitiveShape,
     ScratchTable,
     SolidTable,
@@ -32,13 +32,10 @@ from rrtik_ompl.kernels.simd.compiled import WIDTH, inlined, kernel
 from rrtik_ompl.kernels.simd.lanes import first_bit, float_at, int_at, set_double, set_lanes, spread
 from rrtik_ompl.kernels.simd.vectors import squared
 from rrtik_ompl.kernels.tables.accessors import (
-    balls_of,
-    body_of,
+    body_at,
     centre_of,
-    centres_of,
     cloud_radius_of,
-    cluster_of,
-    corners_of,
+    cluster_at,
     end_around_of,
     end_ball_of,
     end_block_of,
@@ -52,24 +49,16 @@ from rrtik_ompl.kernels.tables.accessors import (
     first_inside_of,
     frame_at,
     frame_of_span,
-    frames_of,
-    head_of,
+    head_at,
     kind_of_solid,
-    moving_solids_of,
-    note_of,
-    outer_balls_of,
-    outer_primitives_of,
-    own_of,
     radius_at,
     round_of,
-    scratch_of,
     second_axis_of,
-    shape_of,
-    sizes_of,
+    shape_at,
+    sizes_at,
     slack_of,
-    solid_of,
-    span_of,
-    standing_solids_of,
+    solid_at,
+    span_at,
     third_axis_of,
 )
 
@@ -85,7 +74,7 @@ ROUNDING = 1e-6  # more than eight roundings of a float32, which is what a heigh
 @inlined
 def is_cloud(solids: SolidTable, body: int) -> bool:
     """Whether a body of a table of solids is a cloud."""
-    kind: int = kind_of_solid(solid_of(solids, first_around_of(span_of(solids, body))))
+    kind: int = kind_of_solid(solid_at(solids.solids, first_around_of(span_at(solids.spans, body))))
     return kind == layout.CLOUD_SOLID
 
 
@@ -101,7 +90,7 @@ def out_of_cloud(shape: PrimitiveShape, p: Any) -> Any:
 
 
 @inlined
-def centre_in_lane(centres: CentreArray, ball: int, lane: int) -> Any:
+def centre_in_lane(centres: Centre, ball: int, lane: int) -> Any:
     """The centre of a ball in one lane."""
     place = layout.AXES * WIDTH * ball + lane
     return float_at(centres, place), float_at(centres, place + WIDTH), float_at(centres, place + 2 * WIDTH)
@@ -110,7 +99,7 @@ def centre_in_lane(centres: CentreArray, ball: int, lane: int) -> Any:
 @kernel
 def put_point(solids: SolidTable, number: int, p: Any) -> None:
     """Let the standing solid of a cloud be the ball around a point of the world."""
-    solid, corners, sizes = solid_of(solids, number), corners_of(solids), sizes_of(solids, number)
+    solid, corners, sizes = solid_at(solids.solids, number), solids.corners, sizes_at(solids.sizes, number)
     for block in range(first_block_of(solid), end_block_of(solid)):
         for axis in range(layout.AXES):
             set_lanes(corners, layout.AXES * block + axis, spread(p[axis]))
@@ -134,7 +123,7 @@ def compare_point(
         answer = UNDECIDED
     else:
         for one in range(first_around_of(span), end_around_of(span)):
-            if kind_of_solid(solid_of(mine, one)) != layout.CONVEX_SOLID:
+            if kind_of_solid(solid_at(mine.solids, one)) != layout.CONVEX_SOLID:
                 answer = UNDECIDED
                 break
             found, way = compare(mine, one, others, number, frames, lane, way)
@@ -144,7 +133,7 @@ def compare_point(
     if answer != UNDECIDED:
         return answer, way
     for one in range(first_inside_of(span), end_inside_of(span)):
-        if kind_of_solid(solid_of(mine, one)) == layout.CONVEX_SOLID:
+        if kind_of_solid(solid_at(mine.solids, one)) == layout.CONVEX_SOLID:
             found, _ = compare(mine, one, others, number, frames, lane, way)
             if found == COLLIDING:
                 return COLLIDING, way
@@ -155,7 +144,7 @@ def compare_point(
 def may_overlap(mine: SolidTable, span: Span) -> bool:
     """Whether a body has a solid inside it, so that an overlap can be proven."""
     for one in range(first_inside_of(span), end_inside_of(span)):
-        if kind_of_solid(solid_of(mine, one)) == layout.CONVEX_SOLID:
+        if kind_of_solid(solid_at(mine.solids, one)) == layout.CONVEX_SOLID:
             return True
     return False
 
@@ -171,9 +160,9 @@ def plane_below(cloud: Cloud, mine: SolidTable, span: Span, frames: Frames, lane
     origin = float(centre[0]), float(centre[1]), float(centre[2])
     least, down = HIGHEST, scaled(way, -1.0)
     for one in range(first_around_of(span), end_around_of(span)):
-        p, sizes = farthest(mine, one, frames[0], frames[2], lane, down), sizes_of(mine, one)
+        p, sizes = farthest(mine, one, frames[0], frames[2], lane, down), sizes_at(mine.sizes, one)
         least = min(least, dot(way, p) - round_of(sizes) - slack_of(sizes))
-    ball = sizes_of(others, number)
+    ball = sizes_at(others.sizes, number)
     rounding = ROUNDING * (size + abs(origin[0]) + abs(origin[1]) + abs(origin[2]))
     height = least - dot(way, origin) - round_of(ball) - slack_of(ball) - rounding
     return np.float32(dot(a, way)), np.float32(dot(b, way)), np.float32(dot(c, way)), np.float32(height)
@@ -198,7 +187,7 @@ def compare_ball(cloud: Cloud, mine: SolidTable, span: Span, frames: Frames, lan
     low = own[0] - reach, own[1] - reach, own[2] - reach
     high = own[0] + reach, own[1] + reach, own[2] + reach
     size = abs(own[0]) + abs(own[1]) + abs(own[2]) + 3.0 * reach
-    points, block = blocks_of(table), -1
+    points, block = table.blocks, -1
     while True:
         block = next_block(table, low, high, block)
         if block < 0 or answer >= worst:
@@ -227,24 +216,25 @@ def compare_ball(cloud: Cloud, mine: SolidTable, span: Span, frames: Frames, lan
 @inlined
 def cloud_of(world: WorldTable, standing: int) -> Cloud:
     """The cloud that a standing body is; see ``Cloud``."""
-    primitives, others = outer_primitives_of(world), standing_solids_of(world)
-    primitive = int_at(own_of(primitives), standing)
-    number = first_around_of(span_of(others, standing))
-    return table_of(primitives, head_of(primitives, primitive)), shape_of(primitives, primitive), others, number
+    primitives, others = world.outer_primitives, world.standing_solids
+    primitive = int_at(primitives.own, standing)
+    number = first_around_of(span_at(others.spans, standing))
+    table = table_of(primitives, head_at(primitives.heads, primitive))
+    return table, shape_at(primitives.shapes, primitive), others, number
 
 
 @inlined
 def frames_for(scratch: ScratchTable, span: Span) -> Frames:
     """The frames of a body and of the world."""
-    return frame_at(frames_of(scratch), frame_of_span(span)), frame_at(frames_of(scratch), 0), note_of(scratch)
+    return frame_at(scratch.frames, frame_of_span(span)), frame_at(scratch.frames, 0), scratch.note
 
 
 @kernel
 def compare_cloud(world: WorldTable, body: int, standing: int, wanted: int) -> Any:
     """Lanes among ``wanted`` in which a body and a cloud are not proven apart, and those in which they overlap."""
-    scratch, balls, mine = scratch_of(world), outer_balls_of(world), moving_solids_of(world)
-    cloud, span = cloud_of(world, standing), span_of(mine, body)
-    frames, carried = frames_for(scratch, span), body_of(balls, body)
+    scratch, balls, mine = world.scratch, world.outer_balls, world.moving_solids
+    cloud, span = cloud_of(world, standing), span_at(mine.spans, body)
+    frames, carried = frames_for(scratch, span), body_at(balls.bodies, body)
     open_, overlapping = 0, 0
     worst = COLLIDING if may_overlap(mine, span) else UNDECIDED
     while wanted != 0:
@@ -253,10 +243,10 @@ def compare_cloud(world: WorldTable, body: int, standing: int, wanted: int) -> A
         answer, plane = FREE, NO_PLANE
         for number in range(first_cluster_of_body(carried), end_cluster_of_body(carried)):
             place_cluster(balls, scratch, number)
-            cluster = cluster_of(balls, number)
+            cluster = cluster_at(balls.clusters, number)
             for ball in range(first_ball_of(cluster), end_ball_of(cluster)):
-                x, y, z = centre_in_lane(centres_of(scratch), ball, lane)
-                asked = x, y, z, radius_at(balls_of(balls), ball)
+                x, y, z = centre_in_lane(scratch.centres, ball, lane)
+                asked = x, y, z, radius_at(balls.balls, ball)
                 answer, plane = compare_ball(cloud, mine, span, frames, lane, asked, (answer, plane, worst))
                 if answer >= worst:
                     break

@@ -42,17 +42,9 @@ from rrtik_ompl.kernels.simd.lanes import (
 )
 from rrtik_ompl.kernels.simd.vectors import squared
 from rrtik_ompl.kernels.tables.accessors import (
-    arm_of,
-    balls_of,
-    best_of,
-    body_balls_of,
-    body_count_of,
-    body_of,
+    body_at,
     body_of_cluster,
-    centres_of,
-    checked_of,
-    cluster_balls_of,
-    cluster_of,
+    cluster_at,
     end_ball_of,
     end_cluster_of_body,
     end_cluster_of_group,
@@ -61,54 +53,38 @@ from rrtik_ompl.kernels.tables.accessors import (
     first_cluster_of_body,
     first_cluster_of_group,
     first_pair_of,
-    found_of,
     frame_at,
     frame_of_body,
     frame_of_cluster,
-    frames_of,
-    gaps_of,
     group_at,
-    group_balls_of,
-    group_centres_of,
-    group_count_of,
-    groups_of,
-    heads_of,
-    joint_count_of,
     one_body_of,
     one_group_of,
     other_body_of,
     other_group_of,
     pair_at,
     pair_group_at,
-    pair_group_count_of,
-    pair_groups_of,
-    pairs_of,
     radius_at,
-    scratch_of,
-    self_margin_of,
     standing_body_at,
-    standing_count_of,
     stored_centre,
-    which_of,
 )
 
 
 @inlined
 def could_be_nearer(probe: ProbeTable, gap: Any) -> bool:
     """Whether in any lane a distance is below the smallest one so far."""
-    nearer: bool = bits(gap < lanes_at(best_of(probe), 0)) != 0
+    nearer: bool = bits(gap < lanes_at(probe.best, 0)) != 0
     return nearer
 
 
 @kernel
 def note(probe: ProbeTable, gap: Any, pair: int) -> None:
     """Keep the distance of a pair in the lanes in which it is the smallest one so far."""
-    best = lanes_at(best_of(probe), 0)
+    best = lanes_at(probe.best, 0)
     nearer = bits(gap < best)
     if nearer != 0:
-        set_lanes(best_of(probe), 0, smaller(gap, best))
+        set_lanes(probe.best, 0, smaller(gap, best))
     while nearer != 0:
-        set_int(which_of(probe), first_bit(nearer), pair)
+        set_int(probe.which, first_bit(nearer), pair)
         nearer &= nearer - 1
 
 
@@ -117,19 +93,19 @@ def cluster_to_primitive(
     balls: BallTable, primitives: PrimitiveTable, scratch: ScratchTable, probe: ProbeTable, place: int, number: int
 ) -> None:
     """Measure the balls of a cluster against a primitive."""
-    cluster = cluster_of(balls, place)
-    frame = frame_at(frames_of(scratch), frame_of_cluster(cluster))
-    pair = body_of_cluster(cluster) * standing_count_of(primitives) + standing_body_at(heads_of(primitives), number)
-    if int_at(checked_of(primitives), pair) == 0:
+    cluster = cluster_at(balls.clusters, place)
+    frame = frame_at(scratch.frames, frame_of_cluster(cluster))
+    pair = body_of_cluster(cluster) * primitives.standing_count + standing_body_at(primitives.heads, number)
+    if int_at(primitives.checked, pair) == 0:
         return
-    around = cluster_balls_of(balls)
+    around = balls.cluster_balls
     x, y, z = placed_centre(frame, around, place)
     if not could_be_nearer(probe, primitive_gap(primitives, number, x, y, z, True) - radius_at(around, place)):
         return
     place_cluster(balls, scratch, place)
     for ball in range(first_ball_of(cluster), end_ball_of(cluster)):
-        x, y, z = stored_centre(centres_of(scratch), ball)
-        gap = primitive_gap(primitives, number, x, y, z, False) - radius_at(balls_of(balls), ball)
+        x, y, z = stored_centre(scratch.centres, ball)
+        gap = primitive_gap(primitives, number, x, y, z, False) - radius_at(balls.balls, ball)
         note(probe, gap, pair)
 
 
@@ -138,7 +114,7 @@ def group_to_primitive(
     balls: BallTable, primitives: PrimitiveTable, scratch: ScratchTable, probe: ProbeTable, place: int, number: int
 ) -> None:
     """Measure the clusters of a group against a primitive."""
-    group = group_at(groups_of(balls), place)
+    group = group_at(balls.groups, place)
     for cluster in range(first_cluster_of_group(group), end_cluster_of_group(group)):
         cluster_to_primitive(balls, primitives, scratch, probe, cluster, number)
 
@@ -152,10 +128,10 @@ def primitives_near_group(
     Returns:
         Their number, and the place in the list of the one that is nearest in any lane.
     """
-    x, y, z = stored_centre(group_centres_of(scratch), group)
-    radius = radius_at(group_balls_of(balls), group)
-    found, gaps = found_of(scratch), gaps_of(probe)
-    reach = radius + max(highest(lanes_at(best_of(probe), 0)), ZERO)
+    x, y, z = stored_centre(scratch.group_centres, group)
+    radius = radius_at(balls.group_balls, group)
+    found, gaps = scratch.found, probe.gaps
+    reach = radius + max(highest(lanes_at(probe.best, 0)), ZERO)
     kept, first, nearest = 0, 0, UNBOUNDED_DISTANCE
     for k in range(primitives_in_reach(primitives, x, y, z, reach, found)):
         gap = primitive_gap(primitives, int_at(found, k), x, y, z, True) - radius
@@ -171,8 +147,8 @@ def primitives_near_group(
 @kernel
 def measure_scene(balls: BallTable, primitives: PrimitiveTable, scratch: ScratchTable, probe: ProbeTable) -> None:
     """Measure the arm against the primitives; the most promising one of a group first, so that it rules out others."""
-    found, gaps = found_of(scratch), gaps_of(probe)
-    for group in range(group_count_of(balls)):
+    found, gaps = scratch.found, probe.gaps
+    for group in range(balls.group_count):
         kept, first = primitives_near_group(balls, primitives, scratch, probe, group)
         if kept > 0:
             group_to_primitive(balls, primitives, scratch, probe, group, int_at(found, first))
@@ -184,7 +160,7 @@ def measure_scene(balls: BallTable, primitives: PrimitiveTable, scratch: Scratch
 @inlined
 def within_best(probe: ProbeTable, x: Any, y: Any, z: Any, centre: Any, reach: float) -> bool:
     """Whether in any lane two balls, whose radii add up to ``reach``, are nearer to each other than the best so far."""
-    most = larger(lanes_at(best_of(probe), 0) + reach, ZERO)
+    most = larger(lanes_at(probe.best, 0) + reach, ZERO)
     nearer: bool = bits(squared(x - centre[0], y - centre[1], z - centre[2]) < most * most) != 0
     return nearer
 
@@ -196,8 +172,8 @@ def measure_clusters(
     """Measure the balls of one cluster against those of another."""
     place_cluster(balls, scratch, first)
     place_cluster(balls, scratch, second)
-    centres, all_balls = centres_of(scratch), balls_of(balls)
-    mine, others, kept = cluster_of(balls, first), cluster_of(balls, second), self_margin_of(balls)
+    centres, all_balls = scratch.centres, balls.balls
+    mine, others, kept = cluster_at(balls.clusters, first), cluster_at(balls.clusters, second), balls.self_margin[0]
     for ball in range(first_ball_of(mine), end_ball_of(mine)):
         x, y, z = stored_centre(centres, ball)
         for other in range(first_ball_of(others), end_ball_of(others)):
@@ -213,10 +189,10 @@ def measure_bodies(
     balls: BallTable, scratch: ScratchTable, probe: ProbeTable, first: int, second: int, pair: int
 ) -> None:
     """Measure two bodies of the arm against each other, less the margin between them."""
-    frames, one, two = frames_of(scratch), body_of(balls, first), body_of(balls, second)
-    around, hulls = cluster_balls_of(balls), body_balls_of(balls)
+    frames, one, two = scratch.frames, body_at(balls.bodies, first), body_at(balls.bodies, second)
+    around, hulls = balls.cluster_balls, balls.body_balls
     first_frame, second_frame = frame_at(frames, frame_of_body(one)), frame_at(frames, frame_of_body(two))
-    kept = self_margin_of(balls)
+    kept = balls.self_margin[0]
     hull, radius = placed_centre(second_frame, hulls, second), radius_at(hulls, second) + kept
     for mine in range(first_cluster_of_body(one), end_cluster_of_body(one)):
         x, y, z = placed_centre(first_frame, around, mine)
@@ -232,9 +208,9 @@ def measure_bodies(
 @kernel
 def measure_self(balls: BallTable, scratch: ScratchTable, probe: ProbeTable, start: int) -> None:
     """Measure the arm against itself; the pairs are numbered from ``start``."""
-    groups, pairs = pair_groups_of(balls), pairs_of(balls)
-    around, centres, kept = group_balls_of(balls), group_centres_of(scratch), self_margin_of(balls)
-    for k in range(pair_group_count_of(balls)):
+    groups, pairs = balls.pair_groups, balls.pairs
+    around, centres, kept = balls.group_balls, scratch.group_centres, balls.self_margin[0]
+    for k in range(balls.pair_group_count):
         group = pair_group_at(groups, k)
         first, second = one_group_of(group), other_group_of(group)
         x, y, z = stored_centre(centres, first)
@@ -261,17 +237,17 @@ def measure(
     Pairs of moving and standing bodies come first, then those of moving bodies; -1 where there is none. Returns
     ``count``, or UNSOUND.
     """
-    scratch = scratch_of(world)
-    crossing = body_count_of(balls) * standing_count_of(primitives)
-    best, which = best_of(probe), which_of(probe)
+    scratch = world.scratch
+    crossing = balls.body_count * primitives.standing_count
+    best, which = probe.best, probe.which
     for start in range(0, count, WIDTH):
         filled = min(WIDTH, count - start)
         for lane in range(WIDTH):
             load_row(world, values, start + min(lane, filled - 1), lane)
             set_int(which, lane, -1)
         set_lanes(best, 0, spread(UNBOUNDED_DISTANCE))
-        forward_kinematics(arm_of(world), scratch)
-        prepare(balls, scratch, joint_count_of(arm_of(world)))
+        forward_kinematics(world.arm, scratch)
+        prepare(balls, scratch, world.arm.joint_count)
         measure_self(balls, scratch, probe, crossing)
         measure_scene(balls, primitives, scratch, probe)
         for lane in range(filled):

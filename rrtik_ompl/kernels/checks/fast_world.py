@@ -19,9 +19,10 @@ from rrtik_ompl.geometry.collision.bodies import Body, by_motion, pair_array
 from rrtik_ompl.kernels.checks import inputs, reference_distances
 from rrtik_ompl.kernels.checks.clearance import Clearance, rounded
 from rrtik_ompl.kernels.checks.reference import ReferenceChecks
-from rrtik_ompl.kernels.layout import CORNERS, MARKS, OUTER_PRIMITIVES, SIZES, STANDING_SOLIDS, UNDECIDED
+from rrtik_ompl.kernels.layout import UNDECIDED, ProbeTable, WorldTable
+from rrtik_ompl.kernels.record import Record
 from rrtik_ompl.kernels.simd.library import library
-from rrtik_ompl.kernels.tables.memory import Table, table, with_own
+from rrtik_ompl.kernels.tables.memory import packed, with_own_arrays
 from rrtik_ompl.kernels.tables.packing import (
     ArmTables,
     Flags,
@@ -104,7 +105,7 @@ class FastWorld:
         self._flagged = Flags(clear, self._arm, moving, standing)
         self._reference = ReferenceChecks(self._arm.arm, self._arm.balls, self._primitives)
         self._kernels = library("checks.check_kernels") if compiled else None
-        self._probe: Table | None = None
+        self._probe: ProbeTable | None = None
         self._moved, self.pinned, self.address = False, False, 0
         if self._kernels is not None:
             self._solids = standing_solids(bodies, standing, solids)
@@ -113,17 +114,33 @@ class FastWorld:
     def _take_memory(self) -> None:
         """Memory to compute in, and the table of all that kernels read."""
         self._scratch = scratch_table(self._arm.arm, self._arm.balls, self._arm.bounds, self._primitives)
-        self.table = table({k: t.address for k, t in enumerate(self.tables)})
+        arm = self._arm
+        outer_balls, inner_balls = arm.balls
+        outer_primitives, inner_primitives = self._primitives
+        self.table = packed(
+            WorldTable,
+            arm=arm.arm,
+            outer_balls=outer_balls,
+            inner_balls=inner_balls,
+            outer_primitives=outer_primitives,
+            inner_primitives=inner_primitives,
+            scratch=self._scratch,
+            moving_solids=arm.solids,
+            standing_solids=self._solids,
+            wider_solids=arm.wider_solids,
+            motion_bounds=arm.bounds,
+        )
         self.address = self.table.address
-        self._marks = self._scratch[MARKS]
+        self._marks = self._scratch.marks
 
     def for_thread(self) -> FastWorld:
         """The same tables with memory of their own to compute in."""
         other = copy.copy(self)
         other._probe = None
         if other._kernels is not None:
-            if other._primitives[0].parts or other._primitives[1].parts:  # of a cloud, a point is put among the solids
-                other._solids = with_own(other._solids, {place: other._solids[place] for place in (SIZES, CORNERS)})
+            outer, inner = other._primitives
+            if outer.clouds or inner.clouds:  # of a cloud, a point is put among the solids
+                other._solids = with_own_arrays(other._solids, "sizes", "corners")
             other._take_memory()
         return other
 
@@ -146,24 +163,20 @@ class FastWorld:
         self._reference = ReferenceChecks(self._arm.arm, self._arm.balls, self._primitives)
         self._probe = None
         if self._kernels is not None:
-            self.table.header[OUTER_PRIMITIVES : OUTER_PRIMITIVES + 2] = [each.address for each in self._primitives]
+            outer, inner = self._primitives
+            self.table.put(outer_primitives=outer, inner_primitives=inner)
             if first:  # the solids stand where nothing is any more; that none is known holds wherever bodies go
                 self._solids = standing_solids(bodies, self.standing, [NO_SOLIDS] * len(bodies))
-                self.table.header[STANDING_SOLIDS] = self._solids.address
+                self.table.put(standing_solids=self._solids)
 
     def intact(self) -> bool:
         """Whether no kernel has written beyond its own memory; tests check it after each call."""
         arm = self._arm
-        tables = [arm.arm, *arm.balls, *self._primitives, arm.solids, arm.wider_solids, arm.bounds]
+        tables: list[Record] = [arm.arm, *arm.balls, *self._primitives]
+        tables += [arm.solids, arm.wider_solids, arm.bounds]
         if self._kernels is not None:
             tables += [self._scratch, self._solids, self.table]
         return all(each.intact() for each in tables) and (self._probe is None or self._probe.intact())
-
-    @property
-    def tables(self) -> tuple[Table, ...]:
-        """What the fields of the world's table point to, in their order."""
-        arm, own = self._arm, (self._scratch, self._arm.solids, self._solids)
-        return (arm.arm, *arm.balls, *self._primitives, *own, arm.wider_solids, arm.bounds)
 
     @property
     def margin(self) -> float:

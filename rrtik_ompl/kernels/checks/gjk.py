@@ -13,22 +13,21 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from rrtik_ompl.kernels import layout
-from rrtik_ompl.kernels.layout import COLLIDING, FREE, UNDECIDED, CornerArray, Frame, SolidTable
+from rrtik_ompl.kernels.layout import COLLIDING, FREE, UNDECIDED, Corners, Frame, SolidTable
 from rrtik_ompl.kernels.record import Floats
 from rrtik_ompl.kernels.simd.compiled import WIDTH, inlined, kernel
 from rrtik_ompl.kernels.simd.lanes import bits, choose, first_bit, float_at, highest, set_lanes, spread
 from rrtik_ompl.kernels.tables.accessors import (
     axis_of,
     corner_block,
-    corners_of,
     disc_of,
     end_block_of,
     first_block_of,
     is_inside,
     round_of,
-    sizes_of,
+    sizes_at,
     slack_of,
-    solid_of,
+    solid_at,
 )
 
 Frames: TypeAlias = tuple[Frame, Frame, Floats]  # of the first and the second solid; lanes to write to
@@ -96,7 +95,7 @@ def carried(frame: Frame, lane: int, p: Any) -> Any:
 
 
 @inlined
-def corner_at(corners: CornerArray, block: int, lane: int) -> Any:
+def corner_at(corners: Corners, block: int, lane: int) -> Any:
     """One corner of a solid."""
     place = layout.AXES * WIDTH * block + lane
     return (
@@ -117,7 +116,7 @@ def farthest(solids: SolidTable, number: int, frame: Frame, note: Floats, lane: 
     y = first_row[1] * direction[0] + second_row[1] * direction[1] + third_row[1] * direction[2]
     z = first_row[2] * direction[0] + second_row[2] * direction[1] + third_row[2] * direction[2]
     a, b, c = np.float32(x), np.float32(y), np.float32(z)
-    solid, corners = solid_of(solids, number), corners_of(solids)
+    solid, corners = solid_at(solids.solids, number), solids.corners
     best, where = spread(LOWEST), spread(np.float32(0.0))
     for block in range(first_block_of(solid), end_block_of(solid)):
         along_x, along_y, along_z = corner_block(corners, block)
@@ -129,7 +128,7 @@ def farthest(solids: SolidTable, number: int, frame: Frame, note: Floats, lane: 
     first = first_bit(bits(best >= highest(best)))
     set_lanes(note, 0, where)
     p = corner_at(corners, int(float_at(note, first)), first)
-    sizes = sizes_of(solids, number)
+    sizes = sizes_at(solids.sizes, number)
     radius = disc_of(sizes)
     if radius > 0.0:
         axis = axis_of(sizes)
@@ -215,7 +214,7 @@ def difference(
 @inlined
 def slack_between(mine: SolidTable, first: int, others: SolidTable, second: int) -> float:
     """How far rounding may misplace two solids towards each other [m]."""
-    return slack_of(sizes_of(mine, first)) + slack_of(sizes_of(others, second))
+    return slack_of(sizes_at(mine.sizes, first)) + slack_of(sizes_at(others.sizes, second))
 
 
 @kernel
@@ -227,9 +226,9 @@ def compare(
     Returns:
         FREE, UNDECIDED or COLLIDING, and the unit vector across the last plane, from the second solid to the first.
     """
-    reach = round_of(sizes_of(mine, first)) + round_of(sizes_of(others, second))
+    reach = round_of(sizes_at(mine.sizes, first)) + round_of(sizes_at(others.sizes, second))
     slack = slack_between(mine, first, others, second)
-    solid = is_inside(solid_of(mine, first)) & is_inside(solid_of(others, second))
+    solid = is_inside(solid_at(mine.solids, first)) & is_inside(solid_at(others.solids, second))
     a = difference(mine, first, others, second, frames, lane, direction)
     if dot(direction, a) > reach + slack:
         return FREE, direction

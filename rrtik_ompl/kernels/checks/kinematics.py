@@ -18,20 +18,14 @@ from rrtik_ompl.kernels.simd.vectors import along
 from rrtik_ompl.kernels.tables.accessors import (
     first_row_of,
     frame_at,
-    frames_of,
-    joint_count_of,
-    joint_kinds_of,
     origin_at,
     origin_of,
-    parents_of,
-    phases_of,
-    placement_of,
+    placement_at,
     rotation_row,
     second_row_of,
     set_origin,
     set_rotation_row,
     third_row_of,
-    values_of,
 )
 
 HALF_TURNS_PER_RADIAN = 1.0 / np.pi
@@ -59,17 +53,17 @@ def sine_and_cosine(angle: Any) -> Any:
 @kernel
 def forward_kinematics(arm: ArmTable, scratch: ScratchTable) -> None:
     """Frames of all joints from the joint values in the scratch memory."""
-    first_frames(arm, scratch, joint_count_of(arm))
+    first_frames(arm, scratch, arm.joint_count)
 
 
 @kernel
 def first_frames(arm: ArmTable, scratch: ScratchTable, count: int) -> None:
     """Frames of the first joints; their parents are among them, and the world's own frame is there already."""
-    parents, kinds, phases = parents_of(arm), joint_kinds_of(arm), phases_of(arm)
-    values, frames = values_of(scratch), frames_of(scratch)
+    parents, kinds, phases = arm.parents, arm.joint_kinds, arm.phases
+    values, frames = scratch.values, scratch.frames
     for joint in range(count):
         parent, frame = frame_at(frames, int_at(parents, joint)), frame_at(frames, joint + 1)
-        fixed, kind = placement_of(arm, joint), int_at(kinds, joint)
+        fixed, kind = placement_at(arm.placements, joint), int_at(kinds, joint)
         value = wide_lanes_at(values, joint)
         if kind == ALIGNED_TURN:
             sine, cosine = sine_and_cosine(value + double_at(phases, joint))

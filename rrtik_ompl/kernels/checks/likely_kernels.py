@@ -9,26 +9,21 @@ from __future__ import annotations
 from rrtik_ompl.kernels.checks.broad_phase import primitives_in_reach
 from rrtik_ompl.kernels.checks.obstacle_kernels import meets_primitives
 from rrtik_ompl.kernels.checks.sphere_kernels import checked_primitives, placed_centre
-from rrtik_ompl.kernels.layout import LIKELY_COUNT, NO_MARKS, BallTable, LikelyBalls, PrimitiveTable, ScratchTable
+from rrtik_ompl.kernels.layout import LIKELY_COUNT, NO_MARKS, BallTable, LikelyBall, PrimitiveTable, ScratchTable
 from rrtik_ompl.kernels.simd.compiled import inlined, kernel
 from rrtik_ompl.kernels.tables.accessors import (
-    balls_of,
-    found_of,
     frame_at,
-    frames_of,
     likely_at,
     likely_body_of,
     likely_frame_of,
     likely_number_of,
-    met_of,
-    near_of,
     radius_at,
     set_likely,
 )
 
 
 @inlined
-def move_up(likely: LikelyBalls, place: int) -> None:
+def move_up(likely: LikelyBall, place: int) -> None:
     """Let a ball of the list and the one before it change places."""
     this, before = likely_at(likely, place), likely_at(likely, place - 1)
     number, frame, body = likely_number_of(this), likely_frame_of(this), likely_body_of(this)
@@ -38,24 +33,22 @@ def move_up(likely: LikelyBalls, place: int) -> None:
 
 @kernel
 def likely_collision(
-    balls: BallTable, primitives: PrimitiveTable, scratch: ScratchTable, wanted: int, likely: LikelyBalls
+    balls: BallTable, primitives: PrimitiveTable, scratch: ScratchTable, wanted: int, likely: LikelyBall
 ) -> int:
     """Lanes among ``wanted`` in which the first likely ball that meets a primitive does so; 0 says nothing."""
-    all_balls, found, near = balls_of(balls), found_of(scratch), near_of(scratch)
+    all_balls, found, near = balls.balls, scratch.found, scratch.near
     for place in range(LIKELY_COUNT):
         ball = likely_at(likely, place)
         number, body = likely_number_of(ball), likely_body_of(ball)
         if number < 0:
             continue
-        x, y, z = placed_centre(frame_at(frames_of(scratch), likely_frame_of(ball)), all_balls, number)
+        x, y, z = placed_centre(frame_at(scratch.frames, likely_frame_of(ball)), all_balls, number)
         radius = radius_at(all_balls, number)
         count = primitives_in_reach(primitives, x, y, z, radius, found)
         count = checked_primitives(primitives, body, found, count, near)
         if count == 0:
             continue
-        meeting, _ = meets_primitives(
-            primitives, x, y, z, radius, False, wanted, near, count, met_of(scratch), NO_MARKS
-        )
+        meeting, _ = meets_primitives(primitives, x, y, z, radius, False, wanted, near, count, scratch.met, NO_MARKS)
         if meeting != 0:
             if place > 0:
                 move_up(likely, place)

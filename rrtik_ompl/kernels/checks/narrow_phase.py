@@ -40,13 +40,10 @@ from rrtik_ompl.kernels.simd.access import nonzero_ints
 from rrtik_ompl.kernels.simd.compiled import WIDTH, inlined, kernel
 from rrtik_ompl.kernels.simd.lanes import first_bit, float_at, int_at, lowest, set_int, set_lanes, spread
 from rrtik_ompl.kernels.tables.accessors import (
-    arm_of,
     axis_of,
-    body_count_of,
     bound_centre_of,
     bound_radius_of,
     corner_block,
-    corners_of,
     disc_of,
     end_around_of,
     end_block_of,
@@ -56,40 +53,24 @@ from rrtik_ompl.kernels.tables.accessors import (
     first_inside_of,
     frame_at,
     frame_of_span,
-    frames_of,
-    inner_primitives_of,
     is_inside,
-    joint_count_of,
     kind_of_solid,
-    marks_of,
     marks_row,
-    moving_solids_of,
-    note_of,
     one_body_of,
     other_body_of,
-    outer_balls_of,
-    outer_likely_of,
-    outer_primitives_of,
-    own_of,
     pair_at,
-    pair_count_of,
-    pairs_of,
     round_of,
-    scratch_of,
-    sizes_of,
+    sizes_at,
     slack_of,
-    solid_of,
-    span_of,
-    standing_count_of,
-    standing_solids_of,
-    wider_solids_of,
+    solid_at,
+    span_at,
 )
 
 
 @inlined
 def outset(mine: SolidTable, first: int, others: SolidTable, second: int, frames: Frames, lane: int) -> Any:
     """Where the bounding ball of the first solid lies as seen from that of the second: the direction, and the gap."""
-    own, other = sizes_of(mine, first), sizes_of(others, second)
+    own, other = sizes_at(mine.sizes, first), sizes_at(others.sizes, second)
     p = carried(frames[0], lane, bound_centre_of(own))
     direction = minus(p, carried(frames[1], lane, bound_centre_of(other)))
     length = sqrt(dot(direction, direction))
@@ -102,14 +83,14 @@ def outset(mine: SolidTable, first: int, others: SolidTable, second: int, frames
 @kernel
 def beyond_plane(mine: SolidTable, first: int, others: SolidTable, second: int, frames: Frames, lane: int) -> int:
     """Compare a solid with a half-space that stands still."""
-    half_space = sizes_of(others, second)
+    half_space = sizes_at(others.sizes, second)
     normal = axis_of(half_space)
     p = farthest(mine, first, frames[0], frames[2], lane, scaled(normal, -1.0))
-    height = dot(normal, p) - disc_of(half_space) - round_of(sizes_of(mine, first))
+    height = dot(normal, p) - disc_of(half_space) - round_of(sizes_at(mine.sizes, first))
     slack = slack_between(mine, first, others, second)
     if height > slack:
         return FREE
-    return COLLIDING if height < -slack and is_inside(solid_of(mine, first)) != 0 else UNDECIDED
+    return COLLIDING if height < -slack and is_inside(solid_at(mine.solids, first)) != 0 else UNDECIDED
 
 
 @kernel
@@ -118,7 +99,7 @@ def compare_solids(mine: SolidTable, first: int, others: SolidTable, second: int
 
     A plane that lies between two solids in one lane often does in the next.
     """
-    kind, own = kind_of_solid(solid_of(others, second)), kind_of_solid(solid_of(mine, first))
+    kind, own = kind_of_solid(solid_at(others.solids, second)), kind_of_solid(solid_at(mine.solids, first))
     if own != layout.CONVEX_SOLID or (kind != layout.CONVEX_SOLID and kind != layout.HALF_SPACE_SOLID):
         return wanted, 0
     open_, overlapping, known, last = 0, 0, False, (1.0, 0.0, 0.0)
@@ -145,11 +126,11 @@ def compare_bodies(
     scratch: ScratchTable, mine: SolidTable, first: int, others: SolidTable, second: int, wanted: int
 ) -> Any:
     """As ``compare_solids``, for bodies: the solids around them, and then those inside them where they differ."""
-    own, other_own = span_of(mine, first), span_of(others, second)
+    own, other_own = span_at(mine.spans, first), span_at(others.spans, second)
     frames = (
-        frame_at(frames_of(scratch), frame_of_span(own)),
-        frame_at(frames_of(scratch), frame_of_span(other_own)),
-        note_of(scratch),
+        frame_at(scratch.frames, frame_of_span(own)),
+        frame_at(scratch.frames, frame_of_span(other_own)),
+        scratch.note,
     )
     open_, overlapping = 0, 0
     for one in range(first_around_of(own), end_around_of(own)):
@@ -179,12 +160,12 @@ def corner_inside(
     mine: SolidTable, one: int, frame: Frame, lane: int, primitives: PrimitiveTable, primitive: int
 ) -> bool:
     """Whether a corner of a solid lies inside a primitive, in one lane."""
-    solid, corners = solid_of(mine, one), corners_of(mine)
+    solid, corners = solid_at(mine.solids, one), mine.corners
     for block in range(first_block_of(solid), end_block_of(solid)):
         a, b, c = corner_block(corners, block)
         x, y = carried_axis(frame, lane, 0, a, b, c), carried_axis(frame, lane, 1, a, b, c)
         gap = primitive_gap(primitives, primitive, x, y, carried_axis(frame, lane, 2, a, b, c), False)
-        if lowest(gap) < -slack_of(sizes_of(mine, one)):
+        if lowest(gap) < -slack_of(sizes_at(mine.sizes, one)):
             return True
     return False
 
@@ -192,13 +173,13 @@ def corner_inside(
 @kernel
 def corners_inside(world: WorldTable, body: int, standing: int, wanted: int) -> int:
     """Lanes among ``wanted`` in which a point of a moving body lies inside one that stands still."""
-    mine, primitives, overlapping = moving_solids_of(world), inner_primitives_of(world), 0
-    primitive, span = int_at(own_of(primitives), standing), span_of(mine, body)
-    frame = frame_at(frames_of(scratch_of(world)), frame_of_span(span))
+    mine, primitives, overlapping = world.moving_solids, world.inner_primitives, 0
+    primitive, span = int_at(primitives.own, standing), span_at(mine.spans, body)
+    frame = frame_at(world.scratch.frames, frame_of_span(span))
     if primitive < 0:
         return 0
     for one in range(first_inside_of(span), end_inside_of(span)):
-        if kind_of_solid(solid_of(mine, one)) == layout.MERE_CORNERS:
+        if kind_of_solid(solid_at(mine.solids, one)) == layout.MERE_CORNERS:
             left = wanted & ~overlapping
             while left != 0:
                 lane = first_bit(left)
@@ -214,14 +195,14 @@ def mark(world: WorldTable, wanted: int) -> int:
 
     The numbers of moving and standing bodies come first, then those of the pairs of moving bodies.
     """
-    scratch, balls, primitives = scratch_of(world), outer_balls_of(world), outer_primitives_of(world)
-    prepare(balls, scratch, joint_count_of(arm_of(world)))
-    marks = marks_of(scratch)
-    crossing = body_count_of(balls) * standing_count_of(primitives)
-    total = crossing + pair_count_of(balls)
+    scratch, balls, primitives = world.scratch, world.outer_balls, world.outer_primitives
+    prepare(balls, scratch, world.arm.joint_count)
+    marks = scratch.marks
+    crossing = balls.body_count * primitives.standing_count
+    total = crossing + balls.pair_count
     for block in range((total + WIDTH - 1) // WIDTH):  # a scene of ten thousand bodies has as many for each link
         set_lanes(marks, block, spread(ZERO))
-    scene_collision(balls, primitives, scratch, wanted, marks, wanted < 0, outer_likely_of(scratch), NO_WATCH)
+    scene_collision(balls, primitives, scratch, wanted, marks, wanted < 0, scratch.outer_likely, NO_WATCH)
     self_collision(balls, scratch, wanted, marks_row(marks, crossing, 1), wanted < 0, NO_WATCH)
     return total
 
@@ -229,13 +210,13 @@ def mark(world: WorldTable, wanted: int) -> int:
 @kernel
 def compare_pair(world: WorldTable, number: int, wanted: int) -> Any:
     """Lanes among ``wanted`` in which a marked pair is not proven apart, and those in which it is proven to overlap."""
-    scratch, balls, mine = scratch_of(world), outer_balls_of(world), moving_solids_of(world)
-    standing = standing_count_of(outer_primitives_of(world))
-    crossing = body_count_of(balls) * standing
+    scratch, balls, mine = world.scratch, world.outer_balls, world.moving_solids
+    standing = world.outer_primitives.standing_count
+    crossing = balls.body_count * standing
     if number >= crossing:
-        pair = pair_at(pairs_of(balls), number - crossing)
-        return compare_bodies(scratch, mine, one_body_of(pair), wider_solids_of(world), other_body_of(pair), wanted)
-    first, second, others = number // standing, number % standing, standing_solids_of(world)
+        pair = pair_at(balls.pairs, number - crossing)
+        return compare_bodies(scratch, mine, one_body_of(pair), world.wider_solids, other_body_of(pair), wanted)
+    first, second, others = number // standing, number % standing, world.standing_solids
     if is_cloud(others, second):
         return compare_cloud(world, first, second, wanted)
     left, hit = compare_bodies(scratch, mine, first, others, second, wanted)
@@ -254,7 +235,7 @@ def narrow_phase(world: WorldTable, wanted: int) -> Any:
         Lanes in which something remains open, and lanes that are colliding.
     """
     total = mark(world, wanted)
-    marks = marks_of(scratch_of(world))
+    marks = world.scratch.marks
     open_, colliding = 0, 0
     for block in range((total + WIDTH - 1) // WIDTH):
         marked = nonzero_ints(marks, block)

@@ -16,9 +16,8 @@ from rrtik_ompl.kernels import layout
 from rrtik_ompl.kernels.clouds.primitive_kernels import cloud_gap, meets_cloud
 from rrtik_ompl.kernels.layout import (
     KIND_COUNT,
-    NO_MARKS,
     Marks,
-    PlaneArray,
+    Plane,
     PrimitiveHead,
     PrimitiveList,
     PrimitiveShape,
@@ -27,6 +26,7 @@ from rrtik_ompl.kernels.layout import (
 from rrtik_ompl.kernels.simd.access import float_reader, vector_reader
 from rrtik_ompl.kernels.simd.compiled import WIDTH, inlined, kernel
 from rrtik_ompl.kernels.simd.lanes import absolute, bits, choose, int_at, larger, set_int, smaller, spread, square_root
+from rrtik_ompl.kernels.simd.records import exists
 from rrtik_ompl.kernels.simd.vectors import along, squared
 from rrtik_ompl.kernels.tables.accessors import (
     Vector,
@@ -35,18 +35,12 @@ from rrtik_ompl.kernels.tables.accessors import (
     first_axis_of,
     first_plane_of,
     head_at,
-    head_of,
-    heads_of,
     kind_of,
     normal_of,
     offset_of,
     plane_at,
-    planes_of,
-    primitive_count_of,
     second_axis_of,
     shape_at,
-    shape_of,
-    shapes_of,
     standing_body_of,
     third_axis_of,
 )
@@ -72,10 +66,12 @@ UNBOUNDED_DISTANCE = np.float32(1e18)  # [m] where there is nothing to measure; 
 @inlined
 def kinds_known(primitives: PrimitiveTable) -> bool:
     """Whether every primitive has a formula; they are sorted by kind, so that the first and the last say it."""
-    count = primitive_count_of(primitives)
+    count = primitives.count
     known = count == 0
     if count > 0:
-        known = kind_of(head_of(primitives, 0)) >= 0 and kind_of(head_of(primitives, count - 1)) < KIND_COUNT
+        first = head_at(primitives.heads, 0)
+        last = head_at(primitives.heads, count - 1)
+        known = kind_of(first) >= 0 and kind_of(last) < KIND_COUNT
     return known
 
 
@@ -108,7 +104,7 @@ def beyond_ends(cylinder: PrimitiveShape, x: Any, y: Any, z: Any) -> Any:
 
 
 @inlined
-def plane_gap(planes: PlaneArray, number: int, x: Any, y: Any, z: Any) -> Any:
+def plane_gap(planes: Plane, number: int, x: Any, y: Any, z: Any) -> Any:
     """Signed distance of a point from a plane, positive in front of it."""
     plane = plane_at(planes, number)
     return along(normal_of(plane), x, y, z) - offset_of(plane)
@@ -121,7 +117,7 @@ def half_space_gap(half_space: PrimitiveShape, x: Any, y: Any, z: Any) -> Any:
 
 
 @kernel
-def meets_convex(planes: PlaneArray, start: int, end: int, share: Any, x: Any, y: Any, z: Any, radius: float) -> Any:
+def meets_convex(planes: Plane, start: int, end: int, share: Any, x: Any, y: Any, z: Any, radius: float) -> Any:
     """Lanes in which no plane has a ball in front of it. Share 0 stands for the centre only."""
     meeting = bits(spread(ZERO) < ONE)
     for plane in range(start, end):
@@ -152,7 +148,7 @@ def meets_primitive(
         if kind == layout.HALF_SPACE:
             return bits(half_space_gap(shape, x, y, z) < radius)
         if kind == layout.CONVEX:
-            share, planes = ONE if bound else share_of(shape), planes_of(primitives)
+            share, planes = ONE if bound else share_of(shape), primitives.planes
             return meets_convex(planes, first_plane_of(head), end_plane_of(head), share, x, y, z, radius)
         if kind == layout.CLOUD:
             return meets_cloud(primitives, head, shape, x, y, z, radius, bound, wanted)
@@ -174,7 +170,7 @@ def meets_primitive(
 
 
 @kernel
-def to_convex(planes: PlaneArray, start: int, end: int, x: Any, y: Any, z: Any) -> Any:
+def to_convex(planes: Plane, start: int, end: int, x: Any, y: Any, z: Any) -> Any:
     """Largest height over the planes of a convex primitive; no more than the distance from it."""
     height = plane_gap(planes, start, x, y, z)
     for plane in range(start + 1, end):
@@ -185,13 +181,13 @@ def to_convex(planes: PlaneArray, start: int, end: int, x: Any, y: Any, z: Any) 
 @kernel
 def primitive_gap(primitives: PrimitiveTable, number: int, x: Any, y: Any, z: Any, bound: bool) -> Any:
     """Signed distance of a point from a primitive, negative inside; ``bound``: the point stands for others near it."""
-    shape, head = shape_of(primitives, number), head_of(primitives, number)
+    shape, head = shape_at(primitives.shapes, number), head_at(primitives.heads, number)
     kind = kind_of(head)
     if kind < 0 or kind >= layout.CENTRED_KINDS:
         if kind == layout.HALF_SPACE:
             return half_space_gap(shape, x, y, z)
         if kind == layout.CONVEX:
-            height = to_convex(planes_of(primitives), first_plane_of(head), end_plane_of(head), x, y, z)
+            height = to_convex(primitives.planes, first_plane_of(head), end_plane_of(head), x, y, z)
             if bound or share_of(shape) != ZERO:
                 return height
             # Outside, the height is too small for an inner primitive.
@@ -232,7 +228,7 @@ def meets_primitives(
 
     Unless ``NO_MARKS``, ``marks`` are one number for each standing body, which collects the lanes that meet it.
     """
-    heads, shapes = heads_of(primitives), shapes_of(primitives)
+    heads, shapes = primitives.heads, primitives.shapes
     meeting, kept = 0, 0
     for k in range(count):
         number = int_at(source, k)
@@ -242,7 +238,7 @@ def meets_primitives(
             meeting |= found
             set_int(sink, kept, number)
             kept += 1
-            if marks != NO_MARKS:
+            if exists(marks):
                 body = standing_body_of(head)
                 set_int(marks, body, int_at(marks, body) | found)
     return meeting, kept

@@ -14,23 +14,22 @@ from numpy.typing import NDArray
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.kernels import layout
-from rrtik_ompl.kernels.tables import cloud_layout
-from rrtik_ompl.kernels.tables.memory import Table
+from rrtik_ompl.kernels.tables.cloud_layout import LEAF, CloudTable
 
 CHUNK = 64  # configurations at a time, to bound memory
 
 
-def frames(arm: Table, values: Matrix) -> NDArray[np.float64]:
+def frames(arm: layout.ArmTable, values: Matrix) -> NDArray[np.float64]:
     """Joint frames as rotation and origin, world first, shape (m, joints + 1, 3, 4)."""
-    fixed = arm[layout.PLACEMENTS].astype(np.float64).reshape(-1, layout.POSE_NUMBERS)
+    fixed = arm.placements.astype(np.float64).reshape(-1, layout.POSE_NUMBERS)
     turns, origins = fixed[:, layout.ROTATION : layout.ROTATION + 9], fixed[:, layout.ORIGIN : layout.ORIGIN + 3]
     found = np.zeros((len(values), len(fixed) + 1, 3, 4))
     found[:, 0, :, :3] = np.eye(3)
-    for joint, (parent, kind) in enumerate(zip(arm[layout.PARENTS], arm[layout.JOINT_KINDS], strict=True)):
+    for joint, (parent, kind) in enumerate(zip(arm.parents, arm.joint_kinds, strict=True)):
         above = found[:, parent]
         rotation = above[:, :, :3] @ turns[joint].reshape(3, 3)
         origin = above[:, :, 3] + above[:, :, :3] @ origins[joint]
-        value, sliding = values[:, joint, None] + arm[layout.PHASES][joint], kind == layout.SLIDE
+        value, sliding = values[:, joint, None] + arm.phases[joint], kind == layout.SLIDE
         x, y, z = rotation[:, :, 0], rotation[:, :, 1], rotation[:, :, 2]
         sine, cosine = np.sin(value), np.cos(value)
         turned = (x, y) if sliding else (x * cosine + y * sine, y * cosine - x * sine)
@@ -46,14 +45,14 @@ class PrimitiveView:
         standing: Number of the standing body that it belongs to.
     """
 
-    def __init__(self, primitives: Table, number: int) -> None:
-        shapes = primitives[layout.PRIMITIVES].reshape(-1, layout.SHAPE_FLOATS)
+    def __init__(self, primitives: layout.PrimitiveTable, number: int) -> None:
+        shapes = primitives.shapes.reshape(-1, layout.SHAPE_FLOATS)
         head = heads(primitives)[number]
         self._shape: Vector = shapes[number].astype(np.float64)
         self.kind, self.standing = int(head[layout.KIND]), int(head[layout.STANDING_BODY])
-        self._planes = primitives[layout.PLANES].reshape(-1, layout.PLANE_FLOATS)
+        self._planes = primitives.planes.reshape(-1, layout.PLANE_FLOATS)
         self._span = slice(head[layout.FIRST_PLANE], head[layout.END_PLANE])
-        self._clouds, self._cloud = primitives.parts, int(head[layout.FIRST_PLANE])
+        self._clouds, self._cloud = primitives.clouds, int(head[layout.FIRST_PLANE])
 
     def number(self, place: int) -> float:
         """One of its numbers."""
@@ -100,17 +99,17 @@ class PrimitiveView:
 
 
 @lru_cache(maxsize=8)
-def _search_tree(cloud: Table) -> Any:
+def _search_tree(cloud: CloudTable) -> Any:
     """SciPy's tree of a cloud's points."""
     from scipy.spatial import cKDTree  # loads slower than most plans take, and few scenes have a cloud
 
-    blocks = cloud[cloud_layout.BLOCKS].reshape(-1, layout.AXES, cloud_layout.LEAF)
+    blocks = cloud.blocks.reshape(-1, layout.AXES, LEAF)
     return cKDTree(blocks.transpose(0, 2, 1).reshape(-1, layout.AXES).astype(np.float64))
 
 
-def heads(primitives: Table) -> NDArray[np.int32]:
+def heads(primitives: layout.PrimitiveTable) -> NDArray[np.int32]:
     """Heads of all primitives, shape (k, ``HEAD_INTS``)."""
-    return primitives[layout.NUMBERS].reshape(-1, layout.HEAD_INTS)
+    return primitives.heads.reshape(-1, layout.HEAD_INTS)
 
 
 def refuse_kind(kind: int) -> NoReturn:
@@ -122,7 +121,9 @@ def refuse_kind(kind: int) -> NoReturn:
     raise InputError(f"collision check: a primitive is of unknown kind {kind}; have 0 to {layout.KINDS.stop - 1}")
 
 
-def meets_primitive(primitives: Table, number: int, points: NDArray[np.float64], radii: NDArray[np.float64]) -> Mask:
+def meets_primitive(
+    primitives: layout.PrimitiveTable, number: int, points: NDArray[np.float64], radii: NDArray[np.float64]
+) -> Mask:
     """Which balls, centres of shape (..., 3), meet a primitive. Shape (...).
 
     Raises:
@@ -148,7 +149,7 @@ def meets_primitive(primitives: Table, number: int, points: NDArray[np.float64],
     refuse_kind(own.kind)
 
 
-def primitive_gap(primitives: Table, number: int, points: NDArray[np.float64]) -> NDArray[np.float64]:
+def primitive_gap(primitives: layout.PrimitiveTable, number: int, points: NDArray[np.float64]) -> NDArray[np.float64]:
     """Signed distance of points, shape (..., 3), from a primitive, negative inside. Shape (...).
 
     Raises:
@@ -183,7 +184,12 @@ def _outside(beyond: NDArray[np.float64]) -> NDArray[np.float64]:
 class ReferenceChecks:
     """The three-valued checks on the tables of a world."""
 
-    def __init__(self, arm: Table, balls: tuple[Table, Table], primitives: tuple[Table, Table]) -> None:
+    def __init__(
+        self,
+        arm: layout.ArmTable,
+        balls: tuple[layout.BallTable, layout.BallTable],
+        primitives: tuple[layout.PrimitiveTable, layout.PrimitiveTable],
+    ) -> None:
         self._arm, self._balls, self._primitives = arm, balls, primitives
 
     def classify(self, values: Matrix, *, resolve: bool) -> NDArray[np.int8]:
@@ -215,11 +221,11 @@ class ReferenceChecks:
     def _in_collision(self, poses: NDArray[np.float64], level: int) -> NDArray[np.bool_]:
         """Which bodies meet, shape (m, moving * standing + pairs of moving bodies)."""
         table, primitives = self._balls[level], self._primitives[level]
-        body_count, standing = int(table.header[layout.BODY_COUNT]), int(primitives.header[layout.STANDING_COUNT])
-        pairs = table[layout.PAIRS].reshape(-1, layout.PAIR_INTS)
+        body_count, standing = table.body_count, primitives.standing_count
+        pairs = table.pairs.reshape(-1, layout.PAIR_INTS)
         found = np.zeros((len(poses), body_count * standing + len(pairs)), dtype=bool)
         points, radii = placed_balls(poses, table)
-        checked = primitives[layout.CHECKED].reshape(body_count, standing)
+        checked = primitives.checked.reshape(body_count, standing)
         for number, stands in enumerate(heads(primitives)[:, layout.STANDING_BODY]):
             for body in np.flatnonzero(checked[:, stands]):
                 found[:, body * standing + stands] |= meets_primitive(
@@ -227,20 +233,20 @@ class ReferenceChecks:
                 ).any(axis=1)
         for k, (i, j) in enumerate(zip(pairs[:, layout.PAIR_ONE], pairs[:, layout.PAIR_OTHER], strict=True)):
             gaps = np.linalg.norm(points[i][:, :, None] - points[j][:, None], axis=3)
-            reaches = radii[i][:, None] + radii[j] + table[layout.SELF_MARGIN][0]
+            reaches = radii[i][:, None] + radii[j] + table.self_margin[0]
             found[:, body_count * standing + k] = (gaps < reaches).any(axis=(1, 2))
         return found
 
 
 def placed_balls(
-    poses: NDArray[np.float64], table: Table
+    poses: NDArray[np.float64], table: layout.BallTable
 ) -> tuple[list[NDArray[np.float64]], list[NDArray[np.float64]]]:
     """Centres in the world, shape (m, n, 3), and radii, shape (n,), of each body's balls."""
-    balls = table[layout.BALLS].astype(np.float64).reshape(-1, layout.BALL_FLOATS)
-    clusters = table[layout.CLUSTERS].reshape(-1, layout.CLUSTER_INTS)
+    balls = table.balls.astype(np.float64).reshape(-1, layout.BALL_FLOATS)
+    clusters = table.clusters.reshape(-1, layout.CLUSTER_INTS)
     centres = balls[:, layout.CENTRE : layout.CENTRE + 3]
     points, radii = [], []
-    for body in table[layout.BODIES].reshape(-1, layout.BODY_INTS):
+    for body in table.bodies.reshape(-1, layout.BODY_INTS):
         first, end = body[layout.BODY_FIRST], body[layout.BODY_END]
         span = slice(0, 0)
         if end > first:

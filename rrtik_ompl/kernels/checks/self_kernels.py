@@ -9,17 +9,14 @@ from typing import Any
 
 from rrtik_ompl.kernels.checks.sphere_kernels import place_cluster, placed_centre
 from rrtik_ompl.kernels.checks.watch_kernels import ZERO, set_clear, slack_at
-from rrtik_ompl.kernels.layout import NO_MARKS, BallTable, Marks, ScratchTable, Watch
+from rrtik_ompl.kernels.layout import BallTable, Marks, ScratchTable, Watch
 from rrtik_ompl.kernels.simd.compiled import inlined, kernel
 from rrtik_ompl.kernels.simd.lanes import bits, int_at, set_int
+from rrtik_ompl.kernels.simd.records import exists
 from rrtik_ompl.kernels.simd.vectors import squared
 from rrtik_ompl.kernels.tables.accessors import (
-    balls_of,
-    body_balls_of,
-    body_of,
-    centres_of,
-    cluster_balls_of,
-    cluster_of,
+    body_at,
+    cluster_at,
     end_ball_of,
     end_cluster_of_body,
     end_pair_of,
@@ -29,21 +26,13 @@ from rrtik_ompl.kernels.tables.accessors import (
     frame_at,
     frame_of_body,
     frame_of_cluster,
-    frames_of,
-    group_balls_of,
-    group_centres_of,
-    group_count_of,
     one_body_of,
     one_group_of,
     other_body_of,
     other_group_of,
     pair_at,
     pair_group_at,
-    pair_group_count_of,
-    pair_groups_of,
-    pairs_of,
     radius_at,
-    self_margin_of,
     stored_centre,
 )
 
@@ -62,11 +51,11 @@ def clusters_meet(balls: BallTable, scratch: ScratchTable, first: int, second: i
     """
     place_cluster(balls, scratch, first)
     place_cluster(balls, scratch, second)
-    centres, all_balls = centres_of(scratch), balls_of(balls)
-    around, frames = cluster_balls_of(balls), frames_of(scratch)
-    mine, others = cluster_of(balls, first), cluster_of(balls, second)
+    centres, all_balls = scratch.centres, balls.balls
+    around, frames = balls.cluster_balls, scratch.frames
+    mine, others = cluster_at(balls.clusters, first), cluster_at(balls.clusters, second)
     hull = placed_centre(frame_at(frames, frame_of_cluster(others)), around, second)
-    meeting, near, kept = 0, 0, self_margin_of(balls)
+    meeting, near, kept = 0, 0, balls.self_margin[0]
     for ball in range(first_ball_of(mine), end_ball_of(mine)):
         x, y, z = stored_centre(centres, ball)
         radius = radius_at(all_balls, ball) + kept
@@ -86,10 +75,10 @@ def clusters_meet(balls: BallTable, scratch: ScratchTable, first: int, second: i
 @kernel
 def bodies_meet(balls: BallTable, scratch: ScratchTable, first: int, second: int, wanted: int, slack: float) -> Any:
     """Lanes in which a ball of one body meets one of another; whether balls around them, by ``slack`` wider, do."""
-    frames, one, two = frames_of(scratch), body_of(balls, first), body_of(balls, second)
-    around, hulls = cluster_balls_of(balls), body_balls_of(balls)
+    frames, one, two = scratch.frames, body_at(balls.bodies, first), body_at(balls.bodies, second)
+    around, hulls = balls.cluster_balls, balls.body_balls
     first_frame, second_frame = frame_at(frames, frame_of_body(one)), frame_at(frames, frame_of_body(two))
-    kept = self_margin_of(balls) + slack
+    kept = balls.self_margin[0] + slack
     hull, radius = placed_centre(second_frame, hulls, second), radius_at(hulls, second) + kept
     x, y, z = placed_centre(first_frame, hulls, first)
     close = within(x, y, z, hull, radius + radius_at(hulls, first)) & wanted
@@ -121,10 +110,10 @@ def self_collision(balls: BallTable, scratch: ScratchTable, wanted: int, marks: 
     Unless ``NO_MARKS``, ``marks`` are one number for each pair, which collects the lanes. ``watch``: see
     :mod:`rrtik_ompl.kernels.checks.watch_kernels`.
     """
-    groups, pairs = pair_groups_of(balls), pairs_of(balls)
-    around, centres = group_balls_of(balls), group_centres_of(scratch)
-    meeting, kept, watched = 0, self_margin_of(balls), group_count_of(balls)
-    for number in range(pair_group_count_of(balls)):
+    groups, pairs = balls.pair_groups, balls.pairs
+    around, centres = balls.group_balls, scratch.group_centres
+    meeting, kept, watched = 0, balls.self_margin[0], balls.group_count
+    for number in range(balls.pair_group_count):
         slack = slack_at(watch, watched + number)
         if slack < ZERO:
             continue
@@ -135,7 +124,7 @@ def self_collision(balls: BallTable, scratch: ScratchTable, wanted: int, marks: 
         x, y, z = stored_centre(centres, first)
         reach = radius_at(around, first) + radius_at(around, second) + kept + slack
         close = within(x, y, z, stored_centre(centres, second), reach) & wanted
-        if marks == NO_MARKS:
+        if not exists(marks):
             close &= ~meeting
         if close == 0:
             continue
@@ -145,8 +134,8 @@ def self_collision(balls: BallTable, scratch: ScratchTable, wanted: int, marks: 
             meeting |= found
             if near and slack > ZERO:
                 set_clear(watch, watched + number, False)
-            if marks != NO_MARKS and found != 0:
+            if exists(marks) and found != 0:
                 set_int(marks, k, int_at(marks, k) | found)
-        if marks == NO_MARKS and (meeting == wanted or (one and meeting != 0)):
+        if not exists(marks) and (meeting == wanted or (one and meeting != 0)):
             break
     return meeting

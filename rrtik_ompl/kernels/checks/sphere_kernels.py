@@ -15,11 +15,10 @@ from rrtik_ompl.kernels.checks.watch_kernels import ZERO, set_clear, slack_at
 from rrtik_ompl.kernels.layout import (
     LIKELY_COUNT,
     NO_MARKS,
-    NO_WATCH,
-    BallArray,
+    Ball,
     BallTable,
     Frame,
-    LikelyBalls,
+    LikelyBall,
     Marks,
     PrimitiveList,
     PrimitiveTable,
@@ -28,47 +27,30 @@ from rrtik_ompl.kernels.layout import (
 )
 from rrtik_ompl.kernels.simd.compiled import inlined, kernel
 from rrtik_ompl.kernels.simd.lanes import int_at, set_int
+from rrtik_ompl.kernels.simd.records import exists
 from rrtik_ompl.kernels.tables.accessors import (
     ball_x,
     ball_y,
     ball_z,
-    balls_of,
     body_of_cluster,
-    centres_of,
-    checked_of,
     checked_row,
-    cluster_balls_of,
-    cluster_count_of,
-    cluster_of,
+    cluster_at,
     end_ball_of,
     end_cluster_of_group,
-    excluding_of,
     first_ball_of,
     first_cluster_of_group,
-    found_of,
     frame_at,
     frame_of_cluster,
     frame_of_group,
-    frames_of,
     group_at,
-    group_balls_of,
-    group_centres_of,
-    group_count_of,
-    groups_of,
-    heads_of,
     likely_at,
     likely_number_of,
     marks_row,
-    met_of,
-    near_of,
     origin_at,
-    placed_flags_of,
-    primitive_count_of,
     radius_at,
     rotation_row,
     set_likely,
     standing_body_at,
-    standing_count_of,
     store_centre,
     stored_centre,
 )
@@ -84,7 +66,7 @@ def carried(frame: Frame, row: int, x: float, y: float, z: float) -> Any:
 
 
 @inlined
-def placed_centre(frame: Frame, balls: BallArray, number: int) -> Any:
+def placed_centre(frame: Frame, balls: Ball, number: int) -> Any:
     """Centre of a ball in the world."""
     x, y, z = ball_x(balls, number), ball_y(balls, number), ball_z(balls, number)
     return carried(frame, 0, x, y, z), carried(frame, 1, x, y, z), carried(frame, 2, x, y, z)
@@ -95,9 +77,9 @@ def checked_primitives(
     primitives: PrimitiveTable, body: int, source: PrimitiveList, count: int, sink: PrimitiveList
 ) -> int:
     """Copy a list of primitives without those that a body need not keep clear of; returns how many are left."""
-    everything = int_at(excluding_of(primitives), body) == 0
-    checked = checked_row(checked_of(primitives), standing_count_of(primitives), body)
-    heads, kept = heads_of(primitives), 0
+    everything = int_at(primitives.excluding, body) == 0
+    checked = checked_row(primitives.checked, primitives.standing_count, body)
+    heads, kept = primitives.heads, 0
     for k in range(count):
         number = int_at(source, k)
         if everything or int_at(checked, standing_body_at(heads, number)) != 0:
@@ -109,35 +91,35 @@ def checked_primitives(
 @kernel
 def prepare(balls: BallTable, scratch: ScratchTable, joints: int) -> None:
     """Place the centres of the groups that the first joints carry, and forget the balls' centres of the last block."""
-    frames, groups = frames_of(scratch), groups_of(balls)
-    for group in range(group_count_of(balls)):
+    frames, groups = scratch.frames, balls.groups
+    for group in range(balls.group_count):
         carrier = frame_of_group(group_at(groups, group))
         if carrier > joints:
             continue
         frame = frame_at(frames, carrier)
-        x, y, z = placed_centre(frame, group_balls_of(balls), group)
-        store_centre(group_centres_of(scratch), group, x, y, z)
-    flags = placed_flags_of(scratch)
-    for cluster in range(cluster_count_of(balls)):
+        x, y, z = placed_centre(frame, balls.group_balls, group)
+        store_centre(scratch.group_centres, group, x, y, z)
+    flags = scratch.placed
+    for cluster in range(balls.cluster_count):
         set_int(flags, cluster, 0)
 
 
 @inlined
 def place_cluster(balls: BallTable, scratch: ScratchTable, number: int) -> None:
     """Place the centres of a cluster's balls if they are not yet."""
-    if int_at(placed_flags_of(scratch), number) != 0:
+    if int_at(scratch.placed, number) != 0:
         return
-    set_int(placed_flags_of(scratch), number, 1)
-    cluster = cluster_of(balls, number)
-    frame = frame_at(frames_of(scratch), frame_of_cluster(cluster))
-    centres, all_balls = centres_of(scratch), balls_of(balls)
+    set_int(scratch.placed, number, 1)
+    cluster = cluster_at(balls.clusters, number)
+    frame = frame_at(scratch.frames, frame_of_cluster(cluster))
+    centres, all_balls = scratch.centres, balls.balls
     for ball in range(first_ball_of(cluster), end_ball_of(cluster)):
         x, y, z = placed_centre(frame, all_balls, ball)
         store_centre(centres, ball, x, y, z)
 
 
 @kernel
-def remember(likely: LikelyBalls, number: int, frame: int, body: int) -> None:
+def remember(likely: LikelyBall, number: int, frame: int, body: int) -> None:
     """Note a ball that met something, in the last place, unless it is in the list."""
     for k in range(LIKELY_COUNT):
         if likely_number_of(likely_at(likely, k)) == number:
@@ -155,32 +137,32 @@ def cluster_meets(
     wanted: int,
     marks: Marks,
     one: bool,
-    likely: LikelyBalls,
+    likely: LikelyBall,
     slack: float,
 ) -> Any:
     """Lanes in which a ball of a cluster meets one of the first ``count`` primitives found; see ``scene_collision``.
 
     Also whether one of them, wider by ``slack``, does.
     """
-    cluster = cluster_of(balls, number)
-    body, frame = body_of_cluster(cluster), frame_at(frames_of(scratch), frame_of_cluster(cluster))
-    near, met = near_of(scratch), met_of(scratch)
-    count = checked_primitives(primitives, body, found_of(scratch), count, near)
+    cluster = cluster_at(balls.clusters, number)
+    body, frame = body_of_cluster(cluster), frame_at(scratch.frames, frame_of_cluster(cluster))
+    near, met = scratch.near, scratch.met
+    count = checked_primitives(primitives, body, scratch.found, count, near)
     if count == 0:
         return 0, False
-    around = cluster_balls_of(balls)
+    around = balls.cluster_balls
     x, y, z = placed_centre(frame, around, number)
     radius = radius_at(around, number) + slack
     close, count = meets_primitives(primitives, x, y, z, radius, True, wanted, near, count, near, NO_MARKS)
     if close == 0:
         return 0, False
     place_cluster(balls, scratch, number)
-    centres, all_balls = centres_of(scratch), balls_of(balls)
-    own_marks = NO_MARKS if marks == NO_MARKS else marks_row(marks, standing_count_of(primitives), body)
+    centres, all_balls = scratch.centres, balls.balls
+    own_marks = marks_row(marks, primitives.standing_count, body) if exists(marks) else NO_MARKS
     meeting, near_by = 0, False
     for ball in range(first_ball_of(cluster), end_ball_of(cluster)):
         x, y, z = stored_centre(centres, ball)
-        still = close if marks != NO_MARKS else close & ~meeting
+        still = close if exists(marks) else close & ~meeting
         radius = radius_at(all_balls, ball)
         if slack > ZERO:
             found, _ = meets_primitives(primitives, x, y, z, radius + slack, True, still, near, count, met, NO_MARKS)
@@ -191,7 +173,7 @@ def cluster_meets(
         if found != 0:
             meeting |= found
             remember(likely, ball, frame_of_cluster(cluster), body)
-        if marks == NO_MARKS and (meeting == close or (one and meeting != 0)):
+        if not exists(marks) and (meeting == close or (one and meeting != 0)):
             break
     return meeting, near_by
 
@@ -201,17 +183,15 @@ def cluster_reaches(
     balls: BallTable, primitives: PrimitiveTable, scratch: ScratchTable, number: int, slack: Any
 ) -> int:
     """List the primitives in reach of a cluster that is wider by ``slack``; returns their number."""
-    frame = frame_at(frames_of(scratch), frame_of_cluster(cluster_of(balls, number)))
-    x, y, z = placed_centre(frame, cluster_balls_of(balls), number)
-    return primitives_in_reach(
-        primitives, x, y, z, radius_at(cluster_balls_of(balls), number) + slack, found_of(scratch)
-    )
+    frame = frame_at(scratch.frames, frame_of_cluster(cluster_at(balls.clusters, number)))
+    x, y, z = placed_centre(frame, balls.cluster_balls, number)
+    return primitives_in_reach(primitives, x, y, z, radius_at(balls.cluster_balls, number) + slack, scratch.found)
 
 
 @inlined
 def open_lanes(lanes: int, meeting: int, marks: Marks) -> int:
     """Lanes that are still asked for: all of them where each pair is marked, else those that meet nothing yet."""
-    return lanes if marks != NO_MARKS else lanes & ~meeting
+    return lanes if exists(marks) else lanes & ~meeting
 
 
 @kernel
@@ -224,18 +204,18 @@ def group_meets(
     wanted: int,
     marks: Marks,
     one: bool,
-    likely: LikelyBalls,
+    likely: LikelyBall,
     slack: float,
 ) -> Any:
     """Lanes in which a ball of a group meets one of the first ``count`` primitives found; see ``cluster_meets``."""
-    close, each, found = wanted, count > FEW, found_of(scratch)
+    close, each, found = wanted, count > FEW, scratch.found
     if not each:
-        x, y, z = stored_centre(group_centres_of(scratch), number)
-        radius = radius_at(group_balls_of(balls), number) + slack
+        x, y, z = stored_centre(scratch.group_centres, number)
+        radius = radius_at(balls.group_balls, number) + slack
         close, count = meets_primitives(primitives, x, y, z, radius, True, wanted, found, count, found, NO_MARKS)
         if close == 0:
             return 0, False
-    group, meeting, near = group_at(groups_of(balls), number), 0, False
+    group, meeting, near = group_at(balls.groups, number), 0, False
     for cluster in range(first_cluster_of_group(group), end_cluster_of_group(group)):
         left = open_lanes(close, meeting, marks)
         if each:
@@ -243,7 +223,7 @@ def group_meets(
         lanes, by = cluster_meets(balls, primitives, scratch, cluster, count, left, marks, one, likely, slack)
         meeting |= lanes
         near |= by
-        if one and meeting != 0 and marks == NO_MARKS:
+        if one and meeting != 0 and not exists(marks):
             break
     return meeting, near
 
@@ -256,7 +236,7 @@ def scene_collision(
     wanted: int,
     marks: Marks,
     one: bool,
-    likely: LikelyBalls,
+    likely: LikelyBall,
     watch: Watch,
 ) -> Any:
     """Lanes among ``wanted`` in which the arm meets a primitive; if ``one`` is enough, not all of them.
@@ -265,17 +245,17 @@ def scene_collision(
     standing body, which collects the lanes in which the two meet. ``watch``: see
     :mod:`rrtik_ompl.kernels.checks.watch_kernels`.
     """
-    if primitive_count_of(primitives) == 0 and watch == NO_WATCH:
+    if primitives.count == 0 and not exists(watch):
         return 0
-    around, found = group_balls_of(balls), found_of(scratch)
+    around, found = balls.group_balls, scratch.found
     meeting = 0
-    for number in range(group_count_of(balls)):
+    for number in range(balls.group_count):
         slack = slack_at(watch, number)
         if slack < ZERO:
             continue
         if slack > ZERO:
             set_clear(watch, number, meeting == 0)
-        x, y, z = stored_centre(group_centres_of(scratch), number)
+        x, y, z = stored_centre(scratch.group_centres, number)
         radius = radius_at(around, number) + slack
         still = open_lanes(wanted, meeting, marks)
         count = primitives_in_reach(primitives, x, y, z, radius, found)
@@ -285,6 +265,6 @@ def scene_collision(
         meeting |= lanes
         if near:
             set_clear(watch, number, False)
-        if meeting != 0 and (one or meeting == wanted) and marks == NO_MARKS:
+        if meeting != 0 and (one or meeting == wanted) and not exists(marks):
             break
     return meeting

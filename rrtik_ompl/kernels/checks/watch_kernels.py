@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from rrtik_ompl.kernels.layout import CLEAR, NO_WATCH, JointValues, Watch, WorldTable
+from rrtik_ompl.kernels.layout import CLEAR, JointValues, Watch, WorldTable
 from rrtik_ompl.kernels.simd.compiled import inlined, kernel
 from rrtik_ompl.kernels.simd.lanes import (
     choose,
@@ -24,15 +24,7 @@ from rrtik_ompl.kernels.simd.lanes import (
     smaller,
     spread,
 )
-from rrtik_ompl.kernels.tables.accessors import (
-    arm_of,
-    bound_blocks_of,
-    bound_rows_of,
-    bounds_of,
-    joint_count_of,
-    scratch_of,
-    watch_of,
-)
+from rrtik_ompl.kernels.simd.records import exists
 
 ZERO, NOW_CLEAR = np.float32(0.0), np.float32(CLEAR)
 
@@ -40,7 +32,7 @@ ZERO, NOW_CLEAR = np.float32(0.0), np.float32(CLEAR)
 @inlined
 def slack_at(watch: Watch, number: int) -> Any:
     """By how much a bound is widened; negative if nothing is to be checked."""
-    return float_at(watch, number) if watch != NO_WATCH else ZERO
+    return float_at(watch, number) if exists(watch) else ZERO
 
 
 @inlined
@@ -52,8 +44,8 @@ def set_clear(watch: Watch, number: int, clear: bool) -> None:
 @kernel
 def watch_motion(world: WorldTable, start: JointValues, end: JointValues, share: float) -> None:
     """Set by how much the bounds are widened: as far as things can move in a share of a motion."""
-    bounds, watch, joints = bounds_of(world), watch_of(scratch_of(world)), joint_count_of(arm_of(world))
-    blocks, rows = bound_blocks_of(bounds), bound_rows_of(bounds)
+    bounds, watch, joints = world.motion_bounds, world.scratch.watch, world.arm.joint_count
+    blocks, rows = bounds.blocks, bounds.rows
     for block in range(blocks):
         total = lanes_at(rows, blocks + block)
         for joint in range(joints):
@@ -65,10 +57,10 @@ def watch_motion(world: WorldTable, start: JointValues, end: JointValues, share:
 @kernel
 def joints_left(world: WorldTable) -> int:
     """After the first block, how many of the first joints carry what is yet to be checked; no bound is wide now."""
-    bounds, watch = bounds_of(world), watch_of(scratch_of(world))
+    bounds, watch = world.motion_bounds, world.scratch.watch
     last = ZERO
-    for block in range(bound_blocks_of(bounds)):
-        slack, frames = lanes_at(watch, block), lanes_at(bound_rows_of(bounds), block)
+    for block in range(bounds.blocks):
+        slack, frames = lanes_at(watch, block), lanes_at(bounds.rows, block)
         last = max(last, highest(choose(slack >= ZERO, frames, spread(ZERO))))
         set_lanes(watch, block, smaller(slack, ZERO))
     return int(last)

@@ -6,18 +6,14 @@ from collections.abc import Callable
 from typing import Any
 
 from rrtik_ompl.kernels.layout import AXES, PrimitiveTable
-from rrtik_ompl.kernels.record import Ints
-from rrtik_ompl.kernels.simd.access import field_reader
+from rrtik_ompl.kernels.record import Tables
 from rrtik_ompl.kernels.simd.compiled import WIDTH, inlined
-from rrtik_ompl.kernels.simd.lanes import field, float_at, int_at, lanes_at
+from rrtik_ompl.kernels.simd.lanes import float_at, int_at, lanes_at
+from rrtik_ompl.kernels.simd.records import table_reader
 from rrtik_ompl.kernels.tables import cloud_layout as layout
-from rrtik_ompl.kernels.tables.accessors import clouds_of
 from rrtik_ompl.kernels.tables.cloud_layout import LEAF, BoxGroups, CloudTable, PointBlocks
 
-level_count_of: Callable[[CloudTable], int] = field_reader(layout.LEVEL_COUNT)
-firsts_of: Callable[[CloudTable], Ints] = field_reader(layout.FIRSTS)
-groups_of: Callable[[CloudTable], BoxGroups] = field_reader(layout.GROUPS)
-blocks_of: Callable[[CloudTable], PointBlocks] = field_reader(layout.BLOCKS)
+table_at: Callable[[Tables, int], CloudTable] = table_reader(CloudTable)
 
 SIDES = len(layout.BOX_SIDES)
 PARTS = LEAF // WIDTH  # of a run of LEAF floats, in lanes
@@ -26,14 +22,13 @@ PARTS = LEAF // WIDTH  # of a run of LEAF floats, in lanes
 @inlined
 def cloud_at(primitives: PrimitiveTable, number: int) -> CloudTable:
     """The table of one of the clouds among primitives."""
-    cloud: CloudTable = field(clouds_of(primitives), number)
-    return cloud
+    return table_at(primitives.clouds, number)
 
 
 @inlined
 def group_at(cloud: CloudTable, level: int, number: int) -> int:
     """Which of all groups a node is."""
-    group: int = int_at(firsts_of(cloud), level) + number
+    group: int = int_at(cloud.firsts, level) + number
     return group
 
 

@@ -13,11 +13,8 @@ import numpy as np
 
 from rrtik_ompl.kernels.clouds.accessors import (
     PARTS,
-    blocks_of,
     coordinates_at,
     group_at,
-    groups_of,
-    level_count_of,
     point_at,
     side_at,
     sides_at,
@@ -117,7 +114,7 @@ def meets_points(cloud: CloudTable, x: Any, y: Any, z: Any, reach: float, bound:
 
     With ``bound`` a block of points in reach will do.
     """
-    boxes, points, top = groups_of(cloud), blocks_of(cloud), level_count_of(cloud) - 1
+    boxes, points, top = cloud.groups, cloud.blocks, cloud.level_count - 1
     low, high = around_lanes(x, y, z, reach)
     square, meeting, level, number = reach * reach, 0, top, 0
     group = group_at(cloud, top, 0)
@@ -180,7 +177,7 @@ def nearer_of_block(points: PointBlocks, block: int, x: Any, y: Any, z: Any, bes
 @kernel
 def to_points(cloud: CloudTable, x: Any, y: Any, z: Any) -> Any:
     """Distance of lanes of points, in the cloud's frame, from the nearest point of the cloud."""
-    boxes, points, top = groups_of(cloud), blocks_of(cloud), level_count_of(cloud) - 1
+    boxes, points, top = cloud.groups, cloud.blocks, cloud.level_count - 1
     middle = HALF * (lowest(x) + highest(x)), HALF * (lowest(y) + highest(y)), HALF * (lowest(z) + highest(z))
     number = 0
     for down in range(top + 1):
@@ -216,7 +213,7 @@ def to_points(cloud: CloudTable, x: Any, y: Any, z: Any) -> Any:
 @kernel
 def next_block(cloud: CloudTable, low: Any, high: Any, after: int) -> int:
     """The first block of points behind a number (-1 for the first of all) whose box meets a box; -1 if none does."""
-    boxes, top = groups_of(cloud), level_count_of(cloud) - 1
+    boxes, top = cloud.groups, cloud.level_count - 1
     level, number, child = 0, after // LEAF, after % LEAF + 1
     if after < 0:
         level, number, child = top, 0, 0

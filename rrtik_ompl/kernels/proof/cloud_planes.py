@@ -6,24 +6,29 @@ and the body. For the other points of a block one plane is searched, and if ther
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import sqrt
 from typing import Any
 
 import numpy as np
 
 from rrtik_ompl.kernels.checks.gjk import dot, minus, scaled
-from rrtik_ompl.kernels.clouds.accessors import PARTS, blocks_of, coordinates_at, point_at
+from rrtik_ompl.kernels.clouds.accessors import PARTS, coordinates_at, point_at
 from rrtik_ompl.kernels.clouds.kernels import next_block
 from rrtik_ompl.kernels.proof import layout
 from rrtik_ompl.kernels.proof.frames import carried, frame_at, origin_of, turned, turned_back, vector_at
 from rrtik_ompl.kernels.proof.layout import Frame, ProofTable, SizeRows
 from rrtik_ompl.kernels.proof.planes import ANY_WAY, SHORTEST, best_plane, corner_at, sizes_at, solid_at
+from rrtik_ompl.kernels.record import Wholes
 from rrtik_ompl.kernels.simd.compiled import WIDTH, inlined, kernel
 from rrtik_ompl.kernels.simd.lanes import bits, first_bit, set_wide_lanes, spread_wide
+from rrtik_ompl.kernels.simd.records import table_reader
 from rrtik_ompl.kernels.simd.vectors import along
 from rrtik_ompl.kernels.tables.cloud_layout import CloudTable, PointBlocks
 
 ALONG_X, ALONG_Y, ALONG_Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+cloud_at: Callable[[Wholes, int], CloudTable] = table_reader(CloudTable)
+
 SINGLE_ROUNDING = 1e-6  # of a point's place in a box, in single precision, relative to the coordinates
 
 
@@ -39,7 +44,7 @@ def cloud_apart(proof: ProofTable, one: int, other: int, frames: Any, wanted: fl
         wanted: See above [m].
     """
     number = solid_at(proof, other)[layout.SOLID_KIND] - layout.CLOUD
-    cloud: CloudTable = proof.clouds[number]
+    cloud = cloud_at(proof.clouds, number)
     pose = frame_at(proof.cloud_poses, number)
     origin = origin_of(pose)
     sizes = sizes_at(proof, one)
@@ -64,7 +69,7 @@ def cloud_apart(proof: ProofTable, one: int, other: int, frames: Any, wanted: fl
     middles = single(own_middle)
     halves = single(widened(own_half, reach + 8.0 * SINGLE_ROUNDING * (1.0 + size)))
 
-    points = blocks_of(cloud)
+    points = cloud.blocks
     block = -1
     while True:
         block = next_block(cloud, low, high, block)

@@ -19,8 +19,9 @@ from rrtik_ompl.kernels.proof import layout
 from rrtik_ompl.kernels.proof.groups import Members, compared_as_one, group_rows
 from rrtik_ompl.kernels.proof.layout import CLOUD, CONVEX_SOLID, HALF_SPACE, NODES, UNKNOWN, WHOLE_BODY, ProofTable
 from rrtik_ompl.kernels.simd.processor import WIDTH
+from rrtik_ompl.kernels.tables.cloud_layout import CloudTable
 from rrtik_ompl.kernels.tables.cloud_tables import cloud_table
-from rrtik_ompl.kernels.tables.memory import Table, packed, with_own
+from rrtik_ompl.kernels.tables.memory import packed, with_own
 from rrtik_ompl.kernels.tables.solid_tables import ConvexSolid, Solids, placed_bodies
 from rrtik_ompl.model.robot import Chain
 
@@ -51,7 +52,7 @@ class ProofPairs:
     """
 
     table: ProofTable
-    clouds: Sequence[Table]
+    clouds: Sequence[CloudTable]
     bodies: NDArray[np.int64]
     sides: NDArray[np.int64]
     margins: Vector

@@ -16,6 +16,7 @@ from numba import types
 from numba.extending import intrinsic
 
 from rrtik_ompl.kernels.layout import ALIGNMENT, INT_BYTES
+from rrtik_ompl.kernels.record import Ints
 from rrtik_ompl.kernels.simd.compiled import WIDTH, inlined
 from rrtik_ompl.kernels.simd.lanes import DOUBLE, INDEX, LANES, SINGLE, WHOLE, pointer
 
@@ -100,12 +101,12 @@ def _vector_of(reader: Any, place: int) -> Any:
 
 
 def record_reader(size: int) -> Any:
-    """Function (array, number) that finds a record in an array of records of ``size`` bytes."""
+    """Function (array, number) that finds a record in an array of records of ``size`` bytes, as an array itself."""
 
     def emit(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         return _scaled(builder, args[0], size, args[1])
 
-    return intrinsic(lambda typingctx, array, number: (types.int64(types.int64, types.int64), emit))
+    return intrinsic(lambda typingctx, array, number: (array(array, types.int64), emit))
 
 
 def member_reader(place: int, size: int) -> Any:
@@ -147,4 +148,4 @@ def _nonzero_ints() -> Any:
 
 
 # Which of a block of ``WIDTH`` whole numbers of 32 bits are not 0, as an integer, the first in the lowest bit.
-nonzero_ints: Callable[[int, int], int] = _nonzero_ints()
+nonzero_ints: Callable[[Ints, int], int] = _nonzero_ints()

@@ -45,6 +45,10 @@ class _Address(types.Type):  # type: ignore[misc]
     def can_convert_to(self, typingctx: Any, other: Any) -> Any:
         return Conversion.safe if other == types.int64 else None
 
+    def unify(self, typingctx: Any, other: Any) -> Any:
+        """An address or a whole number, 0 for none, is a whole number."""
+        return types.int64 if types.unliteral(other) == types.int64 else None
+
 
 class RecordType(_Address):
     """Numba type of the address of a table."""

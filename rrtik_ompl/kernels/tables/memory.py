@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.kernels.layout import ALIGNMENT
-from rrtik_ompl.kernels.record import WORD, Record, holds_array, word
+from rrtik_ompl.kernels.record import WORD, Record, holds_array, holds_tables, word
 from rrtik_ompl.kernels.simd.processor import WIDTH
 
 Header: TypeAlias = NDArray[np.int64]
@@ -65,7 +65,7 @@ class Table:
 
     header: Header
     arrays: dict[int, NDArray[Any]]
-    parts: tuple[Table, ...] = ()
+    parts: tuple[Table | Record, ...] = ()
     address: int = field(init=False)
 
     def __post_init__(self) -> None:
@@ -80,7 +80,7 @@ class Table:
         return own and all(part.intact() for part in self.parts)
 
 
-def table(fields: Mapping[int, int | NDArray[Any]], parts: Sequence[Table] = ()) -> Table:
+def table(fields: Mapping[int, int | NDArray[Any]], parts: Sequence[Table | Record] = ()) -> Table:
     """A table that lives long, from its fields; every place from 0 up has one: a number, or an array to copy.
 
     Arrays are flat, begin on a multiple of ``ALIGNMENT`` bytes and stay where they are as long as the table lives, and
@@ -93,18 +93,24 @@ def table(fields: Mapping[int, int | NDArray[Any]], parts: Sequence[Table] = ())
 
 
 def packed(kind: type[R], **fields: Any) -> R:
-    """A table that lives long, from its fields by name: numbers, arrays to copy, and other tables.
+    """A table that lives long, from its fields by name: numbers, arrays to copy, other tables, and lists of tables.
 
     Numbers that are not given are 0, and so are the addresses of arrays and tables that are not there yet.
     """
     placed: dict[int, Any] = dict.fromkeys(range(len(kind.places)), 0)
     others = {}
+    lists = {}
     for name, value in fields.items():
+        place = kind.places[name]
         if isinstance(value, np.ndarray):
-            placed[kind.places[name]] = value
+            placed[place] = value
+        elif holds_tables(kind.kinds[name]):
+            placed[place] = np.array([each.address for each in value], dtype=np.int64)
+            lists[place] = tuple(value)
         else:
             others[name] = value
     made = kind(table(placed))
+    made.tables |= lists
     made.put(**others)
     return made
 
@@ -131,6 +137,14 @@ def with_own(shared: Table, own: Mapping[int, NDArray[Any]]) -> Table:
     for place, (_, address) in placed.items():
         header[place] = address
     return Table(header, shared.arrays | {place: array for place, (array, _) in placed.items()}, shared.parts)
+
+
+def with_own_arrays(shared: R, *names: str) -> R:
+    """The same for a table that is declared: ``names`` are the arrays to copy."""
+    places = [shared.places[name] for name in names]
+    made = type(shared)(with_own(shared.memory, {place: shared.memory[place] for place in places}))
+    made.tables |= shared.tables
+    return made
 
 
 def record(size: int, numbers: Mapping[int, float | NDArray[Any]]) -> NDArray[np.float64]:

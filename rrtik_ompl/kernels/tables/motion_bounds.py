@@ -11,32 +11,28 @@ import numpy as np
 from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.kernels.layout import (
     BALL_FLOATS,
-    BALLS,
-    BOUND_BLOCKS,
-    BOUNDS,
     CLUSTER_END,
     CLUSTER_FIRST,
     CLUSTER_INTS,
-    CLUSTERS,
     GROUP_END,
     GROUP_FIRST,
     GROUP_FRAME,
     GROUP_INTS,
-    GROUPS,
     PAIR_GROUP_INTS,
     PAIR_GROUP_ONE,
     PAIR_GROUP_OTHER,
-    PAIR_GROUPS,
+    BallTable,
+    BoundTable,
 )
 from rrtik_ompl.kernels.simd.processor import WIDTH
-from rrtik_ompl.kernels.tables.memory import Table, table
+from rrtik_ompl.kernels.tables.memory import packed
 from rrtik_ompl.model.robot import Chain
 
 SLACK = 1e-6  # of a bound, for rounding
 NOTHING = -1e30  # stands where there is nothing to watch
 
 
-def bounds_table(chain: Chain, balls: Table, strokes: Vector, margin: float) -> Table:
+def bounds_table(chain: Chain, balls: BallTable, strokes: Vector, margin: float) -> BoundTable:
     """How far a unit of each joint moves each group of balls, and the groups of each pair against each other, at most.
 
     Args:
@@ -45,24 +41,24 @@ def bounds_table(chain: Chain, balls: Table, strokes: Vector, margin: float) -> 
         strokes: Largest value of each sliding joint [m], shape (n,).
         margin: How far rounding may misplace a ball [m].
     """
-    clusters, spheres = balls[CLUSTERS].reshape(-1, CLUSTER_INTS), balls[BALLS].reshape(-1, BALL_FLOATS)
+    clusters, spheres = balls.clusters.reshape(-1, CLUSTER_INTS), balls.balls.reshape(-1, BALL_FLOATS)
     lines = [np.zeros(len(chain.parent))]
-    for group in balls[GROUPS].reshape(-1, GROUP_INTS):
+    for group in balls.groups.reshape(-1, GROUP_INTS):
         first, last = clusters[group[GROUP_FIRST]], clusters[group[GROUP_END] - 1]
         carried = spheres[first[CLUSTER_FIRST] : last[CLUSTER_END]].astype(np.float64)
         lines.append(_levers(chain, int(group[GROUP_FRAME]) - 1, carried, strokes))
     own = np.array(lines)[1:].reshape(-1, len(chain.parent))
-    pairs = balls[PAIR_GROUPS].reshape(-1, PAIR_GROUP_INTS)
+    pairs = balls.pair_groups.reshape(-1, PAIR_GROUP_INTS)
     one, other = own[pairs[:, PAIR_GROUP_ONE]], own[pairs[:, PAIR_GROUP_OTHER]]
     common = (one > 0.0) & (other > 0.0)  # what carries both does not move them against each other
     rows = np.concatenate([own, np.where(common, 0.0, one + other)])
     made = np.zeros((2 + len(chain.parent), -(-max(len(rows), 1) // WIDTH) * WIDTH), dtype=np.float32)
-    frames = balls[GROUPS].reshape(-1, GROUP_INTS)[:, GROUP_FRAME]
+    frames = balls.groups.reshape(-1, GROUP_INTS)[:, GROUP_FRAME]
     made[0, : len(rows)] = [*frames, *frames[pairs[:, [PAIR_GROUP_ONE, PAIR_GROUP_OTHER]]].max(axis=1)]
     made[1] = NOTHING
     made[1, : len(rows)] = 2.0 * margin
     made[2:, : len(rows)] = (1.0 + SLACK) * rows.T
-    return table({BOUND_BLOCKS: made.shape[1] // WIDTH, BOUNDS: made})
+    return packed(BoundTable, blocks=made.shape[1] // WIDTH, rows=made)
 
 
 def _levers(chain: Chain, joint: int, spheres: Matrix, strokes: Vector) -> Vector:

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from rrtik_ompl.geometry.collision.bodies import Body
 from rrtik_ompl.geometry.collision.shape_table import Core, core_of
 from rrtik_ompl.kernels import layout
+from rrtik_ompl.kernels.layout import PrimitiveTable, SolidTable
 from rrtik_ompl.kernels.simd.processor import WIDTH
-from rrtik_ompl.kernels.tables.memory import Table
 from rrtik_ompl.kernels.tables.moved_boxes import BoxNumbers, box_numbers
 from rrtik_ompl.kernels.tables.primitive_tables import MANY, Primitives, above, below
 from rrtik_ompl.kernels.tables.robot_tables import Spheres
@@ -49,10 +49,10 @@ class MovedRows:
         solids: Of what stands still.
     """
 
-    def __init__(self, outer: Table, inner: Table, solids: Table) -> None:
+    def __init__(self, outer: PrimitiveTable, inner: PrimitiveTable, solids: SolidTable) -> None:
         self._primitives = (_PrimitiveRows(outer), _PrimitiveRows(inner))
         self._solids = _SolidRows(solids)
-        bodies = len(solids[layout.SPANS]) // layout.SPAN_INTS
+        bodies = len(solids.spans) // layout.SPAN_INTS
         self._left = bodies if bodies >= MANY else NO_LIMIT  # moves until all is better made anew
 
     def put(self, place: int, body: Body, spheres: tuple[Spheres, Spheres], solids: Solids) -> bool:
@@ -102,17 +102,17 @@ class MovedRows:
 class _PrimitiveRows:
     """Rows of a table of primitives by their bodies."""
 
-    def __init__(self, table: Table) -> None:
-        self._heads = table[layout.NUMBERS].reshape(-1, layout.HEAD_INTS)
+    def __init__(self, table: PrimitiveTable) -> None:
+        self._heads = table.heads.reshape(-1, layout.HEAD_INTS)
         owners = self._heads[:, layout.STANDING_BODY]
         self._by_body = np.argsort(owners, kind="stable")
-        self._firsts = np.searchsorted(owners[self._by_body], np.arange(int(table.header[layout.STANDING_COUNT]) + 1))
+        self._firsts = np.searchsorted(owners[self._by_body], np.arange(table.standing_count + 1))
         self._kinds = self._heads[:, layout.KIND].copy()
-        self._numbers = table[layout.PRIMITIVES].reshape(-1, layout.SHAPE_FLOATS)
-        self._own = table[layout.OWN]
-        self._planes = table[layout.PLANES].reshape(-1, layout.PLANE_FLOATS)
-        self._boxes = table[layout.BOXES].reshape(3, 2, -1)
-        self._blocks = table[layout.BLOCK_BOXES].reshape(3, 2, -1)
+        self._numbers = table.shapes.reshape(-1, layout.SHAPE_FLOATS)
+        self._own = table.own
+        self._planes = table.planes.reshape(-1, layout.PLANE_FLOATS)
+        self._boxes = table.boxes.reshape(3, 2, -1)
+        self._blocks = table.block_boxes.reshape(3, 2, -1)
 
     def slots(self, place: int, made: Primitives) -> NDArray[np.int64] | None:
         """Where the primitives of a body stand, None unless there are as many of the same kinds."""
@@ -154,11 +154,11 @@ class _PrimitiveRows:
 class _SolidRows:
     """Rows of a table of solids by their bodies."""
 
-    def __init__(self, table: Table) -> None:
-        self._spans = table[layout.SPANS].reshape(-1, layout.SPAN_INTS)
-        self._solids = table[layout.SOLIDS].reshape(-1, layout.SOLID_INTS)
-        self._sizes = table[layout.SIZES].reshape(-1, layout.SIZE_COUNT)
-        self._corners = table[layout.CORNERS].reshape(-1, 3, WIDTH)
+    def __init__(self, table: SolidTable) -> None:
+        self._spans = table.spans.reshape(-1, layout.SPAN_INTS)
+        self._solids = table.solids.reshape(-1, layout.SOLID_INTS)
+        self._sizes = table.sizes.reshape(-1, layout.SIZE_COUNT)
+        self._corners = table.corners.reshape(-1, 3, WIDTH)
 
     def span(self, place: int, parts: Sequence[ConvexSolid]) -> tuple[int, int] | None:
         """The first of a body's solids and the end of them, None unless there are as many of the same kinds."""

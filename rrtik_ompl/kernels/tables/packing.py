@@ -11,8 +11,16 @@ from numpy.typing import NDArray
 from rrtik_ompl.base.arrays import Mask, Vector, distinct
 from rrtik_ompl.geometry.collision.bodies import Body, pair_array
 from rrtik_ompl.geometry.collision.body_arrays import body_arrays
-from rrtik_ompl.kernels.layout import PAIR_INTS, PAIR_ONE, PAIR_OTHER, PAIRS
-from rrtik_ompl.kernels.tables.memory import Table
+from rrtik_ompl.kernels.layout import (
+    PAIR_INTS,
+    PAIR_ONE,
+    PAIR_OTHER,
+    ArmTable,
+    BallTable,
+    BoundTable,
+    PrimitiveTable,
+    SolidTable,
+)
 from rrtik_ompl.kernels.tables.motion_bounds import bounds_table
 from rrtik_ompl.kernels.tables.primitive_tables import Primitives, joined, primitive_table
 from rrtik_ompl.kernels.tables.robot_tables import (
@@ -41,11 +49,11 @@ class ArmTables:
     pairs: tuple[tuple[int, int], ...]
     strokes: Vector
     margin: float
-    arm: Table
-    balls: tuple[Table, Table]
-    bounds: Table
-    solids: Table
-    wider_solids: Table
+    arm: ArmTable
+    balls: tuple[BallTable, BallTable]
+    bounds: BoundTable
+    solids: SolidTable
+    wider_solids: SolidTable
 
     def serves(
         self,
@@ -143,7 +151,7 @@ def _solids(
     *,
     kept: Vector,
     slack: float,
-) -> Table:
+) -> SolidTable:
     """Table of the solids of bodies that joints carry, ``sizes`` bodies in each frame, each grown by ``kept`` [m]."""
     parts = iter(placed_bodies(bodies, poses, margins=kept, slack=slack))
     return solid_table([(frame, [next(parts) for _ in range(size)]) for frame, size in zip(frames, sizes, strict=True)])
@@ -169,7 +177,7 @@ def standing_tables(
     checked: NDArray[np.bool_],
     outer: Sequence[Spheres],
     inner: Sequence[Spheres],
-) -> tuple[Table, Table]:
+) -> tuple[PrimitiveTable, PrimitiveTable]:
     """Primitives that contain what stands still, and primitives inside it."""
     still = [bodies[k] for k in standing]
     around, inside = ([each[k] for k in standing] for each in (outer, inner))
@@ -200,7 +208,7 @@ class PlacedPrimitives:
         return self._made
 
 
-def standing_solids(bodies: Sequence[Body], standing: Sequence[int], solids: Sequence[Solids]) -> Table:
+def standing_solids(bodies: Sequence[Body], standing: Sequence[int], solids: Sequence[Solids]) -> SolidTable:
     """Solids of what stands still, each with its margin around it."""
     poses = body_arrays(bodies).placements[standing]
     kept = [bodies[k].margin + bodies[k].padding for k in standing]
@@ -225,7 +233,7 @@ class Flags:
         standing: Sequence[int],
     ) -> None:
         self._keeps_clear, self._moving, self._standing = keeps_clear, moving, standing
-        self._own = arm.balls[0][PAIRS].reshape(-1, PAIR_INTS)
+        self._own = arm.balls[0].pairs.reshape(-1, PAIR_INTS)
 
     def __getitem__(self, flag: int) -> list[tuple[int, int]]:
         """Pairs of bodies by number, the smaller one first; those of the arm come after the others."""

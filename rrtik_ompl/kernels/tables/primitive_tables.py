@@ -17,15 +17,9 @@ from rrtik_ompl.base.arrays import Mask, Matrix, Vector
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.kernels.layout import (
     BLOCK,
-    BLOCK_BOXES,
-    BLOCK_COUNT,
     BOX_RUNS,
-    BOXES,
-    CHECKED,
     CLOUD,
-    CLOUDS,
     END_PLANE,
-    EXCLUDING,
     FIRST_PLANE,
     HEAD_INTS,
     HIGH_X,
@@ -33,24 +27,19 @@ from rrtik_ompl.kernels.layout import (
     KIND,
     KINDS,
     LOW_X,
-    NUMBERS,
-    OWN,
-    PADDED_COUNT,
     PLANE_FLOATS,
-    PLANES,
-    PRIMITIVE_COUNT,
-    PRIMITIVES,
     SHAPE_FLOATS,
     STANDING_BODY,
-    STANDING_COUNT,
+    PrimitiveTable,
 )
-from rrtik_ompl.kernels.tables.memory import Table, table
+from rrtik_ompl.kernels.tables.cloud_layout import CloudTable
+from rrtik_ompl.kernels.tables.memory import packed
 from rrtik_ompl.kernels.tables.z_order import z_order
 
 MANY = 64  # primitives, from which on those that are near each other are looked at as a block first
 UNBOUNDED_COORDINATE = 1e30  # [m]
 
-Detail: TypeAlias = Matrix | Table | None
+Detail: TypeAlias = Matrix | CloudTable | None
 Grow: TypeAlias = float | Vector  # 1: a little larger, -1: smaller; a number or one for each
 
 
@@ -102,7 +91,7 @@ def joined(parts: Sequence[Primitives]) -> Primitives:
     )
 
 
-def primitive_table(primitives: Primitives, checked: NDArray[np.bool_]) -> Table:
+def primitive_table(primitives: Primitives, checked: NDArray[np.bool_]) -> PrimitiveTable:
     """Table of primitives; ``checked`` has shape (moving bodies, standing bodies).
 
     The kind of balls comes first, so that the last primitive of a body is the one with its formula, if it has one.
@@ -118,7 +107,7 @@ def primitive_table(primitives: Primitives, checked: NDArray[np.bool_]) -> Table
     place[order] = np.arange(len(order))
     heads = np.zeros((len(ordered), HEAD_INTS), dtype=np.int32)
     planes = [detail for detail in ordered.details if isinstance(detail, np.ndarray)]
-    clouds = [detail for detail in ordered.details if isinstance(detail, Table)]
+    clouds = [detail for detail in ordered.details if isinstance(detail, CloudTable)]
     ends = np.cumsum([0, *(len(each) if isinstance(each, np.ndarray) else 0 for each in ordered.details)])
     heads[:, KIND], heads[:, STANDING_BODY] = ordered.kinds, ordered.bodies
     heads[:, FIRST_PLANE], heads[:, END_PLANE] = ends[:-1], ends[1:]
@@ -128,23 +117,21 @@ def primitive_table(primitives: Primitives, checked: NDArray[np.bool_]) -> Table
     own[primitives.bodies[by_kind]] = place[by_kind]  # the last one of a body remains
     boxes = _bounding_boxes(ordered.lows, ordered.highs)
     blocks = _blocks(ordered)
-    return table(
-        {
-            PRIMITIVE_COUNT: len(ordered),
-            PADDED_COUNT: boxes.shape[1],
-            BOXES: boxes,
-            PRIMITIVES: ordered.numbers.astype(np.float32),
-            NUMBERS: heads,
-            PLANES: np.concatenate([np.zeros((0, PLANE_FLOATS)), *planes]).astype(np.float32),
-            STANDING_COUNT: checked.shape[1],
-            CHECKED: checked.astype(np.int32),
-            EXCLUDING: np.asarray((~checked).any(axis=1), dtype=np.int32),
-            OWN: own,
-            CLOUDS: np.array([cloud.address for cloud in clouds], dtype=np.int64),
-            BLOCK_COUNT: blocks.shape[1],
-            BLOCK_BOXES: blocks,
-        },
-        clouds,
+    return packed(
+        PrimitiveTable,
+        count=len(ordered),
+        padded_count=boxes.shape[1],
+        boxes=boxes,
+        shapes=ordered.numbers.astype(np.float32),
+        heads=heads,
+        planes=np.concatenate([np.zeros((0, PLANE_FLOATS)), *planes]).astype(np.float32),
+        standing_count=checked.shape[1],
+        checked=checked.astype(np.int32),
+        excluding=np.asarray((~checked).any(axis=1), dtype=np.int32),
+        own=own,
+        clouds=clouds,
+        block_count=blocks.shape[1],
+        block_boxes=blocks,
     )
 
 

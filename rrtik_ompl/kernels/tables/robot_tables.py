@@ -19,55 +19,37 @@ from rrtik_ompl.geometry.collision.bodies import Body
 from rrtik_ompl.kernels.layout import (
     ALIGNED_TURN,
     BALL_FLOATS,
-    BALLS,
-    BODIES,
-    BODY_BALLS,
-    BODY_COUNT,
     BODY_END,
     BODY_FIRST,
     BODY_FRAME,
     BODY_INTS,
-    CLUSTER_BALLS,
     CLUSTER_BODY,
-    CLUSTER_COUNT,
     CLUSTER_END,
     CLUSTER_FIRST,
     CLUSTER_FRAME,
     CLUSTER_INTS,
-    CLUSTERS,
     FIRST_TURN,
-    GROUP_BALLS,
-    GROUP_COUNT,
     GROUP_END,
     GROUP_FIRST,
     GROUP_FRAME,
     GROUP_INTS,
-    GROUPS,
-    JOINT_COUNT,
-    JOINT_KINDS,
     ORIGIN,
-    PAIR_COUNT,
-    PAIR_GROUP_COUNT,
     PAIR_GROUP_END,
     PAIR_GROUP_FIRST,
     PAIR_GROUP_INTS,
     PAIR_GROUP_ONE,
     PAIR_GROUP_OTHER,
-    PAIR_GROUPS,
     PAIR_INTS,
     PAIR_ONE,
     PAIR_OTHER,
-    PAIRS,
-    PARENTS,
-    PHASES,
-    PLACEMENTS,
     POSE_NUMBERS,
     ROTATION,
-    SELF_MARGIN,
     SLIDE,
     TURN,
+    ArmTable,
+    BallTable,
 )
-from rrtik_ompl.kernels.tables.memory import Table, table, whole_records
+from rrtik_ompl.kernels.tables.memory import packed, whole_records
 from rrtik_ompl.model.robot import Chain
 
 Spheres: TypeAlias = NDArray[np.float64]  # shape (n, 4): centre and radius [m]
@@ -92,7 +74,7 @@ class MovingBody:
     inner: Spheres
 
 
-def arm_table(chain: Chain) -> Table:
+def arm_table(chain: Chain) -> ArmTable:
     """The joints of a tree."""
     turns, parents = axis_turns(chain), chain.parent.tolist()
     placements, phases = np.empty((len(parents), POSE_NUMBERS)), np.zeros(len(parents))
@@ -109,14 +91,13 @@ def arm_table(chain: Chain) -> Table:
             rotation = np.array([[1.0, 0.0, 0.0], [0.0, cosine, -sine], [0.0, sine, cosine]])
         placements[row, ROTATION : ROTATION + 9] = rotation.ravel()
         placements[row, ORIGIN : ORIGIN + 3] = back @ chain.placement[row][:3, 3]
-    return table(
-        {
-            JOINT_COUNT: len(parents),
-            PARENTS: chain.parent.astype(np.int32) + np.int32(1),
-            JOINT_KINDS: np.array(kinds, dtype=np.int32),
-            PLACEMENTS: placements.astype(np.float32),
-            PHASES: phases,
-        }
+    return packed(
+        ArmTable,
+        joint_count=len(parents),
+        parents=chain.parent.astype(np.int32) + np.int32(1),
+        joint_kinds=np.array(kinds, dtype=np.int32),
+        placements=placements.astype(np.float32),
+        phases=phases,
     )
 
 
@@ -199,7 +180,9 @@ def rounding_margin(chain: Chain, reaches: Sequence[tuple[int, float]], strokes:
     return max(SMALLEST_MARGIN, MARGIN_PER_LEVER * float(levers.sum()), MARGIN_PER_METRE * extent)
 
 
-def ball_table(bodies: Sequence[MovingBody], pairs: Sequence[tuple[int, int]], *, inner: bool, kept: float) -> Table:
+def ball_table(
+    bodies: Sequence[MovingBody], pairs: Sequence[tuple[int, int]], *, inner: bool, kept: float
+) -> BallTable:
     """Balls of the moving bodies in three levels, and the pairs of bodies (numbers in ``bodies``) to test.
 
     Args:
@@ -233,24 +216,23 @@ def ball_table(bodies: Sequence[MovingBody], pairs: Sequence[tuple[int, int]], *
     present.sort(key=lambda p: sorted(group_of[bodies[k].frame] for k in p))
     pair_groups = _pair_groups([(group_of[bodies[i].frame], group_of[bodies[j].frame]) for i, j in present])
     runs = [(clusters[g[GROUP_FIRST]][CLUSTER_FIRST], clusters[g[GROUP_END] - 1][CLUSTER_END]) for g in groups]
-    return table(
-        {
-            GROUP_COUNT: len(groups),
-            GROUPS: whole_records(GROUP_INTS, groups),
-            GROUP_BALLS: np.array([enclosing_ball(stacked[a:b]) for a, b in runs], dtype=np.float32),
-            CLUSTERS: whole_records(CLUSTER_INTS, clusters),
-            CLUSTER_BALLS: np.array([enclosing_ball(b) for b in balls], dtype=np.float32),
-            BALLS: stacked.astype(np.float32),
-            BODIES: whole_records(BODY_INTS, spans),
-            BODY_BALLS: np.array(body_balls, dtype=np.float32),
-            PAIR_GROUP_COUNT: len(pair_groups),
-            PAIR_GROUPS: whole_records(PAIR_GROUP_INTS, pair_groups),
-            PAIRS: whole_records(PAIR_INTS, [{PAIR_ONE: i, PAIR_OTHER: j} for i, j in present]),
-            CLUSTER_COUNT: len(clusters),
-            BODY_COUNT: len(bodies),
-            PAIR_COUNT: len(present),
-            SELF_MARGIN: np.array([kept], dtype=np.float32),
-        }
+    return packed(
+        BallTable,
+        group_count=len(groups),
+        groups=whole_records(GROUP_INTS, groups),
+        group_balls=np.array([enclosing_ball(stacked[a:b]) for a, b in runs], dtype=np.float32),
+        clusters=whole_records(CLUSTER_INTS, clusters),
+        cluster_balls=np.array([enclosing_ball(b) for b in balls], dtype=np.float32),
+        balls=stacked.astype(np.float32),
+        bodies=whole_records(BODY_INTS, spans),
+        body_balls=np.array(body_balls, dtype=np.float32),
+        pair_group_count=len(pair_groups),
+        pair_groups=whole_records(PAIR_GROUP_INTS, pair_groups),
+        pairs=whole_records(PAIR_INTS, [{PAIR_ONE: i, PAIR_OTHER: j} for i, j in present]),
+        cluster_count=len(clusters),
+        body_count=len(bodies),
+        pair_count=len(present),
+        self_margin=np.array([kept], dtype=np.float32),
     )
 
 

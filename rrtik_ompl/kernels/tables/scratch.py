@@ -6,47 +6,49 @@ import numpy as np
 
 from rrtik_ompl.kernels import layout
 from rrtik_ompl.kernels.simd.processor import WIDTH
-from rrtik_ompl.kernels.tables.memory import Table, table, whole_lanes
+from rrtik_ompl.kernels.tables.memory import packed, whole_lanes
 
 
-def scratch_table(arm: Table, balls: tuple[Table, ...], bounds: Table, primitives: tuple[Table, ...]) -> Table:
+def scratch_table(
+    arm: layout.ArmTable,
+    balls: tuple[layout.BallTable, layout.BallTable],
+    bounds: layout.BoundTable,
+    primitives: tuple[layout.PrimitiveTable, layout.PrimitiveTable],
+) -> layout.ScratchTable:
     """Memory for one thread that checks with these tables; the frame of the world is in place."""
-
-    def most(tables: tuple[Table, ...], place: int) -> int:
-        return max(int(t.header[place]) for t in tables)
-
-    frames = np.zeros((int(arm.header[layout.JOINT_COUNT]) + 1, layout.POSE_NUMBERS, WIDTH), dtype=np.float32)
+    outer, inner = balls
+    body_count = max(outer.body_count, inner.body_count)
+    pair_count = max(outer.pair_count, inner.pair_count)
+    frames = np.zeros((arm.joint_count + 1, layout.POSE_NUMBERS, WIDTH), dtype=np.float32)
     frames[0, layout.ROTATION : layout.ROTATION + 9] = np.eye(3).reshape(9, 1)
-    ball_count = max(len(t[layout.BALLS]) // layout.BALL_FLOATS for t in balls)
-    numbers = np.zeros(most(primitives, layout.PADDED_COUNT), dtype=np.int32)
-    crossing = most(balls, layout.BODY_COUNT) * most(primitives, layout.STANDING_COUNT)
-    return table(
-        {
-            layout.VALUES: np.zeros((len(frames), WIDTH)),
-            layout.FRAMES: frames,
-            layout.GROUP_CENTRES: np.zeros((most(balls, layout.GROUP_COUNT), 3, WIDTH), dtype=np.float32),
-            layout.CENTRES: np.zeros((ball_count, 3, WIDTH), dtype=np.float32),
-            layout.PLACED: np.zeros(most(balls, layout.CLUSTER_COUNT), dtype=np.int32),
-            layout.FOUND: numbers,
-            layout.NEAR: numbers,
-            layout.MET: numbers,
-            layout.WAITING: np.zeros(WIDTH, dtype=np.int32),
-            layout.OUTER_LIKELY: np.full((layout.LIKELY_COUNT, layout.LIKELY_INTS), -1, dtype=np.int32),
-            layout.INNER_LIKELY: np.full((layout.LIKELY_COUNT, layout.LIKELY_INTS), -1, dtype=np.int32),
-            layout.NOTE: np.zeros(WIDTH, dtype=np.float32),
-            layout.WATCH: np.zeros(int(bounds.header[layout.BOUND_BLOCKS]) * WIDTH, dtype=np.float32),
-            layout.MARKS: whole_lanes(np.zeros(crossing + most(balls, layout.PAIR_COUNT), dtype=np.int32)),
-        }
+    ball_count = max(len(outer.balls), len(inner.balls)) // layout.BALL_FLOATS
+    numbers = np.zeros(max(each.padded_count for each in primitives), dtype=np.int32)
+    crossing = body_count * max(each.standing_count for each in primitives)
+    return packed(
+        layout.ScratchTable,
+        values=np.zeros((len(frames), WIDTH)),
+        frames=frames,
+        group_centres=np.zeros((max(outer.group_count, inner.group_count), 3, WIDTH), dtype=np.float32),
+        centres=np.zeros((ball_count, 3, WIDTH), dtype=np.float32),
+        placed=np.zeros(max(outer.cluster_count, inner.cluster_count), dtype=np.int32),
+        found=numbers,
+        near=numbers,
+        met=numbers,
+        waiting=np.zeros(WIDTH, dtype=np.int32),
+        outer_likely=np.full((layout.LIKELY_COUNT, layout.LIKELY_INTS), -1, dtype=np.int32),
+        inner_likely=np.full((layout.LIKELY_COUNT, layout.LIKELY_INTS), -1, dtype=np.int32),
+        note=np.zeros(WIDTH, dtype=np.float32),
+        watch=np.zeros(bounds.blocks * WIDTH, dtype=np.float32),
+        marks=whole_lanes(np.zeros(crossing + pair_count, dtype=np.int32)),
     )
 
 
-def probe_table(primitives: tuple[Table, ...]) -> Table:
+def probe_table(primitives: tuple[layout.PrimitiveTable, layout.PrimitiveTable]) -> layout.ProbeTable:
     """Memory for measuring distances against any of these tables of primitives."""
-    listed = max(int(t.header[layout.PADDED_COUNT]) for t in primitives)
-    return table(
-        {
-            layout.BEST: np.zeros(WIDTH, dtype=np.float32),
-            layout.WHICH: np.zeros(WIDTH, dtype=np.int32),
-            layout.GAPS: np.zeros((listed, WIDTH), dtype=np.float32),
-        }
+    listed = max(each.padded_count for each in primitives)
+    return packed(
+        layout.ProbeTable,
+        best=np.zeros(WIDTH, dtype=np.float32),
+        which=np.zeros(WIDTH, dtype=np.int32),
+        gaps=np.zeros((listed, WIDTH), dtype=np.float32),
     )

@@ -27,7 +27,6 @@ from rrtik_ompl.kernels.layout import (
     BOUND_RADIUS,
     CLOUD_SOLID,
     CONVEX_SOLID,
-    CORNERS,
     DISC,
     END_BLOCK,
     FIRST_BLOCK,
@@ -38,19 +37,17 @@ from rrtik_ompl.kernels.layout import (
     MERE_CORNERS,
     ROUND,
     SIZE_COUNT,
-    SIZES,
     SLACK,
     SOLID_INTS,
     SOLID_KIND,
-    SOLIDS,
     SPAN_FRAME,
     SPAN_INTS,
-    SPANS,
     UNKNOWN_SOLID,
+    SolidTable,
 )
 from rrtik_ompl.kernels.simd.processor import WIDTH
 from rrtik_ompl.kernels.tables.cloud_layout import LEAF
-from rrtik_ompl.kernels.tables.memory import Table, table
+from rrtik_ompl.kernels.tables.memory import packed
 
 MAX_COMPARED_SIZE = 1e4  # [m]; what is larger or farther away is not compared
 SLACK_PER_METRE = 2e-6  # rounding of corners and of their heights in float32, relative to the coordinates
@@ -189,7 +186,7 @@ def _runs(counts: Sequence[int]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     return np.repeat(np.arange(len(counts)), counts), np.concatenate([[0], np.cumsum(counts, dtype=np.int64)])
 
 
-def solid_table(bodies: Sequence[tuple[int, Sequence[Solids]]]) -> Table:
+def solid_table(bodies: Sequence[tuple[int, Sequence[Solids]]]) -> SolidTable:
     """Table of bodies: for each the frame that carries it and the solids of its parts in that frame.
 
     A part without solids around it leaves the body unknown.
@@ -210,13 +207,12 @@ def solid_table(bodies: Sequence[tuple[int, Sequence[Solids]]]) -> Table:
     numbers[:, SOLID_KIND], numbers[:, IS_INSIDE] = [s.kind for s in solids], [s.inside for s in solids]
     records = np.zeros((len(spans), SPAN_INTS), dtype=np.int32)
     records[:, [SPAN_FRAME, AROUND_FIRST, AROUND_END, INSIDE_FIRST, INSIDE_END]] = np.reshape(spans, (-1, SPAN_INTS))
-    return table(
-        {
-            SPANS: records,
-            SOLIDS: numbers,
-            SIZES: solid_sizes(solids),
-            CORNERS: corner_blocks(solids).astype(np.float32),
-        }
+    return packed(
+        SolidTable,
+        spans=records,
+        solids=numbers,
+        sizes=solid_sizes(solids),
+        corners=corner_blocks(solids).astype(np.float32),
     )
 
 

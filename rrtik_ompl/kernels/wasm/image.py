@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.kernels.layout import ALIGNMENT
-from rrtik_ompl.kernels.record import Record, holds_array, holds_table
+from rrtik_ompl.kernels.record import Record, holds_array, holds_table, holds_tables
 from rrtik_ompl.kernels.tables.memory import PlannedTable, Table
 
 Block: TypeAlias = Record | Table | PlannedTable | NDArray[Any]
@@ -87,7 +87,10 @@ class MemoryImage:
         arrays = record.memory.arrays
         for name, place in record.places.items():
             other = getattr(record, name) if holds_table(record.kinds[name]) else links.get(place)
-            if other is not None:
+            if holds_tables(record.kinds[name]):
+                moved = np.array([self.add(each) for each in getattr(record, name)], dtype=np.int64)
+                header[place] = self._append(_address(arrays[place]), moved)
+            elif other is not None:
                 header[place] = self.add(other)
             elif place in arrays and holds_array(record.kinds[name]):
                 header[place] = self.add(arrays[place])

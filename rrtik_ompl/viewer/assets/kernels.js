@@ -47,7 +47,7 @@ class Kernels {
     this.shortcuts = this.table(places.shortcuts, names.shortcut);
     this.crdt = this.table(places.crdt, names.crdt);
     this.motions = this.table(places.motions, names.motion);
-    this.world = this.table(places.world, names.table);
+    this.world = this.table(places.world, names.world);
     this.spare = plan.end;
     this.touched = new Map();  // by the names of obstacles that were moved: the part of the base that each touches, or null
     const joints = this.motions.get("JOINTS");
@@ -199,7 +199,7 @@ class Kernels {
   nearest(q) {
     this.setValues(q);
     const { values, found, pair } = this.room;
-    const tables = [this.world.address, this.world.get("OUTER"), this.world.get("OUTER_PRIMITIVES"), values, 1, this.plan.places.probe, found, pair];
+    const tables = [this.world.address, this.world.get("OUTER_BALLS"), this.world.get("OUTER_PRIMITIVES"), values, 1, this.plan.places.probe, found, pair];
     this.entries.distance_measure(...tables.map(BigInt));
     const flag = this.ints[pair / LANE_BYTES];
     return { metres: flag < 0 ? Infinity : this.doubles[found / NUMBER_BYTES], pair: flag < 0 ? null : this.pairOf(flag) };
@@ -210,7 +210,7 @@ class Kernels {
     const { moving, standing, names } = this.plan;
     const crossing = moving.length * standing.length;
     if (flag < crossing) return [moving[Math.floor(flag / standing.length)], standing[flag % standing.length]];
-    const pairs = this.table(this.world.get("OUTER"), names.table).get("PAIRS") / LANE_BYTES;
+    const pairs = this.table(this.world.get("OUTER_BALLS"), names.balls).get("PAIRS") / LANE_BYTES;
     const first = pairs + names.table.PAIR_INTS * (flag - crossing);
     return [moving[this.ints[first + names.table.PAIR_ONE]], moving[this.ints[first + names.table.PAIR_OTHER]]];
   }

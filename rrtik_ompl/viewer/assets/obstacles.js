@@ -58,13 +58,13 @@ function placeBlock(kernels, table, row) {
 
 function placePrimitive(kernels, tableName, obstacle, pose, grow) {
   const names = kernels.plan.names.table;
-  const table = kernels.table(kernels.world.get(tableName), names);
+  const table = kernels.table(kernels.world.get(tableName), kernels.plan.names.primitives);
   const row = kernels.ints[table.get("OWN") / LANE_BYTES + obstacle.place];
   if (row < 0) return;
   const { numbers, spread, thickness } = primitiveOf(kernels, obstacle, pose, grow);
   const centre = column(pose, 3);
   const more = kernels.plan.slack.primitive * (1 + largest(centre) + Math.max(...spread));
-  const shape = table.get("PRIMITIVES") / LANE_BYTES + row * names.SHAPE_FLOATS;
+  const shape = table.get("SHAPES") / LANE_BYTES + row * names.SHAPE_FLOATS;
   kernels.floats.fill(0, shape, shape + names.SHAPE_FLOATS);
   kernels.floats.set(numbers, shape);
   const [boxes, padded] = [table.get("BOXES") / LANE_BYTES, table.get("PADDED_COUNT")];
@@ -85,7 +85,7 @@ function placedCorners({ corners }, pose) {
 
 function placeSolid(kernels, obstacle, pose) {
   const names = kernels.plan.names.table;
-  const table = kernels.table(kernels.world.get("STANDING_SOLIDS"), names);
+  const table = kernels.table(kernels.world.get("STANDING_SOLIDS"), kernels.plan.names.solids);
   const span = table.get("SPANS") / LANE_BYTES + names.SPAN_INTS * obstacle.place;
   const solid = kernels.ints[span + names.AROUND_FIRST];
   const block = kernels.ints[table.get("SOLIDS") / LANE_BYTES + names.SOLID_INTS * solid + names.FIRST_BLOCK];

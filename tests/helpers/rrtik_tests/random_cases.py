@@ -11,7 +11,7 @@ from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.description.urdf import robot_from_urdf_text
 from rrtik_ompl.geometry.collision.bodies import Body
 from rrtik_ompl.geometry.collision.solids import bvh, hull
-from rrtik_ompl.kernels import FastWorld, layout
+from rrtik_ompl.kernels import FastWorld
 from rrtik_ompl.kernels.checks import check_kernels as kernels
 from rrtik_ompl.kernels.simd.processor import WIDTH
 from rrtik_ompl.kernels.tables import robot_tables as tables
@@ -196,9 +196,9 @@ def kernel_frames(robot, V):
         block = V[start : start + WIDTH]
         values = np.zeros((len(turns) + 1, WIDTH))
         values[:-1, : len(block)] = block.T
-        world._scratch[layout.VALUES][:] = values.ravel()
-        kernels.forward_kinematics(world._arm.arm.address, world._scratch.address)
-        frames = world._scratch[layout.FRAMES].reshape(-1, 12, WIDTH).transpose(2, 0, 1)[: len(block)]
+        world._scratch.values[:] = values.ravel()
+        kernels.forward_kinematics(world._arm.arm, world._scratch)
+        frames = world._scratch.frames.reshape(-1, 12, WIDTH).transpose(2, 0, 1)[: len(block)]
         found[start : start + WIDTH, :, :3, :3] = frames[..., :9].reshape(len(block), -1, 3, 3)
         found[start : start + WIDTH, :, :3, 3] = frames[..., 9:]
     found[:, 1:, :3, :3] = found[:, 1:, :3, :3] @ turns.transpose(0, 2, 1)

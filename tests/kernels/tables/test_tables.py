@@ -5,7 +5,7 @@ import pinocchio as pin
 import pytest
 
 from rrtik_ompl.geometry.collision.bodies import Body
-from rrtik_ompl.kernels import FastWorld, layout
+from rrtik_ompl.kernels import FastWorld
 from rrtik_ompl.kernels.simd.processor import WIDTH
 from rrtik_ompl.kernels.tables import robot_tables as tables
 from rrtik_tests.random_cases import Case, joint_values
@@ -28,19 +28,19 @@ def test_a_new_scene_keeps_the_tables_of_the_arm():
 def test_every_number_in_the_tables_points_into_them():
     case = Case("panda", 4)
     for balls in case.world._arm.balls:
-        clusters, count = balls[layout.CLUSTERS].reshape(-1, 4), len(balls[layout.BALLS]) // 4
+        clusters, count = balls.clusters.reshape(-1, 4), len(balls.balls) // 4
         assert clusters[0, 2] == 0
         assert clusters[-1, 3] == count
         assert (clusters[1:, 2] == clusters[:-1, 3]).all()
-        assert len(clusters) == balls.header[layout.CLUSTER_COUNT]
-        assert balls[layout.GROUPS].reshape(-1, 3)[-1, 2] == len(clusters)
-        assert balls[layout.PAIRS].max() < balls.header[layout.BODY_COUNT]
-        assert balls[layout.PAIR_GROUPS].reshape(-1, 4)[-1, 3] == balls.header[layout.PAIR_COUNT]
+        assert len(clusters) == balls.cluster_count
+        assert balls.groups.reshape(-1, 3)[-1, 2] == len(clusters)
+        assert balls.pairs.max() < balls.body_count
+        assert balls.pair_groups.reshape(-1, 4)[-1, 3] == balls.pair_count
     for rows in case.world._primitives:
-        numbers = rows[layout.NUMBERS].reshape(-1, 4)
-        assert numbers[:, 1].max() < rows.header[layout.STANDING_COUNT]
-        assert numbers[:, 3].max() <= len(rows[layout.PLANES]) // 4
-        assert rows.header[layout.PADDED_COUNT] % WIDTH == 0
+        numbers = rows.heads.reshape(-1, 4)
+        assert numbers[:, 1].max() < rows.standing_count
+        assert numbers[:, 3].max() <= len(rows.planes) // 4
+        assert rows.padded_count % WIDTH == 0
 
 
 def test_balls_around_balls_contain_them():

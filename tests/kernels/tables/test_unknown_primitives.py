@@ -24,7 +24,7 @@ def spoiled_world():
     fast = rrtik.World(robot, rrtik.Scene([rrtik.Obstacle("ball", rrtik.Sphere(1.0), rrtik.pose([5, 5, 0]))])).fast
     assert isinstance(fast, FastWorld)
     for primitives in fast._primitives:
-        primitives[layout.NUMBERS].reshape(-1, layout.HEAD_INTS)[:, layout.KIND] = UNKNOWN
+        primitives.heads.reshape(-1, layout.HEAD_INTS)[:, layout.KIND] = UNKNOWN
     return fast
 
 
@@ -72,6 +72,6 @@ def test_no_table_is_packed_with_it():
     (body,) = scene_bodies(robot, rrtik.Scene([rrtik.Obstacle("box", rrtik.Box([1, 1, 1]))]))
     known = outer_primitives([body], [np.zeros((0, 4))])
     checked = np.ones((1, 1), dtype=bool)
-    assert primitive_table(known, checked).header[layout.PRIMITIVE_COUNT] == 1
+    assert primitive_table(known, checked).count == 1
     with pytest.raises(InputError, match=f"unknown kind {UNKNOWN}; have 0 to {UNKNOWN - 1}"):
         primitive_table(replace(known, kinds=np.array([UNKNOWN])), checked)

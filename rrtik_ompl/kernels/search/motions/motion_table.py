@@ -93,7 +93,7 @@ class FastMotions:
         self.identity = matrix.shape == (joints, joints) and bool((matrix == np.eye(joints)).all() and not shift.any())
         self.table = packed(
             MotionTable,
-            world=fast.address,
+            world=fast.table,
             dof=self.dof,
             joints=joints,
             gain=matrix,

@@ -21,7 +21,7 @@ from rrtik_ompl.kernels.search.motions.row_kernels import Configuration, row_at
 from rrtik_ompl.kernels.simd.compiled import WIDTH, entry, inlined, kernel
 from rrtik_ompl.kernels.simd.lanes import bits, lane_numbers, set_wide_lanes
 from rrtik_ompl.kernels.simd.records import exists
-from rrtik_ompl.kernels.tables.accessors import arm_of, joint_count_of, joint_row, scratch_of, values_of
+from rrtik_ompl.kernels.tables.accessors import joint_row
 
 LOOKS = 2  # blocks of configurations, spread over a motion, that are looked at before it is proven
 
@@ -29,13 +29,13 @@ LOOKS = 2  # blocks of configurations, spread over a motion, that are looked at 
 @kernel
 def seen_colliding(world: WorldTable, start: JointValues, end: JointValues) -> bool:
     """Whether the inner balls meet something at one of a few configurations of a motion."""
-    scratch, joints = scratch_of(world), joint_count_of(arm_of(world))
-    values, every = values_of(scratch), bits(lane_numbers() >= 0.0)
+    scratch, joints = world.scratch, world.arm.joint_count
+    values, every = scratch.values, bits(lane_numbers() >= 0.0)
     for block in range(LOOKS):
         share = (lane_numbers() * float(LOOKS) + float(block)) / float(LOOKS * WIDTH - 1)
         for joint in range(joints):
             set_wide_lanes(values, joint, (1.0 - share) * start[joint] + share * end[joint])
-        forward_kinematics(arm_of(world), scratch)
+        forward_kinematics(world.arm, scratch)
         if inner_collision(world, every, block >= 0) != 0:
             return True
     return False
