@@ -1,9 +1,8 @@
-"""Where things stand in the tables that Python packs and kernels read, and the types of their addresses.
+"""The tables of the collision checks, which Python packs and kernels read, and what several rooms of kernels share.
 
-A table is an int64 array of fields; a field is a number or the address of an array. An array holds records, each of so
-many numbers. The names below are the places of the fields in a table and of the numbers in a record; packers, kernels
-and the reference implementation in numpy all use these names, so that every place stands here once. Kernels read by the
-named functions of :mod:`rrtik_ompl.kernels.tables.accessors`.
+Each table is declared here once, as a class; see :mod:`rrtik_ompl.kernels.record`. Some arrays hold rows of so many
+numbers, whose places have names beside the class of the array: packers and the reference implementation in numpy use
+these names, and kernels read by the named functions of :mod:`rrtik_ompl.kernels.tables.accessors`.
 
 Frames are counted like Pinocchio's joints: 0 is the world. This module imports no library, so that packing needs no
 compiler and compiling no collision library.
@@ -21,36 +20,28 @@ FREE, UNDECIDED, COLLIDING = 0, 1, 2  # answers
 UNSOUND = -1  # what an entry returns in place of a count if a table holds what no kernel knows
 
 
-class Frame(Floats):
-    """Lanes of the rotation row by row, then of the origin."""
+class Configuration(Doubles):
+    """Rows of one number for each coordinate."""
 
 
-class Centre(Floats):
-    """Points: lanes of x, of y and of z each."""
+class JointValues(Doubles):
+    """Rows of one number for each joint."""
 
 
-class PrimitiveList(Ints):
-    """Numbers of primitives."""
-
-
-class LikelyBall(Ints):
-    """Balls that met something lately, the likeliest first; see below."""
-
-
-class Marks(Ints):
-    """For each pair of bodies the lanes in which it is in doubt, moving and standing bodies first."""
-
-
-class Watch(Floats):
-    """For each group, then each pair of groups, of outer balls one number.
-
-    It is by how much [m] bounds are widened for the configurations of a motion that are yet to be checked; CLEAR if
-    nothing can be met at any of them.
-    """
+# What moves: joints.
 
 
 class Placement(Floats):
     """The rotation row by row, then the origin."""
+
+
+class Frame(Floats):
+    """As a placement, in lanes."""
+
+
+AXES = 3  # numbers of a point, rows of a rotation
+POSE_NUMBERS = 12
+ROTATION, ORIGIN = 0, 9
 
 
 class ArmTable(Record):
@@ -63,32 +54,63 @@ class ArmTable(Record):
     phases: Doubles  # what is added to each value
 
 
+# Kinds of joints. FIRST_TURN: its parent is the world. ALIGNED_TURN: its placement turns about x alone.
+TURN, SLIDE, FIRST_TURN, ALIGNED_TURN = range(4)
+
+
+# What moves: balls, in three levels. A body is a run of clusters too.
+
+
 class Ball(Floats):
-    """The centre in the joint's frame, then the radius."""
+    """Centre in the joint's frame, radius."""
+
+
+BALL_FLOATS = 4
+CENTRE, RADIUS = 0, 3
 
 
 class Group(Ints):
-    """All that a joint carries; see below."""
+    """All that a joint carries: frame, clusters from, to."""
+
+
+GROUP_INTS = 3
+GROUP_FRAME, GROUP_FIRST, GROUP_END = range(3)
 
 
 class Cluster(Ints):
-    """Balls of a body that are neighbours; see below."""
+    """Neighbours of a body: number of the body, frame, balls from, to."""
+
+
+CLUSTER_INTS = 4
+CLUSTER_BODY, CLUSTER_FRAME, CLUSTER_FIRST, CLUSTER_END = range(4)
 
 
 class MovingBody(Ints):
-    """A run of clusters; see below."""
+    """Frame, clusters from, to."""
+
+
+BODY_INTS = 3
+BODY_FRAME, BODY_FIRST, BODY_END = range(3)
 
 
 class PairGroup(Ints):
-    """Pairs between the same two groups; see below."""
+    """Numbers of two groups, pairs of their bodies from, to."""
+
+
+PAIR_GROUP_INTS = 4
+PAIR_GROUP_ONE, PAIR_GROUP_OTHER, PAIR_GROUP_FIRST, PAIR_GROUP_END = range(4)
 
 
 class Pair(Ints):
-    """Two bodies that must not touch; see below."""
+    """Numbers of two bodies that must not touch."""
+
+
+PAIR_INTS = 2
+PAIR_ONE, PAIR_OTHER = range(2)
 
 
 class BallTable(Record):
-    """The balls of the outer cover, or inner ones, in three levels: groups of clusters of balls."""
+    """The balls of the outer cover, or inner ones: groups of clusters of balls."""
 
     group_count: int
     groups: Group
@@ -107,20 +129,55 @@ class BallTable(Record):
     self_margin: Floats  # one number: how far two bodies must stay apart [m]
 
 
+class BoundTable(Record):
+    """How far joints can move what is watched."""
+
+    blocks: int  # of lanes in a row
+    # The first row has the last frame that each needs. The second one is added to the sum of the others, one for each
+    # joint, times what the joints move.
+    rows: Floats
+
+
+# What stands still: primitives.
+
+
 class PrimitiveHead(Ints):
-    """The kind of a primitive, and what belongs to it; see below."""
+    """Kind, number of its standing body, planes from, to (of a cloud: its number among these)."""
+
+
+HEAD_INTS = 4
+KIND, STANDING_BODY, FIRST_PLANE, END_PLANE = range(4)
+
+# Kinds of primitives. A new one needs a branch in `meets_primitive` and `primitive_gap`, in kernels and in numpy.
+BALL, CAPSULE, BOX, CYLINDER, HALF_SPACE, CONVEX, CLOUD = KINDS = range(7)
+KIND_COUNT, CENTRED_KINDS = len(KINDS), 4  # the latter: so many, the first ones, have a centre
 
 
 class PrimitiveShape(Floats):
-    """The numbers of a primitive, by its kind; see below."""
+    """Numbers by the kind: all but half-spaces and convex ones begin with their centre, a capsule with one end."""
+
+
+SHAPE_FLOATS = 16
+SHAPE_CENTRE = 0
+BALL_RADIUS = 3
+CAPSULE_AXIS, CAPSULE_INVERSE_SQUARE, CAPSULE_RADIUS = 3, 6, 7  # vector to the other end; 1 / length^2 (0 for a ball)
+BOX_AXES, BOX_HALF_SIZES = 3, 12
+CYLINDER_AXIS, CYLINDER_HALF_LENGTH, CYLINDER_RADIUS = 3, 6, 7
+HALF_SPACE_NORMAL, HALF_SPACE_OFFSET = 0, 3  # outward
+CLOUD_AXES, CLOUD_RADIUS = 3, 12  # a cloud's centre is the origin of its frame
+CONVEX_SHARE = 0  # 1 if a ball meets it that reaches behind all planes, 0 if the ball's centre must lie behind them
 
 
 class Plane(Floats):
-    """The outward normal, then the offset."""
+    """Outward normal, offset."""
+
+
+PLANE_FLOATS = 4
+PLANE_NORMAL, PLANE_OFFSET = 0, 3
 
 
 class PrimitiveTable(Record):
-    """What stands still: primitives around the bodies, or inside them."""
+    """Primitives around what stands still, or inside it, sorted by kind."""
 
     count: int
     padded_count: int
@@ -137,16 +194,37 @@ class PrimitiveTable(Record):
     block_boxes: Floats  # as ``boxes``, around each ``BLOCK`` primitives
 
 
+BLOCK = 16  # primitives: boxes are compared this many at a time, or half as many
+LOW_X, HIGH_X, LOW_Y, HIGH_Y, LOW_Z, HIGH_Z = BOX_RUNS = range(6)
+
+
+# Solids of bodies: those that move and those that stand still.
+
+
 class Span(Ints):
-    """The frame of a body and its solids; see below."""
+    """Of a body: frame, solids around it from, to, solids inside it from, to."""
+
+
+SPAN_INTS = 5
+SPAN_FRAME, AROUND_FIRST, AROUND_END, INSIDE_FIRST, INSIDE_END = range(5)
 
 
 class Solid(Ints):
-    """The kind of a solid and its corners; see below."""
+    """Kind, blocks of corners from, to, whether it is inside its body."""
+
+
+SOLID_INTS = 4
+SOLID_KIND, FIRST_BLOCK, END_BLOCK, IS_INSIDE = range(4)
+UNKNOWN_SOLID, CONVEX_SOLID, HALF_SPACE_SOLID, MERE_CORNERS = range(4)  # the last: nothing between
+CLOUD_SOLID = 4  # stands for one point after the other, which a kernel puts into its corners
 
 
 class SolidSizes(Doubles):
-    """See below."""
+    """Radius of the disc (offset of a half-space), axis, radius of the ball, slack, bounding ball (centre, radius)."""
+
+
+SIZE_COUNT = 10
+DISC, AXIS, ROUND, SLACK, BOUND_CENTRE, BOUND_RADIUS = 0, 1, 4, 5, 6, 9
 
 
 class Corners(Floats):
@@ -154,7 +232,7 @@ class Corners(Floats):
 
 
 class SolidTable(Record):
-    """Solids around and inside bodies: moving ones, or those that stand still."""
+    """Convex solids around and inside bodies."""
 
     spans: Span
     solids: Solid
@@ -162,17 +240,46 @@ class SolidTable(Record):
     corners: Corners
 
 
-class BoundTable(Record):
-    """How far joints can move what is watched."""
+# What a check computes in.
 
-    blocks: int  # of lanes in a row
-    # The first row has the last frame that each needs. The second one is added to the sum of the others, one for each
-    # joint, times what the joints move.
-    rows: Floats
+
+class Centre(Floats):
+    """Points: lanes of x, of y and of z each."""
+
+
+class PrimitiveList(Ints):
+    """Numbers of primitives."""
+
+
+class Marks(Ints):
+    """For each pair of bodies the lanes in which it is in doubt, moving and standing bodies first."""
+
+
+NO_MARKS = cast(Marks, 0)
+
+
+class LikelyBall(Ints):
+    """A ball that met something lately: number (-1: none yet), frame, body. The likeliest of a list comes first."""
+
+
+LIKELY_INTS, LIKELY_COUNT = 3, 3
+LIKELY_NUMBER, LIKELY_FRAME, LIKELY_BODY = range(3)
+
+
+class Watch(Floats):
+    """For each group, then each pair of groups, of outer balls one number.
+
+    It is by how much [m] bounds are widened for the configurations of a motion that are yet to be checked; CLEAR if
+    nothing can be met at any of them.
+    """
+
+
+CLEAR = -1.0
+NO_WATCH = cast(Watch, 0)
 
 
 class ScratchTable(Record):
-    """The memory that a check computes in."""
+    """The memory of one thread."""
 
     values: Doubles  # wide lanes of joint values
     frames: Frame
@@ -211,81 +318,3 @@ class WorldTable(Record):
     standing_solids: SolidTable
     wider_solids: SolidTable  # the moving ones, each with the margin around it that the arm keeps from itself
     motion_bounds: BoundTable
-
-
-class Configuration(Doubles):
-    """Rows of one number for each coordinate."""
-
-
-class JointValues(Doubles):
-    """Rows of one number for each joint."""
-
-
-# Kinds of joints. FIRST_TURN: its parent is the world. ALIGNED_TURN: its placement turns about x alone.
-TURN, SLIDE, FIRST_TURN, ALIGNED_TURN = range(4)
-# Placement (of floats) and frame (of lanes): the rotation row by row, then the origin.
-AXES = 3  # numbers of a point, rows of a rotation
-POSE_NUMBERS = 12
-ROTATION, ORIGIN = 0, 9
-
-# Ball (floats): centre in the joint frame, radius.
-BALL_FLOATS = 4
-CENTRE, RADIUS = 0, 3
-# Group (ints): frame, clusters from, to.
-GROUP_INTS = 3
-GROUP_FRAME, GROUP_FIRST, GROUP_END = range(3)
-# Cluster (ints): number of its body, frame, balls from, to.
-CLUSTER_INTS = 4
-CLUSTER_BODY, CLUSTER_FRAME, CLUSTER_FIRST, CLUSTER_END = range(4)
-# Body (ints): frame, clusters from, to.
-BODY_INTS = 3
-BODY_FRAME, BODY_FIRST, BODY_END = range(3)
-# Pair group (ints): numbers of two groups, pairs of their bodies from, to.
-PAIR_GROUP_INTS = 4
-PAIR_GROUP_ONE, PAIR_GROUP_OTHER, PAIR_GROUP_FIRST, PAIR_GROUP_END = range(4)
-# Pair (ints): numbers of two bodies.
-PAIR_INTS = 2
-PAIR_ONE, PAIR_OTHER = range(2)
-
-BLOCK = 16  # primitives: boxes are compared this many at a time, or half as many
-LOW_X, HIGH_X, LOW_Y, HIGH_Y, LOW_Z, HIGH_Z = BOX_RUNS = range(6)
-# Head of a primitive (ints): kind, number of its standing body, planes from, to (of a cloud: its number among these).
-HEAD_INTS = 4
-KIND, STANDING_BODY, FIRST_PLANE, END_PLANE = range(4)
-# Plane (floats): outward normal, offset.
-PLANE_FLOATS = 4
-PLANE_NORMAL, PLANE_OFFSET = 0, 3
-
-# Kinds of primitives. A new one needs a branch in `meets_primitive` and `primitive_gap`, in kernels and in numpy.
-BALL, CAPSULE, BOX, CYLINDER, HALF_SPACE, CONVEX, CLOUD = KINDS = range(7)
-KIND_COUNT, CENTRED_KINDS = len(KINDS), 4  # the latter: so many, the first ones, have a centre
-# Shape of a primitive (floats): all but half-spaces and convex ones begin with their centre, a capsule with one end.
-SHAPE_FLOATS = 16
-SHAPE_CENTRE = 0
-BALL_RADIUS = 3
-CAPSULE_AXIS, CAPSULE_INVERSE_SQUARE, CAPSULE_RADIUS = 3, 6, 7  # vector to the other end; 1 / length^2 (0 for a ball)
-BOX_AXES, BOX_HALF_SIZES = 3, 12
-CYLINDER_AXIS, CYLINDER_HALF_LENGTH, CYLINDER_RADIUS = 3, 6, 7
-HALF_SPACE_NORMAL, HALF_SPACE_OFFSET = 0, 3  # outward
-CLOUD_AXES, CLOUD_RADIUS = 3, 12  # a cloud's centre is the origin of its frame
-CONVEX_SHARE = 0  # 1 if a ball meets it that reaches behind all planes, 0 if the ball's centre must lie behind them
-
-# Span of a body (ints): frame, solids around the body from, to, solids inside it from, to.
-SPAN_INTS = 5
-SPAN_FRAME, AROUND_FIRST, AROUND_END, INSIDE_FIRST, INSIDE_END = range(5)
-# Solid (ints): kind, blocks of corners from, to, whether it is inside its body.
-SOLID_INTS = 4
-SOLID_KIND, FIRST_BLOCK, END_BLOCK, IS_INSIDE = range(4)
-UNKNOWN_SOLID, CONVEX_SOLID, HALF_SPACE_SOLID, MERE_CORNERS = range(4)  # the last: nothing between
-CLOUD_SOLID = 4  # stands for one point after the other, which a kernel puts into its corners
-# Sizes of a solid (doubles): radius of its disc (offset of a half-space), axis, radius of its ball, slack, bounding
-# ball (centre, radius).
-SIZE_COUNT = 10
-DISC, AXIS, ROUND, SLACK, BOUND_CENTRE, BOUND_RADIUS = 0, 1, 4, 5, 6, 9
-
-NO_MARKS = cast(Marks, 0)
-NO_WATCH = cast(Watch, 0)
-CLEAR = -1.0  # of what is watched
-# Likely ball (ints): its number (-1: none yet), its frame, its body. There are so many, the likeliest first.
-LIKELY_INTS, LIKELY_COUNT = 3, 3
-LIKELY_NUMBER, LIKELY_FRAME, LIKELY_BODY = range(3)

@@ -41,12 +41,15 @@ def listed(found: PrimitiveList, count: int, first: int, left: int) -> int:
 @inlined
 def block_in_reach(boxes: Floats, run: int, block: int, x: Any, y: Any, z: Any, radius: Any) -> bool:
     """Whether a ball meets the box around a block of primitives in any lane."""
-    place, side = block, run * WIDTH
+    place = block
+    side = run * WIDTH
     square = spread(ZERO)
+
     for p in (x, y, z):
         beyond = larger(float_at(boxes, place) - p, p - float_at(boxes, place + side))
         square = square + larger(beyond, ZERO) * larger(beyond, ZERO)
         place += 2 * side
+
     near: bool = bits(square < radius * radius) != 0
     return near
 
@@ -59,12 +62,16 @@ def primitives_in_reach(primitives: PrimitiveTable, x: Any, y: Any, z: Any, radi
     """
     low = (lowest(x) - radius, lowest(y) - radius, lowest(z) - radius)
     high = (highest(x) + radius, highest(y) + radius, highest(z) + radius)
-    boxes, run, count = primitives.boxes, primitives.padded_count // WIDTH, 0
+    boxes = primitives.boxes
+    run = primitives.padded_count // WIDTH
+    count = 0
     blocks = primitives.block_count // WIDTH
+
     if blocks == 0:
         for k in range(run):
             count = listed(found, count, k * WIDTH, boxes_that_meet(boxes, run, k, low, high))
         return count
+
     for k in range(blocks):
         left = boxes_that_meet(primitives.block_boxes, blocks, k, low, high)
         while left != 0:
@@ -75,4 +82,5 @@ def primitives_in_reach(primitives: PrimitiveTable, x: Any, y: Any, z: Any, radi
             block *= layout.BLOCK // WIDTH
             for part in range(block, block + layout.BLOCK // WIDTH):
                 count = listed(found, count, part * WIDTH, boxes_that_meet(boxes, run, part, low, high))
+
     return count

@@ -87,7 +87,9 @@ def outer_collision(world: WorldTable, wanted: int, one: bool, watch: Watch, joi
 def inner_collision(world: WorldTable, wanted: int, one: bool) -> Any:
     """Lanes that the inner balls prove colliding, for the frames in the scratch memory."""
     likely = world.scratch.inner_likely
-    balls, primitives, joints = world.inner_balls, world.inner_primitives, world.arm.joint_count
+    balls = world.inner_balls
+    primitives = world.inner_primitives
+    joints = world.arm.joint_count
     return in_collision(world, balls, primitives, wanted, likely, one, NO_WATCH, joints)
 
 
@@ -95,9 +97,15 @@ def inner_collision(world: WorldTable, wanted: int, one: bool) -> Any:
 def likely_in_collision(world: WorldTable, wanted: int, inner: bool) -> int:
     """Lanes in which an outer or inner ball that met something lately does so again; 0 says nothing."""
     scratch = world.scratch
-    balls, primitives, likely = world.outer_balls, world.outer_primitives, scratch.outer_likely
+    balls = world.outer_balls
+    primitives = world.outer_primitives
+    likely = scratch.outer_likely
+
     if inner:
-        balls, primitives, likely = world.inner_balls, world.inner_primitives, scratch.inner_likely
+        balls = world.inner_balls
+        primitives = world.inner_primitives
+        likely = scratch.inner_likely
+
     return likely_collision(balls, primitives, scratch, wanted, likely)
 
 
@@ -124,10 +132,12 @@ def resolve_doubtful(world: WorldTable, rows: JointValues, waiting: int, answers
         load_row(world, rows, int_at(queue, min(lane, waiting - 1)), lane)
     forward_kinematics(world.arm, world.scratch)
     wanted = ALL_LANES >> (WIDTH - waiting)
-    colliding, open_ = inner_collision(world, wanted, waiting < 0), 0
+    colliding = inner_collision(world, wanted, waiting < 0)
+    open_ = 0
     if colliding != wanted:
         open_, overlapping = narrow_phase(world, wanted & ~colliding)
         colliding |= overlapping
+
     for lane in range(waiting):
         answer = COLLIDING if (colliding >> lane) & 1 else UNDECIDED if (open_ >> lane) & 1 else FREE
         set_int(answers, int_at(queue, lane), answer)
@@ -140,7 +150,10 @@ def classify(world: WorldTable, rows: JointValues, count: int, answers: Ints, re
     Rows that are not proven free wait until there are enough of them to fill all lanes of a second check. Returns
     ``count``, or UNSOUND.
     """
-    queue, waiting, joints = world.scratch.waiting, 0, world.arm.joint_count
+    queue = world.scratch.waiting
+    waiting = 0
+    joints = world.arm.joint_count
+
     for start in range(0, count, WIDTH):
         filled = min(WIDTH, count - start)
         for lane in range(WIDTH):
@@ -156,6 +169,7 @@ def classify(world: WorldTable, rows: JointValues, count: int, answers: Ints, re
                 if waiting == WIDTH:
                     resolve_doubtful(world, rows, waiting, answers)
                     waiting = 0
+
     if waiting:
         resolve_doubtful(world, rows, waiting, answers)
     return sound_count(world, count)
@@ -180,9 +194,11 @@ def places_in(number: int, blocks: int, middle: int) -> Any:
     """
     if number == 0:
         return lane_numbers() * float(blocks) + float(middle)
-    among, between = lane_numbers() + float((number - 1) * WIDTH), float(blocks - 1)
+    among = lane_numbers() + float((number - 1) * WIDTH)
+    between = float(blocks - 1)
     gap = ((among + 0.5) * (1.0 / between) - 0.5 + TO_WHOLE) - TO_WHOLE  # rounded down
     rest = among - gap * between
+
     return gap * float(blocks) + rest + smaller(larger(rest - float(middle - 1), 0.0), 1.0)
 
 
@@ -206,21 +222,29 @@ def check_part(
     The lanes of the first block are spread over the whole part, so that a collision anywhere shows early; what keeps
     its distance there from all that lies between is watched no more. Without ``resolve`` the outer balls alone decide.
     """
-    scratch, joints = world.scratch, world.arm.joint_count
+    scratch = world.scratch
+    joints = world.arm.joint_count
     blocks = (count + WIDTH - 1) // WIDTH
     every = bits(lane_numbers() >= 0.0)  # a number: for a constant numba would compile all that is called apart
-    answer, middle, watch, left = FREE, blocks // 2, NO_WATCH, joints
+    answer = FREE
+    middle = blocks // 2
+    watch = NO_WATCH
+    left = joints
+
     for number in range(blocks):
         places = smaller(places_in(number, blocks, middle), float(count - 1)) + float(first)
         share = places / float(last)
         place(world, start, end, share, left)
+
         if number == 0:
             if likely_in_collision(world, every, resolve) != 0:
                 answer = COLLIDING if resolve else UNDECIDED
                 break
+
             if blocks > 1:
                 watch = scratch.watch
                 watch_motion(world, start, end, float(middle) / float(last))
+
         doubtful = outer_collision(world, every, not resolve, watch, left)
         if doubtful != 0 and left < joints:
             place(world, start, end, share, joints)
@@ -230,14 +254,17 @@ def check_part(
             if left == 0:
                 break
             continue
+
         if not resolve:
             answer = UNDECIDED
             break
+
         resolved = resolved_block(world, doubtful, resolve)
         if resolved != FREE:
             answer = resolved
         if resolved == COLLIDING:
             break
+
     return answer
 
 
@@ -263,8 +290,10 @@ def classify_edges(
     """
     joints = world.arm.joint_count
     for k in range(count):
-        start, end = joint_row(starts, joints, k), joint_row(ends, joints, k)
+        start = joint_row(starts, joints, k)
+        end = joint_row(ends, joints, k)
         set_int(answers, k, check_edge(world, start, end, int_at(steps, k), resolve != 0))
+
     return sound_count(world, count)
 
 
@@ -274,11 +303,13 @@ def mark_pairs(world: WorldTable, row: JointValues, count: int) -> int:
 
     Returns the number of marks, or UNSOUND.
     """
-    scratch, wanted = world.scratch, ALL_LANES >> (WIDTH - count)
+    scratch = world.scratch
+    wanted = ALL_LANES >> (WIDTH - count)
     for lane in range(WIDTH):
         load_row(world, row, min(lane, count - 1), lane)
     forward_kinematics(world.arm, scratch)
     narrow_phase(world, wanted)
     balls = world.outer_balls
     crossing = balls.body_count * world.outer_primitives.standing_count
+
     return sound_count(world, crossing + balls.pair_count)

@@ -81,7 +81,11 @@ def is_cloud(solids: SolidTable, body: int) -> bool:
 @inlined
 def out_of_cloud(shape: PrimitiveShape, p: Any) -> Any:
     """A point of a cloud's frame in the world."""
-    a, b, c, centre = first_axis_of(shape), second_axis_of(shape), third_axis_of(shape), centre_of(shape)
+    a = first_axis_of(shape)
+    b = second_axis_of(shape)
+    c = third_axis_of(shape)
+    centre = centre_of(shape)
+
     return (
         a[0] * p[0] + b[0] * p[1] + c[0] * p[2] + centre[0],
         a[1] * p[0] + b[1] * p[1] + c[1] * p[2] + centre[1],
@@ -99,10 +103,14 @@ def centre_in_lane(centres: Centre, ball: int, lane: int) -> Any:
 @kernel
 def put_point(solids: SolidTable, number: int, p: Any) -> None:
     """Let the standing solid of a cloud be the ball around a point of the world."""
-    solid, corners, sizes = solid_at(solids.solids, number), solids.corners, sizes_at(solids.sizes, number)
+    solid = solid_at(solids.solids, number)
+    corners = solids.corners
+    sizes = sizes_at(solids.sizes, number)
+
     for block in range(first_block_of(solid), end_block_of(solid)):
         for axis in range(layout.AXES):
             set_lanes(corners, layout.AXES * block + axis, spread(p[axis]))
+
     for axis in range(layout.AXES):
         set_double(sizes, layout.BOUND_CENTRE + axis, p[axis])
 
@@ -126,17 +134,21 @@ def compare_point(
             if kind_of_solid(solid_at(mine.solids, one)) != layout.CONVEX_SOLID:
                 answer = UNDECIDED
                 break
+
             found, way = compare(mine, one, others, number, frames, lane, way)
             answer = max(answer, found)
             if found == COLLIDING:
                 break
+
     if answer != UNDECIDED:
         return answer, way
+
     for one in range(first_inside_of(span), end_inside_of(span)):
         if kind_of_solid(solid_at(mine.solids, one)) == layout.CONVEX_SOLID:
             found, _ = compare(mine, one, others, number, frames, lane, way)
             if found == COLLIDING:
                 return COLLIDING, way
+
     return UNDECIDED, way
 
 
@@ -156,12 +168,19 @@ def plane_below(cloud: Cloud, mine: SolidTable, span: Span, frames: Frames, lane
     ``size``: largest sum of a point's coordinates there [m], for what rounding may do.
     """
     _, shape, others, number = cloud
-    a, b, c, centre = first_axis_of(shape), second_axis_of(shape), third_axis_of(shape), centre_of(shape)
+    a = first_axis_of(shape)
+    b = second_axis_of(shape)
+    c = third_axis_of(shape)
+    centre = centre_of(shape)
     origin = float(centre[0]), float(centre[1]), float(centre[2])
-    least, down = HIGHEST, scaled(way, -1.0)
+    least = HIGHEST
+    down = scaled(way, -1.0)
+
     for one in range(first_around_of(span), end_around_of(span)):
-        p, sizes = farthest(mine, one, frames[0], frames[2], lane, down), sizes_at(mine.sizes, one)
+        p = farthest(mine, one, frames[0], frames[2], lane, down)
+        sizes = sizes_at(mine.sizes, one)
         least = min(least, dot(way, p) - round_of(sizes) - slack_of(sizes))
+
     ball = sizes_at(others.sizes, number)
     rounding = ROUNDING * (size + abs(origin[0]) + abs(origin[1]) + abs(origin[2]))
     height = least - dot(way, origin) - round_of(ball) - slack_of(ball) - rounding
@@ -187,17 +206,21 @@ def compare_ball(cloud: Cloud, mine: SolidTable, span: Span, frames: Frames, lan
     low = own[0] - reach, own[1] - reach, own[2] - reach
     high = own[0] + reach, own[1] + reach, own[2] + reach
     size = abs(own[0]) + abs(own[1]) + abs(own[2]) + 3.0 * reach
-    points, block = table.blocks, -1
+    points = table.blocks
+    block = -1
+
     while True:
         block = next_block(table, low, high, block)
         if block < 0 or answer >= worst:
             return answer, plane
+
         left = points_in_reach(points, block, low, high) & ~points_below(points, block, plane, plane[3])
         while left != 0:
             p = point_at(points, block, first_bit(left))
             left &= left - 1
             if squared(p[0] - own[0], p[1] - own[1], p[2] - own[2]) >= reach * reach:
                 continue
+
             p = out_of_cloud(shape, p)
             put_point(others, number, p)
             way = minus((float(x), float(y), float(z)), p)
@@ -216,10 +239,12 @@ def compare_ball(cloud: Cloud, mine: SolidTable, span: Span, frames: Frames, lan
 @inlined
 def cloud_of(world: WorldTable, standing: int) -> Cloud:
     """The cloud that a standing body is; see ``Cloud``."""
-    primitives, others = world.outer_primitives, world.standing_solids
+    primitives = world.outer_primitives
+    others = world.standing_solids
     primitive = int_at(primitives.own, standing)
     number = first_around_of(span_at(others.spans, standing))
     table = table_of(primitives, head_at(primitives.heads, primitive))
+
     return table, shape_at(primitives.shapes, primitive), others, number
 
 
@@ -232,15 +257,23 @@ def frames_for(scratch: ScratchTable, span: Span) -> Frames:
 @kernel
 def compare_cloud(world: WorldTable, body: int, standing: int, wanted: int) -> Any:
     """Lanes among ``wanted`` in which a body and a cloud are not proven apart, and those in which they overlap."""
-    scratch, balls, mine = world.scratch, world.outer_balls, world.moving_solids
-    cloud, span = cloud_of(world, standing), span_at(mine.spans, body)
-    frames, carried = frames_for(scratch, span), body_at(balls.bodies, body)
-    open_, overlapping = 0, 0
+    scratch = world.scratch
+    balls = world.outer_balls
+    mine = world.moving_solids
+    cloud = cloud_of(world, standing)
+    span = span_at(mine.spans, body)
+    frames = frames_for(scratch, span)
+    carried = body_at(balls.bodies, body)
+    open_ = 0
+    overlapping = 0
     worst = COLLIDING if may_overlap(mine, span) else UNDECIDED
+
     while wanted != 0:
         lane = first_bit(wanted)
         wanted &= wanted - 1
-        answer, plane = FREE, NO_PLANE
+        answer = FREE
+        plane = NO_PLANE
+
         for number in range(first_cluster_of_body(carried), end_cluster_of_body(carried)):
             place_cluster(balls, scratch, number)
             cluster = cluster_at(balls.clusters, number)
@@ -250,10 +283,13 @@ def compare_cloud(world: WorldTable, body: int, standing: int, wanted: int) -> A
                 answer, plane = compare_ball(cloud, mine, span, frames, lane, asked, (answer, plane, worst))
                 if answer >= worst:
                     break
+
             if answer >= worst:
                 break
+
         if answer != FREE:
             open_ |= 1 << lane
         if answer == COLLIDING:
             overlapping |= 1 << lane
+
     return open_, overlapping

@@ -98,10 +98,12 @@ def cluster_to_primitive(
     pair = body_of_cluster(cluster) * primitives.standing_count + standing_body_at(primitives.heads, number)
     if int_at(primitives.checked, pair) == 0:
         return
+
     around = balls.cluster_balls
     x, y, z = placed_centre(frame, around, place)
     if not could_be_nearer(probe, primitive_gap(primitives, number, x, y, z, True) - radius_at(around, place)):
         return
+
     place_cluster(balls, scratch, place)
     for ball in range(first_ball_of(cluster), end_ball_of(cluster)):
         x, y, z = stored_centre(scratch.centres, ball)
@@ -130,24 +132,32 @@ def primitives_near_group(
     """
     x, y, z = stored_centre(scratch.group_centres, group)
     radius = radius_at(balls.group_balls, group)
-    found, gaps = scratch.found, probe.gaps
+    found = scratch.found
+    gaps = probe.gaps
     reach = radius + max(highest(lanes_at(probe.best, 0)), ZERO)
-    kept, first, nearest = 0, 0, UNBOUNDED_DISTANCE
+    kept = 0
+    first = 0
+    nearest = UNBOUNDED_DISTANCE
+
     for k in range(primitives_in_reach(primitives, x, y, z, reach, found)):
         gap = primitive_gap(primitives, int_at(found, k), x, y, z, True) - radius
         if could_be_nearer(probe, gap):
             set_int(found, kept, int_at(found, k))
             set_lanes(gaps, kept, gap)
             if lowest(gap) < nearest:
-                nearest, first = lowest(gap), kept
+                nearest = lowest(gap)
+                first = kept
+
             kept += 1
+
     return kept, first
 
 
 @kernel
 def measure_scene(balls: BallTable, primitives: PrimitiveTable, scratch: ScratchTable, probe: ProbeTable) -> None:
     """Measure the arm against the primitives; the most promising one of a group first, so that it rules out others."""
-    found, gaps = scratch.found, probe.gaps
+    found = scratch.found
+    gaps = probe.gaps
     for group in range(balls.group_count):
         kept, first = primitives_near_group(balls, primitives, scratch, probe, group)
         if kept > 0:
@@ -172,8 +182,12 @@ def measure_clusters(
     """Measure the balls of one cluster against those of another."""
     place_cluster(balls, scratch, first)
     place_cluster(balls, scratch, second)
-    centres, all_balls = scratch.centres, balls.balls
-    mine, others, kept = cluster_at(balls.clusters, first), cluster_at(balls.clusters, second), balls.self_margin[0]
+    centres = scratch.centres
+    all_balls = balls.balls
+    mine = cluster_at(balls.clusters, first)
+    others = cluster_at(balls.clusters, second)
+    kept = balls.self_margin[0]
+
     for ball in range(first_ball_of(mine), end_ball_of(mine)):
         x, y, z = stored_centre(centres, ball)
         for other in range(first_ball_of(others), end_ball_of(others)):
@@ -189,11 +203,17 @@ def measure_bodies(
     balls: BallTable, scratch: ScratchTable, probe: ProbeTable, first: int, second: int, pair: int
 ) -> None:
     """Measure two bodies of the arm against each other, less the margin between them."""
-    frames, one, two = scratch.frames, body_at(balls.bodies, first), body_at(balls.bodies, second)
-    around, hulls = balls.cluster_balls, balls.body_balls
-    first_frame, second_frame = frame_at(frames, frame_of_body(one)), frame_at(frames, frame_of_body(two))
+    frames = scratch.frames
+    one = body_at(balls.bodies, first)
+    two = body_at(balls.bodies, second)
+    around = balls.cluster_balls
+    hulls = balls.body_balls
+    first_frame = frame_at(frames, frame_of_body(one))
+    second_frame = frame_at(frames, frame_of_body(two))
     kept = balls.self_margin[0]
-    hull, radius = placed_centre(second_frame, hulls, second), radius_at(hulls, second) + kept
+    hull = placed_centre(second_frame, hulls, second)
+    radius = radius_at(hulls, second) + kept
+
     for mine in range(first_cluster_of_body(one), end_cluster_of_body(one)):
         x, y, z = placed_centre(first_frame, around, mine)
         extent = radius_at(around, mine)
@@ -208,13 +228,19 @@ def measure_bodies(
 @kernel
 def measure_self(balls: BallTable, scratch: ScratchTable, probe: ProbeTable, start: int) -> None:
     """Measure the arm against itself; the pairs are numbered from ``start``."""
-    groups, pairs = balls.pair_groups, balls.pairs
-    around, centres, kept = balls.group_balls, scratch.group_centres, balls.self_margin[0]
+    groups = balls.pair_groups
+    pairs = balls.pairs
+    around = balls.group_balls
+    centres = scratch.group_centres
+    kept = balls.self_margin[0]
+
     for k in range(balls.pair_group_count):
         group = pair_group_at(groups, k)
-        first, second = one_group_of(group), other_group_of(group)
+        first = one_group_of(group)
+        second = other_group_of(group)
         x, y, z = stored_centre(centres, first)
         reach = radius_at(around, first) + radius_at(around, second) + kept
+
         if within_best(probe, x, y, z, stored_centre(centres, second), reach):
             for number in range(first_pair_of(group), end_pair_of(group)):
                 pair = pair_at(pairs, number)
@@ -239,18 +265,23 @@ def measure(
     """
     scratch = world.scratch
     crossing = balls.body_count * primitives.standing_count
-    best, which = probe.best, probe.which
+    best = probe.best
+    which = probe.which
+
     for start in range(0, count, WIDTH):
         filled = min(WIDTH, count - start)
         for lane in range(WIDTH):
             load_row(world, values, start + min(lane, filled - 1), lane)
             set_int(which, lane, -1)
+
         set_lanes(best, 0, spread(UNBOUNDED_DISTANCE))
         forward_kinematics(world.arm, scratch)
         prepare(balls, scratch, world.arm.joint_count)
         measure_self(balls, scratch, probe, crossing)
         measure_scene(balls, primitives, scratch, probe)
+
         for lane in range(filled):
             set_double(distances, start + lane, float_at(best, lane))
             set_int(pairs, start + lane, int_at(which, lane))
+
     return sound_count(world, count)

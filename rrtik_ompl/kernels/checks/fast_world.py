@@ -100,13 +100,17 @@ class FastWorld:
         self._arm: ArmTables = arm_tables(chain, bodies, moving, kept, outer, inner, solids, self._limits, like=same)
         self._checked = checked_table(moving, standing, clear)
         self._primitives = standing_tables(bodies, standing, self._checked, outer, inner)
-        self.moving, self.standing = moving, standing
-        self._outer, self._placed = outer, PlacedPrimitives()
+        self.moving = moving
+        self.standing = standing
+        self._outer = outer
+        self._placed = PlacedPrimitives()
         self._flagged = Flags(clear, self._arm, moving, standing)
         self._reference = ReferenceChecks(self._arm.arm, self._arm.balls, self._primitives)
         self._kernels = library("checks.check_kernels") if compiled else None
         self._probe: ProbeTable | None = None
-        self._moved, self.pinned, self.address = False, False, 0
+        self._moved = False
+        self.pinned = False
+        self.address = 0
         if self._kernels is not None:
             self._solids = standing_solids(bodies, standing, solids)
             self._take_memory()
@@ -142,6 +146,7 @@ class FastWorld:
             if outer.clouds or inner.clouds:  # of a cloud, a point is put among the solids
                 other._solids = with_own_arrays(other._solids, "sizes", "corners")
             other._take_memory()
+
         return other
 
     def update_obstacles(self, bodies: Sequence[Body], inflation: Sequence[float]) -> None:
@@ -162,6 +167,7 @@ class FastWorld:
         self._primitives = primitive_table(around, self._checked), inside
         self._reference = ReferenceChecks(self._arm.arm, self._arm.balls, self._primitives)
         self._probe = None
+
         if self._kernels is not None:
             outer, inner = self._primitives
             self.table.put(outer_primitives=outer, inner_primitives=inner)
@@ -206,6 +212,7 @@ class FastWorld:
             places = (rows.ctypes.data, len(rows), found.ctypes.data)
             inputs.require_sound(self._kernels.classify(self.address, *places, resolve))
             answers = found.astype(np.int8)
+
         return answers if beyond is None else np.where(beyond, np.int8(UNDECIDED), answers)
 
     def classify_edges(
@@ -224,7 +231,8 @@ class FastWorld:
         Raises:
             InputError: If shapes do not fit, a value is not finite or a number of steps is not a positive integer.
         """
-        (starts, first), (ends, second) = self._values(A, "starts"), self._values(B, "ends")
+        starts, first = self._values(A, "starts")
+        ends, second = self._values(B, "ends")
         steps = inputs.checked_step_counts(counts, len(starts))
         if len(starts) != len(ends):
             raise InputError(f"motions need as many starts as ends, got {len(starts)} and {len(ends)}")
@@ -236,6 +244,7 @@ class FastWorld:
             sink = found.ctypes.data
             inputs.require_sound(self._kernels.classify_edges(self.address, *places, len(starts), sink, resolve))
             answers = found.astype(np.int8)
+
         for beyond in (first, second):
             answers = answers if beyond is None else np.where(beyond, np.int8(UNDECIDED), answers)
         return answers
@@ -261,23 +270,29 @@ class FastWorld:
         rows, beyond = self._values(V, "joint values")
         lowest, nearest = self._measured(rows, 0)
         highest = self._measured(rows, 1)[0] if upper else np.full(len(rows), np.inf)
+
         if beyond is not None:
-            lowest, highest = np.where(beyond, -np.inf, lowest), np.where(beyond, np.inf, highest)
+            lowest = np.where(beyond, -np.inf, lowest)
+            highest = np.where(beyond, np.inf, highest)
             nearest = np.where(beyond, -1, nearest)
+
         pairs = [self._flagged[flag][0] if flag >= 0 else (-1, -1) for flag in nearest.tolist()]
         return Clearance(rounded(lowest, -1.0), rounded(highest, 1.0), np.array(pairs, dtype=np.int64).reshape(-1, 2))
 
     def _measured(self, rows: Matrix, level: int) -> tuple[Vector, NDArray[np.int32]]:
         """Distances between outer (0) or inner (1) solids and the flags of the nearest pairs, -1 for none."""
-        balls, scene = self._arm.balls[level], self._primitives[level]
+        balls = self._arm.balls[level]
+        scene = self._primitives[level]
         kernels = None if self._kernels is None else library("checks.distance_kernels")
         if kernels is None:
             return reference_distances.measure(self._arm.arm, balls, scene, rows)
         if self._probe is None:
             self._probe = probe_table(self._primitives)
-        found, pairs = np.empty(len(rows)), np.empty(len(rows), dtype=np.int32)
+        found = np.empty(len(rows))
+        pairs = np.empty(len(rows), dtype=np.int32)
         tables = (self.address, balls.address, scene.address, rows.ctypes.data, len(rows), self._probe.address)
         inputs.require_sound(kernels.measure(*tables, found.ctypes.data, pairs.ctypes.data))
+
         return np.where(pairs < 0, np.inf, found), pairs
 
     def undecided_pairs(self, V: ArrayLike) -> list[list[tuple[int, int]]]:
@@ -294,6 +309,7 @@ class FastWorld:
             for row, flag in np.argwhere(marks).tolist():
                 pairs[row] += self._flagged[flag]
             found += pairs
+
         for far in np.flatnonzero(beyond) if beyond is not None else ():
             found[far] = list(self._pairs)
         return found

@@ -89,7 +89,9 @@ def frame_origin(frame: Frame, lane: int) -> Any:
 @inlined
 def carried(frame: Frame, lane: int, p: Any) -> Any:
     """A point of a frame in the world."""
-    x, y, z = dot(frame_row(frame, lane, 0), p), dot(frame_row(frame, lane, 1), p), dot(frame_row(frame, lane, 2), p)
+    x = dot(frame_row(frame, lane, 0), p)
+    y = dot(frame_row(frame, lane, 1), p)
+    z = dot(frame_row(frame, lane, 2), p)
     origin = frame_origin(frame, lane)
     return x + origin[0], y + origin[1], z + origin[2]
 
@@ -111,13 +113,20 @@ def farthest(solids: SolidTable, number: int, frame: Frame, note: Floats, lane: 
 
     ``note`` is the address of lanes to write to.
     """
-    first_row, second_row, third_row = frame_row(frame, lane, 0), frame_row(frame, lane, 1), frame_row(frame, lane, 2)
+    first_row = frame_row(frame, lane, 0)
+    second_row = frame_row(frame, lane, 1)
+    third_row = frame_row(frame, lane, 2)
     x = first_row[0] * direction[0] + second_row[0] * direction[1] + third_row[0] * direction[2]
     y = first_row[1] * direction[0] + second_row[1] * direction[1] + third_row[1] * direction[2]
     z = first_row[2] * direction[0] + second_row[2] * direction[1] + third_row[2] * direction[2]
-    a, b, c = np.float32(x), np.float32(y), np.float32(z)
-    solid, corners = solid_at(solids.solids, number), solids.corners
-    best, where = spread(LOWEST), spread(np.float32(0.0))
+    a = np.float32(x)
+    b = np.float32(y)
+    c = np.float32(z)
+    solid = solid_at(solids.solids, number)
+    corners = solids.corners
+    best = spread(LOWEST)
+    where = spread(np.float32(0.0))
+
     for block in range(first_block_of(solid), end_block_of(solid)):
         along_x, along_y, along_z = corner_block(corners, block)
         height = along_x * a + along_y * b
@@ -125,17 +134,20 @@ def farthest(solids: SolidTable, number: int, frame: Frame, note: Floats, lane: 
         higher = height > best
         best = choose(higher, height, best)
         where = choose(higher, spread(np.float32(block)), where)
+
     first = first_bit(bits(best >= highest(best)))
     set_lanes(note, 0, where)
     p = corner_at(corners, int(float_at(note, first)), first)
     sizes = sizes_at(solids.sizes, number)
     radius = disc_of(sizes)
+
     if radius > 0.0:
         axis = axis_of(sizes)
         across = minus((x, y, z), scaled(axis, dot(axis, (x, y, z))))
         length = sqrt(dot(across, across))
         if length > SHORTEST:
             p = minus(p, scaled(across, -radius / length))
+
     return carried(frame, lane, p)
 
 
@@ -145,15 +157,24 @@ def nearest_on_triangle(a: Any, b: Any, c: Any) -> Any:
 
     Whatever rounding does, it is a mean of the corners with weights that are not negative.
     """
-    ab, ac = minus(b, a), minus(c, a)
-    d1, d2, d3, d4, d5, d6 = -dot(ab, a), -dot(ac, a), -dot(ab, b), -dot(ac, b), -dot(ab, c), -dot(ac, c)
+    ab = minus(b, a)
+    ac = minus(c, a)
+    d1 = -dot(ab, a)
+    d2 = -dot(ac, a)
+    d3 = -dot(ab, b)
+    d4 = -dot(ac, b)
+    d5 = -dot(ab, c)
+    d6 = -dot(ac, c)
     if d1 <= 0.0 and d2 <= 0.0:
         return a
     if d3 >= 0.0 and d4 <= d3:
         return b
     if d6 >= 0.0 and d5 <= d6:
         return c
-    of_c, of_b, of_a = d1 * d4 - d3 * d2, d5 * d2 - d1 * d6, d3 * d6 - d5 * d4
+
+    of_c = d1 * d4 - d3 * d2
+    of_b = d5 * d2 - d1 * d6
+    of_a = d3 * d6 - d5 * d4
     if nearest_to_edge(of_c, d1, d3):
         return minus(a, scaled(ab, -d1 / (d1 - d3)))
     if nearest_to_edge(of_b, d2, d6):
@@ -173,7 +194,8 @@ def nearest_to_edge(outside: float, begin: float, end: float) -> bool:
 def mean_of_corners(a: Any, ab: Any, ac: Any, of_a: float, of_b: float, of_c: float) -> Any:
     """The point of a triangle with barycentric coordinates in proportion to three numbers; a corner where they fail."""
     whole = 1.0 / (of_a + of_b + of_c)
-    v, w = of_b * whole, of_c * whole
+    v = of_b * whole
+    w = of_c * whole
     if not (v >= 0.0 and w >= 0.0 and v + w <= 1.0):
         return a
     return minus(minus(a, scaled(ab, -v)), scaled(ac, -w))
@@ -186,7 +208,8 @@ def behind(a: Any, b: Any, c: Any, opposite: Any) -> float:
     length = sqrt(dot(normal, normal))
     if length < SMALLEST_AREA:
         return -1.0
-    side, height = dot(normal, minus(opposite, a)) / length, -dot(normal, a) / length
+    side = dot(normal, minus(opposite, a)) / length
+    height = -dot(normal, a) / length
     if abs(side) < THINNEST:
         return -1.0
     return height if side > 0.0 else -height
@@ -232,7 +255,11 @@ def compare(
     a = difference(mine, first, others, second, frames, lane, direction)
     if dot(direction, a) > reach + slack:
         return FREE, direction
-    b, c, v = a, a, a
+
+    b = a
+    c = a
+    v = a
+
     for _ in range(MOST_STEPS):
         length = sqrt(dot(v, v))
         if length < reach - slack and solid:
@@ -250,14 +277,24 @@ def compare(
                 return COLLIDING, direction
             if depth >= 0.0:
                 break
+
         if length - height < CONVERGED:
             break
-        p, q, r = nearest_on_triangle(a, b, d), nearest_on_triangle(b, c, d), nearest_on_triangle(c, a, d)
-        to_p, to_q, to_r = dot(p, p), dot(q, q), dot(r, r)
+        p = nearest_on_triangle(a, b, d)
+        q = nearest_on_triangle(b, c, d)
+        r = nearest_on_triangle(c, a, d)
+        to_p = dot(p, p)
+        to_q = dot(q, q)
+        to_r = dot(r, r)
+
         if to_p <= to_q and to_p <= to_r:
-            c, v = d, p
+            c = d
+            v = p
         elif to_q <= to_r:
-            a, v = d, q
+            a = d
+            v = q
         else:
-            b, v = d, r
+            b = d
+            v = r
+
     return UNDECIDED, direction

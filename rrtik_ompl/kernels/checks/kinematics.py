@@ -43,10 +43,13 @@ def sine_and_cosine(angle: Any) -> Any:
     """Sine and cosine of wide lanes as lanes, within 1.5e-7 for angles up to 1e8 [rad]."""
     whole = nearest(angle * HALF_TURNS_PER_RADIAN)
     halved = 0.5 * whole
-    x, odd = single(angle - whole * HALF_TURN), single(halved - nearest(halved))  # odd: 1/2 after a half turn, or 0
-    sign, z = ONE - EIGHT * odd * odd, x * x
+    x = single(angle - whole * HALF_TURN)
+    odd = single(halved - nearest(halved))  # odd: 1/2 after a half turn, or 0
+    sign = ONE - EIGHT * odd * odd
+    z = x * x
     sine = x + x * z * (SINE[0] + z * (SINE[1] + z * (SINE[2] + z * SINE[3])))
     cosine = (ONE - HALF * z) + z * z * (COSINE[0] + z * (COSINE[1] + z * (COSINE[2] + z * COSINE[3])))
+
     return sign * sine, sign * cosine
 
 
@@ -59,12 +62,19 @@ def forward_kinematics(arm: ArmTable, scratch: ScratchTable) -> None:
 @kernel
 def first_frames(arm: ArmTable, scratch: ScratchTable, count: int) -> None:
     """Frames of the first joints; their parents are among them, and the world's own frame is there already."""
-    parents, kinds, phases = arm.parents, arm.joint_kinds, arm.phases
-    values, frames = scratch.values, scratch.frames
+    parents = arm.parents
+    kinds = arm.joint_kinds
+    phases = arm.phases
+    values = scratch.values
+    frames = scratch.frames
+
     for joint in range(count):
-        parent, frame = frame_at(frames, int_at(parents, joint)), frame_at(frames, joint + 1)
-        fixed, kind = placement_at(arm.placements, joint), int_at(kinds, joint)
+        parent = frame_at(frames, int_at(parents, joint))
+        frame = frame_at(frames, joint + 1)
+        fixed = placement_at(arm.placements, joint)
+        kind = int_at(kinds, joint)
         value = wide_lanes_at(values, joint)
+
         if kind == ALIGNED_TURN:
             sine, cosine = sine_and_cosine(value + double_at(phases, joint))
             turn_aligned(parent, frame, fixed, sine, cosine)
@@ -102,10 +112,12 @@ def turn(parent: Frame, frame: Frame, fixed: Placement, sine: Any, cosine: Any) 
 @inlined
 def turn_aligned(parent: Frame, frame: Frame, fixed: Placement, sine: Any, cosine: Any) -> None:
     """The same where the placement turns about x alone."""
-    tilted_cosine, tilted_sine = second_row_of(fixed)[1], third_row_of(fixed)[1]
+    tilted_cosine = second_row_of(fixed)[1]
+    tilted_sine = third_row_of(fixed)[1]
     for row in range(3):
         x, b, c = rotation_row(parent, row)
-        y, z = b * tilted_cosine + c * tilted_sine, c * tilted_cosine - b * tilted_sine
+        y = b * tilted_cosine + c * tilted_sine
+        z = c * tilted_cosine - b * tilted_sine
         set_rotation_row(frame, row, x * cosine + y * sine, y * cosine - x * sine, z)
         set_origin(frame, row, origin_at(parent, row) + along(origin_of(fixed), x, b, c))
 
@@ -113,7 +125,10 @@ def turn_aligned(parent: Frame, frame: Frame, fixed: Placement, sine: Any, cosin
 @inlined
 def turn_first(frame: Frame, fixed: Placement, sine: Any, cosine: Any) -> None:
     """The same where the parent is the world."""
-    first, second, third, origin = first_row_of(fixed), second_row_of(fixed), third_row_of(fixed), origin_of(fixed)
+    first = first_row_of(fixed)
+    second = second_row_of(fixed)
+    third = third_row_of(fixed)
+    origin = origin_of(fixed)
     set_turned_row(frame, 0, first, origin[0], sine, cosine)
     set_turned_row(frame, 1, second, origin[1], sine, cosine)
     set_turned_row(frame, 2, third, origin[2], sine, cosine)
@@ -122,7 +137,8 @@ def turn_first(frame: Frame, fixed: Placement, sine: Any, cosine: Any) -> None:
 @inlined
 def set_turned_row(frame: Frame, row: int, fixed: Any, origin: float, sine: Any, cosine: Any) -> None:
     """Set a row of a frame to that of a placement, turned about z."""
-    x, y = fixed[0], fixed[1]
+    x = fixed[0]
+    y = fixed[1]
     set_rotation_row(frame, row, x * cosine + y * sine, y * cosine - x * sine, spread(fixed[2]))
     set_origin(frame, row, spread(origin))
 
@@ -130,7 +146,9 @@ def set_turned_row(frame: Frame, row: int, fixed: Any, origin: float, sine: Any,
 @inlined
 def rotated(fixed: Placement, a: Any, b: Any, c: Any) -> Any:
     """A row (a, b, c) times the rotation of a placement."""
-    first, second, third = first_row_of(fixed), second_row_of(fixed), third_row_of(fixed)
+    first = first_row_of(fixed)
+    second = second_row_of(fixed)
+    third = third_row_of(fixed)
     return (
         a * first[0] + b * second[0] + c * third[0],
         a * first[1] + b * second[1] + c * third[1],

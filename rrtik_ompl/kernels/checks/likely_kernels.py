@@ -25,8 +25,11 @@ from rrtik_ompl.kernels.tables.accessors import (
 @inlined
 def move_up(likely: LikelyBall, place: int) -> None:
     """Let a ball of the list and the one before it change places."""
-    this, before = likely_at(likely, place), likely_at(likely, place - 1)
-    number, frame, body = likely_number_of(this), likely_frame_of(this), likely_body_of(this)
+    this = likely_at(likely, place)
+    before = likely_at(likely, place - 1)
+    number = likely_number_of(this)
+    frame = likely_frame_of(this)
+    body = likely_body_of(this)
     set_likely(this, likely_number_of(before), likely_frame_of(before), likely_body_of(before))
     set_likely(before, number, frame, body)
 
@@ -36,21 +39,28 @@ def likely_collision(
     balls: BallTable, primitives: PrimitiveTable, scratch: ScratchTable, wanted: int, likely: LikelyBall
 ) -> int:
     """Lanes among ``wanted`` in which the first likely ball that meets a primitive does so; 0 says nothing."""
-    all_balls, found, near = balls.balls, scratch.found, scratch.near
+    all_balls = balls.balls
+    found = scratch.found
+    near = scratch.near
+
     for place in range(LIKELY_COUNT):
         ball = likely_at(likely, place)
-        number, body = likely_number_of(ball), likely_body_of(ball)
+        number = likely_number_of(ball)
+        body = likely_body_of(ball)
         if number < 0:
             continue
+
         x, y, z = placed_centre(frame_at(scratch.frames, likely_frame_of(ball)), all_balls, number)
         radius = radius_at(all_balls, number)
         count = primitives_in_reach(primitives, x, y, z, radius, found)
         count = checked_primitives(primitives, body, found, count, near)
         if count == 0:
             continue
+
         meeting, _ = meets_primitives(primitives, x, y, z, radius, False, wanted, near, count, scratch.met, NO_MARKS)
         if meeting != 0:
             if place > 0:
                 move_up(likely, place)
             return int(meeting)
+
     return 0

@@ -70,7 +70,8 @@ from rrtik_ompl.kernels.tables.accessors import (
 @inlined
 def outset(mine: SolidTable, first: int, others: SolidTable, second: int, frames: Frames, lane: int) -> Any:
     """Where the bounding ball of the first solid lies as seen from that of the second: the direction, and the gap."""
-    own, other = sizes_at(mine.sizes, first), sizes_at(others.sizes, second)
+    own = sizes_at(mine.sizes, first)
+    other = sizes_at(others.sizes, second)
     p = carried(frames[0], lane, bound_centre_of(own))
     direction = minus(p, carried(frames[1], lane, bound_centre_of(other)))
     length = sqrt(dot(direction, direction))
@@ -99,10 +100,16 @@ def compare_solids(mine: SolidTable, first: int, others: SolidTable, second: int
 
     A plane that lies between two solids in one lane often does in the next.
     """
-    kind, own = kind_of_solid(solid_at(others.solids, second)), kind_of_solid(solid_at(mine.solids, first))
+    kind = kind_of_solid(solid_at(others.solids, second))
+    own = kind_of_solid(solid_at(mine.solids, first))
     if own != layout.CONVEX_SOLID or (kind != layout.CONVEX_SOLID and kind != layout.HALF_SPACE_SOLID):
         return wanted, 0
-    open_, overlapping, known, last = 0, 0, False, (1.0, 0.0, 0.0)
+
+    open_ = 0
+    overlapping = 0
+    known = False
+    last = (1.0, 0.0, 0.0)
+
     while wanted != 0:
         lane = first_bit(wanted)
         wanted &= wanted - 1
@@ -114,10 +121,12 @@ def compare_solids(mine: SolidTable, first: int, others: SolidTable, second: int
                 continue
             answer, last = compare(mine, first, others, second, frames, lane, last if known else direction)
             known = True
+
         if answer != FREE:
             open_ |= 1 << lane
         if answer == COLLIDING:
             overlapping |= 1 << lane
+
     return open_, overlapping
 
 
@@ -126,24 +135,30 @@ def compare_bodies(
     scratch: ScratchTable, mine: SolidTable, first: int, others: SolidTable, second: int, wanted: int
 ) -> Any:
     """As ``compare_solids``, for bodies: the solids around them, and then those inside them where they differ."""
-    own, other_own = span_at(mine.spans, first), span_at(others.spans, second)
+    own = span_at(mine.spans, first)
+    other_own = span_at(others.spans, second)
     frames = (
         frame_at(scratch.frames, frame_of_span(own)),
         frame_at(scratch.frames, frame_of_span(other_own)),
         scratch.note,
     )
-    open_, overlapping = 0, 0
+    open_ = 0
+    overlapping = 0
+
     for one in range(first_around_of(own), end_around_of(own)):
         for other in range(first_around_of(other_own), end_around_of(other_own)):
             left, hit = compare_solids(mine, one, others, other, frames, wanted & ~overlapping)
             open_ |= left
             overlapping |= hit
+
     if first_around_of(own) == first_inside_of(own) and first_around_of(other_own) == first_inside_of(other_own):
         return open_, overlapping
+
     for one in range(first_inside_of(own), end_inside_of(own)):
         for other in range(first_inside_of(other_own), end_inside_of(other_own)):
             _, hit = compare_solids(mine, one, others, other, frames, open_ & ~overlapping)
             overlapping |= hit
+
     return open_, overlapping
 
 
@@ -160,24 +175,31 @@ def corner_inside(
     mine: SolidTable, one: int, frame: Frame, lane: int, primitives: PrimitiveTable, primitive: int
 ) -> bool:
     """Whether a corner of a solid lies inside a primitive, in one lane."""
-    solid, corners = solid_at(mine.solids, one), mine.corners
+    solid = solid_at(mine.solids, one)
+    corners = mine.corners
     for block in range(first_block_of(solid), end_block_of(solid)):
         a, b, c = corner_block(corners, block)
-        x, y = carried_axis(frame, lane, 0, a, b, c), carried_axis(frame, lane, 1, a, b, c)
+        x = carried_axis(frame, lane, 0, a, b, c)
+        y = carried_axis(frame, lane, 1, a, b, c)
         gap = primitive_gap(primitives, primitive, x, y, carried_axis(frame, lane, 2, a, b, c), False)
         if lowest(gap) < -slack_of(sizes_at(mine.sizes, one)):
             return True
+
     return False
 
 
 @kernel
 def corners_inside(world: WorldTable, body: int, standing: int, wanted: int) -> int:
     """Lanes among ``wanted`` in which a point of a moving body lies inside one that stands still."""
-    mine, primitives, overlapping = world.moving_solids, world.inner_primitives, 0
-    primitive, span = int_at(primitives.own, standing), span_at(mine.spans, body)
+    mine = world.moving_solids
+    primitives = world.inner_primitives
+    overlapping = 0
+    primitive = int_at(primitives.own, standing)
+    span = span_at(mine.spans, body)
     frame = frame_at(world.scratch.frames, frame_of_span(span))
     if primitive < 0:
         return 0
+
     for one in range(first_inside_of(span), end_inside_of(span)):
         if kind_of_solid(solid_at(mine.solids, one)) == layout.MERE_CORNERS:
             left = wanted & ~overlapping
@@ -186,6 +208,7 @@ def corners_inside(world: WorldTable, body: int, standing: int, wanted: int) -> 
                 left &= left - 1
                 if corner_inside(mine, one, frame, lane, primitives, primitive):
                     overlapping |= 1 << lane
+
     return overlapping
 
 
@@ -195,11 +218,14 @@ def mark(world: WorldTable, wanted: int) -> int:
 
     The numbers of moving and standing bodies come first, then those of the pairs of moving bodies.
     """
-    scratch, balls, primitives = world.scratch, world.outer_balls, world.outer_primitives
+    scratch = world.scratch
+    balls = world.outer_balls
+    primitives = world.outer_primitives
     prepare(balls, scratch, world.arm.joint_count)
     marks = scratch.marks
     crossing = balls.body_count * primitives.standing_count
     total = crossing + balls.pair_count
+
     for block in range((total + WIDTH - 1) // WIDTH):  # a scene of ten thousand bodies has as many for each link
         set_lanes(marks, block, spread(ZERO))
     scene_collision(balls, primitives, scratch, wanted, marks, wanted < 0, scratch.outer_likely, NO_WATCH)
@@ -210,15 +236,21 @@ def mark(world: WorldTable, wanted: int) -> int:
 @kernel
 def compare_pair(world: WorldTable, number: int, wanted: int) -> Any:
     """Lanes among ``wanted`` in which a marked pair is not proven apart, and those in which it is proven to overlap."""
-    scratch, balls, mine = world.scratch, world.outer_balls, world.moving_solids
+    scratch = world.scratch
+    balls = world.outer_balls
+    mine = world.moving_solids
     standing = world.outer_primitives.standing_count
     crossing = balls.body_count * standing
     if number >= crossing:
         pair = pair_at(balls.pairs, number - crossing)
         return compare_bodies(scratch, mine, one_body_of(pair), world.wider_solids, other_body_of(pair), wanted)
-    first, second, others = number // standing, number % standing, world.standing_solids
+
+    first = number // standing
+    second = number % standing
+    others = world.standing_solids
     if is_cloud(others, second):
         return compare_cloud(world, first, second, wanted)
+
     left, hit = compare_bodies(scratch, mine, first, others, second, wanted)
     if left != hit:
         hit |= corners_inside(world, first, second, left & ~hit)
@@ -236,7 +268,9 @@ def narrow_phase(world: WorldTable, wanted: int) -> Any:
     """
     total = mark(world, wanted)
     marks = world.scratch.marks
-    open_, colliding = 0, 0
+    open_ = 0
+    colliding = 0
+
     for block in range((total + WIDTH - 1) // WIDTH):
         marked = nonzero_ints(marks, block)
         while marked != 0:
@@ -249,4 +283,5 @@ def narrow_phase(world: WorldTable, wanted: int) -> Any:
             set_int(marks, k, left | int_at(marks, k) & colliding)
             open_ |= left
             colliding |= hit
+
     return open_ & ~colliding, colliding

@@ -59,7 +59,8 @@ half_space_offset_of: Callable[[PrimitiveShape], float] = float_reader(layout.HA
 share_of: Callable[[PrimitiveShape], float] = float_reader(layout.CONVEX_SHARE)
 
 ALL_LANES = (1 << WIDTH) - 1
-ZERO, ONE = np.float32(0.0), np.float32(1.0)
+ZERO = np.float32(0.0)
+ONE = np.float32(1.0)
 UNBOUNDED_DISTANCE = np.float32(1e18)  # [m] where there is nothing to measure; its square is a float32 still
 
 
@@ -72,6 +73,7 @@ def kinds_known(primitives: PrimitiveTable) -> bool:
         first = head_at(primitives.heads, 0)
         last = head_at(primitives.heads, count - 1)
         known = kind_of(first) >= 0 and kind_of(last) < KIND_COUNT
+
     return known
 
 
@@ -124,6 +126,7 @@ def meets_convex(planes: Plane, start: int, end: int, share: Any, x: Any, y: Any
         meeting &= bits(plane_gap(planes, plane, x, y, z) < share * radius)
         if meeting == 0:
             break
+
     return meeting
 
 
@@ -148,24 +151,33 @@ def meets_primitive(
         if kind == layout.HALF_SPACE:
             return bits(half_space_gap(shape, x, y, z) < radius)
         if kind == layout.CONVEX:
-            share, planes = ONE if bound else share_of(shape), primitives.planes
+            share = ONE if bound else share_of(shape)
+            planes = primitives.planes
             return meets_convex(planes, first_plane_of(head), end_plane_of(head), share, x, y, z, radius)
+
         if kind == layout.CLOUD:
             return meets_cloud(primitives, head, shape, x, y, z, radius, bound, wanted)
         return ALL_LANES
+
     centre = centre_of(shape)
-    x, y, z = x - centre[0], y - centre[1], z - centre[2]
+    x = x - centre[0]
+    y = y - centre[1]
+    z = z - centre[2]
     if kind == layout.BOX:
         a, b, c = beyond_faces(shape, x, y, z)
         return bits(squared(larger(a, ZERO), larger(b, ZERO), larger(c, ZERO)) < radius * radius)
+
     if kind == layout.BALL:
         reach = radius + ball_radius_of(shape)
         return bits(squared(x, y, z) < reach * reach)
+
     if kind == layout.CAPSULE:
         reach = radius + capsule_radius_of(shape)
         return bits(to_capsule(shape, x, y, z) < reach * reach)
+
     beyond, outside = beyond_ends(shape, x, y, z)  # the last of the kinds with a centre: a cylinder
-    beyond, outside = larger(beyond, ZERO), larger(outside, ZERO)
+    beyond = larger(beyond, ZERO)
+    outside = larger(outside, ZERO)
     return bits(beyond * beyond + outside * outside < radius * radius)
 
 
@@ -181,8 +193,10 @@ def to_convex(planes: Plane, start: int, end: int, x: Any, y: Any, z: Any) -> An
 @kernel
 def primitive_gap(primitives: PrimitiveTable, number: int, x: Any, y: Any, z: Any, bound: bool) -> Any:
     """Signed distance of a point from a primitive, negative inside; ``bound``: the point stands for others near it."""
-    shape, head = shape_at(primitives.shapes, number), head_at(primitives.heads, number)
+    shape = shape_at(primitives.shapes, number)
+    head = head_at(primitives.heads, number)
     kind = kind_of(head)
+
     if kind < 0 or kind >= layout.CENTRED_KINDS:
         if kind == layout.HALF_SPACE:
             return half_space_gap(shape, x, y, z)
@@ -192,11 +206,15 @@ def primitive_gap(primitives: PrimitiveTable, number: int, x: Any, y: Any, z: An
                 return height
             # Outside, the height is too small for an inner primitive.
             return choose(height < ZERO, height, spread(UNBOUNDED_DISTANCE))
+
         if kind == layout.CLOUD:
             return cloud_gap(primitives, head, shape, x, y, z)
         return spread(-UNBOUNDED_DISTANCE)
+
     centre = centre_of(shape)
-    x, y, z = x - centre[0], y - centre[1], z - centre[2]
+    x = x - centre[0]
+    y = y - centre[1]
+    z = z - centre[2]
     if kind == layout.BALL:
         return square_root(squared(x, y, z)) - ball_radius_of(shape)
     if kind == layout.CAPSULE:
@@ -205,6 +223,7 @@ def primitive_gap(primitives: PrimitiveTable, number: int, x: Any, y: Any, z: An
         a, b, c = beyond_faces(shape, x, y, z)
         outside = square_root(squared(larger(a, ZERO), larger(b, ZERO), larger(c, ZERO)))
         return outside + smaller(larger(larger(a, b), c), ZERO)
+
     a, b = beyond_ends(shape, x, y, z)  # the last of the kinds with a centre: a cylinder
     outside = square_root(larger(a, ZERO) * larger(a, ZERO) + larger(b, ZERO) * larger(b, ZERO))
     return outside + smaller(larger(a, b), ZERO)
@@ -228,12 +247,17 @@ def meets_primitives(
 
     Unless ``NO_MARKS``, ``marks`` are one number for each standing body, which collects the lanes that meet it.
     """
-    heads, shapes = primitives.heads, primitives.shapes
-    meeting, kept = 0, 0
+    heads = primitives.heads
+    shapes = primitives.shapes
+    meeting = 0
+    kept = 0
+
     for k in range(count):
         number = int_at(source, k)
-        head, shape = head_at(heads, number), shape_at(shapes, number)
+        head = head_at(heads, number)
+        shape = shape_at(shapes, number)
         found = meets_primitive(primitives, head, shape, x, y, z, radius, bound, wanted) & wanted
+
         if found != 0:
             meeting |= found
             set_int(sink, kept, number)
@@ -241,4 +265,5 @@ def meets_primitives(
             if exists(marks):
                 body = standing_body_of(head)
                 set_int(marks, body, int_at(marks, body) | found)
+
     return meeting, kept

@@ -22,18 +22,25 @@ CHUNK = 64  # configurations at a time, to bound memory
 def frames(arm: layout.ArmTable, values: Matrix) -> NDArray[np.float64]:
     """Joint frames as rotation and origin, world first, shape (m, joints + 1, 3, 4)."""
     fixed = arm.placements.astype(np.float64).reshape(-1, layout.POSE_NUMBERS)
-    turns, origins = fixed[:, layout.ROTATION : layout.ROTATION + 9], fixed[:, layout.ORIGIN : layout.ORIGIN + 3]
+    turns = fixed[:, layout.ROTATION : layout.ROTATION + 9]
+    origins = fixed[:, layout.ORIGIN : layout.ORIGIN + 3]
     found = np.zeros((len(values), len(fixed) + 1, 3, 4))
     found[:, 0, :, :3] = np.eye(3)
+
     for joint, (parent, kind) in enumerate(zip(arm.parents, arm.joint_kinds, strict=True)):
         above = found[:, parent]
         rotation = above[:, :, :3] @ turns[joint].reshape(3, 3)
         origin = above[:, :, 3] + above[:, :, :3] @ origins[joint]
-        value, sliding = values[:, joint, None] + arm.phases[joint], kind == layout.SLIDE
-        x, y, z = rotation[:, :, 0], rotation[:, :, 1], rotation[:, :, 2]
-        sine, cosine = np.sin(value), np.cos(value)
+        value = values[:, joint, None] + arm.phases[joint]
+        sliding = kind == layout.SLIDE
+        x = rotation[:, :, 0]
+        y = rotation[:, :, 1]
+        z = rotation[:, :, 2]
+        sine = np.sin(value)
+        cosine = np.cos(value)
         turned = (x, y) if sliding else (x * cosine + y * sine, y * cosine - x * sine)
         found[:, joint + 1] = np.stack([*turned, z, origin + (z * value if sliding else 0.0)], axis=2)
+
     return found
 
 
@@ -49,10 +56,12 @@ class PrimitiveView:
         shapes = primitives.shapes.reshape(-1, layout.SHAPE_FLOATS)
         head = heads(primitives)[number]
         self._shape: Vector = shapes[number].astype(np.float64)
-        self.kind, self.standing = int(head[layout.KIND]), int(head[layout.STANDING_BODY])
+        self.kind = int(head[layout.KIND])
+        self.standing = int(head[layout.STANDING_BODY])
         self._planes = primitives.planes.reshape(-1, layout.PLANE_FLOATS)
         self._span = slice(head[layout.FIRST_PLANE], head[layout.END_PLANE])
-        self._clouds, self._cloud = primitives.clouds, int(head[layout.FIRST_PLANE])
+        self._clouds = primitives.clouds
+        self._cloud = int(head[layout.FIRST_PLANE])
 
     def number(self, place: int) -> float:
         """One of its numbers."""
@@ -70,7 +79,8 @@ class PrimitiveView:
 
     def half_space_gap(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Signed distance of points, shape (..., 3), from a half-space. Shape (...)."""
-        normal, offset = self.vector(layout.HALF_SPACE_NORMAL), self.number(layout.HALF_SPACE_OFFSET)
+        normal = self.vector(layout.HALF_SPACE_NORMAL)
+        offset = self.number(layout.HALF_SPACE_OFFSET)
         return np.asarray(points @ normal - offset)
 
     def beyond_faces(self, away: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -134,6 +144,7 @@ def meets_primitive(
         return np.asarray(own.half_space_gap(points) < radii)
     if own.kind == layout.CONVEX:
         return np.asarray(own.heights(points) < own.number(layout.CONVEX_SHARE) * radii)
+
     away = points - own.vector(layout.SHAPE_CENTRE)
     if own.kind == layout.BOX:
         return np.asarray(np.linalg.norm(np.maximum(own.beyond_faces(away), 0.0), axis=-1) < radii)
@@ -146,6 +157,7 @@ def meets_primitive(
     if own.kind == layout.CYLINDER:
         ends, side = own.beyond_ends(away)
         return np.asarray(np.hypot(np.maximum(ends, 0.0), np.maximum(side, 0.0)) < radii)
+
     refuse_kind(own.kind)
 
 
@@ -161,6 +173,7 @@ def primitive_gap(primitives: layout.PrimitiveTable, number: int, points: NDArra
     if own.kind == layout.CONVEX:
         height = own.heights(points)
         return np.asarray(height if own.number(layout.CONVEX_SHARE) else np.where(height < 0.0, height, np.inf))
+
     away = points - own.vector(layout.SHAPE_CENTRE)
     if own.kind == layout.BALL:
         return np.asarray(np.linalg.norm(away, axis=-1) - own.number(layout.BALL_RADIUS))
@@ -172,6 +185,7 @@ def primitive_gap(primitives: layout.PrimitiveTable, number: int, points: NDArra
         return np.asarray(own.to_points(away) - own.number(layout.CLOUD_RADIUS))
     if own.kind == layout.CYLINDER:
         return _outside(np.stack(own.beyond_ends(away), axis=-1))
+
     refuse_kind(own.kind)
 
 
@@ -190,7 +204,9 @@ class ReferenceChecks:
         balls: tuple[layout.BallTable, layout.BallTable],
         primitives: tuple[layout.PrimitiveTable, layout.PrimitiveTable],
     ) -> None:
-        self._arm, self._balls, self._primitives = arm, balls, primitives
+        self._arm = arm
+        self._balls = balls
+        self._primitives = primitives
 
     def classify(self, values: Matrix, *, resolve: bool) -> NDArray[np.int8]:
         """See :meth:`rrtik_ompl.kernels.FastWorld.classify`."""
@@ -202,6 +218,7 @@ class ReferenceChecks:
             open_ = np.flatnonzero(answers[part])
             if resolve and len(open_):
                 answers[start + open_] += self._in_collision(poses[open_], 1).any(axis=1)
+
         return answers
 
     def classify_edges(
@@ -220,21 +237,26 @@ class ReferenceChecks:
 
     def _in_collision(self, poses: NDArray[np.float64], level: int) -> NDArray[np.bool_]:
         """Which bodies meet, shape (m, moving * standing + pairs of moving bodies)."""
-        table, primitives = self._balls[level], self._primitives[level]
-        body_count, standing = table.body_count, primitives.standing_count
+        table = self._balls[level]
+        primitives = self._primitives[level]
+        body_count = table.body_count
+        standing = primitives.standing_count
         pairs = table.pairs.reshape(-1, layout.PAIR_INTS)
         found = np.zeros((len(poses), body_count * standing + len(pairs)), dtype=bool)
         points, radii = placed_balls(poses, table)
         checked = primitives.checked.reshape(body_count, standing)
+
         for number, stands in enumerate(heads(primitives)[:, layout.STANDING_BODY]):
             for body in np.flatnonzero(checked[:, stands]):
                 found[:, body * standing + stands] |= meets_primitive(
                     primitives, number, points[body], radii[body]
                 ).any(axis=1)
+
         for k, (i, j) in enumerate(zip(pairs[:, layout.PAIR_ONE], pairs[:, layout.PAIR_OTHER], strict=True)):
             gaps = np.linalg.norm(points[i][:, :, None] - points[j][:, None], axis=3)
             reaches = radii[i][:, None] + radii[j] + table.self_margin[0]
             found[:, body_count * standing + k] = (gaps < reaches).any(axis=(1, 2))
+
         return found
 
 
@@ -245,13 +267,17 @@ def placed_balls(
     balls = table.balls.astype(np.float64).reshape(-1, layout.BALL_FLOATS)
     clusters = table.clusters.reshape(-1, layout.CLUSTER_INTS)
     centres = balls[:, layout.CENTRE : layout.CENTRE + 3]
-    points, radii = [], []
+    points = []
+    radii = []
+
     for body in table.bodies.reshape(-1, layout.BODY_INTS):
-        first, end = body[layout.BODY_FIRST], body[layout.BODY_END]
+        first = body[layout.BODY_FIRST]
+        end = body[layout.BODY_END]
         span = slice(0, 0)
         if end > first:
             span = slice(clusters[first, layout.CLUSTER_FIRST], clusters[end - 1, layout.CLUSTER_END])
         pose = poses[:, body[layout.BODY_FRAME]]
         points.append(np.einsum("mij,nj->mni", pose[:, :, :3], centres[span]) + pose[:, None, :, 3])
         radii.append(balls[span, layout.RADIUS])
+
     return points, radii

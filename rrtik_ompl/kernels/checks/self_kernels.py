@@ -51,46 +51,64 @@ def clusters_meet(balls: BallTable, scratch: ScratchTable, first: int, second: i
     """
     place_cluster(balls, scratch, first)
     place_cluster(balls, scratch, second)
-    centres, all_balls = scratch.centres, balls.balls
-    around, frames = balls.cluster_balls, scratch.frames
-    mine, others = cluster_at(balls.clusters, first), cluster_at(balls.clusters, second)
+    centres = scratch.centres
+    all_balls = balls.balls
+    around = balls.cluster_balls
+    frames = scratch.frames
+    mine = cluster_at(balls.clusters, first)
+    others = cluster_at(balls.clusters, second)
     hull = placed_centre(frame_at(frames, frame_of_cluster(others)), around, second)
-    meeting, near, kept = 0, 0, balls.self_margin[0]
+    meeting = 0
+    near = 0
+    kept = balls.self_margin[0]
+
     for ball in range(first_ball_of(mine), end_ball_of(mine)):
         x, y, z = stored_centre(centres, ball)
         radius = radius_at(all_balls, ball) + kept
         if within(x, y, z, hull, radius + radius_at(around, second) + slack) & wanted & ~meeting == 0:
             continue
+
         for other in range(first_ball_of(others), end_ball_of(others)):
-            centre, reach = stored_centre(centres, other), radius + radius_at(all_balls, other)
+            centre = stored_centre(centres, other)
+            reach = radius + radius_at(all_balls, other)
             wide = within(x, y, z, centre, reach + slack) & wanted
             if wide != 0:
                 near |= wide
                 meeting |= within(x, y, z, centre, reach) & wanted
+
         if meeting == wanted:
             break
+
     return meeting, near
 
 
 @kernel
 def bodies_meet(balls: BallTable, scratch: ScratchTable, first: int, second: int, wanted: int, slack: float) -> Any:
     """Lanes in which a ball of one body meets one of another; whether balls around them, by ``slack`` wider, do."""
-    frames, one, two = scratch.frames, body_at(balls.bodies, first), body_at(balls.bodies, second)
-    around, hulls = balls.cluster_balls, balls.body_balls
-    first_frame, second_frame = frame_at(frames, frame_of_body(one)), frame_at(frames, frame_of_body(two))
+    frames = scratch.frames
+    one = body_at(balls.bodies, first)
+    two = body_at(balls.bodies, second)
+    around = balls.cluster_balls
+    hulls = balls.body_balls
+    first_frame = frame_at(frames, frame_of_body(one))
+    second_frame = frame_at(frames, frame_of_body(two))
     kept = balls.self_margin[0] + slack
-    hull, radius = placed_centre(second_frame, hulls, second), radius_at(hulls, second) + kept
+    hull = placed_centre(second_frame, hulls, second)
+    radius = radius_at(hulls, second) + kept
     x, y, z = placed_centre(first_frame, hulls, first)
     close = within(x, y, z, hull, radius + radius_at(hulls, first)) & wanted
-    meeting, near_by = 0, False
+    meeting = 0
+    near_by = False
     if close == 0:
         return meeting, near_by
+
     for mine in range(first_cluster_of_body(one), end_cluster_of_body(one)):
         x, y, z = placed_centre(first_frame, around, mine)
         extent = radius_at(around, mine)
         near = within(x, y, z, hull, radius + extent) & close & ~meeting
         if near == 0:
             continue
+
         for other in range(first_cluster_of_body(two), end_cluster_of_body(two)):
             centre = placed_centre(second_frame, around, other)
             both = within(x, y, z, centre, extent + radius_at(around, other) + kept) & near & ~meeting
@@ -98,8 +116,10 @@ def bodies_meet(balls: BallTable, scratch: ScratchTable, first: int, second: int
                 found, wide = clusters_meet(balls, scratch, mine, other, both, slack)
                 meeting |= found
                 near_by = near_by or wide != 0
+
         if meeting == close:
             break
+
     return meeting, near_by
 
 
@@ -110,9 +130,14 @@ def self_collision(balls: BallTable, scratch: ScratchTable, wanted: int, marks: 
     Unless ``NO_MARKS``, ``marks`` are one number for each pair, which collects the lanes. ``watch``: see
     :mod:`rrtik_ompl.kernels.checks.watch_kernels`.
     """
-    groups, pairs = balls.pair_groups, balls.pairs
-    around, centres = balls.group_balls, scratch.group_centres
-    meeting, kept, watched = 0, balls.self_margin[0], balls.group_count
+    groups = balls.pair_groups
+    pairs = balls.pairs
+    around = balls.group_balls
+    centres = scratch.group_centres
+    meeting = 0
+    kept = balls.self_margin[0]
+    watched = balls.group_count
+
     for number in range(balls.pair_group_count):
         slack = slack_at(watch, watched + number)
         if slack < ZERO:
@@ -120,7 +145,8 @@ def self_collision(balls: BallTable, scratch: ScratchTable, wanted: int, marks: 
         if slack > ZERO:
             set_clear(watch, watched + number, meeting == 0)
         group = pair_group_at(groups, number)
-        first, second = one_group_of(group), other_group_of(group)
+        first = one_group_of(group)
+        second = other_group_of(group)
         x, y, z = stored_centre(centres, first)
         reach = radius_at(around, first) + radius_at(around, second) + kept + slack
         close = within(x, y, z, stored_centre(centres, second), reach) & wanted
@@ -128,6 +154,7 @@ def self_collision(balls: BallTable, scratch: ScratchTable, wanted: int, marks: 
             close &= ~meeting
         if close == 0:
             continue
+
         for k in range(first_pair_of(group), end_pair_of(group)):
             pair = pair_at(pairs, k)
             found, near = bodies_meet(balls, scratch, one_body_of(pair), other_body_of(pair), close, slack)
@@ -136,6 +163,8 @@ def self_collision(balls: BallTable, scratch: ScratchTable, wanted: int, marks: 
                 set_clear(watch, watched + number, False)
             if exists(marks) and found != 0:
                 set_int(marks, k, int_at(marks, k) | found)
+
         if not exists(marks) and (meeting == wanted or (one and meeting != 0)):
             break
+
     return meeting

@@ -68,7 +68,9 @@ def carried(frame: Frame, row: int, x: float, y: float, z: float) -> Any:
 @inlined
 def placed_centre(frame: Frame, balls: Ball, number: int) -> Any:
     """Centre of a ball in the world."""
-    x, y, z = ball_x(balls, number), ball_y(balls, number), ball_z(balls, number)
+    x = ball_x(balls, number)
+    y = ball_y(balls, number)
+    z = ball_z(balls, number)
     return carried(frame, 0, x, y, z), carried(frame, 1, x, y, z), carried(frame, 2, x, y, z)
 
 
@@ -79,19 +81,23 @@ def checked_primitives(
     """Copy a list of primitives without those that a body need not keep clear of; returns how many are left."""
     everything = int_at(primitives.excluding, body) == 0
     checked = checked_row(primitives.checked, primitives.standing_count, body)
-    heads, kept = primitives.heads, 0
+    heads = primitives.heads
+    kept = 0
+
     for k in range(count):
         number = int_at(source, k)
         if everything or int_at(checked, standing_body_at(heads, number)) != 0:
             set_int(sink, kept, number)
             kept += 1
+
     return kept
 
 
 @kernel
 def prepare(balls: BallTable, scratch: ScratchTable, joints: int) -> None:
     """Place the centres of the groups that the first joints carry, and forget the balls' centres of the last block."""
-    frames, groups = scratch.frames, balls.groups
+    frames = scratch.frames
+    groups = balls.groups
     for group in range(balls.group_count):
         carrier = frame_of_group(group_at(groups, group))
         if carrier > joints:
@@ -99,6 +105,7 @@ def prepare(balls: BallTable, scratch: ScratchTable, joints: int) -> None:
         frame = frame_at(frames, carrier)
         x, y, z = placed_centre(frame, balls.group_balls, group)
         store_centre(scratch.group_centres, group, x, y, z)
+
     flags = scratch.placed
     for cluster in range(balls.cluster_count):
         set_int(flags, cluster, 0)
@@ -109,10 +116,13 @@ def place_cluster(balls: BallTable, scratch: ScratchTable, number: int) -> None:
     """Place the centres of a cluster's balls if they are not yet."""
     if int_at(scratch.placed, number) != 0:
         return
+
     set_int(scratch.placed, number, 1)
     cluster = cluster_at(balls.clusters, number)
     frame = frame_at(scratch.frames, frame_of_cluster(cluster))
-    centres, all_balls = scratch.centres, balls.balls
+    centres = scratch.centres
+    all_balls = balls.balls
+
     for ball in range(first_ball_of(cluster), end_ball_of(cluster)):
         x, y, z = placed_centre(frame, all_balls, ball)
         store_centre(centres, ball, x, y, z)
@@ -145,36 +155,47 @@ def cluster_meets(
     Also whether one of them, wider by ``slack``, does.
     """
     cluster = cluster_at(balls.clusters, number)
-    body, frame = body_of_cluster(cluster), frame_at(scratch.frames, frame_of_cluster(cluster))
-    near, met = scratch.near, scratch.met
+    body = body_of_cluster(cluster)
+    frame = frame_at(scratch.frames, frame_of_cluster(cluster))
+    near = scratch.near
+    met = scratch.met
     count = checked_primitives(primitives, body, scratch.found, count, near)
     if count == 0:
         return 0, False
+
     around = balls.cluster_balls
     x, y, z = placed_centre(frame, around, number)
     radius = radius_at(around, number) + slack
     close, count = meets_primitives(primitives, x, y, z, radius, True, wanted, near, count, near, NO_MARKS)
     if close == 0:
         return 0, False
+
     place_cluster(balls, scratch, number)
-    centres, all_balls = scratch.centres, balls.balls
+    centres = scratch.centres
+    all_balls = balls.balls
     own_marks = marks_row(marks, primitives.standing_count, body) if exists(marks) else NO_MARKS
-    meeting, near_by = 0, False
+    meeting = 0
+    near_by = False
+
     for ball in range(first_ball_of(cluster), end_ball_of(cluster)):
         x, y, z = stored_centre(centres, ball)
         still = close if exists(marks) else close & ~meeting
         radius = radius_at(all_balls, ball)
+
         if slack > ZERO:
             found, _ = meets_primitives(primitives, x, y, z, radius + slack, True, still, near, count, met, NO_MARKS)
             if found == 0:
                 continue
             near_by = True
+
         found, _ = meets_primitives(primitives, x, y, z, radius, False, still, near, count, met, own_marks)
         if found != 0:
             meeting |= found
             remember(likely, ball, frame_of_cluster(cluster), body)
+
         if not exists(marks) and (meeting == close or (one and meeting != 0)):
             break
+
     return meeting, near_by
 
 
@@ -208,14 +229,21 @@ def group_meets(
     slack: float,
 ) -> Any:
     """Lanes in which a ball of a group meets one of the first ``count`` primitives found; see ``cluster_meets``."""
-    close, each, found = wanted, count > FEW, scratch.found
+    close = wanted
+    each = count > FEW
+    found = scratch.found
+
     if not each:
         x, y, z = stored_centre(scratch.group_centres, number)
         radius = radius_at(balls.group_balls, number) + slack
         close, count = meets_primitives(primitives, x, y, z, radius, True, wanted, found, count, found, NO_MARKS)
         if close == 0:
             return 0, False
-    group, meeting, near = group_at(balls.groups, number), 0, False
+
+    group = group_at(balls.groups, number)
+    meeting = 0
+    near = False
+
     for cluster in range(first_cluster_of_group(group), end_cluster_of_group(group)):
         left = open_lanes(close, meeting, marks)
         if each:
@@ -225,6 +253,7 @@ def group_meets(
         near |= by
         if one and meeting != 0 and not exists(marks):
             break
+
     return meeting, near
 
 
@@ -247,8 +276,11 @@ def scene_collision(
     """
     if primitives.count == 0 and not exists(watch):
         return 0
-    around, found = balls.group_balls, scratch.found
+
+    around = balls.group_balls
+    found = scratch.found
     meeting = 0
+
     for number in range(balls.group_count):
         slack = slack_at(watch, number)
         if slack < ZERO:
@@ -261,10 +293,12 @@ def scene_collision(
         count = primitives_in_reach(primitives, x, y, z, radius, found)
         if count == 0:
             continue
+
         lanes, near = group_meets(balls, primitives, scratch, number, count, still, marks, one, likely, slack)
         meeting |= lanes
         if near:
             set_clear(watch, number, False)
         if meeting != 0 and (one or meeting == wanted) and not exists(marks):
             break
+
     return meeting

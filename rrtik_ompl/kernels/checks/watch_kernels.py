@@ -26,7 +26,8 @@ from rrtik_ompl.kernels.simd.lanes import (
 )
 from rrtik_ompl.kernels.simd.records import exists
 
-ZERO, NOW_CLEAR = np.float32(0.0), np.float32(CLEAR)
+ZERO = np.float32(0.0)
+NOW_CLEAR = np.float32(CLEAR)
 
 
 @inlined
@@ -44,8 +45,12 @@ def set_clear(watch: Watch, number: int, clear: bool) -> None:
 @kernel
 def watch_motion(world: WorldTable, start: JointValues, end: JointValues, share: float) -> None:
     """Set by how much the bounds are widened: as far as things can move in a share of a motion."""
-    bounds, watch, joints = world.motion_bounds, world.scratch.watch, world.arm.joint_count
-    blocks, rows = bounds.blocks, bounds.rows
+    bounds = world.motion_bounds
+    watch = world.scratch.watch
+    joints = world.arm.joint_count
+    blocks = bounds.blocks
+    rows = bounds.rows
+
     for block in range(blocks):
         total = lanes_at(rows, blocks + block)
         for joint in range(joints):
@@ -57,10 +62,14 @@ def watch_motion(world: WorldTable, start: JointValues, end: JointValues, share:
 @kernel
 def joints_left(world: WorldTable) -> int:
     """After the first block, how many of the first joints carry what is yet to be checked; no bound is wide now."""
-    bounds, watch = world.motion_bounds, world.scratch.watch
+    bounds = world.motion_bounds
+    watch = world.scratch.watch
     last = ZERO
+
     for block in range(bounds.blocks):
-        slack, frames = lanes_at(watch, block), lanes_at(bounds.rows, block)
+        slack = lanes_at(watch, block)
+        frames = lanes_at(bounds.rows, block)
         last = max(last, highest(choose(slack >= ZERO, frames, spread(ZERO))))
         set_lanes(watch, block, smaller(slack, ZERO))
+
     return int(last)

@@ -25,7 +25,8 @@ from rrtik_ompl.kernels.simd.vectors import along, squared
 from rrtik_ompl.kernels.tables import cloud_layout as layout
 from rrtik_ompl.kernels.tables.cloud_layout import LEAF, BoxGroups, CloudTable, PointBlocks
 
-ZERO, HALF = np.float32(0.0), np.float32(0.5)
+ZERO = np.float32(0.0)
+HALF = np.float32(0.5)
 FAR_SQUARE = np.float32(1e36)  # [m^2] where there is nothing to measure
 
 
@@ -44,6 +45,7 @@ def boxes_in_reach(boxes: BoxGroups, group: int, low: Any, high: Any) -> int:
             sides_at(boxes, group, layout.HIGH_Z, part) >= low[2]
         )
         found |= bits(x & y & z) << (WIDTH * part)
+
     return found
 
 
@@ -52,10 +54,12 @@ def points_in_reach(points: PointBlocks, block: int, low: Any, high: Any) -> int
     """The points of a block, as bits, that lie in a box. Here lanes hold points."""
     found = 0
     for part in range(PARTS):
-        x, y = coordinates_at(points, block, 0, part), coordinates_at(points, block, 1, part)
+        x = coordinates_at(points, block, 0, part)
+        y = coordinates_at(points, block, 1, part)
         z = coordinates_at(points, block, 2, part)
         inside = (x <= high[0]) & (x >= low[0]) & (y <= high[1]) & (y >= low[1]) & (z <= high[2]) & (z >= low[2])
         found |= bits(inside) << (WIDTH * part)
+
     return found
 
 
@@ -64,8 +68,10 @@ def points_below(points: PointBlocks, block: int, normal: Any, height: float) ->
     """The points of a block, as bits, that lie below a plane. Here lanes hold points."""
     found = 0
     for part in range(PARTS):
-        x, y = coordinates_at(points, block, 0, part), coordinates_at(points, block, 1, part)
+        x = coordinates_at(points, block, 0, part)
+        y = coordinates_at(points, block, 1, part)
         found |= bits(along(normal, x, y, coordinates_at(points, block, 2, part)) < height) << (WIDTH * part)
+
     return found
 
 
@@ -100,11 +106,13 @@ def around_lanes(x: Any, y: Any, z: Any, reach: float) -> Any:
 @kernel
 def block_meets(points: PointBlocks, block: int, low: Any, high: Any, x: Any, y: Any, z: Any, square: float) -> int:
     """Lanes with a point of a block nearer than the root of ``square``."""
-    left, meeting = points_in_reach(points, block, low, high), 0
+    left = points_in_reach(points, block, low, high)
+    meeting = 0
     while left != 0:
         a, b, c = point_at(points, block, first_bit(left))
         left &= left - 1
         meeting |= bits(squared(x - a, y - b, z - c) < square)
+
     return meeting
 
 
@@ -114,41 +122,54 @@ def meets_points(cloud: CloudTable, x: Any, y: Any, z: Any, reach: float, bound:
 
     With ``bound`` a block of points in reach will do.
     """
-    boxes, points, top = cloud.groups, cloud.blocks, cloud.level_count - 1
+    boxes = cloud.groups
+    points = cloud.blocks
+    top = cloud.level_count - 1
     low, high = around_lanes(x, y, z, reach)
-    square, meeting, level, number = reach * reach, 0, top, 0
+    square = reach * reach
+    meeting = 0
+    level = top
+    number = 0
     group = group_at(cloud, top, 0)
     left = boxes_in_reach(boxes, group, low, high)
+
     while True:
         if left == 0:
             if level == top:
                 break
-            level, child, number = level + 1, number % LEAF + 1, number // LEAF
+            level = level + 1
+            child = number % LEAF + 1
+            number = number // LEAF
             group = group_at(cloud, level, number)
             left = above(boxes_in_reach(boxes, group, low, high), child)
             continue
+
         child = first_bit(left)
         left &= left - 1
         near = bits(to_box(boxes, group, child, x, y, z) < square) & wanted & ~meeting
         if near == 0:
             continue
         if level > 0:
-            level, number = level - 1, LEAF * number + child
+            level = level - 1
+            number = LEAF * number + child
             group = group_at(cloud, level, number)
             left = boxes_in_reach(boxes, group, low, high)
             continue
+
         if not bound:
             near &= block_meets(points, LEAF * number + child, low, high, x, y, z, square)
         meeting |= near
         if meeting == wanted:
             break
+
     return meeting
 
 
 @kernel
 def nearest_child(boxes: BoxGroups, group: int, x: float, y: float, z: float) -> int:
     """The child of a group whose box is nearest to a point. Here lanes hold boxes."""
-    best, found = FAR_SQUARE, 0
+    best = FAR_SQUARE
+    found = 0
     for part in range(PARTS):
         a = beyond(
             sides_at(boxes, group, layout.LOW_X, part) - x, spread(x) - sides_at(boxes, group, layout.HIGH_X, part)
@@ -161,7 +182,9 @@ def nearest_child(boxes: BoxGroups, group: int, x: float, y: float, z: float) ->
         )
         away = squared(a, b, c)
         if lowest(away) < best:
-            best, found = lowest(away), WIDTH * part + first_bit(bits(away <= lowest(away)))
+            best = lowest(away)
+            found = WIDTH * part + first_bit(bits(away <= lowest(away)))
+
     return found
 
 
@@ -177,54 +200,79 @@ def nearer_of_block(points: PointBlocks, block: int, x: Any, y: Any, z: Any, bes
 @kernel
 def to_points(cloud: CloudTable, x: Any, y: Any, z: Any) -> Any:
     """Distance of lanes of points, in the cloud's frame, from the nearest point of the cloud."""
-    boxes, points, top = cloud.groups, cloud.blocks, cloud.level_count - 1
+    boxes = cloud.groups
+    points = cloud.blocks
+    top = cloud.level_count - 1
     middle = HALF * (lowest(x) + highest(x)), HALF * (lowest(y) + highest(y)), HALF * (lowest(z) + highest(z))
     number = 0
+
     for down in range(top + 1):
         child = nearest_child(boxes, group_at(cloud, top - down, number), middle[0], middle[1], middle[2])
         number = LEAF * number + child
+
     best = nearer_of_block(points, number, x, y, z, spread(FAR_SQUARE))
-    level, number = top, 0
+    level = top
+    number = 0
     group = group_at(cloud, top, 0)
     left = (1 << LEAF) - 1
+
     while True:
         if left == 0:
             if level == top:
                 break
-            level, child, number = level + 1, number % LEAF + 1, number // LEAF
+            level = level + 1
+            child = number % LEAF + 1
+            number = number // LEAF
             group = group_at(cloud, level, number)
             low, high = around_lanes(x, y, z, highest(square_root(best)))
             left = above(boxes_in_reach(boxes, group, low, high), child)
             continue
+
         child = first_bit(left)
         left &= left - 1
         if bits(to_box(boxes, group, child, x, y, z) < best) == 0:
             continue
         if level > 0:
-            level, number = level - 1, LEAF * number + child
+            level = level - 1
+            number = LEAF * number + child
             group = group_at(cloud, level, number)
             low, high = around_lanes(x, y, z, highest(square_root(best)))
             left = boxes_in_reach(boxes, group, low, high)
             continue
+
         best = nearer_of_block(points, LEAF * number + child, x, y, z, best)
+
     return square_root(best)
 
 
 @kernel
 def next_block(cloud: CloudTable, low: Any, high: Any, after: int) -> int:
     """The first block of points behind a number (-1 for the first of all) whose box meets a box; -1 if none does."""
-    boxes, top = cloud.groups, cloud.level_count - 1
-    level, number, child = 0, after // LEAF, after % LEAF + 1
+    boxes = cloud.groups
+    top = cloud.level_count - 1
+    level = 0
+    number = after // LEAF
+    child = after % LEAF + 1
+
     if after < 0:
-        level, number, child = top, 0, 0
+        level = top
+        number = 0
+        child = 0
+
     while True:
         left = above(boxes_in_reach(boxes, group_at(cloud, level, number), low, high), child)
         if left == 0:
             if level == top:
                 return -1
-            level, child, number = level + 1, number % LEAF + 1, number // LEAF
+            level = level + 1
+            child = number % LEAF + 1
+            number = number // LEAF
             continue
+
         found: int = LEAF * number + first_bit(left)
         if level == 0:
             return found
-        level, number, child = level - 1, found, 0
+
+        level = level - 1
+        number = found
+        child = 0

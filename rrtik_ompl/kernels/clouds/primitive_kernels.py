@@ -31,8 +31,12 @@ def table_of(primitives: PrimitiveTable, head: PrimitiveHead) -> CloudTable:
 def in_cloud(shape: PrimitiveShape, x: Any, y: Any, z: Any) -> Any:
     """Points of the world in a cloud's frame."""
     centre = centre_of(shape)
-    x, y, z = x - centre[0], y - centre[1], z - centre[2]
-    a, b = along(first_axis_of(shape), x, y, z), along(second_axis_of(shape), x, y, z)
+    x = x - centre[0]
+    y = y - centre[1]
+    z = z - centre[2]
+    a = along(first_axis_of(shape), x, y, z)
+    b = along(second_axis_of(shape), x, y, z)
+
     return a, b, along(third_axis_of(shape), x, y, z)
 
 

@@ -109,16 +109,6 @@ def record_reader(size: int) -> Any:
     return intrinsic(lambda typingctx, array, number: (array(array, types.int64), emit))
 
 
-def member_reader(place: int, size: int) -> Any:
-    """Function (table, number) that finds a record in the array at a field of a table; records have ``size`` bytes."""
-
-    def emit(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        array = builder.load(pointer(builder, WHOLE, args[0], _constant(place)), align=_FIELD_BYTES)
-        return _scaled(builder, array, size, args[1])
-
-    return intrinsic(lambda typingctx, table, number: (types.int64(types.int64, types.int64), emit))
-
-
 def _row_reader(size: int) -> Any:
     def emit(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         array, width, number = args

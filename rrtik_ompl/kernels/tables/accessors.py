@@ -1,7 +1,7 @@
-"""What kernels read from the tables, by name: each function here reads one number, or finds one address.
+"""What kernels read from rows in the arrays of the checks' tables, by name: a number, three numbers, or the row itself.
 
-The places are those of :mod:`rrtik_ompl.kernels.layout`. By the types mypy knows which address is meant, so that it
-refuses a table that is passed for another; to the compiler all addresses are whole numbers.
+The places are those of :mod:`rrtik_ompl.kernels.layout`. By the types mypy knows which row is meant, so that it refuses
+one that is passed for another; to the compiler all addresses of numbers of a kind are the same.
 """
 
 from __future__ import annotations

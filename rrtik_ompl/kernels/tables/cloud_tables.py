@@ -19,4 +19,5 @@ def cloud_table(cloud: PointCloud) -> CloudTable:
             CloudTable, level_count=len(tree.firsts), firsts=tree.firsts, groups=tree.boxes, blocks=tree.blocks
         )
         object.__setattr__(cloud, "table", made)
+
     return cast(CloudTable, cloud.table)

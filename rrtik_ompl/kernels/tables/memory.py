@@ -46,6 +46,7 @@ def _placed(array: NDArray[Any]) -> tuple[NDArray[Any], int]:
     memory[:start] = memory[start + array.nbytes :] = GUARD
     copy: NDArray[Any] = np.ndarray(array.size, array.dtype, memory, start)
     copy[:] = array.ravel()
+
     return copy, begin + start
 
 
@@ -100,6 +101,7 @@ def packed(kind: type[R], **fields: Any) -> R:
     placed: dict[int, Any] = dict.fromkeys(range(len(kind.places)), 0)
     others = {}
     lists = {}
+
     for name, value in fields.items():
         place = kind.places[name]
         if isinstance(value, np.ndarray):
@@ -109,6 +111,7 @@ def packed(kind: type[R], **fields: Any) -> R:
             lists[place] = tuple(value)
         else:
             others[name] = value
+
     made = kind(table(placed))
     made.tables |= lists
     made.put(**others)
@@ -155,6 +158,7 @@ def record(size: int, numbers: Mapping[int, float | NDArray[Any]]) -> NDArray[np
             made[place : place + len(value)] = value
         else:
             made[place] = value
+
     return made
 
 
@@ -185,19 +189,25 @@ class TablePlan:
     def __init__(self, arrays: Mapping[int, int], numbers: Mapping[int, int]) -> None:
         self.spans: dict[int, slice] = {}
         self.fields, self.pointing = np.zeros((2, len(arrays) + len(numbers)), dtype=np.int64)
-        guards, end = [], 0
+        guards = []
+        end = 0
+
         for place, size in arrays.items():
             self.spans[place] = slice(end, end + size)
             if size:
-                self.fields[place], self.pointing[place] = WORD * end, 1
+                self.fields[place] = WORD * end
+                self.pointing[place] = 1
                 end += size + GUARD_WORDS
                 guards.append(np.arange(end - GUARD_WORDS, end))
+
         for place, number in numbers.items():
             self.fields[place] = number
-        self.start, self.stop = end, end + len(self.fields)
+        self.start = end
+        self.stop = end + len(self.fields)
         self.words = self.stop + GUARD_WORDS
         self.guards = np.concatenate([*guards, np.arange(self.stop, self.words)])
         self.blank: NDArray[np.float64] | None = None
+
         if self.words <= COPIED_WORDS:
             self.blank = np.zeros(self.words)
             self.blank[self.guards] = GUARD_WORD
@@ -217,13 +227,16 @@ class PlannedTable:
         begin = int(whole.ctypes.data)
         unaligned = -begin % ALIGNMENT
         first = unaligned // WORD
-        self._plan, self._words = plan, whole[first : first + plan.words]
+        self._plan = plan
+        self._words = whole[first : first + plan.words]
         self.header: Header = self._words[plan.start : plan.stop].view(np.int64)
+
         if plan.blank is not None:
             self._words[:] = plan.blank
         else:
             self._words[plan.guards] = GUARD_WORD
             self.header[:] = plan.fields
+
         self.header += plan.pointing * (begin + unaligned)
         self.address = begin + unaligned + WORD * plan.start
 

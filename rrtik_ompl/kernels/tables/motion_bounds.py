@@ -41,15 +41,20 @@ def bounds_table(chain: Chain, balls: BallTable, strokes: Vector, margin: float)
         strokes: Largest value of each sliding joint [m], shape (n,).
         margin: How far rounding may misplace a ball [m].
     """
-    clusters, spheres = balls.clusters.reshape(-1, CLUSTER_INTS), balls.balls.reshape(-1, BALL_FLOATS)
+    clusters = balls.clusters.reshape(-1, CLUSTER_INTS)
+    spheres = balls.balls.reshape(-1, BALL_FLOATS)
     lines = [np.zeros(len(chain.parent))]
+
     for group in balls.groups.reshape(-1, GROUP_INTS):
-        first, last = clusters[group[GROUP_FIRST]], clusters[group[GROUP_END] - 1]
+        first = clusters[group[GROUP_FIRST]]
+        last = clusters[group[GROUP_END] - 1]
         carried = spheres[first[CLUSTER_FIRST] : last[CLUSTER_END]].astype(np.float64)
         lines.append(_levers(chain, int(group[GROUP_FRAME]) - 1, carried, strokes))
+
     own = np.array(lines)[1:].reshape(-1, len(chain.parent))
     pairs = balls.pair_groups.reshape(-1, PAIR_GROUP_INTS)
-    one, other = own[pairs[:, PAIR_GROUP_ONE]], own[pairs[:, PAIR_GROUP_OTHER]]
+    one = own[pairs[:, PAIR_GROUP_ONE]]
+    other = own[pairs[:, PAIR_GROUP_OTHER]]
     common = (one > 0.0) & (other > 0.0)  # what carries both does not move them against each other
     rows = np.concatenate([own, np.where(common, 0.0, one + other)])
     made = np.zeros((2 + len(chain.parent), -(-max(len(rows), 1) // WIDTH) * WIDTH), dtype=np.float32)
@@ -58,6 +63,7 @@ def bounds_table(chain: Chain, balls: BallTable, strokes: Vector, margin: float)
     made[1] = NOTHING
     made[1, : len(rows)] = 2.0 * margin
     made[2:, : len(rows)] = (1.0 + SLACK) * rows.T
+
     return packed(BoundTable, blocks=made.shape[1] // WIDTH, rows=made)
 
 
@@ -69,12 +75,15 @@ def _levers(chain: Chain, joint: int, spheres: Matrix, strokes: Vector) -> Vecto
     found = np.zeros(len(chain.parent))
     reach = float((np.linalg.norm(spheres[:, :3], axis=1) + spheres[:, 3]).max())
     aside = float((np.linalg.norm(spheres[:, :2], axis=1) + spheres[:, 3]).max())
+
     while joint >= 0:
         found[joint] = 1.0 if chain.prismatic[joint] else aside
-        parent, origin = chain.parent[joint], chain.placement[joint][:3, 3]
+        parent = chain.parent[joint]
+        origin = chain.placement[joint][:3, 3]
         stroke = float(strokes[joint]) if chain.prismatic[joint] else 0.0
         away = np.cross(origin, chain.axis[parent]) if parent >= 0 else origin
         aside = float(np.linalg.norm(away)) + stroke + reach
         reach += float(np.linalg.norm(origin)) + stroke
         joint = int(parent)
+
     return found

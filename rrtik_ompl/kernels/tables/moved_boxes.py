@@ -48,19 +48,26 @@ def box_numbers(core: Core, placement: pin.SE3, kept: float) -> BoxNumbers | Non
     """
     assert core.half_sides is not None
     (a, b, c, x), (d, e, f, y), (g, h, i, z), _ = placement.homogeneous.tolist()
-    half, far = core.half_sides.tolist(), max(abs(x), abs(y), abs(z))
+    half = core.half_sides.tolist()
+    far = max(abs(x), abs(y), abs(z))
     slack = scene_tables.SLACK_PER_METRE * (1.0 + far + sqrt(half[0] * half[0] + half[1] * half[1] + half[2] * half[2]))
     turn = [x, y, z, a, d, g, b, e, h, c, f, i]
-    numbers, sides = list[list[float]](), list[list[float]]()
+    numbers = list[list[float]]()
+    sides = list[list[float]]()
+
     for grown in (slack + kept, -slack):
-        u, v, w = half[0] + grown, half[1] + grown, half[2] + grown
+        u = half[0] + grown
+        v = half[1] + grown
+        w = half[2] + grown
         spread = [abs(m) * u + abs(n) * v + abs(o) * w for m, n, o in ((a, b, c), (d, e, f), (g, h, i))]
         beside = scene_tables.SLACK_PER_METRE * (1.0 + far + max(spread))
         if min(u, v, w) < 0.0 or max(far, u, v, w) >= solid_tables.MAX_COMPARED_SIZE:
             return None
+
         numbers.append([*turn, u, v, w, 0.0])
         sides.append([p - (s + beside) for p, s in zip((x, y, z), spread, strict=True)])
         sides.append([p + (s + beside) for p, s in zip((x, y, z), spread, strict=True)])
+
     corners = [
         (a * u + b * v + c * w + x, d * u + e * v + f * w + y, g * u + h * v + i * w + z)
         for u, v, w in core.corners.tolist()
@@ -69,6 +76,7 @@ def box_numbers(core: Core, placement: pin.SE3, kept: float) -> BoxNumbers | Non
     size = max(max(abs(low), abs(high)) for low, high in along) + kept
     if size >= solid_tables.MAX_COMPARED_SIZE:
         return None
+
     middle = [0.5 * (low + high) for low, high in along]
     around = max(dist(corner, middle) for corner in corners) + kept
     bounds = np.array(sides)

@@ -71,6 +71,7 @@ class MovedRows:
         if core is not None and core.half_sides is not None and self._left and self._put_box(place, body, core):
             self._left -= 1
             return True
+
         made = _primitives(body, spheres)
         (placed,) = placed_bodies([solids], _pose(body), margins=np.array([body.margin + body.padding]))
         around = placed.around or (UNKNOWN,)
@@ -79,10 +80,12 @@ class MovedRows:
         span = self._solids.span(place, parts)
         if self._left == 0 or span is None or rows[0] is None or rows[1] is None:
             return False
+
         self._left -= 1
         for own, slots, new in zip(self._primitives, rows, made, strict=True):
             if slots is not None and len(new):
                 own.write(slots, new)
+
         self._solids.write(*span, parts)
         return True
 
@@ -129,18 +132,23 @@ class _PrimitiveRows:
 
     def write_one(self, slot: int, numbers: list[float], bounds: NDArray[np.float32]) -> None:
         """Write a primitive, and the box around its neighbours."""
-        self._numbers[slot], self._boxes[:, :, slot] = numbers, bounds
+        self._numbers[slot] = numbers
+        self._boxes[:, :, slot] = bounds
         if self._blocks.size:
             self._bound(slot // layout.BLOCK)
 
     def write(self, slots: NDArray[np.int64], made: Primitives) -> None:
         """Write primitives, and the boxes around the neighbours of each."""
         made = made if len(made) == 1 else made.only(np.argsort(made.kinds, kind="stable"))
-        self._numbers[slots], self._own[self._heads[slots[0], layout.STANDING_BODY]] = made.numbers, slots[-1]
-        self._boxes[:, 0, slots], self._boxes[:, 1, slots] = below(made.lows.T), above(made.highs.T)
+        self._numbers[slots] = made.numbers
+        self._own[self._heads[slots[0], layout.STANDING_BODY]] = slots[-1]
+        self._boxes[:, 0, slots] = below(made.lows.T)
+        self._boxes[:, 1, slots] = above(made.highs.T)
+
         for slot, detail in zip(slots, made.details, strict=True):
             if isinstance(detail, np.ndarray):
                 self._planes[slice(*self._heads[slot, layout.FIRST_PLANE : layout.END_PLANE + 1])] = detail
+
         if self._blocks.size:
             for block in set((slots // layout.BLOCK).tolist()):
                 self._bound(block)
@@ -148,7 +156,8 @@ class _PrimitiveRows:
     def _bound(self, block: int) -> None:
         """Write the box around some neighbours."""
         near = self._boxes[:, :, layout.BLOCK * block : layout.BLOCK * (block + 1)]
-        self._blocks[:, 0, block], self._blocks[:, 1, block] = near[:, 0].min(axis=1), near[:, 1].max(axis=1)
+        self._blocks[:, 0, block] = near[:, 0].min(axis=1)
+        self._blocks[:, 1, block] = near[:, 1].max(axis=1)
 
 
 class _SolidRows:
@@ -162,7 +171,8 @@ class _SolidRows:
 
     def span(self, place: int, parts: Sequence[ConvexSolid]) -> tuple[int, int] | None:
         """The first of a body's solids and the end of them, None unless there are as many of the same kinds."""
-        first, end = int(self._spans[place, layout.AROUND_FIRST]), int(self._spans[place, layout.INSIDE_END])
+        first = int(self._spans[place, layout.AROUND_FIRST])
+        end = int(self._spans[place, layout.INSIDE_END])
         kinds = self._solids[first:end, layout.SOLID_KIND].tolist()
         return (first, end) if kinds == [part.kind for part in parts] else None
 
@@ -173,6 +183,7 @@ class _SolidRows:
         record = self._solids[first].tolist()
         alone = span[layout.INSIDE_END] == first + 1 and record[layout.SOLID_KIND] == layout.CONVEX_SOLID
         fits = record[layout.END_BLOCK] == record[layout.FIRST_BLOCK] + 1 and len(core.corners) <= WIDTH
+
         return first if alone and fits else None
 
     def write_one(self, number: int, box: BoxNumbers) -> None:
@@ -186,12 +197,14 @@ class _SolidRows:
         if first == end:
             return
         blocks = slice(int(self._solids[first, layout.FIRST_BLOCK]), int(self._solids[end - 1, layout.END_BLOCK]))
-        self._sizes[first:end], self._corners[blocks] = solid_sizes(parts), corner_blocks(parts)
+        self._sizes[first:end] = solid_sizes(parts)
+        self._corners[blocks] = corner_blocks(parts)
 
 
 def _primitives(body: Body, spheres: tuple[Spheres, Spheres]) -> tuple[Primitives, Primitives]:
     """Primitives that contain a body, and primitives inside it."""
-    kind, core = primitive_kind(body.geometry), core_of(body.geometry)
+    kind = primitive_kind(body.geometry)
+    core = core_of(body.geometry)
     if kind in MAKERS and core is not None:  # both by one call of its formula
         kept = body.margin + body.padding
         beside = np.array([kept, kept if kind in ROUNDED else 0.0])
@@ -199,6 +212,7 @@ def _primitives(body: Body, spheres: tuple[Spheres, Spheres]) -> tuple[Primitive
         both = MAKERS[kind](_TWO, pose.repeat(2, axis=0), (core, core), _OUTWARD_AND_INWARD, beside)
         if len(both) == 2 and fits(both).all():
             return both.only(_TWO[:1]), both.only(_TWO[1:])
+
     return outer_primitives([body], spheres[:1]), inner_primitives([body], spheres[1:])
 
 

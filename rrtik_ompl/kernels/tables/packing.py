@@ -83,9 +83,11 @@ def partners(bodies: Sequence[Body], pairs: Sequence[tuple[int, int]]) -> dict[i
     row = np.full(len(bodies), -1)
     row[named] = np.arange(len(named))
     found = np.zeros((len(named), len(bodies)), dtype=bool)
+
     for first, second in (listed.T, listed.T[::-1]):
         moves = row[first] >= 0
         found[row[first[moves]], second[moves]] = True
+
     return dict(zip(named, found, strict=True))
 
 
@@ -117,11 +119,13 @@ def arm_tables(
     listed = pair_array(pairs)
     both = np.sort(listed[np.isin(listed, list(place)).all(axis=1)], axis=1).tolist()
     own = tuple(dict.fromkeys((place[i], place[j]) for i, j in both))
-    carried, sizes = tuple(bodies[k] for members in moving for k in members), tuple(map(len, moving))
+    carried = tuple(bodies[k] for members in moving for k in members)
+    sizes = tuple(map(len, moving))
     covers = tuple(np.asarray(s[k], dtype=np.float64) for members in moving for k in members for s in (outer, inner))
     solids_of = tuple(solids[k] for members in moving for k in members)
     if like is not None and like.serves(carried, sizes, covers, solids_of, own, limits):
         return like
+
     reaches = [(bodies[k].joint, _reach(bodies[k], outer[k])) for members in moving for k in members]
     margin = rounding_margin(chain, reaches, limits)
     packed = [
@@ -132,14 +136,17 @@ def arm_tables(
     bounds = bounds_table(chain, balls[0], limits, margin)
     turns = axis_turns(chain)
     poses = np.zeros((len(carried), 4, 4))
+
     for pose, body in zip(poses, carried, strict=True):  # in the turned frames of their joints
         pose[:] = body.placement.homogeneous
         pose[:3] = turns[body.joint - 1].T @ pose[:3]
+
     frames = [bodies[members[0]].joint for members in moving]
     thick = body_arrays(carried).paddings
     single = _solids(solids_of, poses, frames, sizes, kept=thick, slack=margin)
     wider = single if kept == 0.0 else _solids(solids_of, poses, frames, sizes, kept=thick + kept, slack=margin)
     joints = arm_table(chain)
+
     return ArmTables(carried, sizes, covers, solids_of, own, limits, margin, joints, balls, bounds, single, wider)
 
 
@@ -159,7 +166,8 @@ def _solids(
 
 def as_one(parts: Sequence[MovingBody]) -> MovingBody:
     """Bodies that one joint carries as a single one."""
-    outer, inner = np.concatenate([p.outer for p in parts]), np.concatenate([p.inner for p in parts])
+    outer = np.concatenate([p.outer for p in parts])
+    inner = np.concatenate([p.inner for p in parts])
     return MovingBody(parts[0].frame, outer, inner)
 
 
@@ -200,11 +208,13 @@ class PlacedPrimitives:
         places = [place for place, state in enumerate(now) if self._known.get(place) != state]
         if places:
             moved = [standing[place] for place in places]
-            covers, grown = [outer[k] for k in moved], [inflation[k] for k in moved]
+            covers = [outer[k] for k in moved]
+            grown = [inflation[k] for k in moved]
             made = outer_primitives([bodies[k] for k in moved], covers, grown)
             kept = self._made.only(~np.isin(self._made.bodies, places))
             self._made = joined([kept, replace(made, bodies=np.array(places)[made.bodies])])
             self._known.update((place, now[place]) for place in places)
+
         return self._made
 
 
@@ -232,7 +242,9 @@ class Flags:
         moving: Sequence[tuple[int, ...]],
         standing: Sequence[int],
     ) -> None:
-        self._keeps_clear, self._moving, self._standing = keeps_clear, moving, standing
+        self._keeps_clear = keeps_clear
+        self._moving = moving
+        self._standing = standing
         self._own = arm.balls[0].pairs.reshape(-1, PAIR_INTS)
 
     def __getitem__(self, flag: int) -> list[tuple[int, int]]:
@@ -240,10 +252,13 @@ class Flags:
         crossing = len(self._moving) * len(self._standing)
         if flag < crossing:
             members, place = divmod(flag, len(self._standing))
-            first, second = self._moving[members], (self._standing[place],)
+            first = self._moving[members]
+            second = (self._standing[place],)
         else:
             pair = self._own[flag - crossing]
-            first, second = self._moving[pair[PAIR_ONE]], self._moving[pair[PAIR_OTHER]]
+            first = self._moving[pair[PAIR_ONE]]
+            second = self._moving[pair[PAIR_OTHER]]
+
         return [(min(i, j), max(i, j)) for i in first for j in second if self._keeps_clear[i][j]]
 
 

@@ -80,7 +80,8 @@ class Primitives:
 
 def joined(parts: Sequence[Primitives]) -> Primitives:
     """Primitives one after the other; those of a body stay in their order."""
-    whole, points = np.zeros(0, dtype=np.int64), np.zeros((0, 3))
+    whole = np.zeros(0, dtype=np.int64)
+    points = np.zeros((0, 3))
     return Primitives(
         np.concatenate([whole, *(part.bodies for part in parts)]),
         np.concatenate([whole, *(part.kinds for part in parts)]),
@@ -103,20 +104,24 @@ def primitive_table(primitives: Primitives, checked: NDArray[np.bool_]) -> Primi
     if unknown:
         raise InputError(f"primitives for kernels: unknown kind {unknown[0]}; have {KINDS.start} to {KINDS.stop - 1}")
     order = _order(primitives)
-    ordered, place = primitives.only(order), np.empty_like(order)
+    ordered = primitives.only(order)
+    place = np.empty_like(order)
     place[order] = np.arange(len(order))
     heads = np.zeros((len(ordered), HEAD_INTS), dtype=np.int32)
     planes = [detail for detail in ordered.details if isinstance(detail, np.ndarray)]
     clouds = [detail for detail in ordered.details if isinstance(detail, CloudTable)]
     ends = np.cumsum([0, *(len(each) if isinstance(each, np.ndarray) else 0 for each in ordered.details)])
-    heads[:, KIND], heads[:, STANDING_BODY] = ordered.kinds, ordered.bodies
-    heads[:, FIRST_PLANE], heads[:, END_PLANE] = ends[:-1], ends[1:]
+    heads[:, KIND] = ordered.kinds
+    heads[:, STANDING_BODY] = ordered.bodies
+    heads[:, FIRST_PLANE] = ends[:-1]
+    heads[:, END_PLANE] = ends[1:]
     heads[ordered.kinds == CLOUD, FIRST_PLANE] = np.arange(len(clouds))
     own = np.full(checked.shape[1], -1, dtype=np.int32)
     by_kind = np.argsort(primitives.kinds, kind="stable")  # whatever stands near, the same one of a body's balls
     own[primitives.bodies[by_kind]] = place[by_kind]  # the last one of a body remains
     boxes = _bounding_boxes(ordered.lows, ordered.highs)
     blocks = _blocks(ordered)
+
     return packed(
         PrimitiveTable,
         count=len(ordered),
@@ -139,9 +144,13 @@ def _bounding_boxes(lows: Matrix, highs: Matrix) -> NDArray[np.float32]:
     """Sides of boxes, a run for each side, filled up with boxes that nothing meets."""
     padded = -(-len(lows) // BLOCK) * BLOCK
     boxes = np.empty((len(BOX_RUNS), padded), dtype=np.float32)
-    low, high = boxes[LOW_X : HIGH_Z + 1 : 2], boxes[HIGH_X : HIGH_Z + 1 : 2]
-    low[:], high[:] = UNBOUNDED_COORDINATE, -UNBOUNDED_COORDINATE
-    low[:, : len(lows)], high[:, : len(highs)] = below(lows.T), above(highs.T)
+    low = boxes[LOW_X : HIGH_Z + 1 : 2]
+    high = boxes[HIGH_X : HIGH_Z + 1 : 2]
+    low[:] = UNBOUNDED_COORDINATE
+    high[:] = -UNBOUNDED_COORDINATE
+    low[:, : len(lows)] = below(lows.T)
+    high[:, : len(highs)] = above(highs.T)
+
     return boxes
 
 

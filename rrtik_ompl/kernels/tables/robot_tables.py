@@ -76,21 +76,28 @@ class MovingBody:
 
 def arm_table(chain: Chain) -> ArmTable:
     """The joints of a tree."""
-    turns, parents = axis_turns(chain), chain.parent.tolist()
-    placements, phases = np.empty((len(parents), POSE_NUMBERS)), np.zeros(len(parents))
+    turns = axis_turns(chain)
+    parents = chain.parent.tolist()
+    placements = np.empty((len(parents), POSE_NUMBERS))
+    phases = np.zeros(len(parents))
     kinds = [
         SLIDE if slides else TURN if parent >= 0 else FIRST_TURN
         for slides, parent in zip(chain.prismatic, parents, strict=True)
     ]
+
     for row, parent in enumerate(parents):
         back = turns[parent].T if parent >= 0 else np.eye(3)
         rotation = back @ chain.placement[row][:3, :3] @ turns[row]
         if kinds[row] == TURN and abs(rotation[0, 2]) < ALIGNED:
-            kinds[row], phases[row] = ALIGNED_TURN, np.arctan2(-rotation[0, 1], rotation[0, 0])
-            cosine, sine = rotation[2, 2], -rotation[1, 2]
+            kinds[row] = ALIGNED_TURN
+            phases[row] = np.arctan2(-rotation[0, 1], rotation[0, 0])
+            cosine = rotation[2, 2]
+            sine = -rotation[1, 2]
             rotation = np.array([[1.0, 0.0, 0.0], [0.0, cosine, -sine], [0.0, sine, cosine]])
+
         placements[row, ROTATION : ROTATION + 9] = rotation.ravel()
         placements[row, ORIGIN : ORIGIN + 3] = back @ chain.placement[row][:3, 3]
+
     return packed(
         ArmTable,
         joint_count=len(parents),
@@ -119,6 +126,7 @@ def axis_turns(chain: Chain) -> NDArray[np.float64]:
             square = np.cross(np.eye(3)[np.argmin(np.abs(axis))], axis)
         x = square / np.linalg.norm(square)
         turns[row] = np.column_stack([x, np.cross(axis, x), axis])
+
     return frozen(turns)
 
 
@@ -132,6 +140,7 @@ def moving_body(chain: Chain, body: Body, outer: Spheres, inner: Spheres, margin
     grown, shrunk = (_moved(body.placement, spheres, turn) for spheres in (cover, inner))
     grown[:, 3] += body.padding + margin
     shrunk[:, 3] += body.padding - margin
+
     return MovingBody(body.joint, grown, shrunk[shrunk[:, 3] > 0.0])
 
 
@@ -167,7 +176,9 @@ def rounding_margin(chain: Chain, reaches: Sequence[tuple[int, float]], strokes:
         strokes: Largest value of each sliding joint [m], shape (n,).
     """
     count = len(chain.parent)
-    levers, extent = np.zeros(count), 0.0
+    levers = np.zeros(count)
+    extent = 0.0
+
     for joint, reach in reaches:
         levers[joint - 1] = max(levers[joint - 1], reach)
     for row in range(count - 1, -1, -1):  # children come after their parents, so they are done first
@@ -177,6 +188,7 @@ def rounding_margin(chain: Chain, reaches: Sequence[tuple[int, float]], strokes:
         extent = max(extent, reach)
         if parent >= 0:
             levers[parent] = max(levers[parent], reach)
+
     return max(SMALLEST_MARGIN, MARGIN_PER_LEVER * float(levers.sum()), MARGIN_PER_METRE * extent)
 
 
@@ -197,6 +209,7 @@ def ball_table(
     clusters: list[dict[int, int]] = []
     balls: list[Spheres] = []
     spans = [{BODY_FRAME: 0, BODY_FIRST: 0, BODY_END: 0} for _ in bodies]
+
     for frame in frames:
         start = len(clusters)
         for number, body in enumerate(bodies):
@@ -207,8 +220,11 @@ def ball_table(
                     span = {CLUSTER_FIRST: first, CLUSTER_END: first + len(part)}
                     clusters.append({CLUSTER_BODY: number, CLUSTER_FRAME: frame} | span)
                     balls.append(part)
+
                 spans[number] = {BODY_FRAME: frame, BODY_FIRST: first_cluster, BODY_END: len(clusters)}
+
         groups.append({GROUP_FRAME: frame, GROUP_FIRST: start, GROUP_END: len(clusters)})
+
     stacked = np.concatenate([np.zeros((0, BALL_FLOATS)), *balls])
     group_of = {frame: k for k, frame in enumerate(frames)}
     body_balls = [enclosing_ball(s) if len(s) else np.zeros(BALL_FLOATS) for s in shapes]
@@ -216,6 +232,7 @@ def ball_table(
     present.sort(key=lambda p: sorted(group_of[bodies[k].frame] for k in p))
     pair_groups = _pair_groups([(group_of[bodies[i].frame], group_of[bodies[j].frame]) for i, j in present])
     runs = [(clusters[g[GROUP_FIRST]][CLUSTER_FIRST], clusters[g[GROUP_END] - 1][CLUSTER_END]) for g in groups]
+
     return packed(
         BallTable,
         group_count=len(groups),
@@ -245,6 +262,7 @@ def _pair_groups(groups: Sequence[tuple[int, int]]) -> list[dict[int, int]]:
         else:
             span = {PAIR_GROUP_FIRST: k, PAIR_GROUP_END: k + 1}
             runs.append({PAIR_GROUP_ONE: one, PAIR_GROUP_OTHER: other} | span)
+
     return runs
 
 
@@ -268,15 +286,21 @@ def enclosing_ball(spheres: Spheres) -> Vector:
 @lru_cache(maxsize=4096)  # worlds of one arm that holds different things have most of them in common
 def _enclosing_ball(numbers: bytes) -> Vector:
     spheres = np.frombuffer(numbers).reshape(-1, BALL_FLOATS)
-    centres, radii = spheres[:, :3], spheres[:, 3]
+    centres = spheres[:, :3]
+    radii = spheres[:, 3]
     centre = 0.5 * ((centres - radii[:, None]).min(axis=0) + (centres + radii[:, None]).max(axis=0))
-    best, radius = centre, np.inf
+    best = centre
+    radius = np.inf
+
     for step in range(1, 41):
         away = centres - centre
         depths = np.sqrt(np.add.reduce(away * away, axis=1)) + radii
         farthest = int(np.argmax(depths))
         if depths[farthest] < radius:
-            best, radius = centre, float(depths[farthest])
+            best = centre
+            radius = float(depths[farthest])
+
         centre = centre + (centres[farthest] - centre) / (step + 3)
+
     slack = MARGIN_PER_LEVER * (radius + float(np.abs(best).max()))
     return frozen([*best, radius + slack])

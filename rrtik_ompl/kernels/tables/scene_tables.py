@@ -76,9 +76,13 @@ def outer_primitives(
     endless = ~fits(made)
     if not endless.any():
         return made
-    made.kinds[endless], made.numbers[endless] = BALL, 0.0
+
+    made.kinds[endless] = BALL
+    made.numbers[endless] = 0.0
     made.numbers[endless, BALL_RADIUS] = UNBOUNDED_LENGTH
-    made.lows[endless], made.highs[endless] = -UNBOUNDED_LENGTH, UNBOUNDED_LENGTH
+    made.lows[endless] = -UNBOUNDED_LENGTH
+    made.highs[endless] = UNBOUNDED_LENGTH
+
     return replace(made, details=tuple(None if e else d for e, d in zip(endless, made.details, strict=True)))
 
 
@@ -90,6 +94,7 @@ def inner_primitives(bodies: Sequence[Body], inner: Sequence[Spheres]) -> Primit
     beside = np.where(np.isin(np.arange(len(bodies)), rounded), margins, 0.0)
     rest = [(k, np.asarray(inner[k]).reshape(-1, 4)) for k in (*places.pop(None, ()), *places.get(CONVEX, ()))]
     made = joined([*_exact(bodies, places, -1.0, beside), _balls(bodies, rest, -1.0, margins)])
+
     return made.only(fits(made))
 
 
@@ -127,6 +132,7 @@ def primitive_kind(solid: Any) -> int | None:
         return HALF_SPACE
     if isinstance(solid, coal.ConvexBase):
         return None if outward_planes(solid) is None else CONVEX
+
     core = core_of(solid)
     if core is None:
         return None
@@ -157,25 +163,29 @@ def _exact(
             poses = np.array([bodies[k].placement.homogeneous for k in chosen])
             cores = [cast(Core, core) for core in of_each((bodies[k].geometry for k in chosen), core_of)]
             made.append(MAKERS[kind](own, poses, cores, grow, beside[own]))
+
     return made
 
 
 def _boxes(
     own: NDArray[np.int64], poses: NDArray[np.float64], cores: Sequence[Core], grow: Grow, beside: Vector
 ) -> Primitives:
-    centres, turns = poses[:, :3, 3], poses[:, :3, :3]
+    centres = poses[:, :3, 3]
+    turns = poses[:, :3, :3]
     halves = np.array([core.half_sides for core in cores])
     halves = halves + (grow * _slack(centres, np.linalg.norm(halves, axis=1)) + beside)[:, None]
     spreads = np.einsum("nij,nj->ni", np.abs(turns), halves)
     axes = turns.transpose(0, 2, 1).reshape(-1, 9)
     numbers = {SHAPE_CENTRE: centres, BOX_AXES: axes, BOX_HALF_SIZES: halves}
+
     return _bounded(BOX, own, numbers, centres, spreads, halves.min(axis=1))
 
 
 def _capsules(
     own: NDArray[np.int64], poses: NDArray[np.float64], cores: Sequence[Core], grow: Grow, beside: Vector
 ) -> Primitives:
-    centres, z = poses[:, :3, 3], poses[:, :3, 2]
+    centres = poses[:, :3, 3]
+    z = poses[:, :3, 2]
     lengths, radii = (np.array([getattr(core, name) for core in cores]) for name in ("half_length", "radius"))
     radii = radii + grow * _slack(centres, radii + lengths) + beside
     axes = 2.0 * lengths[:, None] * z
@@ -183,13 +193,15 @@ def _capsules(
     shares = np.where(lengths > 1e-9, 1.0 / np.where(lengths > 1e-9, squares, 1.0), 0.0)
     spreads = lengths[:, None] * np.abs(z) + radii[:, None]
     numbers = {SHAPE_CENTRE: centres - 0.5 * axes, CAPSULE_AXIS: axes, CAPSULE_INVERSE_SQUARE: shares[:, None]}
+
     return _bounded(CAPSULE, own, numbers | {CAPSULE_RADIUS: radii[:, None]}, centres, spreads, radii)
 
 
 def _cylinders(
     own: NDArray[np.int64], poses: NDArray[np.float64], cores: Sequence[Core], grow: Grow, beside: Vector
 ) -> Primitives:
-    centres, z = poses[:, :3, 3], poses[:, :3, 2]
+    centres = poses[:, :3, 3]
+    z = poses[:, :3, 2]
     lengths, radii = (np.array([getattr(core, name) for core in cores]) for name in ("half_length", "disc"))
     radii = radii + grow * _slack(centres, radii + lengths) + beside
     lengths = lengths + grow * _slack(centres, radii + lengths) + beside
@@ -197,6 +209,7 @@ def _cylinders(
     spreads = lengths[:, None] * np.abs(z) + radii[:, None] * across
     numbers = {SHAPE_CENTRE: centres, CYLINDER_AXIS: z, CYLINDER_HALF_LENGTH: lengths[:, None]}
     thickness = np.minimum(radii, lengths)
+
     return _bounded(CYLINDER, own, numbers | {CYLINDER_RADIUS: radii[:, None]}, centres, spreads, thickness)
 
 
@@ -247,6 +260,7 @@ def _balls(bodies: Sequence[Body], covers: Sequence[tuple[int, Spheres]], grow: 
     for k, spheres in covers:
         pose = bodies[k].placement
         placed.append(spheres[:, :3] @ np.array(pose.rotation).T + np.array(pose.translation))
+
     radii = np.concatenate([np.zeros(0), *(spheres[:, 3] for _, spheres in covers)])
     return _round(own, np.concatenate(placed), radii, grow, beside[own])
 
@@ -257,15 +271,18 @@ def _half_space(body: Body, place: int, grow: float, inflation: float) -> Primit
     offset += grow * SLACK_PER_METRE * (1.0 + abs(offset)) + inflation
     everywhere = np.full(3, UNBOUNDED_COORDINATE)
     numbers = record(SHAPE_FLOATS, {HALF_SPACE_NORMAL: normal, HALF_SPACE_OFFSET: offset})
+
     return _single(HALF_SPACE, place, numbers, -everywhere, everywhere, None)
 
 
 def _convex(body: Body, place: int, grow: float, inflation: float) -> Primitives:
     """A convex solid by its planes; a ball meets the inner primitive if its centre lies behind all of them."""
     planes = cast(Matrix, outward_planes(body.geometry))
-    rotation, origin = np.array(body.placement.rotation), np.array(body.placement.translation)
+    rotation = np.array(body.placement.rotation)
+    origin = np.array(body.placement.translation)
     corners = np.array(body.geometry.points()).reshape(-1, 3) @ rotation.T + origin
-    low, high = corners.min(axis=0), corners.max(axis=0)
+    low = corners.min(axis=0)
+    high = corners.max(axis=0)
     inflation += float(_slack(0.5 * (low + high)[None], (high - low).max(keepdims=True))[0])
     kept = outer_planes(body.geometry) if grow > 0.0 else planes
     world = np.empty_like(kept)
@@ -273,18 +290,24 @@ def _convex(body: Body, place: int, grow: float, inflation: float) -> Primitives
     normals[:] = kept[:, :3] @ rotation.T
     world[:, PLANE_OFFSET] = kept[:, 3] + normals @ origin + (inflation if grow > 0.0 else -inflation - PLANE_SLACK)
     numbers = record(SHAPE_FLOATS, {CONVEX_SHARE: 1.0 if grow > 0.0 else 0.0})
+
     return _single(CONVEX, place, numbers, low - inflation, high + inflation, world)
 
 
 def _cloud(body: Body, place: int, grow: float, inflation: float) -> Primitives:
     """A cloud of points by the table of its tree; nothing is left of it if nothing is left of a point."""
     solid = cast(CloudSolid, body.geometry)
-    (low, high), rotation, origin = solid.cloud.bounds, body.placement.rotation, body.placement.translation
-    centre, spread = rotation @ (0.5 * (low + high)) + origin, np.abs(rotation) @ (0.5 * (high - low))
+    low, high = solid.cloud.bounds
+    rotation = body.placement.rotation
+    origin = body.placement.translation
+    centre = rotation @ (0.5 * (low + high)) + origin
+    spread = np.abs(rotation) @ (0.5 * (high - low))
     slack = 3.0 * float(_slack(centre[None], np.abs(origin - centre).max(keepdims=True) + spread.max())[0])
-    radius, reach = solid.cloud.radius + grow * slack + inflation, spread + grow * slack + inflation + slack
+    radius = solid.cloud.radius + grow * slack + inflation
+    reach = spread + grow * slack + inflation + slack
     numbers = record(SHAPE_FLOATS, {SHAPE_CENTRE: origin, CLOUD_AXES: rotation.T.ravel(), CLOUD_RADIUS: radius})
     made = _single(CLOUD, place, numbers, centre - reach, centre + reach, cloud_table(solid.cloud))
+
     return made.only(np.array([radius > 0.0]))
 
 
@@ -293,5 +316,6 @@ _BUILDERS = {HALF_SPACE: _half_space, CONVEX: _convex, CLOUD: _cloud}
 
 def _single(kind: int, place: int, numbers: Vector, low: Vector, high: Vector, detail: Detail) -> Primitives:
     """One primitive, of the body at a place."""
-    places, kinds = np.array([place], dtype=np.int64), np.array([kind], dtype=np.int64)
+    places = np.array([place], dtype=np.int64)
+    kinds = np.array([kind], dtype=np.int64)
     return Primitives(places, kinds, numbers[None], low[None], high[None], (detail,))

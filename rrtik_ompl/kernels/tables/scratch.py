@@ -24,6 +24,7 @@ def scratch_table(
     ball_count = max(len(outer.balls), len(inner.balls)) // layout.BALL_FLOATS
     numbers = np.zeros(max(each.padded_count for each in primitives), dtype=np.int32)
     crossing = body_count * max(each.standing_count for each in primitives)
+
     return packed(
         layout.ScratchTable,
         values=np.zeros((len(frames), WIDTH)),

@@ -99,6 +99,7 @@ def convex_solids(geometry: coal.CollisionGeometry) -> Solids:
         around, inside, points = cached_convex_pieces(geometry)
         held = (*map(ConvexSolid, inside), *(ConvexSolid(p, kind=MERE_CORNERS) for p in points))
         return Solids(tuple(ConvexSolid(p, inside=False) for p in around), held)
+
     own = _own_solid(geometry)
     return NO_SOLIDS if own is None else Solids((own,), (own,))
 
@@ -117,13 +118,16 @@ def _own_solid(solid: coal.CollisionGeometry) -> ConvexSolid | None:
         if solid.getSweptSphereRadius() != 0.0:
             return None
         return ConvexSolid(np.zeros((1, 3)), disc=float(solid.d), axis=np.array(solid.n), kind=HALF_SPACE_SOLID)
+
     core = core_of(solid)
     if core is not None:
         radius = core.radius + float(solid.getSweptSphereRadius())
         return ConvexSolid(core.corners, disc=core.disc or 0.0, radius=radius)
+
     if isinstance(solid, coal.ConvexBase):
         points = np.array(solid.points(), dtype=np.float64).reshape(-1, 3)
         return ConvexSolid(points, radius=float(solid.getSweptSphereRadius()))
+
     return None
 
 
@@ -140,8 +144,10 @@ def placed_solids(
     """
     if not solids:
         return []
+
     owner, starts = _runs([len(s.corners) for s in solids])
-    turns, origins = poses[:, :3, :3], poses[:, :3, 3]
+    turns = poses[:, :3, :3]
+    origins = poses[:, :3, 3]
     corners = np.einsum("nij,nj->ni", turns[owner], np.concatenate([s.corners for s in solids])) + origins[owner]
     axes = np.einsum("nij,nj->ni", turns, np.array([s.axis for s in solids]))
     discs, radii, slacks = np.array([(s.disc, s.radius, s.slack) for s in solids]).T
@@ -151,6 +157,7 @@ def placed_solids(
     sizes = np.maximum.reduceat(np.abs(corners).max(axis=1), starts[:-1]) + discs + radii
     slacks = slacks + slack + SLACK_PER_METRE * (1.0 + np.where(endless, np.abs(discs), sizes))
     compared = endless | (sizes < MAX_COMPARED_SIZE)
+
     return [
         ConvexSolid(s.corners if plane else corners[a:b], s.inside, disc, axis, radius, own_slack, s.kind)
         if near
@@ -174,10 +181,12 @@ def placed_bodies(
     grown = np.broadcast_to(margins, len(bodies))[owner]
     placed = placed_solids([solid for each in own for solid in each], poses[owner], margins=grown, slack=slack)
     made = []
+
     for each, first, end in zip(bodies, starts[:-1].tolist(), starts[1:].tolist(), strict=True):
         middle = first + len(each.around)
         around = tuple(placed[first:middle])
         made.append(Solids(around, around if middle == end and each.inside else tuple(placed[middle:end])))
+
     return made
 
 
@@ -196,17 +205,22 @@ def solid_table(bodies: Sequence[tuple[int, Sequence[Solids]]]) -> SolidTable:
     for frame, parts in bodies:
         around = [solid for part in parts for solid in part.around or (UNKNOWN,)]
         inside = [solid for part in parts for solid in part.inside]
-        start, middle = len(solids), len(solids) + len(around)
+        start = len(solids)
+        middle = len(solids) + len(around)
         solids += around if inside == around else around + inside
         first_inside = start if inside == around else middle
         spans.append((frame, start, middle, first_inside, len(solids)))
+
     counts = np.array([len(solid.corners) for solid in solids], dtype=np.int64)
     blocks = np.concatenate([[0], np.cumsum(-(-counts // WIDTH))])
     numbers = np.zeros((len(solids), SOLID_INTS), dtype=np.int32)
-    numbers[:, FIRST_BLOCK], numbers[:, END_BLOCK] = blocks[:-1], blocks[1:]
-    numbers[:, SOLID_KIND], numbers[:, IS_INSIDE] = [s.kind for s in solids], [s.inside for s in solids]
+    numbers[:, FIRST_BLOCK] = blocks[:-1]
+    numbers[:, END_BLOCK] = blocks[1:]
+    numbers[:, SOLID_KIND] = [s.kind for s in solids]
+    numbers[:, IS_INSIDE] = [s.inside for s in solids]
     records = np.zeros((len(spans), SPAN_INTS), dtype=np.int32)
     records[:, [SPAN_FRAME, AROUND_FIRST, AROUND_END, INSIDE_FIRST, INSIDE_END]] = np.reshape(spans, (-1, SPAN_INTS))
+
     return packed(
         SolidTable,
         spans=records,
@@ -229,6 +243,7 @@ def solid_sizes(solids: Sequence[ConvexSolid]) -> Matrix:
         made[:, AXIS : AXIS + 3] = [solid.axis for solid in solids]
         made[:, BOUND_CENTRE : BOUND_CENTRE + 3] = centres
         made[:, BOUND_RADIUS] = away + np.abs(made[:, DISC]) + made[:, ROUND]
+
     return made
 
 
@@ -240,4 +255,5 @@ def corner_blocks(solids: Sequence[ConvexSolid]) -> NDArray[np.float64]:
     within = np.arange(len(owner)) - np.searchsorted(owner, owner)
     corners = np.concatenate([np.zeros((0, 3)), *(solid.corners for solid in solids)])
     padded = corners[starts[owner] + np.where(within < counts[owner], within, 0)]
+
     return np.asarray(padded.reshape(-1, WIDTH, 3).transpose(0, 2, 1))

@@ -20,8 +20,10 @@ def z_order(points: Matrix) -> NDArray[np.int64]:
     ranks = np.argsort(np.argsort(points, axis=0, kind="stable"), axis=0)  # so that one far away does not matter
     cells = ranks * ((1 << BITS) - 1) // max(len(points) - 1, 1)
     codes = np.zeros(len(points), dtype=np.int64)
+
     for bit in range(BITS):
         for axis in range(3):
             codes |= ((cells[:, axis] >> bit) & 1) << (3 * bit + axis)
+
     order: NDArray[np.int64] = np.argsort(codes, kind="stable")
     return order
