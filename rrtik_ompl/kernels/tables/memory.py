@@ -3,8 +3,7 @@
 There are two ways for whoever needs a table. :func:`packed` makes one that lives long, array by array; an array can be
 replaced by a larger one that :func:`aligned` makes. :func:`planned` is for a table that every call makes anew: all its
 arrays lie in a single piece, for numpy takes as long to give the address of an array as a small kernel runs. What a
-table holds is declared in its class, a :class:`rrtik_ompl.kernels.record.Record`; tables that have none yet are made by
-:func:`table` and :class:`TablePlan` of the places of their fields.
+table holds is declared in its class, a :class:`rrtik_ompl.kernels.record.Record`.
 
 Kernels check no bounds. Therefore every array lies between guard words, at least ``ALIGNMENT`` bytes of a pattern
 before and behind it (in a single piece behind it and behind the fields), and ``intact()`` says whether they are as they
@@ -59,14 +58,10 @@ def is_intact(array: NDArray[Any]) -> bool:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Table:
-    """Fields for the kernels, where they are, and the arrays whose addresses they hold, all by their places.
-
-    ``parts`` are other tables, whose addresses an array holds.
-    """
+    """Fields for the kernels, where they are, and the arrays whose addresses they hold, all by their places."""
 
     header: Header
     arrays: dict[int, NDArray[Any]]
-    parts: tuple[Table | Record, ...] = ()
     address: int = field(init=False)
 
     def __post_init__(self) -> None:
@@ -77,20 +72,18 @@ class Table:
 
     def intact(self) -> bool:
         """Whether nothing has been written beyond an array or the fields."""
-        own = all(is_intact(array) for array in (self.header, *self.arrays.values()))
-        return own and all(part.intact() for part in self.parts)
+        return all(is_intact(array) for array in (self.header, *self.arrays.values()))
 
 
-def table(fields: Mapping[int, int | NDArray[Any]], parts: Sequence[Table | Record] = ()) -> Table:
-    """A table that lives long, from its fields; every place from 0 up has one: a number, or an array to copy.
+def table(fields: Mapping[int, int | NDArray[Any]]) -> Table:
+    """The memory of a table that lives long, from its fields; every place from 0 up has one: a number or an array.
 
-    Arrays are flat, begin on a multiple of ``ALIGNMENT`` bytes and stay where they are as long as the table lives, and
-    so do ``parts``, other tables whose addresses it holds.
+    Arrays are copied, flat, begin on a multiple of ``ALIGNMENT`` bytes and stay where they are as long as it lives.
     """
     placed = {place: _placed(value) for place, value in fields.items() if isinstance(value, np.ndarray)}
     header = [placed[place][1] if place in placed else fields[place] for place in range(len(fields))]
     arrays = {place: array for place, (array, _) in placed.items()}
-    return Table(aligned(np.array(header, dtype=np.int64)), arrays, tuple(parts))
+    return Table(aligned(np.array(header, dtype=np.int64)), arrays)
 
 
 def packed(kind: type[R], **fields: Any) -> R:
@@ -139,7 +132,7 @@ def with_own(shared: Table, own: Mapping[int, NDArray[Any]]) -> Table:
     header = aligned(shared.header)
     for place, (_, address) in placed.items():
         header[place] = address
-    return Table(header, shared.arrays | {place: array for place, (array, _) in placed.items()}, shared.parts)
+    return Table(header, shared.arrays | {place: array for place, (array, _) in placed.items()})
 
 
 def with_own_arrays(shared: R, *names: str) -> R:

@@ -1,13 +1,10 @@
 """Tables as an image of another memory: every table and array gets a place there, and fields that point move along.
 
-Which fields point is said, not guessed. A record knows by the kinds of its fields. Of a table without a class it is
-said: to an array of the table itself or to a part of it (the table knows), to another table or an array that belongs to
-nobody (``links``), to where another field of the same table points (``same``).
+Which fields point is said by their kinds (:mod:`rrtik_ompl.kernels.record`), not guessed.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -15,9 +12,8 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.kernels.layout import ALIGNMENT
 from rrtik_ompl.kernels.record import Record, holds_array, holds_table, holds_tables
-from rrtik_ompl.kernels.tables.memory import PlannedTable, Table
 
-Block: TypeAlias = Record | Table | PlannedTable | NDArray[Any]
+Block: TypeAlias = Record | NDArray[Any]
 
 
 class MemoryImage:
@@ -46,32 +42,14 @@ class MemoryImage:
         """
         return self._places[_address(block)]
 
-    def add(self, block: Block, links: Mapping[int, Block] | None = None, same: Mapping[int, int] | None = None) -> int:
-        """Add a table or an array, unless it is there already; its address.
-
-        Args:
-            block: What is added; what ``links`` name must have been added before.
-            links: Tables or arrays that fields of the table point to.
-            same: Fields that point to where another field does.
-        """
+    def add(self, block: Block) -> int:
+        """Add a table with all that it points to, or an array, unless it is there already; its address."""
         address = _address(block)
         if address in self._places:
             return self._places[address]
+
         self._blocks.append(block)
-        if isinstance(block, np.ndarray):
-            return self._append(address, block)
-        if isinstance(block, Record):
-            return self._append(address, self._moved(block, links or {}))
-        header = block.header.copy()
-        parts = block.parts if isinstance(block, Table) else ()
-        there = {part.address: self.add(part) for part in parts}
-        for place, array in block.arrays.items():
-            header[place] = self._add_pointing(array, there)
-        for place, other in (links or {}).items():
-            header[place] = self.place(other)
-        for place, other_place in (same or {}).items():
-            header[place] = header[other_place]
-        return self._append(address, header)
+        return self._append(address, block if isinstance(block, np.ndarray) else self._moved(block))
 
     def bytes(self) -> bytes:
         """The memory from the base on."""
@@ -81,27 +59,23 @@ class MemoryImage:
             whole[start : start + data.nbytes] = np.frombuffer(data.tobytes(), dtype=np.uint8)
         return whole.tobytes()
 
-    def _moved(self, record: Record, links: Mapping[int, Block]) -> NDArray[np.int64]:
-        """The fields of a record in the other memory, after all that they point to."""
+    def _moved(self, record: Record) -> NDArray[np.int64]:
+        """The fields of a table in the other memory, after all that they point to."""
         header: NDArray[np.int64] = record.memory.header.copy()
         arrays = record.memory.arrays
-        for name, place in record.places.items():
-            other = getattr(record, name) if holds_table(record.kinds[name]) else links.get(place)
-            if holds_tables(record.kinds[name]):
-                moved = np.array([self.add(each) for each in getattr(record, name)], dtype=np.int64)
-                header[place] = self._append(_address(arrays[place]), moved)
-            elif other is not None:
-                header[place] = self.add(other)
-            elif place in arrays and holds_array(record.kinds[name]):
-                header[place] = self.add(arrays[place])
-        return header
 
-    def _add_pointing(self, array: NDArray[Any], there: Mapping[int, int]) -> int:
-        """Add an array of a table; addresses of the table's parts in it become those of the other memory."""
-        addresses = array.tolist() if there and array.dtype == np.int64 else []
-        if not addresses or not there.keys() >= set(addresses):
-            return self.add(array)
-        return self._append(_address(array), np.array([there[address] for address in addresses]))
+        for name, place in record.places.items():
+            kind = record.kinds[name]
+            if holds_table(kind):
+                table = getattr(record, name)
+                header[place] = 0 if table is None else self.add(table)
+            elif holds_tables(kind):
+                addresses = [self.add(table) for table in getattr(record, name)]
+                header[place] = self._append(_address(arrays[place]), np.array(addresses, dtype=np.int64))
+            elif holds_array(kind) and place in arrays:
+                header[place] = self.add(arrays[place])
+
+        return header
 
     def _append(self, address: int, data: NDArray[Any]) -> int:
         place, self._end = self._end, self._end + -(-max(data.nbytes, 1) // ALIGNMENT) * ALIGNMENT

@@ -6,7 +6,7 @@ import weakref
 import numpy as np
 import pytest
 
-from rrtik_ompl.kernels.record import Doubles, Floats, Ints, Record, Wholes
+from rrtik_ompl.kernels.record import Doubles, Floats, Ints, Record, Tables, Wholes
 from rrtik_ompl.kernels.simd.compiled import entry, kernel
 from rrtik_ompl.kernels.simd.records import exists, row_at, same_place, table_reader
 from rrtik_ompl.kernels.tables.memory import PlannedTable, aligned, packed, sizes_of
@@ -30,6 +30,7 @@ class Outer(Record):
     ints: Ints
     wholes: Wholes
     absent: Doubles
+    inners: Tables
 
 
 inner_at = table_reader(Inner)
@@ -54,6 +55,11 @@ def second(table: Outer) -> float:
     return inner_at(table.wholes, 1).row[0]
 
 
+@kernel
+def last(table: Outer) -> float:
+    return inner_at(table.inners, 1).row[0]
+
+
 def outer(**fields):
     inner = packed(Inner, number=3, row=np.arange(4.0))
     arrays = {
@@ -67,7 +73,7 @@ def outer(**fields):
 
 def test_fields_stand_in_the_order_of_the_class_a_word_each():
     table = outer()
-    assert list(Outer.places) == ["count", "share", "inner", "doubles", "floats", "ints", "wholes", "absent"]
+    assert list(Outer.places) == ["count", "share", "inner", "doubles", "floats", "ints", "wholes", "absent", "inners"]
     words = table.memory.header
     assert words[0] == 5
     assert words[1:2].view(np.float64)[0] == 0.5
@@ -101,6 +107,14 @@ def test_arrays_may_be_one_and_be_absent_no_more():
 def test_addresses_of_tables_in_an_array_lead_to_them():
     inner = packed(Inner, row=np.array([8.0]))
     assert second(outer(wholes=np.array([0, inner.address]))) == 8.0
+
+
+@pytest.mark.kernels
+def test_a_list_of_tables_is_kept_and_leads_to_each():
+    table = outer(inners=[packed(Inner), packed(Inner, row=np.array([9.0]))])
+    assert last(table) == 9.0
+    assert [len(inner.row) for inner in table.inners[1:]] == [1]
+    assert outer().inners == ()
 
 
 def test_a_table_in_one_piece_has_the_numbers_and_arrays_that_were_asked_for():

@@ -4,36 +4,60 @@ import numpy as np
 import pytest
 
 import rrtik_ompl as rrtik
-from rrtik_ompl.kernels.tables.memory import table
+from rrtik_ompl.kernels.record import Doubles, Ints, Record, Tables
+from rrtik_ompl.kernels.tables.memory import packed
 from rrtik_ompl.kernels.wasm.image import MemoryImage
 
 BASE = 1 << 20
 
 
+class Inner(Record):
+    """A table that others point to."""
+
+    number: int
+    row: Doubles
+
+
+class Outer(Record):
+    """A field of each kind that points, and some that do not."""
+
+    inner: Inner
+    count: int
+    ints: Ints
+    inners: Tables
+    none: Inner
+    absent: Doubles
+
+
+def words(memory, address, count, kind=np.int64):
+    return np.frombuffer(memory, dtype=kind, count=count, offset=int(address) - BASE).tolist()
+
+
 def test_fields_that_point_move_along_and_numbers_stay():
-    inner = table({0: 7, 1: np.arange(3.0)})
-    outer = table({0: inner.address, 1: 5, 2: np.array([1, 2], dtype=np.int32), 3: 0})
+    inner = packed(Inner, number=7, row=np.arange(3.0))
+    other = packed(Inner, number=8)
+    outer = packed(Outer, inner=inner, count=5, ints=np.array([1, 2], dtype=np.int32), inners=[other, inner])
     image = MemoryImage(BASE)
-    image.add(inner)
-    place = image.add(outer, links={0: inner}, same={3: 2})
+    place = image.add(outer)
     memory = image.bytes()
-    header = np.frombuffer(memory, dtype=np.int64, count=4, offset=place - BASE)
-    assert header[0] == image.place(inner)
-    assert header[1] == 5
-    assert header[3] == header[2]
-    numbers = np.frombuffer(memory, dtype=np.int32, count=2, offset=int(header[2]) - BASE)
-    np.testing.assert_array_equal(numbers, [1, 2])
-    first = np.frombuffer(memory, dtype=np.int64, count=2, offset=image.place(inner) - BASE)
-    assert first[0] == 7
-    np.testing.assert_array_equal(np.frombuffer(memory, count=3, offset=int(first[1]) - BASE), [0.0, 1.0, 2.0])
+    fields = words(memory, place, 6)
+    assert fields[0] == image.place(inner)
+    assert fields[1] == 5
+    assert words(memory, fields[2], 2, np.int32) == [1, 2]
+    assert words(memory, fields[3], 2) == [image.place(other), image.place(inner)]
+    assert fields[4:] == [0, 0]
+    number, row = words(memory, image.place(inner), 2)
+    assert number == 7
+    assert words(memory, row, 3, np.float64) == [0.0, 1.0, 2.0]
     assert len(memory) == image.end - BASE
 
 
-def test_what_is_there_already_is_not_added_again_and_what_is_not_cannot_be_pointed_to():
-    shared, image = np.zeros(4), MemoryImage(BASE)
+def test_what_is_there_already_is_not_added_again_and_what_is_not_has_no_place():
+    shared = np.zeros(4)
+    image = MemoryImage(BASE)
     assert image.add(shared) == image.add(shared)
     with pytest.raises(KeyError):
-        image.add(table({0: 0}), links={0: table({0: 1})})
+        image.place(packed(Inner))
 
 
 @pytest.mark.kernels
