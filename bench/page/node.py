@@ -25,7 +25,7 @@ from rrtik_ompl.kernels.search.crdt.search import CrdtSearch
 from rrtik_ompl.kernels.search.motions.motion_table import step_counts
 from rrtik_ompl.planning.generated_problems import generated_problem
 from rrtik_ompl.viewer.page_planner import SAMPLES, VERTICES, page_planner
-from rrtik_ompl.world.kept_clearance import Room, leaving_room, room_between
+from rrtik_ompl.world.kept_clearance import Clearances, clearances_between, search_form
 from rrtik_ompl.world.problem import densely_checked
 
 SCRIPT = Path(__file__).with_name("in_node.js")
@@ -84,8 +84,10 @@ class Searches:
 
 def searched(problem: rrtik.Problem, *, one_joint: bool, seeds: int, found: dict[str, Any]) -> Searches:
     """Compare the searches in node with those here, which answer every question with no, as the page does."""
-    room = room_between(problem.world, np.stack([problem.start, goal_of(problem)]), None) or Room(0.0, 0.0)
-    world = leaving_room(densely_checked(problem).world, room)
+    clearances = clearances_between(problem.world, np.stack([problem.start, goal_of(problem)]), None) or Clearances(
+        0.0, 0.0
+    )
+    world = search_form(densely_checked(problem).world, clearances)
     equal, rounded, other = 0, 0, 0
     solve = _one_joint(problem, world) if one_joint else _connect(problem, world)
     for seed, path in zip(range(1, seeds + 1), found["paths"], strict=True):
@@ -146,7 +148,7 @@ def answers_of(robot: rrtik.Robot, configurations: int, rng: np.random.Generator
     problem = rrtik.Problem(rrtik.World(robot, scene), start, start)
     plan = page_planner(problem, start, SIDE)
     assert plan is not None
-    room = room_between(problem.world, np.stack([start, start]), None) or Room(0.0, 0.0)
+    clearances = clearances_between(problem.world, np.stack([start, start]), None) or Clearances(0.0, 0.0)
     each = configurations // (POSES * len(shapes))
     moves, wanted, wanted_motions = [], [], []
     for _, (k, (name, sizes)) in _rounds(shapes):
@@ -154,7 +156,7 @@ def answers_of(robot: rrtik.Robot, configurations: int, rng: np.random.Generator
         larger = (np.array(sizes) * rng.uniform(0.5, 2.0, len(sizes))).tolist()
         obstacle = rrtik.Obstacle(name, _shape(name, larger), placed)
         scene = rrtik.Scene(tuple(obstacle if one.name == name else one for one in scene.obstacles))
-        world = leaving_room(densely_checked(problem.with_world(rrtik.World(robot, scene))).world, room)
+        world = search_form(densely_checked(problem.with_world(rrtik.World(robot, scene))).world, clearances)
         Q = rng.uniform(*robot.finite_range(), (each, robot.dof))
         A = Q[: each // SHARE_MOTIONS]
         B = np.clip(A + rng.normal(0.0, 0.2, A.shape), *robot.finite_range())

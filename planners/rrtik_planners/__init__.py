@@ -49,6 +49,14 @@ _MODULES = {
     "RoadmapPlanner": "roadmap",
 }
 
+# The planners that "auto" lets search, in the order of their turns, and what each of them solves.
+PORTFOLIO = {
+    "fastrrtconnect": "any goal",
+    "bicrdt": "any goal",
+    "ikurt": "goal of the tip",
+    "cbirrt": "path constraints",
+}
+
 
 def __getattr__(name: str) -> Any:  # noqa: ANN401 - whatever has that name
     if name not in _MODULES:

@@ -28,7 +28,6 @@ class BiCRDT(OneJointPlanner):
     ompl_name: ClassVar[str] = "BiCRDT"
     supports_iteration_limit: ClassVar[bool] = True
     proof_iterations: ClassVar[int] = 200
-    portfolio_turn: ClassVar[int] = 2
 
     def between(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Stop) -> SearchResult:
         """See :meth:`OneJointPlanner.between`."""

@@ -35,7 +35,6 @@ class FastRRTConnect(SafePlanner):
     supports_iteration_limit: ClassVar[bool] = True
     proof_iterations: ClassVar[int] = 20_000
     reseeded: ClassVar[bool] = True
-    portfolio_turn: ClassVar[int] = 1
 
     def __init__(
         self,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import ClassVar
 
 from ompl import base as ob
 
@@ -29,8 +28,6 @@ class IKURT(TipSeeker):
 
     ``statistics`` says how far from the goal the tip ends: ``position_error`` [m], ``orientation_error`` [rad].
     """
-
-    portfolio_turn: ClassVar[int] = 3
 
     def __init__(
         self,

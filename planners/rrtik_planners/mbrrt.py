@@ -27,7 +27,6 @@ class MBRRT(BiCRDT):
 
     ompl_name: ClassVar[str] = "MBRRT"
     proof_iterations: ClassVar[int] = 0
-    portfolio_turn: ClassVar[int] = 0
 
     def __init__(
         self,

@@ -35,7 +35,6 @@ class RestartShorten(FastRRTConnect):
     anytime: ClassVar[bool] = True
     supports_iteration_limit: ClassVar[bool] = False
     proof_iterations: ClassVar[int] = 0
-    portfolio_turn: ClassVar[int] = 0
 
     ompl_name: ClassVar[str] = "RestartShorten"
 

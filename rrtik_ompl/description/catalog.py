@@ -76,6 +76,20 @@ def find_planner(name: str) -> type[Any]:
     return found
 
 
+@cache
+def portfolio() -> dict[str, str]:
+    """Names of the planners that "auto" lets search, in the order of their turns, each with what it solves.
+
+    A package that offers planners says so in ``PORTFOLIO`` of its outermost module: by name "any goal", "goal of the
+    tip" (the planner finds the configurations itself) or "path constraints". No planner is imported for that.
+    """
+    packages = sorted({entry.module.partition(".")[0] for entry in _offers("planners").values()})
+    found: dict[str, str] = {}
+    for package in packages:
+        found |= getattr(import_module(package), "PORTFOLIO", {})
+    return found
+
+
 def find_workspace(robot: str) -> Callable[[], Any]:
     """What draws a robot's effective workspace: a function without arguments that returns slices.
 

@@ -45,7 +45,6 @@ class PlannerTraits:
         keeps_constraints: It keeps the path constraints of a problem; any other planner is refused there.
         reseeded: A SafePlanner that searches as one made anew once its seed is another, so that one object serves many
             queries (:func:`rrtik_ompl.plan_many`): nothing that it keeps depends on the seed but ``rng``.
-        portfolio_turn: Its turn, from 1, where `plan()` tries planners one after the other ("auto"); 0 if it has none.
     """
 
     anytime: bool = False
@@ -61,7 +60,6 @@ class PlannerTraits:
     brief_options: Mapping[str, Any] = field(default_factory=dict)
     proof_iterations: int = 0
     reseeded: bool = False
-    portfolio_turn: int = 0
     keeps_constraints: bool = False
 
 

@@ -87,7 +87,6 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
     one_joint: ClassVar[bool] = False
     brief_options: ClassVar[Mapping[str, Any]] = MappingProxyType({})
     proof_iterations: ClassVar[int] = 0
-    portfolio_turn: ClassVar[int] = 0
     keeps_constraints: ClassVar[bool] = False
 
     def __init_subclass__(cls, **options: Any) -> None:

@@ -10,7 +10,7 @@ The rows of a planner's `Turn`; which one comes next depends on what has come of
 | proving | by proofs, with that room | 2, 4, ... | after five strict ones, or without kernels |
 
 Strict ones are due from the first path on that is valid but not proven, for half of the effort. A plain one has no
-bound but time if no later one would aim at other configurations.
+bound but time if no later one would have other goal configurations.
 
 `Turn.rows` yields a row, :func:`walk` makes the attempt and gives what has come of it to `Turn.take`, and only then
 does `rows` go on: it finds in the turn what the next row depends on.
@@ -37,11 +37,12 @@ from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.ompl_bridge.attempt import MOTIONS_PER_ITERATION, Attempt, attempt, attempt_seeds
 from rrtik_ompl.ompl_bridge.planner_options import check_options
 from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory, planners_with, traits_of
-from rrtik_ompl.planning.aims import Aims
+from rrtik_ompl.planning.goal_choice import GoalChoice
 from rrtik_ompl.planning.outcome import NamedPlanner, Plan, Request
 from rrtik_ompl.planning.second_check import SecondCheck
-from rrtik_ompl.world.problem import Problem, densely_checked
+from rrtik_ompl.world.problem import Problem, densely_checked, problem_in
 from rrtik_ompl.world.proof import PROOF_KERNELS
+from rrtik_ompl.world.world import form_of
 
 SHORTEST = 1e-3  # [s] that an attempt gets at least
 EFFORT_ITERATIONS = 1000  # that an attempt of effort 1 may take
@@ -62,14 +63,14 @@ class Row(NamedTuple):
     Attributes:
         kind: As in the table; "strict" for proving ones too.
         problem: In the form in which its motions are checked.
-        aims: Configurations at the goal, shape (k, dof); none for a planner that finds them itself.
+        goals: Configurations at the goal, shape (k, dof); none for a planner that finds them itself.
         budget: Until when, with how many iterations, by which random numbers.
-        checked: Whether start and aims are known to be free.
+        checked: Whether start and goals are known to be free.
     """
 
     kind: Kind
     problem: Problem
-    aims: Matrix
+    goals: Matrix
     budget: Budget
     checked: bool = False
 
@@ -98,7 +99,7 @@ def walk(turns: Iterable[Turn]) -> Iterator[Turn]:
                 outcome = attempt(
                     row.problem,
                     turn.planner.factory,
-                    row.aims,
+                    row.goals,
                     row.budget,
                     parameters=turn.parameters,
                     checked=row.checked,
@@ -149,12 +150,11 @@ class Turn:
         self._request = request
         self._traits = traits
         self._seeds = seeds
-        self._aims = Aims(
+        self._goal_choice = GoalChoice(
             problem,
             traits,
-            request.clearance,
-            attempts=len(seeds),
-            seed=seeds[0],
+            request,
+            seeds,
             seconds_left=lambda: self.budget.left,  # of the budget of that moment: `rows` and `take` put others here
         )
         self._check = SecondCheck(problem, planner, request, seed=seeds[0])
@@ -178,17 +178,17 @@ class Turn:
                 return
 
             self.totals["attempts"] += 1
-            aims = self._aims.of(number)
-            if len(aims) == 0 and not self._aims.finds_goals_itself:
-                if self._aims.exhausted:
+            goals = self._goal_choice.of(number)
+            if len(goals) == 0 and not self._goal_choice.planner_finds_goals:
+                if self._goal_choice.exhausted:
                     return
                 continue  # a round of inverse kinematics in vain counts as an attempt
 
             if number == 0:
-                yield from self._quick(aims)
+                yield from self._quick(goals)
                 if self._is_over():
                     return
-            yield self._strict(number, aims) or self._plain(number, aims)
+            yield self._strict(number, goals) or self._plain(number, goals)
 
     def take(self, row: Row, outcome: Attempt) -> None:
         """Count what has come of an attempt, and keep its path if the second check accepts it."""
@@ -214,7 +214,7 @@ class Turn:
         if not self.reason:
             self.path = self._check.best
             if self.path is None:
-                self.reason = self._check.reason or self._aims.reason
+                self.reason = self._check.reason or self._goal_choice.reason
 
         if self.path is None and self.seconds >= self.budget.seconds:
             attempts = self.totals["attempts"]
@@ -269,26 +269,26 @@ class Turn:
     def _goal_is_unreachable(self) -> bool:
         """Whether path constraints keep start and goal apart, as far as the planner sees."""
         times_seen = self.totals.get("separated", 0)
-        return times_seen > 0 and (self._aims.exhausted or times_seen > SEPARATED)
+        return times_seen > 0 and (self._goal_choice.exhausted or times_seen > SEPARATED)
 
-    def _quick(self, aims: Matrix) -> list[Row]:
+    def _quick(self, goals: Matrix) -> list[Row]:
         """A brief attempt on what the kernels can prove; none where they cannot prove an end."""
         if not self._traits.supports_iteration_limit or self._problem.world.accuracy != "exact":
             return []
-        if self._aims.finds_goals_itself and not self._traits.kernels:
+        if self._goal_choice.planner_finds_goals and not self._traits.kernels:
             return []
 
-        conservative = self._problem.with_accuracy("conservative")
-        is_free = conservative.world.checks.free(np.concatenate([conservative.start[None], aims]))
+        conservative = problem_in(self._problem, form_of(self._problem.world, accuracy="conservative"))
+        is_free = conservative.world.checks.free(np.concatenate([conservative.start[None], goals]))
         start_is_free = is_free[0]
-        aims = aims[is_free[1:]]
-        nothing_to_aim_at = len(aims) == 0 and not self._aims.finds_goals_itself
-        if not start_is_free or nothing_to_aim_at:
+        goals = goals[is_free[1:]]
+        no_goal_is_free = len(goals) == 0 and not self._goal_choice.planner_finds_goals
+        if not start_is_free or no_goal_is_free:
             return []
-        return [Row("quick", conservative, aims, self._budget(0, effort=1), checked=True)]
+        return [Row("quick", conservative, goals, self._budget(0, effort=1), checked=True)]
 
-    def _strict(self, number: int, aims: Matrix) -> Row | None:
-        """An attempt with room to spare; None if it is not due, or no aim has that room."""
+    def _strict(self, number: int, goals: Matrix) -> Row | None:
+        """An attempt with room to spare; None if it is not due, or no goal configuration has that room."""
         if not self._strict_is_due(number):
             return None
 
@@ -297,8 +297,8 @@ class Turn:
         if proving not in self._strict_problems:
             self._strict_problems[proving] = self._check.strict_problem(proving=proving)
         strict_problem = self._strict_problems[proving]
-        roomy = aims[strict_problem.world.checks.free(aims)]
-        if len(roomy) == 0 and not self._aims.finds_goals_itself:
+        roomy = goals[strict_problem.world.checks.free(goals)]
+        if len(roomy) == 0 and not self._goal_choice.planner_finds_goals:
             return None
 
         growth = 2 if proving else 4
@@ -318,25 +318,25 @@ class Turn:
             return True
         return self._motions_spent["strict"] < self._motions_spent["plain"]
 
-    def _plain(self, number: int, aims: Matrix) -> Row:
+    def _plain(self, number: int, goals: Matrix) -> Row:
         """An attempt with exact checks."""
         dense = self._traits.anytime or self._check.num_rejected
         problem = densely_checked(self._problem) if dense else self._problem
         checked = problem.world.accuracy == "exact"  # by the problem and by the search for goals
         budget = self._budget(number, self._plain_effort(number), self._share(number))
-        return Row("plain", problem, aims, budget, checked)
+        return Row("plain", problem, goals, budget, checked)
 
     def _plain_effort(self, number: int) -> int | None:
         """How much an attempt may try, in units of `EFFORT_ITERATIONS`; None for as much as there is time for."""
         if not self._traits.supports_iteration_limit:
             return None
-        if self._aims.is_short_way(number):
+        if self._goal_choice.is_short_way(number):
             return SHORT_WAY_EFFORT
-        return 2**number if self._aims.changes_after(number) else None
+        return 2**number if self._goal_choice.changes_after(number) else None
 
     def _share(self, number: int) -> float:
         """The share of time and iterations left for an attempt: half for the short way round, before the long one."""
-        return 0.5 if self._aims.is_short_way(number) else 1.0
+        return 0.5 if self._goal_choice.is_short_way(number) else 1.0
 
     def _budget(self, number: int, effort: int | None, share: float = 1.0) -> Budget:
         """The budget of one attempt: a share of the time, and iterations by its effort, as far as there are any left.

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from types import MappingProxyType
 from typing import TypeAlias
 
@@ -18,7 +18,7 @@ import numpy as np
 
 from rrtik_ompl.base.arrays import Vector
 from rrtik_ompl.base.budget import Budget
-from rrtik_ompl.base.choices import ImproveStrategy, PathObjective
+from rrtik_ompl.base.choices import PathObjective
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.description.joint_weights import weights_of
 from rrtik_ompl.model.path import JointPath
@@ -28,7 +28,7 @@ from rrtik_ompl.ompl_bridge.attempt import ITERATION_LIMIT
 from rrtik_ompl.ompl_bridge.planner_options import planner_options
 from rrtik_ompl.ompl_bridge.weighted import has_weights
 from rrtik_ompl.planning.attempts import Turn, walk
-from rrtik_ompl.planning.outcome import NamedPlanner, Plan, Request
+from rrtik_ompl.planning.outcome import Improvement, NamedPlanner, Plan, Request
 from rrtik_ompl.planning.shortening import Wishes, shortened
 from rrtik_ompl.world.clearance_curve import distances_at, places_along
 from rrtik_ompl.world.kept_clearance import possible_clearance
@@ -49,21 +49,6 @@ NEAREST = 1e-3  # [m] clearances below this cost no more
 DOUBLE = 0.05  # [m] the clearance at which a piece of a path counts double
 
 PathCost: TypeAlias = Callable[[JointPath, Problem], float]
-
-
-@dataclass(frozen=True, slots=True)
-class Improvement:
-    """How a path is to be improved.
-
-    Attributes:
-        seconds: How much longer it may take [s].
-        objective: What is to be made small.
-        strategy: Whether further plans are made, or the first path alone is shortened.
-    """
-
-    seconds: float
-    objective: PathObjective = "length"
-    strategy: ImproveStrategy = "restart-shorten"
 
 
 def improved(problem: Problem, first: Plan, planner: NamedPlanner, request: Request, how: Improvement) -> Plan:

@@ -37,7 +37,7 @@ from rrtik_ompl.ompl_bridge.setup import shared_space
 from rrtik_ompl.planning.attempts import EFFORT_ITERATIONS, load_kernels_for
 from rrtik_ompl.planning.outcome import NamedPlanner, Plan, Request
 from rrtik_ompl.planning.plan import PROOF_MODES, plan
-from rrtik_ompl.world.kept_clearance import Room, rooms_between
+from rrtik_ompl.world.kept_clearance import Clearances, clearances_of_pairs
 from rrtik_ompl.world.problem import Problem, known_problem
 from rrtik_ompl.world.world import World
 
@@ -182,10 +182,12 @@ def plans_together(
 
     began = time.perf_counter()
     usable = _usable(world, ends)
-    rooms = dict(zip(np.flatnonzero(usable).tolist(), rooms_between(world, ends[usable], None), strict=True))
+    clearances_of = dict(
+        zip(np.flatnonzero(usable).tolist(), clearances_of_pairs(world, ends[usable], None), strict=True)
+    )
     searcher = _Searcher(any_problem, planner, request)
-    found = searcher.paths({k: queries[k] for k, room in rooms.items() if room is not None})
-    proofs = _proofs(world, {k: (found_path.path.waypoints, rooms[k]) for k, found_path in found.items()})
+    found = searcher.paths({k: queries[k] for k, clearances in clearances_of.items() if clearances is not None})
+    proofs = _proofs(world, {k: (found_path.path.waypoints, clearances_of[k]) for k, found_path in found.items()})
     seconds_per_query = (time.perf_counter() - began) / len(queries)
 
     for k, proof in proofs.items():
@@ -279,12 +281,15 @@ class _Searcher:
         return _Found(query, path, result.statistics)
 
 
-def _proofs(world: World, routes: Mapping[int, tuple[Matrix, Room | None]]) -> dict[int, Proof]:
+def _proofs(world: World, routes: Mapping[int, tuple[Matrix, Clearances | None]]) -> dict[int, Proof]:
     """Proofs of those routes that are proven to keep what their ends do, by their numbers."""
     proofs: dict[int, Proof] = {}
-    for clearance in sorted({room.kept for _, room in routes.values() if room is not None}):
+    clearances_wanted = {clearances.proven_clearance for _, clearances in routes.values() if clearances is not None}
+    for clearance in sorted(clearances_wanted):
         routes_of_clearance = {
-            k: rows for k, (rows, room) in routes.items() if room is not None and room.kept == clearance
+            k: rows
+            for k, (rows, clearances) in routes.items()
+            if clearances is not None and clearances.proven_clearance == clearance
         }
         proven = world.motions_proven(
             np.concatenate([rows[:-1] for rows in routes_of_clearance.values()]),

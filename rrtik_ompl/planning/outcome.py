@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from rrtik_ompl.base.budget import Budget
-from rrtik_ompl.base.choices import ProofMode
+from rrtik_ompl.base.choices import ImproveStrategy, PathObjective, ProofMode
 from rrtik_ompl.base.copies import as_value, in_notebook, in_one_line
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory
@@ -42,6 +42,21 @@ class Request:
     parameters: Mapping[str, Any] = field(default_factory=dict)
     proof: ProofMode = "preferred"
     clearance: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Improvement:
+    """How a path is to be improved.
+
+    Attributes:
+        seconds: How much longer it may take [s].
+        objective: What is to be made small.
+        strategy: Whether further plans are made, or the first path alone is shortened.
+    """
+
+    seconds: float
+    objective: PathObjective = "length"
+    strategy: ImproveStrategy = "restart-shorten"
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -12,14 +12,12 @@ from rrtik_ompl.base.arrays import not_negative, positive, whole_number
 from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.choices import Accuracy, ImproveStrategy, PathObjective, ProofMode, one_of
 from rrtik_ompl.base.errors import InputError, require
-from rrtik_ompl.ompl_bridge.planner_names import AUTO, find_planner, is_auto
+from rrtik_ompl.ompl_bridge.planner_names import AUTO, find_planner
 from rrtik_ompl.ompl_bridge.planner_names import list_planners as list_planners
 from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory
 from rrtik_ompl.planning.attempts import run_planner
-from rrtik_ompl.planning.improving import Improvement, improved
-from rrtik_ompl.planning.outcome import RESTARTS, NamedPlanner, Request
+from rrtik_ompl.planning.outcome import RESTARTS, Improvement, NamedPlanner, Request
 from rrtik_ompl.planning.outcome import Plan as Plan
-from rrtik_ompl.planning.portfolio import run_portfolio
 from rrtik_ompl.planning.second_check import fixed_ends
 from rrtik_ompl.world.kept_clearance import check_clearance
 from rrtik_ompl.world.problem import Problem
@@ -118,11 +116,15 @@ def plan(
     )
 
     request = Request(Budget(drawn, limit), restarts, parameters or {}, proof, clearance)
-    alone = _named(planner)
-    found = run_portfolio(problem, request) if alone is None else run_planner(problem, alone, request)
+    if isinstance(planner, str) and planner.lower() == AUTO:
+        found = _found_by_portfolio(problem, request)
+    else:
+        found = run_planner(problem, named_planner(planner), request)
 
     if found.found and how.seconds > 0.0:
-        finder = alone or NamedPlanner(found.planner, find_planner(found.planner))
+        from rrtik_ompl.planning.improving import improved  # with shortening, which many plans do without
+
+        finder = named_planner(found.planner if isinstance(planner, str) else planner)
         found = improved(problem, found, finder, request, how)
     if found.path is None:
         return found
@@ -131,11 +133,22 @@ def plan(
 
 def plan_counted(problem: Problem, budget: Budget) -> Plan:
     """A plan by "auto" that ends after the iterations of a budget, of each planner, about: no clock decides."""
-    return run_portfolio(problem, Request(budget))
+    return _found_by_portfolio(problem, Request(budget))
 
 
-def _named(planner: str | PlannerFactory) -> NamedPlanner | None:
-    """The one planner that is asked for; None for "auto"."""
-    if not isinstance(planner, str):
-        return NamedPlanner(planner.__name__, planner)
-    return None if is_auto(planner) else NamedPlanner(planner, find_planner(planner))
+def named_planner(planner: str | PlannerFactory) -> NamedPlanner:
+    """A planner with its name; of one that has a name alone, its class.
+
+    Raises:
+        UnknownNameError: If there is none of that name, as of "auto".
+    """
+    if isinstance(planner, str):
+        return NamedPlanner(planner, find_planner(planner))
+    return NamedPlanner(planner.__name__, planner)
+
+
+def _found_by_portfolio(problem: Problem, request: Request) -> Plan:
+    """What "auto" finds."""
+    from rrtik_ompl.planning.portfolio import run_portfolio  # with shortening, which many plans do without
+
+    return run_portfolio(problem, request)

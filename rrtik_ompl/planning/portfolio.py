@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from functools import cache
 from itertools import chain
 from types import MappingProxyType
 
 from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.description.catalog import portfolio
 from rrtik_ompl.kernels.search.shortcut_layout import KERNELS as SHORTCUT_KERNELS
 from rrtik_ompl.kernels.search.taut.layout import KERNELS as TAUT_KERNELS
 from rrtik_ompl.kernels.warming import load_together
 from rrtik_ompl.model.goal import TipGoal
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.ompl_bridge.planner_names import AUTO, find_planner, refuse_options
-from rrtik_ompl.ompl_bridge.planner_traits import PlannerTraits, planners_with, traits_of
+from rrtik_ompl.ompl_bridge.planner_traits import traits_of
 from rrtik_ompl.planning.attempts import Turn, walk
 from rrtik_ompl.planning.outcome import NamedPlanner, Plan, Request
 from rrtik_ompl.planning.shortening import Wishes, shortened
@@ -67,16 +67,12 @@ def members(problem: Problem) -> tuple[str, ...]:
     With path constraints those that keep them.
     """
     if problem.constraints:
-        return tuple(planners_with(lambda traits: traits.keeps_constraints))
-    tip = isinstance(problem.goal, TipGoal)
-    return tuple(name for name, traits in _by_turn() if tip or not traits.finds_goals)
-
-
-@cache
-def _by_turn() -> tuple[tuple[str, PlannerTraits], ...]:
-    """The planners of the portfolio and their traits, in the order of their turns."""
-    found = planners_with(lambda traits: traits.portfolio_turn)
-    return tuple(sorted(found.items(), key=lambda item: item[1].portfolio_turn))
+        wanted = {"path constraints"}
+    elif isinstance(problem.goal, TipGoal):
+        wanted = {"any goal", "goal of the tip"}
+    else:
+        wanted = {"any goal"}
+    return tuple(name for name, solves in portfolio().items() if solves in wanted)
 
 
 def _load_kernels(problem: Problem) -> None:

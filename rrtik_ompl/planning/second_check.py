@@ -8,11 +8,18 @@ from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.model.path import JointPath, path_through
 from rrtik_ompl.ompl_bridge.attempt import Attempt
 from rrtik_ompl.ompl_bridge.planner_traits import traits_of
-from rrtik_ompl.planning.moves.clearance_levels import roomiest
+from rrtik_ompl.planning.moves.clearance_levels import wide_clearances_between
 from rrtik_ompl.planning.outcome import NamedPlanner, Request
 from rrtik_ompl.world.detours import with_detours
-from rrtik_ompl.world.kept_clearance import Room, keeping, leaving_room, proved, proved_as_clear, room_between
-from rrtik_ompl.world.problem import Problem, densely_checked
+from rrtik_ompl.world.kept_clearance import (
+    Clearances,
+    clearances_between,
+    keeping,
+    proved,
+    proved_as_clear,
+    search_form,
+)
+from rrtik_ompl.world.problem import Problem, densely_checked, problem_in
 from rrtik_ompl.world.route_check import violations_of
 
 MOVE_RULES = ("frozen_joints", "last_joints", "smallest_move")  # options of planners, see MoveRules
@@ -86,22 +93,23 @@ class SecondCheck:
         path = JointPath.of(self._problem.robot, self._problem.start[None])
         if not self.wants_proofs:
             return path
-        room = self._provable_room(path.waypoints)
-        return proved_as_clear(path, self._problem.world, 0.0 if room is None else room.kept)
+        clearances = self._provable_clearances(path.waypoints)
+        return proved_as_clear(path, self._problem.world, 0.0 if clearances is None else clearances.proven_clearance)
 
     def strict_problem(self, *, proving: bool) -> Problem:
-        """The problem for searches that leave room: motions keep more than the clearance in steps, and may be proven.
+        """The problem for searches that keep a distance: more than the clearance in steps, and perhaps proven.
 
-        Where they are not proven, see :func:`leaving_room`.
+        Where they are not proven, see :func:`search_form`.
 
         Args:
             proving: Whether motions have to be proven, which searches in kernels cannot.
         """
-        room = self._provable_room(self._problem.start[None]) or Room(0.0, 0.0)
+        clearances = self._provable_clearances(self._problem.start[None]) or Clearances(0.0, 0.0)
         dense = densely_checked(self._problem)
         if proving:
-            return dense.with_world(keeping(dense.world, room.searched, proven=room.kept))
-        return dense.with_world(leaving_room(dense.world, room))
+            proving_world = keeping(dense.world, clearances.searched_clearance, proven=clearances.proven_clearance)
+            return problem_in(dense, proving_world)
+        return problem_in(dense, search_form(dense.world, clearances))
 
     def accept(self, outcome: Attempt) -> JointPath | None:
         """Check the path of an attempt, and take note of what comes of it.
@@ -137,14 +145,19 @@ class SecondCheck:
             None if there is no such proof: its ends cannot be proven free, which is remembered; detours may not be
             made, as they might break a rule or a constraint; or they did not help.
         """
-        room = self._provable_room(path.waypoints[[0, -1]])
-        if room is None:
+        clearances = self._provable_clearances(path.waypoints[[0, -1]])
+        if clearances is None:
             self._ends_can_be_proven = False
             return None
 
         world = self._problem.world
-        leaves_room = self._traits.leaves_room
-        first = proved_as_clear(path, world, room.kept) if leaves_room else proved(path, world, clearance=room.kept)
+        clearance = clearances.proven_clearance
+        if self._traits.leaves_room:
+            first = proved_as_clear(path, world, clearance)
+            known_proof = None  # perhaps of less clearance
+        else:
+            first = proved(path, world, clearance=clearance)
+            known_proof = first.proof
         if first.proven:
             return first
         detours_might_break_rules = self._moves_are_restricted or bool(self._problem.constraints)
@@ -154,14 +167,14 @@ class SecondCheck:
         repaired = with_detours(
             world,
             path.waypoints,
-            clearance=room.kept,
+            clearance=clearance,
             rng=np.random.default_rng(self._seed),
             one_joint=self._traits.one_joint,
-            proof=None if leaves_room else first.proof,
+            proof=known_proof,
         )
         if repaired is None:
             return None
-        with_detour = proved(path_through(path, repaired), world, clearance=room.kept)
+        with_detour = proved(path_through(path, repaired), world, clearance=clearance)
         return with_detour if with_detour.proven else None
 
     def _check_in_steps(self, path: JointPath) -> JointPath | None:
@@ -192,10 +205,10 @@ class SecondCheck:
             self.reason = f"no path that is proven free: {self._first_gap(path.waypoints)}"
         return self.best if self.cannot_improve else None
 
-    def _provable_room(self, ends: Matrix) -> Room | None:
+    def _provable_clearances(self, ends: Matrix) -> Clearances | None:
         """The clearance that paths between ends, shape (k, dof), can be proven to keep; None if there is none."""
-        room_of = roomiest if self._traits.leaves_room else room_between
-        return room_of(self._problem.world, ends, self._clearance)
+        clearances_of = wide_clearances_between if self._traits.leaves_room else clearances_between
+        return clearances_of(self._problem.world, ends, self._clearance)
 
     def _first_gap(self, rows: Matrix) -> str:
         """The first motion of a route, shape (k, dof), that is not proven, in words; "" if all are."""

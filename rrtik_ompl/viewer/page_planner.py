@@ -47,7 +47,7 @@ from rrtik_ompl.problem_files.problem import problem_data
 from rrtik_ompl.viewer.drawing.robot_picture import node_name
 from rrtik_ompl.viewer.page_fixed import packed, standing_parts
 from rrtik_ompl.viewer.story import dragged_tips, tip_entry
-from rrtik_ompl.world.kept_clearance import Room, leaving_room, room_between
+from rrtik_ompl.world.kept_clearance import Clearances, clearances_between, search_form
 from rrtik_ompl.world.problem import Problem, densely_checked
 from rrtik_ompl.world.world import World
 
@@ -98,8 +98,8 @@ def page_planner(problem: Problem, goal: Vector, side: float, *, one_joint: bool
     scene, courses = _standing_still(problem.world.scene)
     problem, spare = _with_spares(problem, scene, side)
 
-    room = room_between(problem.world, np.stack([problem.start, goal]), None) or Room(0.0, 0.0)
-    world = leaving_room(densely_checked(problem).world, room)
+    clearances = clearances_between(problem.world, np.stack([problem.start, goal]), None) or Clearances(0.0, 0.0)
+    world = search_form(densely_checked(problem).world, clearances)
 
     module = page_kernels()
     motions = world.motions
@@ -112,7 +112,7 @@ def page_planner(problem: Problem, goal: Vector, side: float, *, one_joint: bool
     except InputError:  # beyond what the margins of the kernels cover
         return None
 
-    obstacles = _obstacles(problem.world, motions.fast, room.searched, spare)
+    obstacles = _obstacles(problem.world, motions.fast, clearances.searched_clearance, spare)
     fixed = standing_parts(problem.world)
     if fixed is None or not {course["name"] for course in courses} <= {obstacle["name"] for obstacle in obstacles}:
         return None
@@ -135,7 +135,7 @@ def page_planner(problem: Problem, goal: Vector, side: float, *, one_joint: bool
         "tries": TRIES,
         "far": UNBOUNDED_COORDINATE,
         "slack": {"primitive": PRIMITIVE_SLACK, "solid": SOLID_SLACK},
-        "clearance": room.kept,
+        "clearance": clearances.proven_clearance,
         "planner": "BiCRDT" if one_joint else "RRTConnect",
         "start": problem.start.tolist(),
         "goal": goal.tolist(),

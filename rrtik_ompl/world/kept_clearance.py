@@ -21,19 +21,19 @@ HALVINGS = 10  # of what is kept, until it is given up
 BISECTIONS = 30
 
 
-class Room(NamedTuple):
+class Clearances(NamedTuple):
     """What can be kept between given ends.
 
     Attributes:
-        kept: To be proven of every motion, beside the margins [m].
-        searched: To be kept by searches, which look at points of a motion alone [m].
+        proven_clearance: To be proven of every motion, beside the margins [m].
+        searched_clearance: To be kept by searches, which look at points of a motion alone [m].
     """
 
-    kept: float
-    searched: float
+    proven_clearance: float
+    searched_clearance: float
 
 
-def room_between(world: World, ends: Matrix, clearance: float | None) -> Room | None:
+def clearances_between(world: World, ends: Matrix, clearance: float | None) -> Clearances | None:
     """What can be kept on the way between configurations, shape (k, dof); None if not even these are proven free.
 
     Args:
@@ -41,48 +41,48 @@ def room_between(world: World, ends: Matrix, clearance: float | None) -> Room | 
         ends: Where a path begins and ends.
         clearance: Wanted [m]; None for a millimetre, or less if the ends have less, but not less than the world keeps.
     """
-    for room in _rooms(world, clearance):
-        if world.prover.proven(ends, ends, clearance=room.searched).all():
-            return room
+    for clearances in _candidates(world, clearance):
+        if world.prover.proven(ends, ends, clearance=clearances.searched_clearance).all():
+            return clearances
     return None
 
 
-def rooms_between(world: World, ends: NDArray[np.float64], clearance: float | None) -> list[Room | None]:
-    """:func:`room_between` for several pairs of configurations, shape (m, 2, dof), in a few calls."""
-    rooms: list[Room | None] = [None] * len(ends)
+def clearances_of_pairs(world: World, ends: NDArray[np.float64], clearance: float | None) -> list[Clearances | None]:
+    """:func:`clearances_between` for several pairs of configurations, shape (m, 2, dof), in a few calls."""
+    found: list[Clearances | None] = [None] * len(ends)
     undecided = np.arange(len(ends))
-    for room in _rooms(world, clearance):
+    for clearances in _candidates(world, clearance):
         if len(undecided) == 0:
             break
         rows = ends[undecided].reshape(-1, ends.shape[2])
-        proven = world.prover.proven(rows, rows, clearance=room.searched).reshape(-1, 2).all(axis=1)
+        proven = world.prover.proven(rows, rows, clearance=clearances.searched_clearance).reshape(-1, 2).all(axis=1)
         for k in undecided[proven].tolist():
-            rooms[k] = room
+            found[k] = clearances
         undecided = undecided[~proven]
 
-    return rooms
+    return found
 
 
-def _rooms(world: World, clearance: float | None) -> Iterator[Room]:
+def _candidates(world: World, clearance: float | None) -> Iterator[Clearances]:
     """What may be kept, the most first."""
     least_clearance = world.settings.kept
     wanted_clearance = max(CLEARANCE if clearance is None else clearance, least_clearance)
     halved = (wanted_clearance * 0.5**k for k in range(HALVINGS))
     smaller = (half for half in halved if half > least_clearance)
     for searched in chain((wanted_clearance + min(wanted_clearance, SPARE),), smaller, (least_clearance,)):
-        yield Room(min(wanted_clearance, searched), searched)
+        yield Clearances(min(wanted_clearance, searched), searched)
 
 
 def possible_clearance(world: World, clearance: float | None, rows: Matrix) -> float | None:
     """What is asked for [m], or as much of it as the ends of a route, shape (k, dof), have; None stays None."""
     if clearance is None:
         return None
-    room = room_between(world, rows[[0, -1]], clearance)
-    return 0.0 if room is None else room.kept
+    clearances = clearances_between(world, rows[[0, -1]], clearance)
+    return 0.0 if clearances is None else clearances.proven_clearance
 
 
 def keeping(world: World, clearance: float, *, proven: float | None = None) -> World:
-    """The same world for searches that leave room: what it keeps itself, or more.
+    """The same world for searches that keep a distance: what it keeps itself, or more.
 
     Args:
         world: The world, which may keep a clearance of its own.
@@ -96,14 +96,14 @@ def keeping(world: World, clearance: float, *, proven: float | None = None) -> W
     return form_of(world, inflation=inflation, proving=max(proven, settings.proving or 0.0))
 
 
-def leaving_room(world: World, room: Room) -> World:
+def search_form(world: World, clearances: Clearances) -> World:
     """The same world for searches: motions keep more than what is to be kept, at points that lie close enough.
 
-    No point of the arm moves between two of them farther than twice what is kept beyond ``room.kept``, so that what is
-    thin is not stepped over: in between, too, obstacles are that far away [16].
+    No point of the arm moves between two of them farther than twice what searches keep beyond what is to be
+    proven, so that what is thin is not stepped over: in between, too, obstacles are that far away [16].
     """
-    with_clearance = keeping(world, room.searched)
-    step = 2.0 * (room.searched - room.kept)
+    with_clearance = keeping(world, clearances.searched_clearance)
+    step = 2.0 * (clearances.searched_clearance - clearances.proven_clearance)
     if FINEST_RESOLUTION <= step < world.motion_resolution:
         return form_of(with_clearance, motion_resolution=step)
     return with_clearance
@@ -147,10 +147,10 @@ def provable_clearances(world: World, rows: Matrix, clearance: float | None) -> 
         rows: The route.
         clearance: Wanted [m]; None for a millimetre, or less if the ends have less, but not less than the world keeps.
     """
-    room = room_between(world, rows[[0, -1]], clearance)
-    if room is None:
+    clearances = clearances_between(world, rows[[0, -1]], clearance)
+    if clearances is None:
         return
-    for candidate in sorted({room.kept, world.settings.kept}, reverse=True):
+    for candidate in sorted({clearances.proven_clearance, world.settings.kept}, reverse=True):
         if world.prover.route(rows, clearance=candidate).proven:
             yield candidate
 

@@ -156,7 +156,7 @@ class Problem:
             InputError: If it is no world.
         """
         require(world, World, "world of a problem", "use World(robot, scene)")
-        return changed(self, settings=world.settings, world=world)
+        return problem_in(self, world)
 
     def reached(self, q: ArrayLike) -> bool:
         """Whether a configuration, shape (dof,), satisfies the goal."""
@@ -180,7 +180,12 @@ def known_problem(world: World, start: Vector, goal: JointGoal | Vector) -> Prob
 def densely_checked(problem: Problem) -> Problem:
     """The same problem, its motions checked as densely as by the second check of a path."""
     world = problem.world
-    return problem.with_world(form_of(world, motion_resolution=verification_resolution(world)))
+    return problem_in(problem, form_of(world, motion_resolution=verification_resolution(world)))
+
+
+def problem_in(problem: Problem, world: World) -> Problem:
+    """As :meth:`Problem.with_world`, of what is known to be a world."""
+    return changed(problem, settings=world.settings, world=world)
 
 
 def usable_configuration(world: World, values: ArrayLike, what: str) -> Vector:

@@ -11,8 +11,8 @@ from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.errors import InputError, UnknownNameError
 from rrtik_ompl.cli.app import run
 from rrtik_ompl.planning import improving
-from rrtik_ompl.planning.improving import COSTS, Improvement, improved, least_time, weighted_length
-from rrtik_ompl.planning.outcome import NamedPlanner, Request
+from rrtik_ompl.planning.improving import COSTS, improved, least_time, weighted_length
+from rrtik_ompl.planning.outcome import Improvement, NamedPlanner, Request
 from rrtik_ompl.planning.plan import plan
 from rrtik_ompl.problem_files.problem import load_problem
 from rrtik_ompl.world.problem import Problem

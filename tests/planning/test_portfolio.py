@@ -7,8 +7,10 @@ import pytest
 
 from rrtik_ompl import Problem, load_problem, plan, plan_batch, save_problem
 from rrtik_ompl.base.errors import InputError, PlannerError, UnknownNameError
+from rrtik_ompl.description import catalog
 from rrtik_ompl.ompl_bridge import SafePlanner, SearchResult
 from rrtik_ompl.ompl_bridge.planner_names import AUTO, find_planner
+from rrtik_ompl.ompl_bridge.planner_traits import traits_of
 from rrtik_ompl.planning import portfolio
 from rrtik_ompl.planning.portfolio import members
 
@@ -51,6 +53,15 @@ def test_planners_that_seek_the_tip_try_goals_of_the_tip_alone(boxes, pose):
     joints, tip = members(boxes), members(pose)
     assert joints[:2] == ("fastrrtconnect", "bicrdt")
     assert set(tip) > set(joints)
+
+
+def test_planners_of_the_portfolio_solve_what_is_said_of_them():
+    offered = {name: traits_of(find_planner(name)) for name in catalog.list_planners()}
+    for name, solves in catalog.portfolio().items():
+        assert offered[name].finds_goals == (solves == "goal of the tip")
+        assert offered[name].keeps_constraints == (solves == "path constraints")
+    keeping = {name for name, traits in offered.items() if traits.keeps_constraints}
+    assert keeping == {name for name, solves in catalog.portfolio().items() if solves == "path constraints"}
 
 
 def test_the_default_is_the_portfolio_and_its_path_is_shorter_than_what_was_found(boxes):

@@ -17,7 +17,7 @@ from rrtik_ompl.ompl_bridge.motion_checker import WorldChecker
 from rrtik_ompl.ompl_bridge.setup import planning_bounds, unchecked_space
 from rrtik_ompl.planning.plan import plan
 from rrtik_ompl.world.detours import with_detours
-from rrtik_ompl.world.kept_clearance import CLEARANCE, room_between
+from rrtik_ompl.world.kept_clearance import CLEARANCE, clearances_between
 from rrtik_planners import FewestMoves
 
 PLANNERS = ("bicrdt", "fastrrtconnect", "fewest-moves", "RRTConnect", "KPIECE1")
@@ -64,7 +64,7 @@ def test_a_preference_gives_way_where_no_path_keeps_it(planner):
     """Two walls with a gap that the disc passes with 0.4 mm to spare on each side."""
     world = disc_world((5.0, 5.0 + 2.5 + 0.3004, 0.2, 5.0), (5.0, 5.0 - 2.5 - 0.3004, 0.2, 5.0))
     problem = rrtik.Problem(world, [2.0, 5.0], [8.0, 5.0])
-    assert room_between(world, np.array([problem.start, problem.goal.q]), None).kept == CLEARANCE
+    assert clearances_between(world, np.array([problem.start, problem.goal.q]), None).proven_clearance == CLEARANCE
     found = plan(problem, planner, seed=1)
     assert found.proven
     assert found.path.proof.clearance == 0.0
@@ -98,7 +98,7 @@ def test_a_start_that_is_the_goal_is_proven_although_convex_pieces_of_two_links_
 def test_ends_that_have_less_are_content_with_less():
     world = disc_world((5.0, 2.0, 0.2, 4.0))
     ends = np.array([[4.9 - 0.3 - 0.0003, 2.0], [8.0, 2.0]])  # 0.3 mm beside the wall
-    kept, searched = room_between(world, ends, None)
+    kept, searched = clearances_between(world, ends, None)
     assert 0.0001 < kept <= searched < 0.0003
     found = plan(rrtik.Problem(world, *ends), "RRTConnect", seed=1)
     assert found.proven

@@ -24,7 +24,7 @@ from rrtik_ompl.planning.generated_problems import generated_problem
 from rrtik_ompl.planning.moves.axis_cut import double_axis_cut
 from rrtik_ompl.viewer.page import page
 from rrtik_ompl.viewer.page_planner import SAMPLES, VERTICES, page_planner
-from rrtik_ompl.world.kept_clearance import Room, leaving_room, room_between
+from rrtik_ompl.world.kept_clearance import Clearances, clearances_between, search_form
 from rrtik_ompl.world.problem import Problem, densely_checked
 from rrtik_tests.browser import Browser, planning_page
 from rrtik_tests.programs import needs_chromium, node
@@ -69,8 +69,10 @@ def in_node(plan, tmp_path, **work):
 
 
 def searched_world(problem: Problem) -> rrtik.World:
-    room = room_between(problem.world, np.stack([problem.start, problem.goal.q]), None) or Room(0.0, 0.0)
-    return leaving_room(densely_checked(problem).world, room)
+    clearances = clearances_between(problem.world, np.stack([problem.start, problem.goal.q]), None) or Clearances(
+        0.0, 0.0
+    )
+    return search_form(densely_checked(problem).world, clearances)
 
 
 def refused(A: Matrix, B: Matrix) -> np.ndarray:
@@ -130,7 +132,7 @@ def test_searches_of_single_joint_moves_find_pythons_paths(name, tmp_path):
 def test_moved_obstacles_are_packed_as_python_packs_them(name, tmp_path):
     problem, rng = PROBLEMS[name](), np.random.default_rng(3)
     plan = page_planner(problem, problem.goal.q, 0.1)
-    room = room_between(problem.world, np.stack([problem.start, problem.goal.q]), None)
+    clearances = clearances_between(problem.world, np.stack([problem.start, problem.goal.q]), None)
     named = {each["name"]: k for k, each in enumerate(plan["obstacles"])}
     scene, moves, wanted = problem.world.scene, [], []
     lower, upper = problem.robot.finite_range()
@@ -140,7 +142,7 @@ def test_moved_obstacles_are_packed_as_python_packs_them(name, tmp_path):
         Q = rng.uniform(lower, upper, (150, problem.robot.dof))
         kept = tuple(replace(each, pose=placed) if each is chosen else each for each in scene.obstacles)
         scene = Scene(kept, scene.attached, scene.allowed_collisions)
-        world = rrtik.World(problem.robot, scene).with_clearance(room.searched)
+        world = rrtik.World(problem.robot, scene).with_clearance(clearances.searched_clearance)
         wanted.append(world.fast.classify(problem.robot.joint_values(Q)) == FREE)
         moves.append({"obstacle": named[chosen.name], "pose": placed.homogeneous.ravel().tolist(), "Q": Q.tolist()})
     assert 0 < np.mean(wanted) < 1
@@ -166,14 +168,14 @@ def test_every_kind_of_obstacle_is_packed_alike_wherever_and_however_large(tmp_p
     ends = np.zeros(6), np.full(6, -0.5)
     problem = Problem(rrtik.World(robot, scene), *ends)
     plan = page_planner(problem, problem.goal.q, 0.1)
-    room = room_between(problem.world, np.stack(ends), None)
+    clearances = clearances_between(problem.world, np.stack(ends), None)
     moves, wanted = [], []
     for k, each in enumerate(plan["obstacles"][: len(solids)]):
         for solid, sizes in ((solids[each["name"]], None), resized[each["name"]]):
             placed = pin.SE3(pin.exp3(rng.normal(size=3)), rng.normal(0.0, 0.3, 3))
             Q = rng.uniform(-3.0, 3.0, (200, 6))
             scene = scene.without(each["name"]).with_(rrtik.Obstacle(each["name"], solid, placed, margin=0.01))
-            world = rrtik.World(robot, scene).with_clearance(room.searched)
+            world = rrtik.World(robot, scene).with_clearance(clearances.searched_clearance)
             wanted.append(world.fast.classify(robot.joint_values(Q)) == FREE)
             moves.append({"obstacle": k, "pose": placed.homogeneous.ravel().tolist(), "sizes": sizes, "Q": Q.tolist()})
     assert all(0.05 < share.mean() < 0.95 for share in wanted)
@@ -190,13 +192,13 @@ def test_what_touches_the_base_leaves_nothing_free(name, tmp_path):
         rrtik.World(robot, Scene(tuple(rrtik.Obstacle(k, v, far) for k, v in solids.items()))), start, start
     )
     plan = page_planner(problem, start, 0.1)
-    room = room_between(problem.world, np.stack([start, start]), None) or Room(0.0, 0.0)
+    clearances = clearances_between(problem.world, np.stack([start, start]), None) or Clearances(0.0, 0.0)
     Q, moves, wanted = rng.uniform(*robot.finite_range(), (60, robot.dof)), [], []
     for _ in range(40):
         k = int(rng.integers(3))
         placed = pin.SE3(pin.exp3(rng.normal(size=3)), rng.normal(0.0, 0.12, 3))
         scene = Scene(tuple(rrtik.Obstacle(n, v, placed if n == [*solids][k] else far) for n, v in solids.items()))
-        fast = leaving_room(densely_checked(problem.with_world(rrtik.World(robot, scene))).world, room).fast
+        fast = search_form(densely_checked(problem.with_world(rrtik.World(robot, scene))).world, clearances).fast
         wanted.append(np.zeros(len(Q), bool) if fast is None else fast.classify(robot.joint_values(Q)) == FREE)
         moves.append({"obstacle": k, "pose": placed.homogeneous.ravel().tolist(), "Q": Q.tolist()})
         moves.append({"obstacle": k, "pose": far.homogeneous.ravel().tolist(), "Q": []})

@@ -1,11 +1,11 @@
-"""Forms of a world that keep less and less room around obstacles: fewest moves come first, clearance second."""
+"""Forms of a world that keep less and less clearance: fewest moves come first, clearance second."""
 
 from __future__ import annotations
 
 from functools import cached_property
 
 from rrtik_ompl.base.arrays import Matrix
-from rrtik_ompl.world.kept_clearance import CLEARANCE, Room, keeping, room_between
+from rrtik_ompl.world.kept_clearance import CLEARANCE, Clearances, clearances_between, keeping
 from rrtik_ompl.world.world import World
 
 PREFERRED_CLEARANCE = 0.01  # [m] of single-joint moves, which a person may follow by hand
@@ -50,20 +50,21 @@ def clearance_levels(world: World, ends: Matrix, clearance: float | None) -> lis
         ends: Where moves begin and end, shape (k, dof); all of them keep all levels.
         clearance: Wanted [m]; None for a centimetre. Less is kept where the ends have less.
     """
-    room = roomiest(world, ends, clearance)
-    if room is None:
+    clearances = wide_clearances_between(world, ends, clearance)
+    if clearances is None:
         return [Level(world, None, 0.0)]
     smallest = world.settings.kept
-    usual = max(min(room.kept, CLEARANCE), smallest)
-    clearances = sorted({room.kept, usual, smallest}, reverse=True)
-    return [Level(world, proven, min(room.searched, proven + min(proven, CLEARANCE))) for proven in clearances]
+    usual = max(min(clearances.proven_clearance, CLEARANCE), smallest)
+    levels = sorted({clearances.proven_clearance, usual, smallest}, reverse=True)
+    most = clearances.searched_clearance
+    return [Level(world, proven, min(most, proven + min(proven, CLEARANCE))) for proven in levels]
 
 
-def roomiest(world: World, ends: Matrix, clearance: float | None) -> Room | None:
-    """As :func:`room_between`, with a centimetre where ``clearance`` is None; never less than the world keeps.
+def wide_clearances_between(world: World, ends: Matrix, clearance: float | None) -> Clearances | None:
+    """As :func:`clearances_between`, with a centimetre where ``clearance`` is None; never less than the world keeps.
 
     Returns:
         What may be kept between two ends, shape (2, dof); None if an end cannot be proven free.
     """
     wanted = PREFERRED_CLEARANCE if clearance is None else clearance
-    return room_between(world, ends, max(wanted, world.settings.kept))
+    return clearances_between(world, ends, max(wanted, world.settings.kept))

@@ -96,7 +96,7 @@ class FineGrids:
                         first = start
                         last = goal
 
-                    found = self._roomiest_route(values, first, last, max_moves=len(best_known) - 2)
+                    found = self._clearest_route(values, first, last, max_moves=len(best_known) - 2)
                     if found is not None:
                         best = found
                         best_known = found[0]
@@ -128,7 +128,7 @@ class FineGrids:
         """Of a grid of so many configurations, rounded down."""
         return int(nodes ** (1.0 / len(self.joints)))
 
-    def _roomiest_route(self, values: Values, start: Vector, goal: Vector, max_moves: int) -> tuple[Matrix, int] | None:
+    def _clearest_route(self, values: Values, start: Vector, goal: Vector, max_moves: int) -> tuple[Matrix, int] | None:
         """The route of a grid with the fewest moves, with the largest clearance that needs no more of them.
 
         Returns:
@@ -140,9 +140,9 @@ class FineGrids:
             return None
 
         for number, level in enumerate(self.levels[:last_level]):
-            roomy = self._proven_route(level, values, start, goal, len(route) - 1)
-            if roomy is not None:
-                return roomy, number
+            clear = self._proven_route(level, values, start, goal, len(route) - 1)
+            if clear is not None:
+                return clear, number
         return route, last_level
 
     def _proven_route(self, level: Level, values: Values, start: Vector, goal: Vector, max_moves: int) -> Matrix | None:

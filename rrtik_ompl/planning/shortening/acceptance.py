@@ -7,12 +7,12 @@ from typing import NamedTuple
 import numpy as np
 
 from rrtik_ompl.model.path import JointPath, path_through
-from rrtik_ompl.planning.moves.clearance_levels import roomiest
+from rrtik_ompl.planning.moves.clearance_levels import wide_clearances_between
 from rrtik_ompl.planning.shortening.task import Wishes
 from rrtik_ompl.world.detours import with_detours
-from rrtik_ompl.world.kept_clearance import Room, keeping, proved_as_clear, room_between
+from rrtik_ompl.world.kept_clearance import Clearances, clearances_between, keeping, proved_as_clear
 from rrtik_ompl.world.motion_queries import MotionQueries
-from rrtik_ompl.world.problem import Problem, densely_checked
+from rrtik_ompl.world.problem import Problem, densely_checked, problem_in
 from rrtik_ompl.world.proven_motions import proven_motions
 from rrtik_ompl.world.route_check import violations_of
 
@@ -64,8 +64,8 @@ class Acceptance:
         self._one_joint = one_joint
         self._leaves_room = leaves_room
         self._checks_in_steps = samples
-        room_of = roomiest if leaves_room else room_between
-        self._room = room_of(problem.world, path.waypoints[[0, -1]], wishes.clearance)
+        clearances_of = wide_clearances_between if leaves_room else clearances_between
+        self._clearances = clearances_of(problem.world, path.waypoints[[0, -1]], wishes.clearance)
 
         input_is_settled = path.proven_in(problem.world) and self._keeps_clearance(path)
         self.input = path if input_is_settled else self._proved(path)
@@ -82,21 +82,21 @@ class Acceptance:
         if self._leaves_room:
             return [Form(dense, dense.world, 1.0)]
 
-        forms = [] if self._room is None else self._forms_with_room(dense, self._room)
+        forms = [] if self._clearances is None else self._forms_with_clearance(dense, self._clearances)
         if not self._input_keeps_clearance:
             forms.append(Form(dense, dense.world, 1.0))
         return forms
 
-    def _forms_with_room(self, dense: Problem, room: Room) -> list[Form]:
+    def _forms_with_clearance(self, dense: Problem, clearances: Clearances) -> list[Form]:
         """Those that leave room; where the input does not keep the clearance, with time left for one that need not."""
-        searched_clearance = min(room.searched, room.kept + SPARE)
+        searched_clearance = min(clearances.searched_clearance, clearances.proven_clearance + SPARE)
         last_share = 1.0 if self._input_keeps_clearance else 0.5
         if not self._checks_in_steps:
             return [Form(dense, proven_motions(dense.world, searched_clearance, self.input.waypoints), last_share)]
 
-        roomy = keeping(dense.world, searched_clearance)
-        proving = keeping(dense.world, searched_clearance, proven=room.kept)
-        return [Form(dense.with_world(roomy), roomy, 0.7), Form(dense.with_world(proving), proving, last_share)]
+        clear = keeping(dense.world, searched_clearance)
+        proving = keeping(dense.world, searched_clearance, proven=clearances.proven_clearance)
+        return [Form(problem_in(dense, clear), clear, 0.7), Form(problem_in(dense, proving), proving, last_share)]
 
     def accepted(self, shorter: JointPath) -> JointPath | None:
         """Whether a shortened path may be returned in place of the input.
@@ -109,9 +109,10 @@ class Acceptance:
         if self._keeps_clearance(proved):
             return proved
 
-        if self._room is not None and not self._one_joint:
+        if self._clearances is not None and not self._one_joint:
             rng = np.random.default_rng(self._seed)
-            rows = with_detours(self._problem.world, shorter.waypoints, clearance=self._room.kept, rng=rng)
+            clearance = self._clearances.proven_clearance
+            rows = with_detours(self._problem.world, shorter.waypoints, clearance=clearance, rng=rng)
             if rows is not None:
                 return self._proved(path_through(shorter, rows))
 
@@ -125,10 +126,12 @@ class Acceptance:
 
     def _proved(self, path: JointPath) -> JointPath:
         """The path with a proof of the clearance, or of less."""
-        clearance = 0.0 if self._room is None else self._room.kept
+        clearance = 0.0 if self._clearances is None else self._clearances.proven_clearance
         return proved_as_clear(path, self._problem.world, clearance)
 
     def _keeps_clearance(self, proved: JointPath) -> bool:
         """Whether a path is proven to keep the clearance."""
         proof = proved.proof
-        return self._room is not None and proof is not None and proof.proven and proof.clearance >= self._room.kept
+        if self._clearances is None or proof is None:
+            return False
+        return proof.proven and proof.clearance >= self._clearances.proven_clearance
