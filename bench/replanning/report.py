@@ -19,11 +19,11 @@ from bench.replanning.runs import outcome
 from bench.shared.parts import Parts
 from bench.shared.problems import goal_joints
 from bench.shared.run import Run
+from rrtik_bench.contact_check import check_contacts
 from rrtik_bench.report.page import Report
 from rrtik_bench.shortening.plane_worlds import Plane
 from rrtik_ompl.replanning import ReplanRun, replan
 from rrtik_ompl.replanning.connecting import PythonConnect
-from rrtik_ompl.replanning.contact_check import check_contacts
 from rrtik_ompl.replanning.drrt_con import DrrtCon
 from rrtik_ompl.world.moving_world import MovingWorld
 

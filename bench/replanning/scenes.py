@@ -9,9 +9,9 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 import rrtik_ompl as rrtik
+from rrtik_bench.moving_scenes import turning_points
 from rrtik_ompl.model.scene import Obstacle, Scene, TimedPoses
 from rrtik_ompl.model.shapes import Prism
-from rrtik_ompl.replanning.generate import turning_points
 
 SIZE, STEP, EPS, RATE = 20.0, 0.5, 1.0, 10.0
 WALLS = [[(6, -5), (8, -5), (8, 12), (6, 12)], [(12, 8), (14, 8), (14, 25), (12, 25)]]

@@ -12,12 +12,12 @@ from functools import cache
 import numpy as np
 
 import rrtik_ompl as rrtik
+from rrtik_bench.contact_check import check_contacts
 from rrtik_bench.drrt_con import FASTEST, REPAIR_SECONDS
+from rrtik_bench.moving_scenes import moving_problem
 from rrtik_bench.report.rows import Bar, Row, all_of, judged
 from rrtik_bench.tables import Table
 from rrtik_ompl.replanning import ReplanRun, replan_with
-from rrtik_ompl.replanning.contact_check import check_contacts
-from rrtik_ompl.replanning.generate import moving_problem
 from rrtik_ompl.replanning.in_time import plan_in_time
 from rrtik_ompl.replanning.scenario import load_scenario
 from rrtik_ompl.replanning.settings import ReplanSettings

@@ -15,13 +15,13 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from rrtik_bench.contact_check import check_contacts
 from rrtik_bench.drrt_con import FASTEST, REPAIR_SECONDS
 from rrtik_bench.report.rows import Bar, Row, all_of, judged
 from rrtik_bench.tables import Table
 from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.model.transitions import route_length
 from rrtik_ompl.replanning import ReplanRun
-from rrtik_ompl.replanning.contact_check import check_contacts
 from rrtik_ompl.replanning.drrt_con import points_along, without_points_between
 from rrtik_ompl.replanning.feed import feed_of
 from rrtik_ompl.replanning.loop import Loop

@@ -15,13 +15,13 @@ from rrtik_ompl.files.text import check_target, file_name
 from rrtik_ompl.model.scene import Scene
 from rrtik_ompl.motion.trajectory.limits import RateLimits
 from rrtik_ompl.replanning.drrt_con import DrrtCon
-from rrtik_ompl.replanning.feed import SILENCE_SECONDS, Snapshot, Source, SpeedWarning, Watch, feed_of
+from rrtik_ompl.replanning.feed import PATIENCE_SECONDS, SILENCE_SECONDS, PatientFeed, Snapshot, Source, Watch, feed_of
 from rrtik_ompl.replanning.loop import Clock, Loop
-from rrtik_ompl.replanning.patient import PATIENCE_SECONDS, PatientFeed
 from rrtik_ompl.replanning.record import ReplanRun, load_run
 from rrtik_ompl.replanning.settings import PLANNERS, ReplanSettings, refuse_renamed
 from rrtik_ompl.replanning.start_and_goals import GoalFeed, refuse_constraints
 from rrtik_ompl.replanning.tick import Tick
+from rrtik_ompl.replanning.travels import SpeedWarning
 from rrtik_ompl.world.problem import Problem
 
 __all__ = [

@@ -37,8 +37,9 @@ from rrtik_ompl.geometry.collision.shape_table import farthest
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import Motion, Obstacle, Scene, TimedPoses, pairs_that_may_touch
 from rrtik_ompl.model.shapes import same_shape
-from rrtik_ompl.replanning.feed import ROTATION_NOISE, Feed, Snapshot
+from rrtik_ompl.replanning.feed import Feed, Snapshot
 from rrtik_ompl.replanning.tick import Tick
+from rrtik_ompl.replanning.travels import travel_bound
 from rrtik_ompl.world.problem import Problem
 
 FINEST = 2e-5  # [m]: of the motion of a pair, below which its middle stands for it
@@ -355,7 +356,7 @@ class _PeriodJudge:
         """How much nearer each pair can come in a part of a tick [m]."""
         change = np.abs(self._configuration(number, end) - self._configuration(number, begin))
         travels = [
-            _travel_bound(self._obstacle_pose(name, begin), self._obstacle_pose(name, end), radius)
+            travel_bound(self._obstacle_pose(name, begin), self._obstacle_pose(name, end), radius)
             for name, radius in zip(self._obstacle_names, self._obstacle_radii.tolist(), strict=True)
         ]
         travel_of_body = np.array([0.0, *travels])[self._obstacle_of_body + 1]
@@ -420,13 +421,6 @@ def _bounding_ball(body: Body) -> tuple[float, float, float, float]:
         return 0.0, 0.0, 0.0, float("inf")
     x, y, z = np.asarray(body.geometry.aabb_center).tolist()
     return x, y, z, float(body.geometry.aabb_radius)
-
-
-def _travel_bound(a: pin.SE3, b: pin.SE3, radius: float) -> float:
-    """How far a point of an obstacle goes at most from one pose to another [m]."""
-    angle = float(np.linalg.norm(pin.log3(a.rotation.T @ b.rotation)))
-    arc = radius * angle if angle > ROTATION_NOISE else 0.0
-    return float(np.linalg.norm(b.translation - a.translation)) + arc
 
 
 def _signed_distance(

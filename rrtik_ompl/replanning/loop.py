@@ -16,19 +16,12 @@ from rrtik_ompl.base.poses import pose_row
 from rrtik_ompl.model.goal import JOINT_TOLERANCE
 from rrtik_ompl.model.scene import Scene, pairs_that_may_touch
 from rrtik_ompl.replanning.evading import evasion
-from rrtik_ompl.replanning.feed import (
-    SILENCE_SECONDS,
-    MotionTracker,
-    Snapshot,
-    Travels,
-    Watch,
-    refuse_endless_turns,
-    required_distances,
-)
+from rrtik_ompl.replanning.feed import SILENCE_SECONDS, Snapshot, Watch
 from rrtik_ompl.replanning.record import ReplanRun
 from rrtik_ompl.replanning.settings import PREDICTED_PLACES, ReplanSettings, make_planner
 from rrtik_ompl.replanning.start_and_goals import GoalFeed, check_start, every_goal, goal_now, held_pairs, sampling_box
 from rrtik_ompl.replanning.tick import Tick
+from rrtik_ompl.replanning.travels import MotionTracker, Travels, refuse_endless_turns, required_distances
 from rrtik_ompl.world.kept_clearance import CLEARANCE
 from rrtik_ompl.world.moving_world import MovingWorld, check_held
 from rrtik_ompl.world.problem import Problem

@@ -15,8 +15,7 @@ from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.motion.trajectory.limits import RateLimits
 from rrtik_ompl.problem_files.run import RENAMED
 from rrtik_ompl.replanning.connecting import KERNELS, KernelCuts
-from rrtik_ompl.replanning.drrt_con import DrrtCon, FromScratch
-from rrtik_ompl.replanning.kernel_drrt_con import KernelDrrtCon
+from rrtik_ompl.replanning.drrt_con import DrrtCon, FromScratch, KernelDrrtCon
 from rrtik_ompl.replanning.single_tree import SingleTree
 from rrtik_ompl.world.motion_queries import has_kernels
 from rrtik_ompl.world.moving_world import MovingWorld

@@ -9,16 +9,14 @@ import pinocchio as pin
 import pytest
 
 import rrtik_ompl as rrtik
+from rrtik_bench.contact_check import check_contacts
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.cli.app import run as run_command
 from rrtik_ompl.model.scene import ConstantVelocity, Obstacle, Scene, TimedPoses
 from rrtik_ompl.model.shapes import Box, HalfSpace, Sphere
-from rrtik_ompl.replanning.contact_check import check_contacts
 from rrtik_ompl.replanning.in_time import plan_in_time
 from rrtik_ompl.replanning.in_time.foreseen import travel
-from rrtik_ompl.replanning.in_time.hurry import full_pace
-from rrtik_ompl.replanning.in_time.search import each_slot
-from rrtik_ompl.replanning.in_time.tree import Pace, TimeTree
+from rrtik_ompl.replanning.in_time.search import Pace, TimeTree, each_slot, full_pace
 from rrtik_ompl.world.world import World
 from rrtik_tests.moving_plane import FAST, box, crossing, place, plane
 

@@ -10,6 +10,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from rrtik_bench.moving_scenes import moving_problem
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.model.goal import PositionGoal
@@ -17,7 +18,6 @@ from rrtik_ompl.model.scene import ConstantVelocity, Obstacle, Scene, TimedPoses
 from rrtik_ompl.model.shapes import Box, PointCloud, Prism, Sphere
 from rrtik_ompl.replanning import PLANNERS, SpeedWarning, replan
 from rrtik_ompl.replanning.evading import evasion
-from rrtik_ompl.replanning.generate import moving_problem
 from rrtik_ompl.world.moving_world import MovingWorld
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World

@@ -16,13 +16,13 @@ from rrtik_ompl.kernels.simd.library import library
 from rrtik_ompl.model.scene import Scene
 from rrtik_ompl.motion.trajectory.limits import RateLimits
 from rrtik_ompl.replanning.drrt_con import without_points_between
-from rrtik_ompl.replanning.feed import Snapshot, refuse_endless_turns
+from rrtik_ompl.replanning.feed import Snapshot
 from rrtik_ompl.replanning.in_time.foreseen import ForeseenWorlds
-from rrtik_ompl.replanning.in_time.search import Ends, TimeSearch
-from rrtik_ompl.replanning.in_time.tree import Pace
+from rrtik_ompl.replanning.in_time.search import Ends, Pace, TimeSearch
 from rrtik_ompl.replanning.record import ReplanRun
 from rrtik_ompl.replanning.start_and_goals import every_goal, held_pairs, refuse_constraints, sampling_box
 from rrtik_ompl.replanning.tick import Tick
+from rrtik_ompl.replanning.travels import refuse_endless_turns
 from rrtik_ompl.world.kept_clearance import CLEARANCE
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.proof import PROOF_KERNELS

@@ -16,12 +16,11 @@ import pinocchio as pin
 
 from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.base.budget import Stop
-from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.geometry.collision.bodies import Body
 from rrtik_ompl.geometry.collision.certificate import distance
 from rrtik_ompl.geometry.collision.shape_table import farthest
 from rrtik_ompl.model.scene import ConstantVelocity, Obstacle, Scene
-from rrtik_ompl.replanning.feed import ROTATION_NOISE
+from rrtik_ompl.replanning.travels import travel_bound, turns_without_end
 from rrtik_ompl.world.moving_world import MovingWorld
 from rrtik_ompl.world.world import World
 
@@ -173,13 +172,7 @@ def travel(obstacle: Obstacle, begin: float, end: float, radius: float) -> float
     for first, last in ((begin, middle), (middle, end)):
         stations = motion.times[(motion.times > first) & (motion.times < last)]
         poses = [motion.pose_at(obstacle.pose, float(time)) for time in (first, *stations, last)]
-        travels.append(sum(_travel_bound(a, b, radius, obstacle.name) for a, b in pairwise(poses)))
+        travels.append(sum(travel_bound(a, b, radius) for a, b in pairwise(poses)))
+    if not np.isfinite(max(travels)):
+        raise turns_without_end(obstacle.name)
     return max(travels) + (ROUNDING if max(travels) > 0.0 else 0.0)
-
-
-def _travel_bound(a: pin.SE3, b: pin.SE3, radius: float, name: str) -> float:
-    angle = float(np.linalg.norm(pin.log3(a.rotation.T @ b.rotation)))
-    arc = radius * angle if angle > ROTATION_NOISE else 0.0
-    if not np.isfinite(arc):
-        raise InputError(f"obstacle '{name}' has no end and turns: no bound on its way; use a box in its place")
-    return float(np.linalg.norm(b.translation - a.translation)) + arc

@@ -8,6 +8,7 @@ others, in turn for such as arrive earlier from the outset and for any.
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -17,8 +18,6 @@ from numpy.typing import NDArray
 from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.base.budget import Stop
 from rrtik_ompl.replanning.in_time.foreseen import ForeseenWorlds
-from rrtik_ompl.replanning.in_time.hurry import hurried
-from rrtik_ompl.replanning.in_time.tree import Pace, TimeTree
 
 PIECE = 8  # slots of one extension
 FIRST_SHARE = 1.5  # of the least time: the first last arrival
@@ -28,7 +27,12 @@ ROUNDS = 12  # without an earlier arrival, one after the other
 STANDING = 0.1  # share of the extensions in which the robot stands
 CUTS = 200  # tries to shorten the way
 
+GAP_WEIGHT = 0.2  # of a slot between two vertices, beside a slot that the motion needs at least
+ROUNDING = 1e-9  # [slots]
+NEVER = 1 << 40  # slots: more than any plan has, and still a number
+
 Aim: TypeAlias = tuple[int, tuple[Vector, int]]  # a vertex, and the configuration and the slot to grow towards
+Place: TypeAlias = tuple[int, int]  # slot and number of a place along a way
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -238,3 +242,162 @@ def each_slot(rows: Matrix, slots: NDArray[np.int64]) -> Matrix:
 
 def _length(rows: Matrix) -> float:
     return float(np.linalg.norm(np.diff(rows, axis=0), axis=1).sum())
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Pace:
+    """How far a robot goes in a slot.
+
+    Attributes:
+        change: Of each joint [rad or m], shape (n,).
+        step: Of the configuration, joints counted alike [unit of the space]; inf for no bound.
+    """
+
+    change: Vector
+    step: float
+
+    def slots(self, moves: Matrix) -> Vector:
+        """The least number of slots that moves, shape (m, n), take; fractions count. Shape (m,)."""
+        joints = (np.abs(moves) / self.change).max(axis=1)
+        slots: Vector = np.maximum(joints, np.linalg.norm(moves, axis=1) / self.step)
+        return slots
+
+    def whole_slots(self, moves: Matrix) -> NDArray[np.int64]:
+        """The same in whole slots, ``NEVER`` at most, shape (m,)."""
+        return np.minimum(np.ceil(self.slots(moves) - ROUNDING), NEVER).astype(np.int64)
+
+
+class TimeTree:
+    """Vertices are configurations at the begin of slots; an edge is a straight motion at constant speed.
+
+    Attributes:
+        q: Shape (k, n).
+        slot: Shape (k,).
+        size: Number of vertices.
+        onward: 1 if children are later than their parents, -1 if they are earlier.
+
+    Args:
+        pace: How far the robot goes in a slot.
+        onward: See above.
+    """
+
+    def __init__(self, pace: Pace, onward: int) -> None:
+        self._pace = pace
+        self.onward = onward
+        self.size = 0
+        self._q = np.zeros((64, len(pace.change)))
+        self._slot = np.zeros(64, dtype=np.int64)
+        self._parent = np.zeros(64, dtype=np.int64)
+
+    @property
+    def q(self) -> Matrix:
+        """Configurations of the vertices, shape (k, n)."""
+        return self._q[: self.size]
+
+    @property
+    def slot(self) -> NDArray[np.int64]:
+        """Slots of the vertices, shape (k,)."""
+        return self._slot[: self.size]
+
+    def add(self, q: Vector, slot: int, parent: int) -> int:
+        """A new vertex, a root if the parent is -1; its number."""
+        if self.size == len(self._q):
+            self._q = np.vstack([self._q, np.zeros_like(self._q)])
+            self._slot = np.concatenate([self._slot, np.zeros_like(self._slot)])
+            self._parent = np.concatenate([self._parent, np.zeros_like(self._parent)])
+
+        self._q[self.size] = q
+        self._slot[self.size] = slot
+        self._parent[self.size] = parent
+        self.size += 1
+        return self.size - 1
+
+    def nearest(self, q: Vector, slot: int) -> int | None:
+        """The vertex from which a configuration is reached in a slot most easily; None if no speed suffices."""
+        gap = self.onward * (slot - self.slot)
+        needed = self._pace.slots(q - self.q)
+        reachable = np.flatnonzero((gap > 0) & (needed <= gap + ROUNDING))
+        if len(reachable) == 0:
+            return None
+        return int(reachable[(needed[reachable] + GAP_WEIGHT * gap[reachable]).argmin()])
+
+    def rows_towards(self, vertex: int, q: Vector, slot: int, max_slots: int) -> tuple[Matrix, bool]:
+        """Configurations slot by slot from a vertex towards q in a slot, at most so many slots; whether q is the last.
+
+        Returns:
+            Shape (k, n), the vertex first.
+        """
+        gap = abs(slot - int(self._slot[vertex]))
+        shares = np.arange(min(gap, max_slots) + 1)[:, None] / gap
+        rows: Matrix = self._q[vertex] + shares * (q - self._q[vertex])
+        if gap <= max_slots:
+            rows[-1] = q
+        return rows, gap <= max_slots
+
+    def branch(self, vertex: int) -> tuple[Matrix, NDArray[np.int64]]:
+        """Vertices from the root to one of them: configurations, shape (k, n), and slots, shape (k,)."""
+        numbers = [vertex]
+        while self._parent[numbers[-1]] >= 0:
+            numbers.append(int(self._parent[numbers[-1]]))
+        return self._q[numbers[::-1]], self._slot[numbers[::-1]]
+
+
+def full_pace(rows: Matrix, pace: Pace) -> Matrix:
+    """Places along a way, shape (k, n), each a slot at full pace from the last one; both ends stay. Shape (m, n)."""
+    slots_along = np.concatenate([[0.0], np.cumsum(pace.slots(np.diff(rows, axis=0)))])
+    moving = np.concatenate([[True], np.diff(slots_along) > 0.0])
+    count = max(int(np.ceil(slots_along[-1] - 1e-9)), 1)
+    slots_of_places = slots_along[-1] * np.arange(count + 1) / count
+    places = np.stack([np.interp(slots_of_places, slots_along[moving], column) for column in rows[moving].T], axis=1)
+    places[[0, -1]] = rows[[0, -1]]
+    return places
+
+
+def hurried(rows: Matrix, pace: Pace, worlds: ForeseenWorlds, max_slots: int, stop: Stop) -> Matrix | None:
+    """The same way with the fewest slots, at most so many; a configuration for each slot, or None.
+
+    Along a fixed way only its timing is left to choose, as in the decomposition of [71]; here over whole slots: go at
+    full pace or stand still, with the fewest slots that stand still.
+
+    Args:
+        rows: A configuration for each slot, shape (k, n).
+        pace: How far the robot goes in a slot.
+        worlds: What is free in which slot.
+        max_slots: That it may take.
+        stop: Ends it without a way.
+    """
+    places = full_pace(rows, pace)
+    last = len(places) - 1
+    begin = (0, 0)
+    previous: dict[Place, Place] = {begin: begin}
+    queue = deque([begin])  # those that have stood less come first
+
+    while queue and not stop():
+        slot, k = queue.popleft()
+        if k == last:
+            return places[_numbers(previous, (slot, k))]
+        if slot + last - k > max_slots:
+            continue
+
+        for advance in (0, 1):  # going on is put before standing, for it is taken from the left
+            place = (slot + 1, k + advance)
+            if place in previous or (not advance and slot + 1 + last - k > max_slots):
+                continue
+            if worlds.free(slot, places[k], places[k + advance]):
+                previous[place] = (slot, k)
+                if advance:
+                    queue.appendleft(place)
+                else:
+                    queue.append(place)
+
+    return None
+
+
+def _numbers(previous: dict[Place, Place], end: Place) -> list[int]:
+    """Numbers of the places in each slot from the first to one."""
+    numbers = [end[1]]
+    place = end
+    while previous[place] != place:
+        place = previous[place]
+        numbers.append(place[1])
+    return numbers[::-1]

@@ -13,8 +13,7 @@ from rrtik_ompl.kernels.search.repair import PathRepair
 from rrtik_ompl.model.scene import Obstacle, Scene
 from rrtik_ompl.model.shapes import Box, Sphere
 from rrtik_ompl.replanning.connecting import PythonConnect
-from rrtik_ompl.replanning.drrt_con import DrrtCon
-from rrtik_ompl.replanning.kernel_drrt_con import KernelDrrtCon
+from rrtik_ompl.replanning.drrt_con import DrrtCon, KernelDrrtCon
 from rrtik_ompl.world.moving_world import MovingWorld
 from rrtik_ompl.world.world import World
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from rrtik_bench.moving_scenes import moving_scene
 from rrtik_ompl.description.catalog import load_robot
-from rrtik_ompl.replanning.generate import moving_scene
 
 
 def test_generated_obstacles_keep_to_their_speed_and_their_distance():
