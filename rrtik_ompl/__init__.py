@@ -74,8 +74,8 @@ if TYPE_CHECKING:
     from rrtik_ompl.model.task_region import TaskRegion as TaskRegion
     from rrtik_ompl.motion.following.follower import Followed as Followed
     from rrtik_ompl.motion.following.follower import Follower as Follower
-    from rrtik_ompl.motion.following.links import RobotLink as RobotLink
-    from rrtik_ompl.motion.following.links import SimulatedLink as SimulatedLink
+    from rrtik_ompl.motion.following.follower import RobotLink as RobotLink
+    from rrtik_ompl.motion.following.follower import SimulatedLink as SimulatedLink
     from rrtik_ompl.motion.following.servo import Servo as Servo
     from rrtik_ompl.motion.trajectory import RateLimits as RateLimits
     from rrtik_ompl.motion.trajectory import Trajectory as Trajectory
@@ -145,8 +145,7 @@ else:
         "description.variants": ("narrowed", "padded", "scaled", "weighted"),
         "constraints.shorthands": ("inside", "on_line", "on_plane", "orientation_of", "upright"),
         "base.errors": ("InputError", "PlannerError", "ProblemError", "RrtikError", "UnknownNameError"),
-        "motion.following.follower": ("Followed", "Follower"),
-        "motion.following.links": ("RobotLink", "SimulatedLink"),
+        "motion.following.follower": ("Followed", "Follower", "RobotLink", "SimulatedLink"),
         "motion.following.servo": ("Servo",),
         "model.goal": ("GoalSet", "JointGoal", "MultiGoal", "PoseGoal", "PositionGoal"),
         "ik.batch": ("IkBatch", "solve_ik_batch"),

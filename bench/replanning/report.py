@@ -23,7 +23,7 @@ from rrtik_bench.contact_check import check_contacts
 from rrtik_bench.report.page import Report
 from rrtik_bench.shortening.plane_worlds import Plane
 from rrtik_ompl.replanning import ReplanRun, replan
-from rrtik_ompl.replanning.connecting import PythonConnect
+from rrtik_ompl.replanning.connecting import PythonConnect, TreeOptions
 from rrtik_ompl.replanning.drrt_con import DrrtCon
 from rrtik_ompl.world.moving_world import MovingWorld
 
@@ -54,7 +54,8 @@ def static_rows(report: Report, count: int) -> None:
             run = plane_run(problem, seed)
             best = plane.class_optimum(run.configurations)
             walked.append(run.length / best)
-            planner = DrrtCon(PythonConnect(np.zeros(2), np.full(2, scenes.SIZE), scenes.EPS, seed), scenes.EPS)
+            options = TreeOptions(np.zeros(2), np.full(2, scenes.SIZE), scenes.EPS, seed)
+            planner = DrrtCon(PythonConnect(options), scenes.EPS)
             planner.begin(problem.start, goal_joints(problem)[None], MovingWorld(problem.world))
             route = planner.path
             assert route is not None

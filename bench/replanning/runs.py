@@ -15,7 +15,7 @@ from rrtik_bench.moving_scenes import moving_problem
 from rrtik_ompl.model.scene import Scene
 from rrtik_ompl.planning.plan import plan
 from rrtik_ompl.replanning import ReplanRun, replan
-from rrtik_ompl.replanning.connecting import PythonConnect
+from rrtik_ompl.replanning.connecting import PythonConnect, TreeOptions
 from rrtik_ompl.replanning.drrt_con import DrrtCon, FromScratch, KernelDrrtCon
 from rrtik_ompl.replanning.feed import feed_of
 from rrtik_ompl.replanning.loop import Loop
@@ -144,10 +144,11 @@ def with_pairs(loop: Loop, quick: Moments, slow: Moments, slow_every: int) -> No
     planner, repair, world = loop._planner, loop._planner.repair, loop._world
     lower, upper = loop._problem.robot.finite_range()
     eps, count = planner.max_edge, 0
-    scratch = {SCRATCH: KernelDrrtCon(world, lower, upper, eps, 1, forgetting=True)}
+    options = TreeOptions(lower, upper, eps, 1)
+    scratch = {SCRATCH: KernelDrrtCon(world, options, forgetting=True)}
     plain = {
-        "DRRT-Con as published, in Python": DrrtCon(PythonConnect(lower, upper, eps, 1), eps),
-        "from scratch as published, in Python": FromScratch(PythonConnect(lower, upper, eps, 1), eps),
+        "DRRT-Con as published, in Python": DrrtCon(PythonConnect(options), eps),
+        "from scratch as published, in Python": FromScratch(PythonConnect(options), eps),
     }
 
     def timed(motions: MotionQueries, stop: Callable[[], Any]) -> bool:

@@ -7,7 +7,6 @@ from itertools import pairwise
 
 import coal
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Matrix, Vector
@@ -15,7 +14,7 @@ from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.geometry.collision.bodies import Body, link_bodies, scene_bodies
 from rrtik_ompl.geometry.collision.cloud_solid import cloud_gap, has_cloud, nearest_of_cloud
 from rrtik_ompl.model.robot import Robot
-from rrtik_ompl.model.scene import Obstacle, Scene
+from rrtik_ompl.model.scene import Scene, pose_at
 from rrtik_ompl.model.shapes import same_shape
 from rrtik_ompl.replanning.feed import Feed
 from rrtik_ompl.replanning.record import ReplanRun
@@ -78,7 +77,7 @@ def check_contacts(
 def _poses(source: Scene | Feed, times: list[float]) -> dict[str, NDArray[np.float64]]:
     """Where each obstacle is at the times, shape (m, 4, 4)."""
     if isinstance(source, Scene):
-        return {o.name: np.array([_place(o, time).homogeneous for time in times]) for o in source.obstacles}
+        return {o.name: np.array([pose_at(o, time).homogeneous for time in times]) for o in source.obstacles}
 
     scenes = [source(time) for time in times]
     names = [o.name for o in scenes[0].obstacles]
@@ -87,10 +86,6 @@ def _poses(source: Scene | Feed, times: list[float]) -> dict[str, NDArray[np.flo
         if any(not same_shape(scene.obstacle(name).shape, shape) for scene in scenes):
             raise InputError(f"check of contacts: '{name}' has other points later; check such a run tick by tick")
     return {name: np.array([scene.obstacle(name).pose.homogeneous for scene in scenes]) for name in names}
-
-
-def _place(obstacle: Obstacle, time: float) -> pin.SE3:
-    return obstacle.pose if obstacle.motion is None else obstacle.motion.pose_at(obstacle.pose, time)
 
 
 def _gaps(

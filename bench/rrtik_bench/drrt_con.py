@@ -12,7 +12,7 @@ from rrtik_bench.tables import Table
 from rrtik_ompl.model.goal import JointGoal
 from rrtik_ompl.model.transitions import route_length
 from rrtik_ompl.replanning import ReplanRun
-from rrtik_ompl.replanning.connecting import PythonConnect
+from rrtik_ompl.replanning.connecting import PythonConnect, TreeOptions
 from rrtik_ompl.replanning.drrt_con import DrrtCon
 from rrtik_ompl.replanning.scenario import Scenario, load_scenario
 from rrtik_ompl.world.moving_world import MovingWorld
@@ -36,7 +36,8 @@ def static(quick: bool) -> list[Row]:
     walked = [run.length for run in _runs(scenario, count)]
     once = []
     for seed in range(count):
-        planner = DrrtCon(PythonConnect(problem.robot.lower, problem.robot.upper, edge, seed), edge)
+        options = TreeOptions(problem.robot.lower, problem.robot.upper, edge, seed)
+        planner = DrrtCon(PythonConnect(options), edge)
         planner.begin(problem.start, problem.goal.q[None], MovingWorld(problem.world))
         assert planner.path is not None
         once.append(route_length(planner.path))

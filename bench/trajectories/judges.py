@@ -23,8 +23,7 @@ from rrtik_ompl.motion.trajectory import State, Trajectory
 from rrtik_ompl.motion.trajectory.corners import first_radii, vertices
 from rrtik_ompl.motion.trajectory.curve import Curve
 from rrtik_ompl.motion.trajectory.fastest import Bounds, fastest
-from rrtik_ompl.motion.trajectory.line import along_lines
-from rrtik_ompl.motion.trajectory.runs import along_curve
+from rrtik_ompl.motion.trajectory.runs import along_curve, along_lines
 from rrtik_ompl.world.world import World
 
 _PANDA = load_robot("panda")

@@ -14,7 +14,7 @@ from rrtik_ompl.kernels.search.motions.motion_table import NO_LIMIT
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SafePlanner, SearchResult, Stop
 from rrtik_ompl.ompl_bridge.results import PlannerGraph
 from rrtik_ompl.replanning.connecting import KERNELS as LIBRARIES
-from rrtik_ompl.replanning.connecting import KernelConnect, PythonConnect
+from rrtik_ompl.replanning.connecting import KernelConnect, PythonConnect, TreeOptions
 from rrtik_ompl.replanning.drrt_con import DrrtCon, points_along
 from rrtik_ompl.world.motion_queries import has_kernels, is_conservative
 
@@ -108,11 +108,11 @@ class DRRTCon(SafePlanner):
     def _new(self) -> DrrtCon:
         lower, upper = self.bounds()
         max_edge, _ = connect_lengths(lower, upper, self.range, None, turning=self.turning())
-        seed = int(self.rng.integers(2**63))
+        options = TreeOptions(lower, upper, max_edge, int(self.rng.integers(2**63)), NO_LIMIT)
         world = self._world
         if is_conservative(world) and has_kernels(world, *LIBRARIES):
-            return DrrtCon(KernelConnect(world, lower, upper, max_edge, seed, NO_LIMIT), max_edge)
-        return DrrtCon(PythonConnect(lower, upper, max_edge, seed, NO_LIMIT), max_edge)
+            return DrrtCon(KernelConnect(world, options), max_edge)
+        return DrrtCon(PythonConnect(options), max_edge)
 
 
 def _with_points(path: Matrix, edges: Mask, step: float) -> Matrix:

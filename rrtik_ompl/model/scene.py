@@ -40,9 +40,11 @@ class ConstantVelocity:
         """
         require(start, pin.SE3, "pose of an obstacle", "use rrtik_ompl.pose(xyz, quat_xyzw)")
         time = finite_number(time, "time of a motion")
-        if not abs(time) * float(np.abs(self.velocity).max()) <= LARGEST:
-            raise InputError(f"motion: at {time:g} s an obstacle of velocity {self.velocity.tolist()} m/s is far away")
-        return pin.SE3(start.rotation, start.translation + time * self.velocity)
+        if abs(time) * float(np.abs(self.velocity).max()) <= LARGEST:
+            position = start.translation + time * self.velocity
+            if np.abs(position).max() <= LARGEST:
+                return pin.SE3(start.rotation, position)
+        raise InputError(f"motion: at {time:g} s an obstacle of velocity {self.velocity.tolist()} m/s is far away")
 
     def seen_from(self, time: float) -> ConstantVelocity:
         """The same motion with ``time`` [s] as its time 0."""
@@ -90,7 +92,7 @@ class TimedPoses:
 
     def seen_from(self, time: float) -> TimedPoses:
         """The same motion with ``time`` [s] as its time 0."""
-        return TimedPoses(self.times - time, self.poses)
+        return changed(self, times=frozen(self.times - time))
 
 
 Motion: TypeAlias = ConstantVelocity | TimedPoses
@@ -376,11 +378,16 @@ class Scene:
         time = finite_number(time, "time of a scene")
         if all(o.motion is None for o in self.obstacles):
             return self
-        moved = (
-            o if o.motion is None else replace(o, pose=o.motion.pose_at(o.pose, time), motion=o.motion.seen_from(time))
+        moved = tuple(
+            o if o.motion is None else changed(o, pose=pose_at(o, time), motion=o.motion.seen_from(time))
             for o in self.obstacles
         )
-        return replace(self, obstacles=tuple(moved))
+        return changed(self, obstacles=moved)
+
+
+def pose_at(obstacle: Obstacle, time: float) -> pin.SE3:
+    """Where an obstacle is at a time [s]: by the motion that it states, if it states one."""
+    return obstacle.pose if obstacle.motion is None else obstacle.motion.pose_at(obstacle.pose, time)
 
 
 def pairs_that_may_touch(scene: Scene) -> frozenset[tuple[frozenset[str], float | None]]:

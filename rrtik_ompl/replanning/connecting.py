@@ -28,6 +28,29 @@ PATIENCE = 40  # of them without gain, after which it ends
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class TreeOptions:
+    """How the trees of a search grow.
+
+    Attributes:
+        lower, upper: The box to sample in, shape (n,).
+        max_edge: The longest edge [unit of the space].
+        seed: Of the samples.
+        iterations: Samples of one search at most.
+    """
+
+    lower: Vector
+    upper: Vector
+    max_edge: float
+    seed: int
+    iterations: int = ITERATIONS
+
+    @property
+    def rules(self) -> ConnectRules:
+        """The same for the search in Python."""
+        return ConnectRules(self.lower, self.upper, self.max_edge, max_iterations=self.iterations)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Joined:
     """Two pieces of a path and the connection between them.
 
@@ -67,12 +90,10 @@ class Connect(Protocol):
 class KernelConnect:
     """The search in a kernel, for worlds that have them (:mod:`rrtik_ompl.kernels.search.connect_kernels`)."""
 
-    def __init__(
-        self, world: KernelWorld, lower: Vector, upper: Vector, max_edge: float, seed: int, iterations: int = ITERATIONS
-    ) -> None:
-        self._search = ConnectSearch(world.motions, lower, upper, range_=max_edge)
-        self._rng = np.random.default_rng(seed)
-        self._iterations = iterations
+    def __init__(self, world: KernelWorld, options: TreeOptions) -> None:
+        self._search = ConnectSearch(world.motions, options.lower, options.upper, range_=options.max_edge)
+        self._rng = np.random.default_rng(options.seed)
+        self._iterations = options.iterations
         self.samples = 0
 
     def __call__(
@@ -80,8 +101,7 @@ class KernelConnect:
     ) -> Joined | None:
         """See :class:`Connect`; conservative: what the kernel cannot prove counts as blocked."""
         seed = int(self._rng.integers(2**63))
-        max_iterations = self._iterations
-        bridge = self._search.solve(first, second, seed, stop=stop, max_iterations=max_iterations)
+        bridge = self._search.solve(first, second, seed, stop=stop, max_iterations=self._iterations)
         self.samples += int(self._search.statistics()["iterations"])
         return None if bridge is None else joined(first, bridge, second, chain=chain)
 
@@ -93,12 +113,9 @@ class PythonConnect:
         trees: Of the last search, from both sides; None before the first.
     """
 
-    def __init__(self, lower: Vector, upper: Vector, max_edge: float, seed: int, iterations: int = ITERATIONS) -> None:
-        self._lower = lower
-        self._upper = upper
-        self._max_edge = max_edge
-        self._rng = np.random.default_rng(seed)
-        self._iterations = iterations
+    def __init__(self, options: TreeOptions) -> None:
+        self._rules = options.rules
+        self._rng = np.random.default_rng(options.seed)
         self.samples = 0
         self.trees: tuple[ConfigurationTree, ConfigurationTree] | None = None
 
@@ -106,8 +123,7 @@ class PythonConnect:
         self, first: Matrix, second: Matrix, motions: MotionQueries, stop: Stop, *, chain: bool = True
     ) -> Joined | None:
         """See :class:`Connect`."""
-        rules = ConnectRules(self._lower, self._upper, self._max_edge, max_iterations=self._iterations)
-        search = RrtConnect(first, second, rules, one_by_one(motions), self._rng)
+        search = RrtConnect(first, second, self._rules, one_by_one(motions), self._rng)
         bridge = search.run(stop)
         self.trees = search.trees
         self.samples += search.iterations

@@ -22,13 +22,13 @@ from rrtik_ompl.kernels.search.repair import PathRepair
 from rrtik_ompl.model.transitions import part_counts, subdivided, without_repeats
 from rrtik_ompl.replanning.connecting import (
     CUTS,
-    ITERATIONS,
     PATIENCE,
     Connect,
     Joined,
     KernelConnect,
     KernelCuts,
     PythonConnect,
+    TreeOptions,
 )
 from rrtik_ompl.world.motion_queries import MotionQueries, has_kernels
 from rrtik_ompl.world.moving_world import MovingWorld
@@ -74,9 +74,9 @@ class DrrtCon:
         self._blocked_at_last_check: Mask = np.zeros(0, dtype=bool)
 
     @classmethod
-    def in_box(cls, lower: Vector, upper: Vector, max_edge: float, seed: int, post: Post | None) -> DrrtCon:
-        """One that samples in the box from lower to upper, shape (n,)."""
-        return cls(PythonConnect(lower, upper, max_edge, seed), max_edge, post=post)
+    def with_trees(cls, options: TreeOptions, post: Post | None) -> DrrtCon:
+        """One whose search, in Python, grows trees so."""
+        return cls(PythonConnect(options), options.max_edge, post=post)
 
     def begin(self, start: Matrix | Vector, goals: Matrix, motions: MotionQueries, stop: Stop = no_stop) -> bool:
         """Look for a first path; whether there is one.
@@ -196,28 +196,25 @@ class KernelDrrtCon(DrrtCon):
 
     Args:
         world: Checks motions; the ``motions`` of all methods.
-        lower, upper: The box to sample in, shape (n,).
-        max_edge: See :class:`DrrtCon`.
-        seed: Of the samples and the shortcuts.
+        options: How the trees grow; the seed is that of the shortcuts too.
         forgetting: Whether each repair plans from scratch, as :class:`FromScratch` does.
 
     Raises:
         InputError: If the world has no kernels.
     """
 
-    def __init__(
-        self, world: MovingWorld, lower: Vector, upper: Vector, max_edge: float, seed: int, *, forgetting: bool = False
-    ) -> None:
+    def __init__(self, world: MovingWorld, options: TreeOptions, *, forgetting: bool = False) -> None:
         self._world = world  # before the check, behind which its type is a lesser one
         if not has_kernels(world):
             raise InputError("replanning in kernels: the world has none; install numba")
 
         self._forgetting = forgetting
-        self._rng = np.random.default_rng([seed, 1])
-        super().__init__(KernelConnect(world, lower, upper, max_edge, seed), max_edge, post=KernelCuts(world, seed))
+        self._rng = np.random.default_rng([options.seed, 1])
+        super().__init__(KernelConnect(world, options), options.max_edge, post=KernelCuts(world, options.seed))
         tries, patience = (CUTS, PATIENCE) if forgetting else (REPAIR_CUTS, REPAIR_PATIENCE)
         self._kernels = PathRepair(
-            world.motions, lower, upper, max_edge=max_edge, iterations=ITERATIONS, tries=tries, patience=patience
+            world.motions, options.lower, options.upper, max_edge=options.max_edge, iterations=options.iterations,
+            tries=tries, patience=patience,
         )  # fmt: skip
 
     def check_path(self, motions: MotionQueries) -> bool:

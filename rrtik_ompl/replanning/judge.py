@@ -35,7 +35,7 @@ from rrtik_ompl.geometry.collision.distances import is_ours, own_nearest
 from rrtik_ompl.geometry.collision.motion_bound import approach_weights
 from rrtik_ompl.geometry.collision.shape_table import farthest
 from rrtik_ompl.model.robot import Robot
-from rrtik_ompl.model.scene import Motion, Obstacle, Scene, TimedPoses, pairs_that_may_touch
+from rrtik_ompl.model.scene import Motion, Obstacle, Scene, TimedPoses, pairs_that_may_touch, pose_at
 from rrtik_ompl.model.shapes import same_shape
 from rrtik_ompl.replanning.feed import Feed, Snapshot
 from rrtik_ompl.replanning.tick import Tick
@@ -401,8 +401,7 @@ class _PeriodJudge:
         return tick.q + (time - tick.time) / (next_tick.time - tick.time) * (next_tick.q - tick.q)
 
     def _obstacle_pose(self, name: str, time: float) -> pin.SE3:
-        obstacle = self._obstacles[name]
-        return obstacle.pose if obstacle.motion is None else obstacle.motion.pose_at(obstacle.pose, time)
+        return pose_at(self._obstacles[name], time)
 
 
 def _clearance_applies(first: Body, second: Body) -> bool:

@@ -54,7 +54,8 @@ class Loop:
         clock: Clock = time.perf_counter,
         patience: float = SILENCE_SECONDS,
     ) -> None:
-        self._clock: Clock = lambda: finite_number(clock(), "clock: what it gives")
+        finite_number(clock(), "clock: what it gives")
+        self._clock = clock
         self._problem = problem
         self._feed = feed
         self._settings = settings

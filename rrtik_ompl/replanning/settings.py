@@ -14,7 +14,7 @@ from rrtik_ompl.kernels.search.connect_lengths import connect_lengths
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.motion.trajectory.limits import RateLimits
 from rrtik_ompl.problem_files.run import RENAMED
-from rrtik_ompl.replanning.connecting import KERNELS, KernelCuts
+from rrtik_ompl.replanning.connecting import KERNELS, KernelCuts, TreeOptions
 from rrtik_ompl.replanning.drrt_con import DrrtCon, FromScratch, KernelDrrtCon
 from rrtik_ompl.replanning.single_tree import SingleTree
 from rrtik_ompl.world.motion_queries import has_kernels
@@ -146,10 +146,9 @@ def refuse_renamed(options: Mapping[str, object]) -> None:
 
 def make_planner(settings: ReplanSettings, world: MovingWorld, lower: Vector, upper: Vector) -> DrrtCon:
     """The replanner of the name, for a world and a box of configurations to sample in."""
-    edge_length = settings.edge_length(world.robot)
-    seed = settings.seed
+    options = TreeOptions(lower, upper, settings.edge_length(world.robot), settings.seed)
     kind = REPLANNERS[settings.planner]
-    cuts = KernelCuts(world, seed) if has_kernels(world, *KERNELS) else None
+    cuts = KernelCuts(world, settings.seed) if has_kernels(world, *KERNELS) else None
     if cuts is not None and kind.repairs_in_kernels:
-        return KernelDrrtCon(world, lower, upper, edge_length, seed, forgetting=kind.forgetting)
-    return kind.in_box(lower, upper, edge_length, seed, cuts)
+        return KernelDrrtCon(world, options, forgetting=kind.forgetting)
+    return kind.with_trees(options, cuts)

@@ -13,8 +13,9 @@ import numpy as np
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector
 from rrtik_ompl.base.budget import Stop, no_stop
 from rrtik_ompl.base.choices import Replanner
-from rrtik_ompl.planning.search.rrt_connect import ConfigurationTree, ConnectRules, extend
-from rrtik_ompl.replanning.connecting import ITERATIONS, Joined, joined, one_by_one
+from rrtik_ompl.planning.search.rrt_connect import extend
+from rrtik_ompl.planning.search.rrt_connect import ConfigurationTree
+from rrtik_ompl.replanning.connecting import Joined, TreeOptions, joined, one_by_one
 from rrtik_ompl.replanning.drrt_con import DrrtCon, Post
 from rrtik_ompl.world.motion_queries import MotionQueries
 
@@ -25,26 +26,25 @@ class SingleTree(DrrtCon):
     """DRRT: when the path is blocked all edges of the tree are checked, and branches behind blocked ones are trimmed.
 
     Args:
-        lower, upper: The box to sample in, shape (n,).
-        max_edge: See :class:`DrrtCon`.
-        seed: Of the samples.
+        options: How the tree grows.
         post: See :class:`DrrtCon`.
     """
 
     name: ClassVar[Replanner] = "drrt"
     repairs_in_kernels: ClassVar[bool] = False
 
-    def __init__(self, lower: Vector, upper: Vector, max_edge: float, seed: int, *, post: Post | None = None) -> None:
-        super().__init__(self, max_edge, post=post)
-        self._rules = ConnectRules(lower, upper, max_edge)
-        self._rng = np.random.default_rng(seed)
+    def __init__(self, options: TreeOptions, *, post: Post | None = None) -> None:
+        super().__init__(self, options.max_edge, post=post)
+        self._options = options
+        self._rules = options.rules
+        self._rng = np.random.default_rng(options.seed)
         self._tree: ConfigurationTree | None = None
         self.samples = 0
 
     @classmethod
-    def in_box(cls, lower: Vector, upper: Vector, max_edge: float, seed: int, post: Post | None) -> SingleTree:
-        """See :meth:`DrrtCon.in_box`."""
-        return cls(lower, upper, max_edge, seed, post=post)
+    def with_trees(cls, options: TreeOptions, post: Post | None) -> SingleTree:
+        """See :meth:`DrrtCon.with_trees`."""
+        return cls(options, post=post)
 
     def begin(self, start: Vector, goals: Matrix, motions: MotionQueries, stop: Stop = no_stop) -> bool:
         """See :meth:`DrrtCon.begin`; the tree's only root is the first goal that is free."""
@@ -65,12 +65,12 @@ class SingleTree(DrrtCon):
         if self._tree is None or not (self._tree.rows[0] == second[0]).all():
             self._tree = ConfigurationTree(second[:1])
 
-        for _ in range(ITERATIONS):
+        for _ in range(self._options.iterations):
             if stop():
                 return None
             self.samples += 1
             at_robot = self._rng.random() < ROBOT_PROBABILITY
-            target = robot_configuration if at_robot else self._rng.uniform(self._rules.lower, self._rules.upper)
+            target = robot_configuration if at_robot else self._rng.uniform(self._options.lower, self._options.upper)
             vertex = extend(self._tree, target, self._rules, one_by_one(motions))
             if vertex is not None and (self._tree.rows[vertex] == robot_configuration).all():
                 return joined(first, self._tree.branch(vertex)[::-1], second, chain=False)

@@ -20,7 +20,7 @@ from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.tasks.branches import Branch
 from rrtik_ompl.tasks.contact_life import MotionContact as MotionContact
 from rrtik_ompl.tasks.contact_life import world_from
-from rrtik_ompl.tasks.foreseen import never_set_down
+from rrtik_ompl.tasks.handling import never_set_down
 from rrtik_ompl.tasks.program import check_program, steps_of
 from rrtik_ompl.tasks.search import Done, TaskSearch
 from rrtik_ompl.tasks.setting import Setting, world_of_motion

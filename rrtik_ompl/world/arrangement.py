@@ -30,7 +30,7 @@ from rrtik_ompl.geometry.collision.containment import Containment
 from rrtik_ompl.geometry.collision.motion_bound import approach_weights, displacement_weights
 from rrtik_ompl.geometry.collision.shape_table import pieces
 from rrtik_ompl.model.robot import Robot
-from rrtik_ompl.model.scene import Obstacle, Scene, exchanged
+from rrtik_ompl.model.scene import Obstacle, Scene, exchanged, pose_at
 from rrtik_ompl.model.shapes import Mesh
 from rrtik_ompl.world.arm_cache import Spheres, arm_cache
 
@@ -186,7 +186,7 @@ class Numbers:
 
     def placements(self, obstacle: Obstacle) -> dict[int, pin.SE3]:
         """Where the bodies of an obstacle are, by their numbers."""
-        pose = obstacle.pose if obstacle.motion is None else obstacle.motion.pose_at(obstacle.pose, 0.0)
+        pose = pose_at(obstacle, 0.0)
         return {
             number: pose * part.placement
             for number, part in zip(self.bodies[obstacle.name], pieces(obstacle.shape), strict=True)

@@ -91,7 +91,7 @@ def test_a_search_ends_in_the_midst_of_what_takes_long(monkeypatch):
         asked.append(slot)
         return free(worlds, slot, a, b)
 
-    monkeypatch.setattr("rrtik_ompl.replanning.in_time.time.perf_counter", lambda: clock[0])
+    monkeypatch.setattr("rrtik_ompl.base.budget.time.monotonic", lambda: clock[0])
     monkeypatch.setattr(ForeseenWorlds, "free", counted)
     door = TimedPoses([0.0, 6.0, 6.5], [place(10.0, 10.0), place(10.0, 10.0), place(10.0, -30.0)])
     problem = plane(box("low", 10.0, 3.0, 1.0, 10.0), box("high", 10.0, 17.0, 1.0, 10.0),
@@ -111,12 +111,12 @@ def test_what_a_search_has_to_wait_for_is_not_taken_from_its_time(monkeypatch):
         clock[0] += 1000.0
         return hopeless(*of)
 
-    monkeypatch.setattr("rrtik_ompl.replanning.in_time.time.perf_counter", lambda: clock[0])
+    monkeypatch.setattr("rrtik_ompl.base.budget.time.monotonic", lambda: clock[0])
     monkeypatch.setattr(in_time, "_why_impossible", compiled)
     assert plan_in_time(crossing(), speed=5.0, limits=FAST, seconds=1.0, seed=1).found
 
 
-def test_who_is_stopped_while_he_hurries_keeps_the_way_that_there_is():
+def test_a_retiming_that_is_stopped_keeps_the_path_that_there_is():
     problem = plane()
     rows = np.linspace(problem.start, problem.goal.q, 50)
     worlds, pace = ForeseenWorlds(problem.world, 0.1, 0.0), Pace(np.ones(2), np.inf)

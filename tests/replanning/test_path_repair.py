@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rrtik_ompl.planning.search.rrt_connect import ConfigurationTree
-from rrtik_ompl.replanning.connecting import PythonConnect
+from rrtik_ompl.replanning.connecting import PythonConnect, TreeOptions
 from rrtik_ompl.replanning.drrt_con import (
     DrrtCon,
     FromScratch,
@@ -38,7 +38,7 @@ class Scripted:
 
 def on_straight_path(length=20.0):
     """DRRT-Con with a straight path along y = 10, found while nothing was in its way."""
-    planner = DrrtCon(PythonConnect(LOW, HIGH, 1.0, seed=3), 1.0)
+    planner = DrrtCon(PythonConnect(TreeOptions(LOW, HIGH, 1.0, seed=3)), 1.0)
     assert planner.begin(np.array([0.0, 10.0]), np.array([[length, 10.0]]), Scripted((0, 0), 0.1))
     return planner
 
@@ -72,7 +72,7 @@ def test_where_no_way_is_found_the_path_is_kept_and_serves_again_without_a_searc
 
 
 def test_from_scratch_forgets_the_pieces():
-    planner = FromScratch(PythonConnect(LOW, HIGH, 1.0, seed=3), 1.0)
+    planner = FromScratch(PythonConnect(TreeOptions(LOW, HIGH, 1.0, seed=3)), 1.0)
     planner.begin(np.array([0.0, 10.0]), np.array([[20.0, 10.0]]), Scripted((0, 0), 0.1))
     checker = Scripted((10.0, 10.0), 2.0)
     planner.check_path(checker)

@@ -10,10 +10,11 @@ from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.robot import Robot, require_joints
 from rrtik_ompl.motion.trajectory.blending import blended, fault_finder, stopped
 from rrtik_ompl.motion.trajectory.corners import vertices
+from rrtik_ompl.motion.trajectory.cubics import Peaks, State
 from rrtik_ompl.motion.trajectory.dynamics import DynamicLimits
 from rrtik_ompl.motion.trajectory.limits import RateLimits
 from rrtik_ompl.motion.trajectory.load import load_trajectory
-from rrtik_ompl.motion.trajectory.motion import Peaks, State, Trajectory
+from rrtik_ompl.motion.trajectory.motion import Trajectory
 from rrtik_ompl.motion.trajectory.report import MotionReport, motion_report
 from rrtik_ompl.world.kept_clearance import check_route_clearance
 from rrtik_ompl.world.world import World

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,10 +11,10 @@ from rrtik_ompl.base.arrays import Mask, Matrix, Vector
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.motion.trajectory.checks import bad_moments, proof_of_pieces
 from rrtik_ompl.motion.trajectory.corners import MERGED_SHARE, first_radii, spaced, vertices
+from rrtik_ompl.motion.trajectory.cubics import Pieces
 from rrtik_ompl.motion.trajectory.dynamics import DynamicLimits
 from rrtik_ompl.motion.trajectory.limits import RateLimits
 from rrtik_ompl.motion.trajectory.motion import Trajectory
-from rrtik_ompl.motion.trajectory.pieces import joined
 from rrtik_ompl.motion.trajectory.runs import runs
 from rrtik_ompl.world.kept_clearance import provable_clearances
 from rrtik_ompl.world.world import World
@@ -67,6 +67,22 @@ def blended(
     return None
 
 
+def joined(runs: Sequence[Pieces], path: JointPath) -> Trajectory:
+    """The runs one after the other; the motion ends where ``path`` ends, and takes its names and units."""
+    durations, positions, velocities, accelerations = (np.concatenate(rows) for rows in zip(*runs, strict=True))
+    rest = np.zeros((1, positions.shape[1]))
+    last = -2.0 * velocities[-1:] / durations[-1] - accelerations[-1:]  # of the cubic that comes to rest
+    return Trajectory(
+        np.concatenate([np.zeros(1), np.cumsum(durations)]),
+        np.vstack([positions, path.waypoints[-1:]]),
+        np.vstack([velocities, rest]),
+        np.vstack([accelerations, last]),
+        joint_names=path.joint_names,
+        prismatic=path.prismatic,
+        robot_name=path.robot_name,
+    )
+
+
 def within(motion: Trajectory, limits: RateLimits, rounds: int = 10) -> Trajectory:
     """The motion, slowed where rounding errors let it exceed a limit."""
     for _ in range(rounds):
@@ -111,7 +127,7 @@ def fault_finder(path: JointPath, world: World, clearance: float | None) -> Faul
     """
     proven_clearance = next(provable_clearances(world, path.waypoints, clearance), None)
     if proven_clearance is None:
-        return lambda motion, _: np.searchsorted(motion.times, bad_moments(motion, world), side="right") - 1
+        return lambda motion, _: np.searchsorted(motion.times, bad_moments(motion.cubics, world), side="right") - 1
 
     def unproven(motion: Trajectory, off_path: Mask) -> NDArray[np.int64]:
         steps = np.diff(np.concatenate([[False], off_path, [False]]).astype(np.int8))
@@ -120,7 +136,7 @@ def fault_finder(path: JointPath, world: World, clearance: float | None) -> Faul
             [
                 first + gap.motion
                 for first, end in stretches
-                for gap in proof_of_pieces(motion, world, proven_clearance, first, end).unproven
+                for gap in proof_of_pieces(motion.cubics, world, proven_clearance, first, end).unproven
             ],
             dtype=np.int64,
         )

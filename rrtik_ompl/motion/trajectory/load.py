@@ -13,7 +13,7 @@ from rrtik_ompl.files.tables import FORMATS as PATH_FORMATS
 from rrtik_ompl.files.text import known_ending, read_text
 from rrtik_ompl.model.path import JointPath, load_path
 from rrtik_ompl.model.robot import Robot
-from rrtik_ompl.motion.trajectory.cubics import are_set_points, in_thirds
+from rrtik_ompl.motion.trajectory.cubics import Cubics
 from rrtik_ompl.motion.trajectory.motion import Trajectory
 from rrtik_ompl.motion.trajectory.text import FORMATS, holds_motion, loads
 
@@ -78,17 +78,17 @@ def _from_document(document: dict[str, Any], robot: Robot | None) -> Trajectory:
         return plain
 
     bends = finite_array(document["accelerations"], plain.positions.shape, "trajectory accelerations")
-    points = (plain.times, plain.positions, plain.velocities, bends)
-    dense = are_set_points(*points)
+    points = Cubics(plain.times, plain.positions, plain.velocities, bends)
+    dense = points.are_set_points()
     if not dense:
         try:
-            return Trajectory(*points, **names)
+            return Trajectory(points.times, points.positions, points.velocities, bends, **names)
         except InputError:  # they lead elsewhere than to the next point
             pass
 
-    clock, *rows = in_thirds(*points)
+    thirds = points.in_thirds()
     try:
-        smooth = Trajectory(clock[:, 0], *rows, **names)
+        smooth = Trajectory(thirds.times, thirds.positions, thirds.velocities, thirds.accelerations, **names)
     except InputError:  # numbers do not suffice
         return plain
-    return smooth.at_set_points(np.arange(0, len(clock), 3)) if dense else smooth
+    return smooth.at_set_points(np.arange(0, len(thirds.times), 3)) if dense else smooth

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,49 +14,24 @@ from rrtik_ompl.base.copies import as_value, changed, in_notebook
 from rrtik_ompl.base.errors import InputError, at_most, require
 from rrtik_ompl.base.units import joint_units
 from rrtik_ompl.files.text import write_text
+from rrtik_ompl.model.judgement import Played
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.proof import Proof
 from rrtik_ompl.model.robot import require_joints
-from rrtik_ompl.motion.trajectory.checks import faults_of, proof_of_pieces
+from rrtik_ompl.motion.trajectory.checks import faults_of, proof_of_motion
 from rrtik_ompl.motion.trajectory.cubics import (
-    cubic_peaks,
-    ends_of,
+    Cubics,
+    Peaks,
+    State,
     hermite_accelerations,
-    jerks_of,
     places,
-    set_point_peaks,
 )
-from rrtik_ompl.motion.trajectory.messages import write_mcap
-from rrtik_ompl.motion.trajectory.text import dumps, written_ending
+from rrtik_ompl.motion.trajectory.played import played_motion
+from rrtik_ompl.motion.trajectory.text import dumps, write_mcap, written_ending
 from rrtik_ompl.world.world import World
-
-if TYPE_CHECKING:
-    from rrtik_ompl.model.judgement import Played
 
 END_ERROR = 1e-6  # [s] before the end; a tick there is the end, for no drive takes two points at once
 FIT_TOLERANCE = 1e-8  # [rad] or [m]; between a knot and the end of the cubic that leads to it
-
-
-class State(NamedTuple):
-    """Where a motion is, shape (n,) each for one time, (k, n) for k times.
-
-    Attributes:
-        positions: [rad or m].
-        velocities: [rad/s or m/s].
-        accelerations: [rad/s^2 or m/s^2]; just after a jump.
-    """
-
-    positions: NDArray[np.float64]
-    velocities: NDArray[np.float64]
-    accelerations: NDArray[np.float64]
-
-
-class Peaks(NamedTuple):
-    """Largest absolute velocity, acceleration and jerk of each joint, shape (n,); inf is a jump of acceleration."""
-
-    velocity: Vector
-    acceleration: Vector
-    jerk: Vector
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -118,7 +92,7 @@ class Trajectory:
             bends = hermite_accelerations(clock, rows, rates)
         else:
             bends = finite_array(accelerations, rows.shape, "trajectory accelerations")
-            end_errors = np.abs(ends_of(clock, rows, rates, bends) - rows[1:])
+            end_errors = np.abs(Cubics(clock, rows, rates, bends).ends - rows[1:])
             if end_errors.max() > FIT_TOLERANCE * max(1.0, np.abs(rates).max()):
                 point = int(end_errors.max(axis=1).argmax()) + 2
                 raise InputError(
@@ -137,6 +111,11 @@ class Trajectory:
         return f"Trajectory({len(self.joint_names)} joints, {len(self.times)} knots, {self.duration:.3g} s)"
 
     @property
+    def cubics(self) -> Cubics:
+        """The motion as numbers alone, for what computes with it."""
+        return Cubics(self.times, self.positions, self.velocities, self.accelerations)
+
+    @property
     def duration(self) -> float:
         """Time from the first to the last knot [s]."""
         return float(self.times[-1])
@@ -151,33 +130,21 @@ class Trajectory:
         """
         many = getattr(t, "ndim", int(np.iterable(t))) > 0
         wanted = finite_array(t, (None,) if many else (), "time of a trajectory")
-        clock = np.clip(np.atleast_1d(wanted), 0.0, self.duration)
-
-        piece = np.clip(np.searchsorted(self.times, clock, side="right") - 1, 0, len(self.times) - 2)
-        x = (clock - self.times[piece])[:, None]
-        q, v, a = (rows[piece] for rows in (self.positions, self.velocities, self.accelerations))
-        j = jerks_of(self.times, self.velocities, self.accelerations, piece)
-        values = [q + x * (v + x * (a / 2.0 + x * j / 6.0)), v + x * (a + x * j / 2.0), a + x * j]
-
-        values[0][clock == self.duration] = self.positions[-1]  # to the bit
-        outside = np.atleast_1d(wanted) != clock
-        values[1][outside] = values[2][outside] = 0.0
-        return State(*values) if many else State(*(rows[0] for rows in values))
+        states = self.cubics.states(np.atleast_1d(wanted))
+        return states if many else State(*(rows[0] for rows in states))
 
     @property
     def jerks(self) -> Matrix:
         """Jerk of each piece [rad/s^3 or m/s^3], shape (m - 1, n)."""
-        return jerks_of(self.times, self.velocities, self.accelerations)
+        return self.cubics.jerks
 
     def peaks(self) -> Peaks:
         """The largest velocity, acceleration and jerk of each joint: exact, not sampled, for every piece is a cubic.
 
         With ``set_points``: at these, the jerk by their differences.
         """
-        if self.set_points is None:
-            return Peaks(*cubic_peaks(self.times, self.velocities, self.accelerations))
-        at = self.set_points
-        return Peaks(*set_point_peaks(self.times[at], self.velocities[at], self.accelerations[at]))
+        cubics = self.cubics
+        return cubics.peaks() if self.set_points is None else cubics.at_knots(self.set_points).set_point_peaks()
 
     def slowed(self, factor: float) -> Trajectory:
         """The same motion, ``factor`` times as long.
@@ -190,7 +157,10 @@ class Trajectory:
             raise InputError(f"factor of a trajectory: expected 1e-6 to 1e6, got {k:g}")
 
         rates = (self.velocities / k, self.accelerations / k**2)
-        slow = Trajectory(self.times * k, self.positions, *rates, **self._names())
+        slow = Trajectory(
+            self.times * k, self.positions, *rates,
+            joint_names=self.joint_names, prismatic=self.prismatic, robot_name=self.robot_name,
+        )  # fmt: skip
         return slow if self.set_points is None else slow.at_set_points(self.set_points)
 
     def at_set_points(self, knots: NDArray[np.int64]) -> Trajectory:
@@ -215,7 +185,7 @@ class Trajectory:
         """
         require(world, World, "world of a trajectory's check")
         require_joints(world.robot, self.joint_names, "trajectory")
-        return tuple(f"after {moment:.3f} s: {reason}" for moment, reason in faults_of(self, world))
+        return tuple(f"after {moment:.3f} s: {reason}" for moment, reason in faults_of(self.cubics, world))
 
     def prove(self, world: World, *, clearance: float | None = None) -> Proof:
         """Prove the motion itself free, at every time, not the path it was made from.
@@ -237,8 +207,8 @@ class Trajectory:
         """
         require(world, World, "world of a trajectory's proof")
         require_joints(world.robot, self.joint_names, "trajectory")
-        kept_clearance = world.settings.kept if clearance is None else not_negative(clearance, "clearance")
-        return proof_of_pieces(self, world, kept_clearance, 0, len(self.times) - 1)
+        kept_clearance = None if clearance is None else not_negative(clearance, "clearance")
+        return proof_of_motion(self.cubics, world, kept_clearance)
 
     def played(self, world: World | None) -> Played:
         """The motion as a picture plays it, and what is said of it there: by :meth:`prove` and :meth:`faults`.
@@ -249,18 +219,15 @@ class Trajectory:
         Raises:
             InputError: If it moves other joints than the world's robot, or these in another order.
         """
-        from rrtik_ompl.motion.trajectory.played import played_motion
-
         require(world, World | None, "world of a trajectory to play")
         if world is not None:
             require_joints(world.robot, self.joint_names, "trajectory")
-        return played_motion(self, world)
+        return played_motion(self.cubics, world)
 
     def jumps(self) -> Matrix:
         """How much the acceleration jumps at each knot, shape (m, n): from rest at the first, to rest at the last."""
         a = self.accelerations
-        ends = a[:-1] + np.diff(self.times)[:, None] * self.jerks
-        before = np.vstack([np.zeros_like(a[:1]), ends])
+        before = np.vstack([np.zeros_like(a[:1]), self.cubics.last_accelerations])
         after = np.vstack([a[:-1], np.zeros_like(a[:1])])
         jump_sizes: Matrix = np.abs(after - before)
         return jump_sizes
@@ -308,6 +275,3 @@ class Trajectory:
         if not accelerations and ending != ".csv":
             columns.pop()
         write_text(file, dumps(self.robot_name, self.joint_names, joint_units(self.prismatic), columns, ending))
-
-    def _names(self) -> dict[str, Any]:
-        return {"joint_names": self.joint_names, "prismatic": self.prismatic, "robot_name": self.robot_name}

@@ -4,20 +4,17 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Vector, frozen
 from rrtik_ompl.model.judgement import ClearanceCurve, Judged, PathContact, Played, Verdict
-from rrtik_ompl.motion.trajectory.checks import faults_of, greatest_speeds
+from rrtik_ompl.motion.trajectory.checks import faults_of, greatest_speeds, proof_of_motion
+from rrtik_ompl.motion.trajectory.cubics import Cubics
 from rrtik_ompl.world.clearance_curve import PLACES, Course
 from rrtik_ompl.world.played import Fault, judged_course, with_reason
 from rrtik_ompl.world.world import World
-
-if TYPE_CHECKING:
-    from rrtik_ompl.motion.trajectory.motion import Trajectory
 
 MOST_KNOTS = 900  # of a timed motion, that are all looked at
 FRAME_RATE = 30.0  # [1/s] of a timed motion
@@ -25,17 +22,17 @@ MOST_FRAMES = 900  # beside what is looked at
 TIME_DIGITS = 9  # of a page's times [s]
 
 
-def played_motion(motion: Trajectory, world: World | None) -> Played:
+def played_motion(motion: Cubics, world: World | None) -> Played:
     """A timed motion as it is played in a world; see :meth:`Trajectory.played`."""
     if world is None:
         clock = _frames_of(motion, np.empty(0))
         judged = None
     else:
         clock, judged = _judged_motion(motion, world)
-    return Played(frozen(motion(clock).positions), clock, judged)
+    return Played(frozen(motion.states(clock).positions), clock, judged)
 
 
-def _judged_motion(motion: Trajectory, world: World) -> tuple[Vector, Judged]:
+def _judged_motion(motion: Cubics, world: World) -> tuple[Vector, Judged]:
     """Times at which a timed motion is drawn [s], shape (k,), and the verdict on it, by the moves between these.
 
     Everything that is looked at is drawn too: a motion of some tenths of a second is not lost between two pictures.
@@ -64,7 +61,7 @@ def _judged_motion(motion: Trajectory, world: World) -> tuple[Vector, Judged]:
     return clock, Judged(verdict, curve, contacts)
 
 
-def _course_of(world: World, motion: Trajectory) -> Course:
+def _course_of(world: World, motion: Cubics) -> Course:
     """A timed motion as a course: its places are spread over how far the arm moves, and at its knots."""
     h = np.diff(motion.times)
     speed = greatest_speeds(motion)
@@ -75,12 +72,12 @@ def _course_of(world: World, motion: Trajectory) -> Course:
         clock = np.unique(np.append(clock, motion.times))
     return Course(
         *_places_at(motion.times, clock),
-        at=lambda pieces, shares: motion(_clock(motion, pieces, shares)).positions,
-        prove=lambda clearance: motion.prove(world, clearance=clearance),
+        at=lambda pieces, shares: motion.states(_clock(motion, pieces, shares)).positions,
+        prove=lambda clearance: proof_of_motion(motion, world, clearance),
     )
 
 
-def _faults_of_motion(world: World, motion: Trajectory) -> list[Fault]:
+def _faults_of_motion(world: World, motion: Cubics) -> list[Fault]:
     """The first fault of each piece of a timed motion."""
     faults = faults_of(motion, world)
     pieces, shares = _places_at(motion.times, np.array([moment for moment, _ in faults]))
@@ -93,18 +90,18 @@ def _places_at(times: Vector, clock: Vector) -> tuple[NDArray[np.int64], Vector]
     return pieces, np.clip((clock - times[pieces]) / np.diff(times)[pieces], 0.0, 1.0)
 
 
-def _clock(motion: Trajectory, pieces: NDArray[np.int64], shares: Vector) -> Vector:
+def _clock(motion: Cubics, pieces: NDArray[np.int64], shares: Vector) -> Vector:
     """Times of places on pieces [s]."""
     return np.asarray(motion.times[pieces] + shares * np.diff(motion.times)[pieces])
 
 
-def _times(motion: Trajectory, at: Vector) -> Vector:
+def _times(motion: Cubics, at: Vector) -> Vector:
     """Times of places that are written as the number of a piece plus the share of it [s]."""
     pieces = np.clip(at.astype(np.int64), 0, len(motion.times) - 2)
     return _clock(motion, pieces, at - pieces)
 
 
-def _frames_of(motion: Trajectory, more: Vector) -> Vector:
+def _frames_of(motion: Cubics, more: Vector) -> Vector:
     """Times at which a motion is drawn [s], shape (k,): at an even rate, at its knots, and at some more."""
     count = int(np.clip(np.ceil(FRAME_RATE * motion.duration), 2, MOST_FRAMES))
     knots = motion.times if len(motion.times) <= MOST_KNOTS else motion.times[[0, -1]]
@@ -112,7 +109,7 @@ def _frames_of(motion: Trajectory, more: Vector) -> Vector:
     return frozen(np.unique(np.round(clock, TIME_DIGITS)))  # the page rounds them, and no two may be the same
 
 
-def _drawn_moves(motion: Trajectory, pieces: tuple[int, ...], clock: Vector) -> tuple[int, ...]:
+def _drawn_moves(motion: Cubics, pieces: tuple[int, ...], clock: Vector) -> tuple[int, ...]:
     """Numbers of the moves between drawn times that lie on some pieces, at least in part."""
     first = np.searchsorted(clock, motion.times[list(pieces)] + 10.0**-TIME_DIGITS, side="right") - 1
     end = np.searchsorted(clock, motion.times[[k + 1 for k in pieces]] - 10.0**-TIME_DIGITS, side="left")
@@ -120,13 +117,13 @@ def _drawn_moves(motion: Trajectory, pieces: tuple[int, ...], clock: Vector) -> 
     return tuple(sorted(k for k in moves if k < len(clock) - 1))
 
 
-def _on_frames(motion: Trajectory, curve: ClearanceCurve, clock: Vector, unproven: tuple[int, ...]) -> ClearanceCurve:
+def _on_frames(motion: Cubics, curve: ClearanceCurve, clock: Vector, unproven: tuple[int, ...]) -> ClearanceCurve:
     """A curve by pieces as one by the moves between drawn times."""
     moves, shares = _places_at(clock, _clock(motion, curve.motions, curve.shares))
     return replace(curve, motions=moves, shares=frozen(shares), unproven=unproven)
 
 
-def _contact_on_frames(motion: Trajectory, contact: PathContact, clock: Vector) -> PathContact:
+def _contact_on_frames(motion: Cubics, contact: PathContact, clock: Vector) -> PathContact:
     ends = _places_at(clock, _times(motion, np.array([contact.begin, contact.end])))
     begin, end = (ends[0] + ends[1]).tolist()
     return replace(contact, begin=begin, end=end)

@@ -105,8 +105,8 @@ def switches(motion: Trajectory) -> Vector:
     if motion.set_points is not None:
         both = motion.accelerations[motion.set_points]
     else:
-        ends = motion.accelerations[:-1] + np.diff(motion.times)[:, None] * motion.jerks
-        both = np.stack([motion.accelerations[:-1], ends], axis=1).reshape(-1, ends.shape[1])
+        both = np.stack([motion.accelerations[:-1], motion.cubics.last_accelerations], axis=1)
+        both = both.reshape(-1, len(motion.joint_names))
 
     loud = np.abs(both) > QUIET_SHARE * np.abs(both).max(axis=0)
     return np.array(

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass
 
 import numpy as np
 
 from rrtik_ompl.base.arrays import Matrix, not_negative, positive, whole_number
+from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.choices import TickEvent
 from rrtik_ompl.base.copies import in_one_line
 from rrtik_ompl.base.errors import at_most, require
@@ -134,22 +134,21 @@ def plan_in_time(
         margin=not_negative(margin, "margin"),
         clearance=max(wanted_clearance, (settings.proving or 0.0) - settings.clearance),
         limits=limits,
-        seed=whole_number(seed, "seed"),
+        budget=Budget(
+            whole_number(seed, "seed"), positive(seconds, "seconds"), whole_number(iterations, "iterations", least=1)
+        ),
     )
     at_most(options.horizon / options.slot, MOST_SLOTS, "slots of time", "lower horizon or rate")
-    max_iterations = whole_number(iterations, "iterations", least=1)
-    time_limit = positive(seconds, "seconds")
 
-    begin = time.perf_counter()
     search, reaches_base = _search(problem, options)
     reason = _why_impossible(search, options, reaches_base)
-    end = time.perf_counter() + time_limit  # kernels may have been compiled and goals been looked for until now
-    rows = None if reason else search.run(max_iterations, lambda: time.perf_counter() > end)
+    # kernels may have been compiled and goals been looked for until now
+    rows = None if reason else search.run(options.budget.begun_now())
     if rows is None and not reason:
         reason = _why_not_found(search, reaches_base)
 
     run = None if rows is None else _record(problem, search, rows, options)
-    return TimedPlan(run, reason, options.slot * search.least_slots, search.iterations, time.perf_counter() - begin)
+    return TimedPlan(run, reason, options.slot * search.least_slots, search.iterations, options.budget.elapsed)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -162,14 +161,14 @@ class _Options:
     margin: float
     clearance: float
     limits: RateLimits | None
-    seed: int
+    budget: Budget
 
 
 def _search(problem: Problem, options: _Options) -> tuple[TimeSearch, str]:
     """The search of a problem, and a line that says when an obstacle reaches the base before the horizon, or ""."""
     robot = problem.robot
     scene = problem.world.scene
-    rng = np.random.default_rng(options.seed)
+    rng = np.random.default_rng(options.budget.seed)
 
     if options.limits is not None:
         require(options.limits, RateLimits, "limits", "use RateLimits(velocity, acceleration)")
@@ -218,7 +217,7 @@ def _record(problem: Problem, search: TimeSearch, rows: Matrix, options: _Option
     step = min(search.pace.step, float(np.linalg.norm(search.pace.change)))
 
     run = ReplanRun(
-        problem.name, robot.name, robot.joint_names, NAME, options.seed, step, 1.0 / slot, options.margin, None,
+        problem.name, robot.name, robot.joint_names, NAME, options.budget.seed, step, 1.0 / slot, options.margin, None,
         clearance=options.clearance,
     )  # fmt: skip
 

@@ -19,7 +19,7 @@ from rrtik_ompl.base.budget import Stop
 from rrtik_ompl.geometry.collision.bodies import Body
 from rrtik_ompl.geometry.collision.certificate import distance
 from rrtik_ompl.geometry.collision.shape_table import farthest
-from rrtik_ompl.model.scene import ConstantVelocity, Obstacle, Scene
+from rrtik_ompl.model.scene import ConstantVelocity, Obstacle, Scene, pose_at
 from rrtik_ompl.replanning.travels import travel_bound, turns_without_end
 from rrtik_ompl.world.moving_world import MovingWorld
 from rrtik_ompl.world.world import World
@@ -96,7 +96,7 @@ class ForeseenWorlds:
         """When an obstacle first touches a body at rest, None if it is proven apart from it from begin to end [s]."""
         middle = 0.5 * (begin + end)
         reach = travel(obstacle, begin, end, self._radii[obstacle.name])
-        pose = _pose_at(obstacle, middle) * obstacle_body.within
+        pose = pose_at(obstacle, middle) * obstacle_body.within
         rest = base_part.placement.homogeneous
         if distance(base_part.geometry, rest, obstacle_body.geometry, pose.homogeneous, reach) is not None:
             return None
@@ -111,7 +111,7 @@ class ForeseenWorlds:
     def scene_at(self, time: float) -> Scene:
         """Where obstacles are at a time [s]."""
         scene = self._world.scene
-        return replace(scene, obstacles=tuple(replace(o, pose=_pose_at(o, time)) for o in scene.obstacles))
+        return replace(scene, obstacles=tuple(replace(o, pose=pose_at(o, time)) for o in scene.obstacles))
 
     def _world_in_slot(self, slot: int) -> MovingWorld:
         """The world in a slot; where all is at rest one world serves every slot."""
@@ -142,11 +142,6 @@ class ForeseenWorlds:
         if len(self._worlds) < MOST_WORLDS:
             return MovingWorld(self._world)
         return self._worlds.pop(list(self._worlds)[int(self._rng.integers(len(self._worlds)))])
-
-
-def _pose_at(obstacle: Obstacle, time: float) -> pin.SE3:
-    """Where an obstacle is at a time [s]."""
-    return obstacle.pose if obstacle.motion is None else obstacle.motion.pose_at(obstacle.pose, time)
 
 
 def travel(obstacle: Obstacle, begin: float, end: float, radius: float) -> float:

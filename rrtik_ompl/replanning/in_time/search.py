@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Matrix, Vector
-from rrtik_ompl.base.budget import Stop
+from rrtik_ompl.base.budget import Budget, Stop, no_stop
 from rrtik_ompl.replanning.in_time.foreseen import ForeseenWorlds
 
 PIECE = 8  # slots of one extension
@@ -77,6 +77,7 @@ class TimeSearch:
         self._least_slots_of_goals: NDArray[np.int64] = np.maximum(pace.whole_slots(ends.goals - ends.start), 1)
         self.least_slots = int(self._least_slots_of_goals.min())
         self.iterations = 0
+        self._over: Stop = no_stop  # whether the budget of the run is used up
         self._begin_anew(None)
 
     @property
@@ -93,18 +94,20 @@ class TimeSearch:
         first_last_slot = int(np.ceil(FIRST_SHARE * self.least_slots)) + PIECE
         self._last = min(self.ends.last, first_last_slot) if earlier is None else earlier
 
-    def run(self, iterations: int, stop: Stop) -> Matrix | None:
+    def run(self, budget: Budget) -> Matrix | None:
         """The earliest arrival that is found: a configuration for each slot, shape (k, n); None if there is none."""
+        self._over = budget.over
+        most_iterations = np.inf if budget.iterations is None else budget.iterations
         best: Matrix | None = None
         fruitless = 0  # rounds without an earlier way
         iterations_of_round = 0
 
-        while self.iterations < iterations and not (stop() or self._is_done(best, fruitless)):
+        while self.iterations < most_iterations and not (self._over() or self._is_done(best, fruitless)):
             self.iterations += 1
             iterations_of_round += 1
             patience = PUT_OFF if self._must_be_earlier else PATIENCE
-            rows = self._iterate(stop)
-            rows = None if rows is None else self._improved(rows, stop)
+            rows = self._iterate()
+            rows = None if rows is None else self._improved(rows)
 
             if rows is not None and (best is None or len(rows) < len(best)):
                 best = rows
@@ -124,12 +127,12 @@ class TimeSearch:
         """Whether no earlier arrival is possible, or none to be hoped for."""
         return best is not None and (fruitless >= ROUNDS or len(best) - 1 <= self.least_slots)
 
-    def _iterate(self, stop: Stop) -> Matrix | None:
+    def _iterate(self) -> Matrix | None:
         """A further arrival, an extension of one tree and a connection to the other; the way if they meet."""
         self._add_arrival()
         grown, other = self._trees[:: 1 if self.iterations % 2 else -1]
 
-        new_vertex = self._extend(grown, stop) if grown.size else None
+        new_vertex = self._extend(grown) if grown.size else None
         if new_vertex is None:
             return None
 
@@ -138,7 +141,7 @@ class TimeSearch:
             return None
 
         target = grown.q[new_vertex], int(grown.slot[new_vertex])
-        end = self._grow(other, nearest_vertex, target, self.ends.last, stop)
+        end = self._grow(other, nearest_vertex, target, self.ends.last)
         if end is None or not end[1]:
             return None
 
@@ -158,13 +161,13 @@ class TimeSearch:
             self._trees[1].add(q, slot, -1)
         self._arrivals_tried.add((goal, slot))
 
-    def _extend(self, tree: TimeTree, stop: Stop) -> int | None:
+    def _extend(self, tree: TimeTree) -> int | None:
         """Towards a sample, or standing still; the new vertex."""
         aim = self._standing(tree) if self._rng.random() < STANDING else self._sample(tree)
         if aim is None:
             return None
         vertex, to = aim
-        end = self._grow(tree, vertex, to, PIECE, stop)
+        end = self._grow(tree, vertex, to, PIECE)
         return None if end is None else end[0]
 
     def _standing(self, tree: TimeTree) -> Aim | None:
@@ -187,9 +190,7 @@ class TimeSearch:
         nearest_vertex = tree.nearest(q, slot)
         return None if nearest_vertex is None else (nearest_vertex, (q, slot))
 
-    def _grow(
-        self, tree: TimeTree, vertex: int, to: tuple[Vector, int], max_slots: int, stop: Stop
-    ) -> tuple[int, bool] | None:
+    def _grow(self, tree: TimeTree, vertex: int, to: tuple[Vector, int], max_slots: int) -> tuple[int, bool] | None:
         """A vertex as far towards a configuration in a slot as is free, at most so many slots.
 
         Returns:
@@ -197,7 +198,7 @@ class TimeSearch:
         """
         rows, complete = tree.rows_towards(vertex, *to, max_slots)
         begin = int(tree.slot[vertex])
-        steps_free = self.worlds.steps_free(begin if tree.onward > 0 else begin - 1, rows, tree.onward, stop)
+        steps_free = self.worlds.steps_free(begin if tree.onward > 0 else begin - 1, rows, tree.onward, self._over)
         if steps_free == 0:
             return None
         new_vertex = tree.add(rows[steps_free], begin + tree.onward * steps_free, vertex)
@@ -211,24 +212,24 @@ class TimeSearch:
         slots = np.concatenate([before, after[::-1][1:]])
         return each_slot(rows, slots)
 
-    def _improved(self, rows: Matrix, stop: Stop) -> Matrix:
+    def _improved(self, rows: Matrix) -> Matrix:
         """With less motion and earlier, in turn, as long as it arrives earlier."""
         while True:
-            rows = self._shortened(rows, stop)
-            earlier = hurried(rows, self.pace, self.worlds, len(rows) - 2, stop)
+            rows = self._shortened(rows)
+            earlier = hurried(rows, self.pace, self.worlds, len(rows) - 2, self._over)
             if earlier is None:
                 return rows
             rows = earlier
 
-    def _shortened(self, rows: Matrix, stop: Stop) -> Matrix:
+    def _shortened(self, rows: Matrix) -> Matrix:
         """The same arrival with less motion: straight pieces in the place of random ones."""
         for _ in range(CUTS):
-            if len(rows) < 3 or stop():
+            if len(rows) < 3 or self._over():
                 break
             a, b = sorted(self._rng.choice(len(rows), 2, replace=False).tolist())
             straight = each_slot(rows[[a, b]], np.array([0, b - a]))
             shorter = _length(straight) < _length(rows[a : b + 1]) - 1e-9
-            if shorter and self.worlds.steps_free(a, straight, 1, stop) == b - a:
+            if shorter and self.worlds.steps_free(a, straight, 1, self._over) == b - a:
                 rows = np.vstack([rows[:a], straight, rows[b + 1 :]])
 
         return rows

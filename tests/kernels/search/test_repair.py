@@ -12,7 +12,7 @@ from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.kernels.search.repair import PathRepair
 from rrtik_ompl.model.scene import Obstacle, Scene
 from rrtik_ompl.model.shapes import Box, Sphere
-from rrtik_ompl.replanning.connecting import PythonConnect
+from rrtik_ompl.replanning.connecting import PythonConnect, TreeOptions
 from rrtik_ompl.replanning.drrt_con import DrrtCon, KernelDrrtCon
 from rrtik_ompl.world.moving_world import MovingWorld
 from rrtik_ompl.world.world import World
@@ -57,8 +57,8 @@ def test_a_look_finds_what_python_finds_and_asks_for_as_many_configurations(name
     answers = []
     for _ in range(20):
         path = 0.4 * rng.uniform(low, high, (3, robot.dof))
-        plain = DrrtCon(PythonConnect(low, high, 1.0, 0), 1.0)
-        kernel = KernelDrrtCon(world, low, high, 1.0, 0)
+        plain = DrrtCon(PythonConnect(TreeOptions(low, high, 1.0, 0)), 1.0)
+        kernel = KernelDrrtCon(world, TreeOptions(low, high, 1.0, 0))
         plain.path = kernel.path = path
         before = world.checked
         answers.append(plain.check_path(world))
@@ -157,4 +157,4 @@ def test_a_world_without_kernels_is_refused(monkeypatch):
     world = plane(1.0)
     monkeypatch.setattr(MovingWorld, "fast", None)
     with pytest.raises(InputError, match="install numba"):
-        KernelDrrtCon(world, LOW, HIGH, 1.0, 0)
+        KernelDrrtCon(world, TreeOptions(LOW, HIGH, 1.0, 0))

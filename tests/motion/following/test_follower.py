@@ -8,8 +8,7 @@ from hypothesis import strategies as st
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.model.path import JointPath
-from rrtik_ompl.motion.following.follower import Follower
-from rrtik_ompl.motion.following.links import SimulatedLink
+from rrtik_ompl.motion.following.follower import Follower, SimulatedLink
 from rrtik_ompl.motion.trajectory import RateLimits, Trajectory, time_parameterize
 from rrtik_ompl.pilot.devices.arm import SimulatedArm
 from rrtik_ompl.pilot.devices.line_arm import ArmLink, LineArm, LineServer

@@ -17,8 +17,7 @@ from rrtik_ompl.motion.trajectory.blending import blended, stopped
 from rrtik_ompl.motion.trajectory.corners import COINCIDENCE, first_radii, vertices
 from rrtik_ompl.motion.trajectory.curve import Curve
 from rrtik_ompl.motion.trajectory.fastest import Bounds, fastest
-from rrtik_ompl.motion.trajectory.line import along_lines
-from rrtik_ompl.motion.trajectory.runs import PERIOD, along_curve
+from rrtik_ompl.motion.trajectory.runs import PERIOD, along_curve, along_lines
 from rrtik_ompl.world.world import World
 
 PANDA = RateLimits(
