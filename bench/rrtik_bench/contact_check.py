@@ -11,13 +11,14 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.base.errors import InputError
-from rrtik_ompl.geometry.collision.bodies import Body, link_bodies, scene_bodies
+from rrtik_ompl.geometry.collision.bodies import Body
 from rrtik_ompl.geometry.collision.cloud_solid import cloud_gap, has_cloud, nearest_of_cloud
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import Scene, pose_at
 from rrtik_ompl.model.shapes import same_shape
 from rrtik_ompl.replanning.feed import Feed
 from rrtik_ompl.replanning.record import ReplanRun
+from rrtik_ompl.world.arrangement import arranged
 
 SAMPLES_PER_TICK = 10
 MAX_DISTANCE = 0.05  # [m]; larger distances are not measured
@@ -92,34 +93,28 @@ def _gaps(
     robot: Robot, rows: Matrix, scene: Scene, obstacle_poses: dict[str, NDArray[np.float64]]
 ) -> tuple[NDArray[np.float64], list[tuple[str, str]]]:
     """Distances [m] of all pairs of an arm's body and an obstacle, shape (samples, pairs), and the pairs' names."""
-    bodies_of_scene = scene_bodies(robot, scene)
-    arm = [*link_bodies(robot), *(body for body in bodies_of_scene if body.kind == "attached")]
-    allowed = {frozenset(pair) for pair in scene.allowed_collisions}
-    obstacle_bodies = [body for body in bodies_of_scene if body.kind == "obstacle"]
-    pairs = [
-        (link, obstacle)
-        for link in arm
-        for obstacle in obstacle_bodies
-        if frozenset((link.name, obstacle.name)) not in allowed and link.joint > 0
+    solids = arranged(robot, scene, 0.0)
+    bodies = solids.bodies.whole
+    frames = robot.joint_frames(rows)
+    body_poses = [
+        obstacle_poses[body.name] @ body.within.homogeneous
+        if body.kind == "obstacle"
+        else frames[:, body.joint] @ body.placement.homogeneous
+        for body in bodies
     ]
 
-    frames = robot.joint_frames(rows)
-    arm_poses = {id(link): frames[:, link.joint] @ link.placement.homogeneous for link in arm}
-    from_world = {obstacle.name: obstacle.pose.inverse() for obstacle in scene.obstacles}
-    body_poses = {  # of each piece of an obstacle
-        id(obstacle): obstacle_poses[obstacle.name] @ (from_world[obstacle.name] * obstacle.placement).homogeneous
-        for obstacle in obstacle_bodies
-    }
+    both = (sorted(pair, key=lambda number: bodies[number].kind == "obstacle") for pair in solids.moving)
+    pairs = sorted((arm, other) for arm, other in both if bodies[other].kind == "obstacle")
 
     gaps = np.full((len(rows), len(pairs)), np.inf)
-    for k, (link, obstacle) in enumerate(pairs):
-        arm_pose = arm_poses[id(link)]
-        body_pose = body_poses[id(obstacle)]
-        near_samples = np.flatnonzero(_sphere_distances(link, arm_pose, obstacle, body_pose) < MAX_DISTANCE)
-        for sample in near_samples:
-            gaps[sample, k] = _distance(link.geometry, arm_pose[sample], obstacle.geometry, body_pose[sample])
+    for k, (arm, other) in enumerate(pairs):
+        near = _sphere_distances(bodies[arm], body_poses[arm], bodies[other], body_poses[other]) < MAX_DISTANCE
+        for sample in np.flatnonzero(near):
+            gaps[sample, k] = _distance(
+                bodies[arm].geometry, body_poses[arm][sample], bodies[other].geometry, body_poses[other][sample]
+            )
 
-    return gaps, [(link.name, obstacle.name) for link, obstacle in pairs]
+    return gaps, [(bodies[arm].name, bodies[other].name) for arm, other in pairs]
 
 
 def _sphere_distances(

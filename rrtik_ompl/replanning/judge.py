@@ -19,17 +19,7 @@ from numpy.typing import NDArray
 from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.base.copies import as_value
 from rrtik_ompl.base.poses import pose
-from rrtik_ompl.geometry.collision.bodies import (
-    Body,
-    Pairs,
-    colliding_pairs,
-    contact_distance,
-    in_contact,
-    keeps_clearance,
-    kept_apart,
-    link_bodies,
-    scene_bodies,
-)
+from rrtik_ompl.geometry.collision.bodies import Body, contact_distance, keeps_clearance, kept_apart
 from rrtik_ompl.geometry.collision.certificate import distance
 from rrtik_ompl.geometry.collision.distances import is_ours, own_nearest
 from rrtik_ompl.geometry.collision.motion_bound import approach_weights
@@ -40,6 +30,7 @@ from rrtik_ompl.model.shapes import same_shape
 from rrtik_ompl.replanning.feed import Feed, Snapshot
 from rrtik_ompl.replanning.tick import Tick
 from rrtik_ompl.replanning.travels import travel_bound
+from rrtik_ompl.world.arrangement import arranged
 from rrtik_ompl.world.problem import Problem
 
 FINEST = 2e-5  # [m]: of the motion of a pair, below which its middle stands for it
@@ -230,19 +221,16 @@ class _PeriodJudge:
         self._ticks = ticks
         self._period = period
 
-        scene = period.scene
-        bodies = (*link_bodies(robot, self_margin), *scene_bodies(robot, scene, self_margin))
-        self._bodies = in_contact(robot, scene, bodies)
-        self._pairs: Pairs = colliding_pairs(robot, scene, self._bodies)
+        solids = arranged(robot, period.scene, self_margin)
+        self._bodies = solids.bodies.whole
+        self._pairs = solids.pairs
         self._approach_weights = approach_weights(robot, self._bodies, self._pairs)
         self._pair_indices: NDArray[np.int64] = np.array(self._pairs, dtype=np.int64).reshape(-1, 2)
 
-        self._obstacles = {o.name: o for o in scene.obstacles}
-        from_world = {name: o.pose.inverse() for name, o in self._obstacles.items()}
+        self._obstacles = {o.name: o for o in period.scene.obstacles}
         # Where each solid is in the frame of its joint, or in that of its obstacle.
         self._local_poses = [
-            (from_world[body.name] * body.placement if body.kind == "obstacle" else body.placement).homogeneous
-            for body in self._bodies
+            (body.within if body.kind == "obstacle" else body.placement).homogeneous for body in self._bodies
         ]
 
         self._obstacle_names = list(self._obstacles)
