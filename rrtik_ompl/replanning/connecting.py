@@ -23,8 +23,8 @@ from rrtik_ompl.world.motion_queries import KernelWorld, MotionFree, MotionQueri
 
 KERNELS = (CONNECT_KERNELS, CUT_KERNELS)  # libraries that replanning in kernels needs
 ITERATIONS = 4000  # samples of one search at most, so that the same seed gives the same run
-CUTS = 100  # tries of random shortcuts
-PATIENCE = 40  # of them without gain, after which it ends
+SHORTCUT_TRIES = 100  # tries of random shortcuts
+SHORTCUT_PATIENCE = 40  # of them without gain, after which it ends
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,7 +51,7 @@ class TreeOptions:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Joined:
+class Connection:
     """Two pieces of a path and the connection between them.
 
     Attributes:
@@ -75,7 +75,7 @@ class Connect(Protocol):
 
     def __call__(
         self, first: Matrix, second: Matrix, motions: MotionQueries, stop: Stop, *, chain: bool = True
-    ) -> Joined | None:
+    ) -> Connection | None:
         """The whole path from ``first[0]`` by a connection from one piece to the other, or None.
 
         Args:
@@ -98,12 +98,12 @@ class KernelConnect:
 
     def __call__(
         self, first: Matrix, second: Matrix, motions: MotionQueries, stop: Stop, *, chain: bool = True
-    ) -> Joined | None:
+    ) -> Connection | None:
         """See :class:`Connect`; conservative: what the kernel cannot prove counts as blocked."""
         seed = int(self._rng.integers(2**63))
         bridge = self._search.solve(first, second, seed, stop=stop, max_iterations=self._iterations)
         self.samples += int(self._search.statistics()["iterations"])
-        return None if bridge is None else joined(first, bridge, second, chain=chain)
+        return None if bridge is None else connected(first, bridge, second, chain=chain)
 
 
 class PythonConnect:
@@ -121,13 +121,13 @@ class PythonConnect:
 
     def __call__(
         self, first: Matrix, second: Matrix, motions: MotionQueries, stop: Stop, *, chain: bool = True
-    ) -> Joined | None:
+    ) -> Connection | None:
         """See :class:`Connect`."""
         search = RrtConnect(first, second, self._rules, one_by_one(motions), self._rng)
         bridge = search.run(stop)
         self.trees = search.trees
         self.samples += search.iterations
-        return None if bridge is None else joined(first, bridge, second, chain=chain)
+        return None if bridge is None else connected(first, bridge, second, chain=chain)
 
 
 class KernelCuts:
@@ -142,7 +142,7 @@ class KernelCuts:
         if len(route) < 3:
             return route
         search = ShortcutSearch(self._world.motions, route, seed=int(self._rng.integers(2**62)), asking=False)
-        search.run(CUTS, patience=PATIENCE)
+        search.run(SHORTCUT_TRIES, patience=SHORTCUT_PATIENCE)
         return search.waypoints
 
 
@@ -151,10 +151,10 @@ def one_by_one(motions: MotionQueries) -> MotionFree:
     return lambda a, b: bool(motions.motion_valid_batch(a[None], b[None])[0])
 
 
-def joined(first: Matrix, bridge: Matrix, second: Matrix, *, chain: bool) -> Joined:
+def connected(first: Matrix, bridge: Matrix, second: Matrix, *, chain: bool) -> Connection:
     """A piece up to the begin of a bridge, the bridge, and the other piece from its end on; no row twice running."""
     begin = int(np.flatnonzero((first == bridge[0]).all(axis=1))[0])
     end = int(np.flatnonzero((second == bridge[-1]).all(axis=1))[-1])
     bridge = without_repeats(bridge)
     path = np.vstack([first[:begin], bridge, second[end + 1 :] if chain else second[:0]])
-    return Joined(path, begin, begin + len(bridge) - 1)
+    return Connection(path, begin, begin + len(bridge) - 1)

@@ -21,10 +21,10 @@ from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.kernels.search.repair import PathRepair
 from rrtik_ompl.model.transitions import part_counts, subdivided, without_repeats
 from rrtik_ompl.replanning.connecting import (
-    CUTS,
-    PATIENCE,
+    SHORTCUT_PATIENCE,
+    SHORTCUT_TRIES,
     Connect,
-    Joined,
+    Connection,
     KernelConnect,
     KernelCuts,
     PythonConnect,
@@ -35,6 +35,8 @@ from rrtik_ompl.world.moving_world import MovingWorld
 
 MAX_CUTS = 24  # shortcut ends that are tried from one point of a path
 STRAIGHT_TOLERANCE = 1e-9  # change of the unit direction
+REPAIR_TRIES = 16  # of random shortcuts, where only a detour is new; walking shortens it further
+REPAIR_PATIENCE = 6  # of them without gain, after which it ends
 
 Post = Callable[[Matrix], Matrix]  # a free route, shape (k, n), made shorter
 
@@ -96,7 +98,7 @@ class DrrtCon:
 
         connection = self.connect(free_starts, free_goals, motions, stop, chain=False)
         if connection is not None:  # the other starts do not lead to the one where it begins
-            connection = Joined(connection.path[connection.begin :], 0, connection.end - connection.begin)
+            connection = Connection(connection.path[connection.begin :], 0, connection.end - connection.begin)
         return self._take_over(connection, motions)
 
     def check_path(self, motions: MotionQueries) -> bool:
@@ -152,7 +154,7 @@ class DrrtCon:
             self.path = rest if (rest[0] == place).all() else np.vstack([place, rest])
             self.free = False
 
-    def _reconnected(self, motions: MotionQueries, stop: Stop) -> Joined | None:
+    def _reconnected(self, motions: MotionQueries, stop: Stop) -> Connection | None:
         """Cut at the first hit seen from the robot and at the first one seen from the goal; join the two pieces."""
         blocked = np.flatnonzero(self._blocked_at_last_check)
         first = int(blocked[0])
@@ -160,7 +162,7 @@ class DrrtCon:
         points = self._points_at_last_check
         return self.connect(points[: first + 1], points[last + 1 :], motions, stop)
 
-    def _take_over(self, connection: Joined | None, motions: MotionQueries) -> bool:
+    def _take_over(self, connection: Connection | None, motions: MotionQueries) -> bool:
         """Make a new path the path, if there is one, what is new of it shortened; whether there is one."""
         self.free = connection is not None
         if connection is not None:
@@ -182,11 +184,8 @@ class FromScratch(DrrtCon):
     name: ClassVar[Replanner] = "rrt-connect"
     forgetting: ClassVar[bool] = True
 
-    def _reconnected(self, motions: MotionQueries, stop: Stop) -> Joined | None:
+    def _reconnected(self, motions: MotionQueries, stop: Stop) -> Connection | None:
         return self.connect(self._points_at_last_check[:1], self._points_at_last_check[-1:], motions, stop)
-
-
-REPAIR_CUTS, REPAIR_PATIENCE = 16, 6  # as CUTS and PATIENCE, where only a detour is new; walking shortens it further
 
 
 class KernelDrrtCon(DrrtCon):
@@ -211,7 +210,8 @@ class KernelDrrtCon(DrrtCon):
         self._forgetting = forgetting
         self._rng = np.random.default_rng([options.seed, 1])
         super().__init__(KernelConnect(world, options), options.max_edge, post=KernelCuts(world, options.seed))
-        tries, patience = (CUTS, PATIENCE) if forgetting else (REPAIR_CUTS, REPAIR_PATIENCE)
+        tries = SHORTCUT_TRIES if forgetting else REPAIR_TRIES
+        patience = SHORTCUT_PATIENCE if forgetting else REPAIR_PATIENCE
         self._kernels = PathRepair(
             world.motions, options.lower, options.upper, max_edge=options.max_edge, iterations=options.iterations,
             tries=tries, patience=patience,

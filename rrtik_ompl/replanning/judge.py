@@ -33,11 +33,11 @@ from rrtik_ompl.replanning.travels import travel_bound
 from rrtik_ompl.world.arrangement import arranged
 from rrtik_ompl.world.problem import Problem
 
-FINEST = 2e-5  # [m]: of the motion of a pair, below which its middle stands for it
-COARSEST = 2e-3  # [m]: the same where too little is kept there, of which the least is not sought any closer
-RELATIVE = 0.1  # of what is lacking: no closer either
+FINEST_APPROACH = 2e-5  # [m]: of the motion of a pair, below which its middle stands for it
+COARSEST_APPROACH = 2e-3  # [m]: the same where too little is kept there, of which the least is not sought any closer
+RELATIVE_ACCURACY = 0.1  # of what is lacking: no closer either
 ROUNDING = 2e-6  # [m]: of distances and of poses that are computed from times
-PARTS = 4  # of a tick, at whose ends a function of time is asked for the truth
+TRUTHS_PER_TICK = 4  # times in a tick at which a function of time is asked for the truth
 
 Frames: TypeAlias = NDArray[np.float64]
 
@@ -52,8 +52,8 @@ class RunViolation:
         event: Of the tick.
         first, second: Names of the two.
         distance: Between them [m]; below 0 how deep they overlap, as far as that is known of their shapes.
-        kept: What had to be kept [m]: 0 (below it for a contact that the scene names), or margins and clearance where
-            the move is called proven.
+        required_distance: What had to be kept [m]: 0 (below it for a contact that the scene names), or margins and
+            clearance where the move is called proven.
         proven: Whether the record calls the move proven.
     """
 
@@ -63,7 +63,7 @@ class RunViolation:
     first: str
     second: str
     distance: float
-    kept: float
+    required_distance: float
     proven: bool
 
     __reduce__ = as_value
@@ -79,7 +79,8 @@ class RunViolation:
         if self.touches:
             deep = f" by {-1e3 * self.distance:.3g} mm" if self.distance < 0.0 else ""
             return f"{where}: {pair} {'overlap' if deep else 'touch'}{deep}"
-        return f"{where}: {pair} are {1e3 * self.distance:.3g} mm apart, less than {1e3 * self.kept:.3g} mm"
+        required = f"{1e3 * self.required_distance:.3g} mm"
+        return f"{where}: {pair} are {1e3 * self.distance:.3g} mm apart, less than {required}"
 
 
 def run_violations(
@@ -109,10 +110,15 @@ def run_violations(
     for period in _periods(snapshots, ticks[-1].time):
         for violation in _PeriodJudge(problem.robot, ticks, period, self_margin, clearance).violations():
             key = violation.tick, violation.first, violation.second
-            if key not in worst or violation.distance - violation.kept < worst[key].distance - worst[key].kept:
+            if key not in worst or _lacking(violation) > _lacking(worst[key]):
                 worst[key] = violation
 
     return tuple(sorted(worst.values(), key=lambda violation: (violation.time, violation.first, violation.second)))
+
+
+def _lacking(violation: RunViolation) -> float:
+    """How much is lacking of the distance that had to be kept [m]."""
+    return violation.required_distance - violation.distance
 
 
 def _snapshots(
@@ -123,7 +129,8 @@ def _snapshots(
         return [Snapshot(0.0, truth.at(0.0), stated=True)]
     if truth is not None:
         times = [tick.time for tick in ticks]
-        instants = np.interp(np.arange(PARTS * (len(times) - 1) + 1) / PARTS, np.arange(len(times)), times)
+        numbers = np.arange(TRUTHS_PER_TICK * (len(times) - 1) + 1) / TRUTHS_PER_TICK
+        instants = np.interp(numbers, np.arange(len(times)), times)
         return [Snapshot(time, truth(time)) for time in instants.tolist()]
     if scenes:
         return scenes
@@ -314,7 +321,7 @@ class _PeriodJudge:
         """
         middle = 0.5 * (begin + end)
         sufficient = required  # to be kept in the middle, so that enough is kept in all of the part
-        if approach > FINEST:
+        if approach > FINEST_APPROACH:
             sufficient += 0.5 * approach
         solids = self._solids_of_pair(number, pair, middle)
         if distance(*solids, margin=_less_rounding(sufficient)) is not None:
@@ -324,10 +331,10 @@ class _PeriodJudge:
         lacking = middle_distance <= _less_rounding(required)
         if not lacking and required < 0.0:  # of solids that may overlap the depth may not be known
             lacking = distance(*solids, margin=_less_rounding(required)) is None
-        if approach <= FINEST and not lacking:
+        if approach <= FINEST_APPROACH and not lacking:
             return None
 
-        if lacking and approach <= max(COARSEST, RELATIVE * (required - middle_distance)):
+        if lacking and approach <= max(COARSEST_APPROACH, RELATIVE_ACCURACY * (required - middle_distance)):
             ends = [(time, _signed_distance(*self._solids_of_pair(number, pair, time))) for time in (begin, end)]
             return min((middle, middle_distance), *ends, key=lambda candidate: candidate[1])
 

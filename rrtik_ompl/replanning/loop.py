@@ -29,7 +29,7 @@ from rrtik_ompl.world.world import World
 
 Clock = Callable[[], float]
 
-TRIES = 3  # to find a path that is proven
+PROOF_TRIES = 3  # to find a path that is proven
 REACTION_TICKS = 6  # before a cloud is too near, at the speed at which it comes: then the arm evades it
 
 
@@ -267,7 +267,7 @@ class Loop:
         stop = self._budget_ends()
         new_path: Matrix | None = None
 
-        for _ in range(TRIES):
+        for _ in range(PROOF_TRIES):
             if not self._new_path(stop):
                 break
             new_path = planner.path

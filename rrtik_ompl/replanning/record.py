@@ -240,7 +240,7 @@ _HEADS += ("speed_bound", "outcome", "reason")
 
 def _contact(fault: RunViolation) -> PathContact:
     """A fault as what is drawn red in its tick."""
-    contact = Contact(fault.first, fault.second, fault.distance, NOWHERE, NOWHERE, fault.kept)
+    contact = Contact(fault.first, fault.second, fault.distance, NOWHERE, NOWHERE, fault.required_distance)
     names = frozenset((fault.first, fault.second))
     return PathContact(float(fault.tick), float(fault.tick + 1), contact, names)
 

@@ -13,9 +13,8 @@ import numpy as np
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector
 from rrtik_ompl.base.budget import Stop, no_stop
 from rrtik_ompl.base.choices import Replanner
-from rrtik_ompl.planning.search.rrt_connect import extend
-from rrtik_ompl.planning.search.rrt_connect import ConfigurationTree
-from rrtik_ompl.replanning.connecting import Joined, TreeOptions, joined, one_by_one
+from rrtik_ompl.planning.search.rrt_connect import ConfigurationTree, extend
+from rrtik_ompl.replanning.connecting import Connection, TreeOptions, connected, one_by_one
 from rrtik_ompl.replanning.drrt_con import DrrtCon, Post
 from rrtik_ompl.world.motion_queries import MotionQueries
 
@@ -51,14 +50,14 @@ class SingleTree(DrrtCon):
         self._tree = None
         return super().begin(start, goals, motions, stop)
 
-    def _reconnected(self, motions: MotionQueries, stop: Stop) -> Joined | None:
+    def _reconnected(self, motions: MotionQueries, stop: Stop) -> Connection | None:
         if self._tree is not None:
             self._tree = trimmed(self._tree, motions)
         return self(self._points_at_last_check[:1], self._points_at_last_check[-1:], motions, stop)
 
     def __call__(
         self, first: Matrix, second: Matrix, motions: MotionQueries, stop: Stop, *, chain: bool = True
-    ) -> Joined | None:
+    ) -> Connection | None:
         """Grow the tree until it reaches the end of ``first``; the way back to its root, or None."""
         del chain
         robot_configuration = first[-1]
@@ -73,7 +72,7 @@ class SingleTree(DrrtCon):
             target = robot_configuration if at_robot else self._rng.uniform(self._options.lower, self._options.upper)
             vertex = extend(self._tree, target, self._rules, one_by_one(motions))
             if vertex is not None and (self._tree.rows[vertex] == robot_configuration).all():
-                return joined(first, self._tree.branch(vertex)[::-1], second, chain=False)
+                return connected(first, self._tree.branch(vertex)[::-1], second, chain=False)
         return None
 
 

@@ -292,11 +292,6 @@ def _line_of(branch: Branch, stage: Straight, seed: int) -> Way:
     return Way((straight_rail(tip, stage.goal(tip)),), TOLERANCE, None, seed)
 
 
-def with_effort(branch: Branch, effort: int) -> Branch:
-    """The same branch, to be tried with more effort."""
-    return replace(branch, effort=effort)
-
-
 def _following_branch(
     branch: Branch,
     step: Step,

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import heapq
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import count
 
 import numpy as np
@@ -17,7 +17,7 @@ from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.errors import ProblemError
 from rrtik_ompl.model.path import JointPath, path_through
 from rrtik_ompl.planning.plan import plan_counted
-from rrtik_ompl.tasks.branches import Branch, Expander, with_effort
+from rrtik_ompl.tasks.branches import Branch, Expander
 from rrtik_ompl.tasks.contact_life import MotionContact, follow_contacts
 from rrtik_ompl.tasks.program import Step
 from rrtik_ompl.tasks.setting import world_of_motion
@@ -80,7 +80,7 @@ class TaskSearch:
             self._motions_not_found.clear()
             failed = [branch for branch, _, _ in self._expander.failures] if effort == 0 else []
             for branch in (*waiting, *failed):
-                self._push(with_effort(branch, effort + 1))
+                self._push(replace(branch, effort=effort + 1))
             for branch in self._expander.more():
                 self._push(branch)
             if not self._queue:

@@ -13,7 +13,7 @@ from rrtik_ompl.motion.trajectory.limits import RateLimits
 from rrtik_ompl.replanning import in_time
 from rrtik_ompl.replanning.in_time import foreseen, plan_in_time
 from rrtik_ompl.replanning.in_time.foreseen import ForeseenWorlds
-from rrtik_ompl.replanning.in_time.search import NEVER, Pace, hurried
+from rrtik_ompl.replanning.in_time.search import NEVER, Pace, retimed
 from rrtik_ompl.world.world import World
 from rrtik_tests.moving_plane import FAST, box, crossing, place, plane
 
@@ -120,8 +120,8 @@ def test_a_retiming_that_is_stopped_keeps_the_path_that_there_is():
     problem = plane()
     rows = np.linspace(problem.start, problem.goal.q, 50)
     worlds, pace = ForeseenWorlds(problem.world, 0.1, 0.0), Pace(np.ones(2), np.inf)
-    assert len(hurried(rows, pace, worlds, 48, lambda: False)) == 19
-    assert hurried(rows, pace, worlds, 48, lambda: True) is None
+    assert len(retimed(rows, pace, worlds, 48, lambda: False)) == 19
+    assert retimed(rows, pace, worlds, 48, lambda: True) is None
 
 
 def test_the_slowest_speeds_are_too_slow_and_nothing_else():

@@ -16,7 +16,7 @@ from rrtik_ompl.model.scene import ConstantVelocity, Obstacle, Scene, TimedPoses
 from rrtik_ompl.model.shapes import Box, HalfSpace, Sphere
 from rrtik_ompl.replanning.in_time import plan_in_time
 from rrtik_ompl.replanning.in_time.foreseen import travel
-from rrtik_ompl.replanning.in_time.search import Pace, TimeTree, each_slot, full_pace
+from rrtik_ompl.replanning.in_time.search import Pace, TimeTree, at_full_speed, each_slot
 from rrtik_ompl.world.world import World
 from rrtik_tests.moving_plane import FAST, box, crossing, place, plane
 
@@ -156,7 +156,7 @@ def test_a_vertex_is_reached_only_onwards_in_time_and_at_a_speed_that_is_allowed
 
 def test_full_pace_takes_the_fewest_slots_and_keeps_the_ends():
     rows = np.array([[0.0, 0.0], [3.0, 0.0], [3.0, 0.0], [3.0, 2.5]])
-    places = full_pace(rows, Pace(np.ones(2), np.inf))
+    places = at_full_speed(rows, Pace(np.ones(2), np.inf))
     assert len(places) - 1 == 6
     assert (np.abs(np.diff(places, axis=0)) <= 1.0 + 1e-12).all()
     assert (places[[0, -1]] == rows[[0, -1]]).all()

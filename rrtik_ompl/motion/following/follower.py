@@ -159,7 +159,7 @@ class Follower:
         self._period = 1.0 / positive(rate, "rate of a follower")
         self._tolerance = positive(tolerance, "tolerance")
         _check_rest(trajectory)
-        self._pace = Pace(trajectory, _limits_to_keep(trajectory, limits))
+        self._pace = Pace(trajectory.cubics, _limits_to_keep(trajectory, limits))
 
         self._lock = Lock()
         self._target_pace = 1.0  # unless it is paused or stopping

@@ -14,7 +14,8 @@ from numpy.polynomial.polynomial import polyder, polyint, polyval
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector
-from rrtik_ompl.motion.trajectory import RateLimits, Trajectory
+from rrtik_ompl.motion.trajectory.cubics import Cubics
+from rrtik_ompl.motion.trajectory.limits import RateLimits
 
 SAMPLES = 80  # along a change of pace
 FIRST_SAMPLES = 12  # along each of those that are tried; most that keep no limits are found by them
@@ -76,7 +77,7 @@ class Pace:
         end: The pace that it is at, or comes to by what has been decided.
     """
 
-    def __init__(self, motion: Trajectory, limits: RateLimits) -> None:
+    def __init__(self, motion: Cubics, limits: RateLimits) -> None:
         """Full pace, at the beginning of a motion that keeps the limits."""
         self.place = 0.0
         self.now = 0.0
@@ -158,7 +159,7 @@ class Pace:
         """Whether the limits are kept after times since the beginning of changes; of the shape of ``clock``."""
         advance, *paces = change.at(clock)
         places = np.ravel(place + advance)
-        state = self._motion(places)
+        state = self._motion.states(places)
         p, rise, curvature = (row.reshape(-1, 1) for row in paces)
         v = state.velocities
         a = state.accelerations

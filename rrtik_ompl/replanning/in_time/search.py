@@ -19,15 +19,15 @@ from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.base.budget import Budget, Stop, no_stop
 from rrtik_ompl.replanning.in_time.foreseen import ForeseenWorlds
 
-PIECE = 8  # slots of one extension
-FIRST_SHARE = 1.5  # of the least time: the first last arrival
-PUT_OFF = 150  # iterations without a way, after which the last arrival is put off to twice the time
-PATIENCE = 600  # iterations of a further round
-ROUNDS = 12  # without an earlier arrival, one after the other
-STANDING = 0.1  # share of the extensions in which the robot stands
-CUTS = 200  # tries to shorten the way
+EXTENSION_SLOTS = 8  # slots of one extension
+FIRST_HORIZON_RATIO = 1.5  # of the least time: the first last arrival
+HORIZON_ITERATIONS = 150  # iterations without a way, after which the last arrival is put off to twice the time
+ROUND_ITERATIONS = 600  # iterations of a further round
+MAX_FRUITLESS_ROUNDS = 12  # without an earlier arrival, one after the other
+WAIT_PROBABILITY = 0.1  # share of the extensions in which the robot stands
+SHORTCUT_TRIES = 200  # tries to shorten the way
 
-GAP_WEIGHT = 0.2  # of a slot between two vertices, beside a slot that the motion needs at least
+WAIT_WEIGHT = 0.2  # of a slot between two vertices, beside a slot that the motion needs at least
 ROUNDING = 1e-9  # [slots]
 NEVER = 1 << 40  # slots: more than any plan has, and still a number
 
@@ -91,7 +91,7 @@ class TimeSearch:
         self._trees[0].add(self.ends.start, 0, -1)
         self._arrivals_tried: set[tuple[int, int]] = set()
         self._must_be_earlier = earlier is not None
-        first_last_slot = int(np.ceil(FIRST_SHARE * self.least_slots)) + PIECE
+        first_last_slot = int(np.ceil(FIRST_HORIZON_RATIO * self.least_slots)) + EXTENSION_SLOTS
         self._last = min(self.ends.last, first_last_slot) if earlier is None else earlier
 
     def run(self, budget: Budget) -> Matrix | None:
@@ -105,7 +105,7 @@ class TimeSearch:
         while self.iterations < most_iterations and not (self._over() or self._is_done(best, fruitless)):
             self.iterations += 1
             iterations_of_round += 1
-            patience = PUT_OFF if self._must_be_earlier else PATIENCE
+            patience = HORIZON_ITERATIONS if self._must_be_earlier else ROUND_ITERATIONS
             rows = self._iterate()
             rows = None if rows is None else self._improved(rows)
 
@@ -115,7 +115,7 @@ class TimeSearch:
             elif best is not None and (rows is not None or iterations_of_round >= patience):
                 fruitless += 1
             else:
-                if iterations_of_round % PUT_OFF == 0:
+                if iterations_of_round % HORIZON_ITERATIONS == 0:
                     self._last = min(2 * self._last, self.ends.last)
                 continue
 
@@ -125,7 +125,7 @@ class TimeSearch:
 
     def _is_done(self, best: Matrix | None, fruitless: int) -> bool:
         """Whether no earlier arrival is possible, or none to be hoped for."""
-        return best is not None and (fruitless >= ROUNDS or len(best) - 1 <= self.least_slots)
+        return best is not None and (fruitless >= MAX_FRUITLESS_ROUNDS or len(best) - 1 <= self.least_slots)
 
     def _iterate(self) -> Matrix | None:
         """A further arrival, an extension of one tree and a connection to the other; the way if they meet."""
@@ -163,18 +163,18 @@ class TimeSearch:
 
     def _extend(self, tree: TimeTree) -> int | None:
         """Towards a sample, or standing still; the new vertex."""
-        aim = self._standing(tree) if self._rng.random() < STANDING else self._sample(tree)
+        aim = self._waiting(tree) if self._rng.random() < WAIT_PROBABILITY else self._sample(tree)
         if aim is None:
             return None
         vertex, to = aim
-        end = self._grow(tree, vertex, to, PIECE)
+        end = self._grow(tree, vertex, to, EXTENSION_SLOTS)
         return None if end is None else end[0]
 
-    def _standing(self, tree: TimeTree) -> Aim | None:
+    def _waiting(self, tree: TimeTree) -> Aim | None:
         """A vertex at random, and the same configuration some slots on; None if there are no more slots."""
         vertex = int(self._rng.integers(tree.size))
         q = tree.q[vertex].copy()
-        slot = int(tree.slot[vertex]) + tree.onward * PIECE
+        slot = int(tree.slot[vertex]) + tree.onward * EXTENSION_SLOTS
         slot = min(max(slot, 0), self._last)
         return (vertex, (q, slot)) if tree.onward * (slot - int(tree.slot[vertex])) > 0 else None
 
@@ -216,14 +216,14 @@ class TimeSearch:
         """With less motion and earlier, in turn, as long as it arrives earlier."""
         while True:
             rows = self._shortened(rows)
-            earlier = hurried(rows, self.pace, self.worlds, len(rows) - 2, self._over)
+            earlier = retimed(rows, self.pace, self.worlds, len(rows) - 2, self._over)
             if earlier is None:
                 return rows
             rows = earlier
 
     def _shortened(self, rows: Matrix) -> Matrix:
         """The same arrival with less motion: straight pieces in the place of random ones."""
-        for _ in range(CUTS):
+        for _ in range(SHORTCUT_TRIES):
             if len(rows) < 3 or self._over():
                 break
             a, b = sorted(self._rng.choice(len(rows), 2, replace=False).tolist())
@@ -320,7 +320,7 @@ class TimeTree:
         reachable = np.flatnonzero((gap > 0) & (needed <= gap + ROUNDING))
         if len(reachable) == 0:
             return None
-        return int(reachable[(needed[reachable] + GAP_WEIGHT * gap[reachable]).argmin()])
+        return int(reachable[(needed[reachable] + WAIT_WEIGHT * gap[reachable]).argmin()])
 
     def rows_towards(self, vertex: int, q: Vector, slot: int, max_slots: int) -> tuple[Matrix, bool]:
         """Configurations slot by slot from a vertex towards q in a slot, at most so many slots; whether q is the last.
@@ -343,7 +343,7 @@ class TimeTree:
         return self._q[numbers[::-1]], self._slot[numbers[::-1]]
 
 
-def full_pace(rows: Matrix, pace: Pace) -> Matrix:
+def at_full_speed(rows: Matrix, pace: Pace) -> Matrix:
     """Places along a way, shape (k, n), each a slot at full pace from the last one; both ends stay. Shape (m, n)."""
     slots_along = np.concatenate([[0.0], np.cumsum(pace.slots(np.diff(rows, axis=0)))])
     moving = np.concatenate([[True], np.diff(slots_along) > 0.0])
@@ -354,7 +354,7 @@ def full_pace(rows: Matrix, pace: Pace) -> Matrix:
     return places
 
 
-def hurried(rows: Matrix, pace: Pace, worlds: ForeseenWorlds, max_slots: int, stop: Stop) -> Matrix | None:
+def retimed(rows: Matrix, pace: Pace, worlds: ForeseenWorlds, max_slots: int, stop: Stop) -> Matrix | None:
     """The same way with the fewest slots, at most so many; a configuration for each slot, or None.
 
     Along a fixed way only its timing is left to choose, as in the decomposition of [71]; here over whole slots: go at
@@ -367,7 +367,7 @@ def hurried(rows: Matrix, pace: Pace, worlds: ForeseenWorlds, max_slots: int, st
         max_slots: That it may take.
         stop: Ends it without a way.
     """
-    places = full_pace(rows, pace)
+    places = at_full_speed(rows, pace)
     last = len(places) - 1
     begin = (0, 0)
     previous: dict[Place, Place] = {begin: begin}
