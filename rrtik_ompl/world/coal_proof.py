@@ -20,8 +20,9 @@ from rrtik_ompl.geometry.collision.distances import measured
 from rrtik_ompl.geometry.collision.motion_bound import approach_weights
 from rrtik_ompl.geometry.collision.solids import is_closed, is_mesh
 from rrtik_ompl.kernels.proof import layout
-from rrtik_ompl.kernels.proof.log import ProofLog, logged
+from rrtik_ompl.kernels.proof.log import logged
 from rrtik_ompl.kernels.proof.packing import ProofPairs
+from rrtik_ompl.model.certificate import MotionEntries
 from rrtik_ompl.model.robot import Robot
 
 MOST = 400  # distances for a pair in one motion: some tenths of a second
@@ -30,7 +31,7 @@ SPARE = 1.01  # of the way that bodies come nearer: who verifies it may bound th
 FAR = 1e6  # [m]; what may overlap by that is apart
 
 Numbers: TypeAlias = NDArray[np.int32]
-Told: TypeAlias = tuple[ProofLog, NDArray[np.int64]]  # by kernels; links and intervals that coal measured
+Told: TypeAlias = tuple[MotionEntries, NDArray[np.int64]]  # by kernels; links and intervals that coal measured
 
 
 class CoalProof:

@@ -23,7 +23,6 @@ from rrtik_ompl.geometry.collision.cloud_solid import CloudSolid
 from rrtik_ompl.geometry.collision.digests import robot_digest, scene_digest, world_digest
 from rrtik_ompl.geometry.collision.solids import of_each
 from rrtik_ompl.kernels.proof.layout import ProofTable
-from rrtik_ompl.kernels.proof.log import ProofLog
 from rrtik_ompl.kernels.proof.packing import ProofPairs, proof_pairs
 from rrtik_ompl.kernels.proof.taken_proof import TakenProof
 from rrtik_ompl.kernels.simd.library import library
@@ -334,7 +333,7 @@ def _joints(robot: Robot) -> tuple[Matrix, Vector, bool]:
     return gain, robot.chain.offset, bounded
 
 
-def _entries(log: ProofLog, measured_intervals: NDArray[np.int64]) -> MotionEntries:
+def _entries(log: MotionEntries, measured_intervals: NDArray[np.int64]) -> MotionEntries:
     """What a verifier does not find by itself; a motion that stands still is one interval of level 0."""
     intervals = log.intervals.copy()
     if len(intervals) and (intervals == intervals[0]).all():  # one interval alone is all of the motion

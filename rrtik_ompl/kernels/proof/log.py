@@ -3,38 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.kernels.proof import layout
 from rrtik_ompl.kernels.proof.layout import ProofTable
 from rrtik_ompl.kernels.proof.packing import ProofPairs
 from rrtik_ompl.kernels.tables.memory import aligned
+from rrtik_ompl.model.certificate import MotionEntries
 
 FIRST_ROOM = 4096  # records
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class ProofLog:
-    """By what pairs are proven apart in a motion, a row for each pair and interval.
-
-    Attributes:
-        solids: Body above the plane, its part, body below, its part, shape (n, 4); part -1: a body as a whole.
-        intervals: Level and number of the interval from number / 2**level to (number + 1) / 2**level, shape (n, 2).
-        normals: Unit normal of the plane seen from the frame that carries both bodies, or zeros if a ball and a ball or
-            box settle it, shape (n, 3).
-    """
-
-    solids: NDArray[np.int64]
-    intervals: NDArray[np.int64]
-    normals: Matrix
-
-
-def logged(packed: ProofPairs, run: Callable[[], object], first_room: int = FIRST_ROOM) -> ProofLog:
-    """What kernels tell while they prove one motion.
+def logged(packed: ProofPairs, run: Callable[[], object], first_room: int = FIRST_ROOM) -> MotionEntries:
+    """What kernels tell while they prove one motion: an entry for each pair and interval, part -1 of a body as a whole.
 
     Args:
         packed: The table that they read.
@@ -57,7 +39,7 @@ def logged(packed: ProofPairs, run: Callable[[], object], first_room: int = FIRS
     records = table.log.reshape(-1, layout.LOG_SIZE)[:count].astype(np.int64)
     intervals = records[:, [layout.LOG_LEVEL, layout.LOG_NUMBER]]
     normals = np.array(table.log_ways.reshape(-1, 3)[:count])
-    return ProofLog(packed.sides[records[:, layout.LOG_PAIR]], intervals, normals)
+    return MotionEntries(packed.sides[records[:, layout.LOG_PAIR]], intervals, normals)
 
 
 def _give_room(table: ProofTable, room: int) -> None:
