@@ -37,9 +37,9 @@ if TYPE_CHECKING:
     from rrtik_ompl.description.variants import weighted as weighted
     from rrtik_ompl.ik.batch import IkBatch as IkBatch
     from rrtik_ompl.ik.batch import solve_ik_batch as solve_ik_batch
-    from rrtik_ompl.ik.reach.grid_map import ReachMap as ReachMap
-    from rrtik_ompl.ik.reach.grid_map import load_reach_map as load_reach_map
-    from rrtik_ompl.ik.reach.sampling import reach_map as reach_map
+    from rrtik_ompl.ik.reach import ReachMap as ReachMap
+    from rrtik_ompl.ik.reach import load_reach_map as load_reach_map
+    from rrtik_ompl.ik.reach import reach_map as reach_map
     from rrtik_ompl.ik.solve import IkResult as IkResult
     from rrtik_ompl.ik.solve import list_ik_methods as list_ik_methods
     from rrtik_ompl.ik.solve import solve_ik as solve_ik
@@ -167,8 +167,7 @@ else:
         "base.poses": ("pose",),
         "world.problem": ("Problem",),
         "problem_files.problem": ("load_problem", "save_problem"),
-        "ik.reach.grid_map": ("ReachMap", "load_reach_map"),
-        "ik.reach.sampling": ("reach_map",),
+        "ik.reach": ("ReachMap", "load_reach_map", "reach_map"),
         "replanning": ("ReplanRun", "load_run", "replan"),
         "model.robot": ("Robot",),
         "replanning.in_time": ("TimedPlan", "plan_in_time"),

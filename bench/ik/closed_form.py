@@ -24,8 +24,8 @@ from rrtik_bench.report.machine import versions
 from rrtik_bench.report.page import Report
 from rrtik_ompl import load_robot
 from rrtik_ompl.ik.analytic.analytic_solver import wrapped
+from rrtik_ompl.ik.analytic.branches import reference_branches
 from rrtik_ompl.ik.analytic.closed_form import form_of, solutions
-from rrtik_ompl.ik.analytic.reference_branches import reference_branches
 from rrtik_ompl.model.robot import Robot
 from rrtik_robots.puma560 import singular_samples as puma_samples
 from rrtik_robots.titan4 import singular_samples as titan_samples

@@ -25,12 +25,11 @@ from rrtik_bench.report.machine import versions
 from rrtik_bench.report.page import Report
 from rrtik_ompl.base.choices import IkMethod, one_of
 from rrtik_ompl.base.errors import InputError
-from rrtik_ompl.ik.goal_rows import pose_rows
+from rrtik_ompl.ik.kernel_tables import KernelCall, seeded_limb_of
 from rrtik_ompl.ik.method_interface import mid_range_configuration
 from rrtik_ompl.ik.numeric.descent import PATIENCE, STEPS
-from rrtik_ompl.ik.numeric.kernel_call import KernelCall
-from rrtik_ompl.ik.serial_chain import seeded_limb_of
 from rrtik_ompl.ik.solve import list_ik_methods
+from rrtik_ompl.ik.targets import pose_rows
 from rrtik_ompl.kernels.ik.ik_layout import KERNELS
 from rrtik_ompl.kernels.simd.library import library
 from rrtik_ompl.model.robot import Robot

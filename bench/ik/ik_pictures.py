@@ -18,7 +18,7 @@ from typer import Option
 import rrtik_ompl as rrtik
 from bench.shared.run import REPORTS
 from rrtik_ompl.base.poses import pose_from_rpy
-from rrtik_ompl.ik.reach.sampling import reach_map
+from rrtik_ompl.ik.reach import reach_map
 from rrtik_ompl.viewer import view
 from rrtik_ompl.viewer.drawing.marks import reach_marks
 from rrtik_ompl.viewer.subject import Shown

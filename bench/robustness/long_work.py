@@ -16,7 +16,7 @@ from rrtik_ompl.benchmark.records import NAME, key_of, read_head, read_records
 from rrtik_ompl.cli import FOUND, NOT_FOUND
 from rrtik_ompl.cli.app import run
 from rrtik_ompl.cli.terminal import stoppable
-from rrtik_ompl.ik.reach.grid_map import load_reach_map
+from rrtik_ompl.ik.reach import load_reach_map
 from rrtik_ompl.model.certificate import load_certificate
 from rrtik_ompl.pilot.overlay.film import write_film
 from rrtik_ompl.pilot.record import read_record

@@ -12,8 +12,7 @@ from rrtik_ompl.kernels.search.crdt.rules import KERNELS, CrdtRules
 from rrtik_ompl.kernels.search.crdt.search import CrdtSearch
 from rrtik_ompl.ompl_bridge import MotionChecker, SearchResult, Stop
 from rrtik_ompl.world.motion_queries import has_kernels
-from rrtik_planners.crdt_stream import CrdtStream
-from rrtik_planners.crdt_tree import CrdtTree, Outcome
+from rrtik_planners.crdt_tree import CrdtStream, CrdtTree, Outcome
 from rrtik_planners.one_joint_planner import OneJointPlanner
 
 

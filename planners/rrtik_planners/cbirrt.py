@@ -8,6 +8,7 @@ import numpy as np
 from ompl import base as ob
 
 from rrtik_ompl.base.arrays import Matrix, Vector, positive
+from rrtik_ompl.base.budget import iteration_limit
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.constraints.held_regions import HeldRegions
 from rrtik_ompl.constraints.walls import separation
@@ -18,7 +19,6 @@ from rrtik_ompl.kernels.search.motions.motion_table import NO_LIMIT, FastMotions
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SafePlanner, SearchResult, Stop
 from rrtik_ompl.world.motion_queries import decider, has_kernels, keeps_constraints
 from rrtik_planners.fast_rrt_connect import python_rules, search_in_python, sound_tree
-from rrtik_planners.one_joint_options import iteration_limit
 
 PLAIN_SAMPLES = 200  # before it is asked whether the constraints alone separate start and goal
 
@@ -45,12 +45,9 @@ class CBiRRT(SafePlanner):
         range: float | None = None,
         max_iterations: int | None = None,
     ) -> None:
-        """Make a planner.
+        """Make a planner with options beside those of :class:`~rrtik_ompl.ompl_bridge.SafePlanner`.
 
         Args:
-            si: ``ompl.base.SpaceInformation`` of real coordinates and angles.
-            world: Checks configurations and motions instead of ``si``, if given.
-            seed: At least 0; drawn from OMPL's if None.
             range: Length of a step, at most [unit of the space]; what suits the bounds if None.
             max_iterations: Samples at most; without limit if None.
 

@@ -15,8 +15,7 @@ from rrtik_ompl.kernels.search.crdt.search import CrdtSearch
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SearchResult, Stop
 from rrtik_ompl.planning.moves.rules import Joints, PerJoint
 from rrtik_ompl.world.motion_queries import has_kernels
-from rrtik_planners.crdt_stream import CrdtStream
-from rrtik_planners.crdt_tree import CrdtTree, Outcome
+from rrtik_planners.crdt_tree import CrdtStream, CrdtTree, Outcome
 from rrtik_planners.one_joint_planner import OneJointPlanner
 
 GOAL_TOLERANCE_SHARE = 0.2  # default goal tolerance as a share of the diagonal of the space
@@ -51,20 +50,11 @@ class CRDT(OneJointPlanner):
         frozen_joints: Joints = (),
         smallest_move: PerJoint = 0.0,
     ) -> None:
-        """Make a planner.
+        """Make a planner with an option beside those of :class:`~rrtik_planners.one_joint_planner.OneJointPlanner`.
 
         Args:
-            si: This argument and those that are not listed are as of
-                :class:`~rrtik_planners.one_joint_planner.OneJointPlanner`.
-            world: As there.
-            seed: As there.
             goal_tolerance: Euclidean distance to a goal below which a vertex tries to reach it [unit of the space];
                 a fifth of the diagonal of the space if None.
-            scale_by_range: As there, like those that follow.
-            max_iterations: ..
-            joint_costs: ..
-            frozen_joints: ..
-            smallest_move: ..
 
         Raises:
             InputError: If an option is out of range or the space is of another kind.

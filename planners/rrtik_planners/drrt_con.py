@@ -39,12 +39,9 @@ class DRRTCon(SafePlanner):
         seed: int | None = None,
         range: float | None = None,
     ) -> None:
-        """Make a planner.
+        """Make a planner with options beside those of :class:`~rrtik_ompl.ompl_bridge.SafePlanner`.
 
         Args:
-            si: ``ompl.base.SpaceInformation`` of real coordinates and angles.
-            world: Checks configurations and motions instead of ``si``, if given.
-            seed: At least 0; drawn from OMPL's if None.
             range: Longest motion of the trees [unit of the space]; what suits the bounds if None.
 
         Raises:

@@ -10,6 +10,7 @@ import numpy as np
 from ompl import base as ob
 
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector, positive
+from rrtik_ompl.base.budget import iteration_limit
 from rrtik_ompl.kernels.search.connect import ConnectSearch
 from rrtik_ompl.kernels.search.connect_keeping import Searched, kept_search, solve_each
 from rrtik_ompl.kernels.search.connect_layout import KERNELS
@@ -20,7 +21,6 @@ from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SafePlanner, Se
 from rrtik_ompl.ompl_bridge.results import Tree, without
 from rrtik_ompl.planning.search.rrt_connect import ConnectRules, RrtConnect, straight_path
 from rrtik_ompl.world.motion_queries import KernelWorld, decider, has_kernels
-from rrtik_planners.one_joint_options import iteration_limit
 
 
 class FastRRTConnect(SafePlanner):
@@ -47,12 +47,9 @@ class FastRRTConnect(SafePlanner):
         max_iterations: int | None = None,
         bound: float | None = None,
     ) -> None:
-        """Make a planner.
+        """Make a planner with options beside those of :class:`~rrtik_ompl.ompl_bridge.SafePlanner`.
 
         Args:
-            si: ``ompl.base.SpaceInformation`` of real coordinates and angles.
-            world: Checks configurations and motions instead of ``si``, if given.
-            seed: At least 0; drawn from OMPL's if None.
             range: Length of a motion of the trees, at most [unit of the space]; what suits the bounds if None.
             domain: Radius in which a vertex is extended once it was blocked [unit of the space]; as with ``range``.
             max_iterations: Samples at most; without limit if None.

@@ -84,19 +84,13 @@ class FewestMoves(OneJointPlanner):
         last_joints: Joints = (),
         clearance: float | None = None,
     ) -> None:
-        """Make a planner.
+        """Make a planner with options beside those of :class:`~rrtik_planners.one_joint_planner.OneJointPlanner`.
 
         Args:
-            si: This argument and those without a text are as of
-                :class:`~rrtik_planners.one_joint_planner.OneJointPlanner`.
-            world: As there. A ``rrtik_ompl.World`` also lets the bound be sharpened by proofs.
-            seed: As there.
+            world: A ``rrtik_ompl.World`` also lets the bound be sharpened by proofs.
             searches: Runs of BiCRDT at the beginning, at least 1.
             rounds: Of improvement, at least 0, after the first. With time enough they alone decide what comes out.
-            joint_costs: As there.
-            frozen_joints: As there.
-            smallest_move: As there.
-            last_joints: As there. The bound counts their moves too.
+            last_joints: The bound counts their moves too.
             clearance: Wanted from obstacles, on top of their margins [m]; None for a centimetre. Needs a
                 ``rrtik_ompl.World``.
 

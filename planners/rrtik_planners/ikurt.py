@@ -42,12 +42,9 @@ class IKURT(TipSeeker):
         stride: float | None = None,
         most_vertices: int = 10_000,
     ) -> None:
-        """Make a planner.
+        """Make a planner with options beside those of :class:`~rrtik_ompl.ompl_bridge.SafePlanner`.
 
         Args:
-            si: ``ompl.base.SpaceInformation`` of real coordinates and angles.
-            world: Checks configurations and motions instead of ``si``, if given.
-            seed: At least 0; drawn from OMPL's if None.
             goal: What the tip has to reach; needs a world. If None, the configurations of the problem definition are
                 the goals.
             jacobian: Look for goal configurations by Levenberg-Marquardt from the vertices; they are met to 1e-9 of

@@ -37,13 +37,10 @@ class IKURTPublished(TipSeeker):
         threshold: float | None = None,
         accuracy: float | None = None,
     ) -> None:
-        """Make a planner.
+        """Make a planner with options beside those of :class:`~rrtik_ompl.ompl_bridge.SafePlanner`.
 
         Args:
-            si: See :class:`rrtik_planners.ikurt.IKURT`.
-            world: As there.
-            seed: As there.
-            goal: As there.
+            goal: See :class:`rrtik_planners.ikurt.IKURT`.
             mu: Weight of the distance in the metric of poses [1/m]; if None the distance at the start counts as much
                 as the largest angle.
             step: Growth step delta0 [unit of the space]; if None 0.15 rad, or 1 % of a space that is not an arm's.

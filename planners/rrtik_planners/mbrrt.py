@@ -39,17 +39,12 @@ class MBRRT(BiCRDT):
         scale_by_range: bool = False,
         max_iterations: int | None = None,
     ) -> None:
-        """Make a planner.
+        """Make a planner with options beside those of :class:`~rrtik_planners.one_joint_planner.OneJointPlanner`.
 
         Args:
-            si: ``ompl.base.SpaceInformation`` of real coordinates and angles.
-            world: Checks configurations and motions instead of ``si``, if given.
-            seed: At least 0; drawn from OMPL's if None.
             goal: What the tip has to reach; needs a world. If None, or where the tree finds nothing, the
                 configurations of the problem definition are the goals.
             ik_seconds: Time that the tree in the workspace may take [s].
-            scale_by_range: See :class:`rrtik_planners.one_joint_planner.OneJointPlanner`.
-            max_iterations: As there.
 
         Raises:
             InputError: If an option is out of range, the space is of another kind, or the robot does not fit.

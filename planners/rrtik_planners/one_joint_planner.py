@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import ClassVar
+from typing import Any, ClassVar
 
+import numpy as np
 from ompl import base as ob
 
-from rrtik_ompl.base.arrays import Matrix
-from rrtik_ompl.kernels.search.crdt.rules import KERNELS
+from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.base.budget import iteration_limit
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.kernels.search.crdt.rules import KERNELS, CrdtRules
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SafePlanner, SearchResult, Stop
-from rrtik_ompl.planning.moves.rules import Joints, PerJoint
-from rrtik_planners.crdt_endings import NO_ENDING, Endings
-from rrtik_planners.one_joint_options import OneJointOptions, joint_names
+from rrtik_ompl.planning.moves.rules import Joints, MoveRules, PerJoint, long_enough
+
+NO_ENDING = "last_joints: they cannot go straight to the goal after all others, or would have to move too little"
 
 
 class OneJointPlanner(SafePlanner):
@@ -40,12 +44,9 @@ class OneJointPlanner(SafePlanner):
         smallest_move: PerJoint = 0.0,
         last_joints: Joints = (),
     ) -> None:
-        """Make a planner. These are the options of all planners that move one joint at a time; some take a part.
+        """Make a planner. These are the options of all that move one joint at a time, beside those of `SafePlanner`.
 
         Args:
-            si: ``ompl.base.SpaceInformation`` of real coordinates and angles.
-            world: Checks configurations and motions instead of ``si``, if given.
-            seed: At least 0; drawn from OMPL's if None.
             scale_by_range: Divide each coordinate by its range in the metric of the nearest neighbour.
             max_iterations: K of [1, ch. 6.3, algorithms 9 to 11]; without limit if None.
             joint_costs: Cost of a joint's motion, greater than 0, shape (n,): a slow or risky joint costs more. The
@@ -92,3 +93,121 @@ class OneJointPlanner(SafePlanner):
             return SearchResult(None, reason=NO_ENDING)
         found = self.between(starts, endings.aims, checker, ptc)
         return found if found.path is None else self.completed(found, endings.completed(found.path))
+
+
+class OneJointOptions(MoveRules):
+    """The options, checked: what moves have to keep to, and how the trees grow.
+
+    Args:
+        names: The joints' names, empty if they are not known.
+        dof: Number of joints.
+        scale_by_range: This option and the others are those of
+            :class:`~rrtik_planners.one_joint_planner.OneJointPlanner`.
+        max_iterations: As there.
+        rules: As there, and as of MoveRules.
+
+    Raises:
+        InputError: If an option is out of range.
+        UnknownNameError: If there is no joint of a name.
+    """
+
+    def __init__(
+        self, names: Sequence[str], dof: int, *, scale_by_range: bool, max_iterations: int | None, **rules: Any
+    ) -> None:
+        super().__init__(names, dof=dof, **rules)
+        self.scale_by_range = scale_by_range
+        self.max_iterations = iteration_limit(max_iterations)
+        self._names = names or [str(k) for k in range(dof)]
+
+    def agreeing(self, starts: Matrix, goals: Matrix) -> tuple[Matrix, Matrix]:
+        """The first start that a goal agrees with in the frozen joints, and all starts and goals that do so too.
+
+        Raises:
+            InputError: If there is none.
+        """
+        frozen = self.frozen_joints
+        if not frozen:
+            return starts, goals
+
+        for start in starts:
+            fitting = (goals[:, frozen] == start[frozen]).all(axis=1)
+            if fitting.any():
+                return starts[(starts[:, frozen] == start[frozen]).all(axis=1)], goals[fitting]
+
+        joint = next(k for k in frozen if starts[0, k] != goals[0, k])
+        raise InputError(
+            f"frozen_joints: joint '{self._names[joint]}' must not move, but it is at {starts[0, joint]:.9g} at the "
+            f"start and at {goals[0, joint]:.9g} at the goal; let it move or change one of them"
+        )
+
+    @property
+    def staying(self) -> list[int]:
+        """Joints that do not move before the last moves."""
+        return [*self.frozen_joints, *self.last_joints]
+
+    def growth(self, lower: Vector, upper: Vector, start: Vector) -> CrdtRules:
+        """How trees grow within bounds, shapes (n,), if the joints that stay are where they are at a start."""
+        scale = self.joint_costs / (upper - lower) if self.scale_by_range else self.joint_costs
+        lower = lower.copy()
+        upper = upper.copy()
+        lower[self.staying] = upper[self.staying] = start[self.staying]
+        return CrdtRules(lower, upper, scale, self.smallest_move, self.joint_costs.min() / self.joint_costs)
+
+    def accepts(self, path: Matrix) -> bool:
+        """Whether no move of a path, shape (k, n), is too short, once those of the same joint in a row are joined."""
+        return long_enough(path, self.smallest_move)
+
+
+def joint_names(world: object) -> Sequence[str]:
+    """Names of the joints of a world's robot, none if it has no robot."""
+    names: Sequence[str] = getattr(getattr(world, "robot", None), "joint_names", ())
+    return names
+
+
+class Endings:
+    """The last moves to each goal: the joints that move last go straight to it, one after the other.
+
+    Attributes:
+        aims: Where the last moves begin, shape (k, n): goals whose last moves are free, with those joints as at the
+            start. Without joints that move last these are the goals themselves.
+
+    Args:
+        start: The last joints are here until all others have arrived, shape (n,).
+        goals: Shape (g, n).
+        joints: Those that move last, in this order.
+        smallest_move: Goals that need a shorter last move are left out, shape (n,).
+        checker: Checks the last moves.
+    """
+
+    def __init__(
+        self, start: Vector, goals: Matrix, joints: Sequence[int], smallest_move: Vector, checker: MotionChecker
+    ) -> None:
+        endings = [_last_moves(start, goal, joints) for goal in goals]
+        if joints:
+            endings = [ending for ending in endings if long_enough(ending, smallest_move) and _free(ending, checker)]
+        self._endings = endings
+        self.aims: Matrix = np.array([ending[0] for ending in endings]).reshape(-1, goals.shape[1])
+
+    def completed(self, path: Matrix) -> Matrix:
+        """A path to one of the aims, shape (k, n), and the last moves after it."""
+        reached = int((self.aims == path[-1]).all(axis=1).argmax())
+        return np.vstack([path, self._endings[reached][1:]])
+
+
+def _last_moves(start: Vector, goal: Vector, joints: Sequence[int]) -> Matrix:
+    """Rows from where the last moves begin to the goal; joints that are there already do not move."""
+    row = goal.copy()
+    row[list(joints)] = start[list(joints)]
+    rows = [row]
+    for joint in joints:
+        if rows[-1][joint] != goal[joint]:
+            row = rows[-1].copy()
+            row[joint] = goal[joint]
+            rows.append(row)
+    return np.array(rows)
+
+
+def _free(ending: Matrix, checker: MotionChecker) -> bool:
+    if len(ending) == 1:
+        return True
+    return checker.valid(ending[0]) and bool(checker.motion_valid_batch(ending[:-1], ending[1:]).all())

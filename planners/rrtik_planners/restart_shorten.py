@@ -48,14 +48,9 @@ class RestartShorten(FastRRTConnect):
         domain: float | None = None,
         patience: int = PATIENCE,
     ) -> None:
-        """Make a planner.
+        """Make a planner with an option beside those of :class:`FastRRTConnect`.
 
         Args:
-            si: ``ompl.base.SpaceInformation`` of real coordinates and angles.
-            world: Checks configurations and motions instead of ``si``, if given.
-            seed: At least 0; drawn from OMPL's if None.
-            range: See :class:`FastRRTConnect`.
-            domain: Likewise.
             patience: Plans in a row of which nothing is gained, after which the search ends; 0 ends it at the first
                 path, shortened.
 

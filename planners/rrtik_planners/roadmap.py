@@ -40,12 +40,9 @@ class RoadmapPlanner(SafePlanner):
         roadmap: Roadmap | str | os.PathLike[str] | None = None,
         near: int = NEAR,
     ) -> None:
-        """Make a planner.
+        """Make a planner with options beside those of :class:`~rrtik_ompl.ompl_bridge.SafePlanner`.
 
         Args:
-            si: ``ompl.base.SpaceInformation`` of real coordinates and angles.
-            world: Checks configurations and motions instead of ``si``, if given.
-            seed: At least 0; drawn from OMPL's if None.
             roadmap: A :class:`~rrtik_ompl.planning.search.roadmap.Roadmap` of the world, or the file of one.
             near: With how many of the vertices near it a new one is joined, if there is no ``roadmap``.
 

@@ -11,9 +11,8 @@ from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.ik.ikurt.metric import ConfigurationMetric, TipMetric
 from rrtik_ompl.ik.ikurt.tree import IkurtTree
-from rrtik_ompl.ik.method_interface import Target
 from rrtik_ompl.ik.targets import targets
-from rrtik_ompl.model.goal import Goal, TipGoal
+from rrtik_ompl.model.goal import Goal, Target, TipGoal
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SafePlanner, SearchResult
 from rrtik_ompl.world.world import World
 

@@ -5,9 +5,12 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from math import ceil
 from typing import TypeAlias
 
 import numpy as np
+
+from rrtik_ompl.base.errors import InputError
 
 Stop: TypeAlias = Callable[[], object]  # true when it is time to stop
 
@@ -72,3 +75,16 @@ class Budget:
     def put_off(self, seconds: float) -> Budget:
         """The budget after some seconds that do not count."""
         return replace(self, begun=self.begun + seconds)
+
+
+def iteration_limit(limit: int | None) -> int | None:
+    """The largest number of iterations that a planner may do, a whole number; None for no limit.
+
+    Raises:
+        InputError: If the limit is no number of at least 1.
+    """
+    if limit is None or limit == np.inf:
+        return None
+    if isinstance(limit, bool) or not isinstance(limit, int | float) or not limit >= 1:
+        raise InputError(f"max_iterations: expected at least 1, got {limit!r}")
+    return ceil(limit)

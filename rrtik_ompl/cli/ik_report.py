@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from rrtik_ompl.base.arrays import TAU, Matrix, Vector, frozen
 from rrtik_ompl.base.units import DEGREES, shown_unit
 from rrtik_ompl.cli.terminal import Table
+from rrtik_ompl.ik.analytic.branches import tip_fault
 from rrtik_ompl.ik.analytic.closed_form import form_of, has_closed_form, solutions
-from rrtik_ompl.ik.analytic.reference_branches import tip_fault
 from rrtik_ompl.ik.method_interface import IkResult, different_rows, mid_range_configuration
 from rrtik_ompl.model.goal import Target, joint_difference
 from rrtik_ompl.model.robot import Robot

@@ -14,7 +14,7 @@ from rrtik_ompl.cli.terminal import PAGE_FORMATS, progress, say
 from rrtik_ompl.files.text import check_target
 
 if TYPE_CHECKING:
-    from rrtik_ompl.ik.reach.grid_map import ReachMap
+    from rrtik_ompl.ik.reach import ReachMap
     from rrtik_ompl.model.robot import Robot
     from rrtik_ompl.world.world import World
 
@@ -62,7 +62,7 @@ def reach(
         return _effective(robot, plot)
 
     from rrtik_ompl import Scene, World, load_robot, load_scene
-    from rrtik_ompl.ik.reach.sampling import reach_map
+    from rrtik_ompl.ik.reach import reach_map
 
     arm = load_robot(robot)
     surroundings = load_scene(scene) if scene is not None else Scene() if free else None

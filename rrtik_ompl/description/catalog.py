@@ -5,7 +5,7 @@ options and returns a `Robot`), ``rrtik_ompl.planners`` (name -> a class), ``rrt
 ``Path`` of a folder of problem files), ``rrtik_ompl.suites`` (the same of suites for ``rrtik bench``),
 ``rrtik_ompl.tables`` (any name -> published tables for ``rrtik reproduce``, see `rrtik_bench.tables.Collection`) and
 ``rrtik_ompl.workspaces`` (name of a robot -> a function that returns slices of its effective workspace, see
-`rrtik_ompl.ik.reach.grid_map.Slice`).
+`rrtik_ompl.ik.reach.Slice`).
 """
 
 from __future__ import annotations

@@ -14,13 +14,13 @@ from rrtik_ompl.base.choices import IkMethod
 from rrtik_ompl.base.copies import as_value, in_one_line
 from rrtik_ompl.base.errors import require
 from rrtik_ompl.description.joint_weights import weighted_difference
+from rrtik_ompl.ik.analytic.branches import tip_residuals
 from rrtik_ompl.ik.analytic.closed_form import branches_of, check_poses, form_of
-from rrtik_ompl.ik.analytic.reference_branches import tip_residuals
-from rrtik_ompl.ik.goal_rows import POSE, pose_rows
 from rrtik_ompl.ik.method_interface import mid_range_configuration
 from rrtik_ompl.ik.methods import load_kernels
 from rrtik_ompl.ik.numeric.descent import Search
 from rrtik_ompl.ik.solve import SECONDS, chosen_method, free_of_collision, solve_ik
+from rrtik_ompl.ik.targets import POSE, pose_rows
 from rrtik_ompl.kernels.threads import cores, in_threads
 from rrtik_ompl.model.goal import PoseGoal, joint_difference
 from rrtik_ompl.model.robot import Robot

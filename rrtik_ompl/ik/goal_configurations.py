@@ -15,14 +15,14 @@ from rrtik_ompl.constraints.held_region import held_region
 from rrtik_ompl.constraints.held_regions import HeldRegions
 from rrtik_ompl.description.joint_weights import weighted_difference
 from rrtik_ompl.ik.held_tables import projected_onto
-from rrtik_ompl.ik.method_interface import SAME_POSTURE, Target
+from rrtik_ompl.ik.method_interface import SAME_POSTURE
 from rrtik_ompl.ik.methods import METHODS, leaves_a_curve
 from rrtik_ompl.ik.multi_goals import at_all_tips
-from rrtik_ompl.ik.numeric.levenberg_marquardt import numeric_ik
 from rrtik_ompl.ik.numeric.projection import project, projected
+from rrtik_ompl.ik.numeric.restarts import numeric_ik
 from rrtik_ompl.ik.solve import DRAWS, solve_ik
 from rrtik_ompl.ik.targets import leaves_freedom, skip_targets, targets
-from rrtik_ompl.model.goal import GoalPart, GoalSet, TipGoal, has_continuous, joint_difference
+from rrtik_ompl.model.goal import GoalPart, GoalSet, Target, TipGoal, has_continuous, joint_difference
 from rrtik_ompl.model.robot import Robot, poses
 from rrtik_ompl.world.problem import Problem
 

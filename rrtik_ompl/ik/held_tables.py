@@ -10,7 +10,7 @@ from rrtik_ompl.base.arrays import Mask, Matrix
 from rrtik_ompl.constraints.held_region import HeldRegion
 from rrtik_ompl.constraints.held_regions import HeldRegions
 from rrtik_ompl.constraints.residuals import DAMPING, LARGEST_STEP, STEPS, projected_rows
-from rrtik_ompl.ik.serial_chain import limb_table, pose_numbers
+from rrtik_ompl.ik.kernel_tables import limb_table, pose_numbers
 from rrtik_ompl.ik.tip_columns import frame_columns
 from rrtik_ompl.kernels.ik import ik_layout
 from rrtik_ompl.kernels.ik.ik_layout import CallTable, LimbTable

@@ -4,18 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.base.arrays import Mask, Matrix, Vector, frozen
+from rrtik_ompl.base.arrays import Mask, Matrix, Vector, frozen, whole_number
 from rrtik_ompl.base.choices import IkMethod
 from rrtik_ompl.base.copies import as_value, in_one_line
 from rrtik_ompl.description.joint_weights import weighted_difference
-from rrtik_ompl.ik.random_stream import RandomStream
-from rrtik_ompl.model.goal import Target as Target
-from rrtik_ompl.model.goal import TipGoal, has_continuous, joint_difference
+from rrtik_ompl.model.goal import Target, TipGoal, has_continuous, joint_difference
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.world.world import World
 
@@ -163,3 +161,22 @@ def unwind(robot: Robot, rows: Matrix, start: Vector | None) -> None:
 def mid_range_configuration(robot: Robot) -> Vector:
     """Where a search begins if nobody says: the middle of the limits, shape (dof,)."""
     return frozen(0.5 * np.sum(robot.finite_range(), axis=0))
+
+
+class RandomStream:
+    """The same seed gives the same numbers.
+
+    Args:
+        seed: A whole number of at least 0.
+
+    Raises:
+        InputError: If it is none.
+    """
+
+    def __init__(self, seed: int) -> None:
+        self._seed = whole_number(seed, "seed")
+
+    @cached_property
+    def rng(self) -> np.random.Generator:
+        """Where the numbers come from."""
+        return np.random.default_rng(self._seed)

@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.base.choices import IkMethod
+from rrtik_ompl.ik.analytic.branches import tip_fault, valid_branches
 from rrtik_ompl.ik.analytic.closed_form import branches_of, family, form_of, has_closed_form
-from rrtik_ompl.ik.analytic.kernel_branches import valid_branches
-from rrtik_ompl.ik.analytic.reference_branches import tip_fault
-from rrtik_ompl.ik.method_interface import IkRequest, IkResponse, Method, Target, fits_all
-from rrtik_ompl.ik.numeric.levenberg_marquardt import numeric
+from rrtik_ompl.ik.method_interface import IkRequest, IkResponse, Method, fits_all
 from rrtik_ompl.ik.numeric.projection import projection
+from rrtik_ompl.ik.numeric.restarts import numeric
 from rrtik_ompl.kernels.ik import branch_layout, ik_layout
 from rrtik_ompl.kernels.simd.library import library
+from rrtik_ompl.model.goal import Target
 from rrtik_ompl.model.robot import Robot, inside_limits
 
 
@@ -91,7 +91,7 @@ def _matrix(target: Target) -> Matrix:
 
 
 def _genetic(request: IkRequest) -> IkResponse:
-    from rrtik_ompl.ik.genetic.method import genetic  # what `plan()` does not need is loaded when it is asked for
+    from rrtik_ompl.ik.genetic.search import genetic  # what `plan()` does not need is loaded when it is asked for
 
     return genetic(request)
 
@@ -113,12 +113,12 @@ def _baseline(name: IkMethod) -> Method:
     """One of the methods that others use."""
 
     def misfit(robot: Robot, target: Target) -> str:
-        from rrtik_ompl.ik.numeric.baseline_methods import BASELINES
+        from rrtik_ompl.ik.baselines import BASELINES
 
         return BASELINES[name].misfit(robot, target)
 
     def run(request: IkRequest) -> IkResponse:
-        from rrtik_ompl.ik.numeric.baseline_methods import BASELINES
+        from rrtik_ompl.ik.baselines import BASELINES
 
         return BASELINES[name].run(request)
 

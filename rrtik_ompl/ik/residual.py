@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector
 from rrtik_ompl.base.poses import working_memory
-from rrtik_ompl.ik.method_interface import Target
+from rrtik_ompl.model.goal import Target
 from rrtik_ompl.model.robot import Robot, pinocchio_rows
 
 SHARE = 0.01  # of the tolerance: a solution on the rim would not survive rounding

@@ -16,7 +16,7 @@ from rrtik_ompl.description.joint_weights import weighted_difference
 from rrtik_ompl.ik.method_interface import (
     IkRequest,
     IkResponse,
-    Target,
+    RandomStream,
     different_rows,
     mid_range_configuration,
     nearest_first,
@@ -24,10 +24,9 @@ from rrtik_ompl.ik.method_interface import (
 from rrtik_ompl.ik.method_interface import IkResult as IkResult
 from rrtik_ompl.ik.methods import METHODS, load_kernels
 from rrtik_ompl.ik.multi_goals import PROJECTION, solve_all_tips
-from rrtik_ompl.ik.random_stream import RandomStream
 from rrtik_ompl.ik.residual import error_of_one
 from rrtik_ompl.ik.targets import leaves_freedom, targets
-from rrtik_ompl.model.goal import TIP_GOALS, MultiGoal, PoseGoal, TipGoal, has_continuous, joint_difference
+from rrtik_ompl.model.goal import TIP_GOALS, MultiGoal, PoseGoal, Target, TipGoal, has_continuous, joint_difference
 from rrtik_ompl.model.robot import Robot, inside_limits
 from rrtik_ompl.model.scene import Scene
 from rrtik_ompl.world.check_world import check_world

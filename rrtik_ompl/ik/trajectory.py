@@ -19,12 +19,11 @@ from rrtik_ompl.ik.analytic.branch_choice import JUMP, follow
 from rrtik_ompl.ik.analytic.closed_form import check_poses, form_of
 from rrtik_ompl.ik.genetic.options import PRESETS, GeneticOptions
 from rrtik_ompl.ik.genetic.search import follow_targets
-from rrtik_ompl.ik.method_interface import Target, unwind
+from rrtik_ompl.ik.method_interface import RandomStream, unwind
 from rrtik_ompl.ik.methods import METHODS, load_kernels
 from rrtik_ompl.ik.numeric.track import Tracker
-from rrtik_ompl.ik.random_stream import RandomStream
 from rrtik_ompl.ik.solve import free_of_collision, solve_ik
-from rrtik_ompl.model.goal import GoalSet, PoseGoal, PositionGoal, TipGoal, joint_difference
+from rrtik_ompl.model.goal import GoalSet, PoseGoal, PositionGoal, Target, TipGoal, joint_difference
 from rrtik_ompl.model.robot import Robot, inside_limits
 from rrtik_ompl.world.check_world import check_world
 from rrtik_ompl.world.world import World

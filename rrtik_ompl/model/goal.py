@@ -235,7 +235,7 @@ class GoalSet(TipGoal):
 
     @property
     def has_regions(self) -> bool:
-        """Whether a member is a region; poses may be freed as rows of `rrtik_ompl.ik.goal_rows` say it."""
+        """Whether a member is a region; poses may be freed as rows of `rrtik_ompl.ik.targets` say it."""
         return any(member.freedom is not None for member in self.members)
 
     def alone(self, number: int) -> TipGoal:

@@ -91,7 +91,7 @@ class TipGoal(Goal):
     @property
     @abstractmethod
     def has_regions(self) -> bool:
-        """Whether it is or has a goal with freedom that no row of `rrtik_ompl.ik.goal_rows` holds."""
+        """Whether it is or has a goal with freedom that no row of `rrtik_ompl.ik.targets` holds."""
         raise NotImplementedError
 
     def alone(self, number: int) -> TipGoal:

@@ -103,7 +103,7 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
             si: ``ompl.base.SpaceInformation`` of a RealVectorStateSpace, an SO2StateSpace or a compound of them.
             name: Name for OMPL's reports.
             world: Checks configurations and motions instead of ``si``, if given.
-            seed: At least 0.
+            seed: At least 0; drawn from OMPL's if None.
 
         Raises:
             InputError: If the space is of another kind or the seed is no such number.

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from rrtik_ompl.base.arrays import Matrix
+from rrtik_ompl.base.arrays import Mask, Matrix
 from rrtik_ompl.ik.goal_configurations import MAX_ROUNDS, GoalSearch
 from rrtik_ompl.model.goal import TipGoal, has_continuous
 from rrtik_ompl.ompl_bridge.planner_traits import PlannerTraits
@@ -67,11 +67,14 @@ class GoalChoice:
 
         num_known = len(self._search.rows)
         found_more = attempt > 0 and self._search.more()
-        rows = self._find_with_clearance()
+        kept = self._find_with_clearance()
+        rows = self._search.rows[kept]
         if self.is_short_way(attempt):
             return rows[:1]  # the goal as it is given; in the others a joint goes the other way round
 
-        first = num_known if found_more else attempt
+        num_known_kept = int(np.count_nonzero(kept[:num_known]))
+        has_new = found_more and num_known_kept < len(rows)
+        first = num_known_kept if has_new else attempt
         return np.roll(rows, -first, axis=0) if first else rows
 
     def is_short_way(self, attempt: int) -> bool:
@@ -84,20 +87,20 @@ class GoalChoice:
             return False
         return not self._search.exhausted or (self._one_goal and attempt + 1 < len(self._search.rows))
 
-    def _find_with_clearance(self) -> Matrix:
-        """Configurations at the goal, shape (k, dof); of the tip, those that keep the clearance if any does.
+    def _find_with_clearance(self) -> Mask:
+        """Which known configurations are searched to: of a goal of the tip, those that keep the clearance if any does.
 
         Searches for more of them, round after round, until one does.
         """
         rows = self._search.first()
         if self._clearance is None or self._goal_in_joints:
-            return rows
+            return np.ones(len(rows), dtype=bool)
 
         for _ in range(MAX_ROUNDS):
             keeps_clearance = self._problem.world.prover.proven(rows, rows, clearance=self._clearance)
             if keeps_clearance.any():
-                return rows[keeps_clearance]
+                return keeps_clearance
             if not self._search.more():
                 break
             rows = self._search.rows
-        return rows
+        return np.ones(len(rows), dtype=bool)

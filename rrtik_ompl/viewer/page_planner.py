@@ -16,9 +16,8 @@ from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.base.poses import pose, pose_row
 from rrtik_ompl.geometry.collision.bodies import Body
 from rrtik_ompl.geometry.collision.shape_table import core_of
+from rrtik_ompl.ik.kernel_tables import call_table, limb_of
 from rrtik_ompl.ik.numeric.descent import PATIENCE, STEPS
-from rrtik_ompl.ik.numeric.kernel_call import call_table
-from rrtik_ompl.ik.serial_chain import limb_of
 from rrtik_ompl.kernels import FastWorld, layout
 from rrtik_ompl.kernels.ik import ik_layout
 from rrtik_ompl.kernels.record import Record, holds_table

@@ -5,8 +5,7 @@ import pytest
 
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.description.catalog import load_robot
-from rrtik_ompl.ik.rate import rate
-from rrtik_ompl.ik.singularity import manipulability, singularity_report
+from rrtik_ompl.ik.singularity import manipulability, rate, singularity_report
 
 TITAN = np.radians([10, 20, -60, 30, 10, 0])
 

@@ -7,15 +7,14 @@ import numpy as np
 import pytest
 
 import rrtik_ompl as rrtik
-from rrtik_ompl.ik.analytic import kernel_branches
+from rrtik_ompl.ik.analytic import branches
 from rrtik_ompl.ik.analytic.closed_form import branches_of, form_of
-from rrtik_ompl.ik.goal_rows import goal_rows
+from rrtik_ompl.ik.kernel_tables import seeded_limb_of, spare_calls
 from rrtik_ompl.ik.method_interface import mid_range_configuration
 from rrtik_ompl.ik.numeric.descent import Search, SearchOfOne
-from rrtik_ompl.ik.numeric.kernel_call import spare_calls
 from rrtik_ompl.ik.residual import error_of_one
-from rrtik_ompl.ik.serial_chain import seeded_limb_of
 from rrtik_ompl.ik.solve import solve_ik
+from rrtik_ompl.ik.targets import goal_rows
 from rrtik_ompl.kernels.ik import ik_layout
 from rrtik_ompl.kernels.simd.library import library
 from rrtik_ompl.world.row_checks import RowChecks
@@ -89,9 +88,9 @@ def test_branches_in_kept_memory_are_those_of_a_new_call(name):
     form, near = form_of(robot), drawn(robot, 1, 1)
     for goal in poses(robot, 50):
         matrix = goal.T_world_tip.homogeneous
-        rows, new = kernel_branches.valid_branches(robot, form, matrix, near[0]), branches_of(robot, matrix[None], near)
+        rows, new = branches.valid_branches(robot, form, matrix, near[0]), branches_of(robot, matrix[None], near)
         np.testing.assert_array_equal(rows, new.branches[new.valid])
-    spare = kernel_branches._arm_of(robot, form).spare
+    spare = branches._arm_of(robot, form).spare
     assert len(spare) > 0
     assert all(call.intact() for call in spare)
 

@@ -10,9 +10,8 @@ import pytest
 import rrtik_ompl as rrtik
 from rrtik_ompl.base.errors import InputError, UnknownNameError
 from rrtik_ompl.base.poses import pose_from_rpy
-from rrtik_ompl.ik.method_interface import IkRequest
+from rrtik_ompl.ik.method_interface import IkRequest, RandomStream
 from rrtik_ompl.ik.numeric.restarts import MAX_ROUNDS, restarted
-from rrtik_ompl.ik.random_stream import RandomStream
 from rrtik_ompl.ik.solve import list_ik_methods, solve_ik
 from rrtik_ompl.model.shapes import Box, Sphere
 

@@ -17,7 +17,7 @@ from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.base.units import wrapped
 from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.ik.analytic.closed_form import solutions
-from rrtik_ompl.ik.reach.grid_map import Slice
+from rrtik_ompl.ik.reach import Slice
 from rrtik_ompl.model.robot import Robot
 
 PITCHES_DEG = tuple(range(-90, 91, 15))  # of the gripper in the arm plane, with a straight wrist

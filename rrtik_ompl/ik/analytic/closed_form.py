@@ -12,9 +12,8 @@ from rrtik_ompl.base.arrays import Matrix, finite_array
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.base.poses import LAST_ROW, LAST_ROW_TOLERANCE, NOT_RIGID, left_handed
 from rrtik_ompl.ik.analytic.analytic_solver import AnalyticSolver
-from rrtik_ompl.ik.analytic.kernel_branches import kernel_branches
+from rrtik_ompl.ik.analytic.branches import kernel_branches, reference_branches, tip_fault
 from rrtik_ompl.ik.analytic.planar import planar_form
-from rrtik_ompl.ik.analytic.reference_branches import reference_branches, tip_fault
 from rrtik_ompl.model.robot import Robot
 
 SAME_ANGLE = 1e-6  # [rad] or [m]

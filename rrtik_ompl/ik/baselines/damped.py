@@ -11,8 +11,8 @@ import pinocchio as pin
 
 from rrtik_ompl.base.arrays import TAU, Matrix, Vector
 from rrtik_ompl.base.poses import working_memory
-from rrtik_ompl.ik.method_interface import Target
 from rrtik_ompl.ik.residual import shortened, twist, walked
+from rrtik_ompl.model.goal import Target
 from rrtik_ompl.model.robot import Robot, jacobians, pinocchio_rows, poses
 
 ITERATIONS = 200

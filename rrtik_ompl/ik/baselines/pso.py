@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Matrix
-from rrtik_ompl.ik.method_interface import Target
+from rrtik_ompl.model.goal import Target
 from rrtik_ompl.model.robot import Robot
 
 PARTICLES = 32  # of a swarm

@@ -8,21 +8,59 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector, frozen
-from rrtik_ompl.ik.genetic.breeding import children
-from rrtik_ompl.ik.genetic.genes import around, random_genes, whole_range
-from rrtik_ompl.ik.genetic.objective import Score, score
-from rrtik_ompl.ik.genetic.options import GeneticOptions
-from rrtik_ompl.ik.method_interface import Target
+from rrtik_ompl.ik.genetic.options import REFINED, GeneticOptions
+from rrtik_ompl.ik.genetic.population import around, children, random_genes, whole_range
+from rrtik_ompl.ik.method_interface import IkRequest, IkResponse
 from rrtik_ompl.ik.numeric.descent import descend
-from rrtik_ompl.model.goal import joint_difference
-from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.ik.numeric.restarts import nearest_posture
+from rrtik_ompl.model.goal import Target, joint_difference
+from rrtik_ompl.model.robot import Robot, inside_limits, jacobians, poses
+from rrtik_ompl.model.tip_distance import reach_of
 
 IMPROVEMENT = 0.99  # of the best cost: less counts as standing still
+MAX_ROUNDS = 64  # populations, after which it gives up
+GENERATIONS = 40  # of each; most that reach the goal do so in ten
+
+
+def genetic(request: IkRequest) -> IkResponse:
+    """One population after another, each until it reaches a target or stalls; the targets take turns."""
+    options = replace(REFINED, generations=GENERATIONS, stall=None, start_over=None)
+    found = np.zeros((0, request.robot.dof))
+    generations = 0
+
+    for number in range(MAX_ROUNDS):
+        target = request.targets[number % len(request.targets)]
+        run = follow_targets(
+            request.robot,
+            (target,),
+            options,
+            request.rng,
+            accept=request.accept,
+            near=request.near,
+            deadline=request.deadline,
+        )
+        found = np.vstack([found, run.q])
+        generations += run.generations
+        if len(found) and not request.all:
+            return IkResponse(found, request.near, generations)
+        if run.timed_out or time.monotonic() > request.deadline:
+            return _given_up(request, found, generations, timed_out=True)
+
+    return _given_up(request, found, generations, timed_out=False)
+
+
+def _given_up(request: IkRequest, found: Matrix, generations: int, *, timed_out: bool) -> IkResponse:
+    """What there is, and a posture for the reason: if it is at the goal and will not do, that is the reason."""
+    robot = request.robot
+    nearest = nearest_posture(request)
+    row = nearest[None]
+    at_goal = row[request.goal.satisfied(robot, row) & inside_limits(robot, row)]
+    return IkResponse(np.vstack([found, at_goal[~request.accept(at_goal)]]), nearest, generations, timed_out)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,10 +117,12 @@ def follow_targets(
     return run.result(timed_out=False)
 
 
+@dataclass(eq=False)
 class GaRun:
     """The state of a run: a population, its window, the points gained so far, and what the restarts watch.
 
     Attributes:
+        robot, targets, options, rng, accept, near: See `follow_targets`.
         generation: How many there were.
         attempts: How often the run began before the first point.
         num_redrawn: How often a population that had stalled was drawn anew.
@@ -97,23 +137,16 @@ class GaRun:
         best: Best cost since the population was drawn or a point was gained; infinite before there is one.
     """
 
-    def __init__(
-        self,
-        robot: Robot,
-        targets: Sequence[Target],
-        options: GeneticOptions,
-        rng: np.random.Generator,
-        accept: Callable[[Matrix], Mask] | None,
-        near: Vector | None,
-    ) -> None:
-        self.robot = robot
-        self.targets = targets
-        self.options = options
-        self.rng = rng
-        self.accept = accept
-        self.near = near
-        dimensions = 6 if targets[0].oriented else 3
-        self.gain = options.gain if options.gain is not None else float(robot.dof <= dimensions)
+    robot: Robot
+    targets: Sequence[Target]
+    options: GeneticOptions
+    rng: np.random.Generator
+    accept: Callable[[Matrix], Mask] | None
+    near: Vector | None
+
+    def __post_init__(self) -> None:
+        dimensions = 6 if self.targets[0].oriented else 3
+        self.gain = float(self.robot.dof <= dimensions) if self.options.gain is None else self.options.gain
 
         self.generation = 0
         self.num_redrawn = 0
@@ -121,7 +154,7 @@ class GaRun:
         self.distances: list[float] = []
         self.farthest: list[Vector] = []
         self.generations_by_point_of_farthest: list[int] = []
-        self.nearest = robot.clamp(np.zeros(robot.dof))
+        self.nearest = self.robot.clamp(np.zeros(self.robot.dof))
         self.best_cost_of_farthest = np.inf
 
         self.begin()
@@ -239,3 +272,73 @@ class GaRun:
             attempts=self.attempts,
             timed_out=timed_out,
         )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Score:
+    """Of every individual: its cost [m], distance [m] and angle [rad] from the target, whether it is there."""
+
+    cost: Vector
+    distance: Vector
+    angle: Vector
+    reached: Mask
+
+
+def score(
+    robot: Robot,
+    target: Target,
+    Q: Matrix,
+    last: Vector | None,
+    options: GeneticOptions,
+    accept: Callable[[Matrix], Mask],
+) -> Score:
+    """Score configurations, shape (m, dof).
+
+    The fitness in [2] is 100 inches less the distance; as a tournament only compares, the distance serves as well.
+
+    Args:
+        robot: The arm.
+        target: A pose, or a position with any orientation.
+        Q: The population.
+        last: Configuration at the point before, shape (dof,), or None.
+        options: The weights.
+        accept: Which configurations will do; the others cost as much as the arm's reach more.
+    """
+    tips = poses(robot, Q)
+    max_distance, max_angle = target.tolerances
+    distance, angle = target.tip_errors(tips)
+    reached = distance < max_distance
+    if target.oriented:
+        reached &= angle < max_angle
+
+    cost = distance + options.orientation_weight * angle
+    if options.motion_weight and last is not None:
+        cost += options.motion_weight * np.linalg.norm(joint_difference(robot, Q, last), axis=1)
+    if options.singularity_weight:
+        cost -= options.singularity_weight * manipulability(robot, Q, not target.oriented)
+
+    accepted = accept(Q)
+    if not accepted.all():
+        reached &= accepted
+        cost += reach_of(robot) * ~accepted
+
+    return Score(cost, distance, angle, reached)
+
+
+def manipulability(robot: Robot, Q: Matrix, position_only: bool) -> Vector:
+    """Product of the singular values of the Jacobian, sqrt(det(J J^T)) [31], lengths in units of the reach.
+
+    Args:
+        robot: The arm.
+        Q: Shape (m, dof).
+        position_only: Whether the task is the position of the tip, not its pose.
+
+    Returns:
+        Shape (m,).
+    """
+    J = jacobians(robot, Q)
+    J[:, :3] /= reach_of(robot)
+    if position_only:
+        J = J[:, :3]
+    values: Vector = np.linalg.svd(J, compute_uv=False).prod(axis=1)
+    return values

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import TAU, Matrix, Vector
-from rrtik_ompl.ik.method_interface import Target
 from rrtik_ompl.ik.residual import twist
 from rrtik_ompl.ik.tip_columns import tip_columns
+from rrtik_ompl.model.goal import Target
 from rrtik_ompl.model.robot import Robot, poses
 
 REACH_PER_TURN = 1.0  # a full turn of the tip counts as far as so many times the reach, unless given

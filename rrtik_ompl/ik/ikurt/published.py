@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rrtik_ompl.base.arrays import Vector
+from rrtik_ompl.base.budget import Stop
 from rrtik_ompl.ik.ikurt.metric import Metric
 from rrtik_ompl.ik.ikurt.tree import IkurtTree
 
@@ -34,10 +35,11 @@ class Steps:
     even: bool = False
 
 
+@dataclass(eq=False)
 class PublishedSearch:
     """One tree, greedy in the workspace, with one step of a basic RRT after every failure.
 
-    Args:
+    Attributes:
         metric: Distance from the goal.
         steps: The numbers.
         lower, upper: Bounds of the samples, shape (n,).
@@ -45,32 +47,26 @@ class PublishedSearch:
         stop: True when the time is up.
         rng: Random numbers.
         start: Shape (n,).
+        tree: Grown from there.
+        connects: How often CONNECT was tried.
     """
 
-    def __init__(
-        self,
-        metric: Metric,
-        steps: Steps,
-        lower: Vector,
-        upper: Vector,
-        motion_free: Callable[[Vector, Vector], bool],
-        stop: Callable[[], object],
-        rng: np.random.Generator,
-        start: Vector,
-    ) -> None:
-        self._metric = metric
-        self._steps = steps
-        self._lower = lower
-        self._upper = upper
-        self._motion_is_free = motion_free
-        self._stop = stop
-        self._rng = rng
-        self.tree = IkurtTree(start[None], metric.distance(start[None]))
+    metric: Metric
+    steps: Steps
+    lower: Vector
+    upper: Vector
+    motion_free: Callable[[Vector, Vector], bool]
+    stop: Stop
+    rng: np.random.Generator
+    start: Vector
+
+    def __post_init__(self) -> None:
+        self.tree = IkurtTree(self.start[None], self.metric.distance(self.start[None]))
         self.connects = 0
 
     def run(self) -> int | None:
         """Algorithm 4: the vertex at the goal, or None if the time was up first."""
-        while not self._stop():
+        while not self.stop():
             vertex = int(self.tree.distance.argmin())
             self.connects += 1
             vertex, reached = self._connect(vertex)
@@ -80,21 +76,21 @@ class PublishedSearch:
             # one step of a basic RRT after every failure
             q_rand = self._random()
             near = int(self.tree.nearest(q_rand[None])[0])
-            q_new = self._inside(_extend(self.tree.q[near], q_rand, self._steps.step))
-            if self._motion_is_free(self.tree.q[near], q_new):
+            q_new = self._inside(_extend(self.tree.q[near], q_rand, self.steps.step))
+            if self.motion_free(self.tree.q[near], q_new):
                 self._add(q_new, near, self._distance(q_new))
         return None
 
     def _connect(self, near: int) -> tuple[int, bool]:
         """Algorithm 5: step after step, until one is blocked; the last vertex, and whether it is at the goal."""
-        delta = self._steps.step
+        delta = self.steps.step
         missed = 0
         q_near = self.tree.q[near].copy()
-        while not self._stop():
+        while not self.stop():
             q_new = self._towards_any(q_near, delta)
-            if not self._motion_is_free(q_near, q_new):
+            if not self.motion_free(q_near, q_new):
                 missed += 1
-                if missed > self._steps.misses:
+                if missed > self.steps.misses:
                     break
                 continue
 
@@ -105,32 +101,32 @@ class PublishedSearch:
                 q_near = q_new
 
             best = float(self.tree.distance[near])
-            if best <= self._steps.accuracy:
+            if best <= self.steps.accuracy:
                 return near, True
-            if best < self._steps.threshold:
-                delta = best * self._steps.step / self._steps.threshold
+            if best < self.steps.threshold:
+                delta = best * self.steps.step / self.steps.threshold
         return near, False
 
     def _towards_any(self, q: Vector, delta: float) -> Vector:
         """A step from a configuration in a random direction, or towards a random sample, as the options say."""
-        if not self._steps.even:
+        if not self.steps.even:
             return self._inside(_extend(q, self._random(), delta))
-        direction = self._rng.normal(size=len(q))
+        direction = self.rng.normal(size=len(q))
         return self._inside(q + direction * (delta / np.linalg.norm(direction)))
 
     def _inside(self, q: Vector) -> Vector:
         """A configuration clipped to the limits, where a step may leave them."""
         # as published, samples lie inside the limits, and with them all steps towards samples
-        cannot_leave = self._steps.beyond == 0.0 and not self._steps.even
-        return q if cannot_leave else np.clip(q, self._lower, self._upper)
+        cannot_leave = self.steps.beyond == 0.0 and not self.steps.even
+        return q if cannot_leave else np.clip(q, self.lower, self.upper)
 
     def _distance(self, q: Vector) -> float:
-        return float(self._metric.distance(q[None])[0])
+        return float(self.metric.distance(q[None])[0])
 
     def _random(self) -> Vector:
         """A uniform sample, shape (n,), in the limits widened by the share ``beyond`` of their range."""
-        margin = self._steps.beyond * (self._upper - self._lower)
-        return self._rng.uniform(self._lower - margin, self._upper + margin)
+        margin = self.steps.beyond * (self.upper - self.lower)
+        return self.rng.uniform(self.lower - margin, self.upper + margin)
 
     def _add(self, q: Vector, parent: int, distance: float) -> int:
         return int(self.tree.add(q[None], np.array([parent]), np.array([distance]))[0])

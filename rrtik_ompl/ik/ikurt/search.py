@@ -17,9 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector
-from rrtik_ompl.ik.ikurt.descent import descend
-from rrtik_ompl.ik.ikurt.metric import ConfigurationMetric, TipMetric
+from rrtik_ompl.base.budget import Stop
+from rrtik_ompl.ik.ikurt.metric import ConfigurationMetric, TipMetric, reach
 from rrtik_ompl.ik.ikurt.tree import IkurtTree
+from rrtik_ompl.ik.residual import shortened
+from rrtik_ompl.model.robot import poses_and_jacobians
 
 DIRECTIONS = 16  # that CONNECT tries at once
 PATIENCE = 8  # CONNECT goes on as long as so many rounds bring the distance down
@@ -39,6 +41,15 @@ DESCENTS = 2  # from vertices of a batch of exploration,
 SCOUTS = 22  # and from samples anywhere, for other goal configurations
 RARE = 32  # once a goal configuration is known, descents follow one batch in so many
 MAX_GOALS = 64  # configurations that are known; further ones do not become roots
+
+# Of a descent by the Jacobian:
+ITERATIONS = 24
+DAMPING = 1e-6  # the constant part, in units of the squared residual
+LARGEST_STEP = 0.5  # [rad] or [m] of any joint in one iteration
+ACCURACY = 1e-9  # of the reach; less where the goal wants that
+SHARE = 0.1  # of the distance within which the goal counts as reached
+STALE = 4  # iterations in which the distance has to fall to FALLS of what it was, or the row is given up
+FALLS = 0.7
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,21 +75,20 @@ class IkurtValidity:
 
     free: Callable[[Matrix], Mask]
     motions_free: Callable[[Matrix, Matrix], Mask]
-    stop: Callable[[], object]
+    stop: Stop
 
 
+@dataclass(eq=False)
 class BatchedSearch:
     """The tree from the start, and the one from what is found at the goal; see the module.
 
-    Args:
+    Attributes:
         metric: Distance from the goal.
         options: How to work.
         lower, upper: Bounds, shape (n,).
         validity: What is free.
         rng: Random numbers.
         starts: Roots, shape (k, n).
-
-    Attributes:
         tree: The tree from the start, the last one after restarts.
         back: The tree from goal configurations that are known, likewise.
         goals: Those, shape (k, n).
@@ -86,24 +96,17 @@ class BatchedSearch:
         connects, restarts, vertices: Counts.
     """
 
-    def __init__(
-        self,
-        metric: TipMetric | ConfigurationMetric,
-        options: Options,
-        lower: Vector,
-        upper: Vector,
-        validity: IkurtValidity,
-        rng: np.random.Generator,
-        starts: Matrix,
-    ) -> None:
-        self._metric = metric
-        self._options = options
-        self._lower = lower
-        self._upper = upper
-        self._validity = validity
-        self._rng = rng
-        self._starts = starts
+    metric: TipMetric | ConfigurationMetric
+    options: Options
+    lower: Vector
+    upper: Vector
+    validity: IkurtValidity
+    rng: np.random.Generator
+    starts: Matrix
 
+    def __post_init__(self) -> None:
+        starts = self.starts
+        metric = self.metric
         self._distances = metric.distance(starts)  # of the starts from the goal, shape (k,)
         self.goals = metric.goals if isinstance(metric, ConfigurationMetric) else starts[:0]
         self.tree = IkurtTree(starts, self._distances)
@@ -134,21 +137,21 @@ class BatchedSearch:
 
     def run(self) -> Matrix | None:
         """The path to the goal, shape (k, n), or None if the time was up first."""
-        if self._least_distance <= self._metric.radius:
+        if self._least_distance <= self.metric.radius:
             return self.tree.branch(int(self._distances.argmin()))
 
         batches = 1  # of exploration before the next CONNECT
         path = self._finish(np.arange(self.tree.size))
-        while path is None and not self._validity.stop():
+        while path is None and not self.validity.stop():
             for _ in range(batches):
                 path = self._explore()
-                if path is not None or self._validity.stop():
+                if path is not None or self.validity.stop():
                     return path
 
             path = self._connect(self.tree.best())
             max_batches = MAX_EXPLORATIONS if self.back.size else MAX_EXPLORATIONS_WITH_CONNECT
             batches = min(2 * batches, max_batches)
-            if self.tree.size > self._options.most_vertices:
+            if self.tree.size > self.options.most_vertices:
                 self._restart()
                 batches = 1
         return path
@@ -157,14 +160,14 @@ class BatchedSearch:
         """From one vertex down the metric; the path to the goal, or None at the end of the patience."""
         self.connects += 1
         vertex = first
-        step = self._options.step
+        step = self.options.step
         shortest = SHORTEST * step
         path = self._finish(np.array([vertex]))
         distance_at_descent = self.tree.distance[vertex]
         distance_at_check = distance_at_descent
 
         for number in count(1):
-            if path is not None or self._validity.stop():
+            if path is not None or self.validity.stop():
                 return path
 
             lower = self._downhill(vertex, step)
@@ -175,7 +178,7 @@ class BatchedSearch:
                 vertex = lower
 
             distance = self.tree.distance[vertex]
-            if distance <= self._metric.radius:
+            if distance <= self.metric.radius:
                 path = self._finish(np.array([vertex]))
                 return self.tree.branch(vertex) if path is None else path
             if distance < NEARER * distance_at_descent:
@@ -183,7 +186,7 @@ class BatchedSearch:
                 distance_at_descent = distance
 
             if number % PATIENCE == 0:
-                wanted_fall = FALL if self._options.jacobian else SLOW_FALL
+                wanted_fall = FALL if self.options.jacobian else SLOW_FALL
                 if distance > wanted_fall * distance_at_check:
                     break
                 distance_at_check = distance
@@ -193,14 +196,14 @@ class BatchedSearch:
     def _downhill(self, vertex: int, step: float) -> int | None:
         """The best of some free steps that lower the distance, as a new vertex."""
         q = self.tree.q[vertex]
-        directions = self._rng.normal(size=(DIRECTIONS, len(q)))
+        directions = self.rng.normal(size=(DIRECTIONS, len(q)))
         directions *= step / np.linalg.norm(directions, axis=1, keepdims=True)
-        candidates = np.clip(q + directions, self._lower, self._upper)
-        distances = self._metric.distance(candidates)
+        candidates = np.clip(q + directions, self.lower, self.upper)
+        distances = self.metric.distance(candidates)
 
         order = np.argsort(distances)[:CHECKED]
         order = order[distances[order] < self.tree.distance[vertex]]
-        free = self._validity.motions_free(np.broadcast_to(q, (len(order), len(q))), candidates[order])
+        free = self.validity.motions_free(np.broadcast_to(q, (len(order), len(q))), candidates[order])
         if not free.any():
             return None
         k = order[free.argmax()]
@@ -227,7 +230,7 @@ class BatchedSearch:
 
     def _grow(self, tree: IkurtTree) -> NDArray[np.int64]:
         """Steps of a basic RRT, many at once; the new vertices."""
-        samples = self._rng.uniform(self._lower, self._upper, (SAMPLES, len(self._lower)))
+        samples = self.rng.uniform(self.lower, self.upper, (SAMPLES, len(self.lower)))
         drawn = min(int(TOWARDS_OTHER * SAMPLES), len(self._newest)) if self.back.size else 0
         samples[:drawn] = self._newest[:drawn]
 
@@ -236,38 +239,38 @@ class BatchedSearch:
         ends = roots.copy()
         towards = samples - roots
         length = np.linalg.norm(towards, axis=1)
-        step = towards * np.minimum(1.0, self._options.stride / np.maximum(length, 1e-12))[:, None]
+        step = towards * np.minimum(1.0, self.options.stride / np.maximum(length, 1e-12))[:, None]
         going = np.flatnonzero(length > 0.0)
         moved = np.zeros(SAMPLES, dtype=bool)
 
         for piece in PIECES:
             further = roots[going] + piece * step[going]
-            free = self._validity.motions_free(roots[going], further)  # from the vertex on: an edge is asked as a whole
+            free = self.validity.motions_free(roots[going], further)  # from the vertex on: an edge is asked as a whole
             going = going[free]
             ends[going] = further[free]
             moved[going] = True
 
-        return tree.add(ends[moved], near[moved], self._metric.distance(ends[moved]))
+        return tree.add(ends[moved], near[moved], self.metric.distance(ends[moved]))
 
     def _worth_it(self, new: NDArray[np.int64]) -> NDArray[np.int64]:
         """Of new vertices those from which to descend: the nearest one in the workspace, and others by chance."""
         nearest = new[self.tree.distance[new].argmin()]
-        others = self._rng.choice(new, min(DESCENTS - 1, len(new)), replace=False)
+        others = self.rng.choice(new, min(DESCENTS - 1, len(new)), replace=False)
         return np.unique(np.append(others, nearest))
 
     def _finish(self, vertices: NDArray[np.int64], scouts: int = 0) -> Matrix | None:
         """Descend from vertices, shape (k,), and go straight to what that finds; descend from some samples too."""
-        if isinstance(self._metric, ConfigurationMetric):
+        if isinstance(self.metric, ConfigurationMetric):
             return self._join(self.tree, vertices, self.back)
-        if not self._options.jacobian:
+        if not self.options.jacobian:
             return None
 
-        samples = self._rng.uniform(self._lower, self._upper, (scouts, len(self._lower)))
+        samples = self.rng.uniform(self.lower, self.upper, (scouts, len(self.lower)))
         origins = np.vstack([self.tree.q[vertices], samples])
-        ends = descend(self._metric, origins, self._lower, self._upper)
+        ends = descend(self.metric, origins, self.lower, self.upper)
         self._see(ends.q, ends.distance)
 
-        arrived = ends.distance <= self._metric.radius
+        arrived = ends.distance <= self.metric.radius
         near = arrived[: len(vertices)]
         path = self._straight(vertices[near], ends.q[: len(vertices)][near])
         return self._remember(ends.q[arrived]) if path is None and arrived.any() else path
@@ -275,7 +278,7 @@ class BatchedSearch:
     def _join(self, tree: IkurtTree, vertices: NDArray[np.int64], other: IkurtTree) -> Matrix | None:
         """The path from the root of one tree to that of the other over the first free motion between two vertices."""
         near = other.nearest(tree.q[vertices])
-        free = self._validity.motions_free(tree.q[vertices], other.q[near])
+        free = self.validity.motions_free(tree.q[vertices], other.q[near])
         if not free.any():
             return None
         k = int(free.argmax())
@@ -283,7 +286,7 @@ class BatchedSearch:
 
     def _straight(self, vertices: NDArray[np.int64], goals: Matrix) -> Matrix | None:
         """The path over the first free motion from vertices to goal configurations."""
-        free = self._validity.motions_free(self.tree.q[vertices], goals)
+        free = self.validity.motions_free(self.tree.q[vertices], goals)
         if not free.any():
             return None
         k = int(free.argmax())
@@ -295,7 +298,7 @@ class BatchedSearch:
         Returns:
             The path from the start if one of them can be reached straight from the other tree, shape (m, n), or None.
         """
-        free = self._validity.free(q)
+        free = self.validity.free(q)
         self.blocked = np.vstack([self.blocked, q[~free]])[:1]
         if len(self.goals) >= MAX_GOALS or not free.any():
             return None
@@ -316,5 +319,70 @@ class BatchedSearch:
         self._see(self.tree.q, self.tree.distance)
         self._dropped += self.tree.size + self.back.size
         self.restarts += 1
-        self.tree = IkurtTree(self._starts, self._distances)
+        self.tree = IkurtTree(self.starts, self._distances)
         self.back = IkurtTree(self.goals, np.zeros(len(self.goals)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Descent:
+    """Where some configurations have led to: the best of each row, shape (m, n), and its distance, shape (m,)."""
+
+    q: Matrix
+    distance: Vector
+
+
+def descend(metric: TipMetric, Q: Matrix, lower: Vector, upper: Vector, *, iterations: int = ITERATIONS) -> Descent:
+    """Walk from each row of Q, shape (m, n), towards the goal, inside bounds of shape (n,): steps by the Jacobian.
+
+    Levenberg-Marquardt [22], as in :mod:`rrtik_ompl.ik.reference_descent`: the damping is half the squared residual
+    plus a small constant. Joints that a step would push through a bound are held and the step is solved for again, so
+    that goals on a limit are reached.
+    """
+    length = reach(metric.robot) * metric.unit
+    enough = min(ACCURACY * length, SHARE * metric.radius)
+    best = Q.copy()
+    best_distance = np.full(len(Q), np.inf)
+    history = np.full((STALE, len(Q)), np.inf)
+    rows = np.arange(len(Q))
+    q = Q
+
+    for step in range(iterations):
+        metric.evaluations += len(rows)
+        tips, J = poses_and_jacobians(metric.robot, q)
+        e, distance = metric.pull(tips)
+
+        better = distance < best_distance[rows]
+        best[rows[better]] = q[better]
+        best_distance[rows[better]] = distance[better]
+
+        going = (distance > enough) & (best_distance[rows] < FALLS * history[step % STALE, rows])
+        history[step % STALE, rows] = best_distance[rows]
+        if not going.any():
+            break
+
+        rows = rows[going]
+        q = q[going]
+        J = J[going]
+        e = e[going] / length
+        q = _stepped(q, J * (metric.scale / length)[:, None], e, lower, upper)
+
+    return Descent(best, best_distance)
+
+
+def _stepped(q: Matrix, J: NDArray[np.float64], e: Matrix, lower: Vector, upper: Vector) -> Matrix:
+    """One step of each row inside the bounds; joints that would leave them are held."""
+    dq = bounded_step(J, e)
+    pinned = ((q <= lower) & (dq < 0.0)) | ((q >= upper) & (dq > 0.0))
+    again = pinned.any(axis=1)
+    if again.any():
+        dq[again] = bounded_step(J[again] * ~pinned[again][:, None], e[again])
+    stepped: Matrix = np.clip(q + dq, lower, upper)
+    return stepped
+
+
+def bounded_step(J: NDArray[np.float64], e: Matrix) -> Matrix:
+    """Solve (J^T J + (e^T e / 2 + DAMPING) I) dq = J^T e for every row; shapes (m, k, n), (m, k) -> (m, n)."""
+    damping: Vector = 0.5 * np.einsum("mi,mi->m", e, e) + DAMPING
+    normal = np.einsum("mki,mkj->mij", J, J) + damping[:, None, None] * np.eye(J.shape[2])
+    step = np.linalg.solve(normal, np.einsum("mki,mk->mi", J, e)[..., None])[..., 0]
+    return shortened(step, LARGEST_STEP)

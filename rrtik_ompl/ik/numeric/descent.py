@@ -6,10 +6,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector
-from rrtik_ompl.ik.goal_rows import goal_rows
-from rrtik_ompl.ik.numeric.kernel_call import KernelCall, spare_calls
+from rrtik_ompl.ik.kernel_tables import SEEDS, KernelCall, limb_of, seeded_limb_of, seeds_of, spare_calls
 from rrtik_ompl.ik.reference_descent import farness, walk_plainly
-from rrtik_ompl.ik.serial_chain import SEEDS, limb_of, seeded_limb_of, seeds_of
+from rrtik_ompl.ik.targets import goal_rows
 from rrtik_ompl.kernels.ik.ik_layout import KERNELS, LimbTable
 from rrtik_ompl.kernels.simd.library import Library, library
 from rrtik_ompl.model.goal import TipGoal
@@ -27,7 +26,7 @@ def walk(
 
     Args:
         robot: The arm.
-        aims: Goals, see `rrtik_ompl.ik.goal_rows`, one for each start or one for all, shape (m, 18) or (1, 18).
+        aims: Goals, see `rrtik_ompl.ik.targets`, one for each start or one for all, shape (m, 18) or (1, 18).
         starts: Shape (m, dof).
         steps: At most.
         patience: Steps after which a start that has not come nearer is given up; never if None.
@@ -60,7 +59,7 @@ class SearchOfOne:
 
     Args:
         kernels: The library.
-        limb: With seeds, see `rrtik_ompl.ik.serial_chain`.
+        limb: With seeds, see `rrtik_ompl.ik.kernel_tables`.
         aim: The goal, shape (1, 18).
         near: Posture inside the limits to start from, shape (dof,).
 
@@ -97,7 +96,7 @@ class Search:
 
     Args:
         robot: The arm.
-        aims: Goals, see `rrtik_ompl.ik.goal_rows`, shape (m, 18).
+        aims: Goals, see `rrtik_ompl.ik.targets`, shape (m, 18).
         near: Posture to start from, shape (dof,) or (m, dof).
 
     Attributes:

@@ -1,4 +1,4 @@
-"""Methods that walk from a start towards a goal, made into methods of `solve_ik`: many starts, round after round."""
+"""Methods of `solve_ik` that walk from many starts: Levenberg-Marquardt, and any other walk, round after round."""
 
 from __future__ import annotations
 
@@ -11,17 +11,93 @@ from typing import TypeAlias
 import numpy as np
 
 from rrtik_ompl.base.arrays import TAU, Matrix, Vector
-from rrtik_ompl.ik.goal_rows import goal_rows
-from rrtik_ompl.ik.method_interface import IkRequest, IkResponse, Target
-from rrtik_ompl.ik.numeric.descent import Search, walk
+from rrtik_ompl.ik.kernel_tables import seeded_limb_of
+from rrtik_ompl.ik.method_interface import IkRequest, IkResponse, mid_range_configuration
+from rrtik_ompl.ik.numeric.descent import PATIENCE, STEPS, Search, SearchOfOne, walk
+from rrtik_ompl.ik.targets import goal_rows
+from rrtik_ompl.kernels.ik.ik_layout import KERNELS
+from rrtik_ompl.kernels.simd.library import library
+from rrtik_ompl.model.goal import Target, TipGoal
 from rrtik_ompl.model.robot import Robot, inside_limits
 
+AT_ONCE = 32  # members of a goal, between two readings of the clock, when others have their turn
 STARTS = 32  # in one round
 MAX_ROUNDS = 16  # after which it gives up
 MEMBERS = 4  # of a region, that are searched once more to say why there is no solution
 
 # From (robot, goal, starts of shape (m, dof)) to where each start has led to, shape (m, dof), and the steps taken.
 Walk: TypeAlias = Callable[[Robot, Target, Matrix], tuple[Matrix, int]]
+
+
+def numeric(request: IkRequest) -> IkResponse:
+    """The method of `solve_ik`: solutions of many members of the goal side by side until one will do."""
+    if request.all:
+        return _many(request)
+    aims = aims_of(request)
+    kernels = library(KERNELS)
+    limb = seeded_limb_of(request.robot)
+    if len(aims) == 1 and kernels is not None and limb is not None:
+        near = request.near
+        if near is not mid_range_configuration(request.robot):  # the default, which needs no clamping
+            near = request.robot.clamp(near)
+        return _alone(request, SearchOfOne(kernels, limb, aims, near))
+
+    search = Search(request.robot, aims, request.near)
+    waiting = np.arange(len(aims))
+    found = []
+    timed_out = False
+    while len(waiting):
+        going = waiting[:AT_ONCE]
+        waiting = waiting[AT_ONCE:]
+        going = going[search.advance(going)]
+        found.append(search.q[going])
+        timed_out = time.monotonic() > request.deadline
+        if timed_out or request.accept(found[-1]).any():
+            break
+        waiting = np.concatenate([waiting, going])
+
+    return _answered(request, np.concatenate(found), search.steps, timed_out)
+
+
+def _alone(request: IkRequest, search: SearchOfOne) -> IkResponse:
+    """The same for a goal of one member."""
+    found = [search.advance()]
+    timed_out = time.monotonic() > request.deadline
+    while not timed_out and len(found[-1]) and not request.accept(found[-1])[0]:
+        found.append(search.advance())
+        timed_out = time.monotonic() > request.deadline
+    search.close()
+    return _answered(request, found[0] if len(found) == 1 else np.concatenate(found), search.steps, timed_out)
+
+
+def _many(request: IkRequest) -> IkResponse:
+    """Solutions from many random starts, as different as they come."""
+    robot = request.robot
+    steps = 0
+    timed_out = False
+    found = [np.zeros((0, robot.dof))]
+    aims = aims_of(request)
+
+    for number in range(MAX_ROUNDS):
+        Q = request.rng.uniform(*robot.finite_range(), (STARTS, robot.dof))
+        if number == 0:
+            Q[0] = request.near
+        Q, reached, taken = walk(robot, aims[(number * STARTS + np.arange(STARTS)) % len(aims)], Q, patience=PATIENCE)
+        found.append(Q[reached])
+        steps += taken
+        timed_out = time.monotonic() > request.deadline
+        if timed_out:
+            break
+
+    return _answered(request, np.vstack(found), steps, timed_out)
+
+
+def _answered(request: IkRequest, found: Matrix, steps: int, timed_out: bool) -> IkResponse:
+    """The response with what was found, shape (k, dof), or else with the posture that comes nearest."""
+    if len(found):
+        return IkResponse(found, request.near, steps, timed_out)
+    searched = not request.all and not timed_out
+    return IkResponse(found, nearest_posture(request, searched=searched), steps, timed_out)
 
 
 def restarted(method: Walk, request: IkRequest, *, starts: int = STARTS, rounds: int = MAX_ROUNDS) -> IkResponse:
@@ -78,13 +154,6 @@ def nearest_posture(request: IkRequest, *, searched: bool = False) -> Vector:
     return nearest
 
 
-def aims_of(request: IkRequest) -> Matrix:
-    """Rows of the goal, see `rrtik_ompl.ik.goal_rows`; of targets drawn from it if it has task-space regions."""
-    if request.goal.has_regions:
-        return np.vstack([goal_rows(target) for target in request.targets])
-    return goal_rows(request.goal)
-
-
 @lru_cache(maxsize=64)
 def _turning_freely(robot: Robot) -> Robot:
     """The robot with a full turn to either side in place of its limits."""
@@ -94,3 +163,32 @@ def _turning_freely(robot: Robot) -> Robot:
         lower=np.where(turning, -TAU, robot.lower),
         upper=np.where(turning, TAU, robot.upper),
     )
+
+
+def aims_of(request: IkRequest) -> Matrix:
+    """Rows of the goal, see `rrtik_ompl.ik.targets`; of targets drawn from it if it has task-space regions."""
+    if request.goal.has_regions:
+        return np.vstack([goal_rows(target) for target in request.targets])
+    return goal_rows(request.goal)
+
+
+def numeric_ik(robot: Robot, goal: TipGoal, starts: Matrix, *, iterations: int = STEPS) -> Matrix:
+    """Move configurations towards a goal, each from its own start, inside the joint limits.
+
+    Args:
+        robot: The arm.
+        goal: A pose, a position with any orientation, or a region of these; its members take turns.
+        starts: Shape (m, dof).
+        iterations: Steps at most.
+
+    Returns:
+        The rows that satisfy the goal, in the order of their starts, shape (k, dof), k <= m.
+
+    Raises:
+        InputError: If the goal is a task-space region or has one: `rrtik_ompl.ik.numeric.projection` is for these.
+    """
+    aims = goal_rows(goal)
+    if len(aims) > 1:
+        aims = aims[np.arange(len(starts)) % len(aims)]
+    Q, _, _ = walk(robot, aims, starts, steps=iterations, patience=PATIENCE)
+    return Q[goal.satisfied(robot, Q)]

@@ -11,9 +11,8 @@ from functools import lru_cache
 import numpy as np
 
 from rrtik_ompl.base.arrays import Matrix, Vector, frozen
-from rrtik_ompl.ik.numeric.kernel_call import KernelCall
+from rrtik_ompl.ik.kernel_tables import KernelCall, limb_of
 from rrtik_ompl.ik.reference_descent import LARGEST_STEP, PER_CHORD
-from rrtik_ompl.ik.serial_chain import limb_of
 from rrtik_ompl.ik.tip_columns import tip_columns
 from rrtik_ompl.kernels.ik import rail_layout
 from rrtik_ompl.kernels.ik.ik_layout import AIM_FLOATS, CHORD_TOLERANCE, FREE_TURN, NO_TURN, POSITION_TOLERANCE

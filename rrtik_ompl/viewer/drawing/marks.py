@@ -19,7 +19,7 @@ from rrtik_ompl.viewer.drawing.triangles import tube
 if TYPE_CHECKING:
     from typing_extensions import Unpack
 
-    from rrtik_ompl.ik.reach.grid_map import ReachMap
+    from rrtik_ompl.ik.reach import ReachMap
 
 TUBE_SIDES = 6  # few, for there may be thousands of tubes
 BALL_SEGMENTS = 48

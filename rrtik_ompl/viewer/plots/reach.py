@@ -10,7 +10,7 @@ import numpy as np
 
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.files.text import known_ending
-from rrtik_ompl.ik.reach.grid_map import Slice
+from rrtik_ompl.ik.reach import Slice
 from rrtik_ompl.viewer.plots.joints import FORMATS, save_figure, tidy
 
 if TYPE_CHECKING:

@@ -8,9 +8,7 @@ import rrtik_ompl as rrtik
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.base.poses import pose_from_rpy
 from rrtik_ompl.description.dh import DhRow, robot_from_dh
-from rrtik_ompl.ik.baselines.ccd import ccd
-from rrtik_ompl.ik.baselines.fabrik import fabrik
-from rrtik_ompl.ik.baselines.joint_axes import Swing
+from rrtik_ompl.ik.baselines.one_joint import Swing, ccd, fabrik
 from rrtik_ompl.ik.residual import twist
 from rrtik_ompl.model.shapes import Sphere
 

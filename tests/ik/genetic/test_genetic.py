@@ -12,11 +12,18 @@ from rrtik_bench.genetic.published import INCH, curve
 from rrtik_ompl.base.errors import InputError, UnknownNameError
 from rrtik_ompl.ik.analytic.analytic_solver import wrapped
 from rrtik_ompl.ik.analytic.closed_form import solutions
-from rrtik_ompl.ik.genetic.breeding import children
-from rrtik_ompl.ik.genetic.genes import LARGEST, Window, around, from_gray, random_genes, to_gray, whole_range
-from rrtik_ompl.ik.genetic.objective import manipulability, score
 from rrtik_ompl.ik.genetic.options import HISTORICAL, STANDARD, GeneticOptions
-from rrtik_ompl.ik.genetic.search import follow_targets
+from rrtik_ompl.ik.genetic.population import (
+    LARGEST,
+    Window,
+    around,
+    children,
+    from_gray,
+    random_genes,
+    to_gray,
+    whole_range,
+)
+from rrtik_ompl.ik.genetic.search import follow_targets, manipulability, score
 from rrtik_ompl.model.tip_distance import reach_of
 
 TOLERANCE = 0.002 * INCH

@@ -13,10 +13,9 @@ import rrtik_ompl as rrtik
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.base.poses import pose
 from rrtik_ompl.cli.plan_report import summary
-from rrtik_ompl.ik.ikurt.descent import descend
 from rrtik_ompl.ik.ikurt.metric import TipMetric, reach
 from rrtik_ompl.ik.ikurt.published import PublishedSearch, Steps
-from rrtik_ompl.ik.ikurt.search import BatchedSearch, IkurtValidity, Options
+from rrtik_ompl.ik.ikurt.search import BatchedSearch, IkurtValidity, Options, descend
 from rrtik_ompl.ik.ikurt.tree import FIRST_ROOM, IkurtTree
 from rrtik_ompl.model.goal import GoalSet, PoseGoal, PositionGoal, Target
 from rrtik_ompl.model.shapes import Sphere

@@ -10,13 +10,13 @@ import rrtik_ompl as rrtik
 from rrtik_ompl.base.errors import InputError, UnknownNameError
 from rrtik_ompl.description.urdf import robot_from_urdf_text
 from rrtik_ompl.ik.batch import solve_ik_batch
-from rrtik_ompl.ik.goal_rows import goal_rows, pose_rows
+from rrtik_ompl.ik.kernel_tables import SEEDS
 from rrtik_ompl.ik.method_interface import mid_range_configuration
 from rrtik_ompl.ik.numeric import descent
 from rrtik_ompl.ik.numeric.descent import Search, walk
-from rrtik_ompl.ik.numeric.levenberg_marquardt import numeric_ik
+from rrtik_ompl.ik.numeric.restarts import numeric_ik
 from rrtik_ompl.ik.reference_descent import walk_plainly
-from rrtik_ompl.ik.serial_chain import SEEDS
+from rrtik_ompl.ik.targets import goal_rows, pose_rows
 from rrtik_ompl.kernels.ik.ik_layout import KERNELS
 from rrtik_ompl.kernels.simd.library import library
 from rrtik_ompl.model.goal import GoalSet, PoseGoal, PositionGoal

@@ -5,7 +5,7 @@ import pytest
 
 from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.ik.goal_configurations import goal_configurations
-from rrtik_ompl.ik.numeric.levenberg_marquardt import numeric_ik
+from rrtik_ompl.ik.numeric.restarts import numeric_ik
 from rrtik_ompl.ik.targets import targets
 from rrtik_ompl.model.goal import GoalSet, PoseGoal, PositionGoal
 from rrtik_ompl.world.problem import Problem

@@ -9,7 +9,7 @@ from rrtik_ompl import Obstacle, Scene, World, load_robot, reach_map
 from rrtik_ompl.base.errors import InputError, UnknownNameError
 from rrtik_ompl.base.poses import pose
 from rrtik_ompl.cli.app import run
-from rrtik_ompl.ik.reach.grid_map import load_reach_map
+from rrtik_ompl.ik.reach import TURNS, load_reach_map
 from rrtik_ompl.ik.singularity import manipulability
 from rrtik_ompl.model.shapes import Box
 from rrtik_ompl.viewer.drawing.marks import cubes, reach_marks
@@ -50,11 +50,9 @@ def test_planar_arms_point_everywhere_near_their_base_and_outwards_at_full_stret
 
 
 def test_the_turns_of_the_first_joint_give_what_forward_kinematics_gives(titan):
-    from rrtik_ompl.ik.reach import sampling
-
     many = reach_map(titan, samples=SAMPLES, measure="samples")
-    assert many.samples == SAMPLES * sampling.TURNS == many.values.sum()
-    Q = np.random.default_rng(0).uniform(titan.lower, titan.upper, (SAMPLES * sampling.TURNS, 6))
+    assert many.samples == SAMPLES * TURNS == many.values.sum()
+    Q = np.random.default_rng(0).uniform(titan.lower, titan.upper, (SAMPLES * TURNS, 6))
     edges = [many.corner[k] + many.size * np.arange(many.values.shape[k] + 1) for k in range(3)]
     plain, _ = np.histogramdd(titan.fk_batch(Q)[:, :3, 3], bins=edges)
     shares = many.values / many.samples - plain / len(Q)

@@ -5,11 +5,10 @@ import pytest
 
 import rrtik_ompl as rrtik
 from rrtik_ompl.base.poses import pose_from_rpy
-from rrtik_ompl.ik.analytic import kernel_branches as module
+from rrtik_ompl.ik.analytic import branches as module
 from rrtik_ompl.ik.analytic.analytic_solver import wrapped
+from rrtik_ompl.ik.analytic.branches import kernel_branches, reference_branches
 from rrtik_ompl.ik.analytic.closed_form import form_of, solutions
-from rrtik_ompl.ik.analytic.kernel_branches import kernel_branches
-from rrtik_ompl.ik.analytic.reference_branches import reference_branches
 from rrtik_ompl.kernels.ik.branch_layout import KERNELS
 from rrtik_ompl.kernels.simd.compiled import WIDTH, kernel
 from rrtik_ompl.kernels.simd.lanes import set_wide_lanes, wide_lanes_at

@@ -5,8 +5,7 @@ import pinocchio as pin
 import pytest
 
 import rrtik_ompl as rrtik
-from rrtik_ompl.ik.numeric.kernel_call import KernelCall
-from rrtik_ompl.ik.serial_chain import limb_of
+from rrtik_ompl.ik.kernel_tables import KernelCall, limb_of
 from rrtik_ompl.kernels.ik import rail_layout
 from rrtik_ompl.kernels.ik.ik_layout import AIM_FLOATS
 from rrtik_ompl.kernels.simd.library import library

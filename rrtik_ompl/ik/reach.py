@@ -1,0 +1,423 @@
+"""Maps of reach by forward kinematics of random postures: in which cell the tip is, and which way it points.
+
+A map is a lower bound: more samples fill more of it.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from io import BytesIO
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rrtik_ompl.base.arrays import TAU, Matrix, Vector, finite_array, frozen, positive, whole_number
+from rrtik_ompl.base.choices import one_of
+from rrtik_ompl.base.copies import as_value, in_one_line
+from rrtik_ompl.base.errors import InputError, at_most
+from rrtik_ompl.files.named_arrays import NamedArrays
+from rrtik_ompl.files.text import known_ending, write_bytes, write_text
+from rrtik_ompl.model.robot import Robot, jacobians, poses
+from rrtik_ompl.world.check_world import check_world
+from rrtik_ompl.world.world import World
+
+SAMPLES = 200_000
+BLOCK = 20_000  # postures at a time
+TURNS = 16  # of the first joint for each of them: the whole arm turns as one body, which needs no kinematics
+CELLS = 18  # of the grid across the farthest reach, if no size is given
+MAX_CELLS = 4_000_000  # 32 MB of values
+MOST_SAMPLES = 1_000_000_000  # some minutes of a processor
+PROBE = 4096  # postures that determine how large the grid must be
+BELOW = 1e-3  # of a cell: the layer of a planar arm ends so far above the arm, which is seen from above
+PROBE_MARGIN = 1.1  # how much larger than what the probe reached
+FORMATS = (".npz", ".csv")
+DIRECTIONS = 64  # one bit each of a 64-bit number
+FINE = 16  # the nearest of them is looked up in a cube of 33 cells a side
+GOLDEN = np.pi * (3.0 - np.sqrt(5.0))  # [rad], the golden angle
+
+Grid = NDArray[np.float64]
+
+
+def reach_map(
+    robot: Robot,
+    *,
+    measure: str = "orientations",
+    cell: float | None = None,
+    samples: int = SAMPLES,
+    world: World | None = None,
+    axis: str | None = None,
+    seed: int = 0,
+) -> ReachMap:
+    """Map where an arm can bring its tip.
+
+    Args:
+        robot: The arm.
+        measure: ``orientations``: share of 64 evenly spread directions (planar arms: of the plane) in which the tip's
+            axis was seen to point; ``manipulability``: the largest product of the Jacobian's singular values
+            seen, sqrt(det(J J^T)) from six joints on [31], metres and radians as they are;
+            ``samples``: how many came.
+        cell: Side of a cell [m]; about an 18th of the reach if None.
+        samples: Postures to draw; where nothing but the arm is considered, each in 16 turns of the first joint.
+        world: If given, only postures that are free count. Its robot must be this one.
+        axis: Of the tip's frame, "x", "y" or "z": what points, for ``orientations``; z if None, of planar arms x.
+        seed: Of the random numbers.
+
+    Raises:
+        UnknownNameError: If there is no such measure.
+        InputError: If an argument makes no sense, or the grid would be too large.
+
+    Example:
+        >>> reach = rrtik.reach_map(rrtik.load_robot("planar3"), samples=2000, seed=1)
+        >>> reach.measure, reach.values.ndim
+        ('orientations', 3)
+    """
+    check_world(world, robot)
+    measure = one_of(MEASURES, measure, "measure of reach")
+    axis = ("x" if robot.planar else "z") if axis is None else axis
+    if not isinstance(axis, str) or axis not in ("x", "y", "z"):
+        raise InputError(f"axis must be x, y or z, got {axis!r:.80}")
+    count = whole_number(samples, "samples", 1)
+    at_most(count, MOST_SAMPLES, "samples")
+    rng = np.random.default_rng(whole_number(seed, "seed"))
+
+    base = poses(robot, np.zeros((1, robot.dof)), robot.link_names[0])[0, :3, 3]
+    corner, size, shape = _grid(robot, base, cell)
+    counter = MEASURES[measure](int(np.prod(shape)), robot.planar)
+    counted = 0
+
+    for points, pointing, quality in _samples(robot, world, counter, "xyz".index(axis), count, rng):
+        cells_of_points = np.floor((points - corner) / size).astype(int)
+        in_grid = ((cells_of_points >= 0) & (cells_of_points < shape)).all(axis=1)
+        cells = np.ravel_multi_index(tuple(cells_of_points[in_grid].T), shape)
+        counter.add(cells, pointing[in_grid], quality[in_grid])
+        counted += len(cells)
+
+    return ReachMap(robot.name, measure, frozen(corner), size, frozen(counter.values.reshape(shape)), counted, base)
+
+
+def _samples(
+    robot: Robot, world: World | None, counter: Counter, axis: int, count: int, rng: np.random.Generator
+) -> Iterator[tuple[Matrix, Matrix, Vector]]:
+    """Where the tip of random postures is, which way it points, shape (m, 3) each, and their quality, shape (m,)."""
+    low, high = robot.finite_range()
+    turn = _first_turn(robot) if world is None else None
+    for begin in range(0, count, BLOCK):
+        Q = rng.uniform(low, high, (min(BLOCK, count - begin), robot.dof))
+        if world is not None:
+            Q = Q[world.valid_batch(Q)]
+
+        tips = poses(robot, Q)
+        quality = counter.quality(robot, Q)
+        points = tips[:, :3, 3]
+        pointing = tips[:, :3, axis]
+        yield points, pointing, quality
+
+        if turn is None:
+            continue
+        for _ in range(TURNS - 1):  # the same arm turned about its first axis: its quality is the same
+            angles = rng.uniform(low[0], high[0], len(Q))
+            points, pointing = turn(points, pointing, angles - Q[:, 0])
+            Q[:, 0] = angles
+            yield points, pointing, quality
+
+
+def _first_turn(robot: Robot) -> Callable[[Matrix, Matrix, Vector], tuple[Matrix, Matrix]] | None:
+    """Turns points and directions, shapes (m, 3), about the first joint's axis by angles, shape (m,).
+
+    None if the first joint does not carry the whole arm by turning it.
+    """
+    chain = robot.chain
+    alone = np.count_nonzero(chain.gain[:, 0]) == 1 and chain.gain[0, 0] == 1.0
+    if robot.prismatic[0] or not alone or np.count_nonzero(chain.parent == -1) != 1:
+        return None
+
+    frame = robot.chain.joint_frames(np.zeros((1, robot.dof)))[0, 1]
+    axis = frame[:3, :3] @ chain.axis[0]
+    origin = frame[:3, 3]
+
+    def turn(points: Matrix, pointing: Matrix, angles: Vector) -> tuple[Matrix, Matrix]:
+        c = np.cos(angles)[:, None]
+        s = np.sin(angles)[:, None]
+
+        def rotated(v: Matrix) -> Matrix:
+            moved: Matrix = c * v + s * np.cross(axis, v) + (1.0 - c) * (v @ axis)[:, None] * axis
+            return moved
+
+        return origin + rotated(points - origin), rotated(pointing)
+
+    return turn
+
+
+def _grid(robot: Robot, base: Vector, cell: float | None) -> tuple[Vector, float, tuple[int, int, int]]:
+    """Corner, cell size and numbers of cells of a grid that holds all tips; the base is on a cell's corner."""
+    rng = np.random.default_rng(0)
+    tips = poses(robot, rng.uniform(*robot.finite_range(), (PROBE, robot.dof)))[:, :3, 3] - base
+    reach = PROBE_MARGIN * float(np.linalg.norm(tips, axis=1).max())
+    if reach == 0.0:
+        raise InputError(f"robot '{robot.name}': no joint moves its tip, so there is nothing to map; name another tip")
+
+    size = reach / CELLS if cell is None else positive(cell, "cell")
+    margin = 0.5 * (PROBE_MARGIN - 1.0) * reach
+
+    with np.errstate(over="ignore"):
+        first = np.floor((tips.min(axis=0) - margin) / size)
+        last = np.ceil((tips.max(axis=0) + margin) / size)
+        if robot.planar:
+            first[2] = BELOW - 1.0
+            last[2] = BELOW
+        numbers = np.maximum(last - first, 1.0)
+        count = float(np.prod(numbers))
+
+    if not count <= MAX_CELLS:
+        raise InputError(f"cell of {size:g} m makes {count:.3g} cells; at most {MAX_CELLS}")
+    shape = tuple(map(int, numbers))
+    return base + size * first, size, (shape[0], shape[1], shape[2])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ReachMap:
+    """A value for every cell of a grid in the world.
+
+    Attributes:
+        robot: Name of the arm.
+        measure: What the values are: one of ``MEASURES``.
+        corner: Low corner of the first cell, shape (3,) [m].
+        size: Side of a cell [m].
+        values: Shape (x, y, z), 0 where no sample came.
+        samples: Postures that counted.
+        base: Where the arm's base is, shape (3,) [m].
+
+    Example:
+        >>> reach = rrtik.reach_map(rrtik.load_robot("planar3"), samples=2000, seed=1)
+        >>> reach.measure, reach.values.ndim
+        ('orientations', 3)
+    """
+
+    robot: str
+    measure: str
+    corner: Vector
+    size: float
+    values: Grid
+    samples: int
+    base: Vector
+
+    __reduce__ = as_value
+    __repr__ = in_one_line
+
+    @property
+    def reached(self) -> NDArray[np.bool_]:
+        """Cells in which a sample came, shape (x, y, z)."""
+        is_inside: NDArray[np.bool_] = self.values > 0.0
+        return is_inside
+
+    @property
+    def flat(self) -> bool:
+        """Whether there is one layer of cells, as for a planar arm."""
+        return bool(self.values.shape[2] == 1)
+
+    @property
+    def volume(self) -> float:
+        """Of these cells [m3]; 0 of a flat map."""
+        return 0.0 if self.flat else float(np.count_nonzero(self.reached)) * self.size**3
+
+    @property
+    def area(self) -> float:
+        """Of these cells seen from above [m2]."""
+        return float(np.count_nonzero(self.reached.any(axis=2))) * self.size**2
+
+    @property
+    def best(self) -> Vector:
+        """Middle of the cell with the largest value, shape (3,) [m]."""
+        place = np.unravel_index(int(np.argmax(self.values)), self.values.shape)
+        middle: Vector = self.corner + self.size * (np.array(place) + 0.5)
+        return middle
+
+    def centres(self, axis: int) -> Vector:
+        """Middles of the cells along an axis, shape (n,) [m]."""
+        axis = whole_number(axis, "axis of a reachability map")
+        at_most(axis, 2, "axis of a reachability map", "0 is x, 1 is y, 2 is z")
+        middles: Vector = self.corner[axis] + self.size * (np.arange(self.values.shape[axis]) + 0.5)
+        return middles
+
+    def value(self, points: Matrix) -> Vector:
+        """The values at points, shape (m, 3) [m]; 0 outside the grid. Shape (m,)."""
+        places = np.floor((finite_array(points, (None, 3), "points") - self.corner) / self.size).astype(int)
+        is_inside = ((places >= 0) & (places < self.values.shape)).all(axis=1)
+        found = np.zeros(len(places))
+        found[is_inside] = self.values[tuple(places[is_inside].T)]
+        return found
+
+    def slices(self) -> list[Slice]:
+        """Two cuts: upright through the base along x, and level at the height where most cells are reached.
+
+        The second alone if there is one layer of cells.
+        """
+        ahead = int(np.clip((self.base[1] - self.corner[1]) / self.size, 0, self.values.shape[1] - 1))
+        level = int(np.argmax(self.reached.sum(axis=(0, 1))))
+        height = self.centres(2)[level]
+        x, y, z = (self.centres(k) for k in range(3))
+        bx, by, bz = (float(value) for value in self.base)
+        side = self.values[:, ahead].T
+        top = self.values[:, :, level].T
+
+        cuts = [
+            Slice(f"side, y = {y[ahead]:.2f} m", "x [m]", "z [m]", x, z, side, base=(bx, bz)),
+            Slice(f"top, z = {height:.2f} m", "x [m]", "y [m]", x, y, top, base=(bx, by)),
+        ]
+        return cuts[1:] if self.flat else cuts
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write everything as .npz, or one row per reached cell (its middle and value) as .csv, whole or not at all.
+
+        Raises:
+            InputError: If the ending is another one or the file cannot be written.
+        """
+        ending = known_ending(path, FORMATS, "map of reach")
+        if ending == ".csv":
+            places = np.argwhere(self.reached)
+            rows = np.column_stack([self.corner + self.size * (places + 0.5), self.values[self.reached]])
+            write_text(path, "\n".join([f"x,y,z,{self.measure}", *(",".join(f"{v:.6g}" for v in r) for r in rows), ""]))
+            return
+
+        data = BytesIO()
+        scalars = {name: getattr(self, name) for name in ("robot", "measure", "size", "samples")}
+        np.savez_compressed(data, corner=self.corner, values=self.values, base=self.base, **scalars)
+        write_bytes(path, data.getvalue())
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Slice:
+    """A picture of values over a plane.
+
+    Attributes:
+        title: What is cut.
+        across, up: Labels of the axes.
+        x, y: Middles of the cells [m], shapes (n,) and (m,).
+        values: Shape (m, n).
+        boxes: Rectangles to draw: low x, low y, high x, high y.
+        points: Places to mark, each x, y.
+        base: Where the arm's base is in this plane.
+        meanings: What values mean, for a legend, where they are no amounts; boxes are then a vehicle, points cameras.
+    """
+
+    title: str
+    across: str
+    up: str
+    x: Vector
+    y: Vector
+    values: Grid
+    boxes: tuple[tuple[float, float, float, float], ...] = ()
+    points: tuple[tuple[float, float], ...] = ()
+    base: tuple[float, float] = (0.0, 0.0)
+    meanings: Mapping[float, str] = field(default_factory=dict)
+
+
+def load_reach_map(path: str | os.PathLike[str]) -> ReachMap:
+    """Read a map that was saved as .npz.
+
+    Raises:
+        InputError: If the file cannot be used.
+
+    Example:
+        >>> rrtik.reach_map(rrtik.load_robot("planar3"), samples=2000, seed=1).save("reach.npz")
+        >>> rrtik.load_reach_map("reach.npz").robot
+        'planar3'
+    """
+    if known_ending(path, FORMATS, "map of reach") != ".npz":
+        raise InputError(f"{path}: only .npz holds a whole map; a .csv cannot be read back")
+    data = NamedArrays(path)
+    try:
+        return ReachMap(
+            robot=str(data["robot"]),
+            measure=str(data["measure"]),
+            corner=frozen(finite_array(data["corner"], (3,), "corner")),
+            size=positive(data["size"], "size"),
+            values=frozen(finite_array(data["values"], (None, None, None), "values")),
+            samples=data.count("samples"),
+            base=frozen(finite_array(data["base"], (3,), "base")),
+        )
+    except InputError as error:
+        raise InputError(f"{path}: is no map of reach: {error}; make one with `rrtik reach ... --out`") from error
+
+
+class Counter:
+    """Collects what the samples of each cell say: here, how many there are."""
+
+    def __init__(self, cells: int, planar: bool) -> None:
+        self.planar = planar
+        self.totals = np.zeros(cells)
+
+    def quality(self, robot: Robot, Q: Matrix) -> Vector:
+        """What does not change when the arm turns as a whole, for each posture, shape (m,)."""
+        del robot
+        return np.ones(len(Q))
+
+    def add(self, cells: NDArray[np.int64], pointing: Matrix, quality: Vector) -> None:
+        """Take in samples: their cells, shape (m,), which way the tip points, shape (m, 3), and their quality."""
+        del pointing
+        np.add.at(self.totals, cells, quality)
+
+    @property
+    def values(self) -> Vector:
+        """What the map says, a number for each cell."""
+        return self.totals
+
+
+class Orientations(Counter):
+    """Which of the directions were seen, a bit for each."""
+
+    def __init__(self, cells: int, planar: bool) -> None:
+        super().__init__(cells, planar)
+        self.seen = np.zeros(cells, dtype=np.uint64)
+        ticks = np.arange(-FINE, FINE + 1)
+        cube = np.stack(np.meshgrid(ticks, ticks, ticks, indexing="ij"), axis=-1).reshape(-1, 3)
+        self.nearest = np.argmax(cube @ _directions(planar).T, axis=1).astype(np.uint64)
+
+    def add(self, cells: NDArray[np.int64], pointing: Matrix, quality: Vector) -> None:
+        """Set the bit of the direction that is nearest to each sample's."""
+        del quality
+        place = np.rint(FINE * pointing).astype(np.int64) + FINE
+        nearest = self.nearest[(place[:, 0] * (2 * FINE + 1) + place[:, 1]) * (2 * FINE + 1) + place[:, 2]]
+        np.bitwise_or.at(self.seen, cells, np.uint64(1) << nearest)
+
+    @property
+    def values(self) -> Vector:
+        """Share of the directions that were seen."""
+        share: Vector = np.bitwise_count(self.seen) / DIRECTIONS
+        return share
+
+
+class Manipulability(Counter):
+    """The largest manipulability that was seen in each cell."""
+
+    def quality(self, robot: Robot, Q: Matrix) -> Vector:
+        """Product of the singular values of the Jacobian [31], as many as there are joints, at most six."""
+        jacobian = jacobians(robot, Q)
+        flipped = jacobian.transpose(0, 2, 1)
+        gram = flipped @ jacobian if robot.dof < 6 else jacobian @ flipped  # the smaller of the two
+        root: Vector = np.sqrt(np.maximum(np.linalg.det(gram), 0.0))
+        return root
+
+    def add(self, cells: NDArray[np.int64], pointing: Matrix, quality: Vector) -> None:
+        """Keep the largest of each cell."""
+        del pointing
+        np.maximum.at(self.totals, cells, quality)
+
+
+def _directions(planar: bool) -> Matrix:
+    """Evenly spread unit vectors, shape (DIRECTIONS, 3): a circle, or a sunflower on the sphere."""
+    if planar:
+        angle = TAU * np.arange(DIRECTIONS) / DIRECTIONS
+        return np.stack([np.cos(angle), np.sin(angle), np.zeros(DIRECTIONS)], axis=1)
+    height = 1.0 - (2.0 * np.arange(DIRECTIONS) + 1.0) / DIRECTIONS
+    turn = GOLDEN * np.arange(DIRECTIONS)
+    radius = np.sqrt(1.0 - height**2)
+    return np.stack([radius * np.cos(turn), radius * np.sin(turn), height], axis=1)
+
+
+MEASURES: Mapping[str, Callable[[int, bool], Counter]] = MappingProxyType(
+    {"orientations": Orientations, "manipulability": Manipulability, "samples": Counter}
+)
