@@ -1,4 +1,4 @@
-"""Reference rasteriser in double precision, one triangle after the other: slow, and it judges `overlay.canvas`."""
+"""Reference rasteriser in double precision, one triangle after the other: slow, and it judges `overlay.rasterizer`."""
 
 from __future__ import annotations
 

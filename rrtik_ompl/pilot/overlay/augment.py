@@ -135,7 +135,7 @@ class Augmenter:
 
         self._figures: dict[Hashable, tuple[tuple[Obstacle, ...], Figure]] = {}
         self._shapes = ShapeSurfaces()
-        self._last: Layer | None = None
+        self._last: Layer  # drawn
 
     def draw(
         self,
@@ -192,13 +192,8 @@ class Augmenter:
     def depths(self) -> NDArray[np.float32]:
         """Depths of the arm and obstacles drawn last. Shape (height, width).
 
-        They are `canvas.FARTHEST_DRAWN` where there was nothing.
-
-        Raises:
-            InputError: If nothing was drawn yet.
+        They are `rasterizer.FARTHEST_DRAWN` where there was nothing.
         """
-        if self._last is None:
-            raise InputError("depths: draw a picture first")
         return self._last.depths.copy()
 
     def _draw_ghost(

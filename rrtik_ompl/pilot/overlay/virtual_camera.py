@@ -6,7 +6,6 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.base.arrays import finite_array, finite_number, positive
 from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.viewer.drawing import palette
 
@@ -26,19 +25,12 @@ def orbit_pose(centre: ArrayLike, distance: float, azimuth: float, elevation: fl
         distance: From there [m].
         azimuth: Of the camera, seen from the centre, from the x axis towards y [rad].
         elevation: Above the horizon [rad]; straight from above the x axis points to the right or as azimuth says.
-
-    Raises:
-        InputError: If a number is not finite or the distance not positive.
     """
-    at = finite_array(centre, (3,), "centre")
-    away = positive(distance, "distance")
-    turn = finite_number(azimuth, "azimuth")
-    rise = finite_number(elevation, "elevation")
-
-    back = np.array([np.cos(rise) * np.cos(turn), np.cos(rise) * np.sin(turn), np.sin(rise)])
-    right = np.array([-np.sin(turn), np.cos(turn), 0.0])
+    level = np.cos(elevation)
+    back = np.array([level * np.cos(azimuth), level * np.sin(azimuth), np.sin(elevation)])
+    right = np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])
     down = np.cross(-back, right)
-    return pin.SE3(np.stack([right, down, -back], 1), at + away * back)
+    return pin.SE3(np.stack([right, down, -back], 1), np.asarray(centre) + distance * back)
 
 
 def background(camera: Camera) -> NDArray[np.uint8]:

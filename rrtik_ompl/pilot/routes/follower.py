@@ -73,7 +73,13 @@ class Follower:
 
     @cached_property
     def _corners(self) -> Matrix:
-        return _corners(self.path, self.moves)
+        """Configurations before and after each move. Shape (moves + 1, dof)."""
+        rows = [np.array(self.path.start)]
+        for move in self.moves:
+            row = rows[-1].copy()
+            row[self.path.joint_names.index(move.joint)] = move.end
+            rows.append(row)
+        return np.array(rows)
 
     @property
     def done(self) -> bool:
@@ -286,14 +292,3 @@ def path_fault(world: World, path: JointPath) -> str:
     """Why a path is not free any more; "" if it is."""
     faults = path.violations(world)
     return faults[0].reason if faults else ""
-
-
-def _corners(path: JointPath, moves: tuple[Move, ...]) -> Matrix:
-    """Configurations before and after each move. Shape (moves + 1, dof)."""
-    names = list(path.joint_names)
-    rows = [np.array(path.start)]
-    for move in moves:
-        row = rows[-1].copy()
-        row[names.index(move.joint)] = move.end
-        rows.append(row)
-    return np.array(rows)

@@ -74,17 +74,9 @@ def check_move(world: World, q: Vector, joint: int, target: float) -> MoveCheck:
         q: Where the arm is, shape (dof,).
         joint: Number of the joint.
         target: Where it is to go [rad or m].
-
-    Raises:
-        InputError: If there is no such joint or the target is not finite.
     """
     robot = world.robot
-    if not 0 <= joint < robot.dof:
-        raise InputError(f"joint must be a number from 0 to {robot.dof - 1}, got {joint}")
-    if not np.isfinite(target):
-        raise InputError(f"target of {robot.joint_names[joint]} must be a finite number, got {target}")
-    start = robot.configuration(q)
-    end = start.copy()
+    end = q.copy()
     end[joint] = target
 
     fault = robot.limit_fault(end)
@@ -92,20 +84,20 @@ def check_move(world: World, q: Vector, joint: int, target: float) -> MoveCheck:
         return MoveCheck(False, fault, (), -np.inf)
 
     end = robot.clamp(end)
-    if not world.valid(start):
-        return _out_of_contact(world, start, end)
-    if not world.motion_valid(start, end):
-        return MoveCheck(False, _obstruction(world, start, end, joint), (), -np.inf)
+    if not world.valid(q):
+        return _out_of_contact(world, q, end)
+    if not world.motion_valid(q, end):
+        return MoveCheck(False, _obstruction(world, q, end, joint), (), -np.inf)
 
     share = np.linspace(0.0, 1.0, CLEARANCE_SAMPLES)[:, None]
-    rows = start + share * (end - start)
+    rows = q + share * (end - q)
     nearest = closest_pair(world, rows)
     clearance = np.inf if nearest is None else nearest.distance
 
     warnings = [*_singular(world, end)]
     if nearest is not None and clearance < CLEARANCE_WARNING:
         warnings.append(f"only {1e3 * max(clearance, 0.0):.0f} mm between {nearest.first} and {nearest.second}")
-    if not world.motion_proven(start, end):
+    if not world.motion_proven(q, end):
         warnings.append("free in steps, but not proven in between")
     return MoveCheck(True, "", tuple(warnings), float(clearance))
 
@@ -116,22 +108,21 @@ def free_until(world: World, q: Vector, joint: int, target: float) -> float:
     By bisection; the arm must be free at q.
     """
     robot = world.robot
-    start = robot.configuration(q)
-    end = start.copy()
+    end = q.copy()
     end[joint] = min(max(target, float(robot.lower[joint])), float(robot.upper[joint]))
-    if world.motion_valid(start, end):
+    if world.motion_valid(q, end):
         return float(end[joint])
 
     low = 0.0
     high = 1.0
     for _ in range(12):
         middle = 0.5 * (low + high)
-        if world.motion_valid(start, start + middle * (end - start)):
+        if world.motion_valid(q, q + middle * (end - q)):
             low = middle
         else:
             high = middle
 
-    return float(start[joint] + low * (end[joint] - start[joint]))
+    return float(q[joint] + low * (end[joint] - q[joint]))
 
 
 def move_refusal(world: World, q: Vector, joint: int, target: float, check: MoveCheck) -> str:
