@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 import rrtik_ompl as rrtik
 from rrtik_ompl.tasks import MoveTo, Task
+from rrtik_ompl.tasks.played import PlayedTask
 from rrtik_ompl.viewer.page import page
 from rrtik_ompl.viewer.subject import ShownPath, subject_of
 from rrtik_tests.crane import story
@@ -192,7 +193,7 @@ KINDS: dict[str, tuple[Any, Callable[[bool], Case]]] = {
     "jab among many knots": (rrtik.Trajectory, lambda good: of_motion(jab(0.6 if good else 1.0, 120.0, knots=1500))),
     "jab between knots": (rrtik.Trajectory, lambda good: of_motion(between_knots(0.6 if good else 1.0))),
     "set points": (rrtik.Trajectory, of_set_points),
-    "task": (rrtik.TaskPlan, of_task),
+    "task": (PlayedTask, of_task),
     "run": (rrtik.ReplanRun, of_run),
     "run of which a move is not proven": (rrtik.ReplanRun, of_unproven_run),
     "run in time": (rrtik.ReplanRun, of_run_in_time),
