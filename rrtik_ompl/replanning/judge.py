@@ -16,12 +16,12 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.base.arrays import Vector
 from rrtik_ompl.base.copies import as_value
 from rrtik_ompl.base.poses import pose
 from rrtik_ompl.geometry.collision.bodies import Body, contact_distance, keeps_clearance, kept_apart
-from rrtik_ompl.geometry.collision.certificate import distance
-from rrtik_ompl.geometry.collision.distances import is_ours, own_nearest
+from rrtik_ompl.geometry.collision.cloud_solid import Ends
+from rrtik_ompl.geometry.collision.distances import gap_beyond, is_ours, own_nearest
 from rrtik_ompl.geometry.collision.motion_bound import approach_weights
 from rrtik_ompl.geometry.collision.shape_table import farthest
 from rrtik_ompl.model.robot import Robot
@@ -324,18 +324,18 @@ class _PeriodJudge:
         if approach > FINEST_APPROACH:
             sufficient += 0.5 * approach
         solids = self._solids_of_pair(number, pair, middle)
-        if distance(*solids, margin=_less_rounding(sufficient)) is not None:
+        if gap_beyond(solids, _less_rounding(sufficient)) is not None:
             return None
 
-        middle_distance = _signed_distance(*solids)
+        middle_distance = _signed_distance(solids)
         lacking = middle_distance <= _less_rounding(required)
         if not lacking and required < 0.0:  # of solids that may overlap the depth may not be known
-            lacking = distance(*solids, margin=_less_rounding(required)) is None
+            lacking = gap_beyond(solids, _less_rounding(required)) is None
         if approach <= FINEST_APPROACH and not lacking:
             return None
 
         if lacking and approach <= max(COARSEST_APPROACH, RELATIVE_ACCURACY * (required - middle_distance)):
-            ends = [(time, _signed_distance(*self._solids_of_pair(number, pair, time))) for time in (begin, end)]
+            ends = [(time, _signed_distance(self._solids_of_pair(number, pair, time))) for time in (begin, end)]
             return min((middle, middle_distance), *ends, key=lambda candidate: candidate[1])
 
         candidates: list[tuple[float, float]] = []
@@ -370,9 +370,7 @@ class _PeriodJudge:
             ]
         )
 
-    def _solids_of_pair(
-        self, number: int, pair: int, time: float
-    ) -> tuple[coal.CollisionGeometry, Matrix, coal.CollisionGeometry, Matrix]:
+    def _solids_of_pair(self, number: int, pair: int, time: float) -> Ends:
         """The two solids of a pair, and where they are."""
         joint_frames = self._robot.joint_frames(self._configuration(number, time)[None])[0]
         first, second = self._pairs[pair]
@@ -383,7 +381,8 @@ class _PeriodJudge:
                 carrier_pose = joint_frames[self._bodies[body].joint]
             else:
                 carrier_pose = self._obstacle_pose(self._obstacle_names[obstacle], time).homogeneous
-            poses.append(carrier_pose @ self._local_poses[body])
+            body_pose = carrier_pose @ self._local_poses[body]
+            poses.append(coal.Transform3s(body_pose[:3, :3], body_pose[:3, 3]))
         return self._bodies[first].geometry, poses[0], self._bodies[second].geometry, poses[1]
 
     def _configuration(self, number: int, time: float) -> Vector:
@@ -417,12 +416,8 @@ def _bounding_ball(body: Body) -> tuple[float, float, float, float]:
     return x, y, z, float(body.geometry.aabb_radius)
 
 
-def _signed_distance(
-    first: coal.CollisionGeometry, first_pose: Matrix, second: coal.CollisionGeometry, second_pose: Matrix
-) -> float:
+def _signed_distance(solids: Ends) -> float:
     """The distance of two solids [m], below 0 how deep they overlap; 0 where that is not known."""
-    transforms = [coal.Transform3s(place[:3, :3], place[:3, 3]) for place in (first_pose, second_pose)]
-    solids = (first, transforms[0], second, transforms[1])
     if is_ours(solids):
         return float(own_nearest(solids).distance)
     if not coal.collide(*solids, coal.CollisionRequest(), coal.CollisionResult()):
