@@ -18,7 +18,7 @@ from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import AttachedObject, Obstacle, Scene, Touching
 from rrtik_ompl.sensing.scene_from_view import SeenObject, scene_with
 from rrtik_ompl.tasks.contact_life import (
-    DEEPER,
+    EXTRA_DEPTH,
     Nearness,
     allowed,
     left_inside,
@@ -230,7 +230,7 @@ class Surroundings:
 
         for pair, reach in nearness.items():
             part, solid = pair
-            leeway = DEEPER + MAX_SHIFT if part in links else DEEPER
+            leeway = EXTRA_DEPTH + MAX_SHIFT if part in links else EXTRA_DEPTH
             if reach.distance < -reach.deepest and part in links:
                 buried.append(pair)
             else:

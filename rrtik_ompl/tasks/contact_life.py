@@ -31,13 +31,13 @@ from rrtik_ompl.world.proof import Prover
 from rrtik_ompl.world.route_check import violations_of
 from rrtik_ompl.world.world import World, form_of
 
-NEAR = 1e-4  # [m] of a gap up to which two touch: straight lines deviate by as much
-DEEPER = 1e-3  # [m] that two in contact may come nearer than they were
-LITTLE = 5e-3  # [m] of overlap that needs no word
-DEEPEST = 1.0  # [m] that is looked for
+CONTACT_GAP = 1e-4  # [m] of a gap up to which two touch: straight lines deviate by as much
+EXTRA_DEPTH = 1e-3  # [m] that two in contact may come nearer than they were
+SMALL_OVERLAP = 5e-3  # [m] of overlap that needs no word
+MAX_MEASURED_DEPTH = 1.0  # [m] that is looked for
 BISECTIONS = 24  # of a depth
-STEP = 2.5e-4  # [m] that two come nearer at most between places of a motion at which parting is looked for
-AT_ONCE = 256  # places
+PARTING_STEP = 2.5e-4  # [m] that two come nearer at most between places of a motion at which parting is looked for
+PLACES_AT_ONCE = 256  # places
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,26 +90,28 @@ class Nearness:
     @property
     def too_deep(self) -> bool:
         """Whether one is deeper inside the other than it may be left."""
-        return self.distance < -DEEPER - DISTANCE_TOLERANCE
+        return self.distance < -EXTRA_DEPTH - DISTANCE_TOLERANCE
 
     def going_on(self) -> Touching:
         """The contact of two that touch now, until they part."""
-        return Touching(self.first, self.second, max(min(self.distance, 0.0) - DEEPER, -self.deepest))
+        return Touching(self.first, self.second, max(min(self.distance, 0.0) - EXTRA_DEPTH, -self.deepest))
 
     def arriving(self) -> Touching:
         """The contact of two of which one is about to be taken or set down here."""
-        return Touching(self.first, self.second, -min(DEEPER, self.deepest))
+        return Touching(self.first, self.second, -min(EXTRA_DEPTH, self.deepest))
 
 
 def allowed(bodies: Iterable[Body], first: str, second: str) -> Touching:
     """The contact of two things that may touch, whether or not they do."""
-    return Touching(first, second, -min(DEEPER, deepest_contact(bodies, first, second)))
+    return Touching(first, second, -min(EXTRA_DEPTH, deepest_contact(bodies, first, second)))
 
 
 def left_inside(near: Nearness) -> str:
     """Says that a thing would be set down inside another, and how deep."""
-    depth = f"more than {1e3 * DEEPEST:g}" if near.distance < -DEEPEST else f"{-1e3 * near.distance:.3g}"
-    return f"'{near.first}' would be left {depth} mm inside '{near.second}'; {1e3 * DEEPER:g} mm at most"
+    depth = f"{-1e3 * near.distance:.3g}"
+    if near.distance < -MAX_MEASURED_DEPTH:
+        depth = f"more than {1e3 * MAX_MEASURED_DEPTH:g}"
+    return f"'{near.first}' would be left {depth} mm inside '{near.second}'; {1e3 * EXTRA_DEPTH:g} mm at most"
 
 
 def with_contacts(scene: Scene, contacts: Iterable[Touching]) -> Scene:
@@ -132,7 +134,7 @@ def touching_at(world: World, q: Vector, name: str) -> list[Nearness]:
             gap = signed_distance(world.robot, (first, second), q, frames)
             other = second.name if first.name == name else first.name
             is_nearest = (name, other) not in nearest_of_pair or gap < nearest_of_pair[name, other].distance
-            if gap <= NEAR and is_nearest:
+            if gap <= CONTACT_GAP and is_nearest:
                 nearest_of_pair[name, other] = Nearness(name, other, gap, deepest_contact(bodies, name, other))
 
     return sorted(nearest_of_pair.values(), key=lambda near: near.distance)
@@ -141,11 +143,11 @@ def touching_at(world: World, q: Vector, name: str) -> list[Nearness]:
 def signed_distance(robot: Robot, pair: tuple[Body, Body], q: Vector, frames: Matrix) -> float:
     """The signed distance of two bodies at q [m], of meshes that of their convex pieces; +inf if they do not touch."""
     poses = _transforms(pair, frames)
-    if distance(pair[0].geometry, poses[0], pair[1].geometry, poses[1], NEAR) is not None:
+    if distance(pair[0].geometry, poses[0], pair[1].geometry, poses[1], CONTACT_GAP) is not None:
         return np.inf
 
     (contact,) = measured(pair, [(0, 1)], frames, near_only=False)
-    if contact.distance > NEAR:
+    if contact.distance > CONTACT_GAP:
         return np.inf
     if any(is_mesh(body.geometry) for body in pair):
         return min(contact.distance, -_depth_of_pieces(robot, pair, q))
@@ -159,7 +161,7 @@ def _depth_of_pieces(robot: Robot, pair: tuple[Body, Body], q: Vector) -> float:
     prover = Prover(robot, bodies, ((0, 1),))
 
     low = 0.0
-    high = DEEPEST
+    high = MAX_MEASURED_DEPTH
     if prover.route(q[None], slack=-low).proven:
         return 0.0
     if not prover.route(q[None], slack=-high).proven:
@@ -262,7 +264,7 @@ def world_from(world: World, contacts: Iterable[MotionContact], number: int) -> 
 
 def touching_again(contact: Touching) -> Touching:
     """The contact of a pair that was allowed for a grasp, once the two have parted: it may touch again, no deeper."""
-    return replace(contact, distance=max(contact.distance, -DEEPER))
+    return replace(contact, distance=max(contact.distance, -EXTRA_DEPTH))
 
 
 def parted(world: World, q: Vector, contact: Touching) -> bool:
@@ -299,9 +301,9 @@ def _places_along(rows: Matrix, robot: Robot, weights: Vector) -> Iterator[tuple
     """Places of a route between which bodies come nearer by a step at most, and the frames of all joints there."""
     ends = [(rows[0], rows[0])] if len(rows) == 1 else pairwise(rows)
     for number, (a, b) in enumerate(ends):
-        steps = max(1, int(np.ceil(float(weights @ np.abs(b - a)) / STEP)))
+        steps = max(1, int(np.ceil(float(weights @ np.abs(b - a)) / PARTING_STEP)))
         shares = np.arange(steps + 1) / steps
-        for part in np.array_split(shares, 1 + len(shares) // AT_ONCE):
+        for part in np.array_split(shares, 1 + len(shares) // PLACES_AT_ONCE):
             frames = robot.joint_frames(a + part[:, None] * (b - a))
             for share, frame in zip(part.tolist(), frames, strict=True):
                 yield number, share, frame
@@ -310,7 +312,7 @@ def _places_along(rows: Matrix, robot: Robot, weights: Vector) -> Iterator[tuple
 def _keep_apart(pair: tuple[Body, Body], frames: Matrix) -> bool:
     """Whether two bodies keep what they must where they are not in contact, and do not touch."""
     poses = _transforms(pair, frames)
-    limit = usually_apart(*pair) + NEAR
+    limit = usually_apart(*pair) + CONTACT_GAP
     return distance(pair[0].geometry, poses[0], pair[1].geometry, poses[1], limit) is not None
 
 

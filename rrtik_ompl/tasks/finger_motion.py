@@ -22,10 +22,10 @@ from rrtik_ompl.geometry.collision.containment import Containment
 from rrtik_ompl.geometry.collision.distances import measured
 from rrtik_ompl.geometry.collision.solids import around
 from rrtik_ompl.model.robot import Robot
-from rrtik_ompl.tasks.contact_life import DEEPER, NEAR, signed_distance
+from rrtik_ompl.tasks.contact_life import CONTACT_GAP, EXTRA_DEPTH, signed_distance
 from rrtik_ompl.tasks.setting import Setting
 
-DEEPEST = 12  # level of an interval: 1/4096 of the way
+MAX_LEVEL = 12  # level of an interval: 1/4096 of the way
 SAME = 1e-7  # [m] or [rad] to which a finger's place in the middle of its way is on the screw
 REMEDY = "attach the object, move the gripper less, or allow the pair"
 
@@ -79,7 +79,7 @@ def _pressed_in(before: Setting, after: Setting, q: Vector, moving: set[int], th
     numbers_held = [k for k in range(len(bodies_after)) if bodies_after[k].name in names_held and k not in moving]
     frames = after.robot.joint_frames(q[None])[0]
 
-    deepest = DEEPER + DISTANCE_TOLERANCE
+    deepest = EXTRA_DEPTH + DISTANCE_TOLERANCE
     note = ""
     for finger in sorted(moving):
         for thing in numbers_held:
@@ -110,8 +110,9 @@ class PairMotion:
         self._twists = [pin.log6(a.placement.actInv(b.placement)).vector for a, b in zip(first, last, strict=True)]
         self._speed = sum(_speed(body, twist) for body, twist in zip(first, self._twists, strict=True))
         self._required_distance = kept_apart(*first)
-        if self._distance(0.0, hulls=False) <= NEAR:  # what fingers let go may go on touching them, no deeper
-            self._required_distance = min(self._required_distance, min(self._distance(0.0, hulls=True), 0.0) - DEEPER)
+        if self._distance(0.0, hulls=False) <= CONTACT_GAP:  # what fingers let go may go on touching them, no deeper
+            overlap_now = min(self._distance(0.0, hulls=True), 0.0)
+            self._required_distance = min(self._required_distance, overlap_now - EXTRA_DEPTH)
 
     def apart(self) -> bool:
         """Whether the two keep what they must on the whole way."""
@@ -128,7 +129,7 @@ class PairMotion:
             spare = distance - self._required_distance - DISTANCE_TOLERANCE
             if spare > 0.5 * width * self._speed:
                 continue
-            if spare <= 0.0 or level == DEEPEST:
+            if spare <= 0.0 or level == MAX_LEVEL:
                 return False
             undecided += [(level + 1, 2 * number + 1), (level + 1, 2 * number)]
         return True

@@ -15,7 +15,7 @@ from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import Touching
 from rrtik_ompl.planning.tip_motion import DEVIATION, TURN_DEVIATION
 from rrtik_ompl.tasks.contact_life import (
-    DEEPER,
+    EXTRA_DEPTH,
     Nearness,
     allowed,
     joined_with,
@@ -155,8 +155,8 @@ def _too_deep(world: World, q: Vector, name: str, tip: Tip, grasp: Tip, moved_be
         placed_body = replace(part, placement=shift * part.placement)
         for other in (body for body in world.bodies if body.name in names_of_others):
             gap = signed_distance(world.robot, (placed_body, other), q, frames)
-            if gap < -DEEPER - uncertainty:
-                return left_inside(Nearness(name, other.name, gap, DEEPER))
+            if gap < -EXTRA_DEPTH - uncertainty:
+                return left_inside(Nearness(name, other.name, gap, EXTRA_DEPTH))
     return ""
 
 

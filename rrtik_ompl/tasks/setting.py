@@ -15,7 +15,7 @@ from rrtik_ompl.description.catalog import robot_from_entry
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import Scene, Touching
-from rrtik_ompl.tasks.contact_life import DEEPER, LITTLE, allowed, left_inside, touching_at, with_contacts
+from rrtik_ompl.tasks.contact_life import EXTRA_DEPTH, SMALL_OVERLAP, allowed, left_inside, touching_at, with_contacts
 from rrtik_ompl.tasks.stages import Attach, Detach, Gripper, MoveTo, Stage
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World, form_of
@@ -50,7 +50,9 @@ class Setting:
         """The setting of a world at q, shape (dof,): what is held there may go on touching what it touches."""
         touching = [near for item in world.scene.attached for near in touching_at(world, q, item.name)]
         known_pairs = {contact.pair for contact in world.scene.contacts}
-        contacts = [near.going_on() for near in touching if near.distance >= -LITTLE and near.pair not in known_pairs]
+        contacts = [
+            near.going_on() for near in touching if near.distance >= -SMALL_OVERLAP and near.pair not in known_pairs
+        ]
         return cls.of(world).with_contacts(contacts)
 
     @cached_property
@@ -101,7 +103,9 @@ class Setting:
         contacts = {frozenset((stage.object, other)): allowed(bodies, stage.object, other) for other in sorted(others)}
         touching = touching_at(setting.world, q, stage.object)
         contacts |= {
-            each.pair: each.going_on() for each in touching if each.distance >= -LITTLE or each.pair in grasp_pairs
+            each.pair: each.going_on()
+            for each in touching
+            if each.distance >= -SMALL_OVERLAP or each.pair in grasp_pairs
         }
         return setting.with_contacts(contacts.values())
 
@@ -116,7 +120,7 @@ class Setting:
         grasp_pairs = frozenset(pair for pair in self.grasp_pairs if stage.object not in pair)
         setting = Setting(self._first_world, self.robot, self.scene.detaching(stage.object, pose), grasp_pairs)
         touching = touching_at(setting.world, q, stage.object)
-        return setting.with_contacts(each.going_on() for each in touching if each.distance >= -DEEPER)
+        return setting.with_contacts(each.going_on() for each in touching if each.distance >= -EXTRA_DEPTH)
 
 
 def world_of_motion(path: JointPath, world: World, stage: Stage) -> World:

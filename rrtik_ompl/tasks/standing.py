@@ -20,7 +20,7 @@ from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import AttachedObject, Obstacle, Scene, Touching
 from rrtik_ompl.model.shapes.shape import same_shape
-from rrtik_ompl.tasks.contact_life import DEEPER, LITTLE, MotionContact, contacts_from, touching_at
+from rrtik_ompl.tasks.contact_life import EXTRA_DEPTH, SMALL_OVERLAP, MotionContact, contacts_from, touching_at
 from rrtik_ompl.world.world import World
 
 MOVED = 1e-6  # [m, rad] between two motions that is rounding
@@ -85,15 +85,15 @@ def _too_deep(world: World, q: Vector, stood_on: Sequence[MotionContact], before
 
     for contact in world.scene.contacts:
         is_deeper_than_before = contact.distance < distance_of_pair.get(contact.pair, 0.0)
-        if is_deeper_than_before and contact.distance < -DEEPER - DISTANCE_TOLERANCE:
+        if is_deeper_than_before and contact.distance < -EXTRA_DEPTH - DISTANCE_TOLERANCE:
             depth = _depth(world, q, contact)
-            deepest_allowed = (depth if contact in named else min(depth, LITTLE)) + DEEPER
+            deepest_allowed = (depth if contact in named else min(depth, SMALL_OVERLAP)) + EXTRA_DEPTH
             if contact.distance < -deepest_allowed - DISTANCE_TOLERANCE:
                 faults.append(_deeper(contact.names, contact.distance, deepest_allowed, depth))
 
     for each in stood_on:
-        if each.then is not None and each.then < -DEEPER - DISTANCE_TOLERANCE:
-            faults.append(_deeper(each.touching.names, each.then, DEEPER, 0.0))
+        if each.then is not None and each.then < -EXTRA_DEPTH - DISTANCE_TOLERANCE:
+            faults.append(_deeper(each.touching.names, each.then, EXTRA_DEPTH, 0.0))
     return faults
 
 
@@ -111,7 +111,7 @@ def _depth(world: World, q: Vector, contact: Touching) -> float:
     name, other = contact.names if contact.first in world.scene.names else contact.names[::-1]
     distances = [each.distance for each in touching_at(world, q, name) if each.second == other]
     may_have_let_go = world.robot.gripper is not None and other in world.robot.link_names
-    least_depth = DEEPER if may_have_let_go else 0.0  # fingers may have moved away since they let it go
+    least_depth = EXTRA_DEPTH if may_have_let_go else 0.0  # fingers may have moved away since they let it go
     return max([least_depth, *(-distance for distance in distances)])
 
 
