@@ -11,8 +11,7 @@ from ompl import base as ob
 
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector, positive
 from rrtik_ompl.base.budget import iteration_limit
-from rrtik_ompl.kernels.search.connect import ConnectSearch
-from rrtik_ompl.kernels.search.connect_keeping import Searched, kept_search, solve_each
+from rrtik_ompl.kernels.search.connect import ConnectSearch, Searched, kept_search, solve_each
 from rrtik_ompl.kernels.search.connect_layout import KERNELS
 from rrtik_ompl.kernels.search.connect_lengths import connect_lengths
 from rrtik_ompl.kernels.search.tree_layout import TreeTable

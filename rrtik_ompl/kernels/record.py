@@ -21,6 +21,7 @@ address of an array, the address of another table, or that of an array of addres
 address of a table and knows its class by the annotation of its argument (:mod:`rrtik_ompl.kernels.simd.records`), so
 that a field is one load or store with a constant offset, and an element of an array one more. There are no bounds
 checks: whoever packs guarantees every index.
+A class that inherits from another table has its fields first; a kernel that reads no others serves all that inherit.
 
 In Python an object of the class owns the memory. Its numbers are read and written in place, its arrays are those of
 numpy whose addresses the table holds, and its tables are objects like itself; all live as long as it does. The pages
@@ -95,7 +96,8 @@ class Record:
 
     def __init_subclass__(cls) -> None:
         hints = get_type_hints(cls)
-        cls.kinds = {name: hints[name] for name in cls.__annotations__}  # not those of Record itself
+        inherited = getattr(cls.__base__, "kinds", {})  # none of Record itself
+        cls.kinds = inherited | {name: hints[name] for name in cls.__annotations__}
         cls.places = {name: place for place, name in enumerate(cls.kinds)}
         for name, place in cls.places.items():
             setattr(cls, name, _member(cls.kinds[name], place))

@@ -1,34 +1,16 @@
-"""Around a closed form in kernels: targets read and placed, branches turned into the limits, and measured."""
+"""Around a closed form in kernels: targets read and placed, branches turned into the limits, and measured.
+
+Targets and answers are read and written by named functions; their places are those of
+:mod:`rrtik_ompl.kernels.ik.branch_layout`.
+"""
 
 from __future__ import annotations
 
 from typing import Any
 
 from rrtik_ompl.kernels.ik import branch_layout, ik_layout
-from rrtik_ompl.kernels.ik.branch_accessors import (
-    answer,
-    frame_column,
-    frame_origin,
-    frame_row,
-    hint_of,
-    load_target,
-    load_target_origin,
-    matrix_entry,
-    pose_of,
-    set_lane,
-    set_placed_entry,
-    set_placed_origin,
-    target_column,
-    target_origin,
-    target_row,
-)
-from rrtik_ompl.kernels.ik.branch_layout import ArmTable, CallTable, Frame
-from rrtik_ompl.kernels.ik.ik_accessors import (
-    next_pose,
-    pose_column,
-    pose_origin,
-    pose_row,
-)
+from rrtik_ompl.kernels.ik.branch_layout import BRANCHES, DOF, MATRIX_NUMBERS, MATRIX_SIDE, ArmTable, CallTable, Frame
+from rrtik_ompl.kernels.ik.ik_accessors import next_pose, pose_column, pose_origin, pose_row
 from rrtik_ompl.kernels.record import Doubles
 from rrtik_ompl.kernels.simd.compiled import WIDTH, inlined, kernel
 from rrtik_ompl.kernels.simd.lanes import (
@@ -41,7 +23,8 @@ from rrtik_ompl.kernels.simd.lanes import (
     square_root,
     wide_lanes_at,
 )
-from rrtik_ompl.kernels.simd.records import exists
+from rrtik_ompl.kernels.simd.records import exists, row_at
+from rrtik_ompl.kernels.simd.vectors import along
 from rrtik_ompl.kernels.simd.wide_angles import TAU, arc_sine, wide_sine_and_cosine, within_half_turn
 
 MAX_COORDINATE = 1e9  # [m] squares of what is farther away could leave the numbers; it is out of reach all the same
@@ -68,7 +51,8 @@ def load(arm: ArmTable, call: CallTable, block: int) -> None:
 @inlined
 def place_targets(arm: ArmTable, scratch: Doubles) -> None:
     """T_base_frame of T_world_tip."""
-    before, after = arm.from_world, arm.to_frame
+    before = arm.from_world
+    after = arm.to_frame
     for row in range(3):
         a, b, c = turned_row(before, row, scratch)
         o = along(
@@ -82,16 +66,12 @@ def place_targets(arm: ArmTable, scratch: Doubles) -> None:
 
 
 @inlined
-def along(vector: Any, x: Any, y: Any, z: Any) -> Any:
-    """Dot product of lanes of vectors with three numbers."""
-    return x * vector[0] + y * vector[1] + z * vector[2]
-
-
-@inlined
 def turned_row(frame: Frame, row: int, scratch: Doubles) -> Any:
     """A row of a rotation times the rotation of the target as given."""
     own = frame_row(frame, row)
-    first, second, third = target_column(scratch, 0), target_column(scratch, 1), target_column(scratch, 2)
+    first = target_column(scratch, 0)
+    second = target_column(scratch, 1)
+    third = target_column(scratch, 2)
     return (
         along(own, first[0], first[1], first[2]),
         along(own, second[0], second[1], second[2]),
@@ -113,7 +93,8 @@ def hold(arm: ArmTable, call: CallTable, branch: int, block: int) -> None:
     """Turn joints by full turns into their limits, towards the hint where they allow it; which configurations fit."""
     fits = lane_numbers() >= 0.0
     for joint in range(branch_layout.DOF):
-        low, high = arm.lowest[joint], arm.highest[joint]
+        low = arm.lowest[joint]
+        high = arm.highest[joint]
         place = answer(call, joint, branch, block)
         value = wide_lanes_at(call.q, place)
         if arm.turning[joint] != 0:
@@ -131,7 +112,8 @@ def hold(arm: ArmTable, call: CallTable, branch: int, block: int) -> None:
 @inlined
 def measure(arm: ArmTable, call: CallTable, branch: int, block: int) -> None:
     """Distance and angle between the target and where a branch brings the tip."""
-    limb, scratch = arm.limb, call.scratch
+    limb = arm.limb
+    scratch = call.scratch
     for joint in range(branch_layout.DOF):
         column = limb.column[joint]
         value = wide_lanes_at(call.q, answer(call, column, branch, block))
@@ -139,12 +121,17 @@ def measure(arm: ArmTable, call: CallTable, branch: int, block: int) -> None:
         sine, cosine = wide_sine_and_cosine(value)
         set_wide_lanes(scratch, branch_layout.SINES + joint, sine)
         set_wide_lanes(scratch, branch_layout.COSINES + joint, cosine)
-    away, turned = spread_wide(0.0), spread_wide(0.0)
+    away = spread_wide(0.0)
+    turned = spread_wide(0.0)
     for row in range(3):
         x, y, z, o = row_of_tip(limb.fixed, scratch, row)
         a, b, c = target_row(scratch, row)
-        x, y, z, o = x - a, y - b, z - c, o - target_origin(scratch, row)
-        away, turned = away + o * o, turned + (x * x + y * y + z * z)
+        x = x - a
+        y = y - b
+        z = z - c
+        o = o - target_origin(scratch, row)
+        away = away + o * o
+        turned = turned + (x * x + y * y + z * z)
     angle = 2.0 * arc_sine(smaller(square_root(turned * 0.125), 1.0))
     set_wide_lanes(call.residuals, answer(call, 0, branch, block), square_root(away))
     set_wide_lanes(call.residuals, answer(call, 1, branch, block), angle)
@@ -153,17 +140,130 @@ def measure(arm: ArmTable, call: CallTable, branch: int, block: int) -> None:
 @inlined
 def row_of_tip(fixed: ik_layout.Pose, scratch: Doubles, row: int) -> Any:
     """A row of the tip's frame: of its three axes and its origin. All joints turn about their z."""
-    first, start = pose_row(fixed, row), pose_origin(fixed, row)
-    x, y, z, o = spread_wide(first[0]), spread_wide(first[1]), spread_wide(first[2]), spread_wide(start)
+    first = pose_row(fixed, row)
+    start = pose_origin(fixed, row)
+    x = spread_wide(first[0])
+    y = spread_wide(first[1])
+    z = spread_wide(first[2])
+    o = spread_wide(start)
     for joint in range(branch_layout.DOF):
         fixed = next_pose(fixed)
         sine = wide_lanes_at(scratch, branch_layout.SINES + joint)
         cosine = wide_lanes_at(scratch, branch_layout.COSINES + joint)
-        a, b = cosine * x + sine * y, cosine * y - sine * x
+        a = cosine * x + sine * y
+        b = cosine * y - sine * x
         o = o + (a * pose_origin(fixed, 0) + b * pose_origin(fixed, 1) + z * pose_origin(fixed, 2))
-        x, y, z = (
-            along(pose_column(fixed, 0), a, b, z),
-            along(pose_column(fixed, 1), a, b, z),
-            along(pose_column(fixed, 2), a, b, z),
-        )
+        x = along(pose_column(fixed, 0), a, b, z)
+        y = along(pose_column(fixed, 1), a, b, z)
+        z = along(pose_column(fixed, 2), a, b, z)
     return x, y, z, o
+
+
+# What stands in the tables.
+
+
+@inlined
+def pose_of(call: branch_layout.CallTable, number: int) -> branch_layout.Matrices:
+    """A target."""
+    return row_at(call.poses, MATRIX_NUMBERS, number)
+
+
+@inlined
+def answer(call: branch_layout.CallTable, joint: int, branch: int, block: int) -> Any:
+    """Place of a joint's values among the answers, in wide lanes."""
+    return (BRANCHES * joint + branch) * call.blocks + block
+
+
+@inlined
+def matrix_entry(pose: branch_layout.Matrices, row: int, column: int) -> Any:
+    """An entry of a pose."""
+    return pose[MATRIX_SIDE * row + column]
+
+
+@inlined
+def hint_of(call: branch_layout.CallTable, row: int, joint: int) -> Any:
+    """A joint value of a target's hint."""
+    return call.near[DOF * row + joint]
+
+
+@inlined
+def set_lane(scratch: Doubles, place: int, lane: int, value: float) -> None:
+    """Set one lane of wide lanes."""
+    scratch[WIDTH * place + lane] = value
+
+
+@inlined
+def load_target(scratch: Doubles, lane: int, row: int, column: int, value: float) -> None:
+    """Set an entry of the rotation of a target as given."""
+    set_lane(scratch, branch_layout.TARGET + branch_layout.ROTATION + 3 * row + column, lane, value)
+
+
+@inlined
+def load_target_origin(scratch: Doubles, lane: int, axis: int, value: float) -> None:
+    """Set a coordinate of the origin of a target as given."""
+    set_lane(scratch, branch_layout.TARGET + branch_layout.ORIGIN + axis, lane, value)
+
+
+@inlined
+def set_placed_entry(scratch: Doubles, row: int, column: int, value: Any) -> None:
+    """Set an entry of the rotation of the targets as the closed form wants them."""
+    set_wide_lanes(scratch, branch_layout.FRAME + branch_layout.ROTATION + 3 * row + column, value)
+
+
+@inlined
+def set_placed_origin(scratch: Doubles, axis: int, value: Any) -> None:
+    """Set a coordinate of the origin of the targets as the closed form wants them."""
+    set_wide_lanes(scratch, branch_layout.FRAME + branch_layout.ORIGIN + axis, value)
+
+
+@inlined
+def frame_row(frame: branch_layout.Frame, row: int) -> Any:
+    """A row of a frame's rotation."""
+    place = branch_layout.ROTATION + 3 * row
+    return frame[place], frame[place + 1], frame[place + 2]
+
+
+@inlined
+def frame_column(frame: branch_layout.Frame, column: int) -> Any:
+    """A column of a frame's rotation."""
+    place = branch_layout.ROTATION + column
+    return frame[place], frame[place + 3], frame[place + 6]
+
+
+@inlined
+def frame_origin(frame: branch_layout.Frame) -> Any:
+    """A frame's origin."""
+    place = branch_layout.ORIGIN
+    return frame[place], frame[place + 1], frame[place + 2]
+
+
+@inlined
+def target_column(scratch: Doubles, column: int) -> Any:
+    """A column of the rotation of the targets as given, in wide lanes."""
+    place = branch_layout.TARGET + branch_layout.ROTATION + column
+    return wide_lanes_at(scratch, place), wide_lanes_at(scratch, place + 3), wide_lanes_at(scratch, place + 6)
+
+
+@inlined
+def target_row(scratch: Doubles, row: int) -> Any:
+    """A row of the rotation of the targets as given, in wide lanes."""
+    place = branch_layout.TARGET + branch_layout.ROTATION + 3 * row
+    return wide_lanes_at(scratch, place), wide_lanes_at(scratch, place + 1), wide_lanes_at(scratch, place + 2)
+
+
+@inlined
+def target_origin(scratch: Doubles, axis: int) -> Any:
+    """A coordinate of the origin of the targets as given, in wide lanes."""
+    return wide_lanes_at(scratch, branch_layout.TARGET + branch_layout.ORIGIN + axis)
+
+
+@inlined
+def placed_entry(call: branch_layout.CallTable, row: int, column: int) -> Any:
+    """An entry of the rotation of the targets as the closed form wants them, in wide lanes."""
+    return wide_lanes_at(call.scratch, branch_layout.FRAME + branch_layout.ROTATION + 3 * row + column)
+
+
+@inlined
+def placed_origin(call: branch_layout.CallTable, axis: int) -> Any:
+    """A coordinate of the origin of the targets as the closed form wants them, in wide lanes."""
+    return wide_lanes_at(call.scratch, branch_layout.FRAME + branch_layout.ORIGIN + axis)

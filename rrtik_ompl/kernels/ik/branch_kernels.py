@@ -9,12 +9,7 @@ from __future__ import annotations
 from typing import Any
 
 from rrtik_ompl.kernels.ik import branch_layout
-from rrtik_ompl.kernels.ik.branch_accessors import (
-    answer,
-    placed_entry,
-    placed_origin,
-)
-from rrtik_ompl.kernels.ik.branch_checks import check_branches, load
+from rrtik_ompl.kernels.ik.branch_checks import answer, check_branches, load, placed_entry, placed_origin
 from rrtik_ompl.kernels.ik.branch_layout import ArmTable, CallTable
 from rrtik_ompl.kernels.simd.compiled import WIDTH, entry, inlined, kernel
 from rrtik_ompl.kernels.simd.lanes import (
@@ -46,15 +41,21 @@ def two_links(first: float, second: float, x: Any, y: Any) -> Any:
     cosine = larger(smaller(raw, 1.0), -1.0)
     square = (1.0 - cosine) * (1.0 + cosine)
     sine = square_root(choose(square < branch_layout.DOUBLE_ROOT, spread_wide(0.0), square))
-    along, across = first + second * cosine, second * sine
-    ax, ay, cx, cy = along * x, along * y, across * x, across * y
+
+    along = first + second * cosine  # of the wrist, seen from the first link
+    across = second * sine
+    ax = along * x
+    ay = along * y
+    cx = across * x
+    cy = across * y
     return arc_tangent(ay - cx, ax + cy), arc_tangent(ay + cx, ax - cy), arc_tangent(sine, cosine), raw
 
 
 @inlined
 def put(call: CallTable, branch: int, block: int, raw: Any, q: Any) -> None:
     """Write a branch: its joint values, and which targets it reaches by the cosine of the elbow's turn."""
-    real, out = absolute(raw) <= 1.0 + branch_layout.REACH_TOLERANCE, call.q
+    real = absolute(raw) <= 1.0 + branch_layout.REACH_TOLERANCE
+    out = call.q
     set_truths(call.real, WIDTH * answer(call, 0, branch, block), real)
     set_wide_lanes(out, answer(call, 0, branch, block), q[0])
     set_wide_lanes(out, answer(call, 1, branch, block), q[1])
@@ -67,9 +68,13 @@ def put(call: CallTable, branch: int, block: int, raw: Any, q: Any) -> None:
 @inlined
 def parallel_side(arm: ArmTable, call: CallTable, block: int, side: int, theta1: Any, c: Any, s: Any) -> Any:
     """Four branches of an arm of parallel axes, its azimuth known; the sine h, and which triangles do not close."""
-    a1, a2, d6 = arm.numbers[branch_layout.A1], arm.numbers[branch_layout.A2], arm.numbers[branch_layout.D6]
-    a3, a4 = arm.numbers[branch_layout.A3], arm.numbers[branch_layout.A4]
-    uz, wz = placed_entry(call, 2, 0), placed_entry(call, 2, 2)
+    a1 = arm.numbers[branch_layout.A1]
+    a2 = arm.numbers[branch_layout.A2]
+    d6 = arm.numbers[branch_layout.D6]
+    a3 = arm.numbers[branch_layout.A3]
+    a4 = arm.numbers[branch_layout.A4]
+    uz = placed_entry(call, 2, 0)
+    wz = placed_entry(call, 2, 2)
     x, s5 = in_plane(placed_entry(call, 0, 2), placed_entry(call, 1, 2), c, s)
     along, across = in_plane(placed_entry(call, 0, 0), placed_entry(call, 1, 0), c, s)
     radius, _ = in_plane(
@@ -79,13 +84,19 @@ def parallel_side(arm: ArmTable, call: CallTable, block: int, side: int, theta1:
         s,
     )
     h = square_root(x * x + wz * wz)
-    least, missed = larger(h, branch_layout.SINGULAR), h < 0.0
+    least = larger(h, branch_layout.SINGULAR)
+    missed = h < 0.0  # none yet
     for way in range(2):
-        sigma, branch = 1.0 - 2.0 * way, 4 * side + 2 * way
-        cosine, sine = sigma * x / least, sigma * wz / least
-        psi, theta5 = arc_tangent(sine, cosine), arc_tangent(s5, sigma * h)
+        sigma = 1.0 - 2.0 * way
+        branch = 4 * side + 2 * way
+        cosine = sigma * x / least
+        sine = sigma * wz / least
+        psi = arc_tangent(sine, cosine)
+        theta5 = arc_tangent(s5, sigma * h)
+
         roll = s5 * (along * cosine + uz * sine) - sigma * h * across
         theta6 = arc_tangent(roll, uz * cosine - along * sine)
+
         height = placed_origin(call, 2) - d6 * wz - a4 * sine
         up, down, turn, raw = two_links(a2, a3, radius - a1 - a4 * cosine, height)
         missed = missed | (absolute(raw) > 1.0 + branch_layout.REACH_TOLERANCE)
@@ -100,17 +111,15 @@ def solve_parallel(arm: ArmTable, call: CallTable, block: int) -> None:
 
     Branches are (front, back) x (near, far) x (up, down).
     """
-    d6, slack = arm.numbers[branch_layout.D6], call.slack
-    px, py = (
-        placed_origin(call, 0) - d6 * placed_entry(call, 0, 2),
-        placed_origin(call, 1) - d6 * placed_entry(call, 1, 2),
-    )
+    d6 = arm.numbers[branch_layout.D6]
+    slack = call.slack
+    px = placed_origin(call, 0) - d6 * placed_entry(call, 0, 2)
+    py = placed_origin(call, 1) - d6 * placed_entry(call, 1, 2)
     away = square_root(px * px + py * py)
-    c, s, front = (
-        px / larger(away, branch_layout.SINGULAR),
-        py / larger(away, branch_layout.SINGULAR),
-        arc_tangent(py, px),
-    )
+    c = px / larger(away, branch_layout.SINGULAR)
+    s = py / larger(away, branch_layout.SINGULAR)
+    front = arc_tangent(py, px)
+
     h, missed = parallel_side(arm, call, block, 0, front, c, s)
     _, missed_too = parallel_side(arm, call, block, 1, opposite(front), -c, -s)
     normal = smaller(
@@ -127,11 +136,17 @@ def ball_wrist(call: CallTable, block: int, branch: int, raw: Any, arm_angles: A
     theta1, theta2, theta3 = arm_angles
     s23, c23 = wide_sine_and_cosine(theta2 + theta3)
     forward, y = in_plane(placed_entry(call, 0, 2), placed_entry(call, 1, 2), c, s)
-    x, z = forward * c23 + placed_entry(call, 2, 2) * s23, placed_entry(call, 2, 2) * c23 - forward * s23
+    x = forward * c23 + placed_entry(call, 2, 2) * s23
+    z = placed_entry(call, 2, 2) * c23 - forward * s23
     sine = square_root(x * x + y * y)
-    c4, s4 = -x / larger(sine, branch_layout.SINGULAR), -y / larger(sine, branch_layout.SINGULAR)
-    ax, ay, az = -s4 * c23 * c - c4 * s, -s4 * c23 * s + c4 * c, -s4 * s23  # the axis of joint 5, backwards
-    theta4, theta5 = arc_tangent(-y, -x), arc_tangent(sine, z)
+    c4 = -x / larger(sine, branch_layout.SINGULAR)
+    s4 = -y / larger(sine, branch_layout.SINGULAR)
+    ax = -s4 * c23 * c - c4 * s  # the axis of joint 5, backwards
+    ay = -s4 * c23 * s + c4 * c
+    az = -s4 * s23
+
+    theta4 = arc_tangent(-y, -x)
+    theta5 = arc_tangent(sine, z)
     theta6 = arc_tangent(
         ax * placed_entry(call, 0, 0) + ay * placed_entry(call, 1, 0) + az * placed_entry(call, 2, 0),
         ax * placed_entry(call, 0, 1) + ay * placed_entry(call, 1, 1) + az * placed_entry(call, 2, 1),
@@ -144,9 +159,13 @@ def ball_wrist(call: CallTable, block: int, branch: int, raw: Any, arm_angles: A
 @inlined
 def ball_side(arm: ArmTable, call: CallTable, block: int, side: int, theta1: Any, radius: Any, short: Any) -> Any:
     """Four branches of an arm with a ball wrist, its azimuth known; which have a straight wrist."""
-    base, a2 = arm.numbers[branch_layout.SHOULDER], arm.numbers[branch_layout.UPPER_ARM]
-    forearm, bend = arm.numbers[branch_layout.FOREARM], arm.numbers[branch_layout.BEND]
-    slack, branch = call.slack, 4 * side
+    base = arm.numbers[branch_layout.SHOULDER]
+    a2 = arm.numbers[branch_layout.UPPER_ARM]
+    forearm = arm.numbers[branch_layout.FOREARM]
+    bend = arm.numbers[branch_layout.BEND]
+    slack = call.slack
+    branch = 4 * side
+
     up, down, turn, raw = two_links(a2, forearm, radius, placed_origin(call, 2) - base)
     raw = choose(short, spread_wide(2.0), raw)
     s, c = wide_sine_and_cosine(theta1)
@@ -161,14 +180,14 @@ def solve_ball(arm: ArmTable, call: CallTable, block: int) -> None:
 
     Branches are (front, back) x (up, down) x (near, flip).
     """
-    px, py, d3 = placed_origin(call, 0), placed_origin(call, 1), arm.numbers[branch_layout.ASIDE]
+    px = placed_origin(call, 0)
+    py = placed_origin(call, 1)
+    d3 = arm.numbers[branch_layout.ASIDE]
     square = px * px + py * py - d3 * d3
     radius = square_root(choose(square < branch_layout.SHOULDER_ROOT, spread_wide(0.0), square))
-    heading, aside, short = (
-        arc_tangent(py, px),
-        arc_tangent(spread_wide(d3), radius),
-        square < -branch_layout.REACH_TOLERANCE,
-    )
+    heading = arc_tangent(py, px)
+    aside = arc_tangent(spread_wide(d3), radius)
+    short = square < -branch_layout.REACH_TOLERANCE
     odd = ball_side(arm, call, block, 0, within_half_turn(heading + aside), radius, short)
     odd = odd | ball_side(arm, call, block, 1, within_half_turn(heading + HALF_TURN - aside), -radius, short)
     set_truths(call.odd, WIDTH * block, odd)

@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Any
 
 from rrtik_ompl.kernels.ik import ik_layout
-from rrtik_ompl.kernels.ik.cholesky import ANY_PIVOT, solve_in_place
+from rrtik_ompl.kernels.ik.damped_steps import ANY_PIVOT, move_by, solve_in_place
 from rrtik_ompl.kernels.ik.ik_accessors import (
     aim_at,
     column_at,
@@ -41,9 +41,10 @@ def along(a: Twist, b: Twist) -> Any:
 def hold_at_limits(limb: LimbTable, call: CallTable, q: Configuration) -> None:
     """Leave joints out that are at a limit and would be driven beyond it: their columns become 0."""
     for k in range(limb.dof):
-        column, value = column_at(call.columns, k), q[k]
+        column = column_at(call.columns, k)
         pull = along(column, call.error)
-        low, high = value <= limb.lower[k], value >= limb.upper[k]
+        low = q[k] <= limb.lower[k]
+        high = q[k] >= limb.upper[k]
         if (low and pull < 0.0) or (high and pull > 0.0):
             for axis in range(TWIST_NUMBERS):
                 column[axis] = 0.0
@@ -73,33 +74,24 @@ def solve_square(call: CallTable) -> None:
 @kernel
 def step(limb: LimbTable, call: CallTable, q: Configuration) -> None:
     """Move the joints by J^T times what :func:`solve_square` left, no joint too far, none beyond a limit."""
-    change, largest = call.change, limb.largest_step
-    most = largest
     for k in range(limb.dof):
-        value = along(column_at(call.columns, k), call.error)
-        change[k] = value
-        most = max(most, abs(value))
-    for k in range(limb.dof):
-        value = q[k] + change[k] * (largest / most)
-        low, high = limb.lower[k], limb.upper[k]
-        q[k] = min(max(value, low), high)
+        call.change[k] = along(column_at(call.columns, k), call.error)
+    move_by(limb, call.change, q)
 
 
 @kernel
 def descend(limb: LimbTable, call: CallTable, aim: Aim, q: Configuration) -> bool:
     """Walk from q towards the goal as :func:`see_from` has it; whether it is reached."""
-    mark, before, share, patience = (
-        UNBOUNDED_RESIDUAL,
-        UNBOUNDED_RESIDUAL,
-        limb.share,
-        call.patience,
-    )
+    share = limb.share
+    mark = UNBOUNDED_RESIDUAL  # squared, some steps ago
+    before = UNBOUNDED_RESIDUAL  # squared, one step ago
     for k in range(call.steps + 1):
         tip = move_tip(limb, call, q)
         if measure(call, aim, tip):
             return True
+
         square = weigh(call)
-        if k > 0 and k % patience == 0:
+        if k > 0 and k % call.patience == 0:
             if square > limb.stalled * mark:
                 return False
             mark = square
@@ -108,6 +100,7 @@ def descend(limb: LimbTable, call: CallTable, aim: Aim, q: Configuration) -> boo
         if square > before:
             share *= limb.share_growth
         before = square
+
         differentiate(limb, call, aim, tip)
         hold_at_limits(limb, call, q)
         fill_square(limb, call, limb.damping + share * square)
@@ -136,24 +129,31 @@ def walk(limb: LimbTable, call: CallTable) -> int:
 def measure_seeds(limb: LimbTable, call: CallTable, aim: Aim) -> None:
     """How far each seed's tip is from a goal, squared and without units."""
     free = free_turn_of(aim)
-    metre, chord = limb.per_metre, limb.per_chord
+    metre = limb.per_metre
+    chord = limb.per_chord
     for seed in range(limb.seed_count):
         tip = pose_at(limb.seed_tips, seed)
-        away, turned = 0.0, 0.0
+        away = 0.0
+        turned = 0.0
         for k in range(3):
             way = pose_origin(tip, k) - pose_origin(aim, k)
             away += way * way
             if free == ik_layout.NO_TURN or free == k:
                 for row in range(3):
                     turned += pose_entry(tip, row, k) * pose_entry(aim, row, k)
-        whole = 3.0 if free == ik_layout.NO_TURN else (0.0 if free == ik_layout.ANY_TURN else 1.0)
+        whole = 1.0  # the largest that it can be
+        if free == ik_layout.NO_TURN:
+            whole = 3.0
+        elif free == ik_layout.ANY_TURN:
+            whole = 0.0
         call.farness[seed] = metre * metre * away + chord * chord * (whole - turned)
 
 
 @kernel
 def take_nearest(limb: LimbTable, call: CallTable) -> int:
     """The nearest seed that has not been taken."""
-    farness, best = call.farness, 0
+    farness = call.farness
+    best = 0
     for seed in range(1, limb.seed_count):
         if farness[seed] < farness[best]:
             best = seed
@@ -164,10 +164,12 @@ def take_nearest(limb: LimbTable, call: CallTable) -> int:
 @kernel
 def search(limb: LimbTable, call: CallTable, row: int) -> bool:
     """Walk from the row's next starts until one reaches its goal; whether one does."""
-    dof, aim = limb.dof, aim_at(call, row)
+    dof = limb.dof
+    aim = aim_at(call, row)
     q = row_at(call.q, dof, row)
     see_from(limb, call, aim)
-    begin, source = call.next[row], near_at(call, row)
+    begin = call.next[row]
+    source = near_at(call, row)
     for start in range(limb.seed_count + 1):
         if start == 1:
             measure_seeds(limb, call, aim)

@@ -32,6 +32,7 @@ from rrtik_ompl.kernels.ik.ik_layout import (
 from rrtik_ompl.kernels.layout import Configuration
 from rrtik_ompl.kernels.simd.compiled import inlined, kernel
 
+STEEPEST = 1e-3  # cosine of the pitch, at least
 HALF_TURN_COSINE = 1e-12  # cosine of half an angle, below which the turn is a half turn
 
 
@@ -45,28 +46,29 @@ def dot(vector: Any, x: float, y: float, z: float) -> float:
 @kernel
 def see_from(limb: LimbTable, call: CallTable, aim: Aim) -> None:
     """Set the frame before the first joint as seen from the goal, and whether turns count."""
-    first, fixed = call.first, limb.fixed
+    first = call.first
+    fixed = limb.fixed
     for row in range(3):
         x, y, z = pose_column(aim, row)
         for column in range(3):
             set_pose_entry(first, row, column, dot(pose_column(fixed, column), x, y, z))
         away = x * (pose_origin(fixed, 0) - pose_origin(aim, 0)) + y * (pose_origin(fixed, 1) - pose_origin(aim, 1))
         set_pose_origin(first, row, away + z * (pose_origin(fixed, 2) - pose_origin(aim, 2)))
-    weights, turns = call.weights, free_turn_of(aim) != ik_layout.ANY_TURN
+    turns = free_turn_of(aim) != ik_layout.ANY_TURN
     for k in range(3):
-        weights[LINEAR + k] = limb.per_metre
-        weights[ANGULAR + k] = limb.per_chord if turns else 0.0
+        call.weights[LINEAR + k] = limb.per_metre
+        call.weights[ANGULAR + k] = limb.per_chord if turns else 0.0
 
 
 @kernel
 def move_tip(limb: LimbTable, call: CallTable, q: Configuration) -> Any:
     """Frames of all joints, each after its own motion, and of the tip; returns where the tip's frame is."""
-    frame, fixed, columns = call.frames, limb.fixed, limb.column
+    frame = call.frames
+    fixed = limb.fixed
     for k in range(POSE_NUMBERS):
         frame[k] = call.first[k]
     for joint in range(limb.joints):
-        value = limb.gain[joint] * q[columns[joint]]
-        value += limb.offset[joint]
+        value = limb.gain[joint] * q[limb.column[joint]] + limb.offset[joint]
         fixed = next_pose(fixed)
         if limb.sliding[joint] != 0:
             move_joint(frame, fixed, value, 1.0, 0.0)
@@ -82,7 +84,8 @@ def move_joint(frame: Pose, fixed: Pose, slide: float, cosine: float, sine: floa
     after = next_pose(frame)
     for row in range(3):
         a, b, z = pose_row(frame, row)
-        x, y = cosine * a + sine * b, cosine * b - sine * a
+        x = cosine * a + sine * b
+        y = cosine * b - sine * a
         origin = pose_origin(frame, row) + slide * z
         set_pose_origin(frame, row, origin)
         for k in range(3):
@@ -112,9 +115,12 @@ def missing_turn(free: int, tip: Pose) -> Any:
 @kernel
 def measure(call: CallTable, aim: Aim, tip: Pose) -> bool:
     """Set the residual [m; chord] of a tip seen from the goal; whether it is within the tolerances."""
-    error, free, away = call.error, free_turn_of(aim), 0.0
+    error = call.error
+    free = free_turn_of(aim)
+    away = 0.0  # squared
     for k in range(3):
-        place, slack = pose_origin(tip, k), box_half(aim, k)
+        place = pose_origin(tip, k)
+        slack = box_half(aim, k)
         outside = min(max(place, -slack), slack) - place
         error[LINEAR + k] = outside
         away += outside * outside
@@ -126,7 +132,8 @@ def measure(call: CallTable, aim: Aim, tip: Pose) -> bool:
     error[ANGULAR + 1] = y / half
     error[ANGULAR + 2] = z / half
     turn = (x * x + y * y + z * z) / (half * half)
-    near, small = aim[ik_layout.POSITION_TOLERANCE], aim[ik_layout.CHORD_TOLERANCE]
+    near = aim[ik_layout.POSITION_TOLERANCE]
+    small = aim[ik_layout.CHORD_TOLERANCE]
     reached: bool = away <= near * near and turn <= small * small
     return reached
 
@@ -134,10 +141,10 @@ def measure(call: CallTable, aim: Aim, tip: Pose) -> bool:
 @kernel
 def weigh(call: CallTable) -> float:
     """Turn the residual into one without units; its square."""
-    error, weights, square = call.error, call.weights, 0.0
+    square = 0.0
     for k in range(TWIST_NUMBERS):
-        value = error[k] * weights[k]
-        error[k] = value
+        value = call.error[k] * call.weights[k]
+        call.error[k] = value
         square += value * value
     return square
 
@@ -145,11 +152,26 @@ def weigh(call: CallTable) -> float:
 @kernel
 def differentiate(limb: LimbTable, call: CallTable, aim: Aim, tip: Pose) -> None:
     """Twist of the Jacobian, weighted like the residual: what one unit of each q does to the tip."""
-    columns, weights, frame = call.columns, call.weights, call.frames
+    chord = call.weights[ANGULAR]
+    weights = held(call, aim, 0), held(call, aim, 1), held(call, aim, 2), chord, chord, chord
+    set_columns(limb, call.frames, tip, weights, free_turn_of(aim), call.columns)
+
+
+@inlined
+def set_columns(limb: LimbTable, frame: Pose, tip: Pose, weights: Any, free: int, columns: Twist) -> None:
+    """Set the weighted columns of the Jacobian.
+
+    Args:
+        limb: The joints.
+        frame: Of the first joint; those of the others stand behind it.
+        tip: The frame that is moved.
+        weights: Six numbers.
+        free: What is felt of a turn, see :func:`felt`.
+        columns: What is set.
+    """
+    u, v, w, r, s, t = weights
     for k in range(TWIST_NUMBERS * limb.dof):
         columns[k] = 0.0
-    u, v, w = held(call, aim, 0), held(call, aim, 1), held(call, aim, 2)
-    chord, free = weights[ANGULAR], free_turn_of(aim)
     for joint in range(limb.joints):
         x, y, z = moved_axis(limb, frame, joint)
         column = column_at(columns, limb.column[joint])
@@ -159,7 +181,7 @@ def differentiate(limb: LimbTable, call: CallTable, aim: Aim, tip: Pose) -> None
             a, b, c = swept(frame, tip, x, y, z)
             add(column, LINEAR, u * a, v * b, w * c)
             x, y, z = felt(free, tip, x, y, z)
-            add(column, ANGULAR, chord * x, chord * y, chord * z)
+            add(column, ANGULAR, r * x, s * y, t * z)
         frame = next_pose(frame)
 
 
@@ -188,11 +210,22 @@ def held(call: CallTable, aim: Aim, axis: int) -> Any:
 
 @inlined
 def felt(free: int, tip: Pose, x: float, y: float, z: float) -> Any:
-    """A turn without its part about an axis of the tip that may point anywhere in its own turn."""
+    """A turn without its part about an axis of the tip, 0, 1 or 2, that may point anywhere in its own turn.
+
+    AS_ANGLES: what it changes of the tip's roll, pitch and yaw. Anything else: all of it.
+    """
     if free == 0 or free == 1 or free == 2:
         a, b, c = pose_column(tip, free)
         own = x * a + y * b + z * c
         x, y, z = x - own * a, y - own * b, z - own * c
+    elif free == ik_layout.AS_ANGLES:
+        a = pose_entry(tip, 0, 0)
+        b = pose_entry(tip, 1, 0)
+        level = max(math.sqrt(a * a + b * b), STEEPEST)
+        a = a / level
+        b = b / level
+        roll = (a * x + b * y) / level
+        x, y, z = roll, b * -x + a * y, z - pose_entry(tip, 2, 0) * roll
     return x, y, z
 
 

@@ -20,27 +20,32 @@ class Twist(Doubles):
     """A residual or a column of the Jacobian: along, about."""
 
 
-class LimbTable(Record):
+class StepRules(Record):
+    """What bounds a step of damped least squares."""
+
+    dof: int
+    lower: Configuration  # limits
+    upper: Configuration
+    per_metre: float  # weight of a residual of the position
+    damping: float
+    largest_step: float  # of a coordinate
+
+
+class LimbTable(StepRules):
     """The joints from the base to the tip."""
 
     joints: int
-    dof: int
     fixed: Pose  # before each joint and after the last, every joint's axis being z
     sliding: Ints  # whether a joint slides
     column: Ints  # joint value = gain q[column] + offset
     gain: Doubles
     offset: Doubles
-    lower: Configuration  # limits
-    upper: Configuration
     seed_count: int
     seeds: Configuration
     seed_tips: Pose  # where seeds bring the tip to
-    per_metre: float
     per_chord: float
-    damping: float
     share: float  # of the squared residual, that is added to the damping
     share_growth: float
-    largest_step: float
     stalled: float
 
 
@@ -82,3 +87,4 @@ LINEAR, ANGULAR = 0, 3
 POSITION_TOLERANCE, CHORD_TOLERANCE, BOX, FREE_TURN = 12, 13, 14, 17
 AIM_FLOATS = 18
 NO_TURN, ANY_TURN = -1, 3  # else 0, 1, 2: about x, y or z of the goal
+AS_ANGLES = 4  # of what is felt of a turn: the changes of roll, pitch and yaw

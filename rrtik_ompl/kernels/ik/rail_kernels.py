@@ -63,7 +63,8 @@ def turned(axis: Any, cosine: float, sine: float, vector: Any) -> Any:
 def place_aim(table: RailTable, aim: Aim, share: float) -> None:
     """Set the pose of a goal to that of the rail at a share of it."""
     rail = table.rail
-    centre, slide = three(rail, rail_layout.CENTRE), three(rail, rail_layout.SLIDE)
+    centre = three(rail, rail_layout.CENTRE)
+    slide = three(rail, rail_layout.SLIDE)
     angle = share * rail[rail_layout.ARC_ANGLE]
     lever = (
         pose_origin(rail, 0) - centre[0],
@@ -75,7 +76,8 @@ def place_aim(table: RailTable, aim: Aim, share: float) -> None:
     set_pose_origin(aim, 1, centre[1] + y + share * slide[1])
     set_pose_origin(aim, 2, centre[2] + z + share * slide[2])
     angle = share * rail[rail_layout.TURN_ANGLE]
-    cosine, sine = math.cos(angle), math.sin(angle)
+    cosine = math.cos(angle)
+    sine = math.sin(angle)
     for column in range(3):
         x, y, z = turned(three(rail, rail_layout.TURN_AXIS), cosine, sine, pose_column(rail, column))
         set_pose_entry(aim, 0, column, x)
@@ -104,7 +106,9 @@ def correct(limb: LimbTable, call: CallTable, aim: Aim, q: Configuration) -> boo
 @kernel
 def guess(limb: LimbTable, table: RailTable, row: int, share: float) -> None:
     """Set the trial configuration with which a step of a share of the rail begins."""
-    dof, trial, far = limb.dof, table.trial, share
+    dof = limb.dof
+    trial = table.trial
+    far = share
     now = row_at(table.q, dof, row)
     at = table.shares[row]
     if table.homing != 0:
@@ -118,14 +122,17 @@ def guess(limb: LimbTable, table: RailTable, row: int, share: float) -> None:
         value = now[k]
         drawn = far * table.pull[k] * (table.reference[k] - value)
         value += drawn + again * (value - before[k])
-        low, high = limb.lower[k], limb.upper[k]
+        low = limb.lower[k]
+        high = limb.upper[k]
         trial[k] = min(max(value, low), high)
 
 
 @kernel
 def bent(limb: LimbTable, table: RailTable, now: Configuration, share: float) -> Any:
     """Bounds of the third derivatives of the tip's distance [m] and turn over a step to the trial configuration."""
-    turn, swept, slid = 0.0, 0.0, 0.0
+    turn = 0.0
+    swept = 0.0
+    slid = 0.0
     for joint in range(limb.joints):
         column = limb.column[joint]
         change = limb.gain[joint] * (table.trial[column] - now[column])
@@ -135,7 +142,8 @@ def bent(limb: LimbTable, table: RailTable, now: Configuration, share: float) ->
             turn += abs(change)
             swept += abs(change) * table.levers[joint]
     rail = table.rail
-    arc, own = abs(share * rail[rail_layout.ARC_ANGLE]), abs(share * rail[rail_layout.TURN_ANGLE])
+    arc = abs(share * rail[rail_layout.ARC_ANGLE])
+    own = abs(share * rail[rail_layout.TURN_ANGLE])
     return turn * turn * (swept + 3.0 * slid) + arc * arc * arc * rail[
         rail_layout.ARC_RADIUS
     ], turn * turn * turn + own * own * own
@@ -144,17 +152,23 @@ def bent(limb: LimbTable, table: RailTable, now: Configuration, share: float) ->
 @kernel
 def strayed(limb: LimbTable, call: CallTable, table: RailTable, row: int, share: float) -> float:
     """How far the tip leaves the rail on the way to the trial configuration at most; 1 is what it may."""
-    dof, trial, middle = limb.dof, table.trial, table.middle
-    now, aim = row_at(table.q, dof, row), aim_at(call, 0)
+    dof = limb.dof
+    trial = table.trial
+    middle = table.middle
+    now = row_at(table.q, dof, row)
+    aim = aim_at(call, 0)
     for k in range(dof):
-        a, b = now[k], trial[k]
+        a = now[k]
+        b = trial[k]
         if abs(b - a) > LARGEST_CHANGE:
             return TOO_FAR
         middle[k] = 0.5 * (a + b)
     place_aim(table, aim, table.shares[row] + 0.5 * share)
     see_from(limb, call, aim)
     measure(call, aim, move_tip(limb, call, middle))
-    error, away, chord = call.error, 0.0, 0.0
+    error = call.error
+    away = 0.0
+    chord = 0.0
     for k in range(3):
         away += error[ik_layout.LINEAR + k] ** 2
         chord += error[ik_layout.ANGULAR + k] ** 2
@@ -168,7 +182,8 @@ def strayed(limb: LimbTable, call: CallTable, table: RailTable, row: int, share:
 @kernel
 def advance(limb: LimbTable, call: CallTable, table: RailTable, row: int, share: float) -> float:
     """Try a step from a row; how far it strays, 1 at most if it was taken."""
-    dof, aim = limb.dof, aim_at(call, 0)
+    dof = limb.dof
+    aim = aim_at(call, 0)
     at = table.shares[row] + share
     guess(limb, table, row, share)
     place_aim(table, aim, at)

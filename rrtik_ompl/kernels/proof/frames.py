@@ -83,7 +83,9 @@ def move_frame(joint: Any, value: float, slides: bool, cosine: float, sine: floa
     """Write the frame of a joint: its placement in the parent's frame, then its own turn (Rodrigues) or slide."""
     x, y, z = vector_at(joint, layout.JOINT_AXIS)
     shift = origin_of(joint)
-    c, s, d = cosine, sine, 1.0 - cosine
+    c = cosine
+    s = sine
+    d = 1.0 - cosine
     for i in range(3):
         row = vector_at(parent, 3 * i)
         u, v, w = turned_back(joint, row)

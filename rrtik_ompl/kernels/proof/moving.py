@@ -71,13 +71,16 @@ class MovedObstacles:
             bodies: As at the beginning, obstacles with other placements and margins.
             room: For each body what is to be kept from it beside its margin [m]; read for obstacles.
         """
-        packed, kept = self._packed, np.array([bodies[k].margin + room[k] for k in self._numbers])
+        packed = self._packed
+        kept = np.array([bodies[k].margin + room[k] for k in self._numbers])
         packed.margins[self._pairs[:, 0]] = kept[self._pairs[:, 1]] + self._paddings
         packed.kept = (float("nan"), packed.kept[1])  # so that margins are written anew
         changes = [bodies[k].placement * back for k, back in zip(self._numbers, self._back, strict=True)]
         turns = np.array([change.rotation for change in changes]).reshape(-1, 3, 3)
         shifts = np.array([change.translation for change in changes]).reshape(-1, 3)
-        turn, shift, rows = turns[self._owners], shifts[self._owners], self._sizes.copy()
+        turn = turns[self._owners]
+        shift = shifts[self._owners]
+        rows = self._sizes.copy()
         rows[:, _BALL] = _turned(turn, rows[:, _BALL]) + shift
         axes = rows[:, _AXES].reshape(-1, 3, 3) @ turn.transpose(0, 2, 1)
         rows[:, _AXES] = axes.reshape(-1, 9)
@@ -91,7 +94,8 @@ class MovedObstacles:
 
     def _put_clouds(self, bodies: Sequence[Body]) -> None:
         """Put the clouds where they are now, and other points in their place where these have changed."""
-        table, numbers = self._packed.table, cloud_bodies(bodies)
+        table = self._packed.table
+        numbers = cloud_bodies(bodies)
         if not numbers:
             return
         table.cloud_poses[:] = cloud_poses(bodies).ravel()
@@ -113,7 +117,8 @@ class MovedSolids:
     """
 
     def __init__(self, packed: ProofPairs) -> None:
-        self._packed, table = packed, packed.table
+        self._packed = packed
+        table = packed.table
         self._records = table.solids.reshape(-1, layout.SOLID_SIZE)
         self._sizes = table.sizes.reshape(-1, layout.SIZE_COUNT)
         self._blocks = table.corners.reshape(-1, 3, WIDTH)
@@ -132,7 +137,8 @@ class MovedSolids:
         """
         pose = np.asarray(body.placement.homogeneous)[None]
         own = placed_bodies([convex_solids(body.geometry)], pose)[0].around or (NOTHING,)
-        first, end = self._packed.firsts[number], self._packed.firsts[number + 1]
+        first = self._packed.firsts[number]
+        end = self._packed.firsts[number + 1]
         parts = self._parts(number)
         kinds = [solid_kind(body, solid) for solid in own]
         if self._left == 0 or kinds != self._records[parts, layout.SOLID_KIND].tolist() or layout.CLOUD in kinds:
@@ -144,7 +150,8 @@ class MovedSolids:
         blocks = slice(self._records[parts[0], layout.FIRST_BLOCK], self._records[parts[-1], layout.END_BLOCK])
         self._blocks[blocks] = corner_blocks([solid.corners for solid in own])
         for group in self._groups.get(number, ()):
-            members, place = self._packed.groups[group], self._packed.firsts[-1] + group
+            members = self._packed.groups[group]
+            place = self._packed.firsts[-1] + group
             if len(members) > BLOCK:  # what is around what was there and what is new is around all
                 solids = [_box(self._sizes[place]), *own]
             else:
@@ -154,12 +161,14 @@ class MovedSolids:
 
     def _parts(self, number: int) -> range:
         """The solids of a body, without the one that stands for all of them."""
-        first, end = self._packed.firsts[number], self._packed.firsts[number + 1]
+        first = self._packed.firsts[number]
+        end = self._packed.firsts[number + 1]
         return range(first + (end - first > 1), end)
 
     def _solid(self, number: int) -> ConvexSolid:
         """A solid as it stands in the table."""
-        record, sizes = self._records[number], self._sizes[number]
+        record = self._records[number]
+        sizes = self._sizes[number]
         return ConvexSolid(
             corners_in(self._blocks[record[layout.FIRST_BLOCK] : record[layout.END_BLOCK]]),
             disc=float(sizes[layout.DISC]),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -108,37 +109,17 @@ def proof_pairs(
         _reaches(chain, body.joint, own, np.broadcast_to(strokes, joints))
         for body, own in zip(bodies, parts, strict=True)
     ]
-    sweeps: dict[tuple[Members, int], int] = {}
-    whole: list[tuple[int, ...]] = []
-    of_parts: list[tuple[int, ...]] = []
-    ends = np.cumsum([0, *(len(part) + (len(part) > 1) for part in parts)]).tolist()
-    on = [body.joint for body in bodies]
-    common = cache(partial(_common, chain))
-    moving = [(i, j) for i, j in pairs if on[i] or on[j]]
-    groups = compared_as_one(bodies, parts, moving, common, fixed=fixed)
-    grouped = {(k, s): None for members, (blocks, *_) in groups for block in blocks for s in block for k in members}
-    for i, j in [*grouped, *(pair for pair in moving if pair not in grouped and pair[::-1] not in grouped)]:
-        base = common(on[i], on[j])
-        one, other = (i, j) if base == on[j] else (j, i)
-        own = [sweeps.setdefault(((k,), base), len(sweeps)) if on[k] != base else -1 for k in (one, other)]
-        first = len(of_parts)
-        split = len(parts[one]) > 1 or len(parts[other]) > 1
-        if split:
-            firsts = [ends[k] + (len(parts[k]) > 1) for k in (one, other)]
-            of_parts += [
-                (firsts[0] + a, firsts[1] + b, base, *own, 0, 0, one, a, other, b)
-                for a in range(len(parts[one]))
-                for b in range(len(parts[other]))
-            ]
-        numbers = [-1 if len(parts[k]) > 1 else 0 for k in (one, other)]
-        span = (first, len(of_parts))
-        whole.append((ends[one], ends[other], base, *own, *span, one, numbers[0], other, numbers[1]))
-    of_groups, together, top = group_rows(groups, on, ends, sweeps, len(whole) + len(of_parts))
-    rows = np.array([*whole, *of_parts, *of_groups], dtype=np.int64).reshape(-1, layout.PAIR_SIZE + 4)
-    rows[: len(whole), layout.PARTS_FIRST : layout.PARTS_END + 1] += len(whole)
-    top += range(len(grouped), len(whole))
+    firsts = np.cumsum([0, *(len(part) + (len(part) > 1) for part in parts)]).tolist()
+    listed = _listed_pairs(chain, bodies, pairs, parts, firsts, fixed=fixed)
+    sweeps = listed.sweeps
+    count = len(listed.whole) + len(listed.of_parts)
+
+    rows = np.array([*listed.whole, *listed.of_parts, *listed.of_groups], dtype=np.int64)
+    rows = rows.reshape(-1, layout.PAIR_SIZE + 4)
+    rows[: len(listed.whole), layout.PARTS_FIRST : layout.PARTS_END + 1] += len(listed.whole)
     sides = rows[:, layout.PAIR_SIZE :]
     named = np.sort(sides[:, ::2], axis=1)
+
     clouds = [cloud_table(bodies[k].geometry.cloud) for k in cloud_bodies(bodies)]
     made = packed(
         ProofTable,
@@ -146,16 +127,16 @@ def proof_pairs(
         parents=(chain.parent + 1).astype(np.int32),
         sliding=chain.prismatic.astype(np.int32),
         joints=_joint_rows(chain),
-        **_solid_arrays(bodies, parts, list(together)),
+        **_solid_arrays(bodies, parts, listed.together),
         sweep_count=len(sweeps),
         sweeps=np.array([(bodies[k].joint, base) for (k, *_), base in sweeps], dtype=np.int32),
         reaches=np.array([np.max([reached[k] for k in them], axis=0) for them, _ in sweeps]),
-        body_pair_count=len(whole),
+        body_pair_count=len(listed.whole),
         pair_count=len(rows),
         pairs=rows[:, : layout.PAIR_SIZE].astype(np.int32),
         margins=np.zeros(len(rows)),
-        top_count=len(top),
-        top_pairs=np.array(top, dtype=np.int32),
+        top_count=len(listed.top),
+        top_pairs=np.array(listed.top, dtype=np.int32),
         frames=np.zeros(NODES * (joints + 1) * layout.FRAME_SIZE),
         stamps=np.zeros(NODES, dtype=np.int32),
         bends=np.zeros(len(sweeps)),
@@ -169,12 +150,14 @@ def proof_pairs(
         clouds=np.array([cloud.address for cloud in clouds], dtype=np.int64),
         cloud_poses=cloud_poses(bodies),
     )
+
     arrays = body_arrays(bodies)
     beside = np.asarray(arrays.obstacles[named].any(axis=1))
     touching = arrays.in_contact(named)
     margins = arrays.kept_apart(named)
-    for number, row in enumerate(of_groups, len(whole) + len(of_parts)):
+    for number, row in enumerate(listed.of_groups, count):
         margins[number] = margins[row[layout.PARTS_FIRST] : row[layout.PARTS_END]].max()
+
     return ProofPairs(
         table=made,
         clouds=clouds,
@@ -184,9 +167,68 @@ def proof_pairs(
         beside_obstacle=beside,
         clear=beside & ~touching,
         touching=np.flatnonzero(touching).tolist(),
-        firsts=ends,
-        groups=list(together),
+        firsts=firsts,
+        groups=listed.together,
     )
+
+
+class _ListedPairs(NamedTuple):
+    """Pairs as rows of the table, behind each of them its sides, see :class:`ProofPairs`.
+
+    ``whole``: of bodies, with spans of ``of_parts``. ``of_parts``: of what these consist of. ``of_groups``: of several
+    bodies, with spans of all rows. ``sweeps``: bodies, and the frame from which they are seen. ``together``: bodies
+    that are one solid. ``top``: rows to begin with.
+    """
+
+    whole: list[tuple[int, ...]]
+    of_parts: list[tuple[int, ...]]
+    of_groups: list[tuple[int, ...]]
+    sweeps: dict[tuple[Members, int], int]
+    together: Sequence[Members]
+    top: Sequence[int]
+
+
+def _listed_pairs(
+    chain: Chain,
+    bodies: Sequence[Body],
+    pairs: Sequence[tuple[int, int]],
+    parts: Sequence[Sequence[ConvexSolid]],
+    firsts: Sequence[int],
+    *,
+    fixed: bool,
+) -> _ListedPairs:
+    """The pairs of bodies, of their parts, and of groups of bodies; arguments as of :func:`proof_pairs`."""
+    joints = [body.joint for body in bodies]
+    common = cache(partial(_common, chain))
+    moving = [(i, j) for i, j in pairs if joints[i] or joints[j]]
+
+    # those that groups are made of come first
+    groups = compared_as_one(bodies, parts, moving, common, fixed=fixed)
+    grouped = {(k, s): None for members, (blocks, *_) in groups for block in blocks for s in block for k in members}
+    others = [pair for pair in moving if pair not in grouped and pair[::-1] not in grouped]
+
+    sweeps: dict[tuple[Members, int], int] = {}
+    whole: list[tuple[int, ...]] = []
+    of_parts: list[tuple[int, ...]] = []
+    for i, j in [*grouped, *others]:
+        base = common(joints[i], joints[j])
+        one, other = (i, j) if base == joints[j] else (j, i)  # what stands still, seen from there, is below
+        own = [sweeps.setdefault(((k,), base), len(sweeps)) if joints[k] != base else -1 for k in (one, other)]
+        begin = len(of_parts)
+        if len(parts[one]) > 1 or len(parts[other]) > 1:
+            first, second = (firsts[k] + (len(parts[k]) > 1) for k in (one, other))
+            of_parts += [
+                (first + a, second + b, base, *own, 0, 0, one, a, other, b)
+                for a in range(len(parts[one]))
+                for b in range(len(parts[other]))
+            ]
+        numbers = [-1 if len(parts[k]) > 1 else 0 for k in (one, other)]
+        span = begin, len(of_parts)
+        whole.append((firsts[one], firsts[other], base, *own, *span, one, numbers[0], other, numbers[1]))
+
+    of_groups, together, top = group_rows(groups, joints, firsts, sweeps, len(whole) + len(of_parts))
+    top += range(len(grouped), len(whole))
+    return _ListedPairs(whole, of_parts, of_groups, sweeps, list(together), top)
 
 
 NOTHING = ConvexSolid(np.zeros((1, 3)), inside=False, kind=-1)
@@ -250,7 +292,8 @@ def size_rows(groups: Sequence[Sequence[ConvexSolid]], turns: NDArray[np.float64
     known = np.array([all(solid.kind in SIZED for solid in group) for group in groups], dtype=bool)
     if not known.any():
         return made
-    turns, kept = turns[known], [group for group, convex in zip(groups, known, strict=True) if convex]
+    turns = turns[known]
+    kept = [group for group, convex in zip(groups, known, strict=True) if convex]
     solids = [solid for group in kept for solid in group]
     counts = [len(solid.corners) for solid in solids]
     group_of = np.repeat(np.arange(len(kept)), [len(group) for group in kept])

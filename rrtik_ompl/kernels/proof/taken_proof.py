@@ -21,7 +21,8 @@ class TakenProof:
         self.packed: ProofPairs | None = None
         self._rows: MovedSolids | None = None
         self._moved: tuple[int, ...] = ()  # bodies that stand elsewhere than in the table
-        self._lent, self._lock = False, threading.Lock()
+        self._lent = False
+        self._lock = threading.Lock()
 
     def get(self, bodies: Sequence[Body], make: Callable[[], ProofPairs]) -> ProofPairs:
         """The table, in which bodies stand where they are now.

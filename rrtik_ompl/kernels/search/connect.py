@@ -1,31 +1,37 @@
-"""RRT-Connect on arrays: the search object that keeps the memory of the kernels and answers their questions."""
+"""RRT-Connect on arrays: the search object that keeps the memory of the kernels and answers their questions.
+
+Making its memory takes longer than most searches: it outlives a call, or serves many queries in one.
+"""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Hashable, Iterator
+from contextlib import contextmanager
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.base.arrays import Matrix, Vector, finite_array
+from rrtik_ompl.base.arrays import Matrix, finite_array
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.kernels.search import connect_layout
 from rrtik_ompl.kernels.search.connect_layout import ConnectTable
 from rrtik_ompl.kernels.search.connect_lengths import connect_lengths
 from rrtik_ompl.kernels.search.motions.motion_table import NO_LIMIT, FastMotions, MotionsFree
 from rrtik_ompl.kernels.search.tree_layout import TreeTable
-from rrtik_ompl.kernels.search.tree_memory import grow, tree_table
-from rrtik_ompl.kernels.simd.halton import inverse_bases
+from rrtik_ompl.kernels.search.tree_memory import grow, sampled, tree_table
 from rrtik_ompl.kernels.simd.library import library
 from rrtik_ompl.kernels.simd.processor import WIDTH
-from rrtik_ompl.kernels.tables.memory import aligned, packed, whole_lanes
+from rrtik_ompl.kernels.tables.memory import aligned, whole_lanes
 
 PATIENCE = 8  # rejected paths until undecided motions are asked for at once
 FIRST_CAPACITY = 64 * WIDTH  # vertices
 FIRST_ROOTS = 16
 FIRST_PATH = 64  # rows
 FIRST_BUDGET, MIN_BUDGET, MAX_BUDGET = 256, 16, 1 << 20  # motions in one call of the kernel
+LARGEST_KEPT = 1 << 16  # vertices of a tree; a search that has grown larger gives its memory back
+MEAN_BUDGET = 512  # motions and samples, for each of many queries in one call
 CALL_SECONDS = 1e-3  # that a call should take; the processor's own clock takes up to half of it to read
 
 
@@ -74,8 +80,24 @@ class ConnectSearch:
         self.range, self.domain = connect_lengths(*box, range_, domain, turning=np.ones(dof, dtype=bool))
         joints = 0 if motions.identity else motions.joints
         self._trees = [tree_table(dof, joints, vertices) for _ in range(2)]
-        self._search = _search_table(motions, self._trees, box)
-        self._search.put(range=self.range, domain=self.domain, patience=patience)
+        self._search = sampled(
+            ConnectTable,
+            motions,
+            box,
+            start_tree=self._trees[0],
+            goal_tree=self._trees[1],
+            domain=self.domain,
+            range=self.range,
+            bound=connect_layout.UNBOUNDED_COST,
+            patience=patience,
+            centre=whole_lanes(np.zeros(dof)),
+            spread=connect_layout.UNBOUNDED_SPREAD,
+            question_starts=np.zeros(connect_layout.MAX_QUESTIONS * dof),
+            question_ends=np.zeros(connect_layout.MAX_QUESTIONS * dof),
+            question_sides=np.zeros(connect_layout.MAX_QUESTIONS, dtype=np.int32),
+            question_vertices=np.zeros(connect_layout.MAX_QUESTIONS, dtype=np.int32),
+            answers=np.zeros(connect_layout.MAX_QUESTIONS, dtype=np.int32),
+        )
         for side in range(2):
             self._make_room(side, FIRST_ROOTS)
         self._make_path_room(FIRST_PATH)
@@ -114,14 +136,13 @@ class ConnectSearch:
         self._set_roots(1, goals)
         self._search.resolve = ask is not None
         self._search.limit = NO_LIMIT if max_iterations is None else max_iterations
-        length = connect_layout.UNBOUNDED_COST if bound is None else bound
-        self._search.bound = length
+        self._search.bound = connect_layout.UNBOUNDED_COST if bound is None else bound
         self._questions = 0
-        counts, number = (len(starts), len(goals)), int(seed) & (2**63 - 1)
-        status = self._kernels.solve(self._search.address, *counts, number, FIRST_BUDGET)
+        number = int(seed) & (2**63 - 1)
+        status = self._kernels.solve(self._search.address, len(starts), len(goals), number, FIRST_BUDGET)
         if status <= connect_layout.OUTSIDE:
             root = connect_layout.OUTSIDE - status
-            what = f"start {root}" if root < counts[0] else f"goal {root - counts[0]}"
+            what = f"start {root}" if root < len(starts) else f"goal {root - len(starts)}"
             raise InputError(f"search: {what} is not in the box of configurations")
         return self._path() if self._finished(status, ask, stop) == connect_layout.SOLVED else None
 
@@ -151,7 +172,7 @@ class ConnectSearch:
         Such a search asks nothing and draws ``max_iterations`` samples at most; :meth:`go_on` continues it.
         """
         self._fit_trees(roots)
-        self._search.resolve, self._search.limit = 0, max_iterations
+        self._search.put(resolve=0, limit=max_iterations)
         return self._search.address
 
     def go_on(self, stop: Callable[[], object]) -> bool:
@@ -169,10 +190,9 @@ class ConnectSearch:
         Samples, vertices of both trees, motions checked, motions asked for, and paths that an answer has broken.
         """
         search = self._search
-        vertices = sum(tree.size for tree in self._trees)
         return {
             "iterations": search.iterations,
-            "vertices": vertices,
+            "vertices": sum(tree.size for tree in self._trees),
             "motions": search.checked,
             "questions": self._questions,
             "rejected": search.rejected,
@@ -201,9 +221,9 @@ class ConnectSearch:
         return status
 
     def _answer(self, ask: MotionsFree) -> None:
-        count, shape = self._search.questions, (-1, self._dof)
-        starts = self._search.question_starts.reshape(shape)[:count].copy()
-        ends = self._search.question_ends.reshape(shape)[:count].copy()
+        count = self._search.questions
+        starts = self._search.question_starts.reshape(-1, self._dof)[:count].copy()
+        ends = self._search.question_ends.reshape(-1, self._dof)[:count].copy()
         self._search.answers[:count] = ask(starts, ends)
         self._questions += count
 
@@ -241,31 +261,68 @@ class ConnectSearch:
         return aligned(np.zeros(count * self._dof)).reshape(count, self._dof)
 
 
-def _search_table(motions: FastMotions, trees: list[TreeTable], box: tuple[Vector, Vector]) -> ConnectTable:
-    """The table of a search; fields that are not named here are numbers that the kernels set."""
-    dof, asked = motions.dof, connect_layout.MAX_QUESTIONS
-    none = whole_lanes(np.zeros(dof))
-    made = packed(
-        ConnectTable,
-        motions=motions.table,
-        start_tree=trees[0],
-        goal_tree=trees[1],
-        lower=whole_lanes(box[0]),
-        upper=whole_lanes(box[1]),
-        inverse_bases=whole_lanes(np.array(inverse_bases(dof))),
-        bound=connect_layout.UNBOUNDED_COST,
-        centre=none,
-        spread=connect_layout.UNBOUNDED_SPREAD,
-        point=none,
-        row=none,
-        row_values=np.zeros(motions.joints),
-        query=whole_lanes(np.zeros(dof, dtype=np.float32)),
-        question_starts=np.zeros(asked * dof),
-        question_ends=np.zeros(asked * dof),
-        question_sides=np.zeros(asked, dtype=np.int32),
-        question_vertices=np.zeros(asked, dtype=np.int32),
-        answers=np.zeros(asked, dtype=np.int32),
-    )
-    if motions.identity:
-        made.put(row_values=made.row)
-    return made
+@contextmanager
+def kept_search(motions: FastMotions, key: Hashable, make: Callable[[], ConnectSearch]) -> Iterator[ConnectSearch]:
+    """An RRT-Connect search in a world: the last one that was used there, if it has the same key.
+
+    Nobody else gets it meanwhile: a second use at the same time makes a search of its own. One that an exception has
+    left is not kept.
+
+    Args:
+        motions: How motions are checked in the world.
+        key: What the search depends on beside these: box, range and domain.
+        make: Makes the search.
+    """
+    known, search = motions.spare.pop("connect", (None, None))
+    if search is None or known != key:
+        search = make()
+    yield search
+    if search.capacity <= LARGEST_KEPT:
+        motions.spare["connect"] = key, search
+
+
+class Searched(NamedTuple):
+    """The path of one of many searches, shape (k, n), or None, and what :meth:`ConnectSearch.statistics` says of it."""
+
+    path: Matrix | None
+    iterations: int
+    motions: int
+    vertices: int
+    questions: int
+    rejected: int
+
+
+def solve_each(search: ConnectSearch, ends: Matrix, seeds: list[int], max_iterations: int) -> list[Searched | None]:
+    """Search for many queries in one call; what :meth:`ConnectSearch.solve` finds if every answer is that none is free.
+
+    Args:
+        search: Whose memory is used.
+        ends: A free start and a free goal each, shape (m, 2, n).
+        seeds: Of each.
+        max_iterations: Samples at most, for each.
+
+    Returns:
+        What was found for each; None for those that take long: they are to be solved one after the other.
+    """
+    address = search.serve(1, max_iterations)
+    kernels = library(connect_layout.KERNELS)
+    if kernels is None:
+        return [None] * len(ends)
+
+    rows = np.ascontiguousarray(ends)
+    search.table.resolve = 1
+    search.table.bound = connect_layout.UNBOUNDED_COST
+    paths = np.empty((FIRST_PATH * len(rows), rows.shape[2]))
+    numbers = np.array([seed & (2**63 - 1) for seed in seeds], dtype=np.int64)
+    results = np.empty((len(rows), connect_layout.RESULT_NUMBERS), dtype=np.int64)
+    given = (address, rows.ctypes.data, numbers.ctypes.data, len(rows), MEAN_BUDGET * len(rows))
+    kernels.solve_each(*given, paths.ctypes.data, len(paths), results.ctypes.data)
+
+    found = list[Searched | None]()
+    last = 0
+    for status, count, *counts in results.tolist():
+        first = last
+        last = last + count
+        ended = status in (connect_layout.SOLVED, connect_layout.EXHAUSTED)
+        found.append(Searched(paths[first:last] if count else None, *counts) if ended else None)
+    return found

@@ -56,7 +56,9 @@ class PathRepair:
         kernels = library(repair_layout.KERNELS)
         if kernels is None:
             raise InputError("repair in kernels: there are none; install numba")
-        self._kernels, self._motions, self._dof = kernels, motions, motions.dof
+        self._kernels = kernels
+        self._motions = motions
+        self._dof = motions.dof
         self._search = ConnectSearch(motions, lower, upper, range_=max_edge)
         self._iterations = iterations
         self._table = packed(

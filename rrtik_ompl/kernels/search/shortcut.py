@@ -59,7 +59,8 @@ class ShortcutSearch:
         if kernels is None or len(rows) < 2 or not motions.fast.covered(motions.joint_values(rows)):
             raise InputError("waypoints to shorten: expected a route of two or more that kernels can check")
         self._kernels = kernels
-        self._motions, self._dof = motions, dof  # its tables live as long as this search
+        self._motions = motions  # its tables live as long as this search
+        self._dof = dof
         plan = _plan(len(rows) + SPARE_WAYPOINTS, dof)
         self.table = made = ShortcutTable(PlannedTable(plan))
         if plan.blank is None:

@@ -20,7 +20,7 @@ from rrtik_ompl.kernels.search.motions.row_kernels import Configuration, copy_ro
 from rrtik_ompl.kernels.search.shortcut_layout import FIRST_INSIDE, SECOND_INSIDE, ShortcutTable
 from rrtik_ompl.kernels.simd.compiled import entry, inlined, kernel
 from rrtik_ompl.kernels.simd.random_kernels import next_share
-from rrtik_ompl.kernels.simd.records import exists
+from rrtik_ompl.kernels.simd.records import exists, same_place
 
 PULL_PROBABILITY = 0.5  # of each joint in a pull
 MIN_GAIN = 1e-6  # of the length of the route, or a shortcut is not worth its checks
@@ -67,10 +67,11 @@ def measure_route(search: ShortcutTable, start: int) -> None:
 @kernel
 def edge_of(search: ShortcutTable, place: float) -> int:
     """Number of the edge on which a place of the route lies, by bisection."""
-    places, low, high = search.arc_lengths, 0, search.count - 1
+    low = 0
+    high = search.count - 1
     while high - low > 1:
         middle = (low + high) // 2
-        if places[middle] <= place:
+        if search.arc_lengths[middle] <= place:
             low = middle
         else:
             high = middle
@@ -80,11 +81,12 @@ def edge_of(search: ShortcutTable, place: float) -> int:
 @kernel
 def random_place(search: ShortcutTable) -> Any:
     """A random place on the route: its waypoint or edge, how much of the edge lies before it, and where that is."""
-    places, count = search.arc_lengths, search.count
+    places = search.arc_lengths
     if next_share(search) < search.waypoint_share:
-        chosen = int(next_share(search) * count)
+        chosen = int(next_share(search) * search.count)
         return chosen, 0.0, places[chosen]
-    place = next_share(search) * places[count - 1]
+
+    place = next_share(search) * places[search.count - 1]
     edge = edge_of(search, place)
     length = places[edge + 1] - places[edge]
     share = (place - places[edge]) / length if length > 0.0 else 0.0
@@ -98,37 +100,49 @@ def random_place(search: ShortcutTable) -> Any:
 @kernel
 def set_end(search: ShortcutTable, number: int, edge: int, share: float) -> None:
     """Place an end of the shortcut, never outside the box between the waypoints around it."""
-    a, target = waypoint(search, edge), end(search, number)
+    target = end(search, number)
+    a = waypoint(search, edge)
     if share == 0.0:
         copy_row(dof_in(search), a, target)
         return
     b = waypoint(search, edge + 1)
     for k in range(dof_in(search)):
-        low, high = min(a[k], b[k]), max(a[k], b[k])
-        value = (1.0 - share) * a[k] + share * b[k]
-        target[k] = min(max(value, low), high)
+        target[k] = between(a[k], b[k], share)
+
+
+@inlined
+def between(a: float, b: float, share: float) -> float:
+    """A share of the way from a to b, which rounding leads beyond neither."""
+    value = (1.0 - share) * a + share * b
+    return min(max(value, min(a, b)), max(a, b))
 
 
 @kernel
 def propose_pull(search: ShortcutTable) -> bool:
     """Draw a pull; whether it would gain something."""
     chosen = 1 + int(next_share(search) * (search.count - 2))
-    before, here, after = (waypoint(search, chosen - 1), waypoint(search, chosen), waypoint(search, chosen + 1))
-    first, second = metric_distance(search, before, here), metric_distance(search, here, after)
-    if first + second <= 0.0:
+    before = waypoint(search, chosen - 1)
+    here = waypoint(search, chosen)
+    after = waypoint(search, chosen + 1)
+    length = metric_distance(search, before, here)
+    share = length
+    length += metric_distance(search, here, after)
+    if length <= 0.0:
         return False
-    share, strength, target = first / (first + second), next_share(search), end(search, 0)
+
+    share /= length  # of the straight line, beside which the waypoint lies
+    strength = next_share(search)
+    target = end(search, 0)
     for k in range(dof_in(search)):
-        low, high = min(before[k], after[k]), max(before[k], after[k])
-        straight = min(max((1.0 - share) * before[k] + share * after[k], low), high)
+        straight = between(before[k], after[k], share)
         pulled = strength if next_share(search) < PULL_PROBABILITY else 0.0
-        low, high = min(here[k], straight), max(here[k], straight)
-        target[k] = min(max((1.0 - pulled) * here[k] + pulled * straight, low), high)
+        target[k] = between(here[k], straight, pulled)
     search.first = chosen
     search.cuts = shortcut_layout.PULL
+
     total = search.arc_lengths[search.count - 1]
     new_length = metric_distance(search, before, target) + metric_distance(search, target, after)
-    return bool(first + second - new_length > MIN_GAIN * total)
+    return bool(length - new_length > MIN_GAIN * total)
 
 
 @kernel
@@ -148,6 +162,7 @@ def propose_shortcut(search: ShortcutTable) -> bool:
     search.cuts = cuts
     set_end(search, 0, first, share)
     set_end(search, 1, second, other_share)
+
     total = search.arc_lengths[search.count - 1]
     return bool(other_place - place - metric_distance(search, end(search, 0), end(search, 1)) > MIN_GAIN * total)
 
@@ -158,7 +173,8 @@ def check_edge(search: ShortcutTable, a: Configuration, b: Configuration) -> int
     resolve = search.resolve != 0
     answer: int = judge_motion(search.motions, a, b, resolve)
     if answer == UNDECIDED:
-        number, dof = search.questions, dof_in(search)
+        dof = dof_in(search)
+        number = search.questions
         copy_row(dof, a, row_at(search.question_starts, dof, number))
         copy_row(dof, b, row_at(search.question_ends, dof, number))
         search.questions = number + 1
@@ -171,8 +187,10 @@ def ends_of_part(search: ShortcutTable, part: int) -> Any:
 
     A part that does not exist has two ends that are the same.
     """
-    first, cuts = search.first, search.cuts
-    near, far = end(search, 0), end(search, 1)
+    first = search.first
+    cuts = search.cuts
+    near = end(search, 0)
+    far = end(search, 1)
     if cuts == shortcut_layout.PULL:
         return near, (waypoint(search, first + 2 * part - 1) if part < 2 else near)
     if part == 0:
@@ -191,7 +209,7 @@ def check_parts(search: ShortcutTable) -> int:
     proven = exists(search.motions.proof)
     for part in range(1 if proven and not pulled else shortcut_layout.MAX_QUESTIONS):
         a, b = ends_of_part(search, part)
-        if a != b:
+        if not same_place(a, b):
             worst = max(worst, check_edge(search, a, b))
         if worst == COLLIDING or (worst == UNDECIDED and search.resolve == 0):
             break
@@ -201,19 +219,22 @@ def check_parts(search: ShortcutTable) -> int:
 @kernel
 def take_shortcut(search: ShortcutTable) -> None:
     """Put the shortcut in place of what it cuts off."""
-    dof, count = dof_in(search), search.count
-    first, second = search.first, search.second
+    dof = dof_in(search)
     cuts = search.cuts
+    first = search.first
+    second = search.second
     kept_from = second + 1 if cuts & SECOND_INSIDE else second  # the second end is that waypoint or lies before it
     put = first + 1
     tail = put + (1 if cuts & FIRST_INSIDE else 0) + (1 if cuts & SECOND_INSIDE else 0)
-    moved = count - kept_from
-    source, sink = waypoint(search, kept_from), waypoint(search, tail)
+    moved = search.count - kept_from
+    source = waypoint(search, kept_from)
+    sink = waypoint(search, tail)
     if tail <= kept_from:
         copy_row(moved * dof, source, sink)
     else:  # it grows: from behind, so that nothing is overwritten before it is moved
         for k in range(moved * dof - 1, -1, -1):
             sink[k] = source[k]
+
     if cuts & FIRST_INSIDE:
         copy_row(dof, end(search, 0), waypoint(search, put))
         put += 1

@@ -121,11 +121,12 @@ def squares_of(points: Floats, query: Floats, dof: int, block: int) -> Any:
 @kernel
 def nearest_by_cost(tree: TreeTable, query: Floats, cost: float) -> Any:
     """The vertex nearest to ``DOF`` floats and a cost, as if what it costs more were one more coordinate."""
-    dof, points, costs, wanted = tree.dof, tree.points, tree.costs, np.float32(cost)
-    least, place = spread(UNBOUNDED_SQUARE), spread(ZERO)
+    wanted = np.float32(cost)
+    least = spread(UNBOUNDED_SQUARE)
+    place = spread(ZERO)
     for block in range((tree.size + WIDTH - 1) // WIDTH):
-        dearer = larger(lanes_at(costs, block) - wanted, ZERO)
-        total = squares_of(points, query, dof, block) + dearer * dearer
+        dearer = larger(lanes_at(tree.costs, block) - wanted, ZERO)
+        total = squares_of(tree.points, query, tree.dof, block) + dearer * dearer
         closer = total < least
         least = choose(closer, total, least)
         place = choose(closer, spread(np.float32(block)), place)
@@ -136,10 +137,10 @@ def nearest_by_cost(tree: TreeTable, query: Floats, cost: float) -> Any:
 @kernel
 def nearest_and_square(tree: TreeTable, query: Floats) -> Any:
     """The same, and the square of its distance."""
-    dof, points = tree.dof, tree.points
-    least, place = spread(UNBOUNDED_SQUARE), spread(ZERO)
+    least = spread(UNBOUNDED_SQUARE)
+    place = spread(ZERO)
     for block in range((tree.size + WIDTH - 1) // WIDTH):
-        total = squares_of(points, query, dof, block)
+        total = squares_of(tree.points, query, tree.dof, block)
         closer = total < least
         least = choose(closer, total, least)
         place = choose(closer, spread(np.float32(block)), place)
@@ -152,7 +153,7 @@ def least_lane(least: Any, place: Any) -> Any:
     square = lowest(least)
     winners = least <= square
     lane = first_bit(bits(winners))
-    if bits(winners) == 1 << lane:
+    if bits(winners) == 1 << lane:  # a single one
         return int(lane_at(place, lane)) * WIDTH + lane, square
     block = lowest(choose(winners, place, spread(UNBOUNDED_BLOCK)))
     return int(block) * WIDTH + first_bit(bits(winners & (place <= block))), square
@@ -161,15 +162,16 @@ def least_lane(least: Any, place: Any) -> Any:
 @kernel
 def add_vertex(tree: TreeTable, row: Configuration, values: JointValues, parent: int, state: int, radius: float) -> Any:
     """Append a vertex; there must be room. Returns its number."""
-    dof, vertex = tree.dof, tree.size
-    points = tree.points
-    if vertex % WIDTH == 0:
-        set_lanes(points, vertex // WIDTH * dof, spread(ABSENT_COORDINATE))
+    dof = tree.dof
+    vertex = tree.size
+    if vertex % WIDTH == 0:  # a new block: its other lanes are far from everything
+        set_lanes(tree.points, vertex // WIDTH * dof, spread(ABSENT_COORDINATE))
     copy_row(dof, row, row_of(tree, vertex))
     for k in range(dof):
-        points[lane_place(dof, vertex, k)] = np.float32(row[k])
+        tree.points[lane_place(dof, vertex, k)] = np.float32(row[k])
     if not same_place(tree.values, tree.rows):  # joint values are not the configuration itself
         copy_row(tree.joints, values, values_of(tree, vertex))
+
     tree.parents[vertex] = parent
     set_state(tree, vertex, state)
     set_radius(tree, vertex, radius)

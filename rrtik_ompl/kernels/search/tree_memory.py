@@ -1,15 +1,55 @@
-"""Memory of search trees in kernels."""
+"""Memory of searches in kernels, and of their trees."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.base.arrays import Mask, Matrix
+from rrtik_ompl.base.arrays import Mask, Matrix, Vector
+from rrtik_ompl.kernels.search.motions.motion_table import FastMotions
 from rrtik_ompl.kernels.search.tree_layout import CERTAIN, TreeTable
-from rrtik_ompl.kernels.tables.memory import aligned, packed
+from rrtik_ompl.kernels.search.two_trees_layout import SampledTable
+from rrtik_ompl.kernels.tables.memory import aligned, packed, whole_lanes
+
+PRIMES = (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37)  # a Halton sequence of more dimensions covers a box badly
+
+S = TypeVar("S", bound=SampledTable)
+
+
+def sampled(kind: type[S], motions: FastMotions, box: tuple[Vector, Vector], **fields: Any) -> S:
+    """The table of a search that draws configurations from a box.
+
+    Args:
+        kind: Its class.
+        motions: How motions are checked.
+        box: Lower and upper bounds, shapes (n,).
+        fields: Those of this kind of search; numbers that are not given are 0.
+    """
+    dof = motions.dof
+    made = packed(
+        kind,
+        motions=motions.table,
+        lower=whole_lanes(box[0]),
+        upper=whole_lanes(box[1]),
+        inverse_bases=whole_lanes(np.array(inverse_bases(dof))),
+        point=whole_lanes(np.zeros(dof)),
+        row=whole_lanes(np.zeros(dof)),
+        row_values=np.zeros(motions.joints),
+        query=whole_lanes(np.zeros(dof, dtype=np.float32)),
+        **fields,
+    )
+    if motions.identity:
+        made.put(row_values=made.row)
+    return made
+
+
+def inverse_bases(dimensions: int) -> list[float]:
+    """Inverse bases of the Halton sequence [49] in that many dimensions; zeros where it would cover a box badly."""
+    if dimensions > len(PRIMES):
+        return [0.0] * dimensions
+    return [1.0 / prime for prime in PRIMES[:dimensions]]
 
 
 def tree_table(dof: int, joints: int, capacity: int) -> TreeTable:
@@ -30,7 +70,8 @@ def grow(tree: TreeTable, factor: int = 2) -> None:
     joints = 0 if np.shares_memory(tree.values, tree.rows) else tree.joints
     capacity = factor * tree.capacity
     for name, larger in _arrays(tree.dof, joints, capacity).items():
-        kept, roomy = getattr(tree, name), aligned(larger)
+        kept = getattr(tree, name)
+        roomy = aligned(larger)
         roomy[: min(len(kept), len(roomy))] = kept[: len(roomy)]
         tree.put(**{name: roomy})
     tree.capacity = capacity

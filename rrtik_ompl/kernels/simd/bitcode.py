@@ -36,7 +36,8 @@ def compiled_module(name: str) -> Code:
         overload = _overload(function)
         code = overload.library._get_module_for_linking().clone()
         code.get_function(overload.fndesc.llvm_func_name).linkage = "external"  # or it is dropped as not called
-        linked.triple, linked.data_layout = code.triple, code.data_layout
+        linked.triple = code.triple
+        linked.data_layout = code.data_layout
         linked.link_in(code)
     _hide_all_but(linked, {PREFIX + entry for entry in functions})
     foreign = sorted(f.name for f in linked.functions if f.is_declaration and f.name.startswith(RUNTIMES))
@@ -60,13 +61,15 @@ def _entry_points(functions: dict[str, Any]) -> Any:
     """C functions of whole numbers that call those of numba, which return a status and the result at an address."""
     module = ir.Module("entry_points")
     for entry, function in functions.items():
-        overload, count = _overload(function), _count(function)
+        overload = _overload(function)
+        count = _count(function)
         convention = cpu_target.target_context.call_conv
         kind = convention.get_function_type(types.int64, (types.int64,) * count)
         inner = ir.Function(module, kind, overload.fndesc.llvm_func_name)
         outer = ir.Function(module, ir.FunctionType(WHOLE, [WHOLE] * count), PREFIX + entry)
         builder = ir.IRBuilder(outer.append_basic_block())
-        result, trouble = builder.alloca(WHOLE), builder.alloca(kind.args[1].pointee)
+        result = builder.alloca(WHOLE)
+        trouble = builder.alloca(kind.args[1].pointee)
         builder.store(ir.Constant(WHOLE, 0), result)
         builder.call(inner, [result, trouble, *outer.args])
         builder.ret(builder.load(result))

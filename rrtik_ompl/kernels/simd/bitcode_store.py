@@ -52,5 +52,6 @@ def own_bitcode(name: str) -> Code:
 
 def _own_file(name: str) -> tuple[Path | None, str]:
     """Where the user's cache keeps the bitcode of a library, None without a cache, and its key."""
-    key, folder = f"bitcode {machine_key(name)}", cache_folder("kernels")
+    key = f"bitcode {machine_key(name)}"
+    folder = cache_folder("kernels")
     return None if folder is None else folder / file_name(name, key, "bitcode"), key

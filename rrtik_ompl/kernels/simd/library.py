@@ -126,7 +126,8 @@ def machine_code(bitcode: Code) -> Code | None:
         return None
     if target_of(module.triple) != this_target():
         return None
-    module.triple, module.data_layout = machine.triple, str(machine.target_data)  # versions of LLVM spell them anew
+    module.triple = machine.triple  # versions of LLVM spell them anew
+    module.data_layout = str(machine.target_data)
     return Code(bitcode.entries, machine.emit_object(module))
 
 

@@ -57,7 +57,8 @@ def processor_identity() -> str:
     import llvmlite.binding as llvm
 
     version = ".".join(map(str, llvm.llvm_version_info))
-    name, triple = llvm.get_host_cpu_name(), llvm.get_process_triple()
+    name = llvm.get_host_cpu_name()
+    triple = llvm.get_process_triple()
     return f"{triple} {name} {_feature_list()} LLVM {version} llvmlite {llvmlite.__version__}"
 
 

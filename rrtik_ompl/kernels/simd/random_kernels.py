@@ -42,10 +42,12 @@ def next_in_bases(x: Any, inverse: Any) -> Any:
     from a random first point it is a randomised Halton sequence [48].
     """
     rest = larger((1.0 - x) - LEAST_REST, LEAST_REST)  # less, as x is rounded
-    previous, digit = inverse, inverse
+    previous = inverse
+    digit = inverse
     first = carry = digit >= rest
     while bits(carry) != 0:
-        previous, digit = choose(carry, digit, previous), choose(carry, digit * inverse, digit)
+        previous = choose(carry, digit, previous)
+        digit = choose(carry, digit * inverse, digit)
         carry = digit >= rest
     return choose(first, larger(((x + previous) + digit) - 1.0, 0.0), x + inverse)
 

@@ -51,7 +51,8 @@ def wide_sine_and_cosine(angle: Any) -> Any:
     sine = x + x * z * polynomial(SINE, z)
     cosine = (1.0 - 0.5 * z) + z * z * polynomial(COSINE, z)
     odd = absolute(absolute(quarter - 2.0) - 1.0) < 0.5
-    turned_sine, turned_cosine = choose(odd, cosine, sine), choose(odd, sine, cosine)
+    turned_sine = choose(odd, cosine, sine)
+    turned_cosine = choose(odd, sine, cosine)
     return (
         choose(quarter > 1.5, -turned_sine, turned_sine),
         choose(absolute(quarter - 1.5) < 1.0, -turned_cosine, turned_cosine),
@@ -61,8 +62,10 @@ def wide_sine_and_cosine(angle: Any) -> Any:
 @kernel
 def arc_tangent(y: Any, x: Any) -> Any:
     """The angle of points (x, y) in (-pi, pi]; 0 at the origin."""
-    wide, high = absolute(x), absolute(y)
-    most, least = larger(larger(wide, high), SMALLEST_DIVISOR), smaller(wide, high)
+    wide = absolute(x)
+    high = absolute(y)
+    most = larger(larger(wide, high), SMALLEST_DIVISOR)
+    least = smaller(wide, high)
     steep = least > most * TANGENT
     t = choose(steep, least - most, least) / choose(steep, least + most, most)
     z = t * t

@@ -31,7 +31,8 @@ def place_on_edge(curve: CurveTable, edge: int, at: float, sink: Doubles) -> Non
 @kernel
 def add_rounding(curve: CurveTable, corner: int, gap: float, sink: Doubles) -> None:
     """Add what the rounding of a corner makes of a place ``gap`` behind it: a ramp instead of a bend."""
-    dof, radius = curve.dof, curve.radii[corner]
+    dof = curve.dof
+    radius = curve.radii[corner]
     inside = radius - abs(gap)
     bend = inside / (radius * radius)
     slope = 0.5 * bend * inside
@@ -50,13 +51,18 @@ def add_rounding(curve: CurveTable, corner: int, gap: float, sink: Doubles) -> N
 @entry
 def sample_curve(curve: CurveTable) -> int:
     """Position and derivatives at all places."""
-    dof, last, along = curve.dof, curve.vertex_count - 2, curve.along
-    widest, edge, first = curve.widest, 0, 1
+    along = curve.along
+    widest = curve.widest
+    last = curve.vertex_count - 2
+    edge = 0
+    first = 1  # corner whose rounding may reach here
     for i in range(curve.place_count):
-        at, sink = curve.at[i], row_at(curve.values, 3 * dof, i)
+        at = curve.at[i]
+        sink = row_at(curve.values, 3 * curve.dof, i)
         while edge < last and at >= along[edge + 1]:
             edge += 1
         place_on_edge(curve, edge, at, sink)
+
         while first <= last and along[first] <= at - widest:
             first += 1
         corner = first
@@ -79,7 +85,7 @@ def set_line(lines: Doubles, number: int, low: float, high: float, slope: float)
 @inlined
 def joint_lines(search: SearchTable, point: int, step: float, count: int) -> int:
     """Add lines for the acceleration limits of a point, ``0.5 * step`` ahead of the one where x holds; their number."""
-    n, lines = search.joints, search.lines
+    n = search.joints
     shape = row_at(search.shape, 3 * n, point)
     for k in range(n):
         second = shape[2 * n + k]
@@ -88,7 +94,7 @@ def joint_lines(search: SearchTable, point: int, step: float, count: int) -> int
             continue
         share = 1.0 / first
         most = search.acceleration[k] * abs(share)
-        set_line(lines, count, -most, most, -second * share)
+        set_line(search.lines, count, -most, most, -second * share)
         count += 1
     return count
 
@@ -96,17 +102,20 @@ def joint_lines(search: SearchTable, point: int, step: float, count: int) -> int
 @inlined
 def row_lines(search: SearchTable, point: int, step: float, count: int) -> int:
     """The same for the further rows of a point."""
-    rows, lines = search.rows, search.lines
-    firsts, seconds = row_at(search.first, rows, point), row_at(search.second, rows, point)
-    lows, highs = row_at(search.low, rows, point), row_at(search.high, rows, point)
+    rows = search.rows
+    firsts = row_at(search.first, rows, point)
+    seconds = row_at(search.second, rows, point)
+    lows = row_at(search.low, rows, point)
+    highs = row_at(search.high, rows, point)
     for r in range(rows):
         second = seconds[r]
         first = firsts[r] + step * second
         if abs(first) < FLAT:
             continue
         share = 1.0 / first
-        one, other = lows[r] * share, highs[r] * share
-        set_line(lines, count, min(one, other), max(one, other), -second * share)
+        one = lows[r] * share
+        other = highs[r] * share
+        set_line(search.lines, count, min(one, other), max(one, other), -second * share)
         count += 1
     return count
 
@@ -130,14 +139,20 @@ def lines_at(search: SearchTable, point: int) -> int:
 @inlined
 def highest(lines: Doubles, count: int, x: float) -> tuple:  # type: ignore[type-arg]
     """The lowest and the highest path acceleration that are allowed with x, and the lines that say so."""
-    least, most, below, above = -MOST, MOST, 0, 0
+    least = -MOST
+    most = MOST
+    below = 0
+    above = 0
     for k in range(count):
         part = lines[3 * k + 2] * x
-        low, high = lines[3 * k] + part, lines[3 * k + 1] + part
+        low = lines[3 * k] + part
+        high = lines[3 * k + 1] + part
         if low > least:
-            least, below = low, k
+            least = low
+            below = k
         if high < most:
-            most, above = high, k
+            most = high
+            above = k
     return least, most, below, above
 
 
@@ -148,7 +163,8 @@ def cap_by_joints(search: SearchTable, point: int) -> float:
     shape = row_at(search.shape, 3 * n, point)
     x: float = search.cap[point]
     for k in range(n):
-        slope, bend = abs(shape[n + k]), abs(shape[2 * n + k])
+        slope = abs(shape[n + k])
+        bend = abs(shape[2 * n + k])
         speed = search.velocity[k]
         if slope * slope * x > speed * speed:
             x = speed * speed / (slope * slope)
@@ -160,12 +176,14 @@ def cap_by_joints(search: SearchTable, point: int) -> float:
 @kernel
 def largest_square(search: SearchTable, point: int) -> float:
     """The largest x of a point from which the end is reached."""
-    x, lines = cap_by_joints(search, point), search.lines
+    lines = search.lines
+    x = cap_by_joints(search, point)
     count = lines_at(search, point)
     for _ in range(ROUNDS):
         low, high, below, above = highest(lines, count, x)
         if high >= low:
             return x
+        # the two lines that leave no room cross where x is less
         fall = lines[3 * below + 2] - lines[3 * above + 2]
         gap = lines[3 * above + 1] - lines[3 * below]
         nearer = gap / fall if fall > 0.0 else 0.0
@@ -178,15 +196,16 @@ def largest_square(search: SearchTable, point: int) -> float:
 @entry
 def find_squares(search: SearchTable) -> int:
     """Path speed squared at all points of the grid: 0 at both ends, the largest that is allowed between."""
-    points, reached, squares, grid = search.points, search.reached, search.squares, search.grid
-    reached[points - 1] = 0.0
-    for back in range(1, points):
-        reached[points - 1 - back] = largest_square(search, points - 1 - back)
+    last = search.points - 1
+    search.reached[last] = 0.0
+    for point in range(last - 1, -1, -1):
+        search.reached[point] = largest_square(search, point)
+
     x = 0.0
-    squares[0] = x
-    for i in range(points - 1):
-        found = highest(search.lines, lines_at(search, i), x)
-        x += 2.0 * (grid[i + 1] - grid[i]) * found[1]
-        x = min(max(x, 0.0), reached[i + 1])
-        squares[i + 1] = x
+    search.squares[0] = x
+    for point in range(last):
+        _, most, _, _ = highest(search.lines, lines_at(search, point), x)
+        x += 2.0 * (search.grid[point + 1] - search.grid[point]) * most
+        x = min(max(x, 0.0), search.reached[point + 1])
+        search.squares[point + 1] = x
     return 0

@@ -14,9 +14,11 @@ def sample_curve(vertices: Matrix, along: Vector, directions: Matrix, radii: Vec
     """Position and its first and second derivative, shape (m, 3 n); see :mod:`rrtik_ompl.kernels.timing.layout`."""
     edge = np.clip(np.searchsorted(along, at, side="right") - 1, 0, len(along) - 2)
     q = vertices[edge] + (at - along[edge])[:, None] * directions[edge]
-    slope, bend = directions[edge].copy(), np.zeros_like(q)
+    slope = directions[edge].copy()
+    bend = np.zeros_like(q)
     for corner in range(1, len(along) - 1):
-        gap, turn = at - along[corner], directions[corner] - directions[corner - 1]
+        gap = at - along[corner]
+        turn = directions[corner] - directions[corner - 1]
         near = np.abs(gap) < radii[corner]
         inside = (radii[corner] - np.abs(gap[near]))[:, None]
         sign = np.where(gap[near] >= 0.0, -1.0, 1.0)[:, None]
@@ -38,7 +40,8 @@ class Rows(NamedTuple):
 def all_rows(shape: Matrix, velocity: Vector, acceleration: Vector, rows: Rows, cap: Vector) -> tuple[Rows, Vector]:
     """The rows with those of the acceleration limits, and the cap lowered by the velocity limits."""
     n = len(velocity)
-    slopes, bends = shape[:, n : 2 * n], shape[:, 2 * n :]
+    slopes = shape[:, n : 2 * n]
+    bends = shape[:, 2 * n :]
     most = np.broadcast_to(acceleration, slopes.shape)
     with np.errstate(divide="ignore"):
         by_speed = ((velocity / np.abs(slopes)) ** 2).min(axis=1)
@@ -69,7 +72,8 @@ def find_squares(rows: Rows, cap: Vector, grid: Vector) -> Vector:
         below, above = lines(i)
         x = cap[i]
         for _ in range(ROUNDS):
-            lower, upper = below[(below @ [1.0, x]).argmax()], above[(above @ [1.0, x]).argmin()]
+            lower = below[(below @ [1.0, x]).argmax()]
+            upper = above[(above @ [1.0, x]).argmin()]
             if upper @ [1.0, x] >= lower @ [1.0, x]:
                 break
             fall = lower[1] - upper[1]

@@ -35,7 +35,8 @@ def wasm_module(libraries: Mapping[str, Code]) -> bytes:
     llvm.initialize_all_asmprinters()
     machine = llvm.Target.from_triple(TRIPLE).create_target_machine(cpu="", features=FEATURES, opt=3)
     whole = llvm.parse_assembly("")
-    whole.triple, whole.data_layout = TRIPLE, str(machine.target_data)
+    whole.triple = TRIPLE
+    whole.data_layout = str(machine.target_data)
     for name, code in libraries.items():
         whole.link_in(llvm.parse_assembly(_exported(code, name, str(machine.target_data))))
     passes = llvm.create_new_module_pass_manager()

@@ -24,7 +24,8 @@ class MemoryImage:
     """
 
     def __init__(self, base: int) -> None:
-        self._base, self._end = base, base
+        self._base = base
+        self._end = base
         self._places: dict[int, int] = {}  # by the address here
         self._parts: list[tuple[int, NDArray[Any]]] = []
         self._blocks: list[Block] = []  # which must live as long as their addresses are asked for

@@ -9,9 +9,8 @@ from rrtik_ompl.kernels.search import tree_kernels as trees
 from rrtik_ompl.kernels.search import tree_layout as layout
 from rrtik_ompl.kernels.search.connect_lengths import connect_lengths
 from rrtik_ompl.kernels.search.motions.motion_layout import Configuration
-from rrtik_ompl.kernels.search.tree_memory import grow, tree_table
+from rrtik_ompl.kernels.search.tree_memory import grow, inverse_bases, tree_table
 from rrtik_ompl.kernels.simd.compiled import WIDTH, entry
-from rrtik_ompl.kernels.simd.halton import inverse_bases
 from rrtik_ompl.kernels.simd.random_kernels import next_point, next_share, start_points
 from rrtik_ompl.kernels.simd.records import row_at
 from rrtik_ompl.kernels.tables.memory import packed, whole_lanes

@@ -10,9 +10,8 @@ import pinocchio as pin
 import pytest
 
 from rrtik_ompl import Box, Obstacle, Scene, World, load_robot
-from rrtik_ompl.kernels.search import connect_keeping
-from rrtik_ompl.kernels.search.connect import ConnectSearch
-from rrtik_ompl.kernels.search.connect_keeping import kept_search, solve_each
+from rrtik_ompl.kernels.search import connect
+from rrtik_ompl.kernels.search.connect import ConnectSearch, kept_search, solve_each
 from rrtik_ompl.planning.plan import plan
 from rrtik_ompl.problem_files.problem import load_problem
 
@@ -58,7 +57,7 @@ def test_a_search_that_an_interrupt_has_left_is_dropped(problem: Any) -> None:
 
 
 def test_a_search_that_has_grown_too_large_gives_its_memory_back(problem: Any, monkeypatch: Any) -> None:
-    monkeypatch.setattr(connect_keeping, "LARGEST_KEPT", 1)
+    monkeypatch.setattr(connect, "LARGEST_KEPT", 1)
     with used(problem) as first:
         pass
     with used(problem) as second:
@@ -135,11 +134,11 @@ def test_what_takes_long_or_has_no_room_is_left_to_a_search_of_its_own(crowded: 
     ends = rows[world.valid_batch(rows)][:80].reshape(40, 2, 6)
     search = ConnectSearch(world.motions, world.robot.lower, world.robot.upper)
     whole = solve_each(search, ends, [1] * 40, 1000)
-    monkeypatch.setattr(connect_keeping, "MEAN_BUDGET", 20)
+    monkeypatch.setattr(connect, "MEAN_BUDGET", 20)
     brief = solve_each(search, ends, [1] * 40, 1000)
     assert 0 < brief.count(None) < 40
     monkeypatch.undo()
-    monkeypatch.setattr(connect_keeping, "FIRST_PATH", 3)
+    monkeypatch.setattr(connect, "FIRST_PATH", 3)
     narrow = solve_each(search, ends, [1] * 40, 1000)
     assert 0 < narrow.count(None) < 40
     for some in (brief, narrow):

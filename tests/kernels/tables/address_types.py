@@ -27,15 +27,16 @@ from rrtik_ompl.kernels.layout import (
     ScratchTable,
     WorldTable,
 )
+from rrtik_ompl.kernels.search.connect_kernels import check_candidate
 from rrtik_ompl.kernels.search.connect_layout import ConnectTable
-from rrtik_ompl.kernels.search.connect_motions import check_candidate, nearest_to
-from rrtik_ompl.kernels.search.crdt.growth import add_free_edges
+from rrtik_ompl.kernels.search.crdt.kernels import add_free_edges
 from rrtik_ompl.kernels.search.crdt.layout import CrdtTable, CrdtTreeTable
 from rrtik_ompl.kernels.search.motions.motion_kernels import check_motion
 from rrtik_ompl.kernels.search.motions.motion_layout import MotionTable
 from rrtik_ompl.kernels.search.motions.row_kernels import Configuration
 from rrtik_ompl.kernels.search.tree_kernels import parent_of
 from rrtik_ompl.kernels.search.tree_layout import TreeTable
+from rrtik_ompl.kernels.search.two_trees_kernels import nearest_to
 from rrtik_ompl.kernels.tables.accessors import first_ball_of, radius_at
 
 

@@ -60,6 +60,23 @@ def last(table: Outer) -> float:
     return inner_at(table.inners, 1).row[0]
 
 
+class Wider(Inner):
+    """A table that begins as another one does."""
+
+    width: float
+
+
+@kernel
+def doubled(table: Inner) -> float:
+    return 2.0 * table.row[table.number]
+
+
+@kernel
+def doubled_of_wider(table: Wider) -> float:
+    table.width = doubled(table)
+    return table.width
+
+
 def outer(**fields):
     inner = packed(Inner, number=3, row=np.arange(4.0))
     arrays = {
@@ -148,3 +165,11 @@ def test_an_array_that_takes_the_place_of_another_is_guarded_too():
 def test_a_field_that_is_not_declared_is_refused(make):
     with pytest.raises((AttributeError, KeyError), match=r"numbr|rows"):
         make()
+
+
+def test_a_table_that_inherits_has_the_inherited_fields_first_and_goes_where_those_are_read():
+    wider = packed(Wider, number=2, row=np.arange(4.0), width=0.5)
+    assert [*Wider.places] == ["number", "row", "width"]
+    assert [*Inner.places] == ["number", "row"]
+    assert (wider.number, wider.width) == (2, 0.5)
+    assert doubled_of_wider(wider) == doubled(wider) == wider.width == 4.0

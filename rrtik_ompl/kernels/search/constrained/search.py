@@ -15,11 +15,10 @@ from rrtik_ompl.kernels.search.constrained import layout
 from rrtik_ompl.kernels.search.constrained.layout import ConstrainedTable, HeldTable
 from rrtik_ompl.kernels.search.motions.motion_table import NO_LIMIT, FastMotions, MotionsFree
 from rrtik_ompl.kernels.search.tree_layout import TreeTable
-from rrtik_ompl.kernels.search.tree_memory import grow, tree_table
-from rrtik_ompl.kernels.simd.halton import inverse_bases
+from rrtik_ompl.kernels.search.tree_memory import grow, sampled, tree_table
 from rrtik_ompl.kernels.simd.library import library
 from rrtik_ompl.kernels.simd.processor import WIDTH
-from rrtik_ompl.kernels.tables.memory import aligned, packed, whole_lanes
+from rrtik_ompl.kernels.tables.memory import aligned
 
 FIRST_CAPACITY = 128 * WIDTH  # vertices
 MOST_ROOM = 16_384  # vertices of one walk
@@ -58,14 +57,27 @@ class ConstrainedSearch:
         if kernels is None:
             raise InputError("search in kernels: there are none; install numba")
         motions.require_covered(lower, upper)
-        self._kernels, self._motions, self._dof = kernels, motions, motions.dof
+        self._kernels = kernels
+        self._motions = motions
+        self._dof = motions.dof
         longest, domain = connect_lengths(lower, upper, range_, None, turning=np.ones(motions.dof, dtype=bool))
         joints = 0 if motions.identity else motions.joints
         self._trees = [tree_table(self._dof, joints, FIRST_CAPACITY) for _ in range(2)]
-        self._search = _search_table(motions, self._trees, held, (lower, upper))
-        self._search.put(longest=longest, shortest=min(shortest, longest), step=longest, domain=domain)
         self._room = min(round(layout.ROOM * max(SHORTEST_STEP / shortest, 1.0)), MOST_ROOM)
-        self._search.walk_room = self._room
+        self._search = sampled(
+            ConstrainedTable,
+            motions,
+            (np.asarray(lower), np.asarray(upper)),
+            start_tree=self._trees[0],
+            goal_tree=self._trees[1],
+            held=held,
+            domain=domain,
+            walk_room=self._room,
+            longest=longest,
+            shortest=min(shortest, longest),
+            step=longest,
+            aim=np.zeros(motions.dof),
+        )
         self._questions = self._rejected = 0
 
     def solve(
@@ -181,7 +193,8 @@ class ConstrainedSearch:
         branches = [self._branch(0, self._search.start_meeting), self._branch(1, self._search.goal_meeting)]
         for side, branch in enumerate(branches):
             tree = self._trees[side]
-            states, parents = tree.states, tree.parents
+            states = tree.states
+            parents = tree.parents
             open_ = [vertex for vertex in branch if states[vertex] == tree_layout.OPEN]
             if not open_ or ask is None:
                 continue
@@ -199,7 +212,8 @@ class ConstrainedSearch:
 
     def _branch(self, side: int, vertex: int) -> list[int]:
         """A vertex and what leads to it, the root last."""
-        parents, branch = self._trees[side].parents, [vertex]
+        parents = self._trees[side].parents
+        branch = [vertex]
         while (vertex := int(parents[vertex])) >= 0:
             branch.append(vertex)
         return branch
@@ -213,28 +227,3 @@ class ConstrainedSearch:
             for tree in self._trees:
                 grow(tree)
         self._search.put(**{("start_rows", "goal_rows")[side]: aligned(np.asarray(rows, dtype=np.float64))})
-
-
-def _search_table(
-    motions: FastMotions, trees: list[TreeTable], held: HeldTable, box: tuple[Vector, Vector]
-) -> ConstrainedTable:
-    """The table of a search; fields that are not named here are numbers that the kernels set."""
-    none = whole_lanes(np.zeros(motions.dof))
-    made = packed(
-        ConstrainedTable,
-        motions=motions.table,
-        start_tree=trees[0],
-        goal_tree=trees[1],
-        held=held,
-        lower=np.asarray(box[0]),
-        upper=np.asarray(box[1]),
-        inverse_bases=whole_lanes(np.array(inverse_bases(motions.dof))),
-        row=none,
-        row_values=np.zeros(motions.joints),
-        aim=none,
-        query=np.zeros(motions.dof, dtype=np.float32),
-        point=none,
-    )
-    if motions.identity:
-        made.put(row_values=made.row)
-    return made

@@ -19,11 +19,10 @@ from rrtik_ompl.kernels.layout import COLLIDING, FREE, UNDECIDED
 from rrtik_ompl.kernels.search.crdt import layout as crdt_layout
 from rrtik_ompl.kernels.search.crdt.layout import CrdtTable, CrdtTreeTable
 from rrtik_ompl.kernels.search.crdt.rules import KERNELS, CrdtRules
-from rrtik_ompl.kernels.search.crdt.tree_memory import TreeMemory
 from rrtik_ompl.kernels.search.motions.motion_table import NO_LIMIT, FastMotions
 from rrtik_ompl.kernels.simd.library import library
 from rrtik_ompl.kernels.simd.processor import WIDTH
-from rrtik_ompl.kernels.tables.memory import PlannedTable, TablePlan, sizes_of
+from rrtik_ompl.kernels.tables.memory import PlannedTable, TablePlan, aligned, packed, sizes_of
 from rrtik_ompl.model.robot import LIMIT_TOLERANCE, Robot
 
 FIRST_CAPACITY = 256  # vertices
@@ -56,10 +55,12 @@ class CrdtSearch:
         tolerance: float = 0.0,
         vertices: int = FIRST_CAPACITY,
     ) -> None:
-        kernels, motions = library(KERNELS), world.motions
+        kernels = library(KERNELS)
+        motions = world.motions
         if kernels is None or motions is None:
             raise PlannerError("there are no kernels for this processor; see has_kernels")
-        self._world, self._motions = world, motions  # they own the tables
+        self._world = world  # they own the tables
+        self._motions = motions
         self._resume = kernels.resume_pair if goals is None else kernels.resume_single
         self._trees = [TreeMemory(rows, vertices) for rows in roots]
         aims = np.zeros((0, motions.dof)) if goals is None else goals
@@ -96,7 +97,8 @@ class CrdtSearch:
     def advance(self, stop: Callable[[], Any]) -> bool:
         """Go on to the next solution; False if ``stop()`` or the limit of iterations came first."""
         while not stop():
-            begin, until = thread_time(), self.iterations + self._budget
+            begin = thread_time()
+            until = self.iterations + self._budget
             status = self._go_on(until)
             while status in (crdt_layout.ASKING, crdt_layout.FULL) and thread_time() - begin < MAX_PAUSE:
                 status = self._go_on(until)
@@ -107,7 +109,8 @@ class CrdtSearch:
 
     def meeting(self) -> tuple[Matrix, Matrix]:
         """The branch of each of two trees from its root to the vertex at which they met, shapes (k, n)."""
-        met, other = self._table.met, self._table.last
+        met = self._table.met
+        other = self._table.last
         if self._table.growing == 0:  # the turns have changed since
             met, other = other, met
         return self._trees[0].branch(met), self._trees[1].branch(other)
@@ -195,3 +198,76 @@ def _plan(dof: int, axes: int, goals: int) -> TablePlan:
 def _words(integers: int) -> int:
     """Words of 8 bytes that so many int32 take."""
     return -(-integers // 2)
+
+
+class TreeMemory:
+    """Vertices of a C-RDT tree, with room for more.
+
+    Attributes:
+        table: What kernels read.
+        address: Of that table; stays when the tree is given more room.
+
+    Args:
+        roots: Its first vertices, shape (r, n).
+        capacity: How many vertices there is room for, a multiple of the lanes; doubled until the roots have room.
+    """
+
+    def __init__(self, roots: Matrix, capacity: int) -> None:
+        count, self._dof = roots.shape
+        while capacity < count + self._dof:
+            capacity *= 2
+        self.table = packed(CrdtTreeTable, size=count, capacity=capacity, **self._arrays(capacity))
+        self._runs[:, :count] = roots.T
+        self._parents[:count] = crdt_layout.ROOT
+        self.address = self.table.address
+
+    @property
+    def size(self) -> int:
+        """Number of vertices."""
+        return self.table.size
+
+    @property
+    def vertices(self) -> Matrix:
+        """Shape (size, n). A view."""
+        return self._runs[:, : self.size].T
+
+    @property
+    def parents(self) -> NDArray[np.int64]:
+        """The parent of each vertex, shape (size,), below 0 for a root; a copy."""
+        return self._parents[: self.size].astype(np.int64)
+
+    def branch(self, vertex: int) -> Matrix:
+        """The configurations from the root to a vertex, shape (k, n)."""
+        chain = [vertex]
+        while (parent := self._parents.item(chain[-1])) != crdt_layout.ROOT:
+            chain.append(parent)
+        return np.ascontiguousarray(self._runs[:, chain[::-1]].T)
+
+    def intact(self) -> bool:
+        """Whether no kernel has written beyond this memory."""
+        return self.table.intact()
+
+    def grow(self) -> None:
+        """Give the tree twice the room."""
+        vertices = self.vertices
+        parents = self._parents[: self.size]
+        capacity = 2 * self.table.capacity
+        self.table.put(**{name: aligned(larger) for name, larger in self._arrays(capacity).items()})
+        self.table.capacity = capacity
+        self._runs[:, : self.size] = vertices.T
+        self._parents[: self.size] = parents
+
+    @property
+    def _runs(self) -> Matrix:
+        """Coordinates, shape (n, capacity)."""
+        return self.table.coordinates.reshape(self._dof, -1)
+
+    @property
+    def _parents(self) -> NDArray[Any]:
+        return self.table.parents
+
+    def _arrays(self, capacity: int) -> dict[str, NDArray[Any]]:
+        return {
+            "coordinates": np.zeros(self._dof * capacity),
+            "parents": np.zeros(capacity, dtype=np.int32),
+        }

@@ -51,9 +51,9 @@ def read_vertex(tree: CrdtTreeTable, dof: int, vertex: int, sink: Configuration)
 @inlined
 def add_crdt_vertex(tree: CrdtTreeTable, dof: int, row: Configuration, parent: int) -> Any:
     """Add the coordinates at an address to a tree that has room; returns the number of the vertex."""
-    vertex, coordinates = tree.size, tree.coordinates
+    vertex = tree.size
     for axis in range(dof):
-        coordinates[axis * tree.capacity + vertex] = row[axis]
+        tree.coordinates[axis * tree.capacity + vertex] = row[axis]
     set_crdt_parent(tree, vertex, parent)
     tree.size = vertex + 1
     return vertex
@@ -64,23 +64,26 @@ def nearest_crdt_vertex(
     tree: CrdtTreeTable, dof: int, target: Configuration, scale: Configuration, nearest: Doubles
 ) -> int:
     """The vertex nearest to a target in the scaled metric; among equals the oldest. ``nearest``: two wide lanes."""
-    coordinates = tree.coordinates
-    count, run = tree.size, tree.capacity // WIDTH
-    lowest, holder = spread_wide(UNBOUNDED_SQUARE), spread_wide(0.0)
+    count = tree.size
+    run = tree.capacity // WIDTH  # blocks of a coordinate
+    lowest = spread_wide(UNBOUNDED_SQUARE)
+    holder = spread_wide(0.0)  # the vertex that has it
     for block in range((count + WIDTH - 1) // WIDTH):
         total = spread_wide(0.0)
         for axis in range(dof):
-            gap = (wide_lanes_at(coordinates, axis * run + block) - target[axis]) * scale[axis]
+            gap = (wide_lanes_at(tree.coordinates, axis * run + block) - target[axis]) * scale[axis]
             total = rounded_sum(total, gap * gap)
         numbers = lane_numbers() + float(block * WIDTH)
         total = choose(numbers < float(count), total, spread_wide(UNBOUNDED_SQUARE))
         nearer = total < lowest
-        lowest, holder = choose(nearer, total, lowest), choose(nearer, numbers, holder)
+        lowest = choose(nearer, total, lowest)
+        holder = choose(nearer, numbers, holder)
     set_wide_lanes(nearest, 0, lowest)
     set_wide_lanes(nearest, 1, holder)
+
     best = 0
     for lane in range(1, WIDTH):
-        a, b = nearest[lane], nearest[best]
-        if a < b or (a == b and nearest[WIDTH + lane] < nearest[WIDTH + best]):
+        closer = nearest[lane] < nearest[best]
+        if closer or (nearest[lane] == nearest[best] and nearest[WIDTH + lane] < nearest[WIDTH + best]):
             best = lane
     return int(nearest[WIDTH + best])

@@ -13,7 +13,7 @@ import numpy as np
 from rrtik_ompl.kernels.checks.check_kernels import check_edge, check_part
 from rrtik_ompl.kernels.layout import FREE, JointValues
 from rrtik_ompl.kernels.search.motions.motion_layout import STEP_TOLERANCE, MotionTable
-from rrtik_ompl.kernels.search.motions.row_kernels import Configuration
+from rrtik_ompl.kernels.search.motions.row_kernels import Configuration, row_at
 from rrtik_ompl.kernels.simd.compiled import inlined, kernel
 from rrtik_ompl.kernels.tables.accessors import joint_row
 
@@ -27,12 +27,12 @@ def resolves(motions: MotionTable) -> bool:
 @kernel
 def set_joint_values(motions: MotionTable, row: Configuration, values: JointValues) -> None:
     """Write the joint values of a configuration."""
-    dof, gain, offset = motions.dof, motions.gain, motions.offset
     for joint in range(motions.joints):
+        gain = row_at(motions.gain, motions.dof, joint)
         total = 0.0
-        for k in range(dof):
-            total += gain[joint * dof + k] * row[k]
-        values[joint] = total + offset[joint]
+        for k in range(motions.dof):
+            total += gain[k] * row[k]
+        values[joint] = total + motions.offset[joint]
 
 
 @inlined
@@ -44,16 +44,15 @@ def whole_steps(steps: float) -> Any:
 @kernel
 def step_count(motions: MotionTable, start: Configuration, end: Configuration) -> Any:
     """Number of steps in which a motion is checked, as :func:`~.motion_table.step_counts` gives it."""
-    dof, weights = motions.dof, motions.weights
-    travel, square = 0.0, 0.0
-    for k in range(dof):
+    travel = 0.0
+    square = 0.0
+    for k in range(motions.dof):
         gap = end[k] - start[k]
-        travel += weights[k] * abs(gap)
+        travel += motions.weights[k] * abs(gap)
         square += gap * gap
     steps = travel / motions.resolution
-    per_unit = motions.steps_per_unit
-    if per_unit > 0.0:
-        steps = max(steps, per_unit * np.sqrt(square))
+    if motions.steps_per_unit > 0.0:
+        steps = max(steps, motions.steps_per_unit * np.sqrt(square))
     return whole_steps(steps)
 
 

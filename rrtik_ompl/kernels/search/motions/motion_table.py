@@ -86,9 +86,14 @@ class FastMotions:
         shift = finite_array(offset, (joints,), "offset")
         if joints != len(fast.limits):
             raise InputError(f"gain and offset: expected {len(fast.limits)} rows, one for each joint, got {joints}")
-        self.fast, self.resolve, self._gain, self._offset, self._proof = fast, resolve, matrix, shift, proof
+        self.fast = fast
+        self.resolve = resolve
+        self._gain = matrix
+        self._offset = shift
+        self._proof = proof
         self.spare: dict[str, Any] = {}
-        self.resolution, self._steps_per_unit = positive(resolution, "resolution"), steps_per_unit
+        self.resolution = positive(resolution, "resolution")
+        self._steps_per_unit = steps_per_unit
         self._weights = finite_array(weights, (self.dof,), "weights")
         self.identity = matrix.shape == (joints, joints) and bool((matrix == np.eye(joints)).all() and not shift.any())
         self.table = packed(

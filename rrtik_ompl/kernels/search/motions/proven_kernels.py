@@ -29,8 +29,10 @@ LOOKS = 2  # blocks of configurations, spread over a motion, that are looked at 
 @kernel
 def seen_colliding(world: WorldTable, start: JointValues, end: JointValues) -> bool:
     """Whether the inner balls meet something at one of a few configurations of a motion."""
-    scratch, joints = world.scratch, world.arm.joint_count
-    values, every = scratch.values, bits(lane_numbers() >= 0.0)
+    scratch = world.scratch
+    joints = world.arm.joint_count
+    values = scratch.values
+    every = bits(lane_numbers() >= 0.0)
     for block in range(LOOKS):
         share = (lane_numbers() * float(LOOKS) + float(block)) / float(LOOKS * WIDTH - 1)
         for joint in range(joints):
@@ -102,7 +104,8 @@ def judge_near(motions: MotionTable, start: Configuration, end: Configuration, h
 @entry
 def judge(motions: MotionTable, starts: Configuration, ends: Configuration, count: int, answers: Ints) -> int:
     """Check motions between rows of two arrays; int32 answers. Returns how many are free."""
-    free, dof = 0, motions.dof
+    free = 0
+    dof = motions.dof
     for k in range(count):
         answer = judge_motion(motions, row_at(starts, dof, k), row_at(ends, dof, k), True)
         answers[k] = answer

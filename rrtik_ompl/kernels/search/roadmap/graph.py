@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.base.arrays import Matrix, finite_array
+from rrtik_ompl.base.arrays import Matrix, Vector, finite_array
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.kernels.search.motions.motion_table import FastMotions, MotionsFree
 from rrtik_ompl.kernels.search.roadmap import layout
-from rrtik_ompl.kernels.search.roadmap.memory import make_room, roadmap_table
-from rrtik_ompl.kernels.search.tree_memory import tree_table
+from rrtik_ompl.kernels.search.roadmap.layout import RoadmapTable
+from rrtik_ompl.kernels.search.tree_layout import TreeTable
+from rrtik_ompl.kernels.search.tree_memory import grow, sampled, tree_table
 from rrtik_ompl.kernels.simd.library import library
 from rrtik_ompl.kernels.simd.processor import WIDTH
 from rrtik_ompl.kernels.tables.memory import aligned
@@ -21,6 +23,9 @@ FIRST_VERTICES = 64 * WIDTH
 SAMPLES_IN_CALL = 64  # samples drawn, about a millisecond
 EDGES_IN_CALL = 128
 HALVES_IN_CALL = 256  # of edges that a query follows
+_BY_VERTEX = {"heads": np.int32, "costs": np.float64, "ahead": np.float64, "came": np.int32}
+_BY_HALF = {"to": np.int32, "next": np.int32, "heap": np.int32, "keys": np.float64}
+_BY_EDGE = {"lengths": np.float64, "states": np.int32}
 
 
 class KernelGraph:
@@ -51,8 +56,12 @@ class KernelGraph:
         kernels = library(layout.KERNELS)
         if kernels is None:
             raise InputError("roadmap in kernels: there are none; install numba")
-        self._kernels, self._motions, self._ask, self._near = kernels, motions, ask, near
-        self._dof, motions.fast.pinned = motions.dof, True
+        self._kernels = kernels
+        self._motions = motions
+        self._ask = ask
+        self._near = near
+        self._dof = motions.dof
+        motions.fast.pinned = True
         box = finite_array(lower, (self._dof,), "lower bounds"), finite_array(upper, (self._dof,), "upper bounds")
         motions.require_covered(*box)
         joints = 0 if motions.identity else motions.joints
@@ -142,7 +151,8 @@ class KernelGraph:
         counts = len(starts), len(goals)
         halves = 2 * (self._near + counts[0]) * sum(counts)
         make_room(self._table, self.size + sum(counts), self._table.halves + halves)
-        address, place = self._table.address, self._place_of(np.concatenate([starts, goals]))
+        address = self._table.address
+        place = self._place_of(np.concatenate([starts, goals]))
         outside = self._kernels.pose(address, place, *counts)
         if outside >= 0:
             what = f"start {outside}" if outside < counts[0] else f"goal {outside - counts[0]}"
@@ -157,7 +167,8 @@ class KernelGraph:
     def statistics(self) -> dict[str, int | float]:
         """Counts since the roadmap was made."""
         self._kernels.forget_query(self._table.address)
-        edges, checked = self._table.halves // 2, self._table.checked
+        edges = self._table.halves // 2
+        checked = self._table.checked
         return {"vertices": self.size, "edges": edges, "motions": checked, "iterations": self._table.samples}
 
     def intact(self) -> bool:
@@ -168,13 +179,16 @@ class KernelGraph:
         """Decide what the kernels ask; the next status."""
         count = self._table.asked
         halves = self._table.questions[:count]
-        to, rows = self._table.to, self._rows()
+        to = self._table.to
+        rows = self._rows()
         free = np.zeros(count, dtype=bool) if self._ask is None else self._ask(rows[to[halves ^ 1]], rows[to[halves]])
         mask = sum(1 << k for k in np.flatnonzero(free).tolist())
         return self._kernels.answer(self._table.address, mask - (1 << 64 if mask >> 63 else 0))
 
     def _path(self) -> Matrix:
-        vertex, to, came = self._table.meeting, self._table.to, self._table.came
+        vertex = self._table.meeting
+        to = self._table.to
+        came = self._table.came
         found = [vertex]
         while (half := int(came[vertex])) >= 0:
             vertex = int(to[half ^ 1])
@@ -187,7 +201,8 @@ class KernelGraph:
 
     def _enough(self, more: int) -> tuple[int, int]:
         """Vertices and halves that there have to be room for, to add some vertices; room is doubled."""
-        halves, room = self._table.halves + 2 * self._near * more, len(self._table.to)
+        halves = self._table.halves + 2 * self._near * more
+        room = len(self._table.to)
         return self.size + more, halves if halves <= room else 2 * room
 
     def _place_of(self, rows: Matrix) -> int:
@@ -198,3 +213,49 @@ class KernelGraph:
             self._ends = aligned(np.zeros(2 * rows.size)).reshape(-1, self._dof)
         self._ends[: len(rows)] = rows
         return int(self._ends.ctypes.data)
+
+
+def roadmap_table(
+    motions: FastMotions, vertices: TreeTable, box: tuple[Vector, Vector], near: int, halves: int, *, resolve: bool
+) -> RoadmapTable:
+    """The table of an empty roadmap.
+
+    Args:
+        motions: How motions are checked.
+        vertices: Memory for these, a tree.
+        box: Lower and upper bounds, shapes (n,).
+        near: With how many vertices a new one is joined.
+        halves: How many halves of edges there is room for, an even number.
+        resolve: Whether undecided motions are asked for.
+    """
+    return sampled(
+        RoadmapTable,
+        motions,
+        box,
+        vertices=vertices,
+        resolve=int(resolve),
+        near=near,
+        near_vertices=np.zeros(near, dtype=np.int32),
+        near_squares=np.zeros(near, dtype=np.float32),
+        questions=np.zeros(layout.MAX_QUESTIONS, dtype=np.int32),
+        **_arrays(vertices.capacity, halves),
+    )
+
+
+def make_room(roadmap: RoadmapTable, rows: int, halves: int) -> None:
+    """Let there be room for so many vertices and halves; addresses of the tables stay."""
+    while roadmap.vertices.capacity < rows:
+        grow(roadmap.vertices)
+    for name, larger in _arrays(roadmap.vertices.capacity, max(halves, len(roadmap.to))).items():
+        kept = getattr(roadmap, name)
+        if len(larger) > len(kept):
+            roomy = aligned(larger)
+            roomy[: len(kept)] = kept
+            roadmap.put(**{name: roomy})
+
+
+def _arrays(vertices: int, halves: int) -> dict[str, NDArray[Any]]:
+    found: dict[str, NDArray[Any]] = {}
+    for size, kinds in ((vertices, _BY_VERTEX), (halves, _BY_HALF), (halves // 2, _BY_EDGE)):
+        found |= {name: np.zeros(size, dtype=kind) for name, kind in kinds.items()}
+    return found

@@ -8,7 +8,7 @@ import numpy as np
 
 from rrtik_ompl.kernels.checks.check_kernels import check_part
 from rrtik_ompl.kernels.layout import FREE, UNDECIDED
-from rrtik_ompl.kernels.search.motions.motion_kernels import descends, set_joint_values, step_count
+from rrtik_ompl.kernels.search.motions.motion_kernels import descends, step_count
 from rrtik_ompl.kernels.search.motions.row_kernels import distance
 from rrtik_ompl.kernels.search.roadmap import layout
 from rrtik_ompl.kernels.search.roadmap.layout import BLOCKED, DOUBTFUL, SURE, UNKNOWN, RoadmapTable
@@ -16,10 +16,7 @@ from rrtik_ompl.kernels.search.tree_kernels import add_vertex, row_of, squares_o
 from rrtik_ompl.kernels.search.tree_layout import CERTAIN, NO_PARENT
 from rrtik_ompl.kernels.simd.access import lane_at
 from rrtik_ompl.kernels.simd.compiled import WIDTH, inlined, kernel
-from rrtik_ompl.kernels.simd.lanes import (
-    lowest,
-)
-from rrtik_ompl.kernels.simd.records import same_place
+from rrtik_ompl.kernels.simd.lanes import lowest
 
 ANY_RADIUS = 0.0  # domains of vertices are of no use here
 FARTHEST = np.float32(3e38)  # more than any squared distance
@@ -44,27 +41,16 @@ def length_of(roadmap: RoadmapTable, half: int) -> Any:
 
 
 @kernel
-def place_row(roadmap: RoadmapTable) -> None:
-    """Make the joint values and the floats of ROW."""
-    motions, row, values = roadmap.motions, roadmap.row, roadmap.row_values
-    if not same_place(row, values):
-        set_joint_values(motions, row, values)
-    for k in range(motions.dof):
-        roadmap.query[k] = np.float32(row[k])
-
-
-@kernel
 def row_is_free(roadmap: RoadmapTable) -> bool:
-    """Whether ROW is certain to be free."""
-    world, values = roadmap.motions.world, roadmap.row_values
-    return check_part(world, values, values, 1, 1, 1, roadmap.resolve != 0) == FREE
+    """Whether the row is certain to be free."""
+    values = roadmap.row_values
+    return check_part(roadmap.motions.world, values, values, 1, 1, 1, roadmap.resolve != 0) == FREE
 
 
 @kernel
 def add_row(roadmap: RoadmapTable) -> Any:
-    """Make ROW a vertex without edges; there must be room. Returns its number."""
-    row, values = roadmap.row, roadmap.row_values
-    vertex = add_vertex(roadmap.vertices, row, values, NO_PARENT, CERTAIN, ANY_RADIUS)
+    """Make the row a vertex without edges; there must be room. Returns its number."""
+    vertex = add_vertex(roadmap.vertices, roadmap.row, roadmap.row_values, NO_PARENT, CERTAIN, ANY_RADIUS)
     roadmap.heads[vertex] = layout.END
     return vertex
 
@@ -72,7 +58,8 @@ def add_row(roadmap: RoadmapTable) -> Any:
 @kernel
 def keep_near(roadmap: RoadmapTable, vertex: int, square: float, count: int) -> Any:
     """Put a vertex among the ``count`` nearest ones so far; returns how many there are then."""
-    vertices, squares = roadmap.near_vertices, roadmap.near_squares
+    vertices = roadmap.near_vertices
+    squares = roadmap.near_squares
     place = min(count, roadmap.near - 1)
     while place > 0 and squares[place - 1] > square:
         squares[place] = squares[place - 1]
@@ -85,11 +72,12 @@ def keep_near(roadmap: RoadmapTable, vertex: int, square: float, count: int) -> 
 
 @kernel
 def find_near(roadmap: RoadmapTable, below: int) -> int:
-    """Find the vertices nearest to QUERY among the first ``below`` ones; returns how many there are."""
-    tree, query, dof = roadmap.vertices, roadmap.query, roadmap.motions.dof
-    points, wanted, count, worst = tree.points, roadmap.near, 0, FARTHEST
+    """Find the vertices nearest to what is looked for among the first ``below`` ones; returns how many there are."""
+    wanted = roadmap.near
+    count = 0
+    worst = FARTHEST
     for block in range((below + WIDTH - 1) // WIDTH):
-        total = squares_of(points, query, dof, block)
+        total = squares_of(roadmap.vertices.points, roadmap.query, roadmap.motions.dof, block)
         if lowest(total) >= worst:
             continue
         for lane in range(min(WIDTH, below - block * WIDTH)):
@@ -112,19 +100,21 @@ def leave(roadmap: RoadmapTable, vertex: int, half: int) -> None:
 @kernel
 def join(roadmap: RoadmapTable, first: int, second: int) -> None:
     """Add an edge between two vertices; there must be room."""
-    half, tree, dof = roadmap.halves, roadmap.vertices, roadmap.motions.dof
+    tree = roadmap.vertices
+    half = roadmap.halves
+    edge = half >> 1
     leave(roadmap, first, half)
     leave(roadmap, second, half + 1)
     roadmap.to[half] = second
     roadmap.to[half + 1] = first
-    roadmap.lengths[half >> 1] = distance(dof, row_of(tree, first), row_of(tree, second))
-    roadmap.states[half >> 1] = UNKNOWN
+    roadmap.lengths[edge] = distance(roadmap.motions.dof, row_of(tree, first), row_of(tree, second))
+    roadmap.states[edge] = UNKNOWN
     roadmap.halves = half + 2
 
 
 @kernel
 def join_near(roadmap: RoadmapTable, vertex: int, below: int) -> int:
-    """Join the vertex at QUERY with those nearest to it among the first ``below`` ones; returns how many."""
+    """Join the vertex that is looked for with those nearest to it among the first ``below`` ones; returns how many."""
     count = find_near(roadmap, below)
     for k in range(count):
         join(roadmap, vertex, roadmap.near_vertices[k])
@@ -134,27 +124,34 @@ def join_near(roadmap: RoadmapTable, vertex: int, below: int) -> int:
 @kernel
 def drop_last_edge(roadmap: RoadmapTable) -> None:
     """Take the edge away that was added last."""
-    half, heads, after = roadmap.halves - 2, roadmap.heads, roadmap.next
-    for each in range(half, half + 2):
-        heads[tail_of(roadmap, each)] = after[each]
-    roadmap.halves = half
+    first = roadmap.halves - 2
+    for half in range(first, first + 2):
+        roadmap.heads[tail_of(roadmap, half)] = roadmap.next[half]
+    roadmap.halves = first
 
 
 @kernel
 def checked_state(roadmap: RoadmapTable, half: int) -> Any:
     """The state of a half's edge, whose motion is checked if nobody has looked at it; its ends are taken to be free."""
-    edge, states = half >> 1, roadmap.states
-    known = states[edge]
+    edge = half >> 1
+    known = roadmap.states[edge]
     if known != UNKNOWN:
         return known
-    motions, tree = roadmap.motions, roadmap.vertices
-    first, second = tail_of(roadmap, half), head_of(roadmap, half)
+
+    motions = roadmap.motions
+    tree = roadmap.vertices
+    first = tail_of(roadmap, half)
+    second = head_of(roadmap, half)
     if descends(motions.dof, row_of(tree, first), row_of(tree, second)):
         first, second = second, first
     last = step_count(motions, row_of(tree, first), row_of(tree, second))
     resolve = roadmap.resolve != 0
     answer = check_part(motions.world, values_of(tree, first), values_of(tree, second), last, 1, last - 1, resolve)
     roadmap.checked += 1
-    state = SURE if answer == FREE else DOUBTFUL if answer == UNDECIDED and resolve else BLOCKED
-    states[edge] = state
+    state = BLOCKED
+    if answer == FREE:
+        state = SURE
+    elif answer == UNDECIDED and resolve:
+        state = DOUBTFUL
+    roadmap.states[edge] = state
     return state

@@ -19,9 +19,10 @@ free the query begins again, with all that is known by then.
 
 from __future__ import annotations
 
+from typing import Any
+
 from rrtik_ompl.kernels.record import Ints
-from rrtik_ompl.kernels.search.box_kernels import copy_inside
-from rrtik_ompl.kernels.search.motions.row_kernels import Configuration, row_at
+from rrtik_ompl.kernels.search.motions.row_kernels import Configuration, distance, row_at
 from rrtik_ompl.kernels.search.roadmap import layout
 from rrtik_ompl.kernels.search.roadmap.graph_kernels import (
     add_row,
@@ -31,22 +32,22 @@ from rrtik_ompl.kernels.search.roadmap.graph_kernels import (
     join,
     join_near,
     length_of,
-    place_row,
     row_is_free,
     tail_of,
 )
-from rrtik_ompl.kernels.search.roadmap.layout import BLOCKED, SURE, UNKNOWN, RoadmapTable
-from rrtik_ompl.kernels.search.roadmap.query_kernels import ask_or_finish, pop, reach
-from rrtik_ompl.kernels.simd.compiled import entry, kernel
-from rrtik_ompl.kernels.simd.random_kernels import next_point, next_share, start_points
+from rrtik_ompl.kernels.search.roadmap.layout import BLOCKED, DOUBTFUL, SURE, UNKNOWN, RoadmapTable
+from rrtik_ompl.kernels.search.sample_kernels import draw, load_row, set_query, set_row_values, start_samples
+from rrtik_ompl.kernels.search.tree_kernels import row_of
+from rrtik_ompl.kernels.simd.compiled import entry, inlined, kernel
+
+# The roadmap.
 
 
 @entry
 def seed_samples(roadmap: RoadmapTable, seed: int) -> int:
     """Choose the first sample."""
-    roadmap.random = seed
-    next_share(roadmap)
-    return start_points(roadmap, roadmap.point, roadmap.motions.dof)
+    start_samples(roadmap, seed)
+    return roadmap.motions.dof
 
 
 @entry
@@ -55,17 +56,14 @@ def grow(roadmap: RoadmapTable, wanted: int, samples: int) -> int:
 
     There must be room, and no query in the roadmap. Returns how many were added.
     """
-    dof, row, added = roadmap.motions.dof, roadmap.row, 0
-    point, bases = roadmap.point, roadmap.inverse_bases
+    added = 0
     while added < wanted and samples > 0:
         samples -= 1
         roadmap.samples += 1
-        next_point(roadmap, point, bases, dof)
-        for k in range(dof):
-            low, high = roadmap.lower[k], roadmap.upper[k]
-            row[k] = low + (high - low) * point[k]
-        place_row(roadmap)
+        draw(roadmap, roadmap.row)
+        set_row_values(roadmap)
         if row_is_free(roadmap):
+            set_query(roadmap, roadmap.row)
             before = roadmap.vertices.size
             join_near(roadmap, add_row(roadmap), before)
             added += 1
@@ -102,6 +100,15 @@ def learn(roadmap: RoadmapTable, rows: Configuration, count: int) -> int:
     return count
 
 
+@kernel
+def load(roadmap: RoadmapTable, rows: Configuration, k: int) -> bool:
+    """Set the row, and what is looked for, to a row at an address; False if that is outside the box."""
+    if not load_row(roadmap, row_at(rows, roadmap.motions.dof, k)):
+        return False
+    set_query(roadmap, roadmap.row)
+    return True
+
+
 @entry
 def connect(roadmap: RoadmapTable, pairs: Ints, count: int) -> int:
     """Add edges between pairs of vertices, int32 at an address; there must be room. Returns HALVES."""
@@ -120,27 +127,16 @@ def check_edges(roadmap: RoadmapTable, first: int, count: int) -> int:
     return blocked
 
 
-@kernel
-def load(roadmap: RoadmapTable, rows: Configuration, k: int) -> bool:
-    """Set ROW to a row at an address; False if that is outside the box."""
-    dof, row = roadmap.motions.dof, roadmap.row
-    lower, upper = roadmap.lower, roadmap.upper
-    inside = copy_inside(dof, row_at(rows, dof, k), lower, upper, row)
-    place_row(roadmap)
-    return inside
-
-
 @entry
-def forget_query(roadmap: RoadmapTable) -> int:
-    """Take starts and goals out of the roadmap."""
-    while (
-        roadmap.halves > 0
-        and max(head_of(roadmap, roadmap.halves - 1), tail_of(roadmap, roadmap.halves - 1)) >= roadmap.mapped
-    ):
-        drop_last_edge(roadmap)
-    roadmap.vertices.size = roadmap.mapped
-    roadmap.vertices.live = roadmap.mapped
-    return 0
+def doubt(roadmap: RoadmapTable) -> int:
+    """Forget what is known of the edges; returns how many there are."""
+    edges: int = roadmap.halves >> 1
+    for edge in range(edges):
+        roadmap.states[edge] = UNKNOWN
+    return edges
+
+
+# Queries.
 
 
 @entry
@@ -160,6 +156,19 @@ def pose(roadmap: RoadmapTable, rows: Configuration, starts: int, goals: int) ->
         for start in range(starts if k >= starts else 0):
             join(roadmap, mapped + start, vertex)
     return -1
+
+
+@entry
+def forget_query(roadmap: RoadmapTable) -> int:
+    """Take starts and goals out of the roadmap."""
+    while roadmap.halves > 0:
+        last = roadmap.halves - 1
+        if max(head_of(roadmap, last), tail_of(roadmap, last)) < roadmap.mapped:
+            break
+        drop_last_edge(roadmap)
+    roadmap.vertices.size = roadmap.mapped
+    roadmap.vertices.live = roadmap.mapped
+    return 0
 
 
 @entry
@@ -184,12 +193,12 @@ def search_on(roadmap: RoadmapTable, budget: int) -> int:
         if roadmap.heap_size == 0:
             return layout.EXHAUSTED
         half = pop(roadmap)
-        head, tail = head_of(roadmap, half), tail_of(roadmap, half)
+        head = head_of(roadmap, half)
         if roadmap.came[head] != layout.UNSEEN:
             continue
         if checked_state(roadmap, half) == BLOCKED:
             continue
-        reach(roadmap, head, half, roadmap.costs[tail] + length_of(roadmap, half))
+        reach(roadmap, head, half, roadmap.costs[tail_of(roadmap, half)] + length_of(roadmap, half))
         if head >= goals:
             roadmap.meeting = head
             return ask_or_finish(roadmap)
@@ -201,16 +210,96 @@ def answer(roadmap: RoadmapTable, mask: int) -> int:
     """Use the answers for the halves that were asked for, bit by bit, 1 for free; returns the status."""
     broken = False
     for k in range(roadmap.asked):
-        free, edge = (mask >> k) & 1, roadmap.questions[k] >> 1
-        roadmap.states[edge] = SURE if free else BLOCKED
+        free = (mask >> k) & 1
+        roadmap.states[roadmap.questions[k] >> 1] = SURE if free else BLOCKED
         broken = broken or not free
     return begin(roadmap) if broken else ask_or_finish(roadmap)
 
 
-@entry
-def doubt(roadmap: RoadmapTable) -> int:
-    """Forget what is known of the edges; returns how many there are."""
-    edges: int = roadmap.halves >> 1
-    for edge in range(edges):
-        roadmap.states[edge] = UNKNOWN
-    return edges
+@kernel
+def reach(roadmap: RoadmapTable, vertex: int, half: int, cost: float) -> None:
+    """Reach a vertex by a half, and follow the halves that leave it."""
+    roadmap.came[vertex] = half
+    roadmap.costs[vertex] = cost
+    leaving = roadmap.heads[vertex]
+    while leaving != layout.END:
+        head = head_of(roadmap, leaving)
+        open_ = roadmap.came[head] == layout.UNSEEN
+        if open_ and roadmap.states[leaving >> 1] != BLOCKED:
+            push(roadmap, leaving, cost + length_of(roadmap, leaving) + ahead_of(roadmap, head))
+        leaving = roadmap.next[leaving]
+
+
+@kernel
+def ahead_of(roadmap: RoadmapTable, vertex: int) -> Any:
+    """Distance from a vertex to the nearest goal, computed once in a query."""
+    known = roadmap.ahead[vertex]
+    if known != layout.NOT_COMPUTED:
+        return known
+    tree = roadmap.vertices
+    dof = roadmap.motions.dof
+    least = 1e300
+    for goal in range(roadmap.mapped + roadmap.starts, tree.size):
+        least = min(least, distance(dof, row_of(tree, vertex), row_of(tree, goal)))
+    roadmap.ahead[vertex] = least
+    return least
+
+
+@kernel
+def ask_or_finish(roadmap: RoadmapTable) -> int:
+    """SOLVED if all motions of the path are certain, else the doubtful ones are asked for."""
+    asked = 0
+    half = roadmap.came[roadmap.meeting]
+    while half >= 0:
+        if asked < layout.MAX_QUESTIONS and roadmap.states[half >> 1] == DOUBTFUL:
+            roadmap.questions[asked] = half
+            asked += 1
+        half = roadmap.came[tail_of(roadmap, half)]
+    roadmap.asked = asked
+    return layout.SOLVED if asked == 0 else layout.ASKING
+
+
+@kernel
+def push(roadmap: RoadmapTable, half: int, key: float) -> None:
+    """Put a half into the heap."""
+    keys = roadmap.keys
+    place = roadmap.heap_size
+    roadmap.heap_size += 1
+    roadmap.heap[place] = half
+    keys[place] = key
+    while place > 0 and keys[(place - 1) >> 1] > keys[place]:
+        swap(roadmap, place, (place - 1) >> 1)
+        place = (place - 1) >> 1
+
+
+@kernel
+def pop(roadmap: RoadmapTable) -> Any:
+    """Take the half with the least key out of the heap, which is not empty."""
+    keys = roadmap.keys
+    size = roadmap.heap_size - 1
+    half = roadmap.heap[0]
+    swap(roadmap, 0, size)
+    roadmap.heap_size = size
+    place = 0
+    while 2 * place + 1 < size:
+        child = 2 * place + 1
+        if child + 1 < size and keys[child + 1] < keys[child]:
+            child += 1
+        if keys[child] >= keys[place]:
+            break
+        swap(roadmap, place, child)
+        place = child
+    return half
+
+
+@inlined
+def swap(roadmap: RoadmapTable, one: int, two: int) -> None:
+    """Swap two places of the heap."""
+    heap = roadmap.heap
+    keys = roadmap.keys
+    half = heap[one]
+    heap[one] = heap[two]
+    heap[two] = half
+    key = keys[one]
+    keys[one] = keys[two]
+    keys[two] = key

@@ -2,34 +2,21 @@
 
 from __future__ import annotations
 
-from rrtik_ompl.kernels.layout import JointValues
-from rrtik_ompl.kernels.record import Doubles, Floats, Ints, Record
-from rrtik_ompl.kernels.search.motions.motion_layout import Configuration, MotionTable
+from rrtik_ompl.kernels.record import Doubles, Floats, Ints
 from rrtik_ompl.kernels.search.tree_layout import TreeTable
+from rrtik_ompl.kernels.search.two_trees_layout import SampledTable
 
 KERNELS = "search.roadmap.kernels"  # the library of roadmaps
 
 
-class RoadmapTable(Record):
+class RoadmapTable(SampledTable):
     """A roadmap, and a query on it.
 
     Edge e is the halves 2 e and 2 e + 1, one each way. The vertices from ``mapped`` on are the starts of the query,
     then its goals.
     """
 
-    motions: MotionTable  # of the world
     vertices: TreeTable  # a tree whose parents nobody reads
-    lower: Doubles  # the box of configurations
-    upper: Doubles
-    inverse_bases: Doubles  # of the sequence of samples
-    resolve: int  # 1 if undecided motions are asked for
-
-    row: Configuration  # the sample
-    row_values: JointValues  # of the row; the same memory where they are the same
-    query: Floats  # of the row
-    point: Doubles  # the sample in the unit box
-    random: int  # state
-
     halves: int  # how many there are
     to: Ints  # the vertex that a half leads to
     next: Ints  # the next half that leaves the same vertex

@@ -56,10 +56,10 @@ def passes(route: TightenTable, start: Configuration, end: Configuration, hint: 
 @kernel
 def drop_bend(route: TightenTable, bend: int) -> None:
     """Take a bend out of the route."""
-    dof, after = dof_in(route), route.count - bend - 1
-    copy_row(after * dof, waypoint(route, bend + 1), waypoint(route, bend))
-    copy_row(after, row_at(route.steps, 1, bend + 1), row_at(route.steps, 1, bend))
+    after = route.count - bend - 1
     size = 2 * HINT_SIZE
+    copy_row(after * dof_in(route), waypoint(route, bend + 1), waypoint(route, bend))
+    copy_row(after, row_at(route.steps, 1, bend + 1), row_at(route.steps, 1, bend))
     copy_row(after * size, row_at(route.hints, size, bend + 1), row_at(route.hints, size, bend))
     route.count -= 1
 
@@ -67,17 +67,23 @@ def drop_bend(route: TightenTable, bend: int) -> None:
 @kernel
 def propose(route: TightenTable, bend: int, step: float) -> float:
     """Draw the new place of a bend; the length of its two motions then."""
-    dof, target = dof_in(route), route.point
-    before, here, after = waypoint(route, bend - 1), waypoint(route, bend), waypoint(route, bend + 1)
+    dof = dof_in(route)
+    target = route.point
+    before = waypoint(route, bend - 1)
+    here = waypoint(route, bend)
+    after = waypoint(route, bend + 1)
     share = distance(dof, before, here)
     share /= max(share + distance(dof, here, after), 1e-300)
-    straight = aside = 0.0
+
+    straight = 0.0  # squared lengths of both parts
+    aside = 0.0
     for k in range(dof):
         way = (1.0 - share) * before[k] + share * after[k] - here[k]
         straight += way * way
         drawn = 2.0 * next_share(route) - 1.0
         aside += drawn * drawn
         target[k] = drawn
+
     size = sqrt(straight / max(aside, 1e-300))
     for k in range(dof):
         way = (1.0 - share) * before[k] + share * after[k] - here[k]
@@ -91,7 +97,9 @@ def propose(route: TightenTable, bend: int, step: float) -> float:
 @kernel
 def fits(route: TightenTable, bend: int) -> bool:
     """Whether both motions by the new place of a bend are free; first the side that failed last."""
-    before, point, after = waypoint(route, bend - 1), route.point, waypoint(route, bend + 1)
+    point = route.point
+    before = waypoint(route, bend - 1)
+    after = waypoint(route, bend + 1)
     hint = row_at(route.hints, 2 * HINT_SIZE, bend)
     other = row_at(hint, HINT_SIZE, 1)
     if hint[0] < 0.0:
@@ -102,22 +110,28 @@ def fits(route: TightenTable, bend: int) -> bool:
 @kernel
 def move_bend(route: TightenTable, bend: int, total: float) -> bool:
     """Give a bend its turn; whether it was dropped."""
-    dof, steps = dof_in(route), route.steps
-    before, here, after = waypoint(route, bend - 1), waypoint(route, bend), waypoint(route, bend + 1)
-    length, step = distance(dof, before, here) + distance(dof, here, after), steps[bend]
+    dof = dof_in(route)
+    before = waypoint(route, bend - 1)
+    here = waypoint(route, bend)
+    after = waypoint(route, bend + 1)
+    length = distance(dof, before, here) + distance(dof, here, after)
+    step = route.steps[bend]
     if length - distance(dof, before, after) < LEAST_BEND * total or step < SHORTEST:
         return False
+
     route.moved = 1
-    dropping, hint = next_share(route) < DROP, row_at(route.hints, 2 * HINT_SIZE, 0)
+    dropping = next_share(route) < DROP
+    hint = row_at(route.hints, 2 * HINT_SIZE, 0)
     if dropping and passes(route, before, after, hint):
         drop_bend(route, bend)
         return True
+
     shorter = propose(route, bend, step) < length - LEAST_GAIN * total
     if shorter and fits(route, bend):
         copy_row(dof, route.point, here)
-        steps[bend] = min(1.0, LONGER * step)
+        route.steps[bend] = min(1.0, LONGER * step)
     else:
-        steps[bend] = SHORTER * step
+        route.steps[bend] = SHORTER * step
     return False
 
 

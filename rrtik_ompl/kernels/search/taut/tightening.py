@@ -32,10 +32,13 @@ class Tightening:
     """
 
     def __init__(self, motions: FastMotions, waypoints: Matrix, *, seed: int = 0) -> None:
-        dof, kernels = motions.dof, library(layout.KERNELS)
+        dof = motions.dof
+        kernels = library(layout.KERNELS)
         if kernels is None or len(waypoints) < 2 or not motions.fast.covered(motions.joint_values(waypoints)):
             raise InputError("waypoints to pull taut: expected a route of two or more that kernels can check")
-        self._kernels, self._motions, self._dof = kernels, motions, dof
+        self._kernels = kernels
+        self._motions = motions
+        self._dof = dof
         self._table = made = TightenTable(PlannedTable(_plan(len(waypoints), dof)))
         made.put(motions=motions.table, random=seed % 2**62)
         made.route[:] = waypoints.ravel()

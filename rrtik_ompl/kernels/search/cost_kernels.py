@@ -26,24 +26,26 @@ def is_bounded(search: ConnectTable) -> bool:
 
 
 @kernel
-def from_roots(dof: int, tree: TreeTable, row: Configuration) -> float:
-    """Distance of a configuration from the nearest root of a tree."""
-    least, vertex = connect_layout.UNBOUNDED_COST, 0
-    while vertex < tree.size and parent_of(tree, vertex) < 0:
-        least = min(least, distance(dof, row_of(tree, vertex), row))
-        vertex += 1
-    return least
-
-
-@kernel
 def vertex_for(search: ConnectTable, tree: TreeTable, other: TreeTable, row: Configuration) -> Any:
     """The vertex to be extended towards a sample, and -1 if no path below the bound leads through that."""
-    dof, bound = search.motions.dof, search.bound
-    least, most = from_roots(dof, tree, row), bound - from_roots(dof, other, row)
+    dof = search.motions.dof
+    least = from_roots(dof, tree, row)
+    most = search.bound - from_roots(dof, other, row)
     if least >= most:
         return -1
     cost = least + next_share(search) * (most - least)
     return nearest_by_cost(tree, search.query, cost)
+
+
+@kernel
+def from_roots(dof: int, tree: TreeTable, row: Configuration) -> float:
+    """Distance of a configuration from the nearest root of a tree."""
+    least = connect_layout.UNBOUNDED_COST
+    vertex = 0
+    while vertex < tree.size and parent_of(tree, vertex) < 0:  # roots come first
+        least = min(least, distance(dof, row_of(tree, vertex), row))
+        vertex += 1
+    return least
 
 
 @kernel
@@ -56,8 +58,6 @@ def may_lead(search: ConnectTable, tree: TreeTable, vertex: int, row: Configurat
 @kernel
 def note_cost(search: ConnectTable, tree: TreeTable, vertex: int) -> None:
     """Set the cost of a new vertex: that of its parent, and the motion from there."""
-    parent, dof = parent_of(tree, vertex), search.motions.dof
-    cost = 0.0
-    if parent >= 0:
-        cost = cost_of(tree, parent) + distance(dof, row_of(tree, parent), row_of(tree, vertex))
-    set_cost(tree, vertex, cost)
+    dof = search.motions.dof
+    parent = parent_of(tree, vertex)
+    set_cost(tree, vertex, cost_of(tree, parent) + distance(dof, row_of(tree, parent), row_of(tree, vertex)))

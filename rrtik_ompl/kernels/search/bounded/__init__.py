@@ -1,1 +1,0 @@
-"""Searches for paths below a length, in the space of configurations and costs."""
