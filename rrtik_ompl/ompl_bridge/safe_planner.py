@@ -44,7 +44,7 @@ from rrtik_ompl.ompl_bridge.states import StateIO, coordinates_of
 from rrtik_ompl.ompl_bridge.unrolled import Unrolled
 from rrtik_ompl.world.motion_queries import MotionQueries, turning_joints
 from rrtik_ompl.world.route_check import route_violations, verification_resolution
-from rrtik_ompl.world.world import World
+from rrtik_ompl.world.world import World, form_of
 
 SEARCHES = 20  # until a world's second check takes a path
 FILLED_IN = ("world", "seed", "goal")  # options that `plan()` fills in
@@ -337,11 +337,11 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         if not isinstance(world, World):  # the space information has the last word
             return self._search_between_free_ends(starts, goals, stop)
 
-        dense = world.with_resolution(verification_resolution(world))
         self._second_check_world = world
         try:
             for number in range(SEARCHES):
-                self._world = dense if self.anytime or number > 0 else world
+                if number == (0 if self.anytime else 1):
+                    self._world = form_of(world, motion_resolution=verification_resolution(world))
                 found = self._search_between_free_ends(starts, goals, stop)
                 refusal = _refusal_of_second_check(world, found.path, unrolled)
                 if not refusal or stop():

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from types import MappingProxyType
 from typing import Any, Protocol, runtime_checkable
@@ -18,7 +18,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.base.arrays import Mask, Matrix, Vector, dimensions, finite_array, positive, whole_number
+from rrtik_ompl.base.arrays import Mask, Matrix, Vector, dimensions, finite_array, whole_number
 from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.choices import ProofMode, one_of
 from rrtik_ompl.base.errors import InputError, ProblemError, require
@@ -36,10 +36,10 @@ from rrtik_ompl.ompl_bridge.safe_planner import SafePlanner
 from rrtik_ompl.ompl_bridge.setup import shared_space
 from rrtik_ompl.planning.attempts import EFFORT_ITERATIONS, load_kernels_for
 from rrtik_ompl.planning.outcome import NamedPlanner, Plan, Request
-from rrtik_ompl.planning.plan import PROOF_MODES, plan
+from rrtik_ompl.planning.plan import PROOF_MODES, named_planner, planned, time_limit
 from rrtik_ompl.world.kept_clearance import Clearances, clearances_of_pairs
-from rrtik_ompl.world.problem import Problem, known_problem
-from rrtik_ompl.world.world import World
+from rrtik_ompl.world.problem import Problem, known_problem, problem_in
+from rrtik_ompl.world.world import World, form_of
 
 Ends = ArrayLike | Sequence[Goal]
 TOGETHER = 32  # queries at a time, whatever the number of threads
@@ -88,6 +88,7 @@ def plan_many(
     require(world, World, "world of plan_many", "use World(robot, scene)")
     one_of(PROOF_MODES, proof, "proof")
     require(parameters, Mapping | None, "parameters of a planner", "use {name of an option: value}")
+    request = Request(Budget(seconds=time_limit(seconds)), parameters=parameters or {}, proof=proof)
 
     dof = world.robot.dof
     wanted = _goals(goals, world.robot)
@@ -97,12 +98,11 @@ def plan_many(
         raise InputError(f"plan_many: as many starts as goals are needed, got {len(rows)} and {len(wanted)}")
 
     seeds = np.random.SeedSequence(whole_number(seed, "seed")).generate_state(max(len(rows), 1), np.uint32).tolist()
-    options = {"seconds": seconds, "parameters": parameters, "proof": proof}
     queries = list(zip(rows, wanted, seeds[: len(rows)], strict=True))
 
     alone = planner is not None and not is_auto(planner) and not is_safe(find_planner(planner))
     batches = [queries[first : first + TOGETHER] for first in range(0, len(queries), TOGETHER)]
-    made = in_threads(partial(_batch, world, planner, options), batches, 1 if alone else threads)
+    made = in_threads(partial(_batch, world, planner, request), batches, 1 if alone else threads)
     return [each for batch in made for each in batch]
 
 
@@ -120,28 +120,26 @@ def _goals(given: Ends, robot: Robot) -> list[Goal]:
 
 
 def _batch(
-    world: World, planner: str | None, options: Mapping[str, Any], queries: Sequence[tuple[Vector, Goal, int]]
+    world: World, planner: str | None, request: Request, queries: Sequence[tuple[Vector, Goal, int]]
 ) -> list[Plan]:
     """The plans of some queries: together as far as that goes, the others one after the other."""
     known: dict[int, Plan | None] = {}
-    if planner is not None and not is_auto(planner) and options["proof"] != "off":
-        budget = Budget(seconds=positive(options["seconds"], "seconds"))
-        request = Request(budget, parameters=options["parameters"] or {})
+    if planner is not None and not is_auto(planner) and request.proof != "off":
         joints = {k: Query(q, goal, seed) for k, (q, goal, seed) in enumerate(queries) if isinstance(goal, JointGoal)}
-        found = plans_together(world, NamedPlanner(planner, find_planner(planner)), list(joints.values()), request)
+        found = plans_together(world, named_planner(planner), list(joints.values()), request)
         known = dict(zip(joints, found, strict=True))
 
-    return [known.get(k) or _planned(world, planner, options, query) for k, query in enumerate(queries)]
+    return [known.get(k) or _planned(world, planner or AUTO, request, query) for k, query in enumerate(queries)]
 
 
-def _planned(world: World, planner: str | None, options: Mapping[str, Any], query: tuple[Vector, Goal, int]) -> Plan:
+def _planned(world: World, planner: str, request: Request, query: tuple[Vector, Goal, int]) -> Plan:
     """The plan of one query."""
     start, goal, seed = query
     try:
         problem = Problem(world, start, goal)
     except ProblemError as error:
-        return Plan(False, None, str(error), 0.0, planner or AUTO, seed, MappingProxyType({}))
-    return plan(problem, planner, seed=seed, **options)
+        return Plan(False, None, str(error), 0.0, planner, seed, MappingProxyType({}))
+    return planned(problem, planner, replace(request, budget=replace(request.budget, seed=seed)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -215,9 +213,8 @@ def _usable(world: World, ends: Matrix) -> Mask:
     """Which starts and goals, shape (m, 2, dof), are two configurations inside the limits that kernels prove free."""
     rows = ends.reshape(-1, world.robot.dof)
     inside_limits: Mask = np.logical_and.reduce((rows >= world.robot.lower) & (rows <= world.robot.upper), axis=1)
-    is_free: Mask = (
-        world.with_accuracy("conservative").valid_batch(np.where(inside_limits[:, None], rows, 0.0)) & inside_limits
-    )
+    conservative = form_of(world, accuracy="conservative")
+    is_free: Mask = conservative.checks.free(np.where(inside_limits[:, None], rows, 0.0)) & inside_limits
     usable: Mask = is_free[::2] & is_free[1::2] & np.logical_or.reduce(ends[:, 0] != ends[:, 1], axis=1)
     return usable
 
@@ -243,7 +240,7 @@ class _Searcher:
         self._request = request
         self._bounds = self._robot.lower, self._robot.upper
         options = {ITERATION_LIMIT: EFFORT_ITERATIONS, **request.parameters}
-        brief = problem.with_accuracy("conservative")
+        brief = problem_in(problem, form_of(problem.world, accuracy="conservative"))
         assert is_safe(planner.factory)  # as `serves` has seen
         space = shared_space(*self._bounds)
         self._planner: SafePlanner = safe_planner(planner.factory, planner.name, space, brief, 0, options)

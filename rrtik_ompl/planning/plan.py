@@ -27,6 +27,7 @@ MAX_SECONDS = 1e9  # thirty years; OMPL's clock overflows at about nine times as
 PROOF_MODES: tuple[ProofMode, ...] = get_args(ProofMode)
 OBJECTIVES: tuple[PathObjective, ...] = get_args(PathObjective)
 STRATEGIES: tuple[ImproveStrategy, ...] = get_args(ImproveStrategy)
+NOT_IMPROVED = Improvement(0.0)
 
 
 def plan(
@@ -99,9 +100,7 @@ def plan(
     require(problem, Problem, "problem to plan", "use Problem(world, start, goal) or load_problem(name)")
     planner = (problem.planner or AUTO) if planner is None else planner
     require(planner, str | Callable, "planner", "use a name of list_planners() or a planner class")
-    limit = positive(seconds, "seconds")
-    if limit > MAX_SECONDS:
-        raise InputError(f"seconds must be {MAX_SECONDS:g} or less, got {limit:g}")
+    limit = time_limit(seconds)
     if isinstance(restarts, bool) or not isinstance(restarts, int) or not 0 <= restarts <= MAX_RESTARTS:
         raise InputError(f"restarts must be a whole number from 0 to {MAX_RESTARTS}, got {restarts!r}")
     require(parameters, Mapping | None, "parameters of a planner", "use {name of an option: value}")
@@ -115,7 +114,29 @@ def plan(
         one_of(STRATEGIES, strategy, "strategy of improve"),
     )
 
-    request = Request(Budget(drawn, limit), restarts, parameters or {}, proof, clearance)
+    return planned(problem, planner, Request(Budget(drawn, limit), restarts, parameters or {}, proof, clearance), how)
+
+
+def time_limit(seconds: float) -> float:
+    """A limit of wall time [s], checked.
+
+    Raises:
+        InputError: If it is not positive, or more than OMPL's clock can bear.
+    """
+    limit = positive(seconds, "seconds")
+    if limit > MAX_SECONDS:
+        raise InputError(f"seconds must be {MAX_SECONDS:g} or less, got {limit:g}")
+    return limit
+
+
+def planned(problem: Problem, planner: str | PlannerFactory, request: Request, how: Improvement = NOT_IMPROVED) -> Plan:
+    """What :func:`plan` does with arguments that make sense.
+
+    Raises:
+        UnknownNameError: If there is no planner of that name.
+        InputError: If the planner does not take a parameter.
+        PlannerError: If the planner broke.
+    """
     if isinstance(planner, str) and planner.lower() == AUTO:
         found = _found_by_portfolio(problem, request)
     else:

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.world.clearance_curve import clearance_along
 from rrtik_ompl.world.problem import Problem
-from rrtik_ompl.world.route_check import how_checked
+from rrtik_ompl.world.route_check import how_checked, violations_of
 from rrtik_ompl.world.world import World
 
 Said: TypeAlias = Literal["proven", "checked", "refused"]
@@ -45,13 +45,13 @@ def opinion_on(world: World, start: ArrayLike, goal: ArrayLike, waypoints: Array
     Problem(world, start, goal)
     path = JointPath.of(world.robot, waypoints)
 
-    faults = path.violations(world)
+    proof = world.prove(path.waypoints)
+    faults = () if proof.proven else violations_of(world, path.waypoints)  # a path that is proven has none
     if faults:
         return Opinion("refused", f"refused: move {faults[0].edge + 1}: {faults[0].reason}")
     if (path.start != start).any() or (path.end != goal).any():
         return Opinion("refused", "refused: the path does not lead from the start to the goal")
 
-    proof = world.prove(path.waypoints)
     text = how_checked(world, path.waypoints, proof)
     if world.scene.obstacles:
         text += f"; {clearance_along(world, path.waypoints)}"
