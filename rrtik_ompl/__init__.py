@@ -52,6 +52,7 @@ if TYPE_CHECKING:
     from rrtik_ompl.model.goal import MultiGoal as MultiGoal
     from rrtik_ompl.model.goal import PoseGoal as PoseGoal
     from rrtik_ompl.model.goal import PositionGoal as PositionGoal
+    from rrtik_ompl.model.goal_kind import TaskRegion as TaskRegion
     from rrtik_ompl.model.path import JointPath as JointPath
     from rrtik_ompl.model.path import load_path as load_path
     from rrtik_ompl.model.robot import Robot as Robot
@@ -71,7 +72,6 @@ if TYPE_CHECKING:
     from rrtik_ompl.model.shapes import PointCloud as PointCloud
     from rrtik_ompl.model.shapes import Prism as Prism
     from rrtik_ompl.model.shapes import Sphere as Sphere
-    from rrtik_ompl.model.task_region import TaskRegion as TaskRegion
     from rrtik_ompl.motion.following.follower import Followed as Followed
     from rrtik_ompl.motion.following.follower import Follower as Follower
     from rrtik_ompl.motion.following.follower import RobotLink as RobotLink
@@ -130,8 +130,8 @@ if TYPE_CHECKING:
     from rrtik_ompl.tasks.timed import time_task as time_task
     from rrtik_ompl.viewer import view as view
     from rrtik_ompl.viewer.plots.joints import plot_joints as plot_joints
-    from rrtik_ompl.world.certificates.checked import verify_certificate as verify_certificate
-    from rrtik_ompl.world.certificates.write import certificate_of as certificate_of
+    from rrtik_ompl.world.certificates import certificate_of as certificate_of
+    from rrtik_ompl.world.certificates import verify_certificate as verify_certificate
     from rrtik_ompl.world.problem import Problem as Problem
     from rrtik_ompl.world.robot_points import without_robot as without_robot
     from rrtik_ompl.world.world import World as World
@@ -140,8 +140,7 @@ else:
         "description.catalog": ("list_problems", "list_robots", "load_robot"),
         "benchmark.batch": ("plan_batch",),
         "model.certificate": ("Certificate", "load_certificate"),
-        "world.certificates.checked": ("verify_certificate",),
-        "world.certificates.write": ("certificate_of",),
+        "world.certificates": ("certificate_of", "verify_certificate"),
         "description.variants": ("narrowed", "padded", "scaled", "weighted"),
         "constraints.shorthands": ("inside", "on_line", "on_plane", "orientation_of", "upright"),
         "base.errors": ("InputError", "PlannerError", "ProblemError", "RrtikError", "UnknownNameError"),
@@ -188,7 +187,7 @@ else:
             "Sphere",
         ),
         "planning.shortening": ("MoveRules", "shorten"),
-        "model.task_region": ("TaskRegion",),
+        "model.goal_kind": ("TaskRegion",),
         "tasks": ("Alternatives", "Attach", "Detach", "Gripper", "MoveTo", "Straight", "Task", "TaskPlan"),
         "tasks.plan_file": ("load_task_plan", "save_task_plan"),
         "tasks.task_file": ("list_tasks", "load_task"),

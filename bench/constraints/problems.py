@@ -12,8 +12,8 @@ from rrtik_ompl.base.arrays import Vector
 from rrtik_ompl.constraints.held_regions import held_regions
 from rrtik_ompl.constraints.residuals import projected_rows
 from rrtik_ompl.constraints.walls import separation
+from rrtik_ompl.model.goal_kind import TaskRegion
 from rrtik_ompl.model.robot import Robot
-from rrtik_ompl.model.task_region import TaskRegion
 from rrtik_ompl.world.problem import Problem
 
 KINDS = ("upright", "plane", "line", "orientation")

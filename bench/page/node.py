@@ -25,7 +25,7 @@ from rrtik_ompl.kernels.search.crdt.search import CrdtSearch
 from rrtik_ompl.kernels.search.motions.motion_table import step_counts
 from rrtik_ompl.planning.generated_problems import generated_problem
 from rrtik_ompl.viewer.page_planner import SAMPLES, VERTICES, page_planner
-from rrtik_ompl.world.kept_clearance import Clearances, clearances_between, search_form
+from rrtik_ompl.world.clearances import Clearances, clearances_between, search_form
 from rrtik_ompl.world.problem import densely_checked
 
 SCRIPT = Path(__file__).with_name("in_node.js")

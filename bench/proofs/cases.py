@@ -15,7 +15,7 @@ from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import Obstacle, Scene
 from rrtik_ompl.model.shapes import Box, Cylinder, HalfSpace, Mesh, Sphere
-from rrtik_ompl.world.certificates.write import certificate_of
+from rrtik_ompl.world.certificates import certificate_of
 from rrtik_ompl.world.world import World
 
 WAYPOINTS = 7

@@ -16,7 +16,7 @@ from bench.proofs.cases import Case, random_cases
 from bench.proofs.tampering import TAMPERINGS
 from rrtik_ompl import load_robot
 from rrtik_ompl.model.certificate import from_document
-from rrtik_ompl.world.certificates.verify import verify_certificate
+from rrtik_ompl.world.certificate_check import certificate_fault
 
 ROBOTS = ("planar3", "titan4", "panda", "ur5_gripper", "puma560", "point2d")
 
@@ -29,7 +29,7 @@ def measured(paths: int, seed: int) -> Counter[str]:
         case = next(streams[number % len(streams)])
         text = json.dumps(case.certificate.document())
         begin = time.perf_counter()
-        fault = verify_certificate(from_document(json.loads(text)), case.world, case.path.waypoints, clearance=0.001)
+        fault = certificate_fault(from_document(json.loads(text)), case.world, case.path.waypoints, clearance=0.001)
         counts["microseconds of verifying"] += round(1e6 * (time.perf_counter() - begin))
         counts["bytes"] += len(text)
         counts["accepted" if not fault else "WRONG: refused"] += 1
@@ -49,7 +49,7 @@ def tampered(case: Case, rng: np.random.Generator) -> Counter[str]:
         falsified = tamper(case, rng)
         if falsified is None:
             counts[f"{name}: nothing to tamper with"] += 1
-        elif verify_certificate(*falsified):
+        elif certificate_fault(*falsified):
             counts[f"{name}: refused"] += 1
         else:
             counts[f"WRONG: {name}: accepted"] += 1

@@ -46,7 +46,7 @@ def free_postures(arm: str, count: int) -> Free:
 
 @contextmanager
 def _kernels_alone() -> Iterator[None]:
-    with patch("rrtik_ompl.world.coal_proof.CoalProof.settle", lambda *_: None):
+    with patch("rrtik_ompl.world.proof.CoalProof.settle", lambda *_: None):
         yield
 
 

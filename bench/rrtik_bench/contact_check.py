@@ -94,7 +94,7 @@ def _gaps(
 ) -> tuple[NDArray[np.float64], list[tuple[str, str]]]:
     """Distances [m] of all pairs of an arm's body and an obstacle, shape (samples, pairs), and the pairs' names."""
     solids = arranged(robot, scene, 0.0)
-    bodies = solids.bodies.whole
+    bodies = solids.bodies.as_tuple
     frames = robot.joint_frames(rows)
     body_poses = [
         obstacle_poses[body.name] @ body.within.homogeneous

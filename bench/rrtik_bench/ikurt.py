@@ -82,7 +82,7 @@ def letter_steps(problem: Problem) -> Steps:
 
 def _dense(problem: Problem) -> World:
     """Its world, motions checked as densely as by the second check."""
-    return problem.world.with_resolution(verification_resolution(problem.world))
+    return problem.world.with_resolution(verification_resolution(problem.world.settings))
 
 
 def letter(problem: Problem, seed: int, most: int = EVALUATIONS) -> Searched:

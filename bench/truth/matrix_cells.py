@@ -40,8 +40,8 @@ from rrtik_ompl import AttachedObject, Obstacle, Problem, Roadmap, Robot, Scene,
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.geometry.collision.certificate import Certificate
+from rrtik_ompl.model.goal_kind import TaskRegion
 from rrtik_ompl.model.shapes import HeightField, Mesh, PointCloud, Shape
-from rrtik_ompl.model.task_region import TaskRegion
 from rrtik_ompl.ompl_bridge.motion_checker import SpaceChecker, WorldChecker
 from rrtik_ompl.replanning.in_time.foreseen import ForeseenWorlds
 from rrtik_ompl.viewer.page_planner import page_planner

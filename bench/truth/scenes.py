@@ -22,7 +22,7 @@ from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.base.errors import RrtikError
 from rrtik_ompl.constraints.held_regions import held_regions
 from rrtik_ompl.constraints.residuals import projected_rows
-from rrtik_ompl.model.task_region import TaskRegion
+from rrtik_ompl.model.goal_kind import TaskRegion
 from rrtik_ompl.world.problem import Problem
 
 DRAWN, ALONG = 2000, 40  # random configurations of a pair of files; parts of each motion

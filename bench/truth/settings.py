@@ -9,11 +9,11 @@ import copy
 import pickle
 import warnings
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, fields, replace
+from dataclasses import Field, dataclass, fields, replace
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 import numpy as np
 import pinocchio as pin
@@ -24,7 +24,7 @@ from bench.truth.matrix_cells import found_ways
 from rrtik_bench.report.page import Report
 from rrtik_ompl import AttachedObject, ConstantVelocity, Obstacle, Problem, Robot, Scene, World
 from rrtik_ompl.base.errors import InputError
-from rrtik_ompl.model.task_region import TaskRegion
+from rrtik_ompl.model.goal_kind import TaskRegion
 from rrtik_ompl.model.world_settings import WorldSettings
 from rrtik_ompl.tasks.setting import Setting
 from rrtik_ompl.tasks.stages import Attach, Detach
@@ -73,13 +73,22 @@ def _of_world(name: str, value: Any) -> Set:
     return Set(lambda: World(_robot(), _scene(), **{name: value}), lambda world: getattr(world.settings, name))
 
 
+# Values that change answers here; every other setting is tried with one that differs from its default.
+VALUES = {"motion_resolution": 0.02, "self_margin": 0.004, "clearance": 0.3, "inflation": 0.1}
+
+
+def _value(setting: Field[Any]) -> Any:
+    """A value of a setting that is a length, a truth or one of some names, other than its default."""
+    if setting.name in VALUES:
+        return VALUES[setting.name]
+    kind = get_type_hints(WorldSettings)[setting.name]
+    known = [True, False] if kind is bool else get_args(kind) if get_origin(kind) is Literal else [0.01, 0.02]
+    return next(value for value in known if value != setting.default)
+
+
+ELSEWHERE = ("robot", "scene", "constraints")  # their rows are below
 SETTINGS: dict[str, Set] = {
-    "accuracy": _of_world("accuracy", "conservative"),
-    "motion_resolution": _of_world("motion_resolution", 0.02),
-    "self_margin": _of_world("self_margin", 0.004),
-    "clearance": _of_world("clearance", 0.3),
-    "proving": _of_world("proving", 0.01),
-    "inflation": _of_world("inflation", 0.1),
+    **{each.name: _of_world(each.name, _value(each)) for each in fields(WorldSettings) if each.name not in ELSEWHERE},
     "constraints": Set(
         lambda: World(_robot(), _scene(), constraints=[_region()]),
         lambda world: [each.bounds.tolist() for each in world.settings.constraints],

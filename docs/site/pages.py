@@ -20,7 +20,7 @@ PICTURE = re.compile(
 # The pages of the public names, and the rooms or modules that each of them is of; the longest that fits counts.
 REFERENCE = {
     "Robots and scenes": ("description", "model", "files", "base.poses", "world"),
-    "Goals and problems": ("model.goal", "model.task_region", "constraints", "world.problem", "problem_files"),
+    "Goals and problems": ("model.goal", "model.goal_kind", "constraints", "world.problem", "problem_files"),
     "Plans and paths": ("planning", "world.path", "benchmark", "viewer"),
     "Certificates": ("world.certificates",),
     "Inverse kinematics": ("ik",),

@@ -36,14 +36,14 @@ def in_blocks(work: Callable[..., NDArray[Any]], *rows: NDArray[Any]) -> NDArray
     answer: NDArray[Any] | None = None
     for begin in range(0, count, BLOCK_ROWS):
         part = work(*(each[begin : begin + BLOCK_ROWS] for each in rows))
-        answer = room((count, *part.shape[1:]), part.dtype) if answer is None else answer
+        answer = allocated((count, *part.shape[1:]), part.dtype) if answer is None else answer
         answer[begin : begin + BLOCK_ROWS] = part
 
     assert answer is not None
     return answer
 
 
-def room(shape: tuple[int, ...], dtype: DTypeLike = np.float64) -> NDArray[Any]:
+def allocated(shape: tuple[int, ...], dtype: DTypeLike = np.float64) -> NDArray[Any]:
     """Memory for an answer.
 
     Raises:

@@ -57,7 +57,7 @@ class Items(Sequence[Kind]):
     """Items of which single ones are exchanged; what that costs does not grow with their number.
 
     Args:
-        whole: The items.
+        items: All of them.
         changes: Others in the place of some, by their numbers.
 
     Example:
@@ -65,24 +65,24 @@ class Items(Sequence[Kind]):
         (1, 5, 3)
     """
 
-    def __init__(self, whole: tuple[Kind, ...], changes: Mapping[int, Kind] = MappingProxyType({})) -> None:
-        self._whole = whole
+    def __init__(self, items: tuple[Kind, ...], changes: Mapping[int, Kind] = MappingProxyType({})) -> None:
+        self._items = items
         self._changes = changes
 
     @property
-    def whole(self) -> tuple[Kind, ...]:
+    def as_tuple(self) -> tuple[Kind, ...]:
         """All of them."""
         if self._changes:
-            every = list(self._whole)
+            every = list(self._items)
             for number, item in self._changes.items():
                 every[number] = item
-            self._whole = tuple(every)
+            self._items = tuple(every)
             self._changes = {}
-        return self._whole
+        return self._items
 
     def with_(self, number: int, item: Kind) -> Items[Kind]:
         """The same items but for one."""
-        known = self._whole if len(self._changes) < MOST_CHANGES else self.whole
+        known = self._items if len(self._changes) < MOST_CHANGES else self.as_tuple
         return Items(known, {**self._changes, number: item})
 
     @overload
@@ -91,14 +91,14 @@ class Items(Sequence[Kind]):
     def __getitem__(self, number: slice) -> tuple[Kind, ...]: ...
     def __getitem__(self, number: int | slice) -> Kind | tuple[Kind, ...]:
         if isinstance(number, slice):
-            return self.whole[number]
-        return self._changes[number] if number in self._changes else self._whole[number]
+            return self.as_tuple[number]
+        return self._changes[number] if number in self._changes else self._items[number]
 
     def __len__(self) -> int:
-        return len(self._whole)
+        return len(self._items)
 
     def __iter__(self) -> Iterator[Kind]:
-        return iter(self.whole)
+        return iter(self.as_tuple)
 
 
 def as_value(thing: object) -> tuple[Any, ...]:

@@ -162,10 +162,10 @@ def _path_lines(problem: Problem, route: JointPath, kept: str) -> list[str]:
     world = problem.world
     lines = []
     if any(body.kind == "obstacle" for body in world.bodies):
-        lines.append(f"{clearance_along(world, route.waypoints)}{kept}")
+        lines.append(f"{clearance_along(world.checks, route.waypoints)}{kept}")
 
     size = f"{len(route.waypoints)} waypoints, {route.transitions} moves, length {route.length:.2f} {route.unit}"
-    return [*lines, f"valid, {how_checked(world, route.waypoints)}; {size}"]
+    return [*lines, f"valid, {how_checked(world.checks, route.waypoints)}; {size}"]
 
 
 # --- a certificate ---------------------------------------------------------------------------------------------------
@@ -181,10 +181,10 @@ def _check_beside(problem: Problem, route: JointPath, file: Path) -> int:
 
 def _say_certified(problem: Problem, path: JointPath, certificate: Certificate, file: Path) -> int:
     """Say whether a certificate, of a file, proves that a path solves a problem."""
-    from rrtik_ompl.world.certificates.verify import verify_certificate
+    from rrtik_ompl.world.certificate_check import certificate_fault
     from rrtik_ompl.world.route_check import as_it_stands
 
-    faults = [verify_certificate(certificate, problem.world, path.waypoints), *_wrong_ends(problem, path)]
+    faults = [certificate_fault(certificate, problem.world, path.waypoints), *_wrong_ends(problem, path)]
     if any(faults):
         say(f"{file}: does not hold: {next(filter(None, faults))}")
         return NOT_FOUND

@@ -91,7 +91,7 @@ def _subject(name: str, scene: Path | None) -> tuple[Any, Robot, str]:
     from rrtik_ompl import Scene, World, list_problems, list_robots, load_problem, load_robot, load_scene
     from rrtik_ompl.problem_files.problem_values import load_unchecked
     from rrtik_ompl.viewer.subject import Shown
-    from rrtik_ompl.world.path_contacts import contacts_along
+    from rrtik_ompl.world.judgement import contacts_along
 
     if Path(name).suffix.lower() in ROBOT_FILES or (name in list_robots() and name not in list_problems()):
         robot = load_robot(name)
@@ -106,7 +106,7 @@ def _subject(name: str, scene: Path | None) -> tuple[Any, Robot, str]:
 
     settings, start, goal = load_unchecked(name)
     note(fault)
-    touching = contacts_along(World.of(settings), start[None])
+    touching = contacts_along(World.of(settings).checks, start[None])
     return Shown(settings.robot, settings.scene, goal, start, touching), settings.robot, fault
 
 

@@ -189,7 +189,7 @@ def _shortened(
 ) -> tuple[JointPath | None, float]:
     """The path made shorter, by the rules of single-joint moves that the planner had; and the time [s]."""
     from rrtik_ompl.planning.shortening import MoveRules, shorten
-    from rrtik_ompl.world.kept_clearance import possible_clearance
+    from rrtik_ompl.world.clearances import possible_clearance
 
     if path is None or method == "none" or len(path.waypoints) < 2:
         return path, 0.0

@@ -121,7 +121,7 @@ def summary(
     if plan.member is not None and len(problem.goal.parts) > 1:
         lines.append(f"it ends at goal {plan.member + 1} of {len(problem.goal.parts)}")
 
-    checked = how_checked(problem.world, path.waypoints, path.proof)
+    checked = how_checked(problem.world.checks, path.waypoints, path.proof)
     lines.append(f"planning {plan.seconds:.3f} s, shortening {shorten_seconds:.3f} s; valid: {checked}")
     return lines
 

@@ -14,8 +14,8 @@ from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.constraints.held_region import ANYWHERE, HeldRegion, Turning
 from rrtik_ompl.constraints.held_regions import HeldRegions
 from rrtik_ompl.constraints.residuals import SMALL, rates, twists
+from rrtik_ompl.model.goal_kind import into_range, roll_pitch_yaw
 from rrtik_ompl.model.robot import Robot
-from rrtik_ompl.model.task_region import into_range, roll_pitch_yaw
 
 TURN_EQUATIONS = {Turning.FREE: 0, Turning.AXIS: 2, Turning.BALL: 3, Turning.RANGES: 3}
 

@@ -21,9 +21,9 @@ from rrtik_ompl.base.arrays import TAU, Matrix, Vector
 from rrtik_ompl.base.errors import InputError, UnknownNameError
 from rrtik_ompl.base.poses import rpy_matrices, turned_z
 from rrtik_ompl.geometry.collision.motion_bound import joint_weights
+from rrtik_ompl.model.goal_kind import TaskRegion, into_range, roll_pitch_yaw
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import Scene
-from rrtik_ompl.model.task_region import TaskRegion, into_range, roll_pitch_yaw
 
 LARGEST_PITCH = np.radians(75.0)  # of ranges of roll, pitch and yaw: beyond, roll and yaw run away
 STEEPEST_PITCH = np.radians(89.0)  # that a frame may come to on its way, with the tolerance
@@ -139,7 +139,7 @@ class HeldRegion:
         return float(measure)
 
     @property
-    def kept(self) -> Vector:
+    def accepted(self) -> Vector:
         """Measures up to which a search leaves configurations where they are, shape (2,)."""
         within: Vector = KEPT_SHARE * self.limits() - self.measured(self.inset)
         return within

@@ -10,11 +10,12 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector
-from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.errors import InputError, UnknownNameError
 from rrtik_ompl.constraints.held_region import HeldRegion, Turning, frame_place, held_region
+from rrtik_ompl.model.goal import Goal
+from rrtik_ompl.model.goal_kind import TaskRegion
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import Scene
-from rrtik_ompl.model.task_region import TaskRegion
 
 HALVINGS = 7  # of a motion, at most, to see that it keeps to a region
 ROUNDING = 1e-9  # without unit; of a measure
@@ -190,3 +191,18 @@ def _nodes(A: Matrix, B: Matrix, parts: int) -> Matrix:
     """Ends of equal parts of motions, shape (m, parts + 1, dof)."""
     shares = np.linspace(0.0, 1.0, parts + 1)[:, None]
     return (1.0 - shares) * A[:, None] + shares * B[:, None]
+
+
+def goal_regions(robot: Robot, scene: Scene, goal: Goal) -> tuple[HeldRegion, ...]:
+    """The regions of all tips of a goal of several.
+
+    Raises:
+        UnknownNameError: If a tip is no link of the robot.
+        InputError: If the ranges of angles of a region cannot be held.
+    """
+    regions = []
+    for frame, part in zip(goal.frames, goal.parts, strict=True):
+        if not robot.model.existFrame(frame):
+            raise UnknownNameError(f"tip of robot '{robot.name}'", frame, robot.link_names)
+        regions.append(held_region(robot, scene, replace(part.region(), frame=frame), f"the goal of '{frame}'"))
+    return tuple(regions)

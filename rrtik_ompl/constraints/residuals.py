@@ -7,6 +7,8 @@ Sources: damped Gauss-Newton steps on the residuals of all regions at once [17, 
 
 from __future__ import annotations
 
+from itertools import combinations
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,9 +16,8 @@ from rrtik_ompl.base.arrays import TAU, Mask, Matrix, Vector
 from rrtik_ompl.base.poses import cross_products
 from rrtik_ompl.constraints.held_region import HeldRegion, Turning
 from rrtik_ompl.constraints.held_regions import HeldRegions
-from rrtik_ompl.model.robot import Robot
-from rrtik_ompl.model.task_region import into_range, roll_pitch_yaw
-from rrtik_ompl.model.tip_distance import PER_RADIAN, reach_of
+from rrtik_ompl.model.goal_kind import into_range, roll_pitch_yaw
+from rrtik_ompl.model.robot import PER_RADIAN, Robot, reach_of
 
 # Added to the squares of the derivatives: a constant, and so much of the squared residual.
 DAMPING = 1e-9
@@ -73,15 +74,15 @@ def residual(robot: Robot, region: HeldRegion, Q: Matrix) -> tuple[Matrix, NDArr
     """
     D = region.displacements(Q)
     measures = region.measures(Q)
-    moves = measures > region.kept
+    moves = measures > region.accepted
     J = twists(robot, region, Q)
 
     away = D[:, :3, 3] - np.clip(D[:, :3, 3], *region.region.bounds[:3].T)
     share = 1.0 - region.aimed[0] / np.where(moves[:, 0], measures[:, 0], 1.0)
-    held = (moves[:, :1] & (away != 0.0)) / reach_of(robot)
-    turn, felt, kept = _turn(region, D[:, :3, :3], measures[:, 1], J[:, 3:])
+    shifted = (moves[:, :1] & (away != 0.0)) / reach_of(robot)
+    turn, felt, counted = _turn(region, D[:, :3, :3], measures[:, 1], J[:, 3:])
 
-    weights = np.hstack([held, kept * moves[:, 1:] * PER_RADIAN])
+    weights = np.hstack([shifted, counted * moves[:, 1:] * PER_RADIAN])
     error = np.hstack([-away * share[:, None], turn]) * weights
     return error, np.concatenate([J[:, :3], felt], axis=1) * weights[:, :, None]
 
@@ -142,3 +143,39 @@ def rates(R: NDArray[np.float64]) -> NDArray[np.float64]:
     roll = np.stack([a / level, b / level, zero])
     yaw = np.stack([sine * roll[0], sine * roll[1], zero + 1.0])
     return np.moveaxis(np.stack([roll, np.stack([-b, a, zero]), yaw]), 2, 0)
+
+
+DRAWN = 64  # configurations that are moved towards the regions
+
+
+def contradiction(robot: Robot, constraints: HeldRegions) -> str:
+    """A line that names two path constraints of which no configuration was found to keep both; "" for none.
+
+    One that no configuration was found to keep at all is named alone. This is a finding of a search, no proof.
+    """
+    rows = np.random.default_rng(0).uniform(*robot.finite_range(), (DRAWN, robot.dof))
+    each_alone = [HeldRegions((region,)) for region in constraints.regions]
+
+    for one in each_alone:
+        if not projected_rows(robot, one, rows)[1].any():
+            return f"no configuration was found that keeps {one.regions[0].label}: is its region in reach?"
+
+    for one, other in combinations(each_alone, 2):
+        both = HeldRegions((*one.regions, *other.regions))
+        moved, there = projected_rows(robot, both, rows)
+        if there.any():
+            continue
+
+        near, _ = projected_rows(robot, one, moved)
+        left = [other.regions[0].outside(q) for q in near[one.held(near)]]
+        if left:
+            metres, angle = min(left, key=lambda each: each[0] + each[1])
+            amounts = [(1e3 * metres, "mm"), (np.degrees(angle), "degrees")]
+            away = " and ".join(f"{amount:.3g} {unit}" for amount, unit in amounts if amount > 0.0)
+            first, second = (each.regions[0].label for each in (one, other))
+            return (
+                f"no configuration was found that keeps both {first} and {second}: where the first is kept, the other "
+                f"is missed by {away} at least; do they contradict each other?"
+            )
+
+    return ""

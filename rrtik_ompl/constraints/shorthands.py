@@ -11,8 +11,8 @@ from rrtik_ompl.base.choices import FrameAxis
 from rrtik_ompl.base.errors import InputError, require
 from rrtik_ompl.base.poses import PoseLike, rigid, turned_z, unit_vector
 from rrtik_ompl.constraints.held_region import ANYWHERE
+from rrtik_ompl.model.goal_kind import TaskRegion
 from rrtik_ompl.model.robot import Robot
-from rrtik_ompl.model.task_region import TaskRegion
 
 LARGEST_TILT_DEG = 80.0
 TURN_TOLERANCE = 1e-2  # [rad] of ranges of angles, at most

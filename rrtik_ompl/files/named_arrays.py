@@ -54,7 +54,7 @@ class NamedArrays:
             raise InputError(f"'{name}' is missing; save it again")
         return self._arrays[name]
 
-    def whole(self, name: str) -> NDArray[np.int64]:
+    def whole_numbers(self, name: str) -> NDArray[np.int64]:
         """An array of whole numbers.
 
         Raises:
@@ -71,7 +71,7 @@ class NamedArrays:
         Raises:
             InputError: If there is none of that name, or it is anything else.
         """
-        found = self.whole(name)
+        found = self.whole_numbers(name)
         if found.ndim != 0 or found < 0:
             raise InputError(f"{name}: expected a whole number of at least 0")
         return int(found)

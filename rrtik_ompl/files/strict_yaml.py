@@ -1,23 +1,219 @@
-"""Strict YAML: no key twice, no tags, no bombs; every value knows its line, every error says FILE:LINE: key: remedy."""
+"""Strict YAML: no key twice, no tags, no bombs; every value knows its line, every error says FILE:LINE: key: remedy.
+
+Plain scalars are read as in YAML 1.2 (``1e-3`` is a number, ``yes`` and ``12:30`` are text). The events come from
+libyaml where PyYAML has it; locations are put together only when an error needs them.
+"""
 
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import yaml
 
 from rrtik_ompl.base.errors import InputError, RrtikError
 from rrtik_ompl.files.text import file_name, read_text, write_text
-from rrtik_ompl.files.yaml_values import MAX_DEPTH, Builder, Group, plain_value
-from rrtik_ompl.files.yaml_values import Location as Location
-from rrtik_ompl.files.yaml_values import key_path as key_path
 
+Location: TypeAlias = tuple[str | int, ...]  # keys and list numbers from the top: ("start", "joints", 2)
+
+MAX_DEPTH = 40
+MAX_VALUES = 1_000_000  # after aliases are followed
 _STYLE: dict[str, Any] = {"default_flow_style": None, "allow_unicode": True}  # innermost lists and groups on one line
+_LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+_INTEGER = re.compile(r"[-+]?[0-9]{1,4000}")
+_FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
+_NUMBER_STARTS = frozenset("+-.0123456789")
+_WORDS: dict[str, bool | float | None] = {"": None, "~": None}
+_WORDS |= {form: value for word, value in {"null": None, "true": True, "false": False}.items()
+           for form in (word, word.capitalize(), word.upper())}  # fmt: skip
+_WORDS |= {form: float(form.replace(".", "")) for form in (".nan", ".NaN", ".NAN")}
+_WORDS |= {sign + form: float(sign + "inf") for form in (".inf", ".Inf", ".INF") for sign in ("", "+", "-")}
+
+
+def key_path(location: Location) -> str:
+    """``("obstacles", 3, "box")`` as a person writes it: ``obstacles[3].box``."""
+    text = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in location)
+    return text.removeprefix(".")
+
+
+def plain_value(text: str) -> bool | float | str | None:
+    """Value of an unquoted scalar: nothing, true/false, whole number, number, else text."""
+    if text in _WORDS:
+        return _WORDS[text]
+    if text[0] not in _NUMBER_STARTS:
+        return text
+    if _INTEGER.fullmatch(text):
+        return int(text)
+    return float(text) if _FLOAT.fullmatch(text) else text
+
+
+@dataclass(slots=True)
+class Group:
+    """A list or mapping of the file.
+
+    Attributes:
+        value: The list or mapping.
+        line: Where it begins, from 1.
+        anchor: Its name for aliases.
+        key: Of a mapping, the key whose value comes next.
+        size, height: How many values it unfolds to, and in how many levels.
+        lines: The line of each entry, by its key or its number.
+        groups: Those of its entries that are groups themselves.
+    """
+
+    value: Any
+    line: int
+    anchor: str | None
+    key: str | None = None
+    size: int = 1
+    height: int = 1
+    lines: dict[str | int, int] = field(default_factory=dict)
+    groups: dict[str | int, Group] = field(default_factory=dict)
+
+    @property
+    def place(self) -> str | int | None:
+        """Key or number of the entry that comes next; None where a mapping expects a key."""
+        return len(self.value) if type(self.value) is list else self.key
+
+    def located(self, location: Location = ()) -> Iterator[tuple[Location, int]]:
+        """Each location in the group and its line."""
+        for place, line in self.lines.items():
+            yield (*location, place), line
+        for place, group in self.groups.items():
+            yield from group.located((*location, place))
+
+
+@dataclass(slots=True)
+class Builder:
+    """Builds values from parser events with its own stack: the parser's composer overflows on deep nesting.
+
+    Attributes:
+        path: The file, for errors.
+        top: The value of the document.
+        group: The group that it is, if it is one.
+        documents: How many have begun.
+    """
+
+    path: Path
+    top: Any = None
+    group: Group | None = None
+    documents: int = 0
+    _stack: list[Group] = field(default_factory=list)
+    _anchors: dict[str, tuple[Any, int, int]] = field(default_factory=dict)  # value, size, height
+
+    def read(self, text: str) -> None:
+        """Digest a whole file.
+
+        Raises:
+            InputError: If the file breaks one of the rules.
+            yaml.YAMLError: If it is not YAML.
+        """
+        next_event = _LOADER(text).get_event
+        while (event := next_event()) is not None:
+            kind = type(event)
+            if kind is yaml.ScalarEvent:
+                self._scalar(event)
+            elif kind is yaml.SequenceStartEvent:
+                self._open(event, [])
+            elif kind is yaml.MappingStartEvent:
+                self._open(event, {})
+            elif kind is yaml.SequenceEndEvent or kind is yaml.MappingEndEvent:
+                done = self._stack.pop()
+                self._add(done.value, done.size, done.height, done.anchor, event)
+            elif kind is yaml.AliasEvent:
+                self._alias(event)
+            elif kind is yaml.DocumentStartEvent:
+                self.documents += 1
+                if self.documents > 1:
+                    raise self._error(event, "a second document starts here ('---'); put one in a file")
+
+    def _scalar(self, event: yaml.ScalarEvent) -> None:
+        if event.tag is not None:
+            raise self._error(event, f"tag '{event.tag}' cannot be used; write the value alone")
+
+        parent = self._stack[-1] if self._stack else None
+        text = event.value
+        if parent is not None and parent.key is None and type(parent.value) is dict:
+            if text in parent.lines:
+                first = f"first in line {parent.lines[text]}"
+                raise self._error(event, f"key '{text}' stands here twice ({first}); delete one")
+            parent.key = text
+            parent.lines[text] = _line(event)
+        else:
+            self._add(plain_value(text) if event.implicit[0] else text, 1, 1, event.anchor, event)
+
+    def _open(self, event: yaml.CollectionStartEvent, value: object) -> None:
+        if event.tag is not None:
+            raise self._error(event, f"tag '{event.tag}' cannot be used; write the value alone")
+
+        parent = self._stack[-1] if self._stack else None
+        group = Group(value, _line(event), event.anchor)
+        if parent is None:
+            self.group = group
+        else:
+            place = self._place(parent, event)
+            parent.lines.setdefault(place, group.line)
+            parent.groups[place] = group
+
+        self._stack.append(group)
+        if len(self._stack) > MAX_DEPTH:
+            raise self._too_deep(event)
+
+    def _alias(self, event: yaml.AliasEvent) -> None:
+        if self._stack:
+            self._place(self._stack[-1], event)
+        if event.anchor not in self._anchors:
+            raise self._error(event, f"alias '*{event.anchor}' stands for nothing that ended before it")
+        self._add(*self._anchors[event.anchor], None, event)
+
+    def _place(self, parent: Group, event: yaml.Event) -> str | int:
+        """Where the next value of a group belongs."""
+        if (place := parent.place) is None:
+            raise self._error(event, "a key must be a word, found a list or a group")
+        return place
+
+    def _add(self, value: object, size: int, height: int, anchor: str | None, event: yaml.Event) -> None:
+        """Put a finished value where it belongs and keep count of what the file unfolds to."""
+        if anchor is not None:
+            self._anchors[anchor] = (value, size, height)
+
+        if not self._stack:
+            self.top = value
+            return
+
+        parent = self._stack[-1]
+        if parent.key is None:
+            parent.lines.setdefault(len(parent.value), _line(event))
+            parent.value.append(value)
+        else:
+            parent.value[parent.key] = value
+            parent.key = None
+
+        parent.size += size
+        if height >= parent.height:
+            parent.height = height + 1
+
+        if len(self._stack) + height > MAX_DEPTH:
+            raise self._too_deep(event)
+        if parent.size > MAX_VALUES:
+            raise self._error(event, f"the file unfolds to more than {MAX_VALUES} values; use fewer aliases")
+
+    def _too_deep(self, event: yaml.Event) -> InputError:
+        return self._error(event, f"nested deeper than {MAX_DEPTH} levels")
+
+    def _error(self, event: yaml.Event, message: str) -> InputError:
+        places = [group.place for group in self._stack[:6]]
+        location = key_path(tuple(place for place in places if place is not None))
+        return InputError(f"{self.path}:{_line(event)}: {location + ': ' if location else ''}{message}")
+
+
+def _line(event: yaml.Event) -> int:
+    return event.start_mark.line + 1  # type: ignore[union-attr]  # every event of a parser has a mark
 
 
 @dataclass(frozen=True, slots=True, eq=False)

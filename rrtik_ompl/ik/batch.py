@@ -24,8 +24,7 @@ from rrtik_ompl.ik.targets import POSE, pose_rows
 from rrtik_ompl.kernels.threads import cores, in_threads
 from rrtik_ompl.model.goal import PoseGoal, joint_difference
 from rrtik_ompl.model.robot import Robot
-from rrtik_ompl.world.check_world import check_world
-from rrtik_ompl.world.world import World
+from rrtik_ompl.world.world import World, check_world
 
 LEAST_SHARE = 256  # poses of a thread: fewer take less time than it does to begin one
 

@@ -18,8 +18,7 @@ from rrtik_ompl.kernels.search.constrained import layout
 from rrtik_ompl.kernels.search.constrained.layout import HeldTable, RegionTable
 from rrtik_ompl.kernels.simd.library import library
 from rrtik_ompl.kernels.tables.memory import aligned, packed, record
-from rrtik_ompl.model.robot import Robot
-from rrtik_ompl.model.tip_distance import PER_RADIAN, reach_of
+from rrtik_ompl.model.robot import PER_RADIAN, Robot, reach_of
 
 SHORTEST_STEP = 0.01  # [unit of the configurations] of a search, unless tolerances need shorter ones
 
@@ -108,7 +107,7 @@ def _record(region: HeldRegion) -> Matrix:
             layout.ANGLES_LOW: bounds[3:, 0],
             layout.ANGLES_HIGH: bounds[3:, 1],
             layout.DIRECTION: region.direction,
-            layout.KEPT: region.kept,
+            layout.KEPT: region.accepted,
             layout.AIMED: region.aimed,
             layout.MOST: region.limits(between=True),
             layout.CURVATURE: region.curvature,
@@ -121,7 +120,7 @@ def _shortest_step(region: HeldRegion) -> float:
     """Half the step of all joints that has room to bend inside a region, `SHORTEST_STEP` at most."""
     dof = region.robot.dof
     step = np.full((1, dof), SHORTEST_STEP / np.sqrt(dof))
-    space_left = region.limits(between=True) - region.kept
+    space_left = region.limits(between=True) - region.accepted
     bent = region.deviations(np.zeros((1, dof)), step)[0]
     # a chord leaves its curve by the square of its length
     share = float(np.sqrt((space_left[bent > 0.0] / bent[bent > 0.0]).min(initial=4.0)))

@@ -14,8 +14,7 @@ from rrtik_ompl.ik.tip_columns import TipColumns, tip_columns
 from rrtik_ompl.kernels.ik import ik_layout
 from rrtik_ompl.kernels.ik.ik_layout import CallTable, LimbTable
 from rrtik_ompl.kernels.tables.memory import PlannedTable, TablePlan, aligned, packed, sizes_of
-from rrtik_ompl.model.robot import Robot
-from rrtik_ompl.model.tip_distance import reach_of
+from rrtik_ompl.model.robot import Robot, reach_of
 
 SEEDS = 512  # configurations that walks may start from
 

@@ -10,16 +10,14 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector, frozen
 from rrtik_ompl.base.choices import IkMethod
-from rrtik_ompl.constraints.goal_regions import goal_regions
 from rrtik_ompl.constraints.held_region import HeldRegion
-from rrtik_ompl.constraints.held_regions import HeldRegions
+from rrtik_ompl.constraints.held_regions import HeldRegions, goal_regions
 from rrtik_ompl.description.joint_weights import weighted_difference
 from rrtik_ompl.ik.held_tables import projected_onto
 from rrtik_ompl.ik.method_interface import IkResult, different_rows, nearest_first
 from rrtik_ompl.model.goal import Goal, MultiGoal, joint_difference
-from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.robot import Robot, metres_per_radian
 from rrtik_ompl.model.scene import Scene
-from rrtik_ompl.model.tip_distance import metres_per_radian
 
 PROJECTION: IkMethod = "projection"
 STARTS = 96  # random ones, for each tip

@@ -21,8 +21,7 @@ from rrtik_ompl.base.errors import InputError, at_most
 from rrtik_ompl.files.named_arrays import NamedArrays
 from rrtik_ompl.files.text import known_ending, write_bytes, write_text
 from rrtik_ompl.model.robot import Robot, jacobians, poses
-from rrtik_ompl.world.check_world import check_world
-from rrtik_ompl.world.world import World
+from rrtik_ompl.world.world import World, check_world
 
 SAMPLES = 200_000
 BLOCK = 20_000  # postures at a time

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector
 from rrtik_ompl.kernels.ik.ik_layout import ANY_TURN, BOX, CHORD_TOLERANCE, FREE_TURN, NO_TURN, POSITION_TOLERANCE
-from rrtik_ompl.model.robot import Robot, jacobians, poses
-from rrtik_ompl.model.tip_distance import reach_of
+from rrtik_ompl.model.robot import Robot, jacobians, poses, reach_of
 
 PER_CHORD = 0.3  # weight of a turn (its chord 2 sin(angle / 2)) where the position counts in reaches
 DAMPING = 1e-9  # the constant part, in units of the squared residual

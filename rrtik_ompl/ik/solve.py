@@ -29,8 +29,7 @@ from rrtik_ompl.ik.targets import leaves_freedom, targets
 from rrtik_ompl.model.goal import TIP_GOALS, MultiGoal, PoseGoal, Target, TipGoal, has_continuous, joint_difference
 from rrtik_ompl.model.robot import Robot, inside_limits
 from rrtik_ompl.model.scene import Scene
-from rrtik_ompl.world.check_world import check_world
-from rrtik_ompl.world.world import World
+from rrtik_ompl.world.world import World, check_world
 
 SECONDS = 1.0  # of a numeric method, unless said otherwise
 METHOD = "inverse kinematics method"  # in messages

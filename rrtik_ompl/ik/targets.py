@@ -18,7 +18,7 @@ from rrtik_ompl.kernels.ik.ik_layout import (
     POSITION_TOLERANCE,
 )
 from rrtik_ompl.model.goal import GoalPart, GoalSet, PoseGoal, PositionGoal, Target, TipGoal
-from rrtik_ompl.model.task_region import TaskRegion, displacements
+from rrtik_ompl.model.goal_kind import TaskRegion, displacements
 
 POSE = PoseGoal(np.eye(4))  # for its tolerances
 UPRIGHT = np.eye(3).ravel()  # where the orientation does not count

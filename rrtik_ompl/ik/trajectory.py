@@ -25,8 +25,7 @@ from rrtik_ompl.ik.numeric.track import Tracker
 from rrtik_ompl.ik.solve import free_of_collision, solve_ik
 from rrtik_ompl.model.goal import GoalSet, PoseGoal, PositionGoal, Target, TipGoal, joint_difference
 from rrtik_ompl.model.robot import Robot, inside_limits
-from rrtik_ompl.world.check_world import check_world
-from rrtik_ompl.world.world import World
+from rrtik_ompl.world.world import World, check_world
 
 SECONDS = 60.0
 SECONDS_A_POINT = 5.0  # to say why a point has no configuration

@@ -20,10 +20,9 @@ from rrtik_ompl.base.units import wrapped
 from rrtik_ompl.model.goal_kind import Goal as Goal
 from rrtik_ompl.model.goal_kind import GoalPart as GoalPart
 from rrtik_ompl.model.goal_kind import Target as Target
+from rrtik_ompl.model.goal_kind import TaskRegion
 from rrtik_ompl.model.goal_kind import TipGoal as TipGoal
-from rrtik_ompl.model.robot import Robot
-from rrtik_ompl.model.task_region import TaskRegion
-from rrtik_ompl.model.tip_distance import metres_per_radian
+from rrtik_ompl.model.robot import Robot, metres_per_radian
 
 JOINT_TOLERANCE = 1e-6  # [rad] or [m]
 AXES: tuple[FrameAxis, ...] = get_args(FrameAxis)

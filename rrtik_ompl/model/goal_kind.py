@@ -1,5 +1,10 @@
 """What every kind of goal answers, so that planning, inverse kinematics and pictures treat all kinds alike.
 
+Every goal of the tip has a :class:`TaskRegion`, poses of the tip with ranges for position and for roll, pitch and yaw,
+that targets are drawn from; it is itself a kind of goal. Source: [17]: a frame w in the world, bounds of the
+displacement of a frame s in it, and the tip's place in s. Their distance is that of the displacement; here it is that
+of the tip from the nearest pose of the region, in metres and radians.
+
 A new kind of goal of the tip is a :class:`GoalPart`: ``rrtik_ompl.model.goal`` has the others, and CONTRIBUTING.md an
 example. Files have their own words for each kind, in ``rrtik_ompl.problem_files.goal``.
 """
@@ -7,20 +12,33 @@ example. Files have their own words for each kind, in ``rrtik_ompl.problem_files
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import TYPE_CHECKING, ClassVar
+from dataclasses import dataclass, field, replace
+from typing import Any, ClassVar
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.base.arrays import Mask, Vector, finite_array, whole_number
+from rrtik_ompl.base.arrays import (
+    TAU,
+    Mask,
+    Matrix,
+    Vector,
+    finite_array,
+    frozen,
+    not_negative,
+    number_rows,
+    positive,
+    whole_number,
+)
 from rrtik_ompl.base.choices import FrameAxis
-from rrtik_ompl.base.errors import InputError, require
-from rrtik_ompl.model.robot import Robot
-from rrtik_ompl.model.tip_distance import metres_per_radian
+from rrtik_ompl.base.copies import as_value
+from rrtik_ompl.base.errors import InputError, name_of, require
+from rrtik_ompl.base.poses import PoseLike, rigid, rotation_angles, rpy_matrices, turned_z, unit_vector
+from rrtik_ompl.model.robot import Robot, metres_per_radian
 
-if TYPE_CHECKING:
-    from rrtik_ompl.model.task_region import TaskRegion
+COORDINATES = ("x", "y", "z", "roll", "pitch", "yaw")
+SWEEPS = 3  # over roll, pitch and yaw; one is exact where a single one of them is free
 
 
 class Goal:
@@ -206,3 +224,240 @@ class Target(GoalPart):
     def has_regions(self) -> bool:
         """It has none."""
         return False
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TaskRegion(GoalPart):
+    """Bring the tip to any pose ``T_world_w @ D @ T_w_tip`` whose displacement D lies within bounds.
+
+    Attributes:
+        T_world_w: Frame of the region.
+        bounds: Lowest and highest x, y, z [m] and fixed-axis roll, pitch, yaw [rad] of D, shape (6, 2). Angles that
+            are a full turn apart are the same; a range of a full turn leaves the angle free.
+        T_w_tip: The tip where D is zero.
+        position_tolerance: [m].
+        orientation_tolerance: [rad].
+        frame: What has to be there in place of the tip, for path constraints: a link or an attached object.
+        position_allowance: How far a path constraint may be left between the waypoints of a path, beyond its tolerance
+            [m]: none unless it is asked for.
+        orientation_allowance: Likewise [rad].
+        from_start: Whether ``T_world_w`` is the frame of the region as seen from the constrained frame at the start of
+            a path; a :class:`rrtik_ompl.Problem` makes a region of the world of it.
+
+    Example:
+        >>> bounds = np.zeros((6, 2))
+        >>> bounds[5] = -np.pi, np.pi  # the tool may turn about the z axis of the region
+        >>> drill = rrtik.TaskRegion(rrtik.pose([0.4, 0.2, 0.3], [1.0, 0.0, 0.0, 0.0]), bounds)
+        >>> rrtik.solve_ik(rrtik.load_robot("ur5"), drill).found
+        True
+    """
+
+    T_world_w: Any
+    bounds: Matrix
+    T_w_tip: Any = field(default_factory=pin.SE3.Identity)
+    position_tolerance: float = 1e-3
+    orientation_tolerance: float = 1e-2
+    frame: str | None = None
+    from_start: bool = False
+    position_allowance: float = 0.0
+    orientation_allowance: float = 0.0
+
+    __reduce__ = as_value
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "T_world_w", rigid(self.T_world_w, "goal region: T_world_w"))
+        object.__setattr__(self, "T_w_tip", rigid(self.T_w_tip, "goal region: T_w_tip"))
+
+        bounds = finite_array(self.bounds, (6, 2), "goal region: bounds")
+        for name, bound in zip(COORDINATES, bounds, strict=True):
+            _range(bound, f"goal region: {name}")
+        object.__setattr__(self, "bounds", frozen(bounds))
+
+        for name in ("position_tolerance", "orientation_tolerance"):
+            object.__setattr__(self, name, positive(getattr(self, name), f"goal region: {name}"))
+        for name in ("position_allowance", "orientation_allowance"):
+            object.__setattr__(self, name, not_negative(getattr(self, name), f"path constraint: {name}"))
+
+        require(self.frame, str | None, "frame of a region", "name a link or an attached object")
+        if self.frame is not None:
+            name_of(self.frame, "the frame of a region")
+        require(self.from_start, bool, "from_start of a region")
+
+    @classmethod
+    def about_axis(
+        cls,
+        T_world_tip: PoseLike,
+        axis: ArrayLike,
+        *,
+        through: ArrayLike | None = None,
+        turn: ArrayLike = (-np.pi, np.pi),
+        slide: ArrayLike = (0.0, 0.0),
+        position_tolerance: float = 1e-3,
+        orientation_tolerance: float = 1e-2,
+    ) -> TaskRegion:
+        """A pose that may be turned about a line of the world and moved along it: a grasp of a bar.
+
+        Args:
+            T_world_tip: A pose of the tip at the goal.
+            axis: Direction of the line in the world, of length 1, shape (3,).
+            through: A point of the line [m], shape (3,); the tip's if None.
+            turn: Lowest and highest angle from that pose [rad], shape (2,).
+            slide: Lowest and highest displacement along the axis [m], shape (2,).
+            position_tolerance: [m].
+            orientation_tolerance: [rad].
+
+        Raises:
+            InputError: If the axis is not of length 1, or a range is upside down.
+        """
+        tip = rigid(T_world_tip, "goal region: T_world_tip")
+        direction = unit_vector(axis, "goal region: axis")
+        point = tip.translation if through is None else finite_array(through, (3,), "goal region: through")
+        T_world_w = pin.SE3(turned_z(direction), np.array(point))
+
+        bounds = np.zeros((6, 2))
+        bounds[2] = _range(slide, "goal region: slide")
+        bounds[5] = _range(turn, "goal region: turn")
+        return cls(T_world_w, bounds, T_world_w.actInv(tip), position_tolerance, orientation_tolerance)
+
+    @property
+    def title(self) -> str:
+        """What it is."""
+        return "tip region"
+
+    @property
+    def tolerances(self) -> tuple[float, float]:
+        """What the errors may be at most: distance [m] and angle [rad]."""
+        return self.position_tolerance, self.orientation_tolerance
+
+    def region(self) -> TaskRegion:
+        """It is one."""
+        return self
+
+    @property
+    def free(self) -> Mask:
+        """Which of the six coordinates have a range, shape (6,)."""
+        ranges: Mask = self.bounds[:, 0] < self.bounds[:, 1]
+        return ranges
+
+    def started_at(self, T_world_frame: PoseLike) -> TaskRegion:
+        """The region of the world that a region ``from_start`` is, for a pose of its frame at the start."""
+        if not self.from_start:
+            return self
+        return replace(
+            self, T_world_w=rigid(T_world_frame, "frame of a region at the start") * self.T_world_w, from_start=False
+        )
+
+    def poses(self, coordinates: Matrix) -> NDArray[np.float64]:
+        """T_world_tip for displacements, shape (m, 6): (m, 4, 4)."""
+        coordinates = _rows(coordinates, (6,), "displacements in a region")
+        poses: NDArray[np.float64] = self.T_world_w.homogeneous @ displacements(coordinates) @ self.T_w_tip.homogeneous
+        return poses
+
+    def drawn(self, count: int, rng: np.random.Generator) -> Matrix:
+        """Displacements drawn evenly from the bounds, shape (count, 6)."""
+        require(rng, np.random.Generator, "rng of a region", "use numpy.random.default_rng(seed)")
+        whole_number(count, "count of a region")
+        return rng.uniform(self.bounds[:, 0], self.bounds[:, 1], (count, 6))
+
+    def nearest(self, tips: NDArray[np.float64]) -> Matrix:
+        """Displacements of the poses of the region that are nearest to tips, shape (m, 4, 4): (m, 6).
+
+        First the nearest orientation, then the nearest position.
+        """
+        tips = _rows(tips, (4, 4), "poses of the tip")
+        R_w = self.T_world_w.rotation
+        R_tip = self.T_w_tip.rotation
+
+        angles = nearest_angles(R_w.T @ tips[:, :3, :3] @ R_tip.T, self.bounds[3:])
+        place = (tips[:, :3, 3] - self.T_world_w.translation) @ R_w - rpy_matrices(angles) @ self.T_w_tip.translation
+        return np.hstack([np.clip(place, self.bounds[:3, 0], self.bounds[:3, 1]), angles])
+
+    def tip_errors(self, tips: NDArray[np.float64]) -> tuple[Vector, Vector]:
+        """Distance [m] and angle [rad] of poses of the tip, shape (m, 4, 4), from the nearest pose, shapes (m,)."""
+        poses = self.poses(self.nearest(tips))
+        position: Vector = np.linalg.norm(tips[:, :3, 3] - poses[:, :3, 3], axis=1)
+        return position, rotation_angles(np.swapaxes(poses[:, :3, :3], 1, 2) @ tips[:, :3, :3])
+
+
+def displacements(coordinates: Matrix) -> NDArray[np.float64]:
+    """The transforms D of rows of x, y, z [m] and roll, pitch, yaw [rad], shape (m, 6): (m, 4, 4)."""
+    D = np.zeros((len(coordinates), 4, 4))
+    D[:, :3, :3] = rpy_matrices(coordinates[:, 3:])
+    D[:, :3, 3] = coordinates[:, :3]
+    D[:, 3, 3] = 1.0
+    return D
+
+
+def _rows(values: ArrayLike, shape: tuple[int, ...], what: str) -> NDArray[np.float64]:
+    """Numbers of shape (m, *shape); those of a search need not be finite."""
+    rows = number_rows(values, what)
+    if rows.shape[1:] != shape:
+        raise InputError(f"{what}: expected shape (m, {', '.join(map(str, shape))}), got {rows.shape}")
+    return rows
+
+
+def _range(values: ArrayLike, what: str) -> Vector:
+    low, high = bounds = finite_array(values, (2,), what)
+    if low > high:
+        raise InputError(f"{what} goes from {low:g} up to {high:g}; put the lower bound first")
+    return bounds
+
+
+def nearest_angles(rotations: NDArray[np.float64], bounds: Matrix) -> Matrix:
+    """Roll, pitch and yaw within bounds, shape (3, 2), whose rotations are near to given ones: (m, 3, 3) -> (m, 3).
+
+    Exact for rotations inside the bounds and where at most one angle has a range. Otherwise the best angle is found
+    in turn with the others held, from both triples that describe the rotation, so that pitch may pass a quarter turn.
+    """
+    best: Matrix = np.tile(bounds[:, 0], (len(rotations), 1))
+    wide = np.flatnonzero(bounds[:, 0] < bounds[:, 1])
+    if len(wide) == 0:
+        return best
+
+    likeness = np.full(len(rotations), -np.inf)
+    first = roll_pitch_yaw(rotations)
+    for start in (first, first * [1.0, -1.0, 1.0] + np.pi):
+        angles = into_range(start, bounds[:, 0], bounds[:, 1])
+        for k in np.tile(wide[::-1], 1 if len(wide) == 1 else SWEEPS):
+            angles[:, k] = into_range(_best_angle(rotations, angles, int(k)), *bounds[k])
+        found = np.einsum("mij,mij->m", rotations, rpy_matrices(angles))
+        better = found > likeness
+        best[better] = angles[better]
+        likeness[better] = found[better]
+
+    return best
+
+
+def roll_pitch_yaw(R: NDArray[np.float64]) -> Matrix:
+    """Of R = Rz(yaw) Ry(pitch) Rx(roll), pitch within a quarter turn; shape (m, 3)."""
+    pitch = np.arctan2(-R[:, 2, 0], np.hypot(R[:, 0, 0], R[:, 1, 0]))
+    return np.column_stack([np.arctan2(R[:, 2, 1], R[:, 2, 2]), pitch, np.arctan2(R[:, 1, 0], R[:, 0, 0])])
+
+
+def _best_angle(R: NDArray[np.float64], angles: Matrix, k: int) -> Vector:
+    """The k-th angle that brings the rotation nearest to R, the other two held, shape (m,).
+
+    The trace of R^T Rz Ry Rx is a cosine of each angle.
+    """
+    first, second = (rpy_matrices(angles * np.eye(3)[other]) for other in range(3) if other != k)
+    C = np.swapaxes(R, 1, 2)
+    if k == 0:
+        C = C @ (second @ first)
+    elif k == 1:
+        C = first @ (C @ second)
+    else:
+        C = (second @ first) @ C
+
+    i = (k + 1) % 3
+    j = (k + 2) % 3
+    angle: Vector = np.arctan2(C[:, i, j] - C[:, j, i], C[:, i, i] + C[:, j, j])
+    return angle
+
+
+def into_range(angles: NDArray[np.float64], low: ArrayLike, high: ArrayLike) -> NDArray[np.float64]:
+    """The nearest of equal angles within bounds, or the nearer bound."""
+    low = np.asarray(low)
+    high = np.asarray(high)
+    middle = 0.5 * (low + high)
+    nearest: NDArray[np.float64] = np.clip(middle + (angles - middle + np.pi) % TAU - np.pi, low, high)
+    return nearest

@@ -17,13 +17,14 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.base.arrays import Mask, Matrix, Vector, finite_array, finite_number, in_blocks, number_rows, room
+from rrtik_ompl.base.arrays import Mask, Matrix, Vector, allocated, finite_array, finite_number, in_blocks, number_rows
 from rrtik_ompl.base.copies import as_value, itself
 from rrtik_ompl.base.errors import InputError, UnknownNameError, require
 from rrtik_ompl.base.poses import MOST_MOVING, cross_products, joint_motions
 from rrtik_ompl.base.units import shown_unit
 
 FEW = 16  # configurations up to which Pinocchio's calls cost less than numpy's
+PER_RADIAN = 0.5  # [reach/rad] of distances of tips: two radians count as much as the whole reach
 LIMIT_TOLERANCE = 1e-5  # [rad] or [m]; a value this far outside counts as inside: URDF files write pi in six digits
 
 
@@ -56,7 +57,7 @@ class Chain:
     def joint_frames(self, rows: Matrix) -> NDArray[np.float64]:
         """Pose in the world of every joint frame, world first, for configurations, (m, dof). Shape (m, n + 1, 4, 4)."""
         motions = joint_motions(self.axis, self.prismatic, self.joint_values(rows))
-        frames = room((len(rows), len(self.parent) + 1, 4, 4))
+        frames = allocated((len(rows), len(self.parent) + 1, 4, 4))
         frames[:, 0] = np.eye(4)
         for k, parent in enumerate(self.parent):
             frames[:, k + 1] = frames[:, parent + 1] @ self.placement[k] @ motions[:, k]
@@ -337,6 +338,16 @@ def _poses(
         pin.forwardKinematics(robot.model, data, full)
         placed[k] = pin.updateFramePlacement(robot.model, data, number).homogeneous
     return placed
+
+
+def reach_of(robot: Robot) -> float:
+    """Unit of length of an arm [m]: all offsets between its joints in a row."""
+    return float(np.linalg.norm(robot.chain.placement[:, :3, 3], axis=1).sum()) or 1.0
+
+
+def metres_per_radian(robot: Robot) -> float:
+    """What a turn of the tip counts beside its way [m/rad]."""
+    return PER_RADIAN * reach_of(robot)
 
 
 def unnamed_joints(count: int) -> tuple[str, ...]:

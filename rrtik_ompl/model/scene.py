@@ -168,10 +168,10 @@ def _checked_solid(name: object, shape: object, pose: object) -> pin.SE3:
 
 
 def _room(value: float, what: str) -> float:
-    room = float(bounded_array(value, (), what))
-    if room < 0.0:
-        raise InputError(f"{what} must be 0 metres or more, got {room:g}")
-    return room
+    metres = float(bounded_array(value, (), what))
+    if metres < 0.0:
+        raise InputError(f"{what} must be 0 metres or more, got {metres:g}")
+    return metres
 
 
 @dataclass(frozen=True, slots=True)

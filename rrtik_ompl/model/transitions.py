@@ -6,7 +6,7 @@ Source: the metric and the count of routes of [1, ch. 6.3].
 from __future__ import annotations
 
 from itertools import pairwise
-from math import factorial, radians
+from math import radians
 from typing import NamedTuple
 
 import numpy as np
@@ -71,23 +71,23 @@ def merge_moves(waypoints: ArrayLike, tolerance: float = SAME) -> Matrix:
     """
     rows = _rows(waypoints)
     values = rows.tolist()  # lists: most routes are short, and numpy takes longer for a row
-    kept = [0]
+    corners = [0]
 
     for i in range(1, len(rows)):
-        while len(kept) > 1 and _same_joint(values[kept[-2]], values[kept[-1]], values[i], tolerance):
-            kept.pop()
-        if _moved_joints(values[kept[-1]], values[i], tolerance):
-            kept.append(i)
-        elif len(kept) > 1:  # a null move: its end takes the place of its beginning, so that the last row is exact
-            kept[-1] = i
+        while len(corners) > 1 and _same_joint(values[corners[-2]], values[corners[-1]], values[i], tolerance):
+            corners.pop()
+        if _moved_joints(values[corners[-1]], values[i], tolerance):
+            corners.append(i)
+        elif len(corners) > 1:  # a null move: its end takes the place of its beginning, so that the last row is exact
+            corners[-1] = i
 
-    return rows[kept]
+    return rows[corners]
 
 
 def without_repeats(route: Matrix) -> Matrix:
     """The route without waypoints that repeat the one before, shape (k, n); both ends stay."""
-    kept: Matrix = route[np.append(True, (np.diff(route, axis=0) != 0.0).any(axis=1))]
-    return kept
+    distinct: Matrix = route[np.append(True, (np.diff(route, axis=0) != 0.0).any(axis=1))]
+    return distinct
 
 
 def transitions(waypoints: ArrayLike, tolerance: float = SAME) -> int:
@@ -113,31 +113,6 @@ def length_of(rows: Matrix) -> float:
     """As :func:`route_length`, of waypoints that are known to be numbers."""
     edges = rows[1:] - rows[:-1]
     return float(np.sqrt((edges * edges).sum(axis=1)).sum())
-
-
-def routes(n: int, l: int, m: int = 1) -> int:  # noqa: E741 - the letter of [1]
-    """Ways to walk m edges one joint at a time on a grid: ``[(n l)! / (l!)^n]^m``, the order of the edges being fixed.
-
-    Args:
-        n: Number of joints.
-        l: Grid steps per joint and edge.
-        m: Number of edges.
-    """
-    return int(_edge_routes(n, l, m) ** m)
-
-
-def routes_published(n: int, l: int, m: int = 1) -> int:  # noqa: E741 - the letter of [1]
-    """The count as printed, ``m! (n l)! / (l!)^n``. It agrees with :func:`routes` for m = 1 only.
-
-    The factor m! would permute the edges of the route, whose order is given.
-    """
-    return factorial(m) * _edge_routes(n, l, m)
-
-
-def _edge_routes(n: int, l: int, m: int) -> int:  # noqa: E741
-    if min(n, l, m) < 1:
-        raise InputError(f"routes: n, l and m must be at least 1, got n={n}, l={l}, m={m}")
-    return int(factorial(n * l) // factorial(l) ** n)
 
 
 def _same_joint(a: list[float], b: list[float], c: list[float], tolerance: float) -> bool:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import MISSING, dataclass, field, fields
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import KW_ONLY, MISSING, dataclass, field, fields
+from functools import partial
 from typing import Any, get_args
 
 from rrtik_ompl.base.arrays import finite_array, not_negative
@@ -11,19 +12,60 @@ from rrtik_ompl.base.choices import Accuracy, one_of
 from rrtik_ompl.base.copies import as_value
 from rrtik_ompl.base.errors import InputError, UnknownNameError, listed, require
 from rrtik_ompl.base.poses import few_joints
+from rrtik_ompl.model.goal_kind import TaskRegion
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import Scene
-from rrtik_ompl.model.task_region import TaskRegion
 
 MOTION_RESOLUTION = 0.01  # [m]
 ACCURACIES: tuple[Accuracy, ...] = get_args(Accuracy)
 FINEST_RESOLUTION = 1e-5  # [m]; a motion across an arm's reach is then some hundred thousand checks
-LENGTH = {"unit": "m"}
+
+
+def _robot(robot: Robot) -> Robot:
+    require(robot, Robot, "robot of a world", "use load_robot(name or file)")
+    few_joints(robot.model)
+    return robot
+
+
+def _scene(scene: Scene) -> Scene:
+    require(scene, Scene, "scene of a world", "use Scene(obstacles) or load_scene(file)")
+    return scene
+
+
+def _resolution(size: float) -> float:
+    resolution = float(finite_array(size, (), "motion_resolution"))
+    if resolution < FINEST_RESOLUTION:
+        raise InputError(f"motion_resolution must be {FINEST_RESOLUTION:g} metres or more, got {size}")
+    return resolution
+
+
+def _optional_clearance(length: float | None) -> float | None:
+    return None if length is None else not_negative(length, "clearance")
+
+
+def _setting(check: Callable[[Any], Any], *, key: str = "", least: float = 0.0, unit: str = "") -> dict[str, Any]:
+    """What a field of :class:`WorldSettings` says of a setting beside its name, type and default.
+
+    Args:
+        check: Makes of what a user gives what a world keeps, or raises.
+        key: What the key of this name in problem files is explained by in their schema; "" if they have no such key.
+        least: The least number that the key may have.
+        unit: In which the setting is printed.
+    """
+    return {"check": check, "key": key, "least": least, "unit": unit}
+
+
+def _length(name: str, key: str = "") -> dict[str, Any]:
+    """As :func:`_setting`, of a length of at least 0 [m]."""
+    return _setting(partial(not_negative, what=name), key=key, unit="m")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WorldSettings:
     """What a :class:`rrtik_ompl.World` is made from; ``dataclasses.replace`` changes some of it, and forgets nothing.
+
+    A new setting is a field here, and what obeys it. The arguments of a world, the keys of files, what is printed and
+    what the truth matrix tries follow from the fields.
 
     Attributes:
         robot: The arm.
@@ -34,7 +76,8 @@ class WorldSettings:
         clearance: What is kept from obstacles on top of their margins [m].
         proving: Motions must be proven too, with this clearance [m]; None if they need not be.
         inflation: What checks keep on top of the clearance, for searches that leave room [m]; no other answer does.
-        constraints: Regions that a frame must not leave, placed in the world.
+        constraints: Regions that a frame must not leave, placed in the world. Only what keeps them is then free; a
+            :class:`rrtik_ompl.Problem` says where those begin that are ``from_start``.
 
     Raises:
         InputError: If one of them is of the wrong type, or a length makes no sense.
@@ -47,25 +90,54 @@ class WorldSettings:
         0.05
     """
 
-    robot: Robot
-    scene: Scene = field(default_factory=Scene)
-    accuracy: Accuracy = "exact"
-    motion_resolution: float = field(default=MOTION_RESOLUTION, metadata=LENGTH)
-    self_margin: float = field(default=0.0, metadata=LENGTH)
-    clearance: float = field(default=0.0, metadata=LENGTH)
-    proving: float | None = field(default=None, metadata=LENGTH)
-    inflation: float = field(default=0.0, metadata=LENGTH)
-    constraints: tuple[TaskRegion, ...] = ()
+    robot: Robot = field(metadata=_setting(_robot))
+    scene: Scene = field(default_factory=Scene, metadata=_setting(_scene))
+    _: KW_ONLY
+    accuracy: Accuracy = field(
+        default="exact",
+        metadata=_setting(
+            partial(one_of, ACCURACIES, kind="accuracy"),
+            key="exact, or conservative: what kernels cannot prove free counts as blocked",
+        ),
+    )
+    motion_resolution: float = field(
+        default=MOTION_RESOLUTION,
+        metadata=_setting(
+            _resolution,
+            key="largest step of any point of the arm between two checked configurations [m]",
+            least=FINEST_RESOLUTION,
+            unit="m",
+        ),
+    )
+    self_margin: float = field(
+        default=0.0,
+        metadata=_length(
+            "self_margin", "[m] that links, and what they hold, keep from each other wherever they must not touch"
+        ),
+    )
+    clearance: float = field(
+        default=0.0, metadata=_length("clearance", "[m] that is kept from obstacles on top of their margins")
+    )
+    proving: float | None = field(
+        default=None,
+        metadata=_setting(
+            _optional_clearance,
+            key="[m] of clearance with which motions must be proven to count as free; in steps if absent",
+            unit="m",
+        ),
+    )
+    inflation: float = field(default=0.0, metadata=_length("inflation"))
+    constraints: Sequence[TaskRegion] = field(default=(), metadata=_setting(partial(listed, what="path constraints")))
 
     __reduce__ = as_value
 
     def __post_init__(self) -> None:
-        given = {name: getattr(self, name) for name in CHECKS}
+        given = {each.name: getattr(self, each.name) for each in fields(self)}
         for name, value in checked_settings(given).items():
             object.__setattr__(self, name, value)
 
     @property
-    def kept(self) -> float:
+    def required_clearance(self) -> float:
         """What every motion keeps from obstacles on top of their margins, where nobody asks for more [m]."""
         return max(self.clearance, self.proving or 0.0)
 
@@ -83,10 +155,14 @@ class WorldSettings:
 
             if each.name == "constraints":
                 yield f"{len(value)} path constraint{'s' * (len(value) > 1)}"
-            elif "unit" in each.metadata:
-                yield f"{each.name}={value:g} {each.metadata['unit']}"
+            elif unit := each.metadata["unit"]:
+                yield f"{each.name}={value:g} {unit}"
             else:
                 yield f"{each.name}={value}"
+
+
+SETTINGS_IN_FILES = tuple(each for each in fields(WorldSettings) if each.metadata["key"])
+CHECKS: dict[str, Callable[[Any], Any]] = {each.name: each.metadata["check"] for each in fields(WorldSettings)}
 
 
 def checked_settings(given: Mapping[str, Any]) -> dict[str, Any]:
@@ -100,58 +176,3 @@ def checked_settings(given: Mapping[str, Any]) -> dict[str, Any]:
         if name not in CHECKS:
             raise UnknownNameError("setting of a world", name, CHECKS)
     return {name: CHECKS[name](value) for name, value in given.items()}
-
-
-def _robot(robot: Robot) -> Robot:
-    require(robot, Robot, "robot of a world", "use load_robot(name or file)")
-    few_joints(robot.model)
-    return robot
-
-
-def _scene(scene: Scene) -> Scene:
-    require(scene, Scene, "scene of a world", "use Scene(obstacles) or load_scene(file)")
-    return scene
-
-
-def _accuracy(accuracy: Accuracy) -> Accuracy:
-    return one_of(ACCURACIES, accuracy, "accuracy")
-
-
-def _resolution(size: float) -> float:
-    resolution = float(finite_array(size, (), "motion_resolution"))
-    if resolution < FINEST_RESOLUTION:
-        raise InputError(f"motion_resolution must be {FINEST_RESOLUTION:g} metres or more, got {size}")
-    return resolution
-
-
-def _self_margin(length: float) -> float:
-    return not_negative(length, "self_margin")
-
-
-def _clearance(length: float) -> float:
-    return not_negative(length, "clearance")
-
-
-def _proving(length: float | None) -> float | None:
-    return None if length is None else not_negative(length, "clearance")
-
-
-def _inflation(length: float) -> float:
-    return not_negative(length, "inflation")
-
-
-def _constraints(regions: Iterable[TaskRegion]) -> tuple[TaskRegion, ...]:
-    return listed(regions, "path constraints")
-
-
-CHECKS: dict[str, Callable[[Any], Any]] = {  # of what a user gives, in the order of the fields
-    "robot": _robot,
-    "scene": _scene,
-    "accuracy": _accuracy,
-    "motion_resolution": _resolution,
-    "self_margin": _self_margin,
-    "clearance": _clearance,
-    "proving": _proving,
-    "inflation": _inflation,
-    "constraints": _constraints,
-}

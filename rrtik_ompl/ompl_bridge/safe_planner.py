@@ -341,7 +341,7 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         try:
             for number in range(SEARCHES):
                 if number == (0 if self.anytime else 1):
-                    self._world = form_of(world, motion_resolution=verification_resolution(world))
+                    self._world = form_of(world, motion_resolution=verification_resolution(world.settings))
                 found = self._search_between_free_ends(starts, goals, stop)
                 refusal = _refusal_of_second_check(world, found.path, unrolled)
                 if not refusal or stop():
@@ -402,7 +402,7 @@ def _refusal_of_second_check(world: object, rows: Matrix | None, unrolled: Unrol
         rows = unrolled.divided(rows)
     if len(rows) == 1:
         rows = rows.repeat(2, axis=0)  # a motion of no length
-    found = route_violations(world, rows, verification_resolution(world))
+    found = route_violations(world.checks, rows, verification_resolution(world.settings))
     return found[0].reason if found else ""
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -217,7 +216,11 @@ def _information(world: World, lower: Vector, upper: Vector, so2: bool) -> ob.Sp
     """A SpaceInformation within bounds, shapes (n,), whose states and motions a world judges."""
     endless = world.robot.continuous
     si = circular_space(lower, upper, endless) if so2 and endless.any() else bounded_space(lower, upper)
-    si.setMotionValidator(CheckedMotions(si, partial(motion_taken, world)))
+
+    def motion_valid(a: Vector, b: Vector) -> bool:
+        return motion_taken(world.checks, a, b)  # those of the thread that asks
+
+    si.setMotionValidator(CheckedMotions(si, motion_valid))
     return _judged(si, world)
 
 

@@ -31,7 +31,7 @@ from rrtik_ompl.planning.attempts import Turn, walk
 from rrtik_ompl.planning.outcome import Improvement, NamedPlanner, Plan, Request
 from rrtik_ompl.planning.shortening import Wishes, shortened
 from rrtik_ompl.world.clearance_curve import distances_at, places_along
-from rrtik_ompl.world.kept_clearance import possible_clearance
+from rrtik_ompl.world.clearances import possible_clearance
 from rrtik_ompl.world.problem import Problem
 
 LEAST_SECONDS = 1e-3  # for which another round is begun
@@ -220,8 +220,8 @@ def weighted_length(path: JointPath, problem: Problem) -> float:
     The clearance is proven at 240 places on the path, so the true one is no smaller.
     """
     rows = path.waypoints
-    motions, shares, places = places_along(problem.world, rows)
-    distances = distances_at(problem.world, places)
+    motions, shares, places = places_along(problem.world.checks, rows)
+    distances = distances_at(problem.world.checks, places)
 
     lengths = np.append(np.linalg.norm(np.diff(rows * _weights(problem), axis=0), axis=1), 0.0)
     ends = np.append(np.where(motions[1:] == motions[:-1], shares[1:], 1.0), 1.0)

@@ -37,7 +37,7 @@ from rrtik_ompl.ompl_bridge.setup import shared_space
 from rrtik_ompl.planning.attempts import EFFORT_ITERATIONS, load_kernels_for
 from rrtik_ompl.planning.outcome import NamedPlanner, Plan, Request
 from rrtik_ompl.planning.plan import PROOF_MODES, named_planner, planned, time_limit
-from rrtik_ompl.world.kept_clearance import Clearances, clearances_of_pairs
+from rrtik_ompl.world.clearances import Clearances, clearances_of_pairs
 from rrtik_ompl.world.problem import Problem, known_problem, problem_in
 from rrtik_ompl.world.world import World, form_of
 

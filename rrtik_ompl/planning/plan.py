@@ -19,7 +19,7 @@ from rrtik_ompl.planning.attempts import run_planner
 from rrtik_ompl.planning.outcome import RESTARTS, Improvement, NamedPlanner, Request
 from rrtik_ompl.planning.outcome import Plan as Plan
 from rrtik_ompl.planning.second_check import fixed_ends
-from rrtik_ompl.world.kept_clearance import check_clearance
+from rrtik_ompl.world.clearances import check_clearance
 from rrtik_ompl.world.problem import Problem
 
 MAX_RESTARTS = 1_000_000

@@ -20,7 +20,7 @@ from rrtik_ompl.ompl_bridge.planner_traits import traits_of
 from rrtik_ompl.planning.attempts import Turn, walk
 from rrtik_ompl.planning.outcome import NamedPlanner, Plan, Request
 from rrtik_ompl.planning.shortening import Wishes, shortened
-from rrtik_ompl.world.kept_clearance import possible_clearance
+from rrtik_ompl.world.clearances import possible_clearance
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.proof import PROOF_KERNELS
 from rrtik_ompl.world.proven_motions import KERNELS as PROVEN_KERNELS

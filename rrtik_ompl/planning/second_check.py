@@ -10,8 +10,7 @@ from rrtik_ompl.ompl_bridge.attempt import Attempt
 from rrtik_ompl.ompl_bridge.planner_traits import traits_of
 from rrtik_ompl.planning.moves.clearance_levels import wide_clearances_between
 from rrtik_ompl.planning.outcome import NamedPlanner, Request
-from rrtik_ompl.world.detours import with_detours
-from rrtik_ompl.world.kept_clearance import (
+from rrtik_ompl.world.clearances import (
     Clearances,
     clearances_between,
     keeping,
@@ -19,6 +18,7 @@ from rrtik_ompl.world.kept_clearance import (
     proved_as_clear,
     search_form,
 )
+from rrtik_ompl.world.detours import with_detours
 from rrtik_ompl.world.problem import Problem, densely_checked, problem_in
 from rrtik_ompl.world.route_check import violations_of
 
@@ -187,7 +187,7 @@ class SecondCheck:
         world = self._problem.world
         if self.wants_proofs:
             path = proved(path, world)  # with no more clearance than the world keeps
-        faults = () if path.proven else violations_of(world, path.waypoints)
+        faults = () if path.proven else violations_of(world.checks, path.waypoints)
         if faults:
             self.num_rejected += 1
             self.reason = f"the path of {self._name} was rejected by the second check: {faults[0].reason}"
@@ -213,7 +213,7 @@ class SecondCheck:
     def _first_gap(self, rows: Matrix) -> str:
         """The first motion of a route, shape (k, dof), that is not proven, in words; "" if all are."""
         world = self._problem.world
-        proof = world.prover.route(rows, clearance=world.settings.kept)
+        proof = world.prover.route(rows, clearance=world.settings.required_clearance)
         return str(next(iter(proof.unproven), ""))
 
 

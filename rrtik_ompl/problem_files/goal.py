@@ -24,8 +24,8 @@ from rrtik_ompl.files.sections import (
     told_apart_by,
 )
 from rrtik_ompl.model.goal import JOINT_TOLERANCE, Goal, GoalPart, GoalSet, JointGoal, MultiGoal, PoseGoal, PositionGoal
+from rrtik_ompl.model.goal_kind import COORDINATES, TaskRegion
 from rrtik_ompl.model.robot import Robot
-from rrtik_ompl.model.task_region import COORDINATES, TaskRegion
 from rrtik_ompl.problem_files.scene import PoseEntry, pose_data
 
 

@@ -9,7 +9,7 @@ from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.constraints.held_region import ANYWHERE
 from rrtik_ompl.model.goal import Goal, PoseGoal, PositionGoal
-from rrtik_ompl.model.task_region import TaskRegion
+from rrtik_ompl.model.goal_kind import TaskRegion
 from rrtik_ompl.problem_files.moveit_messages import Constraints, OrientationConstraint, PositionConstraint
 from rrtik_ompl.problem_files.moveit_scene import Frames
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import os
 from dataclasses import MISSING, fields
+from dataclasses import Field as Setting
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from pydantic import Field
+from pydantic import Field, StrictBool, create_model
 
 from rrtik_ompl.base.arrays import Vector
 from rrtik_ompl.base.choices import Accuracy
@@ -19,7 +20,7 @@ from rrtik_ompl.files.text import file_name
 from rrtik_ompl.model.goal import Goal
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import Scene
-from rrtik_ompl.model.world_settings import FINEST_RESOLUTION, MOTION_RESOLUTION, WorldSettings
+from rrtik_ompl.model.world_settings import SETTINGS_IN_FILES, WorldSettings
 from rrtik_ompl.problem_files.goal import GoalSection, StartSection, build_goal
 from rrtik_ompl.problem_files.path_constraints import ConstraintSection
 from rrtik_ompl.problem_files.robot import RobotEntry
@@ -32,27 +33,24 @@ NO_GOAL = "it has stages and no goal"
 OF_TASKS = {"task": NO_GOAL, "goals": "it has several goals, to be reached in order"}  # by keys
 OF_PATHS = ("waypoints", "points")  # keys of files of paths and of trajectories
 ELSEWHERE = ("robot", "scene", "constraints")  # settings that have sections of their own
+TYPES = {  # of keys, by the types of settings
+    "float": NotNegative,
+    "float | None": NotNegative | None,
+    "bool": StrictBool,
+    "Accuracy": Accuracy,
+}
 
 
-class WorldKeys(Section):
+def _key(setting: Setting[Any]) -> tuple[Any, Any]:
+    """Type and default of the key of a setting, for pydantic."""
+    least = setting.metadata["least"]
+    if least > 0.0:
+        return Positive, Field(setting.default, ge=least, description=setting.metadata["key"])
+    return TYPES[str(setting.type)], Field(setting.default, description=setting.metadata["key"])
+
+
+class _WorldKeys(Section):
     """How a world checks. Lengths in metres."""
-
-    motion_resolution: Positive = Field(
-        MOTION_RESOLUTION,
-        ge=FINEST_RESOLUTION,
-        description="largest step of any point of the arm between two checked configurations [m]",
-    )
-    self_margin: NotNegative = Field(
-        0.0, description="[m] that links, and what they hold, keep from each other wherever they must not touch"
-    )
-    accuracy: Accuracy = Field(
-        "exact", description="exact, or conservative: what kernels cannot prove free counts as blocked"
-    )
-    clearance: NotNegative = Field(0.0, description="[m] that is kept from obstacles on top of their margins")
-    proving: NotNegative | None = Field(
-        None,
-        description="[m] of clearance with which motions must be proven to count as free; in steps if absent",
-    )
 
     def settings(self, robot: Robot, scene: Scene) -> WorldSettings:
         """Of the world of a robot in a scene.
@@ -60,7 +58,13 @@ class WorldKeys(Section):
         Raises:
             InputError: If the robot is none that a world can be made of.
         """
-        return WorldSettings(robot, scene, **{name: getattr(self, name) for name in WorldKeys.model_fields})
+        return WorldSettings(robot, scene, **{each.name: getattr(self, each.name) for each in SETTINGS_IN_FILES})
+
+
+if TYPE_CHECKING:
+    WorldKeys = _WorldKeys
+else:  # a key for each setting that has one
+    WorldKeys = create_model("WorldKeys", __base__=_WorldKeys, **{each.name: _key(each) for each in SETTINGS_IN_FILES})
 
 
 class ProblemFile(WorldKeys):
@@ -176,7 +180,7 @@ def world_data(settings: WorldSettings) -> dict[str, Any]:
         value = getattr(settings, each.name)
         if each.name in ELSEWHERE or each.default is MISSING or value == each.default:
             continue
-        if each.name not in WorldKeys.model_fields:
+        if not each.metadata["key"]:
             raise InputError(f"world: the file has no key for {each.name}={value}; leave it out")
         data[each.name] = value
     return data

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import numpy as np
 import pinocchio as pin
-from pydantic import Field, model_validator
+from pydantic import Field, create_model, model_validator
 from pydantic_core import PydanticCustomError
 
 from rrtik_ompl.base.errors import require
@@ -27,6 +27,7 @@ from rrtik_ompl.files.sections import (
 from rrtik_ompl.files.strict_yaml import Location, YamlDocument, read_yaml, write_yaml
 from rrtik_ompl.files.text import file_name
 from rrtik_ompl.model.scene import AttachedObject, ConstantVelocity, Motion, Obstacle, Scene, TimedPoses, Touching
+from rrtik_ompl.model.world_settings import SETTINGS_IN_FILES
 from rrtik_ompl.problem_files.shapes import ONE_SHAPE, ShapeEntry, shape_data
 
 
@@ -177,7 +178,7 @@ class SceneEntry(Section):
             return Scene(tuple(obstacles), tuple(attached), allowed, contacts)
 
 
-class SceneFile(Section):
+class _SceneFile(Section):
     """A file with a scene alone; a whole problem file will do as well, what else it says is not looked at."""
 
     version: Version
@@ -185,11 +186,10 @@ class SceneFile(Section):
     robot: Any = None
     start: Any = None
     goal: Any = None
-    motion_resolution: Any = None
-    self_margin: Any = None
-    accuracy: Any = None
-    clearance: Any = None
-    proving: Any = None
+
+
+_KEYS_OF_WORLDS: dict[str, Any] = {each.name: (Any, None) for each in SETTINGS_IN_FILES}
+SceneFile = create_model("SceneFile", __base__=_SceneFile, **_KEYS_OF_WORLDS)
 
 
 def load_scene(path: str | os.PathLike[str]) -> Scene:

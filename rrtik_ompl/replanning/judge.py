@@ -24,13 +24,13 @@ from rrtik_ompl.geometry.collision.cloud_solid import Ends
 from rrtik_ompl.geometry.collision.distances import gap_beyond, is_ours, own_nearest
 from rrtik_ompl.geometry.collision.motion_bound import approach_weights
 from rrtik_ompl.geometry.collision.shape_table import farthest
-from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import Motion, Obstacle, Scene, TimedPoses, pairs_that_may_touch, pose_at
 from rrtik_ompl.model.shapes import same_shape
+from rrtik_ompl.model.world_settings import WorldSettings
 from rrtik_ompl.replanning.feed import Feed, Snapshot
 from rrtik_ompl.replanning.tick import Tick
 from rrtik_ompl.replanning.travels import travel_bound
-from rrtik_ompl.world.arrangement import arranged
+from rrtik_ompl.world.arrangement import arrangement_of
 from rrtik_ompl.world.problem import Problem
 
 FINEST_APPROACH = 2e-5  # [m]: of the motion of a pair, below which its middle stands for it
@@ -104,11 +104,10 @@ def run_violations(
         return ()
 
     snapshots = _snapshots(ticks, scenes, problem.world.scene, truth)
-    self_margin = float(problem.world.self_margin)
     worst = dict[tuple[int, str, str], RunViolation]()
 
     for period in _periods(snapshots, ticks[-1].time):
-        for violation in _PeriodJudge(problem.robot, ticks, period, self_margin, clearance).violations():
+        for violation in _PeriodJudge(problem.settings, ticks, period, clearance).violations():
             key = violation.tick, violation.first, violation.second
             if key not in worst or _lacking(violation) > _lacking(worst[key]):
                 worst[key] = violation
@@ -214,22 +213,20 @@ class _PeriodJudge:
     """Says what touches in a period of a run.
 
     Args:
-        robot: That moved.
+        settings: Of the world of the run; the scene is that of the period.
         ticks: Of the whole run.
         period: Of the run.
-        self_margin: What links, and what they hold, keep from each other [m].
         clearance: What moves that are called proven keep from obstacles beside their margins [m].
     """
 
-    def __init__(
-        self, robot: Robot, ticks: Sequence[Tick], period: _Period, self_margin: float, clearance: float
-    ) -> None:
+    def __init__(self, settings: WorldSettings, ticks: Sequence[Tick], period: _Period, clearance: float) -> None:
+        robot = settings.robot
         self._robot = robot
         self._ticks = ticks
         self._period = period
 
-        solids = arranged(robot, period.scene, self_margin)
-        self._bodies = solids.bodies.whole
+        solids = arrangement_of(replace(settings, scene=period.scene))
+        self._bodies = solids.bodies.as_tuple
         self._pairs = solids.pairs
         self._approach_weights = approach_weights(robot, self._bodies, self._pairs)
         self._pair_indices: NDArray[np.int64] = np.array(self._pairs, dtype=np.int64).reshape(-1, 2)

@@ -22,7 +22,7 @@ from rrtik_ompl.replanning.settings import PREDICTED_PLACES, ReplanSettings, mak
 from rrtik_ompl.replanning.start_and_goals import GoalFeed, check_start, every_goal, goal_now, held_pairs, sampling_box
 from rrtik_ompl.replanning.tick import Tick
 from rrtik_ompl.replanning.travels import MotionTracker, Travels, refuse_endless_turns, required_distances
-from rrtik_ompl.world.kept_clearance import CLEARANCE
+from rrtik_ompl.world.clearances import CLEARANCE
 from rrtik_ompl.world.moving_world import MovingWorld, check_held
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World

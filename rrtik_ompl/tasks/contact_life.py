@@ -25,8 +25,8 @@ from rrtik_ompl.geometry.collision.solids import is_mesh
 from rrtik_ompl.model.path import JointPath, path_through
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import Scene, Touching
+from rrtik_ompl.world.clearances import proved
 from rrtik_ompl.world.exact_checks import distance
-from rrtik_ompl.world.kept_clearance import proved
 from rrtik_ompl.world.proof import Prover
 from rrtik_ompl.world.route_check import violations_of
 from rrtik_ompl.world.world import World, form_of
@@ -231,7 +231,7 @@ def follow_contacts(
 
     for until in sorted(set(waypoint_of_place.values())):
         world_after = world_from(world, contacts, until)
-        if violations := violations_of(world_after, rows[until:]):
+        if violations := violations_of(world_after.checks, rows[until:]):
             fault = f"what has parted touches again: {violations[0].reason}"
             return FollowedContacts(path_through(path, rows[: until + 1]), (), (), fault, world_after)
 

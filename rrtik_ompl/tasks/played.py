@@ -16,7 +16,7 @@ from rrtik_ompl.model.judgement import Judged, PathContact, Verdict
 from rrtik_ompl.tasks import MoveTo, TaskPlan
 from rrtik_ompl.tasks.setting import world_of_motion
 from rrtik_ompl.tasks.timed import time_task
-from rrtik_ompl.world.path_contacts import contacts_at
+from rrtik_ompl.world.judgement import contacts_at
 from rrtik_ompl.world.route_check import as_it_stands
 from rrtik_ompl.world.world import World
 
@@ -110,10 +110,10 @@ def _judged(plan: TaskPlan, motions: NDArray[np.int64], rows: Matrix) -> Judged:
 
 def _contacts(world: World, ticks: NDArray[np.int64], rows: Matrix, faults: list[Vector]) -> Iterator[PathContact]:
     """What touches in the ticks of a motion, and at the library's faults of it, each in the tick that is nearest."""
-    yield from contacts_at(world, ticks.astype(np.float64), rows)
+    yield from contacts_at(world.checks, ticks.astype(np.float64), rows)
     for q in faults:
         tick = float(ticks[np.abs(rows - q).sum(axis=1).argmin()])
-        for contact in contacts_at(world, np.array([tick]), q[None]):
+        for contact in contacts_at(world.checks, np.array([tick]), q[None]):
             yield replace(contact, end=tick + 1.0)
 
 

@@ -22,7 +22,7 @@ from rrtik_ompl.tasks.contact_life import MotionContact, follow_contacts
 from rrtik_ompl.tasks.program import Step
 from rrtik_ompl.tasks.setting import world_of_motion
 from rrtik_ompl.tasks.stages import MoveTo
-from rrtik_ompl.world.kept_clearance import CLEARANCE, proved, proved_as_clear
+from rrtik_ompl.world.clearances import CLEARANCE, proved, proved_as_clear
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
 

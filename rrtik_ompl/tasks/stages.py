@@ -15,7 +15,7 @@ from rrtik_ompl.base.choices import one_of
 from rrtik_ompl.base.errors import InputError, listed, require
 from rrtik_ompl.base.poses import rigid
 from rrtik_ompl.model.goal import Goal, PoseGoal
-from rrtik_ompl.model.task_region import TaskRegion
+from rrtik_ompl.model.goal_kind import TaskRegion
 
 LineFrame: TypeAlias = Literal["world", "tip"]
 GripperState: TypeAlias = Literal["open", "close"]

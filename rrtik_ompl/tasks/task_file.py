@@ -30,8 +30,8 @@ from rrtik_ompl.files.sections import (
 from rrtik_ompl.files.strict_yaml import YamlDocument, read_yaml
 from rrtik_ompl.files.text import file_name
 from rrtik_ompl.model.goal import Goal
+from rrtik_ompl.model.goal_kind import TaskRegion
 from rrtik_ompl.model.robot import Robot
-from rrtik_ompl.model.task_region import TaskRegion
 from rrtik_ompl.problem_files.goal import GoalSection, Posture, StartSection, build_goal, goal_data
 from rrtik_ompl.problem_files.path_constraints import ConstraintSection, build_constraints, constraint_data
 from rrtik_ompl.problem_files.problem_values import WorldKeys

@@ -11,10 +11,10 @@ from numpy.typing import ArrayLike
 
 from rrtik_ompl.base.arrays import dimensions
 from rrtik_ompl.base.errors import InputError, listed
+from rrtik_ompl.model.goal_kind import TaskRegion
 from rrtik_ompl.model.path import JointPath, path_through
-from rrtik_ompl.model.task_region import TaskRegion
 from rrtik_ompl.tasks import SECONDS, MoveTo, Task
-from rrtik_ompl.world.kept_clearance import proved
+from rrtik_ompl.world.clearances import proved
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
 

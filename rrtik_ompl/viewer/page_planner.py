@@ -46,7 +46,7 @@ from rrtik_ompl.problem_files.problem import problem_data
 from rrtik_ompl.viewer.drawing.robot_picture import node_name
 from rrtik_ompl.viewer.page_fixed import packed, standing_parts
 from rrtik_ompl.viewer.story import dragged_tips, tip_entry
-from rrtik_ompl.world.kept_clearance import Clearances, clearances_between, search_form
+from rrtik_ompl.world.clearances import Clearances, clearances_between, search_form
 from rrtik_ompl.world.problem import Problem, densely_checked
 from rrtik_ompl.world.world import World
 

@@ -32,6 +32,7 @@ from rrtik_ompl.geometry.collision.shape_table import pieces
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import Obstacle, Scene, exchanged, pose_at
 from rrtik_ompl.model.shapes import Mesh
+from rrtik_ompl.model.world_settings import WorldSettings
 from rrtik_ompl.world.arm_cache import Spheres, arm_cache
 
 
@@ -77,7 +78,7 @@ class Arrangement:
     @cached_property
     def containment(self) -> Containment:
         """Which bodies can be wholly inside others."""
-        return Containment(self.bodies.whole, self.checked, [outer for outer, _ in self.covers()])
+        return Containment(self.bodies.as_tuple, self.checked, [outer for outer, _ in self.covers()])
 
     def moved(self, name: str, pose: ArrayLike | pin.SE3) -> tuple[Arrangement, tuple[int, ...]]:
         """The arrangement with an obstacle elsewhere.
@@ -110,16 +111,21 @@ class Arrangement:
         )
         return other, tuple(placements)
 
-    def with_room(self, clearance: float) -> Items[Body]:
+    def with_clearance(self, clearance: float) -> Items[Body]:
         """The bodies, with a clearance [m] added to the margins of obstacles."""
         if clearance == 0.0:
             return self.bodies
         return Items(
             tuple(
                 replace(body, margin=body.margin + clearance) if body.kind == "obstacle" else body
-                for body in self.bodies.whole
+                for body in self.bodies.as_tuple
             )
         )
+
+
+def arrangement_of(settings: WorldSettings) -> Arrangement:
+    """The solids of a world of some settings; see :func:`arranged`."""
+    return arranged(settings.robot, settings.scene, settings.self_margin)
 
 
 def arranged(robot: Robot, scene: Scene, self_margin: float) -> Arrangement:
@@ -130,10 +136,10 @@ def arranged(robot: Robot, scene: Scene, self_margin: float) -> Arrangement:
     """
     solids = link_bodies(robot, self_margin) + scene_bodies(robot, scene.at(0.0), self_margin)
     bodies = Items(with_contacts(robot, scene, solids))
-    pairs = colliding_pairs(robot, scene, bodies.whole)
+    pairs = colliding_pairs(robot, scene, bodies.as_tuple)
 
     moving, standing = by_motion(bodies, pairs)
-    arrays = body_arrays(bodies.whole)
+    arrays = body_arrays(bodies.as_tuple)
     in_contact = tuple(pair for pair in moving if pair in arrays.contacts) if arrays.contacts else ()
     checked = tuple(pair for pair in moving if pair not in arrays.contacts) if arrays.contacts else moving
 
@@ -145,7 +151,7 @@ def arranged(robot: Robot, scene: Scene, self_margin: float) -> Arrangement:
         checked,
         in_contact,
         weights=displacement_weights(robot, [body for body in bodies if body.kind != "obstacle"]),
-        always_colliding=fixed_contact(robot, bodies.whole, standing) is not None,
+        always_colliding=fixed_contact(robot, bodies.as_tuple, standing) is not None,
         self_margin=self_margin,
         covers=Once(arm_cache(robot).covers_of, bodies),
         approaches=Once(_approaches, robot, bodies, checked),

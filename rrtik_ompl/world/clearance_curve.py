@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +12,7 @@ from numpy.typing import NDArray
 from rrtik_ompl.base.arrays import Matrix, Vector, frozen
 from rrtik_ompl.model.judgement import FARTHEST, ClearanceCurve
 from rrtik_ompl.model.proof import Gap, Proof
-
-if TYPE_CHECKING:
-    from rrtik_ompl.world.world import World
+from rrtik_ompl.world.row_checks import RowChecks
 
 PLACES = 240  # on a path, beside its waypoints
 NEAREST = 1e-5  # [m] of clearances that are told apart
@@ -40,19 +37,24 @@ class Course:
     prove: Callable[[float | None], Proof]
 
 
-def clearance_along(world: World, waypoints: Matrix) -> ClearanceCurve:
+def clearance_along(checks: RowChecks, waypoints: Matrix) -> ClearanceCurve:
     """The curve of a path, waypoints of shape (k, dof), at places spread evenly over how far the arm moves."""
-    return clearance_on(world, course_along(world, waypoints))
+    return clearance_on(checks, course_along(checks, waypoints))
 
 
-def course_along(world: World, waypoints: Matrix) -> Course:
+def course_along(checks: RowChecks, waypoints: Matrix) -> Course:
     """A path, waypoints of shape (k, dof), as a course; a single one is a motion that stands still."""
     rows = np.vstack([waypoints, waypoints]) if len(waypoints) == 1 else waypoints
-    motions, shares, _ = places_along(world, rows)
-    return Course(motions, shares, partial(_between, rows), lambda clearance: world.prove(rows, clearance=clearance))
+    motions, shares, _ = places_along(checks, rows)
+
+    def prove(clearance: float | None) -> Proof:
+        required_clearance = checks.settings.required_clearance if clearance is None else clearance
+        return checks.prover.route(rows, clearance=required_clearance)
+
+    return Course(motions, shares, partial(_between, rows), prove)
 
 
-def clearance_on(world: World, course: Course) -> ClearanceCurve:
+def clearance_on(checks: RowChecks, course: Course) -> ClearanceCurve:
     """The curve of a course.
 
     The least distance is that of the whole course, as far as it is proven free, and not of the places alone: proofs
@@ -61,7 +63,7 @@ def clearance_on(world: World, course: Course) -> ClearanceCurve:
     proof = course.prove(None)
     unproven = tuple(gap.motion for gap in proof.unproven)
 
-    levels, pairs = _proven_levels(world, course.at(course.motions, course.shares))
+    levels, pairs = _proven_levels(checks, course.at(course.motions, course.shares))
     levels_of_proven = levels[~np.isin(course.motions, unproven)]
 
     # The last level below what is to be kept, or -1.
@@ -73,7 +75,7 @@ def clearance_on(world: World, course: Course) -> ClearanceCurve:
     if gaps:
         motions = np.array([gap.motion for gap, _ in gaps])
         shares = np.array([gap.share for gap, _ in gaps])
-        levels_of_gaps, _ = _proven_levels(world, course.at(motions, shares))
+        levels_of_gaps, _ = _proven_levels(checks, course.at(motions, shares))
         levels = np.append(levels, np.minimum(levels_of_gaps, [level for _, level in gaps]))
         pairs = (*pairs, *((gap.first, gap.second) for gap, _ in gaps))
 
@@ -118,23 +120,23 @@ def _nearest_of_proven(course: Course, level_of_places: int, unproven: set[int])
     return [(gap, proven_level) for gap in gaps]
 
 
-def places_along(world: World, waypoints: Matrix) -> tuple[NDArray[np.int64], Vector, Matrix]:
+def places_along(checks: RowChecks, waypoints: Matrix) -> tuple[NDArray[np.int64], Vector, Matrix]:
     """Places on a path, waypoints of shape (k, dof), spread evenly over how far the arm moves; the last one its end.
 
     Returns:
         The motion that each is on, shape (m,); where on it, from 0 to 1, shape (m,); configurations, shape (m, dof).
     """
     rows = np.vstack([waypoints, waypoints]) if len(waypoints) == 1 else waypoints
-    travel = np.abs(np.diff(rows, axis=0)) @ world.weights
+    travel = np.abs(np.diff(rows, axis=0)) @ checks.solids.weights
     counts = np.maximum(np.ceil(PLACES * travel / max(float(travel.sum()), 1e-300)), 1.0).astype(np.int64)
     motions = np.append(np.repeat(np.arange(len(counts)), counts), len(counts) - 1)
     shares = np.append(np.concatenate([np.arange(n) / n for n in counts]), 1.0)
     return motions, shares, _between(rows, motions, shares)
 
 
-def distances_at(world: World, places: Matrix) -> Vector:
+def distances_at(checks: RowChecks, places: Matrix) -> Vector:
     """What each configuration, shape (m, dof), is proven to keep from obstacles, of the distances told apart [m]."""
-    return np.asarray(LEVELS[np.maximum(_proven_levels(world, places)[0], 0)])
+    return np.asarray(LEVELS[np.maximum(_proven_levels(checks, places)[0], 0)])
 
 
 def _between(rows: Matrix, motions: NDArray[np.int64], shares: Vector) -> Matrix:
@@ -143,7 +145,7 @@ def _between(rows: Matrix, motions: NDArray[np.int64], shares: Vector) -> Matrix
     return configurations
 
 
-def _proven_levels(world: World, places: Matrix) -> tuple[NDArray[np.int64], tuple[tuple[str, str], ...]]:
+def _proven_levels(checks: RowChecks, places: Matrix) -> tuple[NDArray[np.int64], tuple[tuple[str, str], ...]]:
     """The largest level that each configuration, shape (m, dof), is proven to keep, -1 for none; the nearest pair."""
     proven_levels = np.full(len(places), -1)
     refused_levels = np.full(len(places), len(LEVELS))
@@ -153,7 +155,7 @@ def _proven_levels(world: World, places: Matrix) -> tuple[NDArray[np.int64], tup
         tried_levels = (proven_levels[undecided] + refused_levels[undecided]) // 2
         for level in np.unique(tried_levels).tolist():
             group = undecided[tried_levels == level]
-            gaps = world.prover.still_gaps(places[group], clearance=float(LEVELS[level]))
+            gaps = checks.prover.still_gaps(places[group], clearance=float(LEVELS[level]))
             is_proven = np.ones(len(group), dtype=bool)
             for gap in gaps:
                 is_proven[gap.motion] = False

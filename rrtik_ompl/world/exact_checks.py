@@ -55,8 +55,8 @@ class ExactChecker:
     @collector_waits
     def of(cls, solids: Arrangement, clearance: float) -> ExactChecker:
         """Checks of an arrangement that keep a clearance [m] from obstacles on top of their margins."""
-        bodies = solids.with_room(clearance)
-        packed = arm_cache(solids.robot).pack(bodies.whole, solids.checked, solids.covers())
+        bodies = solids.with_clearance(clearance)
+        packed = arm_cache(solids.robot).pack(bodies.as_tuple, solids.checked, solids.covers())
         return cls(solids, clearance, bodies, TakenTables(packed), _data=working_memory(solids.robot.model))
 
     @property
@@ -97,7 +97,7 @@ class ExactChecker:
         return replace(self, solids=solids, bodies=bodies, tables=tables, motions=motions)
 
     def _packed(self) -> FastWorld:
-        return arm_cache(self._robot).pack(self.bodies.whole, self.solids.checked, self.solids.covers())
+        return arm_cache(self._robot).pack(self.bodies.as_tuple, self.solids.checked, self.solids.covers())
 
     @property
     def _robot(self) -> Robot:

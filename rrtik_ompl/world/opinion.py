@@ -46,13 +46,13 @@ def opinion_on(world: World, start: ArrayLike, goal: ArrayLike, waypoints: Array
     path = JointPath.of(world.robot, waypoints)
 
     proof = world.prove(path.waypoints)
-    faults = () if proof.proven else violations_of(world, path.waypoints)  # a path that is proven has none
+    faults = () if proof.proven else violations_of(world.checks, path.waypoints)  # a path that is proven has none
     if faults:
         return Opinion("refused", f"refused: move {faults[0].edge + 1}: {faults[0].reason}")
     if (path.start != start).any() or (path.end != goal).any():
         return Opinion("refused", "refused: the path does not lead from the start to the goal")
 
-    text = how_checked(world, path.waypoints, proof)
+    text = how_checked(world.checks, path.waypoints, proof)
     if world.scene.obstacles:
-        text += f"; {clearance_along(world, path.waypoints)}"
+        text += f"; {clearance_along(world.checks, path.waypoints)}"
     return Opinion("proven" if proof.proven else "checked", text)

@@ -15,12 +15,11 @@ from rrtik_ompl.base.choices import Accuracy
 from rrtik_ompl.base.copies import as_value, changed, in_notebook, restored
 from rrtik_ompl.base.errors import InputError, ProblemError, Renamed, listed, require
 from rrtik_ompl.base.poses import rigid
-from rrtik_ompl.constraints.contradiction import contradiction
-from rrtik_ompl.constraints.goal_regions import goal_regions
-from rrtik_ompl.constraints.held_regions import HeldRegions, held_regions
+from rrtik_ompl.constraints.held_regions import HeldRegions, goal_regions, held_regions
+from rrtik_ompl.constraints.residuals import contradiction
 from rrtik_ompl.model.goal import Goal, JointGoal, PoseGoal
+from rrtik_ompl.model.goal_kind import TaskRegion
 from rrtik_ompl.model.robot import Robot
-from rrtik_ompl.model.task_region import TaskRegion
 from rrtik_ompl.model.world_settings import WorldSettings
 from rrtik_ompl.world.route_check import verification_resolution
 from rrtik_ompl.world.world import World, form_of, like
@@ -137,7 +136,7 @@ class Problem:
     @property
     def constraints(self) -> tuple[TaskRegion, ...]:
         """Regions that a frame must not leave on the whole path, those ``from_start`` placed in the world."""
-        return self.settings.constraints
+        return tuple(self.settings.constraints)
 
     def with_resolution(self, motion_resolution: float) -> Problem:
         """The same problem, its motions checked in steps of another size [m] (:meth:`World.with_resolution`)."""
@@ -180,7 +179,7 @@ def known_problem(world: World, start: Vector, goal: JointGoal | Vector) -> Prob
 def densely_checked(problem: Problem) -> Problem:
     """The same problem, its motions checked as densely as by the second check of a path."""
     world = problem.world
-    return problem_in(problem, form_of(world, motion_resolution=verification_resolution(world)))
+    return problem_in(problem, form_of(world, motion_resolution=verification_resolution(world.settings)))
 
 
 def problem_in(problem: Problem, world: World) -> Problem:

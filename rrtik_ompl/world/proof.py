@@ -2,27 +2,44 @@
 
 The kernels (:mod:`rrtik_ompl.kernels.proof.proof_kernels`) share the description of the bodies with the checks that
 planners use, and nothing else: their forward kinematics are their own, in float64, and so are their distances.
+
+Between bodies in contact, which overlap, there is no plane that a search for their distance would find, but a proof
+needs none that parts them: one beyond which neither reaches deeper than it may. Coal knows that one, by the normal of
+the contact, and :func:`suggest_planes` lets the kernels try it first.
+
+Two links whose convex pieces stick out of their meshes are proven apart by coal's distances where kernels cannot
+(:class:`CoalProof`), after Schwarzer, Saha and Latombe [16]: bodies whose distance at one place of a motion is larger
+than what they can approach each other on an interval around it are apart in all of that interval. Coal knows surfaces
+alone: whether one body is wholly inside another is asked once a motion, for a closed surface that is never met keeps
+what is inside.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache, partial
 from typing import ClassVar, TypeAlias
 
+import coal
 import numpy as np
+import pinocchio as pin
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector, frozen, in_blocks
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.constraints.held_regions import HeldRegions
-from rrtik_ompl.geometry.collision.bodies import Body
+from rrtik_ompl.geometry.collision.bodies import DISTANCE_TOLERANCE, Body
 from rrtik_ompl.geometry.collision.cloud_solid import CloudSolid
+from rrtik_ompl.geometry.collision.containment import Containment
 from rrtik_ompl.geometry.collision.digests import robot_digest, scene_digest, world_digest
-from rrtik_ompl.geometry.collision.solids import of_each
+from rrtik_ompl.geometry.collision.distances import measured
+from rrtik_ompl.geometry.collision.motion_bound import approach_weights
+from rrtik_ompl.geometry.collision.solids import around, is_closed, is_mesh, of_each
+from rrtik_ompl.kernels.proof import layout
 from rrtik_ompl.kernels.proof.layout import ProofTable
+from rrtik_ompl.kernels.proof.log import logged
 from rrtik_ompl.kernels.proof.packing import ProofPairs, proof_pairs
 from rrtik_ompl.kernels.proof.taken_proof import TakenProof
 from rrtik_ompl.kernels.simd.library import library
@@ -31,8 +48,6 @@ from rrtik_ompl.model.certificate import Certificate, MotionEntries
 from rrtik_ompl.model.proof import Gap, Proof
 from rrtik_ompl.model.robot import Robot, inside_limits
 from rrtik_ompl.world.arm_cache import MAX_ROBOTS, Pairs, strokes
-from rrtik_ompl.world.coal_proof import CoalProof, Told, distance_between
-from rrtik_ompl.world.contact_planes import suggest_planes
 
 LARGEST_VALUE = 1e3  # [rad] or [m] of a joint, up to which rounding is bounded
 PROOF_KERNELS = "proof.proof_kernels"
@@ -40,7 +55,13 @@ SPARE = 1e-10  # [m] that a proof which is written down keeps beyond ROOM: who v
 MOTIONS_AT_ONCE = 64  # in one call of the kernel, between two looks at the clock; Ctrl-C waits no longer
 FEW = 200  # configurations
 PROVEN, NOT_LOOKED_AT = -1, -2  # in the place of a pair's number
+MOST_DISTANCES = 400  # distances for a pair in one motion: some tenths of a second
+DEEPEST_LEVEL = 9  # level of an interval: 1/512 of a motion
+APPROACH_SPARE = 1.01  # of the way that bodies come nearer: who verifies it may bound that by other balls
+FAR_APART = 1e6  # [m]; what may overlap by that is apart
 DOUBLE, INT = 8, 4  # bytes of a number
+Numbers: TypeAlias = NDArray[np.int32]
+Told: TypeAlias = tuple[MotionEntries, NDArray[np.int64]]  # by kernels; links and intervals that coal measured
 Ends: TypeAlias = tuple[Matrix, Matrix]  # where motions begin, and where they end
 
 
@@ -166,7 +187,7 @@ class Prover:
             return None
 
         packed = self._packed_for(clearance, SPARE)
-        coal = CoalProof(self.robot, self.bodies, packed)
+        by_coal = CoalProof(self.robot, self.bodies, packed)
         logs = list[Told]()
         pair = np.zeros(1, dtype=np.int32)
         place = np.zeros(1)
@@ -176,7 +197,7 @@ class Prover:
             run = partial(kernels.prove, packed.table.address, *arguments)
             if packed.touching:
                 suggest_planes(self.robot, self.bodies, packed, rows[k : k + 2])
-            logs.append(coal.logged(rows[k : k + 2], pair, place, run))
+            logs.append(by_coal.logged(rows[k : k + 2], pair, place, run))
             if pair[0] != PROVEN:
                 return None
         return logs
@@ -265,7 +286,7 @@ class Prover:
             return [Gap(k, float("nan"), "", "") for k in range(count)]
 
         packed = self._packed_for(*distances)
-        coal = self._coal_proof(packed)
+        by_coal = self._coal_proof(packed)
         address = packed.table.address
         pairs = np.full(count, NOT_LOOKED_AT, dtype=np.int32)
         places = np.full(count, np.nan)
@@ -296,9 +317,9 @@ class Prover:
         elif open_count == 0 and looked_at == count:
             return []
 
-        for k in (k for k in np.flatnonzero(pairs >= 0).tolist() if coal.links[pairs[k]]):
+        for k in (k for k in np.flatnonzero(pairs >= 0).tolist() if by_coal.links[pairs[k]]):
             motion = np.stack([rows[0][k], rows[1][k]])
-            coal.settle(motion, pairs[k : k + 1], places[k : k + 1], partial(prove, k, 1))
+            by_coal.settle(motion, pairs[k : k + 1], places[k : k + 1], partial(prove, k, 1))
         return [self._gap(packed, k, int(pairs[k]), float(places[k])) for k in np.flatnonzero(pairs != PROVEN).tolist()]
 
     def _packed_for(self, clearance: float, slack: float) -> ProofPairs:
@@ -347,3 +368,169 @@ def _entries(log: MotionEntries, measured_intervals: NDArray[np.int64]) -> Motio
     intervals = np.vstack([intervals[needed], measured_intervals[:, 2:]])
     normals = np.vstack([log.normals[needed], np.zeros((len(measured_intervals), 3))])
     return MotionEntries(frozen(solids, np.int64), frozen(intervals, np.int64), frozen(normals))
+
+
+class CoalProof:
+    """What kernels leave open of motions, settled by coal where it is about two links, one of them a closed mesh.
+
+    Attributes:
+        packed: The table that the kernels read.
+        links: Which pairs of it are such, shape (pairs,).
+
+    Args:
+        robot: The arm.
+        bodies: Its bodies and others.
+        packed: See above.
+    """
+
+    def __init__(self, robot: Robot, bodies: Sequence[Body], packed: ProofPairs) -> None:
+        self._robot = robot
+        self._bodies = bodies
+        self.packed = packed
+        is_of_arm = [body.kind != "obstacle" for body in bodies]
+        is_mesh_of_arm = np.array(
+            [of_arm and is_mesh(body.geometry) for of_arm, body in zip(is_of_arm, bodies, strict=True)], dtype=bool
+        )
+        is_open_mesh = np.array(
+            [mesh and not is_closed(bodies[k].geometry) for k, mesh in enumerate(is_mesh_of_arm)], dtype=bool
+        )
+        has_closed_mesh = is_mesh_of_arm[packed.bodies].any(axis=1) & ~is_open_mesh[packed.bodies].any(axis=1)
+        self.links: Mask = has_closed_mesh & ~packed.beside_obstacle & ~_groups(packed)
+
+    def settle(self, motion: Matrix, pair: Numbers, place: Vector, again: Callable[[], object]) -> NDArray[np.int64]:
+        """Compare links by coal until nothing is left open of a motion, shape (2, dof), or what it cannot settle.
+
+        Args:
+            motion: Its ends.
+            pair: Number of the pair of links that is not proven apart, shape (1,); written, -1 for none.
+            place: Where, shape (1,); written.
+            again: Lets the kernels prove the motion once more, and write both.
+
+        Returns:
+            The numbers of two links, level and number of an interval in whose middle they are measured, shape (n, 4).
+        """
+        margins = self.packed.table.margins
+        bodies = self.packed.bodies
+        solids = self.packed.sides
+
+        original_margins = margins.copy()
+        intervals_of_links = list[list[int]]()
+        try:
+            while pair[0] >= 0 and self.links[pair[0]]:
+                intervals = self._intervals(motion, int(pair[0]), float(place[0]))
+                if not intervals:
+                    break
+                intervals_of_links += [[*solids[pair[0], ::2].tolist(), *interval] for interval in intervals]
+                margins[self.links & (bodies == bodies[pair[0]]).all(axis=1)] = -FAR_APART
+                again()
+        finally:
+            margins[:] = original_margins
+
+        return np.array(intervals_of_links, dtype=np.int64).reshape(-1, 4)
+
+    def logged(self, motion: Matrix, pair: Numbers, place: Vector, run: Callable[[], object]) -> Told:
+        """What kernels tell while they prove a motion, and :meth:`settle` of it; arguments as there."""
+        logs = [logged(self.packed, run)]
+        intervals_of_links = self.settle(motion, pair, place, lambda: logs.append(logged(self.packed, run)))
+        return logs[-1], intervals_of_links
+
+    def _intervals(self, motion: Matrix, row: int, place: float) -> list[tuple[int, int]]:
+        """Intervals that cover a motion, on each of which the bodies of a pair are apart, found by bisection.
+
+        Args:
+            motion: Its ends, shape (2, dof).
+            row: Of the pair in the table.
+            place: The share of the motion where kernels gave up, which is looked at first.
+
+        Returns:
+            Level and number of each interval; no interval if the two are not shown apart in all of the motion.
+        """
+        pair = [self._bodies[k] for k in self.packed.bodies[row].tolist()]
+        required_gap = float(self.packed.table.margins[row]) + DISTANCE_TOLERANCE
+        approach = APPROACH_SPARE * float(
+            approach_weights(self._robot, pair, [(0, 1)])[0] @ np.abs(motion[1] - motion[0])
+        )
+        if required_gap <= 0.0:  # they may overlap, and coal measures surfaces alone
+            return []
+        if Containment((*pair,), ((0, 1),)).holds((0, 1), self._robot.chain.joint_frames(motion[:1])[0]):
+            return []
+
+        def spare_at(share: float) -> float:
+            """How much more than they must the two are apart at a share of the motion [m]."""
+            return _gap_at(self._robot, pair, motion[0] + share * (motion[1] - motion[0])) - required_gap
+
+        if spare_at(place) <= 0.0:
+            return []
+
+        intervals = list[tuple[int, int]]()
+        undecided = [(0, 0)]
+        measured_count = 0
+        while undecided and measured_count < MOST_DISTANCES:
+            level, number = undecided.pop()
+            measured_count += 1
+            width = 0.5**level
+            spare = spare_at((number + 0.5) * width)
+            apart_on_interval = spare > 0.5 * approach * width
+            if spare <= 0.0 or (not apart_on_interval and level == DEEPEST_LEVEL):
+                return []
+            if apart_on_interval:
+                intervals.append((level, number))
+            else:
+                undecided += [(level + 1, 2 * number + 1), (level + 1, 2 * number)]
+
+        return [] if undecided else intervals
+
+
+def distance_between(robot: Robot, bodies: Sequence[Body], names: tuple[str, str], q: Vector) -> float:
+    """The distance between bodies of two names at q, shape (dof,) [m]; nan if there are none."""
+    first, second = ([body for body in bodies if body.name == name] for name in names)
+    return min((_gap_at(robot, [a, b], q) for a in first for b in second), default=float("nan"))
+
+
+def _gap_at(robot: Robot, pair: Sequence[Body], q: Vector) -> float:
+    return next(measured(pair, [(0, 1)], robot.chain.joint_frames(q[None])[0], near_only=False)).distance
+
+
+def _groups(packed: ProofPairs) -> Mask:
+    """Which rows of the table are groups of bodies: these are made of pairs that come before them."""
+    firsts = packed.table.pairs.reshape(-1, layout.PAIR_SIZE)[:, layout.PARTS_FIRST]
+    groups: Mask = (packed.sides[:, [1, 3]] < 0).all(axis=1) & (firsts < np.arange(len(firsts)))
+    return groups
+
+
+def suggest_planes(robot: Robot, bodies: Sequence[Body], packed: ProofPairs, ends: Matrix) -> None:
+    """Let the kernels try the planes of contacts first, where a motion begins or ends, shape (2, dof)."""
+    frames = robot.chain.joint_frames(ends)
+    normals_of_rows = packed.table.ways.reshape(-1, 3)
+    bases = packed.table.pairs.reshape(-1, layout.PAIR_SIZE)[:, layout.PAIR_BASE]
+    normal_of_solids: dict[tuple[int, int], tuple[int, Vector]] = {}
+
+    for row in packed.touching:
+        first, second = packed.sides[row, ::2].tolist()
+        if (first, second) not in normal_of_solids:
+            normal_of_solids[first, second] = _normal((bodies[second], bodies[first]), frames)
+        end, normal = normal_of_solids[first, second]
+        normals_of_rows[row] = frames[end, bases[row], :3, :3].T @ normal
+
+
+def _normal(pair: tuple[Body, Body], frames: Matrix) -> tuple[int, Vector]:
+    """Where two bodies are nearer to each other, 0 or 1, and there the unit vector from the first to the second."""
+    if any(isinstance(body.geometry, CloudSolid) for body in pair):
+        return 0, np.zeros(3)  # kernels look for their own
+
+    least_distance = np.inf
+    nearest_end = 0
+    normal = np.zeros(3)
+
+    for end in range(len(frames)):
+        poses = (pin.SE3(frames[end, body.joint]) * body.placement for body in pair)
+        first, second = (coal.Transform3s(pose.rotation, pose.translation) for pose in poses)
+        solids = around(pair[0].geometry), first, around(pair[1].geometry), second
+
+        result = coal.DistanceResult()
+        if coal.distance(*solids, coal.DistanceRequest(), result) < least_distance:
+            least_distance = result.min_distance
+            nearest_end = end
+            normal = np.array(result.normal)
+
+    return nearest_end, normal

@@ -13,7 +13,7 @@ from rrtik_ompl.kernels import FREE, FastWorld
 from rrtik_ompl.kernels.search.motions.motion_table import FastMotions
 from rrtik_ompl.kernels.simd.library import library
 from rrtik_ompl.model.robot import Robot
-from rrtik_ompl.world.kept_clearance import keeping
+from rrtik_ompl.world.clearances import keeping
 from rrtik_ompl.world.motion_queries import MotionQueries, has_kernels
 from rrtik_ompl.world.world import World
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,33 +16,31 @@ from rrtik_ompl.model.judgement import Violation
 from rrtik_ompl.model.proof import Proof
 from rrtik_ompl.model.scene import Scene
 from rrtik_ompl.model.transitions import in_parts, subdivided
-from rrtik_ompl.model.world_settings import FINEST_RESOLUTION
-
-if TYPE_CHECKING:
-    from rrtik_ompl.world.world import World
+from rrtik_ompl.model.world_settings import FINEST_RESOLUTION, WorldSettings
+from rrtik_ompl.world.row_checks import RowChecks
 
 VERIFICATION_DENSITY = 2.0  # how many times finer than the motion resolution a motion is checked again
 MAX_CHECKS = 30_000_000  # of a path; more than that take minutes
 AT_ONCE = 200_000  # of them, so that a long path needs no more memory than a short one
 
 
-def verification_resolution(world: World) -> float:
+def verification_resolution(settings: WorldSettings) -> float:
     """Largest step of any point of the arm between two configurations of the second check [m]."""
-    return max(world.motion_resolution / VERIFICATION_DENSITY, FINEST_RESOLUTION)
+    return max(settings.motion_resolution / VERIFICATION_DENSITY, FINEST_RESOLUTION)
 
 
-def violations_of(world: World, rows: Matrix, resolution: float | None = None) -> tuple[Violation, ...]:
+def violations_of(checks: RowChecks, rows: Matrix, resolution: float | None = None) -> tuple[Violation, ...]:
     """As :meth:`rrtik_ompl.World.violations`, of waypoints that are trusted, shape (k, dof)."""
-    step = verification_resolution(world) if resolution is None else resolution
-    return route_violations(world, np.vstack([rows, rows]) if len(rows) == 1 else rows, step)
+    step = verification_resolution(checks.settings) if resolution is None else resolution
+    return route_violations(checks, np.vstack([rows, rows]) if len(rows) == 1 else rows, step)
 
 
-def motion_taken(world: World, a: Vector, b: Vector) -> bool:
+def motion_taken(checks: RowChecks, a: Vector, b: Vector) -> bool:
     """Whether a motion is free in the world's own steps, and the second check takes it as part of a path."""
     rows = np.stack([a, b])
-    if not world.checks.motions_free(rows[:1], rows[1:])[0]:
+    if not checks.motions_free(rows[:1], rows[1:])[0]:
         return False
-    return not route_violations(world, rows, verification_resolution(world))
+    return not route_violations(checks, rows, verification_resolution(checks.settings))
 
 
 def as_it_stands(scene: Scene) -> str:
@@ -53,80 +50,80 @@ def as_it_stands(scene: Scene) -> str:
     return ", with moving obstacles as they stand at time 0 (replan and plan_in_time go by their motion)"
 
 
-def how_checked(world: World, rows: Matrix, given_proof: Proof | None = None) -> str:
+def how_checked(checks: RowChecks, rows: Matrix, given_proof: Proof | None = None) -> str:
     """How the second check sees that the motions between waypoints, shape (k, dof), are free, in a few words."""
     proof = given_proof
-    if proof is None or not proof.proven or proof.clearance < world.settings.kept:
-        proof = world.prover.route(rows, clearance=world.settings.kept)
+    if proof is None or not proof.proven or proof.clearance < checks.settings.required_clearance:
+        proof = checks.prover.route(rows, clearance=checks.settings.required_clearance)
 
     if proof.proven:
-        margins = "its margins and " if any(obstacle.margin for obstacle in world.scene.obstacles) else ""
+        margins = "its margins and " if any(obstacle.margin for obstacle in checks.settings.scene.obstacles) else ""
         clearance = f", {margins}{1e3 * proof.clearance:g} mm clear of every obstacle" if proof.clearance else ""
-        return f"proven free at every configuration{clearance}{as_it_stands(world.scene)}"
+        return f"proven free at every configuration{clearance}{as_it_stands(checks.settings.scene)}"
 
     unproven_count = len(proof.unproven)
     first = proof.unproven[0]
     where = f", first motion {first.motion + 1}" + (f" ('{first.first}' and '{first.second}')" if first.second else "")
-    step = f"checked every {1e3 * verification_resolution(world):g} mm"
+    step = f"checked every {1e3 * verification_resolution(checks.settings):g} mm"
     proven = f"{proof.motions - unproven_count} of {proof.motions} motions proven free"
-    return f"{proven}, the others {step}{where}{as_it_stands(world.scene)}"
+    return f"{proven}, the others {step}{where}{as_it_stands(checks.settings.scene)}"
 
 
-def route_violations(world: World, rows: Matrix, resolution: float) -> tuple[Violation, ...]:
+def route_violations(checks: RowChecks, rows: Matrix, resolution: float) -> tuple[Violation, ...]:
     """The first violation of every motion between waypoints that has one.
 
     Args:
-        world: The world.
+        checks: Of the world.
         rows: Waypoints, two at least, shape (k, dof).
         resolution: Largest step of any point of the arm between two checks of a motion that is not proven [m].
 
     Raises:
         InputError: If the path is too long for its checks.
     """
-    if world.constraints is not None:
-        breaches = _not_held(world.constraints, rows)
-        collisions = route_violations(world.unheld, rows, resolution)
+    if checks.constraints is not None:
+        breaches = _not_held(checks.constraints, rows)
+        collisions = route_violations(checks.unheld, rows, resolution)
         edges = {violation.edge for violation in breaches}
         violations = [*breaches, *(violation for violation in collisions if violation.edge not in edges)]
         return tuple(sorted(violations, key=lambda violation: violation.edge))
 
-    counts = _steps(world, rows, resolution)
+    counts = _steps(checks, rows, resolution)
     if counts.sum() > MAX_CHECKS:
         raise InputError(
             f"path: {counts.sum():.1e} checks are too many (at most {MAX_CHECKS:.0e}); "
             f"raise motion_resolution, or check whether the joint values are rad and m"
         )
 
-    unproven = np.flatnonzero(~world.prover.proven(rows[:-1], rows[1:], clearance=world.settings.kept))
+    unproven = np.flatnonzero(~checks.prover.proven(rows[:-1], rows[1:], clearance=checks.settings.required_clearance))
     violations = []
     for run in np.split(unproven, np.flatnonzero(np.diff(unproven) > 1) + 1) if len(unproven) else ():
-        violations += _sampled(world, rows, counts, run)
-    return tuple(violations if world.settings.proving is None else _with_unproven(world, rows, unproven, violations))
+        violations += _sampled(checks, rows, counts, run)
+    return tuple(violations if checks.settings.proving is None else _with_unproven(checks, rows, unproven, violations))
 
 
-def _steps(world: World, rows: Matrix, resolution: float) -> Vector:
+def _steps(checks: RowChecks, rows: Matrix, resolution: float) -> Vector:
     """In how many steps each motion between waypoints is checked, shape (k - 1,); one by one, as everywhere."""
     pairs = pairwise(rows[:, None])
-    return np.array([step_counts(a, b, world.weights, resolution)[0] for a, b in pairs], dtype=np.float64)
+    return np.array([step_counts(a, b, checks.solids.weights, resolution)[0] for a, b in pairs], dtype=np.float64)
 
 
 def _with_unproven(
-    world: World, rows: Matrix, unproven: NDArray[np.int64], violations: list[Violation]
+    checks: RowChecks, rows: Matrix, unproven: NDArray[np.int64], violations: list[Violation]
 ) -> Iterator[Violation]:
     """What was found, and each other motion that is not proven to keep what it must, of those given by numbers."""
     violation_of_edge = {violation.edge: violation for violation in violations}
-    clearance = world.settings.proving or 0.0
-    proven = world.prover.proven(rows[unproven], rows[unproven + 1], clearance=clearance)
+    clearance = checks.settings.proving or 0.0
+    proven = checks.prover.proven(rows[unproven], rows[unproven + 1], clearance=clearance)
     for edge, is_proven in zip(unproven.tolist(), proven.tolist(), strict=True):
         if edge in violation_of_edge:
             yield violation_of_edge[edge]
         elif not is_proven:
-            yield Violation(edge, frozen(rows[edge]), not_proven(world))
+            yield Violation(edge, frozen(rows[edge]), not_proven(checks.settings))
 
 
-def not_proven(world: World) -> str:
+def not_proven(settings: WorldSettings) -> str:
     """What is said of a motion that has to be proven, and is not."""
-    millimetres = 1e3 * (world.settings.proving or 0.0)
+    millimetres = 1e3 * (settings.proving or 0.0)
     return f"not proven to keep {millimetres:.4g} mm from every obstacle" if millimetres else "not proven free"
 
 
@@ -139,14 +136,14 @@ def _not_held(constraints: HeldRegions, rows: Matrix) -> list[Violation]:
     ]
 
 
-def _sampled(world: World, rows: Matrix, counts: Vector, run: NDArray[np.int64]) -> Iterator[Violation]:
+def _sampled(checks: RowChecks, rows: Matrix, counts: Vector, run: NDArray[np.int64]) -> Iterator[Violation]:
     """The violations of consecutive motions, whose numbers are given, checked in steps."""
     for part in in_parts(counts[run], AT_ONCE):
         edges = run[part]
         samples, owners = subdivided(rows[edges[0] : edges[-1] + 2], counts[edges])
-        refused = np.flatnonzero(~world.checks.certified(samples))
+        refused = np.flatnonzero(~checks.certified(samples))
         # The point at which a part begins is the last one of the part before.
         refused = refused[(refused > 0) | (part[0] == 0)]
         _, first = np.unique(owners[refused], return_index=True)
         for k in refused[first]:
-            yield Violation(int(edges[owners[k]]), frozen(samples[k]), world.explain(samples[k]))
+            yield Violation(int(edges[owners[k]]), frozen(samples[k]), checks.explain(samples[k]))

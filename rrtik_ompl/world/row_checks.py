@@ -6,25 +6,57 @@ has rows that are float64, finite and of shape (m, dof) already, and asks here a
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-from rrtik_ompl.base.arrays import Mask, Matrix, in_blocks
+import pinocchio as pin
+from numpy.typing import ArrayLike
+
+from rrtik_ompl.base.arrays import Mask, Matrix, Vector, in_blocks
+from rrtik_ompl.base.copies import changed
+from rrtik_ompl.base.errors import MeshWarning
 from rrtik_ompl.base.sharing import Shared
-from rrtik_ompl.constraints.held_regions import HeldRegions
+from rrtik_ompl.constraints.held_regions import HeldRegions, held_regions
 from rrtik_ompl.geometry.collision.certificate import Certificate
+from rrtik_ompl.geometry.collision.distances import inside, measured
 from rrtik_ompl.kernels.search.motions.motion_table import step_counts
-from rrtik_ompl.model.robot import inside_limits
+from rrtik_ompl.model.goal_kind import TaskRegion
+from rrtik_ompl.model.judgement import Contact
+from rrtik_ompl.model.robot import Robot, inside_limits
+from rrtik_ompl.model.scene import AttachedObject, Scene
 from rrtik_ompl.model.world_settings import WorldSettings
-from rrtik_ompl.world.arrangement import Arrangement
+from rrtik_ompl.world.arrangement import Arrangement, arranged
 from rrtik_ompl.world.exact_checks import ExactChecker, one_way
 from rrtik_ompl.world.proof import Prover
 
 
+def _prover_of(solids: Arrangement, constraints: HeldRegions | None) -> Prover:
+    if constraints is not None:
+        return PROVERS.of(solids, None).holding(constraints)
+    always_colliding = solids.always_colliding
+    return Prover(
+        solids.robot,
+        solids.bodies,
+        solids.moving,
+        self_margin=solids.self_margin,
+        always_colliding=always_colliding,
+    )
+
+
+def _held_regions(robot: Robot, attached: tuple[AttachedObject, ...], regions: tuple[TaskRegion, ...]) -> HeldRegions:
+    return held_regions(robot, Scene(attached=attached), regions, None)
+
+
 def _second_checker(solids: Arrangement, clearance: float) -> Certificate:
-    return Certificate(solids.robot, solids.with_room(clearance).whole, solids.pairs)
+    return Certificate(solids.robot, solids.with_clearance(clearance).as_tuple, solids.pairs)
 
 
+# What a world is made of, and what each part depends on: worlds that are made of the same values share them.
+ARRANGEMENTS = Shared(arranged)  # robot, scene, self_margin
+CHECKERS = Shared(ExactChecker.of)  # arrangement, clearance
+PROVERS = Shared(_prover_of)  # arrangement, held regions
+HELD = Shared(_held_regions)  # robot, what is attached, regions
 CERTIFICATES = Shared(_second_checker)  # arrangement, clearance
 
 
@@ -50,6 +82,27 @@ class RowChecks:
         """The same for another thread."""
         return replace(self, checker=self.checker.for_thread(), prover=self.prover.for_thread())
 
+    @property
+    def unheld(self) -> RowChecks:
+        """The same without path constraints."""
+        return self if self.constraints is None else checks_of(changed(self.settings, constraints=()))
+
+    def moved(self, name: str, pose: ArrayLike | pin.SE3) -> RowChecks:
+        """The same with an obstacle elsewhere; arguments and errors as of :meth:`rrtik_ompl.World.moved`."""
+        settings = self.settings
+        moved, numbers = self.solids.moved(name, pose)
+
+        # These names hold the parts until they have been found again.
+        solids = ARRANGEMENTS.keep(moved, settings.robot, moved.scene, settings.self_margin)
+        unheld_prover = PROVERS.of(self.solids, None)
+        prover = unheld_prover.moved(solids.bodies, numbers, always_colliding=solids.always_colliding)
+        PROVERS.keep(prover, solids, None)
+        checker = self.checker.moved(solids, numbers)
+        if checker is not None:
+            CHECKERS.keep(checker, solids, checker.clearance)
+
+        return checks_of(changed(settings, scene=solids.scene))
+
     @cached_property
     def certificate(self) -> Certificate:
         """The checker behind :meth:`certified`."""
@@ -69,6 +122,56 @@ class RowChecks:
         unproven = mask & ~self.prover.still_proven(rows, clearance=self.settings.clearance)
         mask[unproven] = self.certificate.free(rows[unproven])
         return mask if self.constraints is None else mask & self.constraints.held(rows)
+
+    def contacts(self, q: Vector) -> tuple[Contact, ...]:
+        """See :meth:`rrtik_ompl.World.contacts`, at a configuration that is trusted, shape (dof,)."""
+        solids = self.solids
+        rows = q[None]
+        proven_pairs = self.checker.contacts_of_meshes_kept(rows)
+        pairs = tuple(pair for pair in solids.pairs if pair not in proven_pairs) if proven_pairs else solids.pairs
+        frames = self.settings.robot.chain.joint_frames(rows)[0]
+        contacts = list(measured(solids.bodies.as_tuple, pairs, frames, near_only=True))
+
+        if not contacts:
+            same_pairs = not proven_pairs and self.settings.clearance == 0.0
+            certificate = self.certificate if same_pairs else Certificate(solids.robot, solids.bodies.as_tuple, pairs)
+            contacts = [inside(*names) for names in certificate.first_pairs(rows) if names is not None]
+        return tuple(sorted(contacts, key=lambda c: c.clearance))
+
+    def closest(self, q: Vector) -> Contact | None:
+        """The pair of bodies that is nearest to contact or to its margin at q, shape (dof,), where nothing touches."""
+        frames = self.settings.robot.chain.joint_frames(q[None])[0]
+        contacts = measured(self.solids.bodies.as_tuple, self.solids.pairs, frames, near_only=False)
+        return min(contacts, key=lambda c: c.clearance, default=None)
+
+    def too_near(self, q: Vector) -> tuple[Contact, ...]:
+        """See :meth:`rrtik_ompl.World.too_near`, at a configuration that is trusted, shape (dof,)."""
+        clearance = self.settings.clearance
+        if clearance == 0.0:
+            return ()
+        frames = self.settings.robot.chain.joint_frames(q[None])[0]
+        bodies = self.solids.with_clearance(clearance).as_tuple
+        contacts = measured(bodies, self.solids.pairs, frames, near_only=True)
+        keeping_margin = (c for c in contacts if c.clearance + clearance > 0.0)
+        return tuple(sorted(keeping_margin, key=lambda c: c.clearance))
+
+    def explain(self, q: Vector) -> str:
+        """See :meth:`rrtik_ompl.World.explain`, at a configuration that is trusted, shape (dof,)."""
+        if limit_fault := self.settings.robot.limit_fault(q):
+            return limit_fault
+        if touching := self.contacts(q):
+            return f"{touching[0]}{_and_more(touching)}"
+        if too_near := self.too_near(q):
+            shortfall = f"nearer than the clearance of {1e3 * self.settings.clearance:.4g} mm asked for"
+            distance = f"'{too_near[0].first}' and '{too_near[0].second}' are {1e3 * too_near[0].distance:.4g} mm apart"
+            return f"{distance}, {shortfall}{_and_more(too_near)}"
+        if self.constraints is not None and (breach := self.constraints.explain(q)):
+            return breach
+
+        if self.free(q[None])[0]:
+            return ""
+        nearest = self.closest(q)
+        return "it is not proven free" if nearest is None else f"{nearest}, too near to be told free"
 
     @property
     def _exact(self) -> bool:
@@ -101,3 +204,21 @@ class RowChecks:
         elif self.constraints is not None:  # a prover says that too
             mask[mask] = self.constraints.motions_held(starts[mask], ends[mask])
         return mask
+
+
+def checks_of(settings: WorldSettings) -> RowChecks:
+    """What answers in a world of some settings."""
+    robot = settings.robot
+    scene = settings.scene
+    solids = ARRANGEMENTS.of(robot, scene, settings.self_margin)
+    while solids.doubts:  # each is said once
+        warnings.warn(solids.doubts.pop(0), MeshWarning, stacklevel=3)
+
+    checker = CHECKERS.of(solids, settings.clearance + settings.inflation)
+    constraints = HELD.of(robot, scene.attached, settings.constraints) if settings.constraints else None
+    return RowChecks(settings, solids, checker, PROVERS.of(solids, constraints), constraints)
+
+
+def _and_more(contacts: tuple[Contact, ...]) -> str:
+    more = len(contacts) - 1
+    return f" (and {more} more pair{'s' * (more > 1)})" if more else ""

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable
+from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from inspect import Signature, signature
+from typing import Any, Concatenate, ParamSpec
 
 import numpy as np
 import pinocchio as pin
@@ -15,49 +16,37 @@ from rrtik_ompl.base.arrays import MOST_NUMBERS, Mask, Matrix, Vector, finite_ar
 from rrtik_ompl.base.choices import Accuracy
 from rrtik_ompl.base.copies import ThreadOwn, changed, in_notebook, restored
 from rrtik_ompl.base.errors import DescriptionWarning, InputError, MeshWarning, Renamed, require
-from rrtik_ompl.base.sharing import Shared
-from rrtik_ompl.constraints.held_regions import HeldRegions, held_regions
+from rrtik_ompl.constraints.held_regions import HeldRegions
 from rrtik_ompl.geometry.collision.bodies import Body, Pairs
-from rrtik_ompl.geometry.collision.certificate import Certificate
-from rrtik_ompl.geometry.collision.distances import inside, measured
 from rrtik_ompl.kernels import FastWorld
 from rrtik_ompl.kernels.search.motions.motion_table import FastMotions, motions_of, step_counts
 from rrtik_ompl.model.judgement import Contact, Judge, Judged, Violation
 from rrtik_ompl.model.proof import Proof
 from rrtik_ompl.model.robot import Robot
-from rrtik_ompl.model.scene import AttachedObject, Scene
-from rrtik_ompl.model.task_region import TaskRegion
-from rrtik_ompl.model.world_settings import MOTION_RESOLUTION, WorldSettings, checked_settings
-from rrtik_ompl.world.arrangement import Arrangement, arranged
-from rrtik_ompl.world.exact_checks import ExactChecker
-from rrtik_ompl.world.played import judged_path
+from rrtik_ompl.model.scene import Scene
+from rrtik_ompl.model.world_settings import WorldSettings, checked_settings
+from rrtik_ompl.world.judgement import judged_path
 from rrtik_ompl.world.proof import Prover
 from rrtik_ompl.world.route_check import violations_of
-from rrtik_ompl.world.row_checks import RowChecks
+from rrtik_ompl.world.row_checks import RowChecks, checks_of
+
+P = ParamSpec("P")
 
 
-def _prover_of(solids: Arrangement, constraints: HeldRegions | None) -> Prover:
-    if constraints is not None:
-        return PROVERS.of(solids, None).holding(constraints)
-    always_colliding = solids.always_colliding
-    return Prover(
-        solids.robot,
-        solids.bodies,
-        solids.moving,
-        self_margin=solids.self_margin,
-        always_colliding=always_colliding,
-    )
+def _with_arguments_of(
+    settings: Callable[P, WorldSettings],
+) -> Callable[[Callable[..., None]], Callable[Concatenate[Any, P], None]]:
+    """Let a constructor take the arguments of another, by name where it does not name them, for people and checkers."""
 
+    def declared(constructor: Callable[Concatenate[Any, ...], None]) -> Callable[Concatenate[Any, P], None]:
+        named = {
+            name: each for name, each in signature(constructor).parameters.items() if each.kind != each.VAR_KEYWORD
+        }
+        others = [each for name, each in signature(settings).parameters.items() if name not in named]
+        constructor.__signature__ = Signature([*named.values(), *others])  # type: ignore[attr-defined]
+        return constructor
 
-def _held_regions(robot: Robot, attached: tuple[AttachedObject, ...], regions: tuple[TaskRegion, ...]) -> HeldRegions:
-    return held_regions(robot, Scene(attached=attached), regions, None)
-
-
-# What a world is made of, and what each part depends on: worlds that are made of the same values share them.
-ARRANGEMENTS = Shared(arranged)  # robot, scene, self_margin
-CHECKERS = Shared(ExactChecker.of)  # arrangement, clearance
-PROVERS = Shared(_prover_of)  # arrangement, held regions
-HELD = Shared(_held_regions)  # robot, what is attached, regions
+    return declared
 
 
 class World(Judge):
@@ -89,14 +78,8 @@ class World(Judge):
     Args:
         robot: The arm.
         scene: Its surroundings; empty if None. Moving obstacles are where they are at time 0.
-        motion_resolution: Largest step of any point of the arm between two checked configurations [m].
-        accuracy: "exact" or "conservative".
-        self_margin: How far links, and what they hold, must stay from each other where they must not touch [m].
-        clearance: What is kept from obstacles on top of their margins [m]; see :meth:`with_clearance`.
-        proving: Motions must be proven too, with this clearance [m]; None if they need not be. See :meth:`proving`.
-        inflation: What checks keep on top of the clearance, for searches that leave room [m]; no other answer does.
-        constraints: Regions, placed in the world, that a frame must not leave. Only what keeps them is then free; a
-            :class:`rrtik_ompl.Problem` says where those begin that are ``from_start``.
+        **settings: By their names, the others of :class:`~rrtik_ompl.model.world_settings.WorldSettings`, which says
+            what each means: ``accuracy``, ``motion_resolution``, ``clearance``, ``constraints`` and so on.
 
     Raises:
         InputError: If the scene names links that do not exist, a length makes no sense, or a region cannot be held.
@@ -106,32 +89,10 @@ class World(Judge):
     checks: ThreadOwn[RowChecks] = ThreadOwn()
     resolves = True  # kernels compare solids too where outer balls leave a motion in doubt
 
-    def __init__(
-        self,
-        robot: Robot,
-        scene: Scene | None = None,
-        *,
-        motion_resolution: float = MOTION_RESOLUTION,
-        accuracy: Accuracy = "exact",
-        self_margin: float = 0.0,
-        clearance: float = 0.0,
-        proving: float | None = None,
-        inflation: float = 0.0,
-        constraints: Iterable[TaskRegion] = (),
-    ) -> None:
-        settings = WorldSettings(
-            robot,
-            Scene() if scene is None else scene,
-            accuracy=accuracy,
-            motion_resolution=motion_resolution,
-            self_margin=self_margin,
-            clearance=clearance,
-            proving=proving,
-            inflation=inflation,
-            constraints=constraints,  # type: ignore[arg-type]  # made a tuple there
-        )
-        self._settings = settings
-        self.checks = _checks_of(settings)
+    @_with_arguments_of(WorldSettings)
+    def __init__(self, robot: Robot, scene: Scene | None = None, **settings: Any) -> None:
+        self._settings = WorldSettings(robot, Scene() if scene is None else scene, **settings)
+        self.checks = checks_of(self._settings)
 
     @classmethod
     def of(cls, settings: WorldSettings) -> World:
@@ -195,7 +156,7 @@ class World(Judge):
     @property
     def bodies(self) -> tuple[Body, ...]:
         """The solids of the robot and the scene, with the margins of obstacles, without the clearance."""
-        return self.checks.solids.bodies.whole
+        return self.checks.solids.bodies.as_tuple
 
     @property
     def pairs(self) -> Pairs:
@@ -327,20 +288,7 @@ class World(Judge):
             [0.4, 0.3, 0.4]
         """
         require(name, str, "name of an obstacle")
-        settings = self._settings
-        checks = self.checks
-        moved, numbers = checks.solids.moved(name, pose)
-        solids = ARRANGEMENTS.keep(moved, settings.robot, moved.scene, settings.self_margin)
-
-        # These names hold the parts until the new world has found them.
-        unheld_prover = PROVERS.of(checks.solids, None)
-        prover = unheld_prover.moved(solids.bodies, numbers, always_colliding=solids.always_colliding)
-        PROVERS.keep(prover, solids, None)
-        checker = checks.checker.moved(solids, numbers)
-        if checker is not None:
-            CHECKERS.keep(checker, solids, checker.clearance)
-
-        return form_of(self, scene=solids.scene)
+        return _world_with(self.checks.moved(name, pose))
 
     def valid(self, q: ArrayLike) -> bool:
         """Whether q, shape (dof,), is inside the limits and free of collision.
@@ -368,7 +316,7 @@ class World(Judge):
 
     def motion_proven(self, a: ArrayLike, b: ArrayLike) -> bool:
         """Whether each configuration of the straight motion from a to b, shape (dof,) each, is proven free."""
-        clearance = self._settings.kept
+        clearance = self._settings.required_clearance
         return bool(self.prover.proven(self._rows(a, 1), self._rows(b, 1), clearance=clearance)[0])
 
     def motions_proven(self, A: ArrayLike, B: ArrayLike, *, clearance: float | None = None) -> Mask:
@@ -412,7 +360,7 @@ class World(Judge):
             InputError: If it is no proof.
         """
         require(proof, Proof, "proof", "use world.prove(waypoints)")
-        return proof.proven and proof.clearance >= self._settings.kept and self.prover.made(proof)
+        return proof.proven and proof.clearance >= self._settings.required_clearance and self.prover.made(proof)
 
     def violations(self, waypoints: ArrayLike, *, resolution: float | None = None) -> tuple[Violation, ...]:
         """Check the straight motions between waypoints, shape (k, dof), again: the second check of a path.
@@ -434,7 +382,7 @@ class World(Judge):
             [0]
         """
         step = None if resolution is None else positive(resolution, "resolution", "give metres")
-        return violations_of(self, self._rows(waypoints, 2), step)
+        return violations_of(self.checks, self._rows(waypoints, 2), step)
 
     def judged(self, waypoints: ArrayLike) -> Judged:
         """What is said of the straight motions between waypoints, shape (k, dof), where they are drawn.
@@ -442,7 +390,7 @@ class World(Judge):
         Raises:
             InputError: If a waypoint is no finite row of ``dof`` numbers.
         """
-        return judged_path(self._rows(waypoints, 2), self)
+        return judged_path(self.checks, self._rows(waypoints, 2))
 
     def steps(self, a: ArrayLike, b: ArrayLike, resolution: float | None = None) -> int:
         """Number of steps in which a motion is checked: the bound on the arm's displacement over the resolution."""
@@ -451,27 +399,17 @@ class World(Judge):
 
     def contacts(self, q: ArrayLike) -> tuple[Contact, ...]:
         """Every pair of bodies that touches or is within its margin at q, deepest first; empty if q is free."""
-        rows = self._rows(q, 1)
-        proven_pairs = self.checks.checker.contacts_of_meshes_kept(rows)
-        pairs = tuple(pair for pair in self.pairs if pair not in proven_pairs) if proven_pairs else self.pairs
-        contacts = list(measured(self.bodies, pairs, self.robot.chain.joint_frames(rows)[0], near_only=True))
-
-        if not contacts:
-            same_pairs = not proven_pairs and self._settings.clearance == 0.0
-            certificate = self.checks.certificate if same_pairs else Certificate(self.robot, self.bodies, pairs)
-            contacts = [inside(*names) for names in certificate.first_pairs(rows) if names is not None]
-        return tuple(sorted(contacts, key=lambda c: c.clearance))
+        return self.checks.contacts(self._rows(q, 1)[0])
 
     def closest(self, q: ArrayLike, *, known_free: bool = False) -> Contact | None:
         """The pair of bodies that is nearest to contact or to its margin at q, or deepest in it; None if there is none.
 
         ``known_free`` leaves out the check for contacts, where they were ruled out before.
         """
-        if known_free is not True and (touching := self.contacts(q)):
+        row = self._rows(q, 1)[0]
+        if known_free is not True and (touching := self.checks.contacts(row)):
             return touching[0]
-        frames = self.robot.chain.joint_frames(self._rows(q, 1))[0]
-        contacts = measured(self.bodies, self.pairs, frames, near_only=False)
-        return min(contacts, key=lambda c: c.clearance, default=None)
+        return self.checks.closest(row)
 
     def clearance(self, q: ArrayLike) -> float:
         """Smallest signed distance less its margin at q [m]: negative in collision, +inf if nothing can collide."""
@@ -483,13 +421,7 @@ class World(Judge):
 
         The ``margin`` of such a contact is that of the obstacle and the clearance together.
         """
-        if self._settings.clearance == 0.0:
-            return ()
-        frames = self.robot.chain.joint_frames(self._rows(q, 1))[0]
-        bodies = self.checks.solids.with_room(self._settings.clearance).whole
-        contacts = measured(bodies, self.pairs, frames, near_only=True)
-        keeping_margin = (c for c in contacts if c.clearance + self._settings.clearance > 0.0)
-        return tuple(sorted(keeping_margin, key=lambda c: c.clearance))
+        return self.checks.too_near(self._rows(q, 1)[0])
 
     def explain(self, q: ArrayLike) -> str:
         """A line that says why q is not valid; "" if it is.
@@ -497,29 +429,14 @@ class World(Judge):
         It names the joint outside its limit, the pair in collision, nearer than its margin or than the clearance, or
         the path constraint that q does not keep.
         """
-        row = self._rows(q, 1)[0]
-        if limit_fault := self.robot.limit_fault(row):
-            return limit_fault
-        if touching := self.contacts(row):
-            return f"{touching[0]}{_and_more(touching)}"
-        if too_near := self.too_near(row):
-            shortfall = f"nearer than the clearance of {1e3 * self._settings.clearance:.4g} mm asked for"
-            distance = f"'{too_near[0].first}' and '{too_near[0].second}' are {1e3 * too_near[0].distance:.4g} mm apart"
-            return f"{distance}, {shortfall}{_and_more(too_near)}"
-        if self.constraints is not None and (breach := self.constraints.explain(row)):
-            return breach
-
-        if self.checks.free(row[None])[0]:
-            return ""
-        nearest = self.closest(row, known_free=True)
-        return "it is not proven free" if nearest is None else f"{nearest}, too near to be told free"
+        return self.checks.explain(self._rows(q, 1)[0])
 
     def certify(self, Q: ArrayLike) -> Mask:
         """A second opinion on rows of Q, (m, dof) -> (m,), not by the checks of planners: proofs first, then coal."""
         return self.checks.certified(self._rows(Q, 2))
 
     def _proven_clearance(self, asked: float | None) -> float:
-        return self._settings.kept if asked is None else not_negative(asked, "clearance")
+        return self._settings.required_clearance if asked is None else not_negative(asked, "clearance")
 
     def _both_ends(self, A: ArrayLike, B: ArrayLike) -> tuple[Matrix, Matrix]:
         starts = self._rows(A, 2)
@@ -547,25 +464,11 @@ def form_of(world: World, **known: Any) -> World:
 
 def _world_of(settings: WorldSettings) -> World:
     """A world of settings that are known to be right: ``World(...)`` without its checks."""
-    return restored(World, {"_settings": settings, "checks": _checks_of(settings)})
+    return _world_with(checks_of(settings))
 
 
-def _checks_of(settings: WorldSettings) -> RowChecks:
-    """What answers in a world of these settings."""
-    robot = settings.robot
-    scene = settings.scene
-    solids = ARRANGEMENTS.of(robot, scene, settings.self_margin)
-    while solids.doubts:  # each is said once
-        warnings.warn(solids.doubts.pop(0), MeshWarning, stacklevel=3)
-
-    checker = CHECKERS.of(solids, settings.clearance + settings.inflation)
-    constraints = HELD.of(robot, scene.attached, settings.constraints) if settings.constraints else None
-    return RowChecks(settings, solids, checker, PROVERS.of(solids, constraints), constraints)
-
-
-def _and_more(contacts: tuple[Contact, ...]) -> str:
-    more = len(contacts) - 1
-    return f" (and {more} more pair{'s' * (more > 1)})" if more else ""
+def _world_with(checks: RowChecks) -> World:
+    return restored(World, {"_settings": checks.settings, "checks": checks})
 
 
 def like(settings: WorldSettings) -> World:
@@ -574,3 +477,17 @@ def like(settings: WorldSettings) -> World:
         for doubt in (MeshWarning, DescriptionWarning):
             warnings.simplefilter("ignore", doubt)
         return World.of(settings)
+
+
+def check_world(world: World | None, robot: Robot) -> None:
+    """Refuse what is no robot, no world, or the world of another robot.
+
+    Raises:
+        InputError: It says how to make what is needed.
+    """
+    require(robot, Robot, "robot", "use load_robot(name or file)")
+    if world is None:
+        return
+    require(world, World, "world", "make it with World(robot, scene)")
+    if world.robot is not robot:
+        raise InputError(f"world: it holds another robot, '{world.robot.name}'; make it with World(robot, scene)")

@@ -8,10 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rrtik_ompl.base.errors import InputError, ProblemError
-from rrtik_ompl.files import yaml_values
-from rrtik_ompl.files.strict_yaml import key_path, read_yaml, write_yaml
+from rrtik_ompl.files import strict_yaml
+from rrtik_ompl.files.strict_yaml import key_path, plain_value, read_yaml, write_yaml
 from rrtik_ompl.files.text import read_text, write_text
-from rrtik_ompl.files.yaml_values import plain_value
 
 
 def read(tmp_path, text):
@@ -215,7 +214,7 @@ SAME = [
 def test_libyaml_and_the_parser_in_python_build_the_same(tmp_path, monkeypatch, text):
     found = []
     for name in ("CSafeLoader", "SafeLoader"):
-        monkeypatch.setattr(yaml_values, "_LOADER", getattr(yaml, name))
+        monkeypatch.setattr(strict_yaml, "_LOADER", getattr(yaml, name))
         try:
             document = read(tmp_path, text)
             found.append((document.data, document.lines))

@@ -17,9 +17,9 @@ from rrtik_ompl.ik import goal_configurations
 from rrtik_ompl.ik.goal_configurations import GoalSearch
 from rrtik_ompl.ik.targets import skip_targets, targets
 from rrtik_ompl.model.goal import GoalSet, PoseGoal, PositionGoal, joint_difference
+from rrtik_ompl.model.goal_kind import TaskRegion
 from rrtik_ompl.model.scene import Obstacle, Scene
 from rrtik_ompl.model.shapes import Box
-from rrtik_ompl.model.task_region import TaskRegion
 from rrtik_ompl.ompl_bridge import GoalSampler, StateIO
 from rrtik_ompl.ompl_bridge.planner_traits import ompl_planners, traits_of
 from rrtik_ompl.planning.plan import list_planners, plan

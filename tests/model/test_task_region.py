@@ -13,8 +13,8 @@ from rrtik_ompl.ik.numeric.projection import project
 from rrtik_ompl.ik.solve import solve_ik
 from rrtik_ompl.ik.targets import targets
 from rrtik_ompl.model.goal import GoalSet, PoseGoal, PositionGoal
-from rrtik_ompl.model.task_region import TaskRegion, nearest_angles
-from rrtik_ompl.model.tip_distance import metres_per_radian
+from rrtik_ompl.model.goal_kind import TaskRegion, nearest_angles
+from rrtik_ompl.model.robot import metres_per_radian
 
 FREE = [-np.pi, np.pi]
 angles = st.floats(-4.0, 4.0)

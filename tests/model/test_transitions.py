@@ -11,8 +11,6 @@ from rrtik_ompl.model.transitions import (
     merge_moves,
     moved,
     route_length,
-    routes,
-    routes_published,
     single_joint,
     transitions,
 )
@@ -57,22 +55,6 @@ def test_the_published_prism_list_has_three_transitions_against_a_lower_bound_of
 def test_a_path_of_all_joints_has_as_many_transitions_as_edges_and_is_no_single_joint_route() -> None:
     assert transitions(RRT_CONNECT) == 3
     assert not single_joint(RRT_CONNECT)
-
-
-def test_the_counts_of_routes_are_those_of_the_paper() -> None:
-    assert (routes(3, 1), routes(3, 2)) == (6, 90)
-    assert (routes_published(3, 1), routes_published(3, 2)) == (6, 90)
-
-
-def test_routes_of_several_edges_multiply_and_the_published_count_permutes_the_edges() -> None:
-    assert routes(3, 1, 2) == 36
-    assert routes_published(3, 1, 2) == 12
-
-
-@pytest.mark.parametrize(("n", "l", "m"), [(0, 1, 1), (3, 0, 1), (3, 1, 0)])
-def test_routes_of_nothing_are_refused(n: int, l: int, m: int) -> None:  # noqa: E741
-    with pytest.raises(InputError, match="at least 1"):
-        routes(n, l, m)
 
 
 def test_sigma_is_one_only_for_changes_above_the_tolerance() -> None:

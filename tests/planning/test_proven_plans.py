@@ -16,8 +16,8 @@ from rrtik_ompl.model.shapes import Box, Sphere
 from rrtik_ompl.ompl_bridge.motion_checker import WorldChecker
 from rrtik_ompl.ompl_bridge.setup import planning_bounds, unchecked_space
 from rrtik_ompl.planning.plan import plan
+from rrtik_ompl.world.clearances import CLEARANCE, clearances_between
 from rrtik_ompl.world.detours import with_detours
-from rrtik_ompl.world.kept_clearance import CLEARANCE, clearances_between
 from rrtik_planners import FewestMoves
 
 PLANNERS = ("bicrdt", "fastrrtconnect", "fewest-moves", "RRTConnect", "KPIECE1")

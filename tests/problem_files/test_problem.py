@@ -17,7 +17,7 @@ from rrtik_ompl.base.poses import pose
 from rrtik_ompl.description.catalog import list_problems
 from rrtik_ompl.files.strict_yaml import read_yaml, write_yaml
 from rrtik_ompl.model.goal import GoalSet, JointGoal, PoseGoal, PositionGoal
-from rrtik_ompl.model.task_region import TaskRegion
+from rrtik_ompl.model.goal_kind import TaskRegion
 from rrtik_ompl.problem_files.problem import load_problem, save_problem
 from rrtik_ompl.problem_files.problem_values import load_unchecked, problem_schema
 from rrtik_ompl.world.problem import Problem

@@ -10,9 +10,9 @@ import pytest
 
 from rrtik_ompl.base.errors import InputError, UnknownNameError
 from rrtik_ompl.description.catalog import load_robot
+from rrtik_ompl.model.goal_kind import TaskRegion
 from rrtik_ompl.model.scene import AttachedObject, Obstacle, Scene, TimedPoses
 from rrtik_ompl.model.shapes import Box, HalfSpace, Sphere
-from rrtik_ompl.model.task_region import TaskRegion
 from rrtik_ompl.motion.trajectory.limits import RateLimits
 from rrtik_ompl.replanning import SpeedWarning, load_run, replan
 from rrtik_ompl.replanning.in_time import plan_in_time

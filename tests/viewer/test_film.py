@@ -15,7 +15,7 @@ from rrtik_ompl.viewer.film import film
 from rrtik_ompl.viewer.picture import draw
 from rrtik_ompl.viewer.story import story_of
 from rrtik_ompl.viewer.subject import Shown, subject_of
-from rrtik_ompl.world.path_contacts import contacts_along
+from rrtik_ompl.world.judgement import contacts_along
 from rrtik_tests.programs import needs_chromium
 
 WAYPOINTS = [[0.0, 0.0, 0.0], [1.0, 0.5, 0.5]]
@@ -60,7 +60,7 @@ def test_a_start_in_collision_is_shown_with_its_bodies_red(tmp_path, capsys):
     assert run(["show", str(tmp_path / "bad.yaml"), "--html", str(tmp_path / "bad.html")]) == 1
     assert "start is in collision" in capsys.readouterr().err
     settings, start, _ = load_unchecked(tmp_path / "bad.yaml")
-    touching = contacts_along(rrtik.World.of(settings), start[None])
+    touching = contacts_along(rrtik.World.of(settings).checks, start[None])
     shown = Shown(settings.robot, settings.scene, None, start, touching)
     (told,) = story_of(subject_of(shown), draw(subject_of(shown))[1], "")["contacts"]
     assert "'prism_10'" in told["text"]

@@ -24,7 +24,7 @@ from rrtik_ompl.planning.generated_problems import generated_problem
 from rrtik_ompl.planning.moves.axis_cut import double_axis_cut
 from rrtik_ompl.viewer.page import page
 from rrtik_ompl.viewer.page_planner import SAMPLES, VERTICES, page_planner
-from rrtik_ompl.world.kept_clearance import Clearances, clearances_between, search_form
+from rrtik_ompl.world.clearances import Clearances, clearances_between, search_form
 from rrtik_ompl.world.problem import Problem, densely_checked
 from rrtik_tests.browser import Browser, planning_page
 from rrtik_tests.programs import needs_chromium, node

@@ -16,10 +16,10 @@ from rrtik_ompl.constraints.shorthands import on_plane, upright
 from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.description.urdf import robot_from_urdf_text
 from rrtik_ompl.model.goal import GoalSet, MultiGoal, PoseGoal, PositionGoal
+from rrtik_ompl.model.goal_kind import TaskRegion
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import Obstacle, Scene
 from rrtik_ompl.model.shapes import Box, Capsule, Cylinder, Shape, Sphere
-from rrtik_ompl.model.task_region import TaskRegion
 from rrtik_ompl.viewer.drawing.framing import behind, frame_around, overview
 from rrtik_ompl.viewer.drawing.meshes import look_of_margin
 from rrtik_ompl.viewer.drawing.nodes import TriangleGeometry

@@ -24,7 +24,7 @@ def true_distance(world, q):
 def test_distances_are_never_too_large_and_hardly_too_small(name):
     problem = rrtik.load_problem(name)
     world, path = problem.world, rrtik.plan(problem, "RRTConnect", seed=1).path
-    curve = clearance_along(world, path.waypoints)
+    curve = clearance_along(world.checks, path.waypoints)
     for k in range(0, len(curve.distances), 9):
         a, b = path.waypoints[curve.motions[k]], path.waypoints[curve.motions[k] + 1]
         distance, pair = true_distance(world, (1.0 - curve.shares[k]) * a + curve.shares[k] * b)
@@ -44,7 +44,7 @@ def test_motions_that_are_not_proven_are_named():
     problem = rrtik.load_problem("titan4_sdu")
     path = rrtik.plan(problem, "RRTConnect", seed=1).path
     through = np.vstack([path.waypoints, path.start])  # straight back, through the shelf
-    curve = clearance_along(problem.world, through)
+    curve = clearance_along(problem.world.checks, through)
     assert curve.unproven == (len(path.waypoints) - 1,)
     assert curve.distances.min() == 0.0
     assert curve.motions[curve.least] == len(path.waypoints) - 1
@@ -53,6 +53,6 @@ def test_motions_that_are_not_proven_are_named():
 def test_nothing_near_is_said():
     robot = rrtik.load_robot("planar3")
     world = rrtik.World(robot, Scene((Obstacle("far", Sphere(0.1), rrtik.pose([50.0, 0.0, 0.0])),)))
-    curve = clearance_along(world, np.zeros((1, 3)))
+    curve = clearance_along(world.checks, np.zeros((1, 3)))
     assert (curve.distances == FARTHEST).all()
     assert str(curve) == "no obstacle within 2 m"

@@ -10,8 +10,7 @@ import pytest
 import rrtik_ompl as rrtik
 from rrtik_ompl.geometry.collision.solids import is_closed
 from rrtik_ompl.kernels.tables.solid_tables import convex_solids
-from rrtik_ompl.world.coal_proof import CoalProof
-from rrtik_ompl.world.proof import Prover
+from rrtik_ompl.world.proof import CoalProof, Prover
 from rrtik_ompl.world.world import World
 from rrtik_tests.by_coal import free_by_coal
 

@@ -20,7 +20,7 @@ from rrtik_ompl.pilot.overlay.virtual_camera import pinhole_camera
 from rrtik_ompl.sensing.cameras.pictures import CameraLostError
 from rrtik_ompl.sensing.markers.marker_map import GraspType, MarkedObject, MarkerMap, MountedMarker
 from rrtik_ompl.sensing.scene_from_view import NoBaseError
-from rrtik_ompl.world.certificates.write import certificate_of
+from rrtik_ompl.world.certificates import certificate_of
 
 AT = rrtik.pose([0.1, 0.2, 0.3])
 BALL = rrtik.Obstacle("ball", rrtik.Sphere(0.2), rrtik.pose([9, 9, 9]), margin=0.1)

@@ -15,8 +15,8 @@ from rrtik_ompl.model.scene import AttachedObject, Obstacle, Scene
 from rrtik_ompl.model.shapes import Box, Capsule, Cylinder, Sphere
 from rrtik_ompl.planning.plan import plan
 from rrtik_ompl.problem_files.problem import load_problem, save_problem
-from rrtik_ompl.world.certificates.verify import verify_certificate
-from rrtik_ompl.world.certificates.write import certificate_of
+from rrtik_ompl.world.certificate_check import certificate_fault
+from rrtik_ompl.world.certificates import certificate_of
 from rrtik_ompl.world.moving_world import MovingWorld
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
@@ -184,9 +184,9 @@ def test_paths_and_certificates_keep_it():
     assert found.proven
     assert rooms(problem.world, found.path.resample(0.02).waypoints, {"link6": 0.3}).min() >= -1e-9
     certificate = certificate_of(problem.world, found.path)
-    assert verify_certificate(certificate, problem.world, found.path.waypoints) == ""
+    assert certificate_fault(certificate, problem.world, found.path.waypoints) == ""
     for other in ({}, {"link6": 0.31}, {"link5": 0.3}):
-        assert verify_certificate(certificate, World(padded(robot, other), Scene([wall])), found.path.waypoints) != ""
+        assert certificate_fault(certificate, World(padded(robot, other), Scene([wall])), found.path.waypoints) != ""
 
 
 def test_no_padding_is_as_before():

@@ -13,10 +13,10 @@ from rrtik_ompl.base.copies import changed
 from rrtik_ompl.base.errors import InputError, ProblemError, UnknownNameError
 from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.model.goal import GoalSet, JointGoal, MultiGoal, PoseGoal, PositionGoal
+from rrtik_ompl.model.goal_kind import TaskRegion
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.scene import AttachedObject, Obstacle, Scene
 from rrtik_ompl.model.shapes import Box
-from rrtik_ompl.model.task_region import TaskRegion
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
 

@@ -17,8 +17,8 @@ from rrtik_ompl.model.shapes import Box, Capsule, Sphere
 from rrtik_ompl.planning.plan import plan
 from rrtik_ompl.planning.shortening import shorten
 from rrtik_ompl.problem_files.problem import load_problem, save_problem
-from rrtik_ompl.world.certificates.verify import verify_certificate
-from rrtik_ompl.world.certificates.write import certificate_of
+from rrtik_ompl.world.certificate_check import certificate_fault
+from rrtik_ompl.world.certificates import certificate_of
 from rrtik_ompl.world.moving_world import MovingWorld
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
@@ -165,9 +165,9 @@ def test_paths_keep_the_margin(method):
     for path in (found.path, short):
         assert own_gaps(problem.world, path.resample(0.02).waypoints).min() >= 0.05 - 1e-9
         certificate = certificate_of(problem.world, path)
-        assert verify_certificate(certificate, problem.world, path.waypoints) == ""
+        assert certificate_fault(certificate, problem.world, path.waypoints) == ""
         for other in (0.0, 0.04, 0.06):
-            fault = verify_certificate(certificate, folding(other).world, path.waypoints)
+            fault = certificate_fault(certificate, folding(other).world, path.waypoints)
             assert fault.endswith("self margin, 0.05 m")
 
 
@@ -182,7 +182,7 @@ def test_a_verifier_finds_a_margin_that_is_not_kept():
         self_margin=wide.self_margin,
         scene_digest=scene_digest(wide.bodies, wide.pairs),
     )
-    assert "are not shown apart" in verify_certificate(forged, wide, path.waypoints)
+    assert "are not shown apart" in certificate_fault(forged, wide, path.waypoints)
 
 
 def test_a_start_that_does_not_keep_it_is_refused_in_one_line_with_the_pair():

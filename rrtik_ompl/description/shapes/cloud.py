@@ -14,9 +14,7 @@ from numpy.typing import NDArray
 from rrtik_ompl.base.arrays import positive
 from rrtik_ompl.base.errors import InputError, require
 from rrtik_ompl.description.shapes.octree import octree_points, octree_resolution
-from rrtik_ompl.files.pcd import pcd_points
-from rrtik_ompl.files.ply import ply_points
-from rrtik_ompl.files.point_records import AXES, npy_rows, text_rows
+from rrtik_ompl.files.point_files import AXES, npy_rows, pcd_points, ply_points, text_rows
 from rrtik_ompl.files.text import file_name, read_bytes, write_bytes
 from rrtik_ompl.model.shapes import PointCloud
 from rrtik_ompl.model.shapes.point_cloud import RADIUS, Invalid

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from rrtik_ompl.base.arrays import finite_number, positive
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.files.picture_headers import picture_header, unstretched
-from rrtik_ompl.files.point_records import npy_rows, text_rows
+from rrtik_ompl.files.point_files import npy_rows, text_rows
 from rrtik_ompl.files.text import file_name, read_bytes
 from rrtik_ompl.model.shapes.height_field import HeightField
 from rrtik_ompl.model.shapes.point_cloud import Invalid, known_choice

@@ -22,8 +22,7 @@ from numpy.typing import NDArray
 from rrtik_ompl.base.arrays import TAU, Matrix, Vector
 from rrtik_ompl.ik.residual import walked
 from rrtik_ompl.model.goal import Target
-from rrtik_ompl.model.robot import Robot, poses
-from rrtik_ompl.model.tip_distance import reach_of
+from rrtik_ompl.model.robot import Robot, poses, reach_of
 
 SWEEPS = 300
 AXIS_LENGTH = 0.3  # of the tip's axes, in units of the reach

@@ -19,8 +19,7 @@ from rrtik_ompl.ik.method_interface import IkRequest, IkResponse
 from rrtik_ompl.ik.numeric.descent import descend
 from rrtik_ompl.ik.numeric.restarts import nearest_posture
 from rrtik_ompl.model.goal import Target, joint_difference
-from rrtik_ompl.model.robot import Robot, inside_limits, jacobians, poses
-from rrtik_ompl.model.tip_distance import reach_of
+from rrtik_ompl.model.robot import Robot, inside_limits, jacobians, poses, reach_of
 
 IMPROVEMENT = 0.99  # of the best cost: less counts as standing still
 MAX_ROUNDS = 64  # populations, after which it gives up

@@ -17,9 +17,8 @@ from rrtik_ompl.base.arrays import TAU, Mask, Matrix, Vector
 from rrtik_ompl.base.poses import rpy_matrices
 from rrtik_ompl.ik.method_interface import IkRequest, IkResponse
 from rrtik_ompl.ik.residual import SHARE, shortened, twist_between
-from rrtik_ompl.model.robot import Robot, jacobians, poses
-from rrtik_ompl.model.task_region import TaskRegion
-from rrtik_ompl.model.tip_distance import PER_RADIAN, reach_of
+from rrtik_ompl.model.goal_kind import TaskRegion
+from rrtik_ompl.model.robot import PER_RADIAN, Robot, jacobians, poses, reach_of
 
 ITERATIONS = 60
 PATIENCE = 10  # iterations in which the squared residual has to fall

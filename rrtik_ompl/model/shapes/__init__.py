@@ -1,6 +1,6 @@
 """What obstacles and attached bodies are: frozen solids in their own frame, in metres (not how they collide).
 
-Here are those whose distance to a point has a short formula, and ``SHAPES``, which has every kind by its key in files.
+Here are those that a few numbers describe, and ``SHAPES``, which has every kind by its key in files.
 Whoever adds a kind to it and to ``rrtik_ompl.geometry.collision.shape_table``, before files are read, uses it like the
 others.
 """
@@ -12,15 +12,24 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.base.arrays import TAU, Matrix, Vector, bounded_array, frozen, length, not_negative, whole_number
+from rrtik_ompl.base.arrays import (
+    TAU,
+    Matrix,
+    Vector,
+    bounded_array,
+    finite_number,
+    frozen,
+    length,
+    not_negative,
+    whole_number,
+)
 from rrtik_ompl.base.copies import as_value
 from rrtik_ompl.base.errors import InputError, at_most
-from rrtik_ompl.model.shapes.half_space import HalfSpace
 from rrtik_ompl.model.shapes.height_field import HeightField
 from rrtik_ompl.model.shapes.mesh import Mesh
 from rrtik_ompl.model.shapes.octree import Octree
 from rrtik_ompl.model.shapes.point_cloud import PointCloud
-from rrtik_ompl.model.shapes.prism import Prism
+from rrtik_ompl.model.shapes.polygons import check_simple, without_repeats
 from rrtik_ompl.model.shapes.shape import Measure, Shape, same_shape
 from rrtik_ompl.model.shapes.surfaces import Triangles, extruded, round_ended, rounded
 
@@ -196,6 +205,95 @@ class Capsule(Shape):
     def grown(self, margin: float) -> Capsule:
         """The capsule of a larger radius."""
         return Capsule(self.radius + not_negative(margin, "margin"), self.length)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HalfSpace(Shape):
+    """The filled side of a plane: points with ``normal . x <= offset``; the free side is ``normal . x > offset``.
+
+    ``normal`` is stored with unit length, and ``offset`` [m] is scaled with it.
+
+    Example:
+        >>> floor = rrtik.HalfSpace([0.0, 0.0, 2.0], offset=0.2)
+        >>> floor.normal, floor.offset
+        (array([0., 0., 1.]), 0.1)
+    """
+
+    key = "half_space"
+    measures = (Measure("normal", "vector", None), Measure("offset", "number", default=0.0))
+    bounded = False
+    movable = False
+
+    normal: Vector
+    offset: float
+
+    __reduce__ = as_value
+
+    def __init__(self, normal: ArrayLike, offset: float = 0.0) -> None:
+        direction = bounded_array(normal, (3,), "half-space normal")
+        norm = float(np.linalg.norm(direction))
+        if norm < 1e-9:
+            raise InputError("half-space normal must not be the zero vector")
+        scaled = finite_number(offset, "half-space offset") / norm
+        object.__setattr__(self, "normal", frozen(direction / norm))
+        object.__setattr__(self, "offset", float(bounded_array(scaled, (), "half-space offset")))
+
+    @property
+    def bounding_radius(self) -> float:
+        """Infinite."""
+        return float("inf")
+
+    def surface(self) -> Triangles:
+        """None: see :func:`rrtik_ompl.viewer.drawing.meshes.half_space_plate`.
+
+        Raises:
+            InputError: Always.
+        """
+        raise InputError("a HalfSpace cannot be drawn as a bounded solid")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Prism(Shape):
+    """A simple polygon in the xy-plane, extruded along z and centred about z = 0.
+
+    Attributes:
+        polygon: Vertices in order (either sense), shape (k, 2), metres; convex or not, without self-crossings and
+            without places where two sides touch.
+        height: Full extent along z [m].
+
+    Example:
+        >>> rrtik.Prism([[0.0, 0.0], [0.4, 0.0], [0.0, 0.3]], height=0.1).polygon.shape
+        (3, 2)
+    """
+
+    key = "polygon"
+    measures = (
+        Measure("polygon", "points", "vertices in the xy-plane [m], in order; extruded along z, centred about z = 0"),
+        Measure("height", "length", "of a polygon, along z [m]; 1 if absent", 1.0),
+    )
+    grouped = False
+
+    polygon: Matrix
+    height: float
+
+    __reduce__ = as_value
+
+    def __init__(self, polygon: ArrayLike, height: float = 1.0) -> None:
+        vertices = without_repeats(bounded_array(polygon, (None, 2), "polygon"))
+        if len(vertices) < 3:
+            raise InputError(f"polygon needs at least 3 different vertices, got {len(vertices)}")
+        check_simple(vertices)
+        object.__setattr__(self, "polygon", frozen(vertices))
+        object.__setattr__(self, "height", length(height, "polygon height"))
+
+    @property
+    def bounding_radius(self) -> float:
+        """Distance of its farthest corner from its origin [m]."""
+        return float(np.hypot(np.linalg.norm(self.polygon, axis=1).max(), 0.5 * self.height))
+
+    def surface(self) -> Triangles:
+        """Its walls, floor and roof."""
+        return extruded(self.polygon, self.height)
 
 
 def _segments(given: int) -> int:

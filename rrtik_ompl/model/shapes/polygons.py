@@ -12,8 +12,8 @@ from rrtik_ompl.base.errors import InputError
 
 def without_repeats(polygon: Matrix) -> Matrix:
     """The polygon without vertices that the next one repeats, as the first one of a closed ring repeats the last."""
-    kept: Matrix = polygon[(polygon != np.roll(polygon, -1, axis=0)).any(axis=1)]
-    return kept
+    vertices: Matrix = polygon[(polygon != np.roll(polygon, -1, axis=0)).any(axis=1)]
+    return vertices
 
 
 def check_simple(polygon: Matrix) -> None:

@@ -16,7 +16,7 @@ from rrtik_ompl.motion.trajectory.limits import RateLimits
 from rrtik_ompl.motion.trajectory.load import load_trajectory
 from rrtik_ompl.motion.trajectory.motion import Trajectory
 from rrtik_ompl.motion.trajectory.report import MotionReport, motion_report
-from rrtik_ompl.world.kept_clearance import check_route_clearance
+from rrtik_ompl.world.clearances import check_route_clearance
 from rrtik_ompl.world.world import World
 
 __all__ = [

@@ -16,7 +16,7 @@ from rrtik_ompl.motion.trajectory.dynamics import DynamicLimits
 from rrtik_ompl.motion.trajectory.limits import RateLimits
 from rrtik_ompl.motion.trajectory.motion import Trajectory
 from rrtik_ompl.motion.trajectory.runs import runs
-from rrtik_ompl.world.kept_clearance import provable_clearances
+from rrtik_ompl.world.clearances import provable_clearances
 from rrtik_ompl.world.world import World
 
 DEVIATION_SHARE = 0.22  # of the blend: how far a motion may be from its path

@@ -25,7 +25,8 @@ def faults_of(motion: Cubics, world: World) -> list[tuple[float, str]]:
     """The first fault of every piece that has one, time [s] and reason; see :meth:`Trajectory.faults`."""
     clock = bad_moments(motion, world)
     rows = motion.states(clock).positions
-    return [(moment, world.explain(q) or not_proven(world)) for moment, q in zip(clock.tolist(), rows, strict=True)]
+    reasons = [world.explain(q) or not_proven(world.settings) for q in rows]
+    return list(zip(clock.tolist(), reasons, strict=True))
 
 
 def bad_moments(motion: Cubics, world: World) -> Vector:
@@ -57,7 +58,7 @@ def greatest_speeds(motion: Cubics) -> Matrix:
 
 def proof_of_motion(motion: Cubics, world: World, clearance: float | None = None) -> Proof:
     """A proof of all pieces, of what the world keeps if no clearance [m] is given; see :meth:`Trajectory.prove`."""
-    kept_clearance = world.settings.kept if clearance is None else clearance
+    kept_clearance = world.settings.required_clearance if clearance is None else clearance
     return proof_of_pieces(motion, world, kept_clearance, 0, len(motion.times) - 1)
 
 

@@ -13,7 +13,7 @@ from rrtik_ompl.model.judgement import ClearanceCurve, Judged, PathContact, Play
 from rrtik_ompl.motion.trajectory.checks import faults_of, greatest_speeds, proof_of_motion
 from rrtik_ompl.motion.trajectory.cubics import Cubics
 from rrtik_ompl.world.clearance_curve import PLACES, Course
-from rrtik_ompl.world.played import Fault, judged_course, with_reason
+from rrtik_ompl.world.judgement import Fault, judged_course, with_reason
 from rrtik_ompl.world.world import World
 
 MOST_KNOTS = 900  # of a timed motion, that are all looked at
@@ -38,7 +38,7 @@ def _judged_motion(motion: Cubics, world: World) -> tuple[Vector, Judged]:
     Everything that is looked at is drawn too: a motion of some tenths of a second is not lost between two pictures.
     """
     course = _course_of(world, motion)
-    judgement, faults = judged_course(world, course, partial(_faults_of_motion, world, motion))
+    judgement, faults = judged_course(world.checks, course, partial(_faults_of_motion, world, motion))
 
     doubtful = judgement.verdict.unproven
     doubt = f"not proven free in {len(doubtful)} of {len(motion.times) - 1} pieces" if doubtful else ""
@@ -54,7 +54,7 @@ def _judged_motion(motion: Cubics, world: World) -> tuple[Vector, Judged]:
 
     drawn = _drawn_moves(motion, doubtful, clock)
     proof_verdict = Verdict(not doubtful, text, drawn, doubt)
-    verdict = with_reason(proof_verdict, world, fault_lines, checked=faults is not None)
+    verdict = with_reason(proof_verdict, world.scene, fault_lines, checked=faults is not None)
 
     curve = None if judgement.curve is None else _on_frames(motion, judgement.curve, clock, drawn)
     contacts = tuple(_contact_on_frames(motion, each, clock) for each in judgement.contacts)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import cached_property
 
 from rrtik_ompl.base.arrays import Matrix
-from rrtik_ompl.world.kept_clearance import CLEARANCE, Clearances, clearances_between, keeping
+from rrtik_ompl.world.clearances import CLEARANCE, Clearances, clearances_between, keeping
 from rrtik_ompl.world.world import World
 
 PREFERRED_CLEARANCE = 0.01  # [m] of single-joint moves, which a person may follow by hand
@@ -53,7 +53,7 @@ def clearance_levels(world: World, ends: Matrix, clearance: float | None) -> lis
     clearances = wide_clearances_between(world, ends, clearance)
     if clearances is None:
         return [Level(world, None, 0.0)]
-    smallest = world.settings.kept
+    smallest = world.settings.required_clearance
     usual = max(min(clearances.proven_clearance, CLEARANCE), smallest)
     levels = sorted({clearances.proven_clearance, usual, smallest}, reverse=True)
     most = clearances.searched_clearance
@@ -67,4 +67,4 @@ def wide_clearances_between(world: World, ends: Matrix, clearance: float | None)
         What may be kept between two ends, shape (2, dof); None if an end cannot be proven free.
     """
     wanted = PREFERRED_CLEARANCE if clearance is None else clearance
-    return clearances_between(world, ends, max(wanted, world.settings.kept))
+    return clearances_between(world, ends, max(wanted, world.settings.required_clearance))

@@ -20,7 +20,7 @@ from rrtik_ompl.model.path import JointPath, path_through
 from rrtik_ompl.model.robot import require_joints
 from rrtik_ompl.model.transitions import SAME, merge_moves
 from rrtik_ompl.model.world_settings import FINEST_RESOLUTION
-from rrtik_ompl.world.kept_clearance import check_route_clearance, keeping, provable_clearances, proved
+from rrtik_ompl.world.clearances import check_route_clearance, keeping, provable_clearances, proved
 from rrtik_ompl.world.motion_queries import MotionsFree
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.route_check import VERIFICATION_DENSITY, violations_of
@@ -72,22 +72,22 @@ def one_joint_moves(
         raise InputError("path to convert: it has one waypoint, so there is nothing to convert")
     require_joints(world.robot, path.joint_names, "path")
 
-    faults = violations_of(world, path.waypoints)
+    faults = violations_of(world.checks, path.waypoints)
     if faults:
         raise InputError(f"path to convert: motion {faults[0].edge + 1} is not valid: {faults[0].reason}")
 
     finest_step = FINEST * world.motion_resolution if finest is None else positive(finest, "finest", "give metres")
     check_route_clearance(world, clearance, path.waypoints)
 
-    for kept_clearance in provable_clearances(world, path.waypoints, clearance):
+    for required_clearance in provable_clearances(world, path.waypoints, clearance):
         with suppress(InputError):  # no staircase keeps so much; one that keeps less may
-            rows = _converted(path.waypoints, keeping(world, 0.0, proven=kept_clearance), finest_step)
-            return proved(path_through(path, rows), world, clearance=kept_clearance)
+            rows = _converted(path.waypoints, keeping(world, 0.0, proven=required_clearance), finest_step)
+            return proved(path_through(path, rows), world, clearance=required_clearance)
 
     for density in DENSITIES:
         finer = form_of(world, motion_resolution=max(world.motion_resolution / density, FINEST_RESOLUTION))
         rows = _converted(path.waypoints, finer, finest_step)
-        if not violations_of(world, rows):
+        if not violations_of(world.checks, rows):
             return proved(path_through(path, rows), world)
 
     raise InputError("path to convert: its single-joint moves do not pass the second check; lower motion_resolution")

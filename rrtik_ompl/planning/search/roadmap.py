@@ -279,8 +279,8 @@ def load_roadmap(path: str | os.PathLike[str], world: World, *, moved: bool = Fa
         seed = data.count("seed")
         near = data.count("near")
         rows = finite_array(data["rows"], (None, world.robot.dof), "vertices")
-        edges = data.whole("edges")
-        states = data.whole("states")
+        edges = data.whole_numbers("edges")
+        states = data.whole_numbers("states")
         if not 1 <= near <= 100 or not _fit(edges, states, len(rows)):
             raise InputError("its edges make no sense")
         clearances = finite_array(data["kept"], (2,), "kept").tolist() if "kept" in data else [0.0, NOT_PROVING]

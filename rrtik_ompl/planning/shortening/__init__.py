@@ -26,7 +26,7 @@ from rrtik_ompl.planning.shortening.corners import snap_corners
 from rrtik_ompl.planning.shortening.cuts import random_cut, sequential_cut, shortcut
 from rrtik_ompl.planning.shortening.retraction import retract
 from rrtik_ompl.planning.shortening.task import Task, Wishes
-from rrtik_ompl.world.kept_clearance import check_route_clearance, proved
+from rrtik_ompl.world.clearances import check_route_clearance, proved
 from rrtik_ompl.world.problem import Problem
 
 __all__ = ["METHODS", "Method", "MoveRules", "Task", "Wishes", "shorten", "shortened"]

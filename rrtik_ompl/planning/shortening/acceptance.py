@@ -9,8 +9,8 @@ import numpy as np
 from rrtik_ompl.model.path import JointPath, path_through
 from rrtik_ompl.planning.moves.clearance_levels import wide_clearances_between
 from rrtik_ompl.planning.shortening.task import Wishes
+from rrtik_ompl.world.clearances import Clearances, clearances_between, keeping, proved_as_clear
 from rrtik_ompl.world.detours import with_detours
-from rrtik_ompl.world.kept_clearance import Clearances, clearances_between, keeping, proved_as_clear
 from rrtik_ompl.world.motion_queries import MotionQueries
 from rrtik_ompl.world.problem import Problem, densely_checked, problem_in
 from rrtik_ompl.world.proven_motions import proven_motions
@@ -120,7 +120,7 @@ class Acceptance:
         if self._leaves_room and proved.proven:
             return proved
         is_worse = self._input_keeps_clearance or (self.input.proven and not proved.proven)
-        if is_worse or violations_of(self._problem.world, shorter.waypoints):
+        if is_worse or violations_of(self._problem.world.checks, shorter.waypoints):
             return None
         return proved
 

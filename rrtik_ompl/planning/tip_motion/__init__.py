@@ -246,10 +246,12 @@ def _moved(
         raise InputError(f"turn_deviation must be 1 rad at most, got {tolerance.turn:g}; is it in radians?")
     number = whole_number(seed, "seed")
     require(world, World, "world", "use World(robot, scene)")
-    kept_clearance = None if clearance is None else max(not_negative(clearance, "clearance"), world.settings.kept)
+    required_clearance = (
+        None if clearance is None else max(not_negative(clearance, "clearance"), world.settings.required_clearance)
+    )
 
     begin, starts = _begin(world, q, number)
-    way = Way(tuple(rails(begin)), tolerance, kept_clearance, number)
+    way = Way(tuple(rails(begin)), tolerance, required_clearance, number)
     if way.leads_nowhere(world.robot):
         raise InputError("the tip is at the goal already: there is no line to follow")
     best = farthest(world, way, starts)

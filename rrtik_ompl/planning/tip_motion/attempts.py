@@ -13,8 +13,7 @@ from rrtik_ompl.ik.solve import solve_ik
 from rrtik_ompl.model.goal import PoseGoal
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.proof import Proof
-from rrtik_ompl.model.robot import Robot
-from rrtik_ompl.model.tip_distance import metres_per_radian
+from rrtik_ompl.model.robot import Robot, metres_per_radian
 from rrtik_ompl.model.transitions import route_length
 from rrtik_ompl.planning.tip_motion.following import (
     MOST_ROWS,
@@ -60,7 +59,7 @@ class Way:
 
     def clearance_in(self, world: World) -> float:
         """The clearance to be kept from obstacles in a world [m]."""
-        return world.settings.kept if self.clearance is None else self.clearance
+        return world.settings.required_clearance if self.clearance is None else self.clearance
 
     def leads_nowhere(self, robot: Robot) -> bool:
         """Whether its end is where it begins."""

@@ -29,8 +29,7 @@ from rrtik_ompl.kernels.ik.rail_layout import (
 )
 from rrtik_ompl.kernels.simd.library import library
 from rrtik_ompl.kernels.tables.memory import PlannedTable, TablePlan, sizes_of
-from rrtik_ompl.model.robot import Robot
-from rrtik_ompl.model.tip_distance import reach_of
+from rrtik_ompl.model.robot import Robot, reach_of
 from rrtik_ompl.planning.tip_motion.rails import Rail
 
 MOST_ROWS = 4096  # of one rail

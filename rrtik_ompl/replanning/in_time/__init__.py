@@ -23,7 +23,7 @@ from rrtik_ompl.replanning.record import ReplanRun
 from rrtik_ompl.replanning.start_and_goals import every_goal, held_pairs, refuse_constraints, sampling_box
 from rrtik_ompl.replanning.tick import Tick
 from rrtik_ompl.replanning.travels import refuse_endless_turns
-from rrtik_ompl.world.kept_clearance import CLEARANCE
+from rrtik_ompl.world.clearances import CLEARANCE
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.proof import PROOF_KERNELS
 

@@ -12,9 +12,9 @@ from rrtik_ompl.base.arrays import TAU, Matrix, Vector
 from rrtik_ompl.base.poses import turned_z
 from rrtik_ompl.constraints.held_region import ANYWHERE, HeldRegion, Turning
 from rrtik_ompl.model.goal import Goal, Target
+from rrtik_ompl.model.goal_kind import TaskRegion
 from rrtik_ompl.model.scene import ConstantVelocity, Motion, Obstacle, Scene
 from rrtik_ompl.model.shapes import Box, HalfSpace, Sphere
-from rrtik_ompl.model.task_region import TaskRegion
 from rrtik_ompl.viewer.drawing import palette
 from rrtik_ompl.viewer.drawing.framing import Frame
 from rrtik_ompl.viewer.drawing.meshes import Look, half_space_plate, look_of_margin, look_of_shape, look_of_triangles

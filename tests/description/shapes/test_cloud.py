@@ -7,7 +7,7 @@ import pytest
 
 from rrtik_ompl.base.errors import CloudWarning, InputError
 from rrtik_ompl.description.shapes.cloud import load_cloud, save_cloud
-from rrtik_ompl.files.pcd import unpacked
+from rrtik_ompl.files.point_files import unpacked
 from rrtik_ompl.model.scene import Obstacle, Scene
 from rrtik_ompl.model.shapes import PointCloud, same_shape
 from rrtik_ompl.problem_files.scene import load_scene, save_scene

@@ -16,7 +16,7 @@ from rrtik_ompl.kernels import COLLIDING, FREE
 from rrtik_ompl.kernels.tables import cloud_layout
 from rrtik_ompl.model.scene import AttachedObject, Obstacle, Scene
 from rrtik_ompl.model.shapes import Mesh, PointCloud, Sphere, point_tree
-from rrtik_ompl.world.certificates.write import certificate_of
+from rrtik_ompl.world.certificates import certificate_of
 from rrtik_ompl.world.moving_world import MovingWorld
 from rrtik_ompl.world.world import World
 

@@ -24,7 +24,7 @@ from rrtik_ompl.ik.genetic.population import (
     whole_range,
 )
 from rrtik_ompl.ik.genetic.search import follow_targets, manipulability, score
-from rrtik_ompl.model.tip_distance import reach_of
+from rrtik_ompl.model.robot import reach_of
 
 TOLERANCE = 0.002 * INCH
 EVERY_NUMBER = np.arange(LARGEST + 1, dtype=np.uint16)

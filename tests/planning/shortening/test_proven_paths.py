@@ -8,7 +8,7 @@ import pytest
 import rrtik_ompl as rrtik
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.planning.shortening import METHODS
-from rrtik_ompl.world.kept_clearance import CLEARANCE
+from rrtik_ompl.world.clearances import CLEARANCE
 
 JOINT_METHODS = [name for name, method in METHODS.items() if not method.keeps_moves]
 

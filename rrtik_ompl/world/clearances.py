@@ -65,7 +65,7 @@ def clearances_of_pairs(world: World, ends: NDArray[np.float64], clearance: floa
 
 def _candidates(world: World, clearance: float | None) -> Iterator[Clearances]:
     """What may be kept, the most first."""
-    least_clearance = world.settings.kept
+    least_clearance = world.settings.required_clearance
     wanted_clearance = max(CLEARANCE if clearance is None else clearance, least_clearance)
     halved = (wanted_clearance * 0.5**k for k in range(HALVINGS))
     smaller = (half for half in halved if half > least_clearance)
@@ -126,7 +126,7 @@ def check_clearance(world: World, clearance: float | None, ends: dict[str, Matri
     wanted_clearance = not_negative(clearance, "clearance")
     for what, q in ends.items():
         gap = next(iter(world.prover.route(q[None], clearance=wanted_clearance).unproven), None)
-        if gap is not None and world.prover.proven(q[None], q[None], clearance=world.settings.kept)[0]:
+        if gap is not None and world.prover.proven(q[None], q[None], clearance=world.settings.required_clearance)[0]:
             largest = 1e3 * _largest_clearance(world, q, wanted_clearance)
             pair = f"'{gap.first}' and '{gap.second}'"
             raise InputError(
@@ -150,21 +150,21 @@ def provable_clearances(world: World, rows: Matrix, clearance: float | None) -> 
     clearances = clearances_between(world, rows[[0, -1]], clearance)
     if clearances is None:
         return
-    for candidate in sorted({clearances.proven_clearance, world.settings.kept}, reverse=True):
+    for candidate in sorted({clearances.proven_clearance, world.settings.required_clearance}, reverse=True):
         if world.prover.route(rows, clearance=candidate).proven:
             yield candidate
 
 
 def proved(path: JointPath, world: World, *, clearance: float | None = None, seconds: float | None = None) -> JointPath:
     """As :meth:`rrtik_ompl.JointPath.proved`, of a path of the world's robot."""
-    required_clearance = world.settings.kept if clearance is None else clearance
+    required_clearance = world.settings.required_clearance if clearance is None else clearance
     return path.with_proof(world.prover.route(path.waypoints, clearance=required_clearance, seconds=seconds))
 
 
 def proved_as_clear(path: JointPath, world: World, clearance: float) -> JointPath:
     """A path with a proof that it keeps a clearance [m], or as much as a millimetre of it, or that it is free."""
     proved_path = proved(path, world, clearance=clearance)
-    least_clearance = world.settings.kept
+    least_clearance = world.settings.required_clearance
     fallbacks = {max(min(clearance, CLEARANCE), least_clearance), least_clearance} - {clearance}
     for smaller_clearance in sorted(fallbacks, reverse=True):
         if proved_path.proven:

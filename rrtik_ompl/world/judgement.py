@@ -1,4 +1,4 @@
-"""A motion as a picture plays it, and what the library says of it: proven or not, how near obstacles are, what touches.
+"""What is said of a motion where it is drawn: proven or not, how near obstacles are, what touches.
 
 All of it is said of the motion itself, a path or a timed one, however many pictures of it are drawn.
 """
@@ -8,29 +8,28 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, TypeAlias
+from itertools import groupby
+from typing import TypeAlias
 
 import numpy as np
 
 from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.base.errors import InputError
-from rrtik_ompl.model.judgement import Judged, Verdict
-from rrtik_ompl.world.clearance_curve import Course, clearance_on, course_along
-from rrtik_ompl.world.path_contacts import contacts_at
+from rrtik_ompl.model.judgement import Judged, PathContact, Verdict
+from rrtik_ompl.model.scene import Scene
+from rrtik_ompl.world.clearance_curve import Course, clearance_on, course_along, places_along
 from rrtik_ompl.world.route_check import as_it_stands, route_violations, verification_resolution
-
-if TYPE_CHECKING:
-    from rrtik_ompl.world.world import World
+from rrtik_ompl.world.row_checks import RowChecks
 
 BISECTIONS = 12  # of a place at which a contact begins or ends
 
 Fault: TypeAlias = tuple[int, float, str]  # the piece, where on it, and what is wrong there
 
 
-def judged_path(rows: Matrix, world: World) -> Judged:
+def judged_path(checks: RowChecks, rows: Matrix) -> Judged:
     """The verdict on a path, waypoints of shape (k, dof); if it is a single one, on the posture."""
-    course = course_along(world, rows)
-    judged, faults = judged_course(world, course, partial(_faults_of_path, world, rows))
+    course = course_along(checks, rows)
+    judged, faults = judged_course(checks, course, partial(_faults_of_path, checks, rows))
 
     unproven = judged.verdict.unproven
     text = doubt = ""
@@ -44,14 +43,14 @@ def judged_path(rows: Matrix, world: World) -> Judged:
 
     where = [f"move {k + 1}: {reason}" for k, _, reason in faults or ()]
     verdict = Verdict(not unproven, text, unproven, doubt)
-    return replace(judged, verdict=with_reason(verdict, world, where, checked=faults is not None))
+    return replace(judged, verdict=with_reason(verdict, checks.settings.scene, where, checked=faults is not None))
 
 
 def judged_course(
-    world: World, course: Course, faults_of: Callable[[], list[Fault]]
+    checks: RowChecks, course: Course, faults_of: Callable[[], list[Fault]]
 ) -> tuple[Judged, list[Fault] | None]:
     """What is said of a course by its pieces, without words, and its faults; None if it is too long for its checks."""
-    curve = clearance_on(world, course) if world.scene.obstacles else None
+    curve = clearance_on(checks, course) if checks.settings.scene.obstacles else None
     unproven = tuple(gap.motion for gap in course.prove(None).unproven) if curve is None else curve.unproven
     verdict = Verdict(not unproven, "", unproven)
 
@@ -67,13 +66,13 @@ def judged_course(
 
     places = course if curve is None else curve
     at = np.append(places.motions + places.shares, [piece + share for piece, share, _ in faults or ()])
-    at = _with_ends(world, course, np.unique(at))
-    return Judged(verdict, curve, contacts_at(world, at, _configurations(course, at))), faults
+    at = _with_ends(checks, course, np.unique(at))
+    return Judged(verdict, curve, contacts_at(checks, at, _configurations(course, at))), faults
 
 
-def _with_ends(world: World, course: Course, at: Vector) -> Vector:
+def _with_ends(checks: RowChecks, course: Course, at: Vector) -> Vector:
     """Places, shape (m,), and those at which what is not free begins or ends between them."""
-    free = world.valid_batch(_configurations(course, at))
+    free = checks.free(_configurations(course, at))
     changes = np.flatnonzero(free[:-1] != free[1:])
 
     last_blocked = np.where(free[changes], at[changes + 1], at[changes])
@@ -81,7 +80,7 @@ def _with_ends(world: World, course: Course, at: Vector) -> Vector:
 
     for _ in range(BISECTIONS if len(changes) else 0):
         middle = 0.5 * (last_blocked + last_free)
-        is_free = world.valid_batch(_configurations(course, middle))
+        is_free = checks.free(_configurations(course, middle))
         last_blocked = np.where(is_free, last_blocked, middle)
         last_free = np.where(is_free, middle, last_free)
 
@@ -94,27 +93,58 @@ def _configurations(course: Course, at: Vector) -> Matrix:
     return course.at(pieces, at - pieces)
 
 
-def with_reason(verdict: Verdict, world: World, faults: list[str], *, checked: bool) -> Verdict:
+def with_reason(verdict: Verdict, scene: Scene, faults: list[str], *, checked: bool) -> Verdict:
     """A verdict that says too what the first fault is, and of which world that is said.
 
     Args:
         verdict: Without these.
-        world: The world.
+        scene: Of the world.
         faults: Those that were found.
         checked: Whether they were looked for; not if that takes too long.
     """
     text = verdict.text
     if not verdict.proven:
         text += f"; {faults[0]}" if faults else ", free in steps" if checked else ", too long to be checked in steps"
-    return replace(verdict, text=text + as_it_stands(world.scene))
+    return replace(verdict, text=text + as_it_stands(scene))
 
 
-def _faults_of_path(world: World, rows: Matrix) -> list[Fault]:
+def _faults_of_path(checks: RowChecks, rows: Matrix) -> list[Fault]:
     """The first violation of each motion of a path."""
     rows = np.vstack([rows, rows]) if len(rows) == 1 else rows
     faults = []
-    for each in route_violations(world, rows, verification_resolution(world)):
+    for each in route_violations(checks, rows, verification_resolution(checks.settings)):
         motion = rows[each.edge + 1] - rows[each.edge]
         share = float((each.q - rows[each.edge]) @ motion / max(float(motion @ motion), 1e-300))
         faults.append((each.edge, min(max(share, 0.0), 1.0), each.reason))
     return faults
+
+
+def contacts_along(checks: RowChecks, waypoints: Matrix) -> tuple[PathContact, ...]:
+    """The contacts of a path, waypoints of shape (k, dof), at places spread evenly over how far the arm moves.
+
+    A contact that is shorter than the way between two places can be missed: this shows what is wrong with a path, and
+    is no check of it.
+    """
+    motions, shares, places = places_along(checks, waypoints)
+    return contacts_at(checks, motions + shares, places)
+
+
+def contacts_at(checks: RowChecks, at: Vector, places: Matrix) -> tuple[PathContact, ...]:
+    """The contacts at configurations, shape (m, dof), that stand at places, shape (m,), in their order."""
+    blocked = np.flatnonzero(~checks.free(places))
+    contacts_of_place = {int(k): found for k in blocked if (found := checks.contacts(places[k]))}
+    names_of_place = {
+        k: frozenset(name for c in found for name in (c.first, c.second)) for k, found in contacts_of_place.items()
+    }
+
+    def stretch(item: tuple[int, int]) -> tuple[int, frozenset[str]]:
+        """What is the same for blocked places that follow each other and at which the same bodies touch."""
+        count, place = item
+        return place - count, names_of_place[place]
+
+    stretches = []
+    for (_, together), run in groupby(enumerate(contacts_of_place), stretch):
+        numbers = [k for _, k in run]
+        deepest = min((contacts_of_place[k][0] for k in numbers), key=lambda contact: contact.clearance)
+        stretches.append(PathContact(float(at[numbers[0]]), float(at[numbers[-1]]), deepest, together))
+    return tuple(stretches)

@@ -9,8 +9,8 @@ import rrtik_ompl as rrtik
 from bench.proofs.cases import random_scene
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.proof import Proof
-from rrtik_ompl.world.certificates.verify import verify_certificate
-from rrtik_ompl.world.certificates.write import certificate_of
+from rrtik_ompl.world.certificate_check import certificate_fault
+from rrtik_ompl.world.certificates import certificate_of
 from rrtik_ompl.world.proof import Prover
 from rrtik_ompl.world.world import World
 from rrtik_tests.turning_slider import slider
@@ -46,7 +46,7 @@ def test_what_a_lying_prover_says_of_a_motion_that_collides_is_refused(name, dep
         forged = certificate_of(world, path)
         if forged is not None:
             lies += 1
-            assert verify_certificate(forged, world, path.waypoints)
+            assert certificate_fault(forged, world, path.waypoints)
     assert lies >= 5
 
 
@@ -62,6 +62,6 @@ def test_what_is_proven_for_a_slower_motion_does_not_hold_for_a_faster_one(name)
             continue
         half = certificate_of(world, JointPath.of(robot, [a, middle]))
         path = JointPath.of(robot, [a, b])
-        assert verify_certificate(replace(half, waypoints=path.waypoints), world, path.waypoints)
+        assert certificate_fault(replace(half, waypoints=path.waypoints), world, path.waypoints)
         refused += 1
     assert refused >= 3

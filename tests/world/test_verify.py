@@ -20,9 +20,9 @@ from rrtik_ompl.model.certificate import MotionEntries, from_document
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.scene import AttachedObject, Obstacle, Scene
 from rrtik_ompl.model.shapes import Box, Sphere
-from rrtik_ompl.world.certificates.verify import Motions, verify_certificate
-from rrtik_ompl.world.certificates.write import certificate_of
-from rrtik_ompl.world.coal_proof import CoalProof
+from rrtik_ompl.world.certificate_check import Motions, certificate_fault
+from rrtik_ompl.world.certificates import certificate_of
+from rrtik_ompl.world.proof import CoalProof
 from rrtik_ompl.world.world import World
 from rrtik_tests.turning_slider import slider
 
@@ -48,8 +48,8 @@ def cases(tmp_path_factory):
 def test_a_certificate_of_a_proven_path_holds_also_when_read_again(name, cases):
     for world, path, certificate in ((case.world, case.path, case.certificate) for case in cases(name)):
         again = from_document(json.loads(json.dumps(certificate.document())))
-        assert verify_certificate(certificate, world, path.waypoints) == ""
-        assert verify_certificate(again, world, path.waypoints, clearance=0.001) == ""
+        assert certificate_fault(certificate, world, path.waypoints) == ""
+        assert certificate_fault(again, world, path.waypoints, clearance=0.001) == ""
         assert again.entries == certificate.entries
         assert (again.waypoints == path.waypoints).all()
         assert world.prover.tables.packed.table.intact()
@@ -63,7 +63,7 @@ def test_what_is_tampered_with_is_refused(name, kind, seed, cases):
     falsified = TAMPERINGS[kind](case, rng)
     if falsified is None:
         pytest.skip("there is nothing to tamper with")
-    fault = verify_certificate(*falsified)
+    fault = certificate_fault(*falsified)
     assert fault
     assert "\n" not in fault
 
@@ -77,8 +77,8 @@ def test_a_gap_of_an_obstacle_less_than_a_millimetre_away_is_looked_at_closely()
     path = JointPath.of(robot, [a, b])
     certificate = certificate_of(near, path)
     assert max(motion.intervals[:, 0].max() for motion in certificate.motions) >= 6
-    assert verify_certificate(certificate, near, path.waypoints) == ""
-    assert "not shown apart" in verify_certificate(replace(certificate, clearance=2e-5), near, path.waypoints)
+    assert certificate_fault(certificate, near, path.waypoints) == ""
+    assert "not shown apart" in certificate_fault(replace(certificate, clearance=2e-5), near, path.waypoints)
 
 
 def test_what_an_arm_holds_and_what_it_may_touch_are_part_of_the_scene():
@@ -89,9 +89,9 @@ def test_what_an_arm_holds_and_what_it_may_touch_are_part_of_the_scene():
     start = np.array([0.0, -1.2, 1.0, -1.0, -1.5, 0.0])
     path = JointPath.of(robot, [start, start + np.array([-0.6, 0.2, 0.1, 0.3, 0.0, 1.0])])
     certificate = certificate_of(world, path)
-    assert verify_certificate(certificate, world, path.waypoints) == ""
+    assert certificate_fault(certificate, world, path.waypoints) == ""
     for other in (Scene([post]), Scene([post], attached=[replace(tool, allow=("forearm_link",))])):
-        assert verify_certificate(certificate, World(robot, other), path.waypoints) == "it is for another scene"
+        assert certificate_fault(certificate, World(robot, other), path.waypoints) == "it is for another scene"
 
 
 def test_a_path_that_is_not_proven_has_no_certificate():
@@ -110,7 +110,7 @@ def test_a_path_that_stands_still_has_a_certificate():
     for rows in ([q], [q, q], [q, q, q + 0.01]):
         path = JointPath.of(robot, rows)
         certificate = certificate_of(world, path)
-        assert verify_certificate(certificate, world, path.waypoints) == ""
+        assert certificate_fault(certificate, world, path.waypoints) == ""
         assert len(certificate.motions) == max(1, len(rows) - 1)
 
 
@@ -119,7 +119,7 @@ def test_a_base_that_touches_an_obstacle_has_none_and_a_forged_one_is_refused(ca
     floor = Obstacle("slab", Box([1.0, 1.0, 0.1]), rrtik.pose([0.0, 0.0, 0.0]))
     world = World(case.world.robot, Scene([floor]))
     assert certificate_of(world, case.path) is None
-    fault = verify_certificate(replace(case.certificate, scene_digest=scene_of(world)), world, case.path.waypoints)
+    fault = certificate_fault(replace(case.certificate, scene_digest=scene_of(world)), world, case.path.waypoints)
     assert "touch and never move" in fault
 
 
@@ -135,7 +135,7 @@ def test_entries_of_no_pair_part_or_interval_are_refused(cases):
     for solid, interval in (([0, 0, 0, 0], [0, 0]), ([0, 99, 1, 0], [0, 0]), (first.solids[0], [60, 0])):
         changed = replace(first, solids=first.solids.copy(), intervals=first.intervals.copy())
         changed.solids[0], changed.intervals[0] = solid, interval
-        fault = verify_certificate(
+        fault = certificate_fault(
             replace(case.certificate, motions=(changed, *others)), case.world, case.path.waypoints
         )
         assert fault.startswith("motion 1: no parts")
@@ -143,7 +143,7 @@ def test_entries_of_no_pair_part_or_interval_are_refused(cases):
 
 def test_a_larger_clearance_than_the_certificate_has_is_not_shown_by_it(cases):
     case = cases("titan4")[0]
-    assert "clearance" in verify_certificate(case.certificate, case.world, case.path.waypoints, clearance=0.002)
+    assert "clearance" in certificate_fault(case.certificate, case.world, case.path.waypoints, clearance=0.002)
 
 
 def test_links_that_coal_proves_apart_are_in_the_certificate_and_measured_again():
@@ -160,12 +160,12 @@ def test_links_that_coal_proves_apart_are_in_the_certificate_and_measured_again(
         (motion,) = certificate.motions
         measured = np.flatnonzero(motion.solids[:, 1] < 0)
         assert len(measured) > 0
-        assert verify_certificate(certificate, world, [a, b]) == ""
+        assert certificate_fault(certificate, world, [a, b]) == ""
         kept = np.arange(len(motion.solids)) != measured[-1]
         missing = MotionEntries(motion.solids[kept], motion.intervals[kept], motion.normals[kept])
         other = replace(motion, solids=np.where(motion.solids < 0, 0, motion.solids))
         for falsified in (missing, other):
-            assert verify_certificate(replace(certificate, motions=(falsified,)), world, [a, b])
+            assert certificate_fault(replace(certificate, motions=(falsified,)), world, [a, b])
 
 
 def test_links_that_touch_are_not_measured_apart_whatever_a_certificate_says():
@@ -177,7 +177,7 @@ def test_links_that_touch_are_not_measured_apart_whatever_a_certificate_says():
     solids = np.array([[i, -1, j, -1] for i, j in motions.pairs])
     entries = MotionEntries(solids, np.zeros((len(solids), 2), dtype=np.int64), np.zeros((len(solids), 3)))
     forged = replace(honest, waypoints=np.array([q, q]), motions=(entries,))
-    assert "not shown apart" in verify_certificate(forged, world, [q, q])
+    assert "not shown apart" in certificate_fault(forged, world, [q, q])
 
 
 @pytest.mark.parametrize("name", ["panda", "slider"])
@@ -210,14 +210,14 @@ def test_the_log_grows_where_it_is_too_small_and_costs_nothing_afterwards(cases,
     packed = case.world.prover.tables.packed
     monkeypatch.setattr(log.logged, "__defaults__", (1,))
     again = certificate_of(case.world, case.path, 0.001)
-    assert verify_certificate(again, case.world, case.path.waypoints) == ""
+    assert certificate_fault(again, case.world, case.path.waypoints) == ""
     assert again.entries == case.certificate.entries
     assert packed.table.intact()
     assert packed.table.log_room == 0
 
 
 def test_a_verifier_needs_neither_kernels_nor_planners():
-    code = "import sys, rrtik_ompl.world.certificates.verify"
+    code = "import sys, rrtik_ompl.world.certificate_check"
     code += "; print([m for m in sys.modules if m.split('.')[0] in ('numba', 'ompl', 'scipy', 'rrtik_planners')"
     code += " or m.startswith(('rrtik_ompl.kernels.proof', 'rrtik_ompl.kernels.checks', 'rrtik_ompl.world.world'))])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -1,4 +1,4 @@
-"""Certificates of paths, made by the kernels that prove motions."""
+"""Certificates of paths: made by the kernels that prove motions, verified without them."""
 
 from __future__ import annotations
 
@@ -6,10 +6,11 @@ from typing import Protocol, runtime_checkable
 
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.base.arrays import Matrix, finite_array, not_negative
+from rrtik_ompl.base.arrays import Matrix, finite_array, not_negative, number_rows
 from rrtik_ompl.base.errors import require
 from rrtik_ompl.model.certificate import Certificate
 from rrtik_ompl.model.robot import require_joints, unnamed_joints
+from rrtik_ompl.world.certificate_check import certificate_fault
 from rrtik_ompl.world.world import World
 
 
@@ -45,3 +46,28 @@ def certificate_of(world: World, path: HasWaypoints | ArrayLike, clearance: floa
     rows = finite_array(waypoints, (None, None), "path of a certificate")
     require_joints(robot, getattr(path, "joint_names", unnamed_joints(rows.shape[1])), "path")
     return world.prover.certificate(rows, required_clearance)
+
+
+def verify_certificate(certificate: Certificate, world: World, waypoints: ArrayLike, *, clearance: float = 0.0) -> str:
+    """The first fault of a certificate in one line; "" if it proves that a path is free.
+
+    Args:
+        certificate: The certificate; nothing in it is believed.
+        world: The robot and the scene; bodies, pairs and the chain of joints are read, no check of it is asked.
+        waypoints: Of the path, shape (k, dof); the certificate has to be for these to the bit.
+        clearance: What the path has to keep from obstacles beside their margins at least [m].
+
+    Raises:
+        InputError: If an argument is of another kind.
+
+    Example:
+        >>> problem = rrtik.load_problem("planar3_boxes")
+        >>> path = rrtik.plan(problem, seed=1).path
+        >>> rrtik.verify_certificate(rrtik.certificate_of(problem.world, path), problem.world, path.waypoints)
+        ''
+    """
+    require(certificate, Certificate, "certificate")
+    require(world, World, "world of a certificate")
+    rows = number_rows(waypoints, "waypoints of a certificate")
+    required_clearance = not_negative(clearance, "clearance")
+    return certificate_fault(certificate, world, rows, clearance=required_clearance)

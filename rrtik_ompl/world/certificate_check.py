@@ -64,7 +64,7 @@ class Entry(NamedTuple):
         return self[:4]
 
 
-def verify_certificate(certificate: Certificate, world: World, waypoints: ArrayLike, *, clearance: float = 0.0) -> str:
+def certificate_fault(certificate: Certificate, world: World, waypoints: ArrayLike, *, clearance: float = 0.0) -> str:
     """As :func:`rrtik_ompl.verify_certificate`, which refuses arguments of another kind first.
 
     Returns:

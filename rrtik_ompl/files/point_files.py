@@ -1,0 +1,276 @@
+"""Points and rows of numbers out of the bytes of files: text, .npy, PLY and PCD, as many as a header claims.
+
+Of a PLY file (text, little- and big-endian) it is the element ``vertex``, of a PCD file (ascii, binary,
+binary_compressed) the fields x, y and z. The sensor's pose that a PCD file may state (VIEWPOINT) is not applied: points
+are taken as they stand in the file.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rrtik_ompl.base.errors import InputError
+
+AXES = ("x", "y", "z")
+LONGEST_LINE = 4 * 1024 * 1024  # bytes, that are surely read; a line takes ten times its size in memory
+PLY_TYPES = {"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4", "float": "f4"}
+PLY_TYPES |= {"double": "f8", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4"}
+PLY_TYPES |= {"float32": "f4", "float64": "f8"}
+PLY_ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
+PLY_END = b"end_header"
+PCD_KINDS = {"F": "f", "I": "i", "U": "u"}
+PCD_SIZES = ("1", "2", "4", "8")
+MOST_UNPACKED = 256 * 1024 * 1024  # bytes of compressed points
+
+
+def claimed(text: str, what: str) -> int:
+    """A number of points that a header claims.
+
+    Raises:
+        InputError: If it is no whole number of at least 0.
+    """
+    if not text.isascii() or not text.isdigit() or len(text) > 18:
+        raise InputError(f"{what}: expected a number of points, got '{text[:20]}'")
+    return int(text)
+
+
+def records(data: bytes, offset: int, kind: np.dtype[Any], count: int, what: str) -> NDArray[Any]:
+    """Records from a place on, shape (count,), without a copy.
+
+    Raises:
+        InputError: If the file is too short for so many.
+    """
+    most = max(0, len(data) - offset) // max(1, kind.itemsize)
+    if count > most:
+        raise InputError(f"{what}: its header claims {count} points, but the file has room for {most}; save it again")
+    return np.frombuffer(data, dtype=kind, count=count, offset=offset)
+
+
+def npy_rows(data: bytes, what: str, columns: int | None = None) -> NDArray[Any]:
+    """The array of a .npy file of numpy, shape (n, columns); any number of columns if None.
+
+    Raises:
+        InputError: If it is none, its shape is another one, or the file is too short for what its header claims.
+    """
+    stream = io.BytesIO(data)
+    try:
+        version = np.lib.format.read_magic(stream)
+        read = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}[version]
+        shape, columnwise, kind = read(stream)
+    except (ValueError, KeyError) as error:
+        raise InputError(f"{what}: not a .npy file of numpy: {str(error).splitlines()[0]}") from None
+
+    if kind.kind not in "fiu" or len(shape) != 2 or columns not in (None, shape[1]):
+        wanted = f"(any, {'any' if columns is None else columns})"
+        raise InputError(f"{what}: expected numbers of shape {wanted}, got {kind} of shape {shape}")
+
+    if not columnwise:
+        return records(data, stream.tell(), np.dtype((kind, (shape[1],))), shape[0], what)
+    return records(data, stream.tell(), kind, shape[1] * shape[0], what).reshape(shape[::-1]).T
+
+
+def text_rows(data: bytes, columns: Sequence[int] | None, what: str, most: int | None = None) -> NDArray[np.float64]:
+    """Columns of rows of numbers in a text, shape (n, len(columns)); all of them if None.
+
+    Raises:
+        InputError: If a row is too short, too long, or has something else.
+    """
+    for begin in range(0, len(data) - LONGEST_LINE, LONGEST_LINE):
+        end = begin + LONGEST_LINE
+        if data.find(b"\n", begin, end) < 0 and data.find(b"\r", begin, end) < 0:
+            most = LONGEST_LINE // 2**20
+            raise InputError(f"{what}: not rows of numbers: a line is longer than {most} MiB, the most that is read")
+
+    plain = data.replace(b",", b" ") if b"," in data else data
+    if not plain or plain.isspace():
+        return np.zeros((0, len(columns or ())))
+
+    lines = io.TextIOWrapper(io.BytesIO(plain), "ascii", errors="replace")  # read line by line: all at once take memory
+    try:
+        rows = np.loadtxt(lines, usecols=columns, ndmin=2, max_rows=most, dtype=np.float64)
+    except ValueError as error:
+        raise InputError(f"{what}: not rows of numbers: {str(error).splitlines()[0]}") from None
+    return rows if columns is None else rows.reshape(-1, len(columns))
+
+
+def coordinates(rows: NDArray[Any]) -> NDArray[Any]:
+    """The fields x, y and z of records as rows, shape (n, 3)."""
+    kind = np.float64 if any(rows.dtype[axis].itemsize > 4 for axis in AXES) else np.float32
+    points = np.empty((len(rows), len(AXES)), dtype=kind)
+    for k, axis in enumerate(AXES):
+        points[:, k] = rows[axis]
+    return points
+
+
+def ply_points(data: bytes, what: str) -> NDArray[Any]:
+    """Points of a PLY file, shape (n, 3).
+
+    Raises:
+        InputError: If it is none, or has no points; one line.
+    """
+    head, found, _ = data.partition(PLY_END)
+    if not data.startswith(b"ply") or not found:
+        raise InputError(f"{what}: not a PLY file: no header from 'ply' to 'end_header'; export it again")
+
+    begin = data.find(b"\n", len(head)) + 1
+    lines = [line.split() for line in head.decode("ascii", "replace").splitlines()]
+    order = next((line[1] for line in lines if line[0:1] == ["format"] and len(line) > 1), "")
+    if order not in PLY_ORDERS:
+        raise InputError(f"{what}: format '{order}' of a PLY file is unknown; have {', '.join(PLY_ORDERS)}")
+
+    fields, claim = _vertex(lines, what)
+    names = [line[2] for line in fields]
+    count = claimed(claim, what)
+
+    if order == "ascii":
+        rows = text_rows(data[begin:], [names.index(axis) for axis in AXES], what, count)
+        if len(rows) < count:
+            raise InputError(f"{what}: its header claims {count} points, but the file has {len(rows)}; save it again")
+        return rows
+
+    kinds = [
+        (f"{k} {name}" if name not in AXES else name, PLY_ORDERS[order] + PLY_TYPES[kind])
+        for k, (_, kind, name) in enumerate(fields)
+    ]
+    return coordinates(records(data, begin, np.dtype(kinds), count, what))
+
+
+def _vertex(lines: list[list[str]], what: str) -> tuple[list[list[str]], str]:
+    """The properties of the element ``vertex``, each "property", type and name, and how many points are claimed."""
+    elements = [k for k, line in enumerate(lines) if line[0:1] == ["element"] and len(line) == 3]
+    if not elements or lines[elements[0]][1] != "vertex":
+        raise InputError(f"{what}: the first element of a PLY file must be 'vertex'; export points alone")
+
+    end = elements[1] if len(elements) > 1 else len(lines)
+    fields = [line for line in lines[elements[0] + 1 : end] if line[0:1] == ["property"]]
+    if any(len(line) != 3 or line[1] not in PLY_TYPES for line in fields):
+        raise InputError(f"{what}: a property of 'vertex' is a list or of an unknown type; export points alone")
+
+    names = [line[2] for line in fields]
+    if missing := [axis for axis in AXES if names.count(axis) != 1]:
+        raise InputError(f"{what}: 'vertex' needs one property '{missing[0]}'; it has {', '.join(names) or 'none'}")
+    return fields, lines[elements[0]][2]
+
+
+def pcd_points(data: bytes, what: str) -> NDArray[Any]:
+    """Points of a PCD file, shape (n, 3).
+
+    Raises:
+        InputError: If it is none, or has no points; one line.
+    """
+    head, found, rest = data.partition(b"\nDATA ")
+    if not found:
+        raise InputError(f"{what}: not a PCD file: its header has no line DATA; export it again")
+
+    way, _, body = rest.partition(b"\n")
+    lines = [line.split() for line in head.decode("ascii", "replace").splitlines()]
+    header = {line[0]: line[1:] for line in lines if line and not line[0].startswith("#")}
+    names = header.get("FIELDS", [])
+    count = claimed(" ".join(header.get("POINTS", [])), f"{what}: POINTS")
+    if missing := [axis for axis in AXES if names.count(axis) != 1]:
+        raise InputError(f"{what}: FIELDS needs one '{missing[0]}'; it has {', '.join(names) or 'none'}")
+
+    kind = _record(header, names, what)
+    stored = way.strip().decode("ascii", "replace")
+    if stored == "ascii":
+        places = np.cumsum([0, *(kind[k].shape[0] if kind[k].shape else 1 for k in range(len(names)))])
+        rows = text_rows(body, [int(places[names.index(axis)]) for axis in AXES], what, count)
+        if len(rows) < count:
+            raise InputError(f"{what}: its header claims {count} points, but the file has {len(rows)}; save it again")
+        return rows
+    if stored == "binary":
+        return coordinates(records(body, 0, kind, count, what))
+    if stored == "binary_compressed":
+        return _columns(body, kind, count, what)
+    raise InputError(f"{what}: DATA '{stored[:20]}' is unknown; have ascii, binary, binary_compressed")
+
+
+def _record(header: dict[str, list[str]], names: list[str], what: str) -> np.dtype[Any]:
+    """The type of one point."""
+    sizes = header.get("SIZE", [])
+    kinds = header.get("TYPE", [])
+    counts = header.get("COUNT", ["1"] * len(names))
+    if not len(names) == len(sizes) == len(kinds) == len(counts):
+        raise InputError(f"{what}: FIELDS, SIZE, TYPE and COUNT must have as many entries each")
+
+    known = all(
+        size in PCD_SIZES and kind in PCD_KINDS and (kind, size) != ("F", "1")
+        for size, kind in zip(sizes, kinds, strict=True)
+    )
+    if not known or not all(count.isdigit() and 0 < int(count) < 10_000 for count in counts):
+        raise InputError(f"{what}: SIZE, TYPE or COUNT has an entry that is unknown; export it again")
+
+    fields = []
+    for k, (name, size, kind, many) in enumerate(zip(names, sizes, kinds, counts, strict=True)):
+        own = f"<{PCD_KINDS[kind]}{size}"
+        fields.append((name, own) if name in AXES else (f"{k} {name}", own, (int(many),)))
+    return np.dtype(fields)
+
+
+def _columns(body: bytes, kind: np.dtype[Any], count: int, what: str) -> NDArray[Any]:
+    """The points of compressed data: all x, then all y, ..."""
+    if len(body) < 8:
+        raise InputError(f"{what}: the compressed points are missing; save it again")
+    packed, size = (int.from_bytes(body[k : k + 4], "little") for k in (0, 4))
+    if size != count * kind.itemsize or packed > len(body) - 8:
+        raise InputError(f"{what}: its header claims {count} points, which the compressed data are not; save it again")
+    if size > MOST_UNPACKED:
+        raise InputError(f"{what}: {size >> 20} MiB of compressed points, more than is read; save it as DATA binary")
+
+    plain = unpacked(body[8 : 8 + packed], size, what)
+    assert kind.names is not None
+
+    points = np.empty((count, len(AXES)))
+    begin = 0
+    for name in kind.names:
+        if name in AXES:
+            points[:, AXES.index(name)] = np.frombuffer(plain, kind[name], count, begin)
+        begin += count * kind[name].itemsize
+    return points
+
+
+def unpacked(packed: bytes, size: int, what: str) -> bytes:
+    """Bytes out of Lehmann's LZF: runs of bytes, and copies of what came before.
+
+    Raises:
+        InputError: If they are damaged.
+    """
+    plain = bytearray()
+    place = 0
+    try:
+        while place < len(packed):
+            control = packed[place]
+            place += 1
+            # As many bytes as this says follow as they are.
+            if control < 32:
+                plain += packed[place : place + control + 1]
+                place += control + 1
+                continue
+
+            # Or it is a copy: of how many bytes, and from how far back.
+            count = control >> 5
+            if count == 7:
+                count += packed[place]
+                place += 1
+
+            begin = len(plain) - ((control & 31) << 8) - packed[place] - 1
+            place += 1
+            if begin < 0:
+                raise IndexError
+            end = begin + count + 2
+            if end <= len(plain):
+                plain += plain[begin:end]
+            else:  # it goes on with what it has just copied
+                for k in range(begin, end):
+                    plain.append(plain[k])
+    except IndexError:
+        raise InputError(f"{what}: the compressed points are damaged; save it again") from None
+
+    if len(plain) != size:
+        raise InputError(f"{what}: the compressed points are damaged; save it again")
+    return bytes(plain)
