@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector, frozen
-from rrtik_ompl.ik.reference_descent import DAMPING, DAMPING_SHARE, LARGEST_STEP, PER_CHORD, SHARE_GROWTH, STALLED
 from rrtik_ompl.ik.tip_columns import TipColumns, tip_columns
 from rrtik_ompl.kernels.ik import ik_layout
 from rrtik_ompl.kernels.ik.ik_layout import CallTable, LimbTable
+from rrtik_ompl.kernels.reference.descent import DAMPING, DAMPING_SHARE, LARGEST_STEP, PER_CHORD, SHARE_GROWTH, STALLED
 from rrtik_ompl.kernels.tables.memory import PlannedTable, TablePlan, aligned, packed, sizes_of
 from rrtik_ompl.model.robot import Robot, reach_of
 

@@ -334,9 +334,9 @@ class Descent:
 def descend(metric: TipMetric, Q: Matrix, lower: Vector, upper: Vector, *, iterations: int = ITERATIONS) -> Descent:
     """Walk from each row of Q, shape (m, n), towards the goal, inside bounds of shape (n,): steps by the Jacobian.
 
-    Levenberg-Marquardt [22], as in :mod:`rrtik_ompl.ik.reference_descent`: the damping is half the squared residual
-    plus a small constant. Joints that a step would push through a bound are held and the step is solved for again, so
-    that goals on a limit are reached.
+    Levenberg-Marquardt [22], as in :mod:`rrtik_ompl.kernels.reference.descent`: the damping is half the squared
+    residual plus a small constant. Joints that a step would push through a bound are held and the step is solved for
+    again, so that goals on a limit are reached.
     """
     length = reach(metric.robot) * metric.unit
     enough = min(ACCURACY * length, SHARE * metric.radius)

@@ -7,9 +7,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector
 from rrtik_ompl.ik.kernel_tables import SEEDS, KernelCall, limb_of, seeded_limb_of, seeds_of, spare_calls
-from rrtik_ompl.ik.reference_descent import farness, walk_plainly
 from rrtik_ompl.ik.targets import goal_rows
 from rrtik_ompl.kernels.ik.ik_layout import KERNELS, LimbTable
+from rrtik_ompl.kernels.reference.descent import farness, walk_plainly
 from rrtik_ompl.kernels.simd.library import Library, library
 from rrtik_ompl.model.goal import TipGoal
 from rrtik_ompl.model.robot import Robot

@@ -3,7 +3,7 @@
 What the region leaves free does not constrain the joints, so that arms of fewer joints than a pose needs fit as well.
 
 Sources: [23] for steps that leave free directions out; damping after [22], as in
-`rrtik_ompl.ik.reference_descent`.
+`rrtik_ompl.kernels.reference.descent`.
 """
 
 from __future__ import annotations

@@ -1,1 +1,1 @@
-"""Collision checks of configurations and motions in kernels, and the same in numpy as the reference."""
+"""Collision checks of configurations and motions in kernels."""

@@ -16,11 +16,11 @@ from numpy.typing import ArrayLike, NDArray
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector, distinct
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.geometry.collision.bodies import Body, by_motion, pair_array
-from rrtik_ompl.kernels.checks import inputs, reference_distances
+from rrtik_ompl.kernels.checks import inputs
 from rrtik_ompl.kernels.checks.clearance import Clearance, rounded
-from rrtik_ompl.kernels.checks.reference import ReferenceChecks
 from rrtik_ompl.kernels.layout import UNDECIDED, ProbeTable, WorldTable
 from rrtik_ompl.kernels.record import Record
+from rrtik_ompl.kernels.reference.checks import ReferenceChecks, measure
 from rrtik_ompl.kernels.simd.library import library
 from rrtik_ompl.kernels.tables.memory import packed, with_own_arrays
 from rrtik_ompl.kernels.tables.packing import (
@@ -285,7 +285,7 @@ class FastWorld:
         scene = self._primitives[level]
         kernels = None if self._kernels is None else library("checks.distance_kernels")
         if kernels is None:
-            return reference_distances.measure(self._arm.arm, balls, scene, rows)
+            return measure(self._arm.arm, balls, scene, rows)
         if self._probe is None:
             self._probe = probe_table(self._primitives)
         found = np.empty(len(rows))

@@ -1,7 +1,7 @@
 """Numeric inverse kinematics in kernels: Levenberg-Marquardt from many starts, for any row of joints from base to tip.
 
 Source: [22]. Everything is seen from the goal, so that the residual is where the tip is; joints at a limit that would
-go on beyond it are left out of a step. :mod:`rrtik_ompl.ik.reference_descent` is the same in numpy.
+go on beyond it are left out of a step. :mod:`rrtik_ompl.kernels.reference.descent` is the same in numpy.
 """
 
 from __future__ import annotations

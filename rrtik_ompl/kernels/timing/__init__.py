@@ -1,1 +1,1 @@
-"""Motions along curves in the shortest time, in kernels: the curve, the search along it, and their twins in numpy."""
+"""Motions along curves in the shortest time, in kernels: the curve and the search along it."""

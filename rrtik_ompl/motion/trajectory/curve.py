@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.kernels.reference import timing as reference
 from rrtik_ompl.kernels.simd.library import library
 from rrtik_ompl.kernels.tables.memory import PlannedTable, TablePlan, sizes_of
-from rrtik_ompl.kernels.timing import reference
 from rrtik_ompl.kernels.timing.layout import KERNELS, CurveTable
 from rrtik_ompl.motion.trajectory.cubics import even_parts
 

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from rrtik_ompl.base.arrays import Matrix, Vector, dimensions, finite_array, not_negative, positive
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.base.poses import working_memory
-from rrtik_ompl.kernels.timing.reference import Rows
+from rrtik_ompl.kernels.reference.timing import Rows
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.motion.trajectory.curve import Samples
 from rrtik_ompl.motion.trajectory.fastest import MOST, Bounds

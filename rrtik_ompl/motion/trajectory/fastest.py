@@ -9,11 +9,11 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from rrtik_ompl.base.arrays import Vector
+from rrtik_ompl.kernels.reference import timing as reference
+from rrtik_ompl.kernels.reference.timing import Rows
 from rrtik_ompl.kernels.simd.library import library
 from rrtik_ompl.kernels.tables.memory import PlannedTable, TablePlan, sizes_of
-from rrtik_ompl.kernels.timing import reference
 from rrtik_ompl.kernels.timing.layout import KERNELS, LINE, SearchTable, line_count
-from rrtik_ompl.kernels.timing.reference import Rows
 from rrtik_ompl.motion.trajectory.curve import Samples
 from rrtik_ompl.motion.trajectory.limits import RateLimits
 

@@ -12,7 +12,6 @@ import numpy as np
 
 from rrtik_ompl.base.arrays import Matrix, Vector, frozen
 from rrtik_ompl.ik.kernel_tables import KernelCall, limb_of
-from rrtik_ompl.ik.reference_descent import LARGEST_STEP, PER_CHORD
 from rrtik_ompl.ik.tip_columns import tip_columns
 from rrtik_ompl.kernels.ik import rail_layout
 from rrtik_ompl.kernels.ik.ik_layout import AIM_FLOATS, CHORD_TOLERANCE, FREE_TURN, NO_TURN, POSITION_TOLERANCE
@@ -27,6 +26,7 @@ from rrtik_ompl.kernels.ik.rail_layout import (
     SMALLEST_SHRINKING,
     RailTable,
 )
+from rrtik_ompl.kernels.reference.descent import LARGEST_STEP, PER_CHORD
 from rrtik_ompl.kernels.simd.library import library
 from rrtik_ompl.kernels.tables.memory import PlannedTable, TablePlan, sizes_of
 from rrtik_ompl.model.robot import Robot, reach_of

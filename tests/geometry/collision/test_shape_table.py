@@ -261,5 +261,5 @@ def test_a_shape_with_a_formula_for_the_kernels_touches_six_files():
         "rrtik_ompl/kernels/layout.py",
         "rrtik_ompl/kernels/tables/scene_tables.py",
         "rrtik_ompl/kernels/checks/obstacle_kernels.py",
-        "rrtik_ompl/kernels/checks/reference.py",
+        "rrtik_ompl/kernels/reference/checks.py",
     }

@@ -15,9 +15,9 @@ from rrtik_ompl.ik.method_interface import mid_range_configuration
 from rrtik_ompl.ik.numeric import descent
 from rrtik_ompl.ik.numeric.descent import Search, walk
 from rrtik_ompl.ik.numeric.restarts import numeric_ik
-from rrtik_ompl.ik.reference_descent import walk_plainly
 from rrtik_ompl.ik.targets import goal_rows, pose_rows
 from rrtik_ompl.kernels.ik.ik_layout import KERNELS
+from rrtik_ompl.kernels.reference.descent import walk_plainly
 from rrtik_ompl.kernels.simd.library import library
 from rrtik_ompl.model.goal import GoalSet, PoseGoal, PositionGoal
 from rrtik_ompl.model.shapes import Box

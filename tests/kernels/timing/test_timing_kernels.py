@@ -5,11 +5,11 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from rrtik_ompl.kernels.reference import timing as reference
+from rrtik_ompl.kernels.reference.timing import Rows
 from rrtik_ompl.kernels.simd.library import library
 from rrtik_ompl.kernels.tables.memory import packed
-from rrtik_ompl.kernels.timing import reference
 from rrtik_ompl.kernels.timing.layout import KERNELS, LINE, CurveTable, SearchTable, line_count
-from rrtik_ompl.kernels.timing.reference import Rows
 
 pytestmark = pytest.mark.kernels
 seeds = st.integers(0, 2**32 - 1)
