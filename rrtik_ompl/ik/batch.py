@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass
 from functools import partial
 
@@ -10,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector, finite_array, frozen, not_negative, whole_number
+from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.choices import IkMethod
 from rrtik_ompl.base.copies import as_value, in_one_line
 from rrtik_ompl.base.errors import require
@@ -121,9 +121,9 @@ def _solved(
     part: slice,
 ) -> tuple[Matrix, Matrix, list[str], list[str]]:
     """The answers for a part of the poses: q, residuals, reasons and details of an :class:`IkBatch`."""
-    begin = time.monotonic()
     method = asked
     targets = poses[part]
+    budget = Budget(seconds=seconds * len(targets))
     q = np.full((len(targets), robot.dof), np.nan)
     residuals = np.full((len(targets), 2), np.nan)
     reasons = [""] * len(targets)
@@ -134,7 +134,7 @@ def _solved(
     if method == "closed-form" and form_of(robot).kind == "pose":
         _by_closed_form(robot, targets, near, world, q, residuals)
     elif method == "numeric":
-        _by_search(robot, targets, near, world, begin + seconds * len(targets), q, residuals)
+        _by_search(robot, targets, near, world, budget, q, residuals)
 
     # what is left one by one, each with the seed of its place: however many threads there are, answers are the same
     for k in np.flatnonzero(np.isnan(q[:, 0])).tolist():
@@ -171,7 +171,7 @@ def _by_search(
     targets: NDArray[np.float64],
     near: Vector,
     world: World | None,
-    deadline: float,
+    budget: Budget,
     q: Matrix,
     residuals: Matrix,
 ) -> None:
@@ -179,7 +179,7 @@ def _by_search(
     search = Search(robot, pose_rows(targets), near)
     going = np.arange(len(targets))
 
-    while len(going) and time.monotonic() < deadline:
+    while len(going) and not budget.over():
         going = going[search.advance(going)]
         free = free_of_collision(world, search.q[going])
         done = going[free]

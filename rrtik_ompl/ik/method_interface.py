@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector, frozen, whole_number
+from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.choices import IkMethod
 from rrtik_ompl.base.copies import as_value, in_one_line
 from rrtik_ompl.description.joint_weights import weighted_difference
@@ -31,7 +32,7 @@ class IkRequest:
         near: Posture near which a solution is preferred, shape (dof,).
         accept: Which of some configurations, shape (k, dof), inside the limits and at the goal, will do.
         all: Whether to return every solution that the method can find, not just one.
-        deadline: Time of ``time.monotonic`` at which to stop.
+        budget: How long a method may take; it looks between its rounds. The random numbers are those of ``random``.
         random: Random numbers.
         world: What ``accept`` checks collisions with, for methods that place the arm link by link.
     """
@@ -42,7 +43,7 @@ class IkRequest:
     near: Vector
     accept: Callable[[Matrix], Mask]
     all: bool
-    deadline: float
+    budget: Budget
     random: RandomStream
     world: World | None = None
 

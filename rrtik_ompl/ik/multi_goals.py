@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector, frozen
+from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.choices import IkMethod
 from rrtik_ompl.constraints.held_region import HeldRegion
 from rrtik_ompl.constraints.held_regions import HeldRegions, goal_regions
@@ -74,7 +74,7 @@ def solve_all_tips(
     goal: MultiGoal,
     near: Vector,
     accept: Callable[[Matrix], Mask],
-    deadline: float,
+    budget: Budget,
     rng: np.random.Generator,
     *,
     scene: Scene,
@@ -86,16 +86,15 @@ def solve_all_tips(
         goal: Likewise.
         near: Likewise.
         accept: Which configurations, shape (m, dof), are free, shape (m,).
-        deadline: When to end [s, of ``time.monotonic``]; there is a first round in any case.
+        budget: How long it may take; there is a first round in any case.
         rng: See :func:`at_all_tips`.
         scene: Likewise.
     """
-    begin = time.monotonic()
     rounds = 0
     reason = "time"
     detail = ""
 
-    while rounds == 0 or time.monotonic() < deadline:
+    while rounds == 0 or not budget.over():
         rounds += 1
         found = at_all_tips(robot, goal, near, rng, scene=scene, path_regions=())
         free = found[accept(found)]
@@ -103,14 +102,14 @@ def solve_all_tips(
             turned = joint_difference(robot, free, near)
             chosen = different_rows(turned, nearest_first(robot, free, near))
             rows = np.where(robot.continuous, near + turned[chosen], free[chosen])
-            return _result(rows, _residuals(robot, goal, rows), "", "", rounds, begin)
+            return _result(rows, _residuals(robot, goal, rows), "", "", rounds, budget.elapsed)
         if len(found):
             reason = "collision"
             detail = f"{len(found)} configurations reach the goals, all in collision"
 
     tips = " and ".join(f"'{frame}'" for frame in goal.frames)
     detail = detail or f"no configuration with {tips} at their goals in {rounds} rounds; are they in reach?"
-    return _result(np.zeros((0, robot.dof)), np.zeros((0, 2)), reason, detail, rounds, begin)
+    return _result(np.zeros((0, robot.dof)), np.zeros((0, 2)), reason, detail, rounds, budget.elapsed)
 
 
 def _residuals(robot: Robot, goal: MultiGoal, rows: Matrix) -> Matrix:
@@ -121,6 +120,5 @@ def _residuals(robot: Robot, goal: MultiGoal, rows: Matrix) -> Matrix:
     return farthest
 
 
-def _result(rows: Matrix, residuals: Matrix, reason: str, detail: str, rounds: int, begin: float) -> IkResult:
-    spent = time.monotonic() - begin
-    return IkResult(frozen(rows), frozen(residuals), reason, detail, rounds, PROJECTION, spent)
+def _result(rows: Matrix, residuals: Matrix, reason: str, detail: str, rounds: int, seconds: float) -> IkResult:
+    return IkResult(frozen(rows), frozen(residuals), reason, detail, rounds, PROJECTION, seconds)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from typing import Any, get_args
 
 import numpy as np
@@ -10,6 +9,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector, frozen, not_negative
+from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.choices import IkMethod, one_of
 from rrtik_ompl.base.errors import InputError, require
 from rrtik_ompl.description.joint_weights import weighted_difference
@@ -82,8 +82,7 @@ def solve_ik(
     require(all, bool, "all")
     load_kernels(robot)
 
-    begin = time.monotonic()
-    limit = not_negative(seconds, "seconds")
+    budget = Budget(seconds=not_negative(seconds, "seconds"))
     random = RandomStream(seed)
     posture = mid_range_configuration(robot) if near is None else robot.configuration(near, "near")
 
@@ -94,7 +93,7 @@ def solve_ik(
         if method not in ("auto", PROJECTION):
             raise InputError(f"method '{method}' is for one tip; use {PROJECTION}")
         scene = Scene() if world is None else world.scene
-        found = solve_all_tips(robot, goal, posture, accept, begin + limit, random.rng, scene=scene)
+        found = solve_all_tips(robot, goal, posture, accept, budget, random.rng, scene=scene)
         return found if all else found.nearest()
 
     goal = _tip_goal(goal)
@@ -103,8 +102,8 @@ def solve_ik(
     if method == "auto" and name == "numeric":
         name = _walking_method(goal)
 
-    request = IkRequest(robot, goal, drawn, posture, accept, all, begin + limit, random, world)
-    return _solve_by(request, name, method == "auto", begin)
+    request = IkRequest(robot, goal, drawn, posture, accept, all, budget, random, world)
+    return _solve_by(request, name, method == "auto")
 
 
 def free_of_collision(world: World | None, Q: Matrix) -> Mask:
@@ -159,7 +158,7 @@ def _walking_method(goal: TipGoal) -> IkMethod:
     return "projection" if goal.has_regions else "numeric"
 
 
-def _solve_by(request: IkRequest, name: IkMethod, auto: bool, begin: float) -> IkResult:
+def _solve_by(request: IkRequest, name: IkMethod, auto: bool) -> IkResult:
     """The answer of a method; if it has none and was chosen by "auto", of the one that walks to the goal."""
     robot = request.robot
     goal = request.goal
@@ -167,13 +166,13 @@ def _solve_by(request: IkRequest, name: IkMethod, auto: bool, begin: float) -> I
 
     nearest = None if request.all else _nearest(request, response.q)
     if nearest is not None:
-        return IkResult(*nearest, "", "", response.iterations, name, time.monotonic() - begin)
+        return IkResult(*nearest, "", "", response.iterations, name, request.budget.elapsed)
 
     q, residuals, free = _rows_at_goal(request, response.q)
     took_draws = _takes_draws_alone(name, goal)
     took_part_of_a_curve = name == "closed-form" and response.singular and len(q) == 0
     if auto and not free.any() and (took_draws or took_part_of_a_curve):
-        walked = _solve_by(request, _walking_method(goal), False, begin)
+        walked = _solve_by(request, _walking_method(goal), False)
         if walked.found or took_draws:  # else the closed form knows better why there is nothing
             return walked
 
@@ -191,7 +190,7 @@ def _solve_by(request: IkRequest, name: IkMethod, auto: bool, begin: float) -> I
         detail=detail,
         iterations=response.iterations,
         method=name,
-        seconds=time.monotonic() - begin,
+        seconds=request.budget.elapsed,
     )
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector, dimensions, finite_array, frozen, not_negative, positive
+from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.choices import FrameAxis, GeneticPreset, IkMethod, TrajectoryIkMethod, one_of
 from rrtik_ompl.base.copies import as_value, in_one_line
 from rrtik_ompl.base.errors import InputError
@@ -79,7 +80,7 @@ class Task:
     jump: float
     options: GeneticOptions
     rng: np.random.Generator
-    deadline: float
+    budget: Budget
 
     def accept(self, Q: Matrix) -> Mask:
         """Which configurations, shape (k, dof), are free of collision."""
@@ -145,7 +146,7 @@ def solve_ik_trajectory(
         jump=positive(jump, "jump"),
         options=_options(options),
         rng=RandomStream(seed).rng,
-        deadline=begin + not_negative(seconds, "seconds"),
+        budget=Budget(seconds=not_negative(seconds, "seconds"), begun=begin),
     )
 
     name = _chosen_method(task, method)
@@ -163,7 +164,7 @@ def solve_ik_trajectory(
         blocked=_blocked(world, q),
         method=name,
         iterations=iterations,
-        seconds=time.monotonic() - begin,
+        seconds=task.budget.elapsed,
     )
 
 
@@ -239,16 +240,14 @@ def _genetic(task: Task) -> tuple[Matrix, int]:
     """Configurations of the points, shape (k, dof), NaN from where the run stopped, and its generations."""
     quick = None if task.world is None else task.world.valid_batch  # the second opinion comes at the end
     options = replace(task.options, largest_step=task.options.largest_step or task.jump)
-    run = follow_targets(
-        task.robot, task.targets, options, task.rng, accept=quick, near=task.near, deadline=task.deadline
-    )
+    run = follow_targets(task.robot, task.targets, options, task.rng, accept=quick, near=task.near, budget=task.budget)
     q = np.full((len(task.targets), task.robot.dof), np.nan)
     q[: len(run.q)] = run.q
     return q, run.generations
 
 
 def _numeric(task: Task) -> tuple[Matrix, int]:
-    return Tracker(task.robot, task.goals, task.accept, task.jump, task.rng, task.deadline).follow(task.near)
+    return Tracker(task.robot, task.goals, task.accept, task.jump, task.rng, task.budget).follow(task.near)
 
 
 FOLLOWERS: Mapping[TrajectoryIkMethod, Callable[[Task], tuple[Matrix, int]]] = MappingProxyType(
@@ -280,7 +279,7 @@ def _why(task: Task, name: TrajectoryIkMethod, q: Matrix) -> tuple[tuple[str, ..
     detail = ""
 
     for k in np.flatnonzero(np.isnan(q[:, 0])):
-        left = task.deadline - time.monotonic()
+        left = task.budget.left
         reasons[k] = "time"
         line = f"method '{name}' came to its limit before it found a way there"
         if left > 0.0 and (name != "genetic" or not detail):

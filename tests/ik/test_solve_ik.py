@@ -8,6 +8,7 @@ import pinocchio as pin
 import pytest
 
 import rrtik_ompl as rrtik
+from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.errors import InputError, UnknownNameError
 from rrtik_ompl.base.poses import pose_from_rpy
 from rrtik_ompl.ik.method_interface import IkRequest, RandomStream
@@ -221,7 +222,7 @@ def test_methods_that_walk_from_random_starts_give_every_target_a_round():
         asked.append(target)
         return Q, 1
 
-    rest = {"near": np.zeros(6), "accept": lambda Q: np.ones(len(Q), dtype=bool), "all": False, "deadline": np.inf}
+    rest = {"near": np.zeros(6), "accept": lambda Q: np.ones(len(Q), dtype=bool), "all": False, "budget": Budget()}
     restarted(stay, IkRequest(robot, rrtik.GoalSet(goals), goals, random=RandomStream(0), **rest))
     assert asked == list(goals)
 

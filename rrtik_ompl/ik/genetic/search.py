@@ -6,13 +6,13 @@ Source: [2]. The bit strings are kept when the window moves, so that a constant 
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector, frozen
+from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.ik.genetic.options import REFINED, GeneticOptions
 from rrtik_ompl.ik.genetic.population import around, children, random_genes, whole_range
 from rrtik_ompl.ik.method_interface import IkRequest, IkResponse
@@ -21,6 +21,7 @@ from rrtik_ompl.ik.numeric.restarts import nearest_posture
 from rrtik_ompl.model.goal import Target, joint_difference
 from rrtik_ompl.model.robot import Robot, inside_limits, jacobians, poses, reach_of
 
+ENDLESS = Budget()
 IMPROVEMENT = 0.99  # of the best cost: less counts as standing still
 MAX_ROUNDS = 64  # populations, after which it gives up
 GENERATIONS = 40  # of each; most that reach the goal do so in ten
@@ -41,13 +42,13 @@ def genetic(request: IkRequest) -> IkResponse:
             request.rng,
             accept=request.accept,
             near=request.near,
-            deadline=request.deadline,
+            budget=request.budget,
         )
         found = np.vstack([found, run.q])
         generations += run.generations
         if len(found) and not request.all:
             return IkResponse(found, request.near, generations)
-        if run.timed_out or time.monotonic() > request.deadline:
+        if run.timed_out or request.budget.over():
             return _given_up(request, found, generations, timed_out=True)
 
     return _given_up(request, found, generations, timed_out=False)
@@ -95,7 +96,7 @@ def follow_targets(
     *,
     accept: Callable[[Matrix], Mask] | None = None,
     near: Vector | None = None,
-    deadline: float = np.inf,
+    budget: Budget = ENDLESS,
 ) -> GeneticRun:
     """Reach one target after another until the last is reached, the generations are used up or the time is over.
 
@@ -106,11 +107,11 @@ def follow_targets(
         rng: Random numbers.
         accept: Which of some configurations, shape (k, dof), will do; all if None.
         near: Posture before the first point, shape (dof,): one individual begins there.
-        deadline: Time of ``time.monotonic`` at which to stop.
+        budget: How long it may take.
     """
     run = GaRun(robot, targets, options, rng, accept, near)
     while len(run.points) < len(targets) and run.generation < options.generations:
-        if time.monotonic() > deadline:
+        if budget.over():
             return run.result(timed_out=True)
         run.step()
     return run.result(timed_out=False)

@@ -7,7 +7,6 @@ polished by Levenberg-Marquardt.
 
 from __future__ import annotations
 
-import time
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -17,6 +16,7 @@ import numpy as np
 import pinocchio as pin
 
 from rrtik_ompl.base.arrays import TAU, Mask, Matrix, Vector
+from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.errors import DescriptionWarning
 from rrtik_ompl.ik.mb_rrt.axes import Axes, axes_of, misfit
 from rrtik_ompl.ik.mb_rrt.workspace_tree import WorkspaceTree
@@ -52,7 +52,7 @@ def mb_rrt(request: IkRequest) -> IkResponse:
             near=request.near,
             accept=request.accept,
             rng=request.rng,
-            deadline=request.deadline,
+            budget=request.budget,
             world=request.world,
             collect_all=request.all,
             rounds=max(1, (ROUNDS_FOR_ALL if request.all else MAX_ROUNDS) // count),
@@ -77,7 +77,7 @@ def tree_aims(world: World, goal: TipGoal, near: Vector, rng: np.random.Generato
     Returns:
         Shape (k, dof), k <= `MAX_CONFIGURATIONS`, none if none was found in time.
     """
-    deadline = time.monotonic() + seconds
+    budget = Budget(seconds=seconds)
     robot = world.robot
     rows = np.zeros((0, robot.dof))
 
@@ -85,7 +85,7 @@ def tree_aims(world: World, goal: TipGoal, near: Vector, rng: np.random.Generato
         return world.valid_batch(robot.clamp(Q))
 
     for target in targets(goal, DRAWS, rng):
-        found = search(robot, target, near=near, accept=accept, rng=rng, deadline=deadline, world=world)
+        found = search(robot, target, near=near, accept=accept, rng=rng, budget=budget, world=world)
         rows = np.vstack([rows, robot.clamp(found.q)])
         rows = rows[goal.satisfied(robot, rows) & world.valid_batch(rows)] if len(rows) else rows
         if found.timed_out or len(rows) >= MAX_CONFIGURATIONS:
@@ -113,7 +113,7 @@ def search(
     near: Vector,
     accept: Callable[[Matrix], Mask],
     rng: np.random.Generator,
-    deadline: float,
+    budget: Budget,
     world: World | None = None,
     collect_all: bool = False,
     width: int = WIDTH,
@@ -127,7 +127,7 @@ def search(
         near: Values of joints that the tree does not move, shape (dof,).
         accept: Which configurations, shape (k, dof), at the goal will do.
         rng: Random numbers.
-        deadline: Time of ``time.monotonic`` at which to stop.
+        budget: How long it may take.
         world: If given, and if the first rounds end in collision, every further edge of the tree is held clear of
             its obstacles, link by link.
         collect_all: Whether to go on for all ``rounds`` and collect every solution.
@@ -147,7 +147,7 @@ def search(
         solutions = np.vstack([solutions, ends])
         if not collect_all and accept(ends).any():
             break
-        if time.monotonic() > deadline:
+        if budget.over():
             return Found(solutions, tree.passes, True)
 
     return Found(solutions, tree.passes)

@@ -8,8 +8,6 @@ Sources: [23] for steps that leave free directions out; damping after [22], as i
 
 from __future__ import annotations
 
-import time
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -109,7 +107,7 @@ def projection(request: IkRequest) -> IkResponse:
         found = np.vstack([found, rows[region.satisfied(robot, rows)]])
         if request.accept(found).any() and not request.all:
             break
-        timed_out = time.monotonic() > request.deadline
+        timed_out = request.budget.over()
         if timed_out:
             break
 

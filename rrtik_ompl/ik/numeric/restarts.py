@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
@@ -51,7 +50,7 @@ def numeric(request: IkRequest) -> IkResponse:
         waiting = waiting[AT_ONCE:]
         going = going[search.advance(going)]
         found.append(search.q[going])
-        timed_out = time.monotonic() > request.deadline
+        timed_out = request.budget.over()
         if timed_out or request.accept(found[-1]).any():
             break
         waiting = np.concatenate([waiting, going])
@@ -62,10 +61,10 @@ def numeric(request: IkRequest) -> IkResponse:
 def _alone(request: IkRequest, search: SearchOfOne) -> IkResponse:
     """The same for a goal of one member."""
     found = [search.advance()]
-    timed_out = time.monotonic() > request.deadline
+    timed_out = request.budget.over()
     while not timed_out and len(found[-1]) and not request.accept(found[-1])[0]:
         found.append(search.advance())
-        timed_out = time.monotonic() > request.deadline
+        timed_out = request.budget.over()
     search.close()
     return _answered(request, found[0] if len(found) == 1 else np.concatenate(found), search.steps, timed_out)
 
@@ -85,7 +84,7 @@ def _many(request: IkRequest) -> IkResponse:
         Q, reached, taken = walk(robot, aims[(number * STARTS + np.arange(STARTS)) % len(aims)], Q, patience=PATIENCE)
         found.append(Q[reached])
         steps += taken
-        timed_out = time.monotonic() > request.deadline
+        timed_out = request.budget.over()
         if timed_out:
             break
 
@@ -124,7 +123,7 @@ def restarted(method: Walk, request: IkRequest, *, starts: int = STARTS, rounds:
         steps += taken
         if request.accept(found).any() and not request.all:
             break
-        if time.monotonic() > request.deadline:
+        if request.budget.over():
             return IkResponse(found, nearest_posture(request), steps, timed_out=True)
 
     return IkResponse(found, request.near if len(found) else nearest_posture(request), steps)

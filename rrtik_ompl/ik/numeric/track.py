@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -10,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector
+from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.ik.method_interface import different_rows
 from rrtik_ompl.ik.numeric.descent import descend
 from rrtik_ompl.ik.numeric.restarts import STARTS
@@ -30,7 +30,7 @@ class Tracker:
         accept: Which of some configurations, shape (k, dof), will do.
         jump: Motion of one joint between two points [rad or m] from which on it counts as a jump.
         rng: Random numbers.
-        deadline: Time of ``time.monotonic`` at which to stop.
+        budget: How long it may take.
     """
 
     robot: Robot
@@ -38,7 +38,7 @@ class Tracker:
     accept: Callable[[Matrix], Mask]
     jump: float
     rng: np.random.Generator
-    deadline: float
+    budget: Budget
 
     def follow(self, near: Vector | None) -> tuple[Matrix, int]:
         """Configurations of all points, shape (k, dof), NaN where none was found, and the steps taken.
@@ -50,7 +50,7 @@ class Tracker:
         point = 0
         last = near
         steps = 0
-        while point < len(q) and time.monotonic() <= self.deadline:
+        while point < len(q) and not self.budget.over():
             first_solutions, taken = self.fresh(self.targets[point], last)
             steps += taken
             if len(first_solutions) == 0:
@@ -79,7 +79,7 @@ class Tracker:
             Q, taken = descend(self.robot, target, starts)
             steps += taken
             Q = self.usable_rows(target, Q)
-            if len(Q) or time.monotonic() > self.deadline:
+            if len(Q) or self.budget.over():
                 break
 
         distance = np.zeros(len(Q)) if last is None else np.linalg.norm(joint_difference(self.robot, Q, last), axis=1)
@@ -91,7 +91,7 @@ class Tracker:
         tracks = begun[None]
         steps = 0
         for target in self.targets[point + 1 :]:
-            if time.monotonic() > self.deadline:
+            if self.budget.over():
                 break
             current = tracks[-1]
             guess = 2.0 * current - tracks[-2] if len(tracks) > 1 else current

@@ -7,6 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import rrtik_ompl as rrtik
+from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.description.dh import DhRow, robot_from_dh
 from rrtik_ompl.ik.mb_rrt.axes import axes_of
@@ -165,7 +166,7 @@ def test_one_pass_and_a_polish_solve_seven_one_axis_joints():
     robot, rng = zigzag(7), np.random.default_rng(0)
     for q in rng.uniform(-np.pi, np.pi, (20, 7)):
         goal = rrtik.PositionGoal(robot.fk(q).translation, 1e-4)
-        options = {"near": np.zeros(7), "accept": lambda Q: np.ones(len(Q), dtype=bool), "deadline": np.inf}
+        options = {"near": np.zeros(7), "accept": lambda Q: np.ones(len(Q), dtype=bool), "budget": Budget()}
         found = search(robot, goal, rng=rng, width=1, **options)
         assert len(found.q) == 1
         assert found.passes <= 3
