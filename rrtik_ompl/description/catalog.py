@@ -26,7 +26,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from rrtik_ompl.base.errors import InputError, RrtikError, UnknownNameError
+from rrtik_ompl.base.errors import InputError, RrtikError, UnknownNameError, listed, name_of, require
 from rrtik_ompl.description.robot_source import base_pose, plain, source_entry
 from rrtik_ompl.description.urdf import URDF_OPTIONS, robot_from_urdf
 from rrtik_ompl.description.variants import narrowed, padded, scaled, weighted
@@ -186,9 +186,10 @@ def load_robot(
             takes = ", ".join(sorted((*recipe.options, *COMMON_OPTIONS)))
             raise InputError(f"robot '{os.fspath(name)}' takes no option '{option}'; it takes {takes}")
 
-    values = {key: _absolute(key, value) for key, value in options.items() if value is not None}
+    where = f"robot '{os.fspath(name)}'"
+    values = {key: _checked(key, value, where) for key, value in options.items() if value is not None}
     if "base_pose" in values:
-        values["base_pose"] = base_pose(values["base_pose"], f"robot '{os.fspath(name)}': base_pose")
+        values["base_pose"] = base_pose(values["base_pose"], f"{where}: base_pose")
 
     key = json.dumps([recipe.target, plain(values)], sort_keys=True, default=repr)
     loaded = _cache.get(key)
@@ -302,15 +303,32 @@ def _stamps(paths: Iterable[str]) -> tuple[_Stamp, ...]:
 _cache = _RobotCache()
 
 
-def _absolute(key: str, value: object) -> object:
-    """Files by their absolute path, so that the cache does not depend on the current folder."""
-    if key in FILE_OPTIONS and isinstance(value, (str, os.PathLike)):
-        return Path(value).absolute()
-    if key == "packages" and isinstance(value, (str, os.PathLike)):
-        return [Path(value).absolute()]
-    if key == "packages" and isinstance(value, Iterable):
-        return [Path(folder).absolute() for folder in value]
+def _checked(key: str, value: object, where: str) -> object:
+    """The value of an option that names files, joints or links, of a type that makes sense; of others as it is.
+
+    Files have their absolute path, so that the cache does not depend on the current folder.
+    """
+    what = f"{where}: {key}"
+    if key in FILE_OPTIONS:
+        return _file(value, what)
+    if key == "packages":
+        folders = [value] if isinstance(value, (str, os.PathLike)) else listed(value, what)
+        return [_file(folder, what) for folder in folders]
+    if key == "joints":
+        return [name_of(joint, f"a joint of {what}") for joint in listed(value, what)]
+    if key in ("tip", "group"):
+        return name_of(value, f"the {key} of {where}")
+    if key in ("locked", "xacro_args"):
+        require(value, Mapping, what, f"give values by name of {'joint' if key == 'locked' else 'argument'}")
     return value
+
+
+def _file(value: object, what: str) -> Path:
+    require(value, str | os.PathLike, what, "give the name of a file")
+    path = Path(str(value))
+    if "\0" in str(path):
+        raise InputError(f"{what}: no file can have the name {str(path)!r}")
+    return path.absolute()
 
 
 def _option_files(options: Mapping[str, Any]) -> list[str]:

@@ -11,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.base.arrays import Vector, bounded_array, finite_array
+from rrtik_ompl.base.arrays import Vector, bounded_array, dimensions, finite_array
 from rrtik_ompl.base.choices import DhConvention
 from rrtik_ompl.base.errors import InputError, UnknownNameError, at_most
 from rrtik_ompl.base.poses import PoseLike, rigid, turned_z
@@ -156,8 +156,9 @@ def _checked(name: str, rows: Iterable[DhRow]) -> list[DhRow]:
 
 
 def _radii(name: str, radius: float | Sequence[float], count: int) -> list[float]:
-    values = np.asarray(radius, dtype=np.float64)
-    values = bounded_array(np.full(count, values) if values.ndim == 0 else values, (count,), f"robot '{name}': radius")
+    what = f"robot '{name}': radius"
+    one_for_all = dimensions(radius) == 0
+    values = np.full(count, bounded_array(radius, (), what)) if one_for_all else bounded_array(radius, (count,), what)
     if (values < 0.0).any():
         raise InputError(f"robot '{name}': radius must not be negative, got {values.min():g}")
     return [max(float(value), SMALLEST_RADIUS) for value in values]

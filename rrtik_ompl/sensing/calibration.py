@@ -59,11 +59,27 @@ def calibrate(pictures: Sequence[NDArray[np.uint8]], board: Board) -> Calibratio
     Raises:
         InputError: If the photographs differ in size, or fewer than five show the board well enough.
     """
+    return calibrate_by_corners(*seen_boards(pictures, board), board)
+
+
+def seen_boards(
+    pictures: Sequence[NDArray[np.uint8]], board: Board
+) -> tuple[list[NDArray[np.uint8]], list[tuple[Matrix, Matrix]]]:
+    """Photographs as grey values, and the corners of the board in each.
+
+    Raises:
+        InputError: If the photographs differ in size.
+    """
     grays = [as_gray(picture) for picture in pictures]
     if len({gray.shape for gray in grays}) > 1:
         raise InputError("the photographs differ in size; take all of them with the same camera and settings")
+    return grays, [board_corners(gray, board) for gray in grays]
 
-    found = [board_corners(gray, board) for gray in grays]
+
+def calibrate_by_corners(
+    grays: Sequence[NDArray[np.uint8]], found: Sequence[tuple[Matrix, Matrix]], board: Board
+) -> Calibration:
+    """As :func:`calibrate`, from what :func:`seen_boards` gives."""
     unused = ["" if len(points) >= MIN_CORNERS else _too_few(len(points)) for points, _ in found]
     used = [k for k, reason in enumerate(unused) if not reason]
 

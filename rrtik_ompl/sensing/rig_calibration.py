@@ -13,11 +13,10 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.base.errors import InputError
-from rrtik_ompl.sensing.calibration import MIN_CORNERS, Board, Calibration, board_corners, calibrate
+from rrtik_ompl.sensing.calibration import MIN_CORNERS, Board, Calibration, calibrate_by_corners, seen_boards
 from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.markers.chessboard import Chessboard
 from rrtik_ompl.sensing.rig import Rig
-from rrtik_ompl.sensing.sight import as_gray
 
 MIN_MOMENTS = 4  # in which both cameras see the board
 MAX_ERROR = 1.0  # [pixels] of the corners of all moments; a larger one means other times, or cameras that moved
@@ -75,13 +74,15 @@ def calibrate_rig(pictures: Sequence[Sequence[NDArray[np.uint8]]], board: Board)
         )
 
     cameras = []
+    corners = []
     for number, camera_pictures in enumerate(pictures, start=1):
         try:
-            cameras.append(calibrate(camera_pictures, board))
+            grays, found = seen_boards(camera_pictures, board)
+            cameras.append(calibrate_by_corners(grays, found, board))
+            corners.append(found)
         except InputError as reason:
             raise InputError(f"camera {number}: {reason}") from None
 
-    corners = [[board_corners(as_gray(picture), board) for picture in camera_pictures] for camera_pictures in pictures]
     relative = [_relative_to_first(cameras, corners, number) for number in range(1, len(pictures))]
     poses, moments, errors, sigmas = zip(*relative, strict=True)
 

@@ -1,6 +1,8 @@
 """Names to robots and problems: the cache, the options, the entries of problem files."""
 
+import inspect
 import os
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +11,7 @@ import pytest
 
 from rrtik_ompl.base.errors import InputError, UnknownNameError
 from rrtik_ompl.description.catalog import (
+    _load,
     find_planner,
     find_problem,
     list_planners,
@@ -18,6 +21,7 @@ from rrtik_ompl.description.catalog import (
     robot_from_entry,
 )
 
+load_entry = partial(_load, "robot", "robots")
 URDF = """<robot name="arm"><link name="base"/><link name="arm"/><joint name="j" type="revolute">
 <parent link="base"/><child link="arm"/><origin xyz="{height} 0 0"/><axis xyz="0 0 1"/>
 <limit lower="-1" upper="1" velocity="1" effort="1"/></joint></robot>"""
@@ -156,3 +160,27 @@ def test_unknown_problems_and_planners_list_the_alternatives():
 
 def test_every_listed_planner_is_a_class():
     assert all(isinstance(find_planner(name), type) for name in list_planners())
+
+
+ODD = [5, b"x", "\0", [[1, 2]], {}, np.zeros(3), np.array(["a"]), object(), iter([1])]
+TAKES = ("base_pose", "group", "joint_limits", "joints", "locked", "packages", "srdf", "strict", "tip", "xacro_args")
+
+
+@pytest.mark.parametrize("name", ["planar", "point2d", "puma560", "titan4", "two_titan4", "urdf"])
+def test_an_option_without_sense_is_refused_in_one_line(name, urdf):
+    options = TAKES if name == "urdf" else inspect.signature(load_entry(name)).parameters
+    refusals = []
+    for option in (*options, "scale", "padding", "joint_ranges", "joint_weights"):
+        for value in ODD:
+            try:
+                load_robot(urdf if name == "urdf" else name, **{option: value})
+            except InputError as error:
+                refusals.append(str(error))
+    assert len(refusals) > len(options)
+    assert [refusal for refusal in refusals if "\n" in refusal] == []
+
+
+@pytest.mark.parametrize("option", [{"limits": [0, 1]}, {"lengths": 5}, {"lengths": np.zeros(3)}])
+def test_limits_and_lengths_of_the_titan_are_checked(option):
+    with pytest.raises(InputError, match=f"titan4: {next(iter(option))} must be of type"):
+        load_robot("titan4", **option)

@@ -130,3 +130,6 @@ def test_what_is_no_picture_is_refused(tmp_path):
         list(pictures_from(tmp_path / "empty.mp4"))
     with pytest.raises(InputError, match="cannot be opened"):
         list(pictures_from(77))
+    for nothing in (-1, True, None, 0.5):
+        with pytest.raises(InputError, match=r"number of a camera|name of a file"):
+            list(pictures_from(nothing))

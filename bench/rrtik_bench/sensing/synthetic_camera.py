@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import cv2
 import numpy as np
@@ -19,6 +20,7 @@ from rrtik_ompl.sensing.cameras.camera import Camera
 
 PUBLISHED_MATRIX = ((877.6915, 0.0, 320.6451), (0.0, 869.8953, 242.8119), (0.0, 0.0, 1.0))
 BLACK, WHITE, GREY = 0.12, 0.85, 0.55  # of full scale: ink, paper, what is behind
+FEW_RAYS = 3  # through a photosite, squared: as many are kept from picture to picture
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -121,15 +123,30 @@ def _draw(picture: NDArray[np.float32], camera: Camera, pose: pin.SE3, sheet: Pr
     right, bottom = np.minimum(np.ceil(pixels.max(axis=0)).astype(int) + 4, (camera.width, camera.height))
 
     brightness = (BLACK + (WHITE - BLACK) * sheet.cells / 255.0).astype(np.float32)
-    within = (np.arange(rays) + 0.5) / rays - 0.5
     for row in range(top, bottom if right > left else top):  # one row of photosites at a time, for the memory's sake
-        u, v = np.meshgrid((np.arange(left, right)[:, None] + within).ravel(), row + within)
-        seen = _seen(camera.rays(np.c_[u.ravel(), v.ravel()]), pose, sheet, brightness)
+        if rays <= FEW_RAYS:
+            through_row = _rays_of_row(camera, row, rays)[:, left * rays : right * rays].reshape(-1, 2)
+        else:
+            through_row = _rays(camera, row, left, right, rays)
+        seen = _seen(through_row, pose, sheet, brightness)
 
         # What rays miss stays as it was drawn before.
         seen = seen.reshape(rays, right - left, rays)
         share = np.isfinite(seen).mean(axis=(0, 2))
         picture[row, left:right] = np.nansum(seen, axis=(0, 2)) / rays**2 + (1.0 - share) * picture[row, left:right]
+
+
+def _rays(camera: Camera, row: int, left: int, right: int, rays: int) -> Matrix:
+    """Where the rays through some photosites of a row meet the plane z = 1, line by line. Shape (m, 2)."""
+    within = (np.arange(rays) + 0.5) / rays - 0.5
+    u, v = np.meshgrid((np.arange(left, right)[:, None] + within).ravel(), row + within)
+    return camera.rays(np.c_[u.ravel(), v.ravel()])
+
+
+@lru_cache(maxsize=1024)
+def _rays_of_row(camera: Camera, row: int, rays: int) -> NDArray[np.float64]:
+    """The same of a whole row, shape (rays, width times rays, 2): the lens takes most of the time of a picture."""
+    return _rays(camera, row, 0, camera.width, rays).reshape(rays, -1, 2)
 
 
 def _seen(rays: Matrix, pose: pin.SE3, sheet: Print, brightness: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from rrtik_ompl.base.arrays import finite_array
-from rrtik_ompl.base.errors import InputError, UnknownNameError
+from rrtik_ompl.base.errors import InputError, UnknownNameError, require
 
 JOINTS = ("azimuth", "shoulder_pitch", "elbow_pitch", "wrist_pitch", "wrist_yaw", "wrist_rotate")
 
@@ -70,23 +70,28 @@ def geometry_from(lengths: Mapping[str, float] | TitanGeometry | None) -> TitanG
     """The default geometry with the given lengths [m] in it.
 
     Raises:
-        UnknownNameError: If a length has a name that `TitanGeometry` does not know.
+        InputError: If they are no mapping, or a length has a name that `TitanGeometry` does not know.
     """
     if isinstance(lengths, TitanGeometry):
         return lengths
+    if lengths is None:
+        return TitanGeometry()
+
+    require(lengths, Mapping, "titan4: lengths", "give lengths [m] by name")
     names = [field.name for field in fields(TitanGeometry)]
-    for name in lengths or {}:
+    for name in lengths:
         if name not in names:
             raise UnknownNameError("length", name, names, where="titan4: lengths")
-    return TitanGeometry(**dict(lengths or {}))
+    return TitanGeometry(**lengths)
 
 
 def limits_rad(which: str) -> dict[str, tuple[float, float]]:
     """Limit set ``"planning"`` or ``"envelope"`` [rad] by joint.
 
     Raises:
-        UnknownNameError: If there is no set of that name.
+        InputError: If there is no set of that name.
     """
+    require(which, str, "titan4: limits", f"use one of {', '.join(LIMIT_SETS)}")
     if which not in LIMIT_SETS:
         raise UnknownNameError("limit set", which, LIMIT_SETS, where="titan4: limits")
     table = LIMIT_SETS[which]

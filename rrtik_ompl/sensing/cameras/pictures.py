@@ -14,8 +14,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from rrtik_ompl.base.arrays import whole_number
 from rrtik_ompl.base.errors import InputError, at_most
-from rrtik_ompl.files.text import write_bytes
+from rrtik_ompl.files.text import file_name, write_bytes
 
 IMAGE_ENDINGS = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp")
 VIDEO_ENDINGS = (".mp4", ".avi", ".webm", ".mkv", ".mov", ".m4v")
@@ -50,7 +51,7 @@ def read_picture(path: str | os.PathLike[str]) -> NDArray[np.uint8]:
     Raises:
         InputError: If the file is missing or not an image.
     """
-    file = Path(path)
+    file = file_name(path)
     try:
         size = file.stat().st_size
         if not os.path.isfile(file) or size > MAX_FILE_BYTES:
@@ -90,10 +91,11 @@ def pictures_from(source: str | os.PathLike[str] | int) -> Iterator[Picture]:
         InputError: If there is nothing that can be read. A camera that is lost ends with `CameraLostError`.
     """
     if isinstance(source, int) or str(source).isdecimal():
-        yield from _device(int(str(source)))
+        number = source if isinstance(source, int) else int(str(source))
+        yield from _device(whole_number(number, "number of a camera"))
         return
 
-    path = Path(source)
+    path = file_name(source)
     if os.path.isdir(path):
         files = sorted(f for f in path.iterdir() if f.suffix.lower() in IMAGE_ENDINGS)
         if not files:
