@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Matrix, Vector, frozen
-from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.errors import InputError, listed, require
 from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.markers.alignment import Look, look_of
 from rrtik_ompl.sensing.markers.chessboard import Chessboard
@@ -59,7 +59,8 @@ def calibrate(pictures: Sequence[NDArray[np.uint8]], board: Board) -> Calibratio
     Raises:
         InputError: If the photographs differ in size, or fewer than five show the board well enough.
     """
-    return calibrate_by_corners(*seen_boards(pictures, board), board)
+    require(board, cv2.aruco.CharucoBoard | Chessboard, "board", "use charuco_board(...) or Chessboard(...)")
+    return calibrate_by_corners(*seen_boards(listed(pictures, "photographs"), board), board)
 
 
 def seen_boards(

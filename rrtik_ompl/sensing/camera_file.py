@@ -86,6 +86,9 @@ def save_camera(camera: Camera | Calibration, path: str | os.PathLike[str]) -> N
     Raises:
         InputError: If the file cannot be written.
     """
+    if not isinstance(camera, Camera | Calibration):
+        raise InputError(f"camera to save must be a Camera or a Calibration, got {type(camera).__name__}")
+
     lens = camera.camera if isinstance(camera, Calibration) else camera
     (fx, _, cx), (_, fy, cy), _ = lens.matrix.tolist()
     data: dict[str, Any] = {"size": [lens.width, lens.height], "fx": fx, "fy": fy, "cx": cx, "cy": cy}
@@ -100,8 +103,6 @@ def save_camera(camera: Camera | Calibration, path: str | os.PathLike[str]) -> N
     if isinstance(camera, Calibration):
         data["error_px"] = camera.error
         data["view_errors_px"] = [e for e in camera.view_errors.tolist() if e == e]
-    elif not isinstance(camera, Camera):
-        raise InputError(f"camera to save must be a Camera or a Calibration, got {type(camera).__name__}")
 
     write_yaml(path, {"version": 1, "camera": data})
 

@@ -16,13 +16,13 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Matrix, Vector, frozen, not_negative
-from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.errors import InputError, listed, require
 from rrtik_ompl.base.poses import rigid
 from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.markers.corner_pose import CornerPose
 from rrtik_ompl.sensing.markers.detection import SeenMarker
 from rrtik_ompl.sensing.markers.marker_map import MarkerMap
-from rrtik_ompl.sensing.sight import Sighting, check_size, detect_objects
+from rrtik_ompl.sensing.sight import Sighting, as_gray, check_size, detect_objects
 
 MAX_CONTRADICTION = 5.0  # squared deviations for each number that the cameras both give; 1 is usual
 NEAREST = 0.01  # [m] before a camera that it can see
@@ -53,6 +53,10 @@ class Rig:
     rotation_sigma: float = 0.0
 
     def __post_init__(self) -> None:
+        for word in ("cameras", "poses"):
+            object.__setattr__(self, word, listed(getattr(self, word), f"{word} of a rig"))
+        for camera in self.cameras:
+            require(camera, Camera, "camera of a rig", "use load_camera(file)")
         if len(self.cameras) < 2 or len(self.poses) != len(self.cameras):
             raise InputError(
                 f"a rig has two cameras or more, each with its pose; got {len(self.cameras)} and {len(self.poses)}"
@@ -60,7 +64,6 @@ class Rig:
         poses = tuple(rigid(T, f"pose of camera {k}") for k, T in enumerate(self.poses, start=1))
         if not poses[0].isIdentity(1e-9):
             raise InputError("poses of a rig are in the frame of its first camera, whose own pose is the identity")
-        object.__setattr__(self, "cameras", tuple(self.cameras))
         object.__setattr__(self, "poses", poses)
         for name in ("position_sigma", "rotation_sigma"):
             object.__setattr__(self, name, not_negative(getattr(self, name), f"{name} of a rig"))
@@ -81,12 +84,14 @@ def detect_in_rig(pictures: Sequence[NDArray[np.uint8]], rig: Rig, marker_map: M
     Raises:
         InputError: If there are not as many pictures as cameras, or one does not have its camera's size.
     """
+    require(rig, Rig, "rig", "use load_rig(file)")
+    pictures = listed(pictures, "pictures of a rig")
     if len(pictures) != len(rig.cameras):
         raise InputError(f"a rig of {len(rig.cameras)} cameras needs as many pictures, got {len(pictures)}")
 
     sightings_of: dict[str, list[Sighting]] = {}
     for number, (picture, camera) in enumerate(zip(pictures, rig.cameras, strict=True)):
-        check_size(picture, camera, f"picture of camera {number + 1}")
+        check_size(as_gray(picture), camera, f"picture of camera {number + 1}")
         for sighting in detect_objects(picture, camera, marker_map):
             sightings_of.setdefault(sighting.object.name, []).append(_in_first(sighting, rig, number))
 

@@ -12,9 +12,10 @@ import numpy as np
 import pinocchio as pin
 from pydantic import Field
 
-from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.errors import InputError, require
 from rrtik_ompl.files.sections import Name, NotNegative, Section, Version, parse
 from rrtik_ompl.files.strict_yaml import read_yaml, write_yaml
+from rrtik_ompl.files.text import file_name
 from rrtik_ompl.problem_files.scene import PoseEntry, pose_data
 from rrtik_ompl.sensing.camera_file import load_camera, save_camera
 from rrtik_ompl.sensing.cameras.pictures import Picture, pictures_from
@@ -76,7 +77,10 @@ def save_rig(rig: Rig, path: str | os.PathLike[str]) -> list[Path]:
     Raises:
         InputError: If a file cannot be written.
     """
-    target = Path(path)
+    require(rig, Rig, "rig to save", "use calibrate_rig(pictures, board)")
+    target = file_name(path)
+    if not target.name:
+        raise InputError(f"{path}: is not the name of a file")
     files = [target.with_name(f"{target.stem}_{k}.yaml") for k in range(1, len(rig.cameras) + 1)]
 
     entries: list[dict[str, Any]] = []

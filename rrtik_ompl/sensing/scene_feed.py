@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
-from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.errors import InputError, require
 from rrtik_ompl.model.scene import ConstantVelocity, Obstacle, Scene
 from rrtik_ompl.replanning.feed import Snapshot
 from rrtik_ompl.sensing.cameras.pictures import Picture
@@ -31,6 +31,8 @@ def scene_feed(pictures: Iterable[Picture], sensor: Sensor, scene: Scene | None 
     Raises:
         InputError: If the pictures end before everything was seen; it names what was not. If a picture cannot be used.
     """
+    require(sensor, Sensor, "sensor of a scene feed", "use Sensor(camera, marker_map)")
+    require(scene, Scene | None, "scene of a scene feed", "use load_scene(file)")
     given_scene = Scene(()) if scene is None else scene
     solids = [
         name for each in sensor.marker_map.objects if each.role not in ("base", "arm") for name in each.solid_names

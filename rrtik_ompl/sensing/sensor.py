@@ -12,7 +12,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.errors import InputError, require
 from rrtik_ompl.base.poses import quaternion_xyzw
 from rrtik_ompl.model.scene import Scene
 from rrtik_ompl.sensing.cameras.camera import Camera
@@ -106,6 +106,8 @@ class Sensor:
         Raises:
             InputError: If ``sigmas`` is not 0 or more.
         """
+        require(camera, Camera | Rig, "camera of a sensor", "use load_camera(file) or load_rig(file)")
+        require(marker_map, MarkerMap, "marker map", "use load_marker_map(file)")
         self._rig = camera if isinstance(camera, Rig) else None
         self.camera = camera.cameras[0] if isinstance(camera, Rig) else camera
         self.marker_map = marker_map

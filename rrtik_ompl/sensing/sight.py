@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
 from rrtik_ompl.base.arrays import Matrix, frozen
-from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.errors import InputError, require
 from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.markers.alignment import MIN_LIKENESS
 from rrtik_ompl.sensing.markers.corner_pose import (
@@ -98,6 +98,8 @@ def detect_objects(
     Raises:
         InputError: If the picture does not have the camera's size, or is none.
     """
+    require(camera, Camera, "camera", "use load_camera(file)")
+    require(marker_map, MarkerMap, "marker map", "use load_marker_map(file)")
     gray = as_gray(picture)
     check_size(gray, camera)
 

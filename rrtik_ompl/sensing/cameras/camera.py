@@ -60,7 +60,8 @@ class Camera:
         expected = [[given[0, 0], 0.0, given[0, 2]], [0.0, given[1, 1], given[1, 2]], [0.0, 0.0, 1.0]]
         if not np.array_equal(given, expected) or given[0, 0] <= 0.0 or given[1, 1] <= 0.0:
             raise InputError("camera matrix must be [[fx, 0, cx], [0, fy, cy], [0, 0, 1]] with fx, fy > 0, no skew")
-        if int(width) != width or int(height) != height or width < 1 or height < 1:
+        sides = [finite_number(side, "camera size") for side in (width, height)]
+        if any(side != int(side) or side < 1 for side in sides):
             raise InputError(f"camera size must be two positive whole numbers, got {width} x {height}")
 
         doubts = finite_array(sigmas, (9,), "camera sigmas")

@@ -13,7 +13,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from rrtik_ompl.base.arrays import Vector, finite_array, finite_number, frozen
-from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.errors import InputError, listed, require
 from rrtik_ompl.base.poses import rigid
 from rrtik_ompl.sensing.cameras.camera import Camera
 
@@ -66,7 +66,9 @@ class PanTiltZoom:
         pan: Encoder = Encoder(),  # noqa: B008 - frozen
         tilt: Encoder = Encoder(),  # noqa: B008
     ) -> None:
-        self.cameras = tuple(cameras)
+        self.cameras = listed(cameras, "cameras of a zoom lens")
+        for camera in self.cameras:
+            require(camera, Camera, "camera of a zoom lens", "use load_camera(file)")
         self.zooms: Vector = frozen(finite_array(zooms, (len(self.cameras),), "zooms"))
         if not self.cameras or (np.diff(self.zooms) <= 0.0).any():
             raise InputError("a zoom lens needs a camera for each of its zooms, which increase")

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 
 import pinocchio as pin
 
-from rrtik_ompl.base.arrays import Matrix, frozen, not_negative
-from rrtik_ompl.base.errors import InputError, UnknownNameError
+from rrtik_ompl.base.arrays import Matrix, finite_number, frozen, not_negative
+from rrtik_ompl.base.errors import InputError, UnknownNameError, listed, require
 from rrtik_ompl.base.poses import rigid
 from rrtik_ompl.model.scene import Obstacle
 from rrtik_ompl.sensing.markers.corner_pose import square_corners
@@ -32,6 +32,8 @@ class MountedMarker:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "T_object_marker", rigid(self.T_object_marker, f"marker {self.number}: its pose"))
+        for word in ("side", "side_sigma"):
+            object.__setattr__(self, word, finite_number(getattr(self, word), f"marker {self.number}: {word}"))
         if not 0.0 < self.side < 100.0:
             raise InputError(f"marker {self.number}: side must be between 0 and 100 m, got {self.side:g}")
         if not 0.0 <= self.side_sigma < self.side:
@@ -63,7 +65,10 @@ class GraspType:
 
     def __init__(self, name: str, levels: Iterable[pin.SE3], approach: float = 0.1, lift: float = 0.1) -> None:
         object.__setattr__(self, "name", name)
-        poses = (rigid(T, f"grasp type '{name}': level {k}") for k, T in enumerate(levels, start=1))
+        poses = (
+            rigid(T, f"grasp type '{name}': level {k}")
+            for k, T in enumerate(listed(levels, f"levels of grasp type '{name}'"), 1)
+        )
         object.__setattr__(self, "levels", tuple(poses))
         for word, value in (("approach", approach), ("lift", lift)):
             object.__setattr__(self, word, not_negative(value, f"grasp type '{name}': {word}"))
@@ -95,8 +100,9 @@ class MarkedObject:
 
     def __post_init__(self) -> None:
         for word in ("markers", "solids", "grasps"):
-            object.__setattr__(self, word, tuple(getattr(self, word)))
+            object.__setattr__(self, word, listed(getattr(self, word), f"{word} of object '{self.name}'"))
 
+        require(self.role, str, f"role of object '{self.name}'", f"use one of {', '.join(ROLES)}")
         if self.role not in ROLES:
             raise UnknownNameError("role of an object", self.role, ROLES, where=self.name)
         if not self.markers:
@@ -136,7 +142,9 @@ class MarkerMap:
     T_base_camera: pin.SE3 | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "objects", tuple(self.objects))
+        object.__setattr__(self, "objects", listed(self.objects, "objects of a marker map"))
+        for marked_object in self.objects:
+            require(marked_object, MarkedObject, "object of a marker map")
         if self.T_base_camera is not None:
             object.__setattr__(self, "T_base_camera", rigid(self.T_base_camera, "pose of the camera"))
 
