@@ -126,7 +126,7 @@ def test_what_is_called_proven_has_to_keep_margin_and_clearance_and_the_rest_mus
     for margin, clearance, kept in ((0.0, None, 0.05), (0.02, None, 0.07), (0.02, 0.01, 0.08)):
         run = by_hand(robot, rows, seen, proven=True, margin=margin, clearance=clearance)
         found = run.violations(problem)
-        assert [each.kept for each in found] == pytest.approx([kept] * len(found))
+        assert [each.required_distance for each in found] == pytest.approx([kept] * len(found))
         assert bool(found) == (nearest < kept - 1e-5)
         assert not any(each.touches for each in found)
         assert by_hand(robot, rows, seen, proven=False, margin=margin).violations(problem) == ()
