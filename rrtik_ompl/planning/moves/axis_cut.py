@@ -9,11 +9,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from rrtik_ompl.base.arrays import Mask, Matrix, Vector, finite_array
+from rrtik_ompl.base.arrays import Mask, Matrix, Vector
 from rrtik_ompl.base.budget import Budget, Stop, no_stop
-from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.model.transitions import lower_bound, merge_moves, route_length, transitions
 from rrtik_ompl.world.motion_queries import MotionsFree
 
@@ -23,7 +21,7 @@ MAX_CUT_ROUNDS = 20
 
 
 def axis_cut(
-    waypoints: ArrayLike, motions_free: MotionsFree, *, axes: Sequence[int] | None = None, stop: Stop = no_stop
+    waypoints: Matrix, motions_free: MotionsFree, *, axes: Sequence[int] | None = None, stop: Stop = no_stop
 ) -> Matrix:
     """One pass of the axis post-processor.
 
@@ -34,36 +32,33 @@ def axis_cut(
         waypoints: Shape (k, n), start first. Every edge must be free. An edge that moves several joints is kept as it
             is where no sequence of single-joint moves replaces it.
         motions_free: Which straight motions are free, for batches of shape (m, n).
-        axes: Order of the joints within a sequence; the last joint first if None, because distal joints sweep less.
+        axes: Order of all joints within a sequence; the last joint first if None, because distal joints sweep less.
         stop: Called at every pivot; true leaves the rest of the route as it is.
 
     Returns:
         Shape (m, n), start first, ends as given, with no more moves than the route had.
-
-    Raises:
-        InputError: If the waypoints are no (k, n) numbers or ``axes`` is no permutation of the joints.
     """
-    return _backward_pass(_route(waypoints), check_once(motions_free), axes, stop)[::-1]
+    return _backward_pass(merge_moves(waypoints, tolerance=0.0), check_once(motions_free), axes, stop)[::-1]
 
 
 def double_axis_cut(
-    waypoints: ArrayLike, motions_free: MotionsFree, *, axes: Sequence[int] | None = None, stop: Stop = no_stop
+    waypoints: Matrix, motions_free: MotionsFree, *, axes: Sequence[int] | None = None, stop: Stop = no_stop
 ) -> Matrix:
     """The published post-processing: a pass from the end of the route, then one from the start. See :func:`axis_cut`.
 
     Each pass turns the route round, so the second one cuts the other way and restores the direction.
     """
     free = check_once(motions_free)
-    return _backward_pass(_backward_pass(_route(waypoints), free, axes, stop), free, axes, stop)
+    return _backward_pass(_backward_pass(merge_moves(waypoints, tolerance=0.0), free, axes, stop), free, axes, stop)
 
 
-def cut_parts(waypoints: ArrayLike, motions_free: MotionsFree, *, stop: Stop = no_stop) -> Matrix:
+def cut_parts(waypoints: Matrix, motions_free: MotionsFree, *, stop: Stop = no_stop) -> Matrix:
     """The double cut of short parts of a long route, then of longer ones of what is left, up to the whole.
 
     The cut of a whole route checks about the square of its moves, and far waypoints come first; most of its gain is
     near. See :func:`axis_cut`.
     """
-    route = _route(waypoints)
+    route = merge_moves(waypoints, tolerance=0.0)
     size = PART
     while size < len(route) - 1 and not stop():
         parts = [route[k : k + size + 1] for k in range(0, len(route) - 1, size)]
@@ -71,6 +66,46 @@ def cut_parts(waypoints: ArrayLike, motions_free: MotionsFree, *, stop: Stop = n
         route = merge_moves(np.vstack(cut), tolerance=0.0)
         size = LONGER * size
     return double_axis_cut(route, motions_free, stop=stop)
+
+
+def axis_cut_rounds(
+    waypoints: Matrix,
+    motions_free: MotionsFree,
+    *,
+    rounds: int = MAX_CUT_ROUNDS,
+    budget: Budget | None = None,
+) -> Matrix:
+    """The double pass, then ``rounds`` passes with random joint orders in alternating direction; keeps the best.
+
+    A pass never adds a move, but may end in another route with as many. Each round goes on from the last one, so the
+    rounds wander among routes of equal rank and leave where a shorter one opens.
+
+    Args:
+        waypoints: Shape (k, n), start first.
+        motions_free: Which straight motions are free, for batches of shape (m, n).
+        rounds: Number of further passes, at least 0.
+        budget: When to end, with the best so far, and the seed of the random orders; without an end if None.
+
+    Returns:
+        Shape (m, n), start first: the route with the fewest transitions seen, the shortest among those.
+    """
+    budget = Budget() if budget is None else budget
+    rng = np.random.default_rng(budget.seed)
+    free = check_once(motions_free)
+    route = best = double_axis_cut(waypoints, free, stop=budget.over)
+    fewest = lower_bound(best[0], best[-1])
+
+    for k in range(rounds):
+        if transitions(best) == fewest or budget.over():
+            break
+        route = axis_cut(route[::-1], free, axes=rng.permutation(route.shape[1]).tolist(), stop=budget.over)
+        best = min(best, route[::-1] if k % 2 == 0 else route, key=route_rank)
+    return best
+
+
+def route_rank(route: Matrix) -> tuple[int, float]:
+    """Sort key of a route, shape (k, n): transitions, then length."""
+    return transitions(route), route_length(route)
 
 
 def axis_moves(a: Vector, b: Vector, axes: Sequence[int]) -> Matrix:
@@ -165,61 +200,4 @@ def _moves_to_waypoint(route: Matrix, pivot: int, test: int, motions_free: Motio
 
 def _order(axes: Sequence[int] | None, dof: int) -> list[int]:
     """The order of the joints: the last one first if none is given."""
-    order = list(range(dof))[::-1] if axes is None else [int(axis) for axis in axes]
-    if sorted(order) != list(range(dof)):
-        raise InputError(f"axes: expected each of 0 to {dof - 1} once, got {order}")
-    return order
-
-
-def _route(waypoints: ArrayLike) -> Matrix:
-    """A checked copy of a route, shape (k, n), moves of the same joint in a row joined."""
-    route = finite_array(waypoints, (None, None), "waypoints")
-    if len(route) == 0:
-        raise InputError("waypoints: a route needs at least one configuration")
-    return merge_moves(route, tolerance=0.0)
-
-
-def axis_cut_rounds(
-    waypoints: ArrayLike,
-    motions_free: MotionsFree,
-    *,
-    rounds: int = MAX_CUT_ROUNDS,
-    budget: Budget | None = None,
-) -> Matrix:
-    """The double pass, then ``rounds`` passes with random joint orders in alternating direction; keeps the best.
-
-    A pass never adds a move, but may end in another route with as many. Each round goes on from the last one, so the
-    rounds wander among routes of equal rank and leave where a shorter one opens.
-
-    Args:
-        waypoints: Shape (k, n), start first.
-        motions_free: Which straight motions are free, for batches of shape (m, n).
-        rounds: Number of further passes, at least 0.
-        budget: When to end, with the best so far, and the seed of the random orders; without an end if None.
-
-    Returns:
-        Shape (m, n), start first: the route with the fewest transitions seen, the shortest among those.
-
-    Raises:
-        InputError: If the waypoints are no (k, n) numbers or ``rounds`` is negative.
-    """
-    if rounds < 0:
-        raise InputError(f"rounds: expected at least 0, got {rounds}")
-
-    budget = Budget() if budget is None else budget
-    rng = np.random.default_rng(budget.seed)
-    free = check_once(motions_free)
-    route = best = double_axis_cut(waypoints, free, stop=budget.over)
-    fewest = lower_bound(best[0], best[-1])
-
-    for k in range(rounds):
-        if transitions(best) == fewest or budget.over():
-            break
-        route = axis_cut(route[::-1], free, axes=rng.permutation(route.shape[1]).tolist(), stop=budget.over)
-        best = min(best, route[::-1] if k % 2 == 0 else route, key=route_rank)
-    return best
-
-
-def route_rank(route: Matrix) -> tuple[int, float]:
-    """Sort key of a route, shape (k, n): transitions, then length."""
-    return transitions(route), route_length(route)
+    return list(range(dof))[::-1] if axes is None else list(axes)

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from rrtik_ompl.base.arrays import TAU, Matrix, Vector, finite_array
+from rrtik_ompl.base.arrays import TAU, Matrix, Vector
 from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.model.robot import Robot
@@ -38,7 +38,7 @@ class MovesFound:
 
 
 def fewest_moves(
-    waypoints: Matrix,
+    route: Matrix,
     world: World,
     *,
     rounds: int = MAX_IMPROVEMENT_ROUNDS,
@@ -51,7 +51,7 @@ def fewest_moves(
     It keeps a clearance where that costs no move, and its motions are proven free.
 
     Args:
-        waypoints: A free route, shape (k, n), every edge of which moves one joint.
+        route: Free, shape (k, n), every edge of which moves one joint.
         world: Checks motions.
         rounds: Of improvement at most, after the first; the work ends earlier if it is proven that no route has fewer
             moves. The same number and seed give the same route.
@@ -66,23 +66,20 @@ def fewest_moves(
         such joints.
 
     Raises:
-        InputError: If an edge moves several joints or ``rounds`` is negative.
+        InputError: If an edge moves several joints.
     """
-    rows = finite_array(waypoints, (None, world.robot.dof), "waypoints")
-    if len(rows) > 1 and not single_joint(rows[np.append(True, (np.diff(rows, axis=0) != 0.0).any(axis=1))]):
+    if len(route) > 1 and not single_joint(route[np.append(True, (np.diff(route, axis=0) != 0.0).any(axis=1))]):
         raise InputError(
             "path to shorten: an edge moves several joints at once; use one_joint_moves(path, problem) first"
         )
-    if rounds < 0:
-        raise InputError(f"rounds: expected at least 0, got {rounds}")
 
     move_rules = MoveRules.of_robot(world.robot) if rules is None else rules
     budget = Budget() if budget is None else budget
-    work = _Work(rows, world, move_rules, rounds, budget)
-    levels = clearance_levels(world, rows[[0, -1]], clearance)
+    work = _Work(route, world, move_rules, rounds, budget)
+    levels = clearance_levels(world, route[[0, -1]], clearance)
 
-    best = rows
-    bound = lower_bound(rows[0], rows[-1])
+    best = route
+    bound = lower_bound(route[0], route[-1])
     moves_to_save = 0  # 1 once `best` is from a level: a later one, which keeps less, has to save a move
     for level in levels:
         if moves_to_save > 0 and (transitions(best) == bound or budget.over()):
