@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from rrtik_ompl.base.choices import one_of
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.cli import FOUND
-from rrtik_ompl.cli.terminal import TRAJECTORY_FORMATS, ProblemName, progress, say
+from rrtik_ompl.cli.terminal import TRAJECTORY_FORMATS, ProblemName, Table, progress, say
 from rrtik_ompl.files.tables import FORMATS as PATH_FORMATS
 from rrtik_ompl.files.text import check_target, comma_numbers
 
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 
     from rrtik_ompl.base.arrays import Vector
     from rrtik_ompl.model.path import JointPath
+    from rrtik_ompl.motion.trajectory import RateLimits, Trajectory
     from rrtik_ompl.world.problem import Problem
 
 PLOT_FORMATS = (".png", ".svg")
@@ -109,7 +111,6 @@ def time_path(
 
     from rrtik_ompl import RateLimits, load_problem, plot_joints, time_parameterize
     from rrtik_ompl.base.units import DEGREE
-    from rrtik_ompl.cli import plan_report as report
     from rrtik_ompl.motion.trajectory.limits import default_words
 
     task = load_problem(problem)
@@ -139,14 +140,58 @@ def time_path(
         plot_joints(found, plot, limits=limits)
 
     if as_json:
-        print(json.dumps(report.timing_document(task, found, limits)))
+        print(json.dumps(_timing_document(task, found, limits)))
     else:
         defaults = default_words(robot, [name for name, row in given.items() if row is not None])
-        say(
-            f"{task.name}: {found.duration:.3f} s", report.peaks_table(found, limits), *([defaults] if defaults else [])
-        )
+        say(f"{task.name}: {found.duration:.3f} s", _peaks_table(found, limits), *([defaults] if defaults else []))
         say(*(f"wrote {file}" for file in (out, plot) if file is not None))
     return FOUND
+
+
+def _peaks_table(trajectory: Trajectory, limits: RateLimits) -> Table:
+    """One row per joint: its largest velocity, acceleration and jerk beside their limits; degrees, or metres."""
+    from rrtik_ompl.base.units import shown_unit
+    from rrtik_ompl.motion.trajectory import motion_report
+
+    heads = [f"{what}{end}" for what in ("velocity", "acceleration", "jerk") for end in ("", " limit")]
+    numbers = range(1, len(heads) + 1)
+    table = Table("joint", *heads, "unit", "switches/s", right=(*numbers, len(heads) + 2))
+
+    often = motion_report(trajectory, limits).switches
+    peaks = trajectory.peaks()
+    words = ("jumps", "none")  # said of a peak, of a limit, that is infinite
+    pairs = ((peaks.velocity, limits.velocity), (peaks.acceleration, limits.acceleration), (peaks.jerk, limits.jerk))
+
+    for k, name in enumerate(trajectory.joint_names):
+        factor, unit = shown_unit(trajectory.prismatic[k])
+        cells = (_rate(factor * float(row[k]), word) for pair in pairs for row, word in zip(pair, words, strict=True))
+        table.add_row(name, *cells, unit, f"{often[k]:.1f}")
+    return table
+
+
+def _rate(value: float, word: str) -> str:
+    return f"{value:.4g}" if math.isfinite(value) else word
+
+
+def _timing_document(problem: Problem, trajectory: Trajectory, limits: RateLimits) -> dict[str, Any]:
+    """A timed motion for machines: duration and each joint's peaks (a jerk of null is a jump of acceleration)."""
+    from rrtik_ompl.motion.trajectory import motion_report
+
+    peaks = trajectory.peaks()
+    report = motion_report(trajectory, limits)
+    return {
+        "problem": problem.name,
+        "robot": trajectory.robot_name,
+        "duration": trajectory.duration,
+        "knots": len(trajectory.times),
+        "joint_names": list(trajectory.joint_names),
+        "peaks": {
+            name: [float(x) if math.isfinite(x) else None for x in row]
+            for name, row in zip(peaks._fields, peaks, strict=True)
+        },
+        "switches_a_second": report.switches.tolist(),
+        "largest_jump": report.jump.tolist(),
+    }
 
 
 def _path_of_moves(path: Path, problem: str | None, shorten: str | None) -> JointPath:

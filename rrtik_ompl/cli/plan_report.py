@@ -1,9 +1,9 @@
-"""Plans and paths in words and tables for a person: degrees, millimetres, one row per move; their certificates."""
+"""A path and its plan in words and tables for a person: degrees, millimetres, one row per move; its certificate."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -16,11 +16,6 @@ from rrtik_ompl.planning.moves.text import COLUMNS, moves_document
 from rrtik_ompl.planning.plan import Plan
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.route_check import how_checked
-
-if TYPE_CHECKING:
-    from rrtik_ompl.motion.trajectory import RateLimits, Trajectory
-
-SLACK = 1e-6  # share of a joint's fastest rate that rounding may add
 
 
 def moves_table(path: JointPath) -> Table:
@@ -47,30 +42,6 @@ def waypoints_table(path: JointPath) -> Table:
             *(f"{value:.4f}" if m else f"{value:.2f}" for value, m in zip(row, path.prismatic, strict=False)),
         )
     return table
-
-
-def peaks_table(trajectory: Trajectory, limits: RateLimits) -> Table:
-    """One row per joint: its largest velocity, acceleration and jerk beside their limits; degrees, or metres."""
-    from rrtik_ompl.motion.trajectory import motion_report  # whoever plans alone does not wait for it
-
-    heads = [f"{what}{end}" for what in ("velocity", "acceleration", "jerk") for end in ("", " limit")]
-    numbers = range(1, len(heads) + 1)
-    table = Table("joint", *heads, "unit", "switches/s", right=(*numbers, len(heads) + 2))
-
-    often = motion_report(trajectory, limits).switches
-    peaks = trajectory.peaks()
-    words = ("jumps", "none")  # said of a peak, of a limit, that is infinite
-    pairs = ((peaks.velocity, limits.velocity), (peaks.acceleration, limits.acceleration), (peaks.jerk, limits.jerk))
-
-    for k, name in enumerate(trajectory.joint_names):
-        factor, unit = shown_unit(trajectory.prismatic[k])
-        cells = (_rate(factor * float(row[k]), word) for pair in pairs for row, word in zip(pair, words, strict=True))
-        table.add_row(name, *cells, unit, f"{often[k]:.1f}")
-    return table
-
-
-def _rate(value: float, word: str) -> str:
-    return f"{value:.4g}" if np.isfinite(value) else word
 
 
 def fewest_moves(problem: Problem, plan: Plan) -> int | None:
@@ -168,27 +139,6 @@ def document(problem: Problem, plan: Plan, path: JointPath | None, shorten_secon
     if path.one_joint_at_a_time:
         found["moves"] = moves_document(path)
     return found
-
-
-def timing_document(problem: Problem, trajectory: Trajectory, limits: RateLimits) -> dict[str, Any]:
-    """A timed motion for machines: duration and each joint's peaks (a jerk of null is a jump of acceleration)."""
-    from rrtik_ompl.motion.trajectory import motion_report
-
-    peaks = trajectory.peaks()
-    report = motion_report(trajectory, limits)
-    return {
-        "problem": problem.name,
-        "robot": trajectory.robot_name,
-        "duration": trajectory.duration,
-        "knots": len(trajectory.times),
-        "joint_names": list(trajectory.joint_names),
-        "peaks": {
-            name: [float(x) if np.isfinite(x) else None for x in row]
-            for name, row in zip(peaks._fields, peaks, strict=True)
-        },
-        "switches_a_second": report.switches.tolist(),
-        "largest_jump": report.jump.tolist(),
-    }
 
 
 def write_certificate(problem: Problem, path: JointPath, file: Path, *, beside: bool = False) -> str:
