@@ -100,7 +100,7 @@ def finite_array(values: ArrayLike, shape: tuple[int | None, ...], what: str) ->
 
 
 def _as_floats(values: ArrayLike, what: str) -> NDArray[np.float64]:
-    """Numbers given by a user as float64; the one place that says what is a number.
+    """Return numbers given by a user as float64; the one place that says what is a number.
 
     Raises:
         InputError: If they are none (truths, texts and complex numbers are none), or too many.
@@ -119,7 +119,7 @@ def _as_floats(values: ArrayLike, what: str) -> NDArray[np.float64]:
 
 
 def _count(values: object) -> int:
-    """How many members a value given by a user has, before they are copied; 0 if it does not say."""
+    """Return how many members a value given by a user has, before they are copied; 0 if it does not say."""
     if isinstance(values, np.ndarray):
         return values.size
     try:
@@ -129,7 +129,7 @@ def _count(values: object) -> int:
 
 
 def _has_truths(values: Iterable[Any]) -> bool:
-    """Whether True or False is among numbers, which numpy takes for 1 and 0; level by level of lists in lists."""
+    """Check whether True or False is among numbers, which numpy takes for 1 and 0; level by level of lists in lists."""
     while True:
         kinds = set(map(type, values))
         if bool in kinds or np.bool_ in kinds:
@@ -146,12 +146,12 @@ def _has_shape(array: NDArray[np.float64], shape: tuple[int | None, ...]) -> boo
 
 
 def too_many(count: int, what: str) -> InputError:
-    """The error for more numbers than a call takes."""
+    """Return the error for more numbers than a call takes."""
     return InputError(f"{what}: {count} are more numbers than the {MOST_NUMBERS} of one call; give them in parts")
 
 
 def dimensions(values: object) -> int:
-    """How many dimensions a value given by a user has; 0 for nested lists that make no array."""
+    """Return how many dimensions a value given by a user has; 0 for nested lists that make no array."""
     if not isinstance(values, np.ndarray) and _count(values) > MOST_NUMBERS:
         return 0
     try:
@@ -236,7 +236,7 @@ def truths(values: ArrayLike, what: str) -> Mask:
 
 
 def finite_number(value: ArrayLike, what: str) -> float:
-    """A number given by a user.
+    """Return a number given by a user.
 
     Raises:
         InputError: If it is none, or not finite.
@@ -247,7 +247,7 @@ def finite_number(value: ArrayLike, what: str) -> float:
 
 
 def positive(value: ArrayLike, what: str, remedy: str = "") -> float:
-    """A number greater than 0 given by a user.
+    """Return a number greater than 0 given by a user.
 
     Args:
         value: What was given.
@@ -264,7 +264,7 @@ def positive(value: ArrayLike, what: str, remedy: str = "") -> float:
 
 
 def length(value: ArrayLike, what: str) -> float:
-    """A length of a solid [m] given by a user: greater than 0, at most ``LARGEST``.
+    """Return a length of a solid [m] given by a user: greater than 0, at most ``LARGEST``.
 
     Raises:
         InputError: If it is none.
@@ -273,7 +273,7 @@ def length(value: ArrayLike, what: str) -> float:
 
 
 def not_negative(value: ArrayLike, what: str) -> float:
-    """A number of at least 0 given by a user.
+    """Return a number of at least 0 given by a user.
 
     Raises:
         InputError: If it is none.
@@ -285,7 +285,7 @@ def not_negative(value: ArrayLike, what: str) -> float:
 
 
 def whole_number(value: object, what: str, least: int = 0) -> int:
-    """A whole number given by a user, such as a seed.
+    """Return a whole number given by a user, such as a seed.
 
     Raises:
         InputError: If it is none, or less than ``least``.

@@ -61,24 +61,24 @@ class Budget:
         return self.iterations is not None or bool(np.isfinite(self.seconds))
 
     def over(self) -> bool:
-        """Whether it is time to stop: a :data:`Stop` for searches that are given nothing else."""
+        """Check whether it is time to stop: a :data:`Stop` for searches that are given nothing else."""
         return time.monotonic() - self.begun >= self.seconds or bool(self.stop())
 
     def begun_now(self) -> Budget:
-        """The same budget, whose time begins now."""
+        """Return the same budget, whose time begins now."""
         return replace(self, begun=time.monotonic())
 
     def part(self, share: float) -> Budget:
-        """A share of the time that is left, from now on."""
+        """Return a share of the time that is left, from now on."""
         return replace(self, seconds=max(share * self.left, 0.0), begun=time.monotonic())
 
     def put_off(self, seconds: float) -> Budget:
-        """The budget after some seconds that do not count."""
+        """Return the budget after some seconds that do not count."""
         return replace(self, begun=self.begun + seconds)
 
 
 def iteration_limit(limit: int | None) -> int | None:
-    """The largest number of iterations that a planner may do, a whole number; None for no limit.
+    """Return the largest number of iterations that a planner may do, a whole number; None for no limit.
 
     Raises:
         InputError: If the limit is no number of at least 1.

@@ -51,7 +51,7 @@ Name = TypeVar("Name", bound=str)
 
 
 def one_of(names: Iterable[Name], name: str, kind: str) -> Name:
-    """A name that was given as text, as one of those that there are.
+    """Return a name that was given as text, as one of those that there are.
 
     Args:
         names: Those that there are.

@@ -81,7 +81,7 @@ class Items(Sequence[Kind]):
         return self._items
 
     def with_(self, number: int, item: Kind) -> Items[Kind]:
-        """The same items but for one."""
+        """Return the same items but for one."""
         known = self._items if len(self._changes) < MOST_CHANGES else self.as_tuple
         return Items(known, {**self._changes, number: item})
 
@@ -117,7 +117,7 @@ def as_value(thing: object) -> tuple[Any, ...]:
 
 
 def restored(kind: type[Thing], state: dict[str, Any]) -> Thing:
-    """The object that :func:`as_value` took apart; nothing is checked again.
+    """Return the object that :func:`as_value` took apart; nothing is checked again.
 
     This is the only place where a value is made without its constructor.
     """
@@ -151,7 +151,7 @@ class _ReadOnlyMapping(NamedTuple):
 
 
 def packed(value: object) -> object:
-    """A value in which what pickle cannot take, or would make writable, is marked."""
+    """Return a value in which what pickle cannot take, or would make writable, is marked."""
     if isinstance(value, MappingProxyType):
         return _ReadOnlyMapping({key: packed(item) for key, item in value.items()})
     if isinstance(value, np.ndarray) and not value.flags.writeable:
@@ -160,7 +160,7 @@ def packed(value: object) -> object:
 
 
 def unpacked(value: object) -> object:
-    """The value that :func:`packed` marked."""
+    """Return the value that :func:`packed` marked."""
     if isinstance(value, _ReadOnlyMapping):
         return MappingProxyType({key: unpacked(item) for key, item in value.values.items()})
     return frozen(value.values, value.values.dtype) if isinstance(value, _ReadOnlyArray) else value
@@ -180,7 +180,7 @@ def in_one_line(thing: DataclassInstance) -> str:
 
 
 def _short(value: object) -> str:
-    """A value in some ten words."""
+    """Return a value in some ten words."""
     if isinstance(value, np.ndarray):
         if value.size > MOST_SHOWN:
             return f"<array of shape {value.shape}>"
@@ -214,7 +214,7 @@ class ForThread(Protocol):
     """What is not for two threads at a time, but can be had again."""
 
     def for_thread(self) -> object:
-        """The same for another thread."""
+        """Return the same for another thread."""
 
 
 class _Cell(threading.local):
@@ -240,7 +240,7 @@ class ThreadOwn(Generic[Kept]):
     @overload
     def __get__(self, thing: object, kind: type) -> Kept: ...
     def __get__(self, thing: object, kind: type) -> object:
-        """The value of this thread; it ends with the thread."""
+        """Return the value of this thread; it ends with the thread."""
         return self if thing is None else vars(thing)[self._name].value
 
     def __set__(self, thing: object, value: Kept) -> None:

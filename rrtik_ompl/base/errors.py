@@ -13,7 +13,7 @@ MOST_MEMBERS = 1_000_000  # of a list that is given
 
 
 def _restored(kind: type[RrtikError], args: tuple[Any, ...], attributes: dict[str, Any]) -> RrtikError:
-    """The error that came from another process."""
+    """Return the error that came from another process."""
     error = kind.__new__(kind, *args)
     error.args = args
     vars(error).update(attributes)
@@ -21,7 +21,7 @@ def _restored(kind: type[RrtikError], args: tuple[Any, ...], attributes: dict[st
 
 
 def printable(text: str) -> str:
-    """The text with every letter that a terminal would obey instead of showing it, or cannot show, spelt out."""
+    """Return the text with every letter that a terminal would obey instead of showing it, or cannot show, spelt out."""
     return text if text.isprintable() else "".join(c if c.isprintable() else _spelt(c) for c in text)
 
 
@@ -110,7 +110,7 @@ class ProblemError(RrtikError):
 
 
 def in_file(path: object, error: InputError) -> InputError:
-    """The same error, naming the file before all else, as errors of its lines do by themselves."""
+    """Return the same error, naming the file before all else, as errors of its lines do by themselves."""
     return error if str(error).startswith(str(path)) else InputError(f"{path}: {error}")
 
 
@@ -154,7 +154,7 @@ def called(value: object, what: str, *arguments: str) -> None:
 
 
 def name_of(value: object, what: str) -> str:
-    """A name of a link, joint or solid: text that can be shown and written to a file.
+    """Return a name of a link, joint or solid: text that can be shown and written to a file.
 
     Raises:
         InputError: If it is no text, or has letters that no terminal shows.
@@ -179,7 +179,7 @@ def at_most(count: float, limit: float, what: str, remedy: str = "") -> None:
 
 
 def listed(values: object, what: str, most: int = MOST_MEMBERS) -> tuple[Any, ...]:
-    """The members of a list, or of anything else that has members, but of a text.
+    """Return the members of a list, or of anything else that has members, but of a text.
 
     Raises:
         InputError: If it has none, or more than ``most``; of what never ends no more are taken.
@@ -193,7 +193,7 @@ def listed(values: object, what: str, most: int = MOST_MEMBERS) -> tuple[Any, ..
 
 
 def few(names: Iterable[str], most: int = 4) -> str:
-    """The first of some names, and how many more there are: "a, b and 3 more"."""
+    """Return the first of some names, and how many more there are: "a, b and 3 more"."""
     known = tuple(names)
     rest = len(known) - most
     return ", ".join(known[:most]) + (f" and {rest} more" if rest > 0 else "")

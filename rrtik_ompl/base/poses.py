@@ -67,12 +67,12 @@ def quaternion_xyzw(placement: pin.SE3) -> Vector:
 
 
 def pose_row(placement: pin.SE3) -> Vector:
-    """A pose as x, y, z [m] and the quaternion x, y, z, w, shape (7,)."""
+    """Return a pose as x, y, z [m] and the quaternion x, y, z, w, shape (7,)."""
     return np.concatenate([placement.translation, quaternion_xyzw(placement)])
 
 
 def apart(first: pin.SE3, second: pin.SE3) -> tuple[float, float]:
-    """How far two poses are apart [m], and by which angle they are turned to each other [rad]."""
+    """Return how far two poses are apart [m], and by which angle they are turned to each other [rad]."""
     off = first.actInv(second)
     return float(np.linalg.norm(off.translation)), float(np.linalg.norm(pin.log3(off.rotation)))
 
@@ -155,7 +155,7 @@ def _written_pose(numbers: ArrayLike, what: str) -> pin.SE3:
 
 
 def left_handed(x: Sequence[Coordinate], y: Sequence[Coordinate], z: Sequence[Coordinate]) -> bool | Mask:
-    """Whether the determinant of three vectors is negative; their coordinates are numbers or arrays of them."""
+    """Check whether the determinant of three vectors is negative; their coordinates are numbers or arrays of them."""
     return x[0] * (y[1] * z[2] - y[2] * z[1]) < x[1] * (y[0] * z[2] - y[2] * z[0]) - x[2] * (y[0] * z[1] - y[1] * z[0])
 
 
@@ -164,7 +164,7 @@ def _dot(a: Sequence[float], b: Sequence[float]) -> float:
 
 
 def unit_vector(values: ArrayLike, what: str) -> Vector:
-    """A direction, shape (3,).
+    """Return a direction, shape (3,).
 
     Raises:
         InputError: If its length differs from 1 by more than 1e-3.
@@ -177,7 +177,7 @@ def unit_vector(values: ArrayLike, what: str) -> Vector:
 
 
 def turned_z(direction: Vector) -> NDArray[np.float64]:
-    """The shortest rotation that takes z to a unit vector, shape (3,): (3, 3)."""
+    """Return the shortest rotation that takes z to a unit vector, shape (3,): (3, 3)."""
     rotation: NDArray[np.float64] = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), direction).matrix()
     return rotation
 

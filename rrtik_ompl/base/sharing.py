@@ -38,7 +38,7 @@ class Shared(Generic[Part]):
         self._values: WeakKeyDictionary[Any, tuple[object, ...]] = WeakKeyDictionary()
 
     def of(self, *values: object) -> Part:
-        """The part of some values, made if there is none."""
+        """Return the part of some values, made if there is none."""
         key = _key(values)
         thread = threading.get_ident()
         known: Part | None = self._parts.get((thread, key))

@@ -38,5 +38,5 @@ def shown_unit(slides: bool) -> tuple[float, str]:
 
 
 def reading(value: float, unit: str) -> tuple[float, str]:
-    """A joint value as a person reads it: degrees for radians, metres as they are; and the name of that unit."""
+    """Return a joint value as a person reads it: degrees for radians, metres as they are; and the name of that unit."""
     return (value, "m") if unit == "m" else (float(np.rad2deg(value)), "deg")

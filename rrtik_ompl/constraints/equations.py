@@ -21,12 +21,12 @@ TURN_EQUATIONS = {Turning.FREE: 0, Turning.AXIS: 2, Turning.BALL: 3, Turning.RAN
 
 
 def equation_count(constraints: HeldRegions) -> int:
-    """How many equations there are."""
+    """Return how many equations there are."""
     return sum(len(_coordinates(region)) + TURN_EQUATIONS[region.turning] for region in constraints.regions)
 
 
 def equations(robot: Robot, constraints: HeldRegions, q: Vector) -> tuple[Vector, Matrix]:
-    """Values and derivatives of the equations.
+    """Return values and derivatives of the equations.
 
     Args:
         robot: The arm.
@@ -41,7 +41,7 @@ def equations(robot: Robot, constraints: HeldRegions, q: Vector) -> tuple[Vector
 
 
 def _coordinates(region: HeldRegion) -> NDArray[np.int64]:
-    """The coordinates of the position that a region bounds."""
+    """Return the coordinates of the position that a region bounds."""
     return np.flatnonzero((np.abs(region.region.bounds[:3]) < ANYWHERE).any(axis=1))
 
 

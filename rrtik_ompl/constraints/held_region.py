@@ -94,11 +94,11 @@ class HeldRegion:
         return self.robot.tip if self.region.frame is None else self.region.frame
 
     def displacements(self, Q: Matrix) -> NDArray[np.float64]:
-        """The frame as seen from the region's frame for configurations, shape (m, dof): (m, 4, 4)."""
+        """Return the frame as seen from the region's frame for configurations, shape (m, dof): (m, 4, 4)."""
         return self.T_w_world @ self.robot.chain.joint_frames(Q)[:, self.joint] @ self.T_joint_d
 
     def measures(self, Q: Matrix) -> Matrix:
-        """How far configurations, shape (m, dof), are from the region, without its tolerances, shape (m, 2).
+        """Return how far configurations, shape (m, dof), are from the region, without its tolerances, shape (m, 2).
 
         Metres, and for the orientation what `limits` makes of an angle.
         """
@@ -117,11 +117,11 @@ class HeldRegion:
         return np.array([self.region.position_allowance, self.region.orientation_allowance])
 
     def limits(self, *, between: bool = False) -> Vector:
-        """The largest measures allowed: at stored configurations, or between them; shape (2,)."""
+        """Return the largest measures allowed: at stored configurations, or between them; shape (2,)."""
         return self.measured(self.tolerances + self.allowances if between else self.tolerances)
 
     def measured(self, amounts: Vector) -> Vector:
-        """The measures of a distance [m] and an angle [rad], shape (2,)."""
+        """Return the measures of a distance [m] and an angle [rad], shape (2,)."""
         metres, angle = amounts
         angle = min(angle, 0.5 * np.pi)
         if self.turning == Turning.AXIS:
@@ -131,7 +131,7 @@ class HeldRegion:
         return np.array([metres, angle])
 
     def angle_of(self, measure: float) -> float:
-        """The angle [rad] that a small measure of the orientation stands for."""
+        """Return the angle [rad] that a small measure of the orientation stands for."""
         if self.turning == Turning.AXIS:
             return float(np.arcsin(min(measure, 1.0)))
         if self.turning == Turning.BALL:
@@ -209,7 +209,7 @@ def _curvature(pitch: float) -> float:
 
 
 def held_region(robot: Robot, scene: Scene, region: TaskRegion, label: str) -> HeldRegion:
-    """A region prepared for a robot in a scene.
+    """Return a region prepared for a robot in a scene.
 
     Raises:
         InputError: If its ranges of angles cannot be held: pitch too near to a quarter turn.
@@ -234,7 +234,7 @@ def held_region(robot: Robot, scene: Scene, region: TaskRegion, label: str) -> H
 
 
 def frame_place(robot: Robot, scene: Scene, frame: str | None, label: str) -> tuple[str, int, Any]:
-    """The robot's frame that a frame is on, the joint that carries it, and its pose in the joint's frame."""
+    """Return the robot's frame that a frame is on, the joint that carries it, and its pose in the joint's frame."""
     held = next((each for each in scene.attached if each.name == frame), None)
     name = robot.tip if frame is None else frame if held is None else held.link
     if not name.isprintable() or not robot.model.existFrame(name):
@@ -280,7 +280,7 @@ def _turning(region: TaskRegion, label: str) -> tuple[Turning, Vector, NDArray[n
 
 
 def _rows_to(robot: Robot, joint: int) -> list[int]:
-    """Rows of the chain from the base to a joint, given by its number; none to the world, 0."""
+    """Return rows of the chain from the base to a joint, given by its number; none to the world, 0."""
     rows = list[int]()
     row = joint - 1
     while row >= 0:

@@ -40,18 +40,18 @@ class HeldRegions:
         self.regions = tuple(regions)
 
     def of_robot(self, robot: Robot) -> HeldRegions:
-        """The same regions of the same arm whose joints are counted in other units (its chain's ``gain``)."""
+        """Return the same regions of the same arm whose joints are counted in other units (its chain's ``gain``)."""
         return HeldRegions(replace(region, robot=robot) for region in self.regions)
 
     def held(self, Q: Matrix) -> Mask:
-        """Which configurations, shape (m, dof), are in all regions, shape (m,)."""
+        """Return which configurations, shape (m, dof), are in all regions, shape (m,)."""
         mask = np.ones(len(Q), dtype=bool)
         for region in self.regions:
             mask &= (region.measures(Q) <= region.limits() + ROUNDING).all(axis=1)
         return mask
 
     def motions_held(self, A: Matrix, B: Matrix) -> Mask:
-        """Which straight motions A[k] -> B[k], shapes (m, dof), keep all regions, shape (m,)."""
+        """Return which straight motions A[k] -> B[k], shapes (m, dof), keep all regions, shape (m,)."""
         mask = np.ones(len(A), dtype=bool)
         for region in self.regions:
             both = region.measures(np.concatenate([A[mask], B[mask]])).reshape(2, -1, 2)
@@ -59,7 +59,7 @@ class HeldRegions:
         return mask
 
     def route_held(self, rows: Matrix) -> Mask:
-        """Which motions between waypoints, shape (k, dof), keep all regions, shape (k - 1,)."""
+        """Return which motions between waypoints, shape (k, dof), keep all regions, shape (k - 1,)."""
         mask = np.ones(max(len(rows) - 1, 0), dtype=bool)
         for region in self.regions:
             measures = region.measures(rows)
@@ -79,7 +79,7 @@ class HeldRegions:
         return ""
 
     def why(self, a: Vector, b: Vector) -> str:
-        """A line that says what is wrong with a motion, shapes (dof,), that is not held."""
+        """Return a line that says what is wrong with a motion, shapes (dof,), that is not held."""
         between = ", ".join(f"'{region.frame}'" for region in self.regions)
         return self.explain(a) or self.explain(b) or f"it leaves the region of {between} in between"
 
@@ -109,7 +109,7 @@ def held_regions(robot: Robot, scene: Scene, regions: Iterable[TaskRegion], star
 
 
 def _placed(robot: Robot, scene: Scene, region: TaskRegion, label: str, start: Vector | None) -> HeldRegion:
-    """One of them, in the world."""
+    """Return one of them, in the world."""
     if region.from_start and start is not None:
         _, joint, T_joint_frame = frame_place(robot, scene, region.frame, label)
         region = region.started_at(pin.SE3(robot.joint_frames(start)[0, joint]) * T_joint_frame)
@@ -175,7 +175,7 @@ def _keeps(region: HeldRegion, A: Matrix, B: Matrix, ends: NDArray[np.float64]) 
 def _highest(
     first: NDArray[np.float64], last: NDArray[np.float64], deviation: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """The largest that measures can be on motions, from those of both ends; arrays of one shape.
+    """Return the largest that measures can be on motions, from those of both ends; arrays of one shape.
 
     The top of ``first + t (last - first) + 4 t (1 - t) deviation`` for t in [0, 1].
     """
@@ -194,7 +194,7 @@ def _nodes(A: Matrix, B: Matrix, parts: int) -> Matrix:
 
 
 def goal_regions(robot: Robot, scene: Scene, goal: Goal) -> tuple[HeldRegion, ...]:
-    """The regions of all tips of a goal of several.
+    """Return the regions of all tips of a goal of several.
 
     Raises:
         UnknownNameError: If a tip is no link of the robot.

@@ -62,7 +62,7 @@ def projected_rows(robot: Robot, constraints: HeldRegions, rows: Matrix, steps: 
 
 
 def residual(robot: Robot, region: HeldRegion, Q: Matrix) -> tuple[Matrix, NDArray[np.float64]]:
-    """The way into a region, a little beyond its rim, and the derivative of what has to move it.
+    """Return the way into a region, a little beyond its rim, and the derivative of what has to move it.
 
     Args:
         robot: The arm.
@@ -101,7 +101,7 @@ def twists(robot: Robot, region: HeldRegion, Q: Matrix) -> NDArray[np.float64]:
 def _turn(
     region: HeldRegion, R: NDArray[np.float64], measure: Vector, J: NDArray[np.float64]
 ) -> tuple[Matrix, NDArray[np.float64], Matrix]:
-    """The turn into the region [rad], what turns change of it, and which of its numbers count."""
+    """Return the turn into the region [rad], what turns change of it, and which of its numbers count."""
     aimed = region.aimed[1]
     ones = np.ones((len(R), 3))
     if region.turning == Turning.FREE:
@@ -149,7 +149,7 @@ DRAWN = 64  # configurations that are moved towards the regions
 
 
 def contradiction(robot: Robot, constraints: HeldRegions) -> str:
-    """A line that names two path constraints of which no configuration was found to keep both; "" for none.
+    """Return a line that names two path constraints of which no configuration was found to keep both; "" for none.
 
     One that no configuration was found to keep at all is named alone. This is a finding of a search, no proof.
     """

@@ -204,12 +204,12 @@ def inside(
 
 
 def _anywhere() -> Matrix:
-    """Bounds that leave everything free."""
+    """Return bounds that leave everything free."""
     return np.outer([ANYWHERE] * 3 + [np.pi] * 3, [-1.0, 1.0])
 
 
 def _tilt(degrees: ArrayLike, what: str) -> float:
-    """A largest angle [rad], given in degrees."""
+    """Return a largest angle [rad], given in degrees."""
     tilt = positive(degrees, what)
     if tilt > LARGEST_TILT_DEG:
         raise InputError(f"{what} must be {LARGEST_TILT_DEG:g} or less, got {tilt:g}")
@@ -217,6 +217,6 @@ def _tilt(degrees: ArrayLike, what: str) -> float:
 
 
 def _placed(point: ArrayLike, direction: ArrayLike, caller: str, what: str) -> pin.SE3:
-    """A frame at a point, its z axis along a direction."""
+    """Return a frame at a point, its z axis along a direction."""
     R = turned_z(unit_vector(direction, f"{caller}: {what}"))
     return pin.SE3(R, finite_array(point, (3,), f"{caller}: point"))

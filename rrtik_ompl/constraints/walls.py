@@ -50,7 +50,7 @@ def separation(constraints: HeldRegions, start: Vector, goals: Matrix) -> str:
 
 
 def _between(region: HeldRegion, start: Vector, goal: Vector) -> str:
-    """The line about a wall of one region between two configurations."""
+    """Return the line about a wall of one region between two configurations."""
     if region.turning not in (Turning.AXIS, Turning.BALL) or region.joint == 0:
         return ""
 
@@ -75,7 +75,7 @@ def _between(region: HeldRegion, start: Vector, goal: Vector) -> str:
 
 
 def _walls(region: HeldRegion, turns: list[Turn], end: Rotations, place: int, low: float, high: float) -> Vector:
-    """Values between two of the joint of one turn that are walls, each once for all whole turns."""
+    """Return values between two of the joint of one turn that are walls, each once for all whole turns."""
     values = GRID * np.arange(np.floor(low / GRID) + 1, np.ceil(high / GRID))
     values = values[np.unique(np.round((values % TAU) / GRID) % round(TAU / GRID), return_index=True)[1]]
     walls: Vector = values[_blocked(region, turns, end, place, values)]
@@ -83,19 +83,19 @@ def _walls(region: HeldRegion, turns: list[Turn], end: Rotations, place: int, lo
 
 
 def _turns_without_limits(region: HeldRegion, turn: Turn) -> bool:
-    """Whether a joint of a turn has no limits, so that a posture is reached both ways round."""
+    """Check whether a joint of a turn has no limits, so that a posture is reached both ways round."""
     moving = (region.robot.chain.gain[list(turn.joints)] != 0.0).any(axis=0)
     return bool((moving & region.robot.continuous).any())
 
 
 def _angle_of(region: HeldRegion, turn: Turn, q: Vector) -> float:
-    """The angle of a turn at a configuration, shape (dof,) [rad]."""
+    """Return the angle of a turn at a configuration, shape (dof,) [rad]."""
     rows = list(turn.joints)
     return float(np.array(turn.signs) @ region.robot.joint_values(q)[0, rows])
 
 
 def _named(region: HeldRegion, turn: Turn) -> str:
-    """The joints of a turn, and the verb that follows."""
+    """Return the joints of a turn, and the verb that follows."""
     gains = np.array(turn.signs) @ region.robot.chain.gain[list(turn.joints)]
     moving = [(region.robot.joint_names[k], gains[k]) for k in np.flatnonzero(gains)]
     if len(moving) == 1:
@@ -129,7 +129,7 @@ def _turns(region: HeldRegion) -> tuple[list[Turn], Rotations]:
 
 
 def _without_idle_turns(region: HeldRegion, turns: list[Turn], end: Rotations) -> tuple[list[Turn], Rotations]:
-    """The turns without a last one about the axis that is kept, and a first one about where it has to point."""
+    """Return the turns without a last one about the axis that is kept, and a first one about where it has to point."""
     if turns and np.linalg.norm(np.cross(turns[-1].axis, end[:, 2])) < PARALLEL:
         end = turns[-1].before @ end
         turns = turns[:-1]
@@ -146,7 +146,7 @@ def _without_idle_turns(region: HeldRegion, turns: list[Turn], end: Rotations) -
 
 
 def _blocked(region: HeldRegion, turns: list[Turn], end: Rotations, place: int, values: Vector) -> Mask:
-    """Which values of the joint of one turn are walls, shape (k,)."""
+    """Return which values of the joint of one turn are walls, shape (k,)."""
     others = [number for number in range(len(turns)) if number != place]
     blocked = np.zeros(len(values), dtype=bool)
     if len(others) > MOST_ANGLES or len(values) == 0:
@@ -181,7 +181,7 @@ def _blocked(region: HeldRegion, turns: list[Turn], end: Rotations, place: int, 
 
 
 def _span(region: HeldRegion, turn: Turn) -> tuple[float, float]:
-    """All angles that a turn may have: a whole turn, or less if the limits of a single joint say so."""
+    """Return all angles that a turn may have: a whole turn, or less if the limits of a single joint say so."""
     chain = region.robot.chain
     robot = region.robot
     row = turn.joints[0]
@@ -200,7 +200,7 @@ def _span(region: HeldRegion, turn: Turn) -> tuple[float, float]:
 
 
 def _angles(region: HeldRegion, turns: list[Turn], end: Rotations, angles: Matrix) -> Vector:
-    """How far the frame is from what is kept [rad] for angles of all turns, shape (m, turns): (m,)."""
+    """Return how far the frame is from what is kept [rad] for angles of all turns, shape (m, turns): (m,)."""
     R = np.broadcast_to(region.T_w_world[:3, :3], (len(angles), 3, 3))
     for turn, values in zip(turns, angles.T, strict=True):
         R = R @ turn.before @ _rotations(turn.axis, values)

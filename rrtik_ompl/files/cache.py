@@ -22,7 +22,7 @@ OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
 
 
 def cache_folder(kind: str) -> Path | None:
-    """The folder of cached files of a kind, or None if the cache is switched off or nobody's home is known."""
+    """Return the folder of cached files of a kind, or None if the cache is switched off or nobody's home is known."""
     named = os.environ.get(FOLDER_VARIABLE)
     if named is not None:
         return Path(named) / kind if named else None
@@ -37,7 +37,7 @@ def cache_folder(kind: str) -> Path | None:
 
 
 def nobody_else_s(file: Path, *, among: int = OTHERS_WRITE) -> bool:
-    """Whether a file, and all folders above it, belong to the user or root and nobody else can write to them.
+    """Check whether a file, and all folders above it, belong to the user or root and nobody else can write to them.
 
     What is executed, or decides what is free, is taken from no other file: whoever may write to a folder may put other
     folders and files in place of those in it. Above the file's own folder one like ``/tmp`` is good enough, where

@@ -9,7 +9,7 @@ if TYPE_CHECKING:
 
 
 def sha256(data: bytes = b"") -> _Hash:
-    """The hash of some bytes, to which more may be added.
+    """Return the hash of some bytes, to which more may be added.
 
     Python's module takes 3.5 MB, of OpenSSL; who imports this package to plan without a cache does not load it.
     """

@@ -14,7 +14,7 @@ _STEP = {"[": 1, "{": 1, "]": -1, "}": -1}
 
 
 def message_in(text: str | bytes) -> dict[str, Any] | None:
-    """The JSON object in a text; None if there is none, or it is nested more deeply than any message of ours.
+    """Return the JSON object in a text; None if there is none, or it is nested more deeply than any message of ours.
 
     Deep nesting is found before it is read: what reads it, or later shows it, would run out of stack.
     """
@@ -30,7 +30,7 @@ def message_in(text: str | bytes) -> dict[str, Any] | None:
 
 
 def quoted(value: object) -> str:
-    """The beginning of a value as a person reads it, whatever it is."""
+    """Return the beginning of a value as a person reads it, whatever it is."""
     try:
         return str(value)[:MAX_LETTERS]
     except (ValueError, RecursionError):  # a number of thousands of digits, or deep nesting

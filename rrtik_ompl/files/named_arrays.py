@@ -45,7 +45,7 @@ class NamedArrays:
         return name in self._arrays
 
     def __getitem__(self, name: str) -> NDArray[Any]:
-        """An array.
+        """Return an array.
 
         Raises:
             InputError: If there is none of that name.
@@ -55,7 +55,7 @@ class NamedArrays:
         return self._arrays[name]
 
     def whole_numbers(self, name: str) -> NDArray[np.int64]:
-        """An array of whole numbers.
+        """Return an array of whole numbers.
 
         Raises:
             InputError: If there is none of that name, or it holds anything else.
@@ -66,7 +66,7 @@ class NamedArrays:
         return found.astype(np.int64)
 
     def count(self, name: str) -> int:
-        """A whole number of at least 0.
+        """Return a whole number of at least 0.
 
         Raises:
             InputError: If there is none of that name, or it is anything else.

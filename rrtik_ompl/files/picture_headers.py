@@ -59,7 +59,7 @@ def picture_header(data: bytes, what: str) -> PictureHeader:
 
 
 def unstretched(rows: Matrix, header: PictureHeader) -> Matrix:
-    """The numbers of the file, from those of a reader that stretches them to 255."""
+    """Return the numbers of the file, from those of a reader that stretches them to 255."""
     if header.most is None:
         return rows
     return np.round(rows * (header.most / 255.0))
@@ -109,14 +109,14 @@ def _tags(data: bytes) -> Iterator[tuple[int, tuple[int, bytes]]]:
 
 
 def _numbers(tag: tuple[int, bytes] | None) -> list[int]:
-    """The numbers of two bytes of a tag; none if it has others."""
+    """Return the numbers of two bytes of a tag; none if it has others."""
     if tag is None or tag[0] != 3:
         return []
     return [int(value) for value in np.frombuffer(tag[1][: len(tag[1]) // 2 * 2], dtype="<u2")]
 
 
 def _number(text: bytes) -> float | None:
-    """The number in a text; None if there is none, or it is not finite."""
+    """Return the number in a text; None if there is none, or it is not finite."""
     try:
         value = float(text.split(b"\0")[0].strip() or b"nan")
     except ValueError:

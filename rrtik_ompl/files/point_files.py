@@ -29,7 +29,7 @@ MOST_UNPACKED = 256 * 1024 * 1024  # bytes of compressed points
 
 
 def claimed(text: str, what: str) -> int:
-    """A number of points that a header claims.
+    """Return a number of points that a header claims.
 
     Raises:
         InputError: If it is no whole number of at least 0.
@@ -52,7 +52,7 @@ def records(data: bytes, offset: int, kind: np.dtype[Any], count: int, what: str
 
 
 def npy_rows(data: bytes, what: str, columns: int | None = None) -> NDArray[Any]:
-    """The array of a .npy file of numpy, shape (n, columns); any number of columns if None.
+    """Return the array of a .npy file of numpy, shape (n, columns); any number of columns if None.
 
     Raises:
         InputError: If it is none, its shape is another one, or the file is too short for what its header claims.
@@ -99,7 +99,7 @@ def text_rows(data: bytes, columns: Sequence[int] | None, what: str, most: int |
 
 
 def coordinates(rows: NDArray[Any]) -> NDArray[Any]:
-    """The fields x, y and z of records as rows, shape (n, 3)."""
+    """Return the fields x, y and z of records as rows, shape (n, 3)."""
     kind = np.float64 if any(rows.dtype[axis].itemsize > 4 for axis in AXES) else np.float32
     points = np.empty((len(rows), len(AXES)), dtype=kind)
     for k, axis in enumerate(AXES):
@@ -108,7 +108,7 @@ def coordinates(rows: NDArray[Any]) -> NDArray[Any]:
 
 
 def ply_points(data: bytes, what: str) -> NDArray[Any]:
-    """Points of a PLY file, shape (n, 3).
+    """Return points of a PLY file, shape (n, 3).
 
     Raises:
         InputError: If it is none, or has no points; one line.
@@ -158,7 +158,7 @@ def _vertex(lines: list[list[str]], what: str) -> tuple[list[list[str]], str]:
 
 
 def pcd_points(data: bytes, what: str) -> NDArray[Any]:
-    """Points of a PCD file, shape (n, 3).
+    """Return points of a PCD file, shape (n, 3).
 
     Raises:
         InputError: If it is none, or has no points; one line.
@@ -191,7 +191,7 @@ def pcd_points(data: bytes, what: str) -> NDArray[Any]:
 
 
 def _record(header: dict[str, list[str]], names: list[str], what: str) -> np.dtype[Any]:
-    """The type of one point."""
+    """Return the type of one point."""
     sizes = header.get("SIZE", [])
     kinds = header.get("TYPE", [])
     counts = header.get("COUNT", ["1"] * len(names))
@@ -213,7 +213,7 @@ def _record(header: dict[str, list[str]], names: list[str], what: str) -> np.dty
 
 
 def _columns(body: bytes, kind: np.dtype[Any], count: int, what: str) -> NDArray[Any]:
-    """The points of compressed data: all x, then all y, ..."""
+    """Return the points of compressed data: all x, then all y, ..."""
     if len(body) < 8:
         raise InputError(f"{what}: the compressed points are missing; save it again")
     packed, size = (int.from_bytes(body[k : k + 4], "little") for k in (0, 4))

@@ -101,7 +101,7 @@ def tag(key: str) -> str:
 
 
 def exactly_one(section: BaseModel, keys: Iterable[str], what: str) -> str:
-    """The only one of ``keys`` that has a value in a validated section.
+    """Return the only one of ``keys`` that has a value in a validated section.
 
     Raises:
         PydanticCustomError: If none or several have one.
@@ -134,7 +134,7 @@ def parse(document: YamlDocument, model: type[Model], data: object = None) -> Mo
 
 
 def without_null(schema: dict[str, Any]) -> dict[str, Any]:
-    """A JSON schema in which an absent key is absent, never null (pydantic writes ``anyOf: [.., null]``)."""
+    """Return a JSON schema in which an absent key is absent, never null (pydantic writes ``anyOf: [.., null]``)."""
     cleaned: dict[str, Any] = {k: _without_null(v) for k, v in schema.items() if not (k == "default" and v is None)}
     choices = [choice for choice in cleaned.get("anyOf", ()) if choice != {"type": "null"}]
     if len(choices) == 1:

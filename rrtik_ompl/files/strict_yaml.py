@@ -81,7 +81,7 @@ class Group:
         return len(self.value) if type(self.value) is list else self.key
 
     def located(self, location: Location = ()) -> Iterator[tuple[Location, int]]:
-        """Each location in the group and its line."""
+        """Yield each location in the group and its line."""
         for place, line in self.lines.items():
             yield (*location, place), line
         for place, group in self.groups.items():
@@ -172,7 +172,7 @@ class Builder:
         self._add(*self._anchors[event.anchor], None, event)
 
     def _place(self, parent: Group, event: yaml.Event) -> str | int:
-        """Where the next value of a group belongs."""
+        """Return where the next value of a group belongs."""
         if (place := parent.place) is None:
             raise self._error(event, "a key must be a word, found a list or a group")
         return place
@@ -245,7 +245,7 @@ class YamlDocument:
         return f"{where}: {key_path(location)}" if location else where
 
     def error(self, location: Location, message: str) -> InputError:
-        """An error about the value at a location."""
+        """Return an error about the value at a location."""
         return InputError(f"{self.place(location)}: {message}")
 
     @contextmanager

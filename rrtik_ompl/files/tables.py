@@ -42,7 +42,7 @@ def _from_table(text: str, separator: str | None) -> dict[str, Any]:
 
 
 def json_object(text: str, kind: str, key: str) -> dict[str, Any]:
-    """The JSON object of a file of version 1 and of this kind, that has this key; names and units are checked.
+    """Return the JSON object of a file of version 1 and of this kind, that has this key; names and units are checked.
 
     Raises:
         InputError: If the text is something else; the message names the line or the key.
@@ -95,7 +95,7 @@ def _check_heads(document: dict[str, Any], kind: str) -> None:
 
 
 def table_rows(text: str, separator: str | None) -> tuple[list[str] | None, list[list[float]]]:
-    """Names (if there is a separator, then they are in the first line) and numbers of a table.
+    """Return names (if there is a separator, then they are in the first line) and numbers of a table.
 
     Raises:
         InputError: If a line is malformed; the message names it.

@@ -56,7 +56,7 @@ def read_bytes(path: str | os.PathLike[str], limit: int = MAX_BYTES) -> bytes:
 
 
 def _similar(path: Path) -> str:
-    """A hint at a file of nearly the same name in the same folder."""
+    """Return a hint at a file of nearly the same name in the same folder."""
     try:
         near = get_close_matches(path.name, os.listdir(path.parent), n=1, cutoff=0.8)
     except (OSError, ValueError):
@@ -199,7 +199,7 @@ def check_target(path: Path | None, endings: tuple[str, ...]) -> None:
 
 
 def file_name(path: object) -> Path:
-    """The path, if it is text or a path object (a number would be taken for an open file by the system).
+    """Return the path, if it is text or a path object (a number would be taken for an open file by the system).
 
     Raises:
         InputError: If it is something else.
@@ -210,7 +210,7 @@ def file_name(path: object) -> Path:
 
 
 def comma_numbers(text: str, option: str) -> list[float]:
-    """The numbers of an option of the command line, with commas between them, or one alone.
+    """Return the numbers of an option of the command line, with commas between them, or one alone.
 
     Raises:
         InputError: If the text is something else.
@@ -222,7 +222,7 @@ def comma_numbers(text: str, option: str) -> list[float]:
 
 
 def is_number(text: str) -> bool:
-    """Whether a text reads as a number."""
+    """Check whether a text reads as a number."""
     try:
         float(text)
     except ValueError:

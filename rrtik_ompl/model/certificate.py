@@ -147,7 +147,7 @@ def load_certificate(path: str | os.PathLike[str]) -> Certificate:
 
 
 def _inside(text: str) -> dict[str, Any]:
-    """The object of a certificate's file, or of the certificate in a path's."""
+    """Return the object of a certificate's file, or of the certificate in a path's."""
     try:
         return json_object(text, KIND, "motions")
     except InputError as error:
@@ -159,7 +159,7 @@ def _inside(text: str) -> dict[str, Any]:
 
 
 def certificate_beside(path: str | os.PathLike[str]) -> Certificate | None:
-    """The certificate that a path's file has beside its waypoints; None if it has none.
+    """Return the certificate that a path's file has beside its waypoints; None if it has none.
 
     Raises:
         InputError: If it is not sound; the message names the file and the field.
@@ -174,7 +174,7 @@ def certificate_beside(path: str | os.PathLike[str]) -> Certificate | None:
 
 
 def from_document(document: dict[str, Any]) -> Certificate:
-    """The certificate of plain data, see :meth:`Certificate.document`.
+    """Return the certificate of plain data, see :meth:`Certificate.document`.
 
     Raises:
         InputError: If a field is missing, unknown or of the wrong type or shape; the message names it.
@@ -227,7 +227,7 @@ def _entries(rows: object, where: str) -> MotionEntries:
 
 
 def _six(row: list[Any]) -> list[int]:
-    """The whole numbers of an entry, part -1 for links that are measured."""
+    """Return the whole numbers of an entry, part -1 for links that are measured."""
     return [row[0], -1, row[1], -1, *row[2:]] if len(row) == MEASURED else row[:WHOLE]
 
 

@@ -42,7 +42,7 @@ def joint_difference(robot: Robot, Q: ArrayLike, q: ArrayLike) -> NDArray[np.flo
 
 @lru_cache(maxsize=64)
 def has_continuous(robot: Robot) -> bool:
-    """Whether a joint of a robot turns without limits."""
+    """Check whether a joint of a robot turns without limits."""
     return bool(robot.continuous.any())
 
 
@@ -71,7 +71,7 @@ class JointGoal(Goal):
         return np.asarray(np.abs(joint_difference(robot, rows, self.q)).max(axis=1))
 
     def satisfied(self, robot: Robot, Q: ArrayLike) -> Mask:
-        """Which rows of Q are at the goal, shape (m,)."""
+        """Return which rows of Q are at the goal, shape (m,)."""
         return self.distance(robot, Q) <= self.tolerance
 
 
@@ -111,11 +111,11 @@ class PositionGoal(Target):
         return self.position
 
     def tightened(self, share: float) -> PositionGoal:
-        """The same point with that share of the tolerance."""
+        """Return the same point with that share of the tolerance."""
         return PositionGoal(self.position, positive(share, "share of the tolerance") * self.tolerance)
 
     def region(self) -> TaskRegion:
-        """The point in any orientation."""
+        """Return the point in any orientation."""
         everywhere = np.outer([0.0, 0.0, 0.0, 1.0, 1.0, 1.0], [-np.pi, np.pi])
         return TaskRegion(self.pose, everywhere, position_tolerance=self.tolerance)
 
@@ -161,12 +161,12 @@ class PoseGoal(Target):
         return point
 
     def tightened(self, share: float) -> PoseGoal:
-        """The same pose with that share of the tolerances."""
+        """Return the same pose with that share of the tolerances."""
         part = positive(share, "share of the tolerances")
         return PoseGoal(self.T_world_tip, part * self.position_tolerance, part * self.orientation_tolerance)
 
     def region(self) -> TaskRegion:
-        """The pose alone."""
+        """Return the pose alone."""
         return self.freed(None, NO_BOX)
 
     def freed(self, axis: FrameAxis | None, box: Vector) -> TaskRegion:
@@ -238,7 +238,7 @@ class GoalSet(TipGoal):
         return any(member.freedom is not None for member in self.members)
 
     def alone(self, number: int) -> TipGoal:
-        """One of its parts as a goal of its own: of a pose that may be turned, but not shifted, a set of one."""
+        """Return one of its parts as a goal of its own: of a pose that may be turned, but not shifted, a set of one."""
         place = self._place(number)
         member = self.members[place]
         part = self.parts[place]
@@ -262,7 +262,7 @@ class GoalSet(TipGoal):
         return np.asarray((each[..., 0] + metres_per_radian(robot) * each[..., 1]).min(axis=0))
 
     def satisfied(self, robot: Robot, Q: ArrayLike) -> Mask:
-        """Which rows of Q are at one of the parts, shape (m,)."""
+        """Return which rows of Q are at one of the parts, shape (m,)."""
         most = np.array([part.tolerances for part in self.parts])[:, None]
         return np.asarray((self.member_errors(robot, Q) <= most).all(axis=2).any(axis=0))
 
@@ -324,7 +324,7 @@ class MultiGoal(Goal):
         return f"{len(self.frames)} tips"
 
     def arms(self, robot: Robot) -> list[Robot]:
-        """The robot with each of the tips."""
+        """Return the robot with each of the tips."""
         return [arm for arm, _ in self.each(robot)]
 
     def distance(self, robot: Robot, Q: ArrayLike) -> Vector:
@@ -337,7 +337,7 @@ class MultiGoal(Goal):
         return there
 
     def each(self, robot: Robot) -> list[tuple[Robot, GoalPart]]:
-        """The goal of each tip, with the robot that has this tip."""
+        """Return the goal of each tip, with the robot that has this tip."""
         require(robot, Robot, "robot of a goal")
         return [(_with_tip(robot, frame), part) for frame, part in zip(self.frames, self.parts, strict=True)]
 
@@ -353,7 +353,7 @@ TIP_GOALS = PARTS | GoalSet
 
 @lru_cache(maxsize=64)
 def _with_tip(robot: Robot, frame: str) -> Robot:
-    """The same robot, another of its links being the one that goals refer to."""
+    """Return the same robot, another of its links being the one that goals refer to."""
     return replace(robot, tip=frame, closed_form=None)
 
 

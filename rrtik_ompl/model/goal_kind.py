@@ -63,12 +63,12 @@ class Goal:
 
     @abstractmethod
     def distance(self, robot: Robot, Q: ArrayLike) -> Vector:
-        """How far each row of Q is from the goal, shape (m,) [m, of a configuration rad or m]."""
+        """Return how far each row of Q is from the goal, shape (m,) [m, of a configuration rad or m]."""
         raise NotImplementedError
 
     @abstractmethod
     def satisfied(self, robot: Robot, Q: ArrayLike) -> Mask:
-        """Which rows of Q are at the goal, shape (m,)."""
+        """Return which rows of Q are at the goal, shape (m,)."""
         raise NotImplementedError
 
     @property
@@ -87,11 +87,11 @@ class Goal:
         return ()
 
     def arms(self, robot: Robot) -> list[Robot]:
-        """The robot with each of the tips that have a goal."""
+        """Return the robot with each of the tips that have a goal."""
         return [robot]
 
     def member_at(self, robot: Robot, q: ArrayLike) -> int | None:
-        """Which of several goals a configuration, shape (dof,), reaches, from 0; None if it has no members."""
+        """Return which of several goals a configuration, shape (dof,), reaches, from 0; None if it has no members."""
         del robot, q
         return None
 
@@ -113,7 +113,7 @@ class TipGoal(Goal):
         raise NotImplementedError
 
     def alone(self, number: int) -> TipGoal:
-        """One of its parts as a goal of its own.
+        """Return one of its parts as a goal of its own.
 
         Raises:
             InputError: If there is no part of that number.
@@ -121,7 +121,7 @@ class TipGoal(Goal):
         return self.parts[self._place(number)]
 
     def _place(self, number: int) -> int:
-        """The number of one of its parts, checked."""
+        """Return the number of one of its parts, checked."""
         place = whole_number(number, "number of a part of a goal")
         if place >= len(self.parts):
             raise InputError(f"goal: it has {len(self.parts)} parts, counted from 0, and no part {place}")
@@ -187,7 +187,7 @@ class GoalPart(TipGoal):
         return position + metres_per_radian(robot) * angle
 
     def satisfied(self, robot: Robot, Q: ArrayLike) -> Mask:
-        """Which rows of Q are at the goal, shape (m,)."""
+        """Return which rows of Q are at the goal, shape (m,)."""
         position, angle = self.errors(robot, Q)
         near, turned = self.tolerances
         return (position <= near) & (angle <= turned)
@@ -212,7 +212,7 @@ class Target(GoalPart):
 
     @abstractmethod
     def tightened(self, share: float) -> Target:
-        """The same goal with that share of its tolerances."""
+        """Return the same goal with that share of its tolerances."""
         raise NotImplementedError
 
     @property
@@ -295,7 +295,7 @@ class TaskRegion(GoalPart):
         position_tolerance: float = 1e-3,
         orientation_tolerance: float = 1e-2,
     ) -> TaskRegion:
-        """A pose that may be turned about a line of the world and moved along it: a grasp of a bar.
+        """Return a pose that may be turned about a line of the world and moved along it: a grasp of a bar.
 
         Args:
             T_world_tip: A pose of the tip at the goal.
@@ -340,7 +340,7 @@ class TaskRegion(GoalPart):
         return ranges
 
     def started_at(self, T_world_frame: PoseLike) -> TaskRegion:
-        """The region of the world that a region ``from_start`` is, for a pose of its frame at the start."""
+        """Return the region of the world that a region ``from_start`` is, for a pose of its frame at the start."""
         if not self.from_start:
             return self
         return replace(
@@ -380,7 +380,7 @@ class TaskRegion(GoalPart):
 
 
 def displacements(coordinates: Matrix) -> NDArray[np.float64]:
-    """The transforms D of rows of x, y, z [m] and roll, pitch, yaw [rad], shape (m, 6): (m, 4, 4)."""
+    """Return the transforms D of rows of x, y, z [m] and roll, pitch, yaw [rad], shape (m, 6): (m, 4, 4)."""
     D = np.zeros((len(coordinates), 4, 4))
     D[:, :3, :3] = rpy_matrices(coordinates[:, 3:])
     D[:, :3, 3] = coordinates[:, :3]
@@ -389,7 +389,7 @@ def displacements(coordinates: Matrix) -> NDArray[np.float64]:
 
 
 def _rows(values: ArrayLike, shape: tuple[int, ...], what: str) -> NDArray[np.float64]:
-    """Numbers of shape (m, *shape); those of a search need not be finite."""
+    """Return numbers of shape (m, *shape); those of a search need not be finite."""
     rows = number_rows(values, what)
     if rows.shape[1:] != shape:
         raise InputError(f"{what}: expected shape (m, {', '.join(map(str, shape))}), got {rows.shape}")
@@ -435,7 +435,7 @@ def roll_pitch_yaw(R: NDArray[np.float64]) -> Matrix:
 
 
 def _best_angle(R: NDArray[np.float64], angles: Matrix, k: int) -> Vector:
-    """The k-th angle that brings the rotation nearest to R, the other two held, shape (m,).
+    """Return the k-th angle that brings the rotation nearest to R, the other two held, shape (m,).
 
     The trace of R^T Rz Ry Rx is a cosine of each angle.
     """
@@ -455,7 +455,7 @@ def _best_angle(R: NDArray[np.float64], angles: Matrix, k: int) -> Vector:
 
 
 def into_range(angles: NDArray[np.float64], low: ArrayLike, high: ArrayLike) -> NDArray[np.float64]:
-    """The nearest of equal angles within bounds, or the nearer bound."""
+    """Return the nearest of equal angles within bounds, or the nearer bound."""
     low = np.asarray(low)
     high = np.asarray(high)
     middle = 0.5 * (low + high)

@@ -190,7 +190,7 @@ class Judge(ABC):
 
     @abstractmethod
     def violations(self, waypoints: ArrayLike, *, resolution: float | None = None) -> tuple[Violation, ...]:
-        """The first violation of each motion between waypoints, shape (k, dof), that has one."""
+        """Return the first violation of each motion between waypoints, shape (k, dof), that has one."""
 
     @abstractmethod
     def prove(
@@ -205,7 +205,7 @@ class Judge(ABC):
 
     @abstractmethod
     def has_proven(self, proof: Proof) -> bool:
-        """Whether a proof covers every motion, keeps what has to be kept here, and was made here."""
+        """Check whether a proof covers every motion, keeps what has to be kept here, and was made here."""
 
     @abstractmethod
     def judged(self, waypoints: ArrayLike) -> Judged:

@@ -111,7 +111,7 @@ class JointPath:
         return path_through(_at_zero(robot), usable_waypoints(robot.onto_limits(rows)))
 
     def with_waypoints(self, waypoints: ArrayLike) -> JointPath:
-        """The same joints, other waypoints.
+        """Return the same joints, other waypoints.
 
         Raises:
             InputError: If they are no such rows, or have not one column for each joint.
@@ -154,7 +154,7 @@ class JointPath:
         return single_joint(merge_moves(self.waypoints), SAME)
 
     def moves(self) -> tuple[Move, ...]:
-        """The list of single-joint moves that the path consists of; consecutive moves of the same joint are one.
+        """Return the list of single-joint moves that the path consists of; consecutive moves of the same joint are one.
 
         Raises:
             InputError: If an edge moves several joints at once;
@@ -200,7 +200,7 @@ class JointPath:
         return world.violations(self.waypoints, resolution=resolution)
 
     def proved(self, world: Judge, *, clearance: float | None = None, seconds: float | None = None) -> JointPath:
-        """The same path with what is proven of its motions: :meth:`rrtik_ompl.World.prove`.
+        """Return the same path with what is proven of its motions: :meth:`rrtik_ompl.World.prove`.
 
         Raises:
             InputError: If the path is another robot's, there is no world, or the clearance is negative or infinite.
@@ -210,11 +210,11 @@ class JointPath:
         return self.with_proof(world.prove(self.waypoints, clearance=clearance, seconds=seconds))
 
     def with_proof(self, proof: Proof) -> JointPath:
-        """The same path with what somebody else has proven of its motions."""
+        """Return the same path with what somebody else has proven of its motions."""
         return changed(self, proof=proof)
 
     def played(self, world: Judge | None) -> Played:
-        """The path as a picture plays it, and what is said of it there: :meth:`rrtik_ompl.World.judged`.
+        """Return the path as a picture plays it, and what is said of it there: :meth:`rrtik_ompl.World.judged`.
 
         Args:
             world: In which it is judged; None where there is none.
@@ -286,7 +286,7 @@ def path_through(path: JointPath, rows: Matrix) -> JointPath:
 
 @lru_cache(maxsize=64)
 def _at_zero(robot: Robot) -> JointPath:
-    """A path of a robot, from which its others are made."""
+    """Return a path of a robot, from which its others are made."""
     return JointPath(np.zeros((1, robot.dof)), robot.joint_names, robot.prismatic, robot.name, robot.continuous)
 
 
@@ -318,7 +318,7 @@ def load_path(path: str | os.PathLike[str], robot: Robot | None = None) -> Joint
 
 
 def fitted(path: JointPath, robot: Robot) -> JointPath:
-    """A path as one of a robot, onto whose limits it is put.
+    """Return a path as one of a robot, onto whose limits it is put.
 
     Raises:
         InputError: If it moves other joints, or names them in another order; names that nobody gave do not count.

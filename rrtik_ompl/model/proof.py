@@ -97,7 +97,7 @@ class Proof:
 
 
 def certificate_by(proof: Proof | None, waypoints: Matrix) -> Certificate:
-    """The certificate of a path, waypoints of shape (k, dof), for what is proven of it already.
+    """Return the certificate of a path, waypoints of shape (k, dof), for what is proven of it already.
 
     Raises:
         InputError: If that does not cover the path or was made by another process, or the scene has a cloud.

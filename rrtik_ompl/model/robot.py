@@ -51,7 +51,7 @@ class Chain:
     __reduce__ = as_value
 
     def joint_values(self, rows: Matrix) -> Matrix:
-        """Values of every joint, mimic joints resolved, for configurations, shape (m, dof). Shape (m, n)."""
+        """Return values of every joint, mimic joints resolved, for configurations, shape (m, dof). Shape (m, n)."""
         return np.asarray(rows @ self.gain.T + self.offset)
 
     def joint_frames(self, rows: Matrix) -> NDArray[np.float64]:
@@ -64,7 +64,7 @@ class Chain:
         return frames
 
     def whole_turns(self) -> Mask:
-        """Which actuated joints, shape (dof,), leave every link where it was if they turn by a whole turn."""
+        """Return which actuated joints, shape (dof,), leave every link where it was if they turn by a whole turn."""
         turning = ~self.prismatic[:, None] & (self.gain == np.rint(self.gain))
         return np.asarray((turning | (self.gain == 0.0)).all(axis=0))
 
@@ -174,7 +174,7 @@ class Robot:
         return self.postures[name]
 
     def within_limits(self, Q: ArrayLike, tolerance: float = LIMIT_TOLERANCE) -> Mask:
-        """Which of the configurations Q, shape (m, dof), lie inside the limits. Shape (m,)."""
+        """Return which of the configurations Q, shape (m, dof), lie inside the limits. Shape (m,)."""
         return inside_limits(self, self._rows(Q), finite_number(tolerance, "tolerance of limits"))
 
     def finite_range(self) -> tuple[Vector, Vector]:
@@ -261,7 +261,7 @@ class Robot:
         return poses_and_jacobians(self, rows, frame)
 
     def _rows(self, Q: ArrayLike) -> Matrix:
-        """One configuration or several as rows, shape (m, dof)."""
+        """Return one configuration or several as rows, shape (m, dof)."""
         rows = number_rows(Q, f"configurations of robot '{self.name}'")
         if rows.ndim != 2 or rows.shape[1] != self.dof:
             raise InputError(f"configurations of robot '{self.name}': expected shape (m, {self.dof}), got {rows.shape}")

@@ -47,7 +47,7 @@ class ConstantVelocity:
         raise InputError(f"motion: at {time:g} s an obstacle of velocity {self.velocity.tolist()} m/s is far away")
 
     def seen_from(self, time: float) -> ConstantVelocity:
-        """The same motion with ``time`` [s] as its time 0."""
+        """Return the same motion with ``time`` [s] as its time 0."""
         del time
         return self
 
@@ -91,7 +91,7 @@ class TimedPoses:
         return pin.SE3(rotation, (1.0 - share) * a.translation + share * b.translation)
 
     def seen_from(self, time: float) -> TimedPoses:
-        """The same motion with ``time`` [s] as its time 0."""
+        """Return the same motion with ``time`` [s] as its time 0."""
         return changed(self, times=frozen(self.times - time))
 
 
@@ -155,7 +155,7 @@ class AttachedObject:
 
 
 def _checked_solid(name: object, shape: object, pose: object) -> pin.SE3:
-    """The pose of an obstacle or attached object, if all three are what they have to be.
+    """Return the pose of an obstacle or attached object, if all three are what they have to be.
 
     A pose that is not finite would compare as farther away than anything, and what is there would not be seen.
     """
@@ -276,7 +276,7 @@ class Scene:
         return (*(o.name for o in self.obstacles), *(o.name for o in self.attached))
 
     def obstacle(self, name: str) -> Obstacle:
-        """The obstacle of that name.
+        """Return the obstacle of that name.
 
         Raises:
             UnknownNameError: If there is none.
@@ -288,7 +288,7 @@ class Scene:
         raise UnknownNameError("obstacle", name, (o.name for o in self.obstacles))
 
     def with_(self, *obstacles: Obstacle) -> Scene:
-        """The scene with further obstacles.
+        """Return the scene with further obstacles.
 
         Raises:
             InputError: If one is none, or its name is used already.
@@ -296,7 +296,7 @@ class Scene:
         return replace(self, obstacles=(*self.obstacles, *obstacles))
 
     def without(self, *names: str) -> Scene:
-        """The scene without some of its obstacles and attached objects, and without the pairs that name them.
+        """Return the scene without some of its obstacles and attached objects, and without the pairs that name them.
 
         Raises:
             UnknownNameError: If there is none of that name.
@@ -321,7 +321,7 @@ class Scene:
         pose: ArrayLike | pin.SE3 | None = None,
         padding: float | None = None,
     ) -> Scene:
-        """The scene in which an obstacle has become an attached object; pairs that may touch still may.
+        """Return the scene in which an obstacle has become an attached object; pairs that may touch still may.
 
         It keeps its margin; a motion that it had ends. What ``allow`` names may touch it until it is set down: a scene
         knows no posture of the arm, so that it cannot say how deep. :class:`rrtik_ompl.Task` can, and does.
@@ -350,7 +350,7 @@ class Scene:
         return Scene(rest.obstacles, attached, self.allowed_collisions, self.contacts)
 
     def detaching(self, name: str, pose: ArrayLike | pin.SE3) -> Scene:
-        """The scene in which an attached object is an obstacle at T_world_object.
+        """Return the scene in which an attached object is an obstacle at T_world_object.
 
         Its margin is the obstacle's. What was for the grasp ends with it: padding, what it was allowed to touch, and
         contacts of what was held.
@@ -386,12 +386,12 @@ class Scene:
 
 
 def pose_at(obstacle: Obstacle, time: float) -> pin.SE3:
-    """Where an obstacle is at a time [s]: by the motion that it states, if it states one."""
+    """Return where an obstacle is at a time [s]: by the motion that it states, if it states one."""
     return obstacle.pose if obstacle.motion is None else obstacle.motion.pose_at(obstacle.pose, time)
 
 
 def pairs_that_may_touch(scene: Scene) -> frozenset[tuple[frozenset[str], float | None]]:
-    """The pairs of names that a scene allows to touch, and how near those in contact may come [m]."""
+    """Return the pairs of names that a scene allows to touch, and how near those in contact may come [m]."""
     allowed = ((frozenset(pair), None) for pair in scene.allowed_collisions)
     return frozenset([*allowed, *((each.pair, each.distance) for each in scene.contacts)])
 

@@ -85,13 +85,13 @@ def merge_moves(waypoints: ArrayLike, tolerance: float = SAME) -> Matrix:
 
 
 def without_repeats(route: Matrix) -> Matrix:
-    """The route without waypoints that repeat the one before, shape (k, n); both ends stay."""
+    """Return the route without waypoints that repeat the one before, shape (k, n); both ends stay."""
     distinct: Matrix = route[np.append(True, (np.diff(route, axis=0) != 0.0).any(axis=1))]
     return distinct
 
 
 def transitions(waypoints: ArrayLike, tolerance: float = SAME) -> int:
-    """Number of moves of a route, shape (k, n): its edges after :func:`merge_moves`.
+    """Return the number of moves of a route, shape (k, n): its edges after :func:`merge_moves`.
 
     An edge that moves several joints at once counts as one; :func:`single_joint` tells whether there is such an edge.
     """
@@ -99,7 +99,7 @@ def transitions(waypoints: ArrayLike, tolerance: float = SAME) -> int:
 
 
 def single_joint(waypoints: ArrayLike, tolerance: float = 0.0) -> bool:
-    """Whether every edge of the route, shape (k, n), moves exactly one joint."""
+    """Check whether every edge of the route, shape (k, n), moves exactly one joint."""
     rows = _rows(waypoints)
     return bool((moved(rows[:-1], rows[1:], tolerance).sum(axis=1) == 1).all())
 
@@ -116,13 +116,13 @@ def length_of(rows: Matrix) -> float:
 
 
 def _same_joint(a: list[float], b: list[float], c: list[float], tolerance: float) -> bool:
-    """Whether a -> b and b -> c move one and the same joint."""
+    """Check whether a -> b and b -> c move one and the same joint."""
     first = _moved_joints(a, b, tolerance)
     return len(first) == 1 and first == _moved_joints(b, c, tolerance)
 
 
 def _moved_joints(a: list[float], b: list[float], tolerance: float) -> list[int]:
-    """Numbers of the joints that differ by more than the tolerance."""
+    """Return numbers of the joints that differ by more than the tolerance."""
     return [joint for joint, (x, y) in enumerate(zip(a, b, strict=True)) if abs(x - y) > tolerance]
 
 
@@ -135,7 +135,7 @@ def _rows(waypoints: ArrayLike) -> Matrix:
 
 
 def edge_keys(route: Matrix) -> list[tuple[bytes, bytes]]:
-    """The edges of a route as keys."""
+    """Return the edges of a route as keys."""
     return list(pairwise(row.tobytes() for row in route))
 
 
@@ -153,7 +153,7 @@ def part_counts(rows: Matrix, step: float) -> Vector:
 
 
 def in_parts(counts: Vector, at_once: int) -> list[NDArray[np.int64]]:
-    """Numbers of the edges with so many checks each, shape (k,), in parts of about ``at_once`` checks."""
+    """Return numbers of the edges with so many checks each, shape (k,), in parts of about ``at_once`` checks."""
     edges = np.arange(len(counts), dtype=np.int64)
     return np.split(edges, np.flatnonzero(np.diff(counts.cumsum() // at_once)) + 1)
 

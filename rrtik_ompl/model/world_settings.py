@@ -147,7 +147,7 @@ class WorldSettings:
         return ", ".join([self.robot.name, str(self.scene), *self.unusual()])
 
     def unusual(self) -> Iterator[str]:
-        """Each setting beside robot and scene that is not the default, as ``name=value``."""
+        """Yield each setting beside robot and scene that is not the default, as ``name=value``."""
         for each in fields(self):
             value = getattr(self, each.name)
             if each.default is MISSING or value == each.default:

@@ -54,7 +54,7 @@ class ArmCache:
         return (*self.covers, *(spheres_of_key[key] for key in keys))
 
     def pack(self, bodies: Sequence[Body], pairs: Pairs, covers: Sequence[Spheres], *, share: bool = True) -> FastWorld:
-        """The tables of a world.
+        """Return the tables of a world.
 
         Args:
             bodies: Those of the robot's links first.
@@ -79,7 +79,7 @@ class ArmCache:
 
 @lru_cache(maxsize=MAX_ROBOTS)
 def arm_cache(robot: Robot) -> ArmCache:
-    """The cache of a robot; ``arm_cache.cache_clear()`` forgets all of them."""
+    """Return the cache of a robot; ``arm_cache.cache_clear()`` forgets all of them."""
     return ArmCache(robot)
 
 

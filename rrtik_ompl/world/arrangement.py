@@ -81,7 +81,7 @@ class Arrangement:
         return Containment(self.bodies.as_tuple, self.checked, [outer for outer, _ in self.covers()])
 
     def moved(self, name: str, pose: ArrayLike | pin.SE3) -> tuple[Arrangement, tuple[int, ...]]:
-        """The arrangement with an obstacle elsewhere.
+        """Return the arrangement with an obstacle elsewhere.
 
         Returns:
             That arrangement, and the numbers of the obstacle's bodies.
@@ -112,7 +112,7 @@ class Arrangement:
         return other, tuple(placements)
 
     def with_clearance(self, clearance: float) -> Items[Body]:
-        """The bodies, with a clearance [m] added to the margins of obstacles."""
+        """Return the bodies, with a clearance [m] added to the margins of obstacles."""
         if clearance == 0.0:
             return self.bodies
         return Items(
@@ -124,12 +124,12 @@ class Arrangement:
 
 
 def arrangement_of(settings: WorldSettings) -> Arrangement:
-    """The solids of a world of some settings; see :func:`arranged`."""
+    """Return the solids of a world of some settings; see :func:`arranged`."""
     return arranged(settings.robot, settings.scene, settings.self_margin)
 
 
 def arranged(robot: Robot, scene: Scene, self_margin: float) -> Arrangement:
-    """The solids of a robot in a scene.
+    """Return the solids of a robot in a scene.
 
     Raises:
         InputError: If the scene does not fit the robot.
@@ -177,7 +177,7 @@ class Numbers:
 
     @classmethod
     def of(cls, obstacles: Sequence[Obstacle], bodies: Sequence[Body], standing: Pairs) -> Numbers:
-        """Those of a scene."""
+        """Return those of a scene."""
         body_numbers: dict[str, list[int]] = {}
         for k, body in enumerate(bodies):
             if body.kind == "obstacle":
@@ -191,7 +191,7 @@ class Numbers:
         return cls({each.name: k for k, each in enumerate(obstacles)}, body_numbers, pairs_of_body)
 
     def placements(self, obstacle: Obstacle) -> dict[int, pin.SE3]:
-        """Where the bodies of an obstacle are, by their numbers."""
+        """Return where the bodies of an obstacle are, by their numbers."""
         pose = pose_at(obstacle, 0.0)
         return {
             number: pose * part.placement

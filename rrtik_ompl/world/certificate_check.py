@@ -145,7 +145,7 @@ class Solid:
             self.ball_radius = self.largest_length(lambda points: points - self.ball_centre)
 
     def largest_length(self, mapping: Callable[[Matrix], Matrix]) -> float:
-        """The largest length [m] of what a mapping, (n, 3) -> (n, 3), makes of a point; it may stretch none."""
+        """Return the largest length [m] of what a mapping, (n, 3) -> (n, 3), makes of a point; it may stretch none."""
         lengths = [
             float(np.linalg.norm(mapping(part.corners), axis=1).max()) + part.disc + part.radius for part in self.parts
         ]
@@ -219,7 +219,7 @@ class Motions:
         return range(len(parts))
 
     def _bounds(self, number: int, base: int) -> Matrix:
-        """Bounds of how fast a body's points move as seen from a frame, and of their acceleration.
+        """Return bounds of how fast a body's points move as seen from a frame, and of their acceleration.
 
         Args:
             number: Of the body.
@@ -261,7 +261,7 @@ class Motions:
         return np.array([velocity, acceleration])
 
     def _frames(self, motion: Numbers, share: Vector) -> Poses:
-        """Frames of all joints, the world first, at places of motions.
+        """Return frames of all joints, the world first, at places of motions.
 
         Args:
             motion: Numbers of the motions, shape (n,).
@@ -414,7 +414,7 @@ class Motions:
         return f"motion {entry.motion + 1}: {pair} {what} {entry.begin:g} to {entry.begin + entry.width:g} of it"
 
     def fault(self, motions: tuple[MotionEntries, ...]) -> str:
-        """The first thing that entries do not show; "" if they show all pairs apart in all of the motions."""
+        """Return the first thing that entries do not show; "" if they show all pairs apart in all of the motions."""
         pair_numbers = {pair: k for k, pair in enumerate(self.pairs)}
         entries = list[Entry]()
         for number, motion in enumerate(motions):
@@ -447,13 +447,13 @@ class Motions:
         return self._fault_of(of_parts[open_parts[0]], "are not shown apart from") if open_parts else ""
 
     def _parts_of(self, entry: Entry) -> list[Entry]:
-        """All parts of one body of a pair with all parts of the other, on all of a motion."""
+        """Return all parts of one body of a pair with all parts of the other, on all of a motion."""
         i, j = self.pairs[entry.pair]
         return [self._on_all_of(entry.motion, entry.pair, a, b) for a, b in product(self.parts[i], self.parts[j])]
 
 
 def _common_joint(chain: Chain, first: int, second: int) -> int:
-    """The last frame that carries both of two frames."""
+    """Return the last frame that carries both of two frames."""
     while first != second:  # parents have smaller numbers
         first, second = min(first, second), int(chain.parent[max(first, second) - 1]) + 1
     return first

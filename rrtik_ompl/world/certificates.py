@@ -24,7 +24,7 @@ class HasWaypoints(Protocol):
 
 
 def certificate_of(world: World, path: HasWaypoints | ArrayLike, clearance: float = 0.0) -> Certificate | None:
-    """A certificate of a path; None if not every motion of it is proven free.
+    """Return a certificate of a path; None if not every motion of it is proven free.
 
     Args:
         world: The world.
@@ -49,7 +49,7 @@ def certificate_of(world: World, path: HasWaypoints | ArrayLike, clearance: floa
 
 
 def verify_certificate(certificate: Certificate, world: World, waypoints: ArrayLike, *, clearance: float = 0.0) -> str:
-    """The first fault of a certificate in one line; "" if it proves that a path is free.
+    """Return the first fault of a certificate in one line; "" if it proves that a path is free.
 
     Args:
         certificate: The certificate; nothing in it is believed.

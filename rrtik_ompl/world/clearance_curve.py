@@ -38,12 +38,12 @@ class Course:
 
 
 def clearance_along(checks: RowChecks, waypoints: Matrix) -> ClearanceCurve:
-    """The curve of a path, waypoints of shape (k, dof), at places spread evenly over how far the arm moves."""
+    """Return the curve of a path, waypoints of shape (k, dof), at places spread evenly over how far the arm moves."""
     return clearance_on(checks, course_along(checks, waypoints))
 
 
 def course_along(checks: RowChecks, waypoints: Matrix) -> Course:
-    """A path, waypoints of shape (k, dof), as a course; a single one is a motion that stands still."""
+    """Return a path, waypoints of shape (k, dof), as a course; a single one is a motion that stands still."""
     rows = np.vstack([waypoints, waypoints]) if len(waypoints) == 1 else waypoints
     motions, shares, _ = places_along(checks, rows)
 
@@ -55,7 +55,7 @@ def course_along(checks: RowChecks, waypoints: Matrix) -> Course:
 
 
 def clearance_on(checks: RowChecks, course: Course) -> ClearanceCurve:
-    """The curve of a course.
+    """Return the curve of a course.
 
     The least distance is that of the whole course, as far as it is proven free, and not of the places alone: proofs
     with larger clearances name the places at which these are not kept, and so does the one without.
@@ -140,7 +140,7 @@ def distances_at(checks: RowChecks, places: Matrix) -> Vector:
 
 
 def _between(rows: Matrix, motions: NDArray[np.int64], shares: Vector) -> Matrix:
-    """Configurations on the motions between waypoints, shape (m, dof)."""
+    """Return configurations on the motions between waypoints, shape (m, dof)."""
     configurations: Matrix = (1.0 - shares)[:, None] * rows[motions] + shares[:, None] * rows[motions + 1]
     return configurations
 

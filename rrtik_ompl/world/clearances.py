@@ -82,7 +82,7 @@ def possible_clearance(world: World, clearance: float | None, rows: Matrix) -> f
 
 
 def keeping(world: World, clearance: float, *, proven: float | None = None) -> World:
-    """The same world for searches that keep a distance: what it keeps itself, or more.
+    """Return the same world for searches that keep a distance: what it keeps itself, or more.
 
     Args:
         world: The world, which may keep a clearance of its own.
@@ -97,7 +97,7 @@ def keeping(world: World, clearance: float, *, proven: float | None = None) -> W
 
 
 def search_form(world: World, clearances: Clearances) -> World:
-    """The same world for searches: motions keep more than what is to be kept, at points that lie close enough.
+    """Return the same world for searches: motions keep more than what is to be kept, at points that lie close enough.
 
     No point of the arm moves between two of them farther than twice what searches keep beyond what is to be
     proven, so that what is thin is not stepped over: in between, too, obstacles are that far away [16].
@@ -174,7 +174,7 @@ def proved_as_clear(path: JointPath, world: World, clearance: float) -> JointPat
 
 
 def _largest_clearance(world: World, q: Matrix, refused: float) -> float:
-    """The largest clearance that a configuration keeps [m], below one that it does not."""
+    """Return the largest clearance that a configuration keeps [m], below one that it does not."""
     low = 0.0
     high = refused
     for _ in range(BISECTIONS):

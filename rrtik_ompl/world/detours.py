@@ -71,7 +71,7 @@ class Repair(NamedTuple):
 
 
 def _repaired(world: World, rows: Matrix, motion: int, clearance: float, rng: np.random.Generator) -> Repair | None:
-    """The route with a detour around one of its motions, or around a stretch with that in the middle."""
+    """Return the route with a detour around one of its motions, or around a stretch with that in the middle."""
     for more in range(WIDER):
         first = max(motion - more, 0)
         last = min(motion + 1 + more, len(rows) - 1)
@@ -124,7 +124,7 @@ def _waypoints_around(world: World, stretch: Matrix, clearance: float, rng: np.r
 
 
 def _points_near(world: World, stretch: Matrix, size: float, rng: np.random.Generator) -> Matrix:
-    """Random points within the limits, about ``size`` from places spread over a stretch, shape (POINTS, dof)."""
+    """Return random points within the limits, about ``size`` from places spread over a stretch, shape (POINTS, dof)."""
     places = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(stretch, axis=0), axis=1)))
     lengths_along = places[-1] * rng.uniform(0.0, 1.0, POINTS)
     points_on = np.stack([np.interp(lengths_along, places, column) for column in stretch.T], axis=1)

@@ -65,7 +65,7 @@ class ExactChecker:
         return self.tables.get(self._packed)
 
     def for_thread(self) -> ExactChecker:
-        """The same checker for another thread."""
+        """Return the same checker for another thread."""
         tables = self.tables.for_thread(self._packed)
         return replace(self, tables=tables, motions={}, _data=self.solids.robot.model.createData())
 
@@ -109,7 +109,7 @@ class ExactChecker:
         return Prover(self._robot, self.bodies, self.solids.in_contact)
 
     def free(self, rows: Matrix, *, exact: bool = True) -> Mask:
-        """Which rows, shape (m, dof), are free of collision. Shape (m,).
+        """Return which rows, shape (m, dof), are free of collision. Shape (m,).
 
         Without ``exact`` nothing falls back to coal: what kernels leave undecided then counts as colliding.
         """
@@ -146,7 +146,7 @@ class ExactChecker:
         exact: bool = True,
         to_be_proven: bool = False,
     ) -> Mask:
-        """Which straight motions, shape (m, dof), are free at all k / steps, k = 0..steps. Shape (m,).
+        """Return which straight motions, shape (m, dof), are free at all k / steps, k = 0..steps. Shape (m,).
 
         ``exact`` as in :meth:`free`. Of those that have to be proven too, what the kernels leave undecided counts as
         free: coal takes longer to say so than a proof, which settles it.
@@ -166,7 +166,7 @@ class ExactChecker:
         return free
 
     def _motion_free_by_coal(self, start: Vector, end: Vector, steps: int) -> bool:
-        """Whether a motion that the kernels leave undecided is free, by coal.
+        """Check whether a motion that the kernels leave undecided is free, by coal.
 
         Two bodies that are some distance apart at one of the motion's configurations cannot touch at its neighbours,
         where their distance is therefore not computed.
@@ -198,7 +198,7 @@ class ExactChecker:
         return True
 
     def _gaps(self, configuration: Vector, pairs: list[tuple[int, int]]) -> list[float] | None:
-        """Lower bounds of how far pairs of bodies are from touching [m], or None if two of them touch, by coal.
+        """Return lower bounds of how far pairs of bodies are from touching [m], or None if two of them touch, by coal.
 
         Bodies touch that do not keep their margin.
 
@@ -260,7 +260,7 @@ def distance(
 
 
 def one_way(starts: Matrix, ends: Matrix) -> tuple[Matrix, Matrix]:
-    """Motions turned so that both directions of one are the same to the bit: the lexically smaller end first."""
+    """Return motions turned so that both directions of one are the same to the bit: the lexically smaller end first."""
     first_difference = (starts != ends).argmax(axis=1)[:, None]
     first_of_starts = np.take_along_axis(starts, first_difference, axis=1)
     is_turned = first_of_starts > np.take_along_axis(ends, first_difference, axis=1)

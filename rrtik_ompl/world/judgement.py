@@ -27,7 +27,7 @@ Fault: TypeAlias = tuple[int, float, str]  # the piece, where on it, and what is
 
 
 def judged_path(checks: RowChecks, rows: Matrix) -> Judged:
-    """The verdict on a path, waypoints of shape (k, dof); if it is a single one, on the posture."""
+    """Return the verdict on a path, waypoints of shape (k, dof); if it is a single one, on the posture."""
     course = course_along(checks, rows)
     judged, faults = judged_course(checks, course, partial(_faults_of_path, checks, rows))
 
@@ -94,7 +94,7 @@ def _configurations(course: Course, at: Vector) -> Matrix:
 
 
 def with_reason(verdict: Verdict, scene: Scene, faults: list[str], *, checked: bool) -> Verdict:
-    """A verdict that says too what the first fault is, and of which world that is said.
+    """Return a verdict that says too what the first fault is, and of which world that is said.
 
     Args:
         verdict: Without these.
@@ -109,7 +109,7 @@ def with_reason(verdict: Verdict, scene: Scene, faults: list[str], *, checked: b
 
 
 def _faults_of_path(checks: RowChecks, rows: Matrix) -> list[Fault]:
-    """The first violation of each motion of a path."""
+    """Return the first violation of each motion of a path."""
     rows = np.vstack([rows, rows]) if len(rows) == 1 else rows
     faults = []
     for each in route_violations(checks, rows, verification_resolution(checks.settings)):
@@ -120,7 +120,7 @@ def _faults_of_path(checks: RowChecks, rows: Matrix) -> list[Fault]:
 
 
 def contacts_along(checks: RowChecks, waypoints: Matrix) -> tuple[PathContact, ...]:
-    """The contacts of a path, waypoints of shape (k, dof), at places spread evenly over how far the arm moves.
+    """Return the contacts of a path, waypoints of shape (k, dof), at places spread evenly over how far the arm moves.
 
     A contact that is shorter than the way between two places can be missed: this shows what is wrong with a path, and
     is no check of it.
@@ -130,7 +130,7 @@ def contacts_along(checks: RowChecks, waypoints: Matrix) -> tuple[PathContact, .
 
 
 def contacts_at(checks: RowChecks, at: Vector, places: Matrix) -> tuple[PathContact, ...]:
-    """The contacts at configurations, shape (m, dof), that stand at places, shape (m,), in their order."""
+    """Return the contacts at configurations, shape (m, dof), that stand at places, shape (m,), in their order."""
     blocked = np.flatnonzero(~checks.free(places))
     contacts_of_place = {int(k): found for k in blocked if (found := checks.contacts(places[k]))}
     names_of_place = {

@@ -40,20 +40,20 @@ class MotionQueries(Protocol):
     """
 
     def valid(self, q: Vector) -> bool:
-        """Whether q, shape (n,), is free."""
+        """Check whether q, shape (n,), is free."""
         return bool(self.valid_batch(q[None])[0])
 
     def valid_batch(self, Q: Matrix) -> Mask:
-        """Which configurations Q, shape (m, n), are free, shape (m,)."""
+        """Return which configurations Q, shape (m, n), are free, shape (m,)."""
         return self.motion_valid_batch(Q, Q)
 
     def motion_valid(self, a: Vector, b: Vector) -> bool:
-        """Whether the straight motion from a to b, shapes (n,), is free."""
+        """Check whether the straight motion from a to b, shapes (n,), is free."""
         return bool(self.motion_valid_batch(a[None], b[None])[0])
 
     @abstractmethod
     def motion_valid_batch(self, A: Matrix, B: Matrix) -> Mask:
-        """Which straight motions A[k] -> B[k], shapes (m, n), are free, shape (m,)."""
+        """Return which straight motions A[k] -> B[k], shapes (m, n), are free, shape (m,)."""
 
 
 class KernelWorld(MotionQueries, Protocol):
@@ -101,12 +101,12 @@ class HoldingQueries(MotionQueries, Protocol):
 
 
 def kernel_tables(world: object) -> FastWorld | None:
-    """The tables that kernels read of a world, or None where it has none."""
+    """Return the tables that kernels read of a world, or None where it has none."""
     return getattr(world, "fast", None)
 
 
 def has_kernels(world: object, *libraries: str, within: Matrix | None = None) -> TypeGuard[KernelWorld]:
-    """Whether searches can run in kernels in a world.
+    """Check whether searches can run in kernels in a world.
 
     Args:
         world: A world, a stand-in, or None.
@@ -150,12 +150,12 @@ def _none_free(starts: Matrix, ends: Matrix) -> Mask:
 
 
 def keeps_constraints(world: object) -> TypeGuard[HoldingQueries]:
-    """Whether motions in a world also have to keep path constraints."""
+    """Check whether motions in a world also have to keep path constraints."""
     return getattr(world, "constraints", None) is not None
 
 
 def turning_joints(world: object) -> Mask | None:
-    """Which joints of a world's arm turn, shape (n,); None for a stand-in without an arm, or no world."""
+    """Return which joints of a world's arm turn, shape (n,); None for a stand-in without an arm, or no world."""
     robot = getattr(world, "robot", None)
     return ~robot.prismatic if isinstance(robot, Robot) else None
 
@@ -181,7 +181,7 @@ class BatchedMotionQueries:
         self.stop = stop
 
     def __call__(self, tails: Matrix, heads: Matrix) -> Mask:
-        """Which motions are free, shapes (m, n) and (m,).
+        """Return which motions are free, shapes (m, n) and (m,).
 
         Raises:
             OutOfTime: If it is time to stop.
@@ -189,7 +189,7 @@ class BatchedMotionQueries:
         return self._answers(tails, heads, self.stop)
 
     def to_the_end(self, tails: Matrix, heads: Matrix) -> Mask:
-        """Which motions are free, shapes (m, n) and (m,), even when it is time to stop."""
+        """Return which motions are free, shapes (m, n) and (m,), even when it is time to stop."""
         return self._answers(tails, heads, no_stop)
 
     def _answers(self, tails: Matrix, heads: Matrix, stop: Stop) -> Mask:
@@ -213,7 +213,7 @@ class BatchedMotionQueries:
         return np.concatenate(parts)
 
     def in_time(self, tails: Matrix, heads: Matrix) -> Mask:
-        """Which motions are free, shapes (m, n) and (m,); none when it is time to stop."""
+        """Return which motions are free, shapes (m, n) and (m,); none when it is time to stop."""
         with suppress(OutOfTime):
             return self(tails, heads)
         return np.zeros(len(tails), dtype=bool)

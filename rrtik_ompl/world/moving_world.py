@@ -157,21 +157,21 @@ class MovingWorld:
         return self._fast.clearance(self.robot.chain.joint_values(Q)).lower
 
     def valid(self, q: Vector) -> bool:
-        """Whether q, shape (dof,), is free."""
+        """Check whether q, shape (dof,), is free."""
         return bool(self.valid_batch(q[None])[0])
 
     def valid_batch(self, Q: Matrix) -> Mask:
-        """Which rows of Q, shape (m, dof), are free. Shape (m,)."""
+        """Return which rows of Q, shape (m, dof), are free. Shape (m,)."""
         self.checked += len(Q)
         free: Mask = self._fast.classify(self.robot.chain.joint_values(Q), resolve=False) == FREE
         return free & inside_limits(self.robot, Q) & (not self.blocked)
 
     def motion_valid(self, a: Vector, b: Vector) -> bool:
-        """Whether the straight motion from a to b, shapes (dof,), is free."""
+        """Check whether the straight motion from a to b, shapes (dof,), is free."""
         return bool(self.motion_valid_batch(a[None], b[None])[0])
 
     def motion_valid_batch(self, A: Matrix, B: Matrix) -> Mask:
-        """Which straight motions A[k] -> B[k], shapes (m, dof), are free. Shape (m,)."""
+        """Return which straight motions A[k] -> B[k], shapes (m, dof), are free. Shape (m,)."""
         steps = step_counts(A, B, self.weights, self.motion_resolution)
         self.checked += int(steps.sum()) + len(steps)
         sides = self.robot.chain.joint_values(A), self.robot.chain.joint_values(B)
@@ -184,7 +184,7 @@ class MovingWorld:
     def motions_proven(
         self, A: Matrix, B: Matrix, *, less: float = 0.0, inflation: Mapping[str, float] | None = None
     ) -> Mask:
-        """Which straight motions A[k] -> B[k], shapes (m, dof), are proven free as a whole. Shape (m,).
+        """Return which straight motions A[k] -> B[k], shapes (m, dof), are proven free as a whole. Shape (m,).
 
         They keep margins and ``inflation``, ``less`` [m] less of these, from where obstacles are now. Copies, which
         stand where obstacles will be, do not count. ``inflation`` [m] stands for that of :meth:`move` here alone.
@@ -199,7 +199,7 @@ class MovingWorld:
         return proven
 
     def _with_clearance(self, body: Body, margin: float) -> Body:
-        """A body that has a margin [m]; an obstacle with the clearance of the world on top of it."""
+        """Return a body that has a margin [m]; an obstacle with the clearance of the world on top of it."""
         total_margin = margin + self._clearance
         if body.kind != "obstacle" or total_margin == body.margin:
             return body
@@ -282,7 +282,7 @@ def check_held(scene: Scene, before: Scene) -> None:
 
 
 def _held_alike(first: AttachedObject, second: AttachedObject) -> bool:
-    """Whether the arm holds the same in the same way."""
+    """Check whether the arm holds the same in the same way."""
     same_link = first.link == second.link and set(first.allow) == set(second.allow)
     same_margins = first.padding == second.padding and first.margin == second.margin
     same_place = np.allclose(first.pose.homogeneous, second.pose.homogeneous, rtol=0.0, atol=SAME_PLACE)

@@ -30,7 +30,7 @@ class Opinion:
 
 
 def opinion_on(world: World, start: ArrayLike, goal: ArrayLike, waypoints: ArrayLike) -> Opinion:
-    """An opinion on a path.
+    """Return an opinion on a path.
 
     Args:
         world: In which it has to be free.

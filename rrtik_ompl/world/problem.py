@@ -139,17 +139,17 @@ class Problem:
         return tuple(self.settings.constraints)
 
     def with_resolution(self, motion_resolution: float) -> Problem:
-        """The same problem, its motions checked in steps of another size [m] (:meth:`World.with_resolution`)."""
+        """Return the same problem, its motions checked in steps of another size [m] (:meth:`World.with_resolution`)."""
         return self.with_world(self.world.with_resolution(motion_resolution))
 
     refined = Renamed("with_resolution")
 
     def with_accuracy(self, accuracy: Accuracy) -> Problem:
-        """The same problem, its world "exact" or "conservative" (see :meth:`rrtik_ompl.World.with_accuracy`)."""
+        """Return the same problem, its world "exact" or "conservative" (see :meth:`rrtik_ompl.World.with_accuracy`)."""
         return self.with_world(self.world.with_accuracy(accuracy))
 
     def with_world(self, world: World) -> Problem:
-        """The same start and goal in another form of the same world; neither is checked again.
+        """Return the same start and goal in another form of the same world; neither is checked again.
 
         Raises:
             InputError: If it is no world.
@@ -158,12 +158,12 @@ class Problem:
         return problem_in(self, world)
 
     def reached(self, q: ArrayLike) -> bool:
-        """Whether a configuration, shape (dof,), satisfies the goal."""
+        """Check whether a configuration, shape (dof,), satisfies the goal."""
         return bool(self.goal.satisfied(self.robot, self.robot.configuration(q)[None])[0])
 
 
 def known_problem(world: World, start: Vector, goal: JointGoal | Vector) -> Problem:
-    """A problem whose start, shape (dof,), and goal somebody has checked already; no joint may be continuous."""
+    """Return a problem whose start, shape (dof,), and goal somebody has checked already; no joint may be continuous."""
     values = {
         "settings": world.settings,
         "start": frozen(start),
@@ -177,7 +177,7 @@ def known_problem(world: World, start: Vector, goal: JointGoal | Vector) -> Prob
 
 
 def densely_checked(problem: Problem) -> Problem:
-    """The same problem, its motions checked as densely as by the second check of a path."""
+    """Return the same problem, its motions checked as densely as by the second check of a path."""
     world = problem.world
     return problem_in(problem, form_of(world, motion_resolution=verification_resolution(world.settings)))
 
@@ -188,7 +188,7 @@ def problem_in(problem: Problem, world: World) -> Problem:
 
 
 def usable_configuration(world: World, values: ArrayLike, what: str) -> Vector:
-    """One of :func:`usable_configurations`, shape (dof,)."""
+    """Return one of :func:`usable_configurations`, shape (dof,)."""
     return usable_configurations(world, {what: values})[what]
 
 
@@ -256,7 +256,7 @@ def _not_proven_error(world: World, q: Vector, what: str) -> ProblemError:
 
 
 def _of_a_path(region: TaskRegion) -> bool:
-    """Whether a region says what only path constraints can."""
+    """Check whether a region says what only path constraints can."""
     return bool(region.frame or region.from_start or region.position_allowance or region.orientation_allowance)
 
 

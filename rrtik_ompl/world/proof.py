@@ -91,15 +91,15 @@ class Prover:
     _fixed: ClassVar[bool] = True  # whether obstacles stay where they are
 
     def for_thread(self) -> Prover:
-        """The same prover for another thread."""
+        """Return the same prover for another thread."""
         return replace(self, tables=self.tables.for_thread(self.bodies), _coal=None)
 
     def holding(self, constraints: HeldRegions) -> Prover:
-        """The prover of the same bodies for motions that keep path constraints; its proofs are others."""
+        """Return the prover of the same bodies for motions that keep path constraints; its proofs are others."""
         return replace(self, constraints=constraints, kin=object())
 
     def moved(self, bodies: Sequence[Body], numbers: tuple[int, ...], *, always_colliding: bool) -> Prover:
-        """The prover of a world in which some bodies stand elsewhere; it takes over this one's table.
+        """Return the prover of a world in which some bodies stand elsewhere; it takes over this one's table.
 
         Args:
             bodies: All of them, where they stand now.
@@ -147,7 +147,7 @@ class Prover:
         return Proof(count, clearance, tuple(measured_gaps), self.margin, maker=self)
 
     def _with_breaches(self, constraints: HeldRegions, rows: Matrix, gaps: list[Gap]) -> list[Gap]:
-        """The gaps of a route, and a gap for each other motion of it that is not held."""
+        """Return the gaps of a route, and a gap for each other motion of it that is not held."""
         motions_with_gap = {gap.motion for gap in gaps}
         not_held = np.flatnonzero(~constraints.route_held(rows)).tolist()
         breaches = [
@@ -158,7 +158,7 @@ class Prover:
         return sorted(gaps + breaches, key=lambda gap: gap.motion)
 
     def certificate(self, rows: Matrix, clearance: float) -> Certificate | None:
-        """The certificate of a path, waypoints of shape (k, dof), for a clearance [m].
+        """Return the certificate of a path, waypoints of shape (k, dof), for a clearance [m].
 
         Returns:
             None if not every motion is proven.
@@ -203,7 +203,7 @@ class Prover:
         return logs
 
     def proven(self, starts: Matrix, ends: Matrix, *, clearance: float = 0.0) -> Mask:
-        """Which of the motions starts[k] -> ends[k], shapes (m, dof), are proven free. Shape (m,)."""
+        """Return which of the motions starts[k] -> ends[k], shapes (m, dof), are proven free. Shape (m,)."""
         return in_blocks(partial(self._proven, clearance), starts, ends)
 
     def _proven(self, clearance: float, starts: Matrix, ends: Matrix) -> Mask:
@@ -222,7 +222,7 @@ class Prover:
         return mask
 
     def table(self, clearance: float) -> ProofTable:
-        """The table for kernels that prove motions of their own, with a clearance [m] until the next proof.
+        """Return the table for kernels that prove motions of their own, with a clearance [m] until the next proof.
 
         They keep a little more, so that a proof from the other end of a motion agrees, and forget earlier planes.
         """
@@ -231,11 +231,11 @@ class Prover:
         return packed.table
 
     def made(self, proof: Proof) -> bool:
-        """Whether a proof is one of these bodies, by this object or its like for another thread."""
+        """Check whether a proof is one of these bodies, by this object or its like for another thread."""
         return isinstance(proof.maker, Prover) and proof.maker.kin is self.kin
 
     def still_proven(self, rows: Matrix, *, clearance: float) -> Mask:
-        """Which configurations, shape (m, dof), are proven free, with a clearance [m]. Shape (m,).
+        """Return which configurations, shape (m, dof), are proven free, with a clearance [m]. Shape (m,).
 
         Of a few none is, as long as the table is not made: that takes longer than coal needs for them.
         """
@@ -255,7 +255,7 @@ class Prover:
         return distance_between(self.robot, self.bodies, gap.pair, q)
 
     def _joint_values(self, rows: Matrix) -> Matrix:
-        """Values of every joint of the chain, shape (m, joints), row after row in memory."""
+        """Return values of every joint of the chain, shape (m, joints), row after row in memory."""
         gain, offset, _ = _joints(self.robot)
         return np.asarray(rows @ gain + offset)
 
@@ -269,7 +269,7 @@ class Prover:
     def _gaps(
         self, rows: Ends, values: Ends, sound: Mask | None, distances: tuple[float, float], seconds: float | None
     ) -> list[Gap]:
-        """The motions that are not proven.
+        """Return the motions that are not proven.
 
         Args:
             rows: Where they begin and where they end, shapes (m or more, dof) and (m, dof).
@@ -323,7 +323,7 @@ class Prover:
         return [self._gap(packed, k, int(pairs[k]), float(places[k])) for k in np.flatnonzero(pairs != PROVEN).tolist()]
 
     def _packed_for(self, clearance: float, slack: float) -> ProofPairs:
-        """The table, with a clearance and a slack to keep."""
+        """Return the table, with a clearance and a slack to keep."""
         packed = self.tables.get(self.bodies, self._new_table)
         packed.keep(clearance, slack)
         return packed
@@ -456,7 +456,7 @@ class CoalProof:
             return []
 
         def spare_at(share: float) -> float:
-            """How much more than they must the two are apart at a share of the motion [m]."""
+            """Return how much more than they must the two are apart at a share of the motion [m]."""
             return _gap_at(self._robot, pair, motion[0] + share * (motion[1] - motion[0])) - required_gap
 
         if spare_at(place) <= 0.0:
@@ -482,7 +482,7 @@ class CoalProof:
 
 
 def distance_between(robot: Robot, bodies: Sequence[Body], names: tuple[str, str], q: Vector) -> float:
-    """The distance between bodies of two names at q, shape (dof,) [m]; nan if there are none."""
+    """Return the distance between bodies of two names at q, shape (dof,) [m]; nan if there are none."""
     first, second = ([body for body in bodies if body.name == name] for name in names)
     return min((_gap_at(robot, [a, b], q) for a in first for b in second), default=float("nan"))
 
@@ -492,7 +492,7 @@ def _gap_at(robot: Robot, pair: Sequence[Body], q: Vector) -> float:
 
 
 def _groups(packed: ProofPairs) -> Mask:
-    """Which rows of the table are groups of bodies: these are made of pairs that come before them."""
+    """Return which rows of the table are groups of bodies: these are made of pairs that come before them."""
     firsts = packed.table.pairs.reshape(-1, layout.PAIR_SIZE)[:, layout.PARTS_FIRST]
     groups: Mask = (packed.sides[:, [1, 3]] < 0).all(axis=1) & (firsts < np.arange(len(firsts)))
     return groups

@@ -64,7 +64,7 @@ class ProvenMotions(MotionQueries):
         self._kernels = kernels
 
     def motion_valid_batch(self, A: Matrix, B: Matrix) -> Mask:
-        """Which straight motions A[k] -> B[k], shapes (m, n), are proven free, shape (m,)."""
+        """Return which straight motions A[k] -> B[k], shapes (m, n), are proven free, shape (m,)."""
         starts = np.ascontiguousarray(A)
         ends = np.ascontiguousarray(B)
         answers = np.zeros(len(starts), dtype=np.int32)
@@ -76,7 +76,7 @@ class ProvenMotions(MotionQueries):
 
 
 def proven_motions(world: World, clearance: float, within: Matrix) -> MotionQueries:
-    """Motions that must be proven to keep a clearance [m], in kernels where these can do it.
+    """Return motions that must be proven to keep a clearance [m], in kernels where these can do it.
 
     Args:
         world: The world.

@@ -27,7 +27,7 @@ def without_robot(
     pose: ArrayLike | pin.SE3 | None = None,
     scene: Scene | None = None,
 ) -> PointCloud:
-    """A cloud without the points that are on the arm, or on what it holds.
+    """Return a cloud without the points that are on the arm, or on what it holds.
 
     Args:
         cloud: What was seen.
@@ -68,7 +68,7 @@ def without_robot(
 
 
 def _on_body(cloud: PointCloud, from_body: pin.SE3, body: Body, balls: Matrix, margin: float) -> Mask:
-    """Which points of a cloud, whose pose is seen from a body, are on it, shape (n,)."""
+    """Return which points of a cloud, whose pose is seen from a body, are on it, shape (n,)."""
     box = body.geometry.aabb_local
     reach = margin + cloud.radius
     points = cloud.points.astype(np.float64) @ from_body.rotation.T + from_body.translation

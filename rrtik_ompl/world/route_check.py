@@ -36,7 +36,7 @@ def violations_of(checks: RowChecks, rows: Matrix, resolution: float | None = No
 
 
 def motion_taken(checks: RowChecks, a: Vector, b: Vector) -> bool:
-    """Whether a motion is free in the world's own steps, and the second check takes it as part of a path."""
+    """Check whether a motion is free in the world's own steps, and the second check takes it as part of a path."""
     rows = np.stack([a, b])
     if not checks.motions_free(rows[:1], rows[1:])[0]:
         return False
@@ -44,14 +44,14 @@ def motion_taken(checks: RowChecks, a: Vector, b: Vector) -> bool:
 
 
 def as_it_stands(scene: Scene) -> str:
-    """A clause for what is said of a scene as if it stood still: "" where nothing in it moves by itself."""
+    """Return a clause for what is said of a scene as if it stood still: "" where nothing in it moves by itself."""
     if all(obstacle.motion is None for obstacle in scene.obstacles):
         return ""
     return ", with moving obstacles as they stand at time 0 (replan and plan_in_time go by their motion)"
 
 
 def how_checked(checks: RowChecks, rows: Matrix, given_proof: Proof | None = None) -> str:
-    """How the second check sees that the motions between waypoints, shape (k, dof), are free, in a few words."""
+    """Return how the second check sees that the motions between waypoints, shape (k, dof), are free, in a few words."""
     proof = given_proof
     if proof is None or not proof.proven or proof.clearance < checks.settings.required_clearance:
         proof = checks.prover.route(rows, clearance=checks.settings.required_clearance)
@@ -70,7 +70,7 @@ def how_checked(checks: RowChecks, rows: Matrix, given_proof: Proof | None = Non
 
 
 def route_violations(checks: RowChecks, rows: Matrix, resolution: float) -> tuple[Violation, ...]:
-    """The first violation of every motion between waypoints that has one.
+    """Return the first violation of every motion between waypoints that has one.
 
     Args:
         checks: Of the world.
@@ -128,7 +128,7 @@ def not_proven(settings: WorldSettings) -> str:
 
 
 def _not_held(constraints: HeldRegions, rows: Matrix) -> list[Violation]:
-    """The motions that do not keep path constraints."""
+    """Return the motions that do not keep path constraints."""
     edges = np.flatnonzero(~constraints.route_held(rows))
     ends = [rows[k] if constraints.explain(rows[k]) else rows[k + 1] for k in edges]
     return [
@@ -137,7 +137,7 @@ def _not_held(constraints: HeldRegions, rows: Matrix) -> list[Violation]:
 
 
 def _sampled(checks: RowChecks, rows: Matrix, counts: Vector, run: NDArray[np.int64]) -> Iterator[Violation]:
-    """The violations of consecutive motions, whose numbers are given, checked in steps."""
+    """Yield the violations of consecutive motions, whose numbers are given, checked in steps."""
     for part in in_parts(counts[run], AT_ONCE):
         edges = run[part]
         samples, owners = subdivided(rows[edges[0] : edges[-1] + 2], counts[edges])

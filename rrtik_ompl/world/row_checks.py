@@ -79,7 +79,7 @@ class RowChecks:
     constraints: HeldRegions | None
 
     def for_thread(self) -> RowChecks:
-        """The same for another thread."""
+        """Return the same for another thread."""
         return replace(self, checker=self.checker.for_thread(), prover=self.prover.for_thread())
 
     @property
@@ -88,7 +88,7 @@ class RowChecks:
         return self if self.constraints is None else checks_of(changed(self.settings, constraints=()))
 
     def moved(self, name: str, pose: ArrayLike | pin.SE3) -> RowChecks:
-        """The same with an obstacle elsewhere; arguments and errors as of :meth:`rrtik_ompl.World.moved`."""
+        """Return the same with an obstacle elsewhere; arguments and errors as of :meth:`rrtik_ompl.World.moved`."""
         settings = self.settings
         moved, numbers = self.solids.moved(name, pose)
 
@@ -109,15 +109,15 @@ class RowChecks:
         return CERTIFICATES.of(self.solids, self.settings.clearance)
 
     def free(self, rows: Matrix) -> Mask:
-        """Which rows, shape (m, dof), are inside the limits and free. Shape (m,)."""
+        """Return which rows, shape (m, dof), are inside the limits and free. Shape (m,)."""
         return in_blocks(self._free, rows)
 
     def motions_free(self, starts: Matrix, ends: Matrix) -> Mask:
-        """Which straight motions starts[k] -> ends[k], shapes (m, dof), are valid. Shape (m,)."""
+        """Return which straight motions starts[k] -> ends[k], shapes (m, dof), are valid. Shape (m,)."""
         return in_blocks(self._motions_free, starts, ends)
 
     def certified(self, rows: Matrix) -> Mask:
-        """Which rows, shape (m, dof), a second opinion calls free: proofs first, then coal. Shape (m,)."""
+        """Return which rows, shape (m, dof), a second opinion calls free: proofs first, then coal. Shape (m,)."""
         mask = inside_limits(self.settings.robot, rows)
         unproven = mask & ~self.prover.still_proven(rows, clearance=self.settings.clearance)
         mask[unproven] = self.certificate.free(rows[unproven])

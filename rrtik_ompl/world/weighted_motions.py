@@ -63,13 +63,13 @@ class WeightedMotions(MotionQueries):
         self.accuracy: Accuracy = "conservative" if is_conservative(world) else "exact"
 
     def valid_batch(self, Q: Matrix) -> Mask:
-        """Which configurations Q, shape (m, n), are free, shape (m,)."""
+        """Return which configurations Q, shape (m, n), are free, shape (m,)."""
         return np.asarray(self._world.valid_batch(self._unweighted(Q)))
 
     def motion_valid_batch(self, A: Matrix, B: Matrix) -> Mask:
-        """Which straight motions A[k] -> B[k], shapes (m, n), are free, shape (m,)."""
+        """Return which straight motions A[k] -> B[k], shapes (m, n), are free, shape (m,)."""
         return np.asarray(self._world.motion_valid_batch(self._unweighted(A), self._unweighted(B)))
 
     def _unweighted(self, Q: Matrix) -> Matrix:
-        """Configurations of the world of those in weighted coordinates, shape (m, n)."""
+        """Return configurations of the world of those in weighted coordinates, shape (m, n)."""
         return np.asarray(Q / self._scale)

@@ -96,7 +96,7 @@ class World(Judge):
 
     @classmethod
     def of(cls, settings: WorldSettings) -> World:
-        """A world made from settings: all of them are arguments of its class.
+        """Return a world made from settings: all of them are arguments of its class.
 
         Raises:
             InputError: If they are none.
@@ -105,7 +105,7 @@ class World(Judge):
         return _world_of(settings)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """A copy answers as the world does, and may be used in another thread or process."""
+        """Return a copy answers as the world does, and may be used in another thread or process."""
         return like, (self.settings,)
 
     def __repr__(self) -> str:
@@ -203,7 +203,7 @@ class World(Judge):
         return self if self.constraints is None else form_of(self, constraints=())
 
     def with_settings(self, **changes: Any) -> World:
-        """The same world but for some of its settings; it shares what does not depend on them.
+        """Return the same world but for some of its settings; it shares what does not depend on them.
 
         Args:
             **changes: Values by the names of :class:`~rrtik_ompl.model.world_settings.WorldSettings`.
@@ -220,7 +220,7 @@ class World(Judge):
         return form_of(self, **checked_settings(changes))
 
     def with_scene(self, scene: Scene) -> World:
-        """A world of the same robot in another scene, with the same settings.
+        """Return a world of the same robot in another scene, with the same settings.
 
         Raises:
             InputError: If it is no scene, or does not fit the robot or the path constraints.
@@ -228,7 +228,7 @@ class World(Judge):
         return self.with_settings(scene=scene)
 
     def with_accuracy(self, accuracy: Accuracy) -> World:
-        """The same world, "exact" or "conservative"; shares everything else.
+        """Return the same world, "exact" or "conservative"; shares everything else.
 
         Raises:
             UnknownNameError: If there is no such accuracy.
@@ -236,7 +236,7 @@ class World(Judge):
         return self.with_settings(accuracy=accuracy)
 
     def with_resolution(self, motion_resolution: float) -> World:
-        """The same world, its motions checked in steps of another size [m]; shares everything else.
+        """Return the same world, its motions checked in steps of another size [m]; shares everything else.
 
         Raises:
             InputError: If the size is none, or less than 0.01 mm.
@@ -246,7 +246,7 @@ class World(Judge):
     refined = Renamed("with_resolution")
 
     def with_clearance(self, clearance: float) -> World:
-        """The same world, where a distance [m] is kept from obstacles on top of their margins.
+        """Return the same world, where a distance [m] is kept from obstacles on top of their margins.
 
         It takes the place of an earlier one; 0 takes it away. Checks, proofs and whatever moves in it keep it;
         :meth:`contacts` and :meth:`clearance` tell of margins alone.
@@ -257,7 +257,7 @@ class World(Judge):
         return self.with_settings(clearance=clearance)
 
     def proving(self, clearance: float | None = 0.0) -> World:
-        """The same world, where motions have to be proven too, with a clearance [m]; searches in kernels cannot.
+        """Return the same world, where motions have to be proven too, with a clearance [m]; searches in kernels cannot.
 
         It takes the place of an earlier one; None takes it away.
 
@@ -267,7 +267,7 @@ class World(Judge):
         return self.with_settings(proving=clearance)
 
     def moved(self, name: str, pose: ArrayLike | pin.SE3) -> World:
-        """The world in which an obstacle stands elsewhere; what that costs hardly grows with their number.
+        """Return the world in which an obstacle stands elsewhere; what that costs hardly grows with their number.
 
         The new world takes over the tables of this one and writes a few rows of them. This one is as it was; should it
         be asked again, it makes its tables anew, as it does for other threads.
@@ -291,7 +291,7 @@ class World(Judge):
         return _world_with(self.checks.moved(name, pose))
 
     def valid(self, q: ArrayLike) -> bool:
-        """Whether q, shape (dof,), is inside the limits and free of collision.
+        """Check whether q, shape (dof,), is inside the limits and free of collision.
 
         Raises:
             InputError: If q has the wrong length or a value that is not finite.
@@ -299,7 +299,7 @@ class World(Judge):
         return bool(self.checks.free(self._rows(q, 1))[0])
 
     def valid_batch(self, Q: ArrayLike) -> Mask:
-        """Which rows of Q, shape (m, dof), are inside the limits and free of collision. Shape (m,).
+        """Return which rows of Q, shape (m, dof), are inside the limits and free of collision. Shape (m,).
 
         Raises:
             InputError: If Q has the wrong shape or a value that is not finite.
@@ -307,20 +307,20 @@ class World(Judge):
         return self.checks.free(self._rows(Q, 2))
 
     def motion_valid(self, a: ArrayLike, b: ArrayLike) -> bool:
-        """Whether the straight motion from a to b, shape (dof,) each, is valid; the same answer from b to a."""
+        """Check whether the straight motion from a to b, shape (dof,) each, is valid; the same answer from b to a."""
         return bool(self.checks.motions_free(self._rows(a, 1), self._rows(b, 1))[0])
 
     def motion_valid_batch(self, A: ArrayLike, B: ArrayLike) -> Mask:
-        """Which straight motions A[k] -> B[k], shape (m, dof) each, are valid. Shape (m,)."""
+        """Return which straight motions A[k] -> B[k], shape (m, dof) each, are valid. Shape (m,)."""
         return self.checks.motions_free(*self._both_ends(A, B))
 
     def motion_proven(self, a: ArrayLike, b: ArrayLike) -> bool:
-        """Whether each configuration of the straight motion from a to b, shape (dof,) each, is proven free."""
+        """Check whether each configuration of the straight motion from a to b, shape (dof,) each, is proven free."""
         clearance = self._settings.required_clearance
         return bool(self.prover.proven(self._rows(a, 1), self._rows(b, 1), clearance=clearance)[0])
 
     def motions_proven(self, A: ArrayLike, B: ArrayLike, *, clearance: float | None = None) -> Mask:
-        """Which straight motions A[k] -> B[k], shape (m, dof) each, are proven free as a whole. Shape (m,).
+        """Return which straight motions A[k] -> B[k], shape (m, dof) each, are proven free as a whole. Shape (m,).
 
         ``clearance`` [m] is kept from every obstacle on top of its margin, by default what the world keeps. What grazes
         an obstacle cannot be proven.
@@ -354,7 +354,7 @@ class World(Judge):
         return self.prover.route(rows, clearance=required_clearance, slack=required_slack, seconds=time_limit)
 
     def has_proven(self, proof: Proof) -> bool:
-        """Whether a proof covers every motion, keeps what the world keeps, and was made by a form of the world.
+        """Check whether a proof covers every motion, keeps what the world keeps, and was made by a form of the world.
 
         Raises:
             InputError: If it is no proof.
@@ -398,7 +398,7 @@ class World(Judge):
         return int(step_counts(self._rows(a, 1), self._rows(b, 1), self.weights, step)[0])
 
     def contacts(self, q: ArrayLike) -> tuple[Contact, ...]:
-        """Every pair of bodies that touches or is within its margin at q, deepest first; empty if q is free."""
+        """Return every pair of bodies that touches or is within its margin at q, deepest first; empty if q is free."""
         return self.checks.contacts(self._rows(q, 1)[0])
 
     def closest(self, q: ArrayLike, *, known_free: bool = False) -> Contact | None:
@@ -424,7 +424,7 @@ class World(Judge):
         return self.checks.too_near(self._rows(q, 1)[0])
 
     def explain(self, q: ArrayLike) -> str:
-        """A line that says why q is not valid; "" if it is.
+        """Return a line that says why q is not valid; "" if it is.
 
         It names the joint outside its limit, the pair in collision, nearer than its margin or than the clearance, or
         the path constraint that q does not keep.
@@ -463,7 +463,7 @@ def form_of(world: World, **known: Any) -> World:
 
 
 def _world_of(settings: WorldSettings) -> World:
-    """A world of settings that are known to be right: ``World(...)`` without its checks."""
+    """Return a world of settings that are known to be right: ``World(...)`` without its checks."""
     return _world_with(checks_of(settings))
 
 
@@ -472,7 +472,7 @@ def _world_with(checks: RowChecks) -> World:
 
 
 def like(settings: WorldSettings) -> World:
-    """A world of the settings of one that there was already; what it doubts was said there."""
+    """Return a world of the settings of one that there was already; what it doubts was said there."""
     with warnings.catch_warnings():
         for doubt in (MeshWarning, DescriptionWarning):
             warnings.simplefilter("ignore", doubt)

@@ -91,7 +91,7 @@ class Box(Shape):
         return extruded(0.5 * np.array([[-x, -y], [x, -y], [x, y], [-x, y]]), z)
 
     def grown(self, margin: float) -> Triangles:
-        """The box with rounded edges that is larger by the margin [m] on all sides."""
+        """Return the box with rounded edges that is larger by the margin [m] on all sides."""
         turn = np.concatenate([np.linspace(0.0, 0.5 * np.pi, 7) + 0.5 * np.pi * k for k in range(4)])
         corners = np.repeat(0.5 * self.size[:2] * [[1, 1], [-1, 1], [-1, -1], [1, -1]], 7, axis=0)
         return rounded(corners, turn, float(self.size[2]), not_negative(margin, "margin"))
@@ -128,7 +128,7 @@ class Sphere(Shape):
         return round_ended(self.radius, 0.0, _segments(segments))
 
     def grown(self, margin: float) -> Sphere:
-        """The ball of a larger radius."""
+        """Return the ball of a larger radius."""
         return Sphere(self.radius + not_negative(margin, "margin"))
 
 
@@ -159,16 +159,16 @@ class Cylinder(Shape):
         return float(np.hypot(self.radius, 0.5 * self.length))
 
     def surface(self) -> Triangles:
-        """The prism over a polygon inscribed in its base."""
+        """Return the prism over a polygon inscribed in its base."""
         return extruded(self.radius * _circle(SIDES)[1], self.length)
 
     def grown(self, margin: float) -> Triangles:
-        """The cylinder with rounded edges that is larger by the margin [m] on all sides."""
+        """Return the cylinder with rounded edges that is larger by the margin [m] on all sides."""
         turn, circle = _circle(48)
         return rounded(self.radius * circle, turn, self.length, not_negative(margin, "margin"))
 
     def capped(self) -> Capsule:
-        """The cylinder with half a ball on either end."""
+        """Return the cylinder with half a ball on either end."""
         return Capsule(self.radius, self.length)
 
 
@@ -203,7 +203,7 @@ class Capsule(Shape):
         return round_ended(self.radius, self.length, _segments(segments))
 
     def grown(self, margin: float) -> Capsule:
-        """The capsule of a larger radius."""
+        """Return the capsule of a larger radius."""
         return Capsule(self.radius + not_negative(margin, "margin"), self.length)
 
 
@@ -297,7 +297,7 @@ class Prism(Shape):
 
 
 def _segments(given: int) -> int:
-    """The number of segments of a drawn ball, if a quarter of it is a ring or more."""
+    """Return the number of segments of a drawn ball, if a quarter of it is a ring or more."""
     segments = whole_number(given, "segments", least=4)
     at_most(segments, MOST_SEGMENTS, "segments")
     return segments

@@ -34,7 +34,7 @@ class BoxPile(Shape):
         return float(np.linalg.norm(np.abs(centres) + 0.5 * sizes, axis=1).max())
 
     def surface(self) -> Triangles:
-        """The sides of all boxes."""
+        """Return the sides of all boxes."""
         centres, sizes = self.boxes
         corners = centres[:, None] + ONE.vertices * sizes[:, None]
         faces = ONE.faces + len(ONE.vertices) * np.arange(len(centres))[:, None, None]

@@ -151,7 +151,7 @@ class HeightField(BoxPile):
         return HeightField(highest, self.cell * step, self.floor, invalid="drop")
 
     def rounded(self, step: float) -> HeightField:
-        """Each height rounded up to a multiple of a step [m], so that more columns are of one height.
+        """Return each height rounded up to a multiple of a step [m], so that more columns are of one height.
 
         Raises:
             InputError: If the step is no length.

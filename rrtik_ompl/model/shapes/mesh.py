@@ -114,7 +114,7 @@ def _welded(points: Matrix, faces: NDArray[np.int64]) -> tuple[Matrix, NDArray[n
 
 
 def _merged(keys: Matrix, points: Matrix, faces: NDArray[np.int64]) -> tuple[Matrix, NDArray[np.int64]]:
-    """One point for all of the same key, and the faces of those."""
+    """Return one point for all of the same key, and the faces of those."""
     _, first, index = np.unique(keys, axis=0, return_index=True, return_inverse=True)
     return points[first], np.asarray(index).reshape(-1)[faces]
 

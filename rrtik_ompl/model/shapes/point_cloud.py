@@ -143,7 +143,7 @@ class PointCloud(_Kept, Shape):
         return self._tree
 
     def surface(self) -> Triangles:
-        """An octahedron around each point, or around each of some of them where there are many."""
+        """Return an octahedron around each point, or around each of some of them where there are many."""
         some = self.points[:: -(-len(self.points) // MOST_DRAWN)].astype(np.float64)
         tips = self.radius * np.concatenate([np.eye(3), -np.eye(3)])
         faces = np.array([[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2], [1, 0, 5], [3, 1, 5], [4, 3, 5], [0, 4, 5]])
@@ -151,7 +151,7 @@ class PointCloud(_Kept, Shape):
         return Triangles((some[:, None] + tips).reshape(-1, 3), numbers.reshape(-1, 3))
 
     def grown(self, margin: float) -> PointCloud:
-        """The cloud of the same points with a larger radius [m]."""
+        """Return the cloud of the same points with a larger radius [m]."""
         return PointCloud(self.points, self.radius + not_negative(margin, "margin"))
 
     def voxel(self, size: float) -> PointCloud:
@@ -211,7 +211,7 @@ def known_choice(invalid: Invalid, what: str) -> None:
 
 
 def _usable(points: ArrayLike, invalid: Invalid, what: str) -> tuple[Points, int]:
-    """Points as read-only float32, and how many were dropped."""
+    """Return points as read-only float32, and how many were dropped."""
     given = points if isinstance(points, np.ndarray) and points.dtype == np.float32 else number_rows(points, what)
     if given.ndim != 2 or given.shape[1] != 3:
         raise InputError(f"{what}: expected points of shape (any, 3), got shape {given.shape}")

@@ -39,7 +39,7 @@ class PointTree:
         return whole[::2].min(axis=1), whole[1::2].max(axis=1)
 
     def within(self, low: NDArray[Any], high: NDArray[Any]) -> NDArray[np.float32]:
-        """Points of the blocks whose boxes meet a box, shape (k, 3)."""
+        """Return points of the blocks whose boxes meet a box, shape (k, 3)."""
         groups = np.zeros(1, dtype=np.int64)
         for first in self.firsts[::-1].tolist():
             boxes = self.boxes[first + groups]
@@ -56,7 +56,7 @@ def extremes(points: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
 
 
 def point_tree(points: NDArray[np.float32]) -> PointTree:
-    """The tree of points, shape (n, 3), at least one."""
+    """Return the tree of points, shape (n, 3), at least one."""
     count = -(-len(points) // LEAF)
     order = np.argsort(_places(points))
     order = np.append(order, np.full(count * LEAF - len(points), order[-1]))
@@ -88,7 +88,7 @@ def point_tree(points: NDArray[np.float32]) -> PointTree:
 
 
 def _places(points: NDArray[np.float32]) -> NDArray[np.uint32]:
-    """Where points lie along the curve: the bits of their coordinates in turn, shape (n,)."""
+    """Return where points lie along the curve: the bits of their coordinates in turn, shape (n,)."""
     low, high = extremes(points)
     extent = float((high - low).max())
     scale = np.float32(((1 << CURVE_BITS) - 0.5) / extent if extent > 0.0 else 0.0)
@@ -97,7 +97,7 @@ def _places(points: NDArray[np.float32]) -> NDArray[np.uint32]:
 
 
 def _apart(cells: NDArray[np.uint32]) -> NDArray[np.uint32]:
-    """Numbers of ``CURVE_BITS`` bits with two zeros between each two of them."""
+    """Return numbers of ``CURVE_BITS`` bits with two zeros between each two of them."""
     for shift, mask in ((16, 0x030000FF), (8, 0x0300F00F), (4, 0x030C30C3), (2, 0x09249249)):
         cells = (cells | (cells << np.uint32(shift))) & np.uint32(mask)
     return cells

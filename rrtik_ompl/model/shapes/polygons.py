@@ -38,7 +38,7 @@ def check_simple(polygon: Matrix) -> None:
 
 
 def _meet(p: Vector, q: Vector, r: Vector, s: Vector) -> bool:
-    """Whether the segments p q and r s have a point in common."""
+    """Check whether the segments p q and r s have a point in common."""
     if (np.maximum(p, q) < np.minimum(r, s)).any() or (np.maximum(r, s) < np.minimum(p, q)).any():
         return False
     return _turn(p, q, r) * _turn(p, q, s) <= 0.0 and _turn(r, s, p) * _turn(r, s, q) <= 0.0
@@ -104,7 +104,7 @@ def _merged(polygon: Matrix, parts: list[list[int]]) -> list[list[int]]:
 
 
 def _neighbours(polygon: Matrix, parts: list[list[int]]) -> tuple[int, int, list[int]] | None:
-    """The first two parts whose union is convex, by their numbers, and the union; None if there are none."""
+    """Return the first two parts whose union is convex, by their numbers, and the union; None if there are none."""
     for i, j in combinations(range(len(parts)), 2):
         union = _joined(parts[i], parts[j])
         if union is not None and _is_convex(polygon, union):

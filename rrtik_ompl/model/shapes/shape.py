@@ -76,7 +76,7 @@ class Shape(ABC):
         """
 
     def grown(self, margin: float) -> Shape | Triangles | None:
-        """All that is within a margin [m] of it, as a shape or as a surface; None if neither is at hand.
+        """Return all that is within a margin [m] of it, as a shape or as a surface; None if neither is at hand.
 
         Raises:
             InputError: If the margin is negative, or no finite number.
@@ -86,7 +86,7 @@ class Shape(ABC):
 
 
 def same_shape(first: Shape, second: Shape) -> bool:
-    """Whether two shapes are of one kind and one size."""
+    """Check whether two shapes are of one kind and one size."""
     return first is second or (
         type(first) is type(second)
         and all(np.array_equal(getattr(first, f.name), getattr(second, f.name)) for f in fields(first))  # type: ignore[arg-type]

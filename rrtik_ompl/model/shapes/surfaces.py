@@ -46,7 +46,7 @@ def revolved(radii: Vector, heights: Vector, segments: int) -> Triangles:
 
 
 def round_ended(radius: float, length: float, segments: int) -> Triangles:
-    """A ball, cut in two and drawn apart by a length along z."""
+    """Return a ball, cut in two and drawn apart by a length along z."""
     rings = segments // 4
     angles = np.linspace(0.0, 0.5 * np.pi, rings + 1)
     lift = np.concatenate([np.full(rings + 1, -0.5 * length), np.full(rings + 1, 0.5 * length)])
