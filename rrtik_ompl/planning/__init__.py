@@ -1,1 +1,1 @@
-"""From a problem to a path."""
+"""Planning: `plan()` and `plan_many()`, their attempts, the second check, improvement and generated problems."""

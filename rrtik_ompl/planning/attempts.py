@@ -1,6 +1,7 @@
-"""The one loop of `plan()`: :func:`walk` goes through a table of attempts until the second check accepts a path.
+"""The loop of attempts behind `plan()`: :func:`walk` runs a planner until the second check accepts a path.
 
-The rows of a planner's `Turn`; which one comes next depends on what has come of those before:
+A `Turn` is one planner at one problem. Its attempts are the rows of this table; which row comes next depends on the
+results of the rows before it:
 
 | row | its motions are checked | its effort | when |
 |---|---|---|---|
@@ -9,14 +10,14 @@ The rows of a planner's `Turn`; which one comes next depends on what has come of
 | strict | in steps, with room beyond the clearance | 4, 16, ... | see below |
 | proving | by proofs, with that room | 2, 4, ... | after five strict ones, or without kernels |
 
-Strict ones are due from the first path on that is valid but not proven, for half of the effort. A plain one has no
-bound but time if no later one would have other goal configurations.
+As soon as a path was valid but not proven, strict attempts get half of the effort. A plain attempt is limited by time
+alone if later attempts would have the same goal configurations.
 
-`Turn.rows` yields a row, :func:`walk` makes the attempt and gives what has come of it to `Turn.take`, and only then
-does `rows` go on: it finds in the turn what the next row depends on.
+`Turn.rows` yields a row, :func:`walk` makes the attempt and hands its outcome to `Turn.take`, and only then does `rows`
+resume: the state of the turn decides the next row.
 
-"auto" and ``improve=`` are turns one after the other (:mod:`rrtik_ompl.planning.portfolio`,
-:mod:`rrtik_ompl.planning.improving`); a planner that is named has one.
+A named planner has one turn. "auto" and ``improve=`` are several turns one after the other
+(:mod:`rrtik_ompl.planning.portfolio`, :mod:`rrtik_ompl.planning.improving`).
 """
 
 from __future__ import annotations
@@ -44,28 +45,28 @@ from rrtik_ompl.world.problem import Problem, densely_checked, problem_in
 from rrtik_ompl.world.proof import PROOF_KERNELS
 from rrtik_ompl.world.world import form_of
 
-SHORTEST = 1e-3  # [s] that an attempt gets at least
-EFFORT_ITERATIONS = 1000  # that an attempt of effort 1 may take
-SHORT_WAY_EFFORT = 16  # for the short way round alone, before the long way is tried; some 0.2 s of kernels
-ANYTIME_SHARE = 0.8  # of the time, for a strict attempt of an anytime planner, so that a plain one can follow
-ROUNDS = 24  # attempts to find a proven path, once there is one that is checked in steps
-BRIEF_ROUNDS = 2  # attempts to find one that keeps the clearance, once there is a proven one that keeps less
-IN_KERNELS = 5  # strict attempts without proofs while searching, for planners that run in kernels
-SEPARATED = 2  # attempts with further goal configurations, once none that is known can be reached
+SHORTEST = 1e-3  # [s] the least time of an attempt
+EFFORT_ITERATIONS = 1000  # iterations of an attempt of effort 1
+SHORT_WAY_EFFORT = 16  # effort of the attempt that goes the short way round only; about 0.2 s in kernels
+ANYTIME_SHARE = 0.8  # share of the time for a strict attempt of an anytime planner; a plain one can follow
+ROUNDS = 24  # attempts to find a proven path after one that is only checked in steps
+BRIEF_ROUNDS = 2  # attempts to find a path with the clearance after a proven one with less
+IN_KERNELS = 5  # strict attempts before proving ones, for planners that run in kernels
+SEPARATED = 2  # attempts with further goal configurations once no known one can be reached
 
 Kind: TypeAlias = Literal["quick", "plain", "strict"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
 
 
 class Row(NamedTuple):
-    """A row of the table: one attempt.
+    """One attempt: a row of the table at the head of this module.
 
     Attributes:
-        kind: As in the table; "strict" for proving ones too.
-        problem: In the form in which its motions are checked.
-        goals: Configurations at the goal, shape (k, dof); none for a planner that finds them itself.
-        budget: Until when, with how many iterations, by which random numbers.
-        checked: Whether start and goals are known to be free.
+        kind: The kind of row; proving rows count as "strict" too.
+        problem: The problem in the form in which the motions of this attempt are checked.
+        goals: Goal configurations, shape (k, dof); none for a planner that finds them itself.
+        budget: Time limit, limit of iterations and seed of the attempt.
+        checked: Whether start and goals are already known to be free.
     """
 
     kind: Kind
@@ -89,9 +90,9 @@ def run_planner(problem: Problem, planner: NamedPlanner, request: Request) -> Pl
 
 
 def walk(turns: Iterable[Turn]) -> Iterator[Turn]:
-    """Go through the tables of turns, attempt by attempt; yields each turn when its last attempt is over.
+    """Make the attempts of each turn, and yield each turn after its last attempt.
 
-    A turn whose planner breaks is over too, and keeps the error.
+    A turn whose planner breaks ends with that attempt and keeps the error in `Turn.error`.
     """
     for turn in turns:
         try:
@@ -112,23 +113,23 @@ def walk(turns: Iterable[Turn]) -> Iterator[Turn]:
 
 
 class Turn:
-    """One planner at one problem: its attempts, and what has come of them.
+    """One planner at one problem: it decides on the attempts and collects their results.
 
     Attributes:
-        planner: Whose turn it is.
-        parameters: Its options.
-        budget: Of all attempts together; its time begins with the first row, once all kernels are loaded.
-        path: What was found, or None.
-        reason: Why nothing was found, in a line; "" if something was.
-        seconds: How long it took.
-        totals: The counts of all attempts.
-        error: What broke the planner, or None.
+        planner: The planner and its name.
+        parameters: Options of the planner.
+        budget: Budget of all attempts together; its time begins with the first row, after all kernels are loaded.
+        path: The accepted path, or None.
+        reason: One line that says why there is no path; "" if there is one.
+        seconds: Wall time of all attempts together [s].
+        totals: Counts, added up over all attempts.
+        error: The error that broke the planner, or None.
 
     Args:
-        problem: What to solve.
-        planner: Solves it.
-        request: Options, proofs, clearance, restarts; and the budget, if there is no other.
-        budget: Of this turn, in place of the request's.
+        problem: The problem to solve.
+        planner: The planner that solves it.
+        request: Options, proofs, clearance and restarts; its budget holds unless ``budget`` is given.
+        budget: Budget of this turn in place of the request's.
     """
 
     def __init__(self, problem: Problem, planner: NamedPlanner, request: Request, budget: Budget | None = None) -> None:
@@ -155,17 +156,21 @@ class Turn:
             traits,
             request,
             seeds,
-            seconds_left=lambda: self.budget.left,  # of the budget of that moment: `rows` and `take` put others here
+            # Reads the attribute at each call, because `rows` and `take` replace the budget.
+            seconds_left=lambda: self.budget.left,
         )
         self._check = SecondCheck(problem, planner, request, seed=seeds[0])
 
-        # what has come of the attempts so far
+        # Results of the attempts so far.
         self._num_attempts: dict[Kind, int] = dict.fromkeys(KINDS, 0)
-        self._motions_spent: dict[Kind, int] = dict.fromkeys(KINDS, 0)  # checked by attempts of a kind, see `take`
-        self._strict_problems: dict[bool, Problem] = {}  # by whether motions have to be proven
+        self._motions_spent: dict[Kind, int] = dict.fromkeys(KINDS, 0)  # checked motions, see `take`
+        self._strict_problems: dict[bool, Problem] = {}  # keyed by ``proving``
 
     def rows(self) -> Iterator[Row]:
-        """The table: attempts until there is a path, no time, or nothing better to be expected."""
+        """Yield the attempts until there is a path, the time is up, or no better result can be expected.
+
+        The caller must hand the outcome of each row to `take` before it asks for the next row.
+        """
         if self._problem.constraints:
             _refuse_if_it_breaks_constraints(self.planner)
         load_kernels_for(self._problem, self.planner.factory)
@@ -182,7 +187,7 @@ class Turn:
             if len(goals) == 0 and not self._goal_choice.planner_finds_goals:
                 if self._goal_choice.exhausted:
                     return
-                continue  # a round of inverse kinematics in vain counts as an attempt
+                continue  # a fruitless round of inverse kinematics counts too
 
             if number == 0:
                 yield from self._quick(goals)
@@ -191,7 +196,10 @@ class Turn:
             yield self._strict(number, goals) or self._plain(number, goals)
 
     def take(self, row: Row, outcome: Attempt) -> None:
-        """Count what has come of an attempt, and keep its path if the second check accepts it."""
+        """Add up the counts of an attempt, and keep its path if the second check accepts it.
+
+        Updates `totals`, `path` and, without the time spent on counting vertices and edges, `budget`.
+        """
         if outcome.counting:
             self.budget = self.budget.put_off(outcome.counting)
         for key, value in outcome.statistics.items():
@@ -200,13 +208,14 @@ class Turn:
 
         self._num_attempts[row.kind] += 1
         self._motions_spent[row.kind] += int(outcome.statistics.get("checked_motions", 0))
-        self._motions_spent[row.kind] += EFFORT_ITERATIONS * MOTIONS_PER_ITERATION  # what an attempt costs beside
+        # Each attempt also has a fixed cost beyond the motions that it checks.
+        self._motions_spent[row.kind] += EFFORT_ITERATIONS * MOTIONS_PER_ITERATION
 
         self.path = self._check.accept(outcome)  # None: another attempt follows
         self.totals["rejected"] = self._check.num_rejected
 
     def finish(self) -> None:
-        """Say how long the attempts took and, where none was accepted, fall back on the best path, or say why not."""
+        """Set the time taken and, if no path was accepted, set the best path so far or the reason why there is none."""
         self.seconds = self.budget.elapsed
         if self.error is not None or self.path is not None:
             return
@@ -223,7 +232,7 @@ class Turn:
             self.reason = f"no path within {self.budget.seconds:g} s of wall time ({tried}; the last one: {last})"
 
     def plan(self) -> Plan:
-        """What has come of the turn."""
+        """Return the result of the turn as a `Plan`."""
         return Plan(
             self.path is not None,
             self.path,
@@ -259,7 +268,10 @@ class Turn:
         return self.budget.over() or no_iterations_left
 
     def _best_will_do(self) -> bool:
-        """Whether the best path that is not proven with the clearance wanted will do: others came to no more."""
+        """Check whether to settle for the best path although it is not proven with the clearance wanted.
+
+        That is so if its ends cannot be proven free, or if many further attempts have found no better path.
+        """
         best = self._check.best
         if best is None:
             return False
@@ -267,12 +279,16 @@ class Turn:
         return self._check.cannot_improve or self._check.num_unproven > max_rounds
 
     def _goal_is_unreachable(self) -> bool:
-        """Whether path constraints keep start and goal apart, as far as the planner sees."""
+        """Check whether path constraints seem to separate start and goal, as the planner has reported."""
         times_seen = self.totals.get("separated", 0)
         return times_seen > 0 and (self._goal_choice.exhausted or times_seen > SEPARATED)
 
     def _quick(self, goals: Matrix) -> list[Row]:
-        """A brief attempt on what the kernels can prove; none where they cannot prove an end."""
+        """Return a brief attempt with the kernels alone, or none where they cannot prove the start and a goal free.
+
+        Returns:
+            A list of one row, or an empty list.
+        """
         if not self._traits.supports_iteration_limit or self._problem.world.accuracy != "exact":
             return []
         if self._goal_choice.planner_finds_goals and not self._traits.kernels:
@@ -288,7 +304,12 @@ class Turn:
         return [Row("quick", conservative, goals, self._budget(0, effort=1), checked=True)]
 
     def _strict(self, number: int, goals: Matrix) -> Row | None:
-        """An attempt with room to spare; None if it is not due, or no goal configuration has that room."""
+        """Return an attempt with room beyond the clearance; None if none is due or no goal configuration has that room.
+
+        Args:
+            number: Number of the attempt, from 0.
+            goals: Its goal configurations, shape (k, dof).
+        """
         if not self._strict_is_due(number):
             return None
 
@@ -307,7 +328,11 @@ class Turn:
         return Row("strict", strict_problem, roomy, self._budget(number, effort, share))
 
     def _strict_is_due(self, number: int) -> bool:
-        """Whether the next attempt is strict: half of the effort goes to these, from the first unproven path on."""
+        """Check whether the next attempt is a strict one.
+
+        After the first path that is valid but not proven, strict attempts get half of the effort, counted in checked
+        motions.
+        """
         if not self._check.wants_proofs or self._traits.leaves_room:
             return False
         if self._traits.anytime and number == 0 and len(self._seeds) > 1:
@@ -319,15 +344,16 @@ class Turn:
         return self._motions_spent["strict"] < self._motions_spent["plain"]
 
     def _plain(self, number: int, goals: Matrix) -> Row:
-        """An attempt with exact checks."""
+        """Return an attempt whose motions are checked exactly."""
         dense = self._traits.anytime or self._check.num_rejected
         problem = densely_checked(self._problem) if dense else self._problem
-        checked = problem.world.accuracy == "exact"  # by the problem and by the search for goals
+        # The problem has checked its start, and the search for goals the goal configurations.
+        checked = problem.world.accuracy == "exact"
         budget = self._budget(number, self._plain_effort(number), self._share(number))
         return Row("plain", problem, goals, budget, checked)
 
     def _plain_effort(self, number: int) -> int | None:
-        """How much an attempt may try, in units of `EFFORT_ITERATIONS`; None for as much as there is time for."""
+        """Return the effort of a plain attempt in units of `EFFORT_ITERATIONS`; None if only time limits it."""
         if not self._traits.supports_iteration_limit:
             return None
         if self._goal_choice.is_short_way(number):
@@ -335,13 +361,20 @@ class Turn:
         return 2**number if self._goal_choice.changes_after(number) else None
 
     def _share(self, number: int) -> float:
-        """The share of time and iterations left for an attempt: half for the short way round, before the long one."""
+        """Return the share of the remaining time and iterations for an attempt.
+
+        An attempt that goes the short way round gets half, so that the long way can be tried after it.
+        """
         return 0.5 if self._goal_choice.is_short_way(number) else 1.0
 
     def _budget(self, number: int, effort: int | None, share: float = 1.0) -> Budget:
-        """The budget of one attempt: a share of the time, and iterations by its effort, as far as there are any left.
+        """Return the budget of one attempt: a share of the time left, and iterations by its effort.
 
-        An ``effort`` of None sets no limit of iterations but that of all attempts together.
+        Args:
+            number: Number of the attempt, which selects its seed.
+            effort: In units of `EFFORT_ITERATIONS`, as far as any are left; None sets no limit but that of all attempts
+                together.
+            share: Share of the time left.
         """
         iterations_left = self._iterations_left()
         if iterations_left is not None:
@@ -352,14 +385,17 @@ class Turn:
         return Budget(self._seeds[number], seconds, iterations, self.budget.stop)
 
     def _iterations_left(self) -> int | None:
-        """Of all attempts together; None without a limit, or where the planner knows none."""
+        """Return how many iterations all attempts together have left; None if there is no limit.
+
+        A planner that does not count iterations has no limit either.
+        """
         if self.budget.iterations is None or not self._traits.supports_iteration_limit:
             return None
         return self.budget.iterations - int(self.totals.get("iterations", 0))
 
 
 def load_kernels_for(problem: Problem, factory: PlannerFactory) -> None:
-    """Load what the search will use: compiling it for the first time is no part of planning."""
+    """Load the kernels that the search will use, so that compiling them does not count as planning time."""
     if problem.goal.q is None:
         load_kernels(problem.robot)
     if problem.world.fast is not None or problem.constraints:
@@ -367,7 +403,7 @@ def load_kernels_for(problem: Problem, factory: PlannerFactory) -> None:
 
 
 def _refuse_if_it_breaks_constraints(planner: NamedPlanner) -> None:
-    """Refuse a planner whose paths would leave the regions of a problem's path constraints."""
+    """Raise an InputError if the paths of a planner may leave the regions of the problem's path constraints."""
     traits = traits_of(planner.factory)
     if traits.keeps_constraints:
         return
@@ -377,7 +413,7 @@ def _refuse_if_it_breaks_constraints(planner: NamedPlanner) -> None:
 
 
 def _starts_at_goal(problem: Problem) -> bool:
-    """Whether the start is the goal, to the bit if that is a configuration; a `Problem` has checked its start."""
+    """Check whether the start is at the goal; goal joint values have to be equal to the last bit."""
     if problem.goal.q is not None:
         return bool((problem.start == problem.goal.q).all())
     return problem.reached(problem.start)

@@ -1,13 +1,12 @@
-"""Generated problems for any arm: a posture to be reached, obstacles of a family around it, and a start far from it.
+"""Generated problems for any arm: a goal posture, obstacles of a family around it, and a start far from it.
 
-A problem is kept if it is worth planning: the straight motion collides, no order of moving every joint once is free,
-and a path is known to exist, because a planner found one within a number of iterations (a limit of time would make the
-problem depend on the machine). These planners are those whose class has the trait ``proof_iterations``.
+A problem is kept if it is worth planning: the straight motion collides, moving each joint once is not free in any
+order, and a planner finds a path within a number of iterations. (A limit of time would make the problem depend on the
+machine.) These planners are those whose class has the trait ``proof_iterations``.
 
-What is built around the posture is the business of the families. A builder is given the place of the tip: x is the way
-that the forearm points, z lies as near as can be to the axis of the first joint. All sizes are shares of the arm's
-reach, so that one builder serves arms of any size; an arm that is thick, or whose wrist stands off to one side, is
-given more room beside the way of its forearm.
+Each family has a builder of obstacles. A builder works in a frame at the tip: x points along the forearm, z is as near
+as possible to the axis of the first joint. All sizes are shares of the arm's reach, so that one builder serves arms of
+any size. An arm that is thick, or whose wrist is offset to one side, is given more room beside its forearm.
 """
 
 from __future__ import annotations
@@ -32,33 +31,33 @@ from rrtik_ompl.planning.plan import plan
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
 
-POSTURES = 512  # drawn at a time
-DRAWS = 300  # of scenes, before a seed is given up
-SPACE_PER_DRAW = 0.01  # more room with every draw
-STARTS = 2  # tried in a scene
+POSTURES = 512  # random postures drawn at a time
+DRAWS = 300  # scenes tried before a seed is given up
+SPACE_PER_DRAW = 0.01  # growth of the spacing with every scene
+STARTS = 2  # starts tried in each scene
 MIN_DISTANCE, MAX_DISTANCE = 0.4, 0.85  # of a goal's tip from the base, in reaches
 MIN_HEIGHT = -0.25  # of a goal's tip above the base, in reaches
 AWAY = 0.3  # the tip's least distance between start and goal, in reaches
-OUTWARD = 0.3  # cosine of the forearm's angle to the way out, at least
+OUTWARD = 0.3  # least cosine of the angle between the forearm and the direction away from the base
 PATIENCE = 60.0  # [s], never used up
 
 Solids: TypeAlias = list[tuple[Shape, Any]]  # shapes and their poses in the frame of the place, in shares of the reach
-Builder: TypeAlias = Callable[[np.random.Generator, float], Solids]  # of a random stream and the spacing: 1 or more
+Builder: TypeAlias = Callable[[np.random.Generator, float], Solids]  # takes a random stream and the spacing, 1 or more
 
 THICKNESS = 0.03  # of boards and plates
 BARS = 0.02  # half the thickness of a frame's bars
 CLUTTER = 25  # solids
-FREE_AROUND = 0.09  # pipes leave so much room about the way of the forearm
+FREE_AROUND = 0.09  # room that pipes leave on both sides of the forearm
 
 
 def generated_problem(robot: Robot, family: str, seed: int, *, motion_resolution: float = MOTION_RESOLUTION) -> Problem:
-    """A problem that has a solution and is not trivial; the same arguments give the same problem.
+    """Return a problem that has a solution and is not trivial; the same arguments give the same problem.
 
     Args:
         robot: Any arm.
         family: One of FAMILIES: panel, pipes, frame, slot_along, slot_across, clutter.
         seed: Number of the problem in its family, at least 0.
-        motion_resolution: Of its world [m].
+        motion_resolution: Motion resolution of its world [m].
 
     Raises:
         UnknownNameError: If there is no such family.
@@ -88,19 +87,19 @@ def generated_problem(robot: Robot, family: str, seed: int, *, motion_resolution
 
 
 def _reach(robot: Robot) -> float:
-    """The farthest tip of many random postures from the base [m]."""
+    """Return the greatest distance of the tip from the base among many random postures [m]."""
     tips = robot.fk_batch(_postures(robot, 4 * POSTURES, np.random.default_rng(0)))[:, :3, 3]
     return float(np.linalg.norm(tips - _base(robot), axis=1).max())
 
 
 def _base(robot: Robot) -> Vector:
-    """Where the first joint is."""
+    """Return the position of the first joint [m], shape (3,)."""
     place: Vector = robot.joint_frames(np.zeros(robot.dof))[0, 1, :3, 3]
     return place
 
 
 def _postures(robot: Robot, count: int, rng: np.random.Generator) -> Matrix:
-    """Random configurations within half a turn of zero and within the limits, shape (count, dof)."""
+    """Draw random configurations within the limits, and within half a turn of zero, shape (count, dof)."""
     lower, upper = robot.finite_range()
     turning = ~robot.prismatic & (lower < np.pi) & (upper > -np.pi)
     lower = np.where(turning, np.maximum(lower, -np.pi), lower)
@@ -109,7 +108,11 @@ def _postures(robot: Robot, count: int, rng: np.random.Generator) -> Matrix:
 
 
 def _goals(empty_world: World, reach: float, rng: np.random.Generator) -> Iterator[tuple[Vector, Any]]:
-    """Postures in which the forearm points outwards, and the place of the tip; see the families. Without end."""
+    """Yield free postures whose forearm points outwards, each with the frame of the tip; never ends.
+
+    Yields:
+        A configuration, shape (dof,), and the ``pinocchio.SE3`` frame in which the obstacles are built.
+    """
     robot = empty_world.robot
     base = _base(robot)
     while True:
@@ -131,7 +134,10 @@ def _goals(empty_world: World, reach: float, rng: np.random.Generator) -> Iterat
 
 
 def _axes(forward: Vector, upward: Vector) -> Matrix:
-    """Axes of a place: x forward, z as near as can be to upward (to anything else if that lies forward too)."""
+    """Return the axes of a frame as columns, shape (3, 3): x forward, z as near as possible to ``upward``.
+
+    If ``upward`` is almost parallel to ``forward``, the coordinate axis farthest from ``forward`` takes its place.
+    """
     x = forward / np.linalg.norm(forward)
     if np.linalg.norm(np.cross(upward, x)) < 0.1:
         upward = np.eye(3)[int(np.abs(x).argmin())]
@@ -141,7 +147,12 @@ def _axes(forward: Vector, upward: Vector) -> Matrix:
 
 
 def _starts(world: World, goal: Vector, reach: float, rng: np.random.Generator) -> list[Vector]:
-    """Free configurations far from the goal from which no easy motion leads there; none if the goal is not free."""
+    """Draw free configurations far from the goal from which no simple motion leads to it.
+
+    Returns:
+        At most `STARTS` configurations whose straight motion and single-joint moves to the goal all collide; none if
+        the goal is not free.
+    """
     if not world.valid(goal) or not world.certify(goal[None])[0]:
         return []
     rows = _postures(world.robot, POSTURES, rng)
@@ -155,7 +166,7 @@ def _starts(world: World, goal: Vector, reach: float, rng: np.random.Generator) 
 
 
 def _solvable(problem: Problem) -> bool:
-    """Whether one of the planners that prove it finds a path."""
+    """Check whether one of the planners of `_proofs` finds a path."""
     return any(
         plan(
             problem,
@@ -172,7 +183,7 @@ def _solvable(problem: Problem) -> bool:
 
 @cache
 def _proofs() -> tuple[tuple[str, int], ...]:
-    """The planners that prove that a problem has a solution, and their iterations; the most first.
+    """Return the planners that prove problems solvable, with their numbers of iterations, largest number first.
 
     Raises:
         InputError: If no package offers one.
@@ -185,13 +196,13 @@ def _proofs() -> tuple[tuple[str, int], ...]:
 
 
 def _board(low: tuple[float, float, float], high: tuple[float, float, float]) -> tuple[Shape, Any]:
-    """A box from one corner to the other."""
+    """Return a box with two opposite corners given, and its pose."""
     corners = np.array([low, high])
     return Box(corners[1] - corners[0]), pin.SE3(np.eye(3), corners.mean(axis=0))
 
 
 def panel(rng: np.random.Generator, spacing: float) -> Solids:
-    """A board behind the tip with a shelf below it, a wall on one side, and knobs; after the subsea panel."""
+    """Build a board behind the tip with a shelf below it, a wall on one side, and knobs, like a subsea panel."""
     gap = rng.uniform(0.04, 0.08)
     width = rng.uniform(0.3, 0.5)
     up = rng.uniform(0.2, 0.4)
@@ -216,7 +227,7 @@ def panel(rng: np.random.Generator, spacing: float) -> Solids:
 
 
 def pipes(rng: np.random.Generator, spacing: float) -> Solids:
-    """Upright and level pipes around the way of the forearm."""
+    """Build vertical and horizontal pipes on both sides of the forearm."""
     solids: Solids = []
     for number in range(rng.integers(6, 11)):
         x = rng.uniform(-0.4, 0.15)
@@ -230,7 +241,7 @@ def pipes(rng: np.random.Generator, spacing: float) -> Solids:
 
 
 def frame(rng: np.random.Generator, spacing: float) -> Solids:
-    """Two windows of bars one behind the other, joined by four rails; the forearm reaches through the first."""
+    """Build two windows of bars one behind the other, joined by four rails; the forearm passes through the first."""
     half = spacing * rng.uniform(0.12, 0.2, 2)
     front = -rng.uniform(0.08, 0.2)
     back = rng.uniform(0.1, 0.2)
@@ -253,7 +264,7 @@ def _beam(centre: tuple[float, float, float], half: tuple[float, float, float]) 
 
 
 def _slot(rng: np.random.Generator, spacing: float, roll: float) -> Solids:
-    """Two plates with the forearm between them, turned about its way."""
+    """Build two plates with the forearm between them, rotated by ``roll`` [rad] about the forearm."""
     gap = spacing * rng.uniform(0.065, 0.09)
     front = -rng.uniform(0.15, 0.3)
     back = rng.uniform(0.05, 0.1)
@@ -268,17 +279,17 @@ def _slot(rng: np.random.Generator, spacing: float, roll: float) -> Solids:
 
 
 def slot_along(rng: np.random.Generator, spacing: float) -> Solids:
-    """A narrow slot that the axis of the first joint lies along: the other joints move in it one at a time."""
+    """Build a narrow slot parallel to the axis of the first joint: the other joints can move in it one at a time."""
     return _slot(rng, spacing, 0.0)
 
 
 def slot_across(rng: np.random.Generator, spacing: float) -> Solids:
-    """A narrow slot askew to the joints' axes: to stay in it, several joints must move in turns."""
+    """Build a narrow slot oblique to the joint axes: to stay in it, several joints must move alternately."""
     return _slot(rng, spacing, rng.choice([-1.0, 1.0]) * rng.uniform(0.5, 1.1))
 
 
 def clutter(rng: np.random.Generator, spacing: float) -> Solids:
-    """Boxes, cylinders and balls of many sizes, some near the tip and some far."""
+    """Build boxes, cylinders and spheres of many sizes, some near the tip and some far."""
     solids: Solids = []
     for _ in range(CLUTTER):
         kind = rng.integers(3)
@@ -306,14 +317,14 @@ FAMILIES: Mapping[str, Builder] = MappingProxyType(
 def obstacles(
     family: str, rng: np.random.Generator, place: pin.SE3, reach: float, spacing: float = 1.0
 ) -> tuple[Obstacle, ...]:
-    """Obstacles of a family around a place.
+    """Build the obstacles of a family around a place.
 
     Args:
         family: One of FAMILIES.
-        rng: Of all sizes.
-        place: ``pinocchio.SE3``; see the head of this module.
-        reach: Of the arm [m].
-        spacing: Beside the forearm, as a factor of the usual.
+        rng: Random stream of all sizes.
+        place: Frame at the tip, a ``pinocchio.SE3``; see the head of this module.
+        reach: Reach of the arm [m].
+        spacing: Factor of the free space beside the forearm.
     """
     found = []
     for number, (shape, pose) in enumerate(FAMILIES[family](rng, spacing), start=1):
@@ -323,5 +334,5 @@ def obstacles(
 
 
 def _scaled(shape: Shape, factor: float) -> Shape:
-    """The same shape in another size; all measures of those above are lengths."""
+    """Return a shape with all its measures, which are lengths, multiplied by a factor."""
     return type(shape)(**{measure.name: factor * getattr(shape, measure.name) for measure in shape.measures})

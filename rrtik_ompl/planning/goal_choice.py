@@ -1,4 +1,4 @@
-"""Which configurations at the goal the attempts of a planner search to."""
+"""The choice of the goal configurations that each attempt of a planner searches to."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from rrtik_ompl.world.problem import Problem
 class GoalChoice:
     """The goal configurations of each attempt of a planner; attempts are counted from 0.
 
-    Args:
-        problem: What is solved.
-        traits: Of the planner.
-        request: Its clearance is kept where there are configurations that do.
-        seeds: Of all attempts that there may be; the first one is that of inverse kinematics too.
-        seconds_left: How long there is time [s].
-
     Attributes:
-        planner_finds_goals: Whether the planner finds configurations at the goal by itself: it is given none.
+        planner_finds_goals: Whether the planner finds goal configurations itself, so that it is given none.
+
+    Args:
+        problem: The problem that is solved.
+        traits: Traits of the planner.
+        request: Configurations that keep its clearance are preferred.
+        seeds: Seeds of all attempts that there may be; the first one also seeds inverse kinematics.
+        seconds_left: Returns the remaining time [s].
     """
 
     def __init__(
@@ -53,14 +53,14 @@ class GoalChoice:
 
     @property
     def reason(self) -> str:
-        """Why there is no configuration, in a line; "" if there is one."""
+        """One line that says why there is no goal configuration; "" if there is one."""
         return self._search.reason
 
     def of(self, attempt: int) -> Matrix:
-        """The goal configurations of an attempt: all that are known, shape (k, dof).
+        """Return the known goal configurations for an attempt, shape (k, dof); may search for more of them.
 
-        Some planners take the first row alone. So the newest ones come first or, if there is nothing new, at each
-        attempt another one does.
+        Some planners use the first row only. The order of the rows therefore changes: configurations that are new come
+        first; if there are none, the rows are rotated so that each attempt begins with another one.
         """
         if self.planner_finds_goals:
             return np.zeros((0, self._problem.robot.dof))
@@ -70,7 +70,8 @@ class GoalChoice:
         kept = self._find_with_clearance()
         rows = self._search.rows[kept]
         if self.is_short_way(attempt):
-            return rows[:1]  # the goal as it is given; in the others a joint goes the other way round
+            # The first row is the goal as it is given. In the other rows a joint turns the other way round.
+            return rows[:1]
 
         num_known_kept = int(np.count_nonzero(kept[:num_known]))
         has_new = found_more and num_known_kept < len(rows)
@@ -78,19 +79,20 @@ class GoalChoice:
         return np.roll(rows, -first, axis=0) if first else rows
 
     def is_short_way(self, attempt: int) -> bool:
-        """Whether an attempt goes the short way round alone."""
+        """Check whether an attempt may turn continuous joints the short way round only."""
         return self._has_long_way and attempt == 0
 
     def changes_after(self, attempt: int) -> bool:
-        """Whether later attempts would have other goal configurations than this one."""
+        """Check whether later attempts would have other goal configurations than this one."""
         if self.planner_finds_goals or attempt == self._max_attempts - 1:
             return False
         return not self._search.exhausted or (self._one_goal and attempt + 1 < len(self._search.rows))
 
     def _find_with_clearance(self) -> Mask:
-        """Which known configurations are searched to: of a goal of the tip, those that keep the clearance if any does.
+        """Return a mask of the known goal configurations to search to, shape (k,).
 
-        Searches for more of them, round after round, until one does.
+        For a goal of the tip with a clearance wanted, these are the configurations that keep the clearance. More are
+        searched for, round after round, until one does; if none does, all are selected.
         """
         rows = self._search.first()
         if self._clearance is None or self._goal_in_joints:

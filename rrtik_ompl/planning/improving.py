@@ -1,9 +1,9 @@
-"""Paths that go on getting shorter: plan again, shorten, keep the best, until the time is up or nothing is gained.
+"""Improvement of paths: plan again, shorten, and keep the best path until the time is up or nothing is gained.
 
-New seeds lead past obstacles on other sides, which shortening alone never does. Most of them are not worth much work:
-each new path is shortened for a moment, and of a few such paths only the best one for as long as it takes.
+Plans with new seeds pass obstacles on other sides, which shortening alone cannot do. Most of them are worth little
+work: each new path is shortened briefly, and only the best of a few such paths is shortened until it stops improving.
 
-What is made small is a cost of a path (`COSTS`), of which :func:`least_cost` says what no path of a problem costs less.
+The quantity that is minimized is a cost of a path (`COSTS`); :func:`least_cost` is a lower bound of it for a problem.
 """
 
 from __future__ import annotations
@@ -34,16 +34,16 @@ from rrtik_ompl.world.clearance_curve import distances_at, places_along
 from rrtik_ompl.world.clearances import possible_clearance
 from rrtik_ompl.world.problem import Problem
 
-LEAST_SECONDS = 1e-3  # for which another round is begun
-PLANS = 4  # of which the best is shortened further, if it is worth it
-BOUND_OPTION = "bound"  # of planners that can be told how long a path may be
-PATIENCE = 60  # plans of which nothing is gained, after which the search has converged
-GAIN = 1e-4  # of the cost, below which nothing is gained
-QUICK_CHECKS = 120  # motions that are checked to see what a path is worth; some 3 ms
-WORTH = 1.2  # times the cost of the best path, above which one is not shortened further
-SETTLED = 1e-2  # of the cost, gained less than which a path is not shortened again
-BOUND = 1.5  # times the length of the best path are further ones to stay below, before they are shortened
-BOUNDED_SAMPLES = 3000  # that are drawn to find one
+LEAST_SECONDS = 1e-3  # [s] least time left for another round
+PLANS = 4  # plans in a group, the best of which is shortened further
+BOUND_OPTION = "bound"  # option of planners that accept an upper bound of the path length
+PATIENCE = 60  # plans in a row without a gain, after which the search has converged
+GAIN = 1e-4  # share of the cost that counts as a gain
+QUICK_CHECKS = 120  # motions checked while a new path is shortened briefly; about 3 ms
+WORTH = 1.2  # paths of more than this times the best cost are not shortened further
+SETTLED = 1e-2  # a path is shortened again only if this share of its cost was gained
+BOUND = 1.5  # limit of the length of further plans, in lengths of the best path
+BOUNDED_SAMPLES = 3000  # samples of such a bounded plan
 
 NEAREST = 1e-3  # [m] clearances below this cost no more
 DOUBLE = 0.05  # [m] the clearance at which a piece of a path counts double
@@ -52,26 +52,26 @@ PathCost: TypeAlias = Callable[[JointPath, Problem], float]
 
 
 def improved(problem: Problem, first: Plan, planner: NamedPlanner, request: Request, how: Improvement) -> Plan:
-    """The best of many plans, each shortened.
+    """Improve a path by further plans, each shortened, and return the first plan with the best path.
 
     Args:
-        problem: What was planned.
+        problem: The problem that was planned.
         first: A plan that found a path.
-        planner: Makes the further ones.
-        request: That of the first plan; the work ends when its time is up.
-        how: What is to be made small, for how long, and by what.
+        planner: The planner that makes the further plans.
+        request: The request of the first plan; the work ends when its time is up.
+        how: Objective, time limit and strategy.
 
     Returns:
-        The first plan with the best path, which is proven if the first one is. Its statistics have ``cost_over_time``,
-        rows of seconds since the beginning and the cost then, ``improving_rounds``, and ``length_bound`` (of other
-        objectives ``cost_bound``) where the goal is in joint values: no path costs less. Ctrl-C ends the work, not the
-        plan.
+        The first plan with the best path, which is proven if the first one is. Its statistics also have
+        ``cost_over_time``, rows of seconds since the beginning and the cost at that time, and ``improving_rounds``. If
+        the goal is in joint values they have a lower bound of the cost too: ``length_bound``, or ``cost_bound`` for the
+        other objectives. Ctrl-C ends the improvement and returns the best path so far.
 
     Raises:
         InputError: If the objective cannot be computed for the robot.
     """
     work = _Work(problem, first, planner, request, how)
-    with suppress(KeyboardInterrupt):  # what was found by then is the answer
+    with suppress(KeyboardInterrupt):  # the best path so far is the result
         work.run()
 
     name = "length_bound" if how.objective == "length" else "cost_bound"
@@ -83,14 +83,14 @@ def improved(problem: Problem, first: Plan, planner: NamedPlanner, request: Requ
 
 
 class _Work:
-    """The rounds of plans and shortenings; ``best`` and ``course`` hold at any moment."""
+    """The rounds of planning and shortening; ``best`` and ``course`` are valid at any moment."""
 
     def __init__(
         self, problem: Problem, first: Plan, planner: NamedPlanner, request: Request, how: Improvement
     ) -> None:
         assert first.path is not None
 
-        # what was asked
+        # Arguments.
         self._problem = problem
         self._first = first
         self._planner = planner
@@ -102,7 +102,7 @@ class _Work:
         seconds = min(how.seconds, request.budget.seconds - first.seconds)
         self._budget = replace(request.budget, seconds=seconds).begun_now()
 
-        # what has come of it so far
+        # Results so far.
         self.best = first.path
         self.bound = least_cost(problem, how.objective)
         self.rounds = 0
@@ -112,11 +112,11 @@ class _Work:
         self._shortenings = 0
 
     def clock(self) -> float:
-        """Time since the first plan was begun [s]."""
+        """Return the time since the first plan was begun [s]."""
         return self._first.seconds + self._budget.elapsed
 
     def run(self) -> None:
-        """Go on until the time is up, nothing is gained any more, or the path costs as little as can be."""
+        """Plan and shorten until the time is up, nothing is gained any more, or the cost reaches its lower bound."""
         seeds = np.random.default_rng([self._request.budget.seed, 1])
         paths = [self._shortened(self.best, self._quick_checks)]
         while self._how.strategy == "restart-shorten" and self._rounds_without_gain < PATIENCE:
@@ -136,11 +136,14 @@ class _Work:
 
     @property
     def _quick_checks(self) -> int | None:
-        """Checks by which it is seen what a path is worth; ways to shorten single-joint moves know no such limit."""
+        """Number of checks for a brief shortening; None for single-joint moves, whose shortening has no such limit."""
         return None if self._one_joint else QUICK_CHECKS
 
     def _turn(self, seed: int) -> Turn:
-        """Another plan; by a planner that takes a bound, one whose path is not much longer than the best."""
+        """Return another turn of the planner.
+
+        If the planner takes a bound, its path must not be much longer than the best one.
+        """
         request = self._request
         if self._takes_bound:
             bound = BOUND * COSTS["length"](self.best, self._problem)
@@ -150,7 +153,7 @@ class _Work:
         return Turn(self._problem, self._planner, request, budget)
 
     def _shorten_further(self, path: JointPath) -> None:
-        """Shorten a path as long as that gains something, if it is worth it."""
+        """Shorten a path as long as that gains something; a path of much more than the best cost is left."""
         if self._one_joint or self._cost(path)[1] > WORTH * self._best_cost[1]:
             return
         before = np.inf
@@ -159,16 +162,21 @@ class _Work:
             path = self._shortened(path, None)
 
     def _is_done(self) -> bool:
-        """Whether the time is up, or the best path costs as little as can be."""
+        """Check whether the time is up, or the cost of the best path has reached its lower bound."""
         is_optimal = self._best_cost[1] <= self.bound * (1.0 + GAIN)
         return self._budget.left <= LEAST_SECONDS or is_optimal
 
     def _shortened(self, path: JointPath, checks: int | None) -> JointPath:
-        """A path after some work, kept if it is the best; as it was if there is no time, or it does not move."""
+        """Shorten a path, keep the result if it is the best, and return it.
+
+        Args:
+            path: Returned as it is if there is no time or the path does not move.
+            checks: Limit of checked motions; None for none.
+        """
         if self._budget.left <= LEAST_SECONDS or len(path.waypoints) < 2:
             return path
 
-        self._shortenings += 1  # each has random numbers of its own
+        self._shortenings += 1  # each shortening has its own random stream
         clearance = possible_clearance(self._problem.world, self._request.clearance, path.waypoints)
         budget = Budget(self._budget.seed + self._shortenings, iterations=checks, stop=self._budget.over)
         single = self._one_joint and path.one_joint_at_a_time
@@ -178,7 +186,10 @@ class _Work:
         return found
 
     def _keep_if_best(self, candidate: JointPath) -> None:
-        """Keep a path if it is the best: proven and of single-joint moves if the first one is."""
+        """Keep a path if it costs less than the best one.
+
+        It must be proven if the first path is, and consist of single-joint moves if the first path does.
+        """
         if self._one_joint and not candidate.one_joint_at_a_time:
             return
         if self._first.proven and not candidate.proven:
@@ -195,18 +206,23 @@ class _Work:
         self.course.append((self.clock(), cost[1]))
 
     def _cost(self, path: JointPath) -> tuple[int, float]:
-        """What is to be small: the number of moves, 0 unless they are single-joint moves, then the objective."""
+        """Return the cost of a path as a tuple that is compared in order.
+
+        Returns:
+            The number of moves, which is 0 unless the path must consist of single-joint moves, and the value of the
+            objective.
+        """
         num_moves = path.transitions if self._one_joint else 0
         return num_moves, COSTS[self._how.objective](path, self._problem)
 
 
 def length(path: JointPath, problem: Problem) -> float:
-    """Length in joint space, each joint's way multiplied by its weight [rad; m]."""
+    """Return the length of a path in joint space, each joint's way multiplied by its weight [rad; m]."""
     return route_length(path.waypoints * _weights(problem))
 
 
 def least_time(path: JointPath, problem: Problem) -> float:
-    """Time [s] that the robot needs at least: of each motion the slowest joint at its velocity limit.
+    """Return the least time that the robot needs for a path [s]: for each motion that of its slowest joint.
 
     Raises:
         InputError: If the robot has no velocity limit.
@@ -215,9 +231,9 @@ def least_time(path: JointPath, problem: Problem) -> float:
 
 
 def weighted_length(path: JointPath, problem: Problem) -> float:
-    """Weighted length in joint space, where each piece counts ``1 + 0.05 m / clearance`` times [rad; m].
+    """Return the weighted length of a path in which each piece counts ``1 + 0.05 m / clearance`` times [rad; m].
 
-    The clearance is proven at 240 places on the path, so the true one is no smaller.
+    The clearance is a proven lower bound at 240 places along the path.
     """
     rows = path.waypoints
     motions, shares, places = places_along(problem.world.checks, rows)
@@ -235,7 +251,10 @@ COSTS: Mapping[PathObjective, PathCost] = MappingProxyType(
 
 
 def least_cost(problem: Problem, objective: PathObjective) -> float:
-    """What no path costs less than: that of the straight motion to a goal in joint values; 0 for any other goal."""
+    """Return a lower bound of the cost of all paths of a problem.
+
+    For a goal in joint values it is the cost of the straight motion; for any other goal it is 0.
+    """
     q = problem.goal.q
     if q is None:
         return 0.0
@@ -246,12 +265,17 @@ def least_cost(problem: Problem, objective: PathObjective) -> float:
 
 
 def _weights(problem: Problem) -> Vector | float:
-    """How much each joint counts in lengths, shape (dof,); all alike where there are no weights."""
+    """Return the weight of each joint in lengths, shape (dof,); 1.0 if the robot has no weights."""
     return weights_of(problem.robot) if has_weights(problem) else 1.0
 
 
 def _seconds(motions: np.ndarray, robot: Robot) -> Vector:
-    """Least time of each motion, shapes (m, dof) and (m,)."""
+    """Return the least time of each motion [s], shape (m,).
+
+    Args:
+        motions: Differences of joint values, shape (m, dof).
+        robot: Its velocity limits hold.
+    """
     if not np.isfinite(robot.velocity).any():
         raise InputError(f"objective 'time': robot '{robot.name}' has no velocity limits; give them in its URDF")
     seconds: Vector = (np.abs(motions) / robot.velocity).max(axis=1, initial=0.0)

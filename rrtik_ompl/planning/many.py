@@ -1,9 +1,9 @@
-"""`plan_many()`: many queries in one world, by all cores of this machine.
+"""`plan_many()`: plan many queries in one world, on all cores of this machine.
 
-For each query `plan()` makes a brief attempt on what kernels prove, and accepts its path if all of it is proven with
-the clearance that its ends have. :func:`plans_together` does that for many queries in a few calls: the ends of all, and
-then the paths of all, go to the kernels together. A query that takes any other turn gets no plan there; `plan()` then
-does all of it.
+For each query `plan()` makes a brief attempt on what the kernels can prove, and accepts its path if all of it is proven
+with the clearance of its ends. :func:`plans_together` does this for many queries in a few calls: the ends of all
+queries, and then the paths of all queries, go to the kernels together. A query that needs any further step gets no plan
+there; `plan()` then plans it from the beginning.
 """
 
 from __future__ import annotations
@@ -57,22 +57,23 @@ def plan_many(
     proof: ProofMode = "preferred",
     threads: int | None = None,
 ) -> list[Plan]:
-    """Plans from starts to goals in one world, in threads; what is found does not depend on how many there are.
+    """Plan from starts to goals in one world, in threads; the paths do not depend on the number of threads.
 
     Args:
         world: Robot and scene.
-        starts: Shape (m, dof), or (dof,) for one start of all of them, rad or m.
+        starts: Shape (m, dof), or (dof,) for one start of all queries [rad; m].
         goals: Shape (m, dof), or m goals.
-        planner: As for :func:`rrtik_ompl.plan`. OMPL's, and those in Python of others, have one generator of random
-            numbers for all threads, so they do one query after the other.
-        seconds: Limit of wall time for each [s].
-        seed: Of all of them; the k-th query has a seed of its own that depends on this and k alone.
+        planner: As for :func:`rrtik_ompl.plan`. OMPL's planners, and third-party ones in Python, share one generator of
+            random numbers among all threads, so they plan one query after the other.
+        seconds: Limit of wall time for each query [s].
+        seed: Seed of all queries; the k-th query has a seed of its own that depends on this and k alone.
         parameters: Options of the planner.
         proof: As for :func:`rrtik_ompl.plan`.
-        threads: Queries at a time; as many as there are cores if None.
+        threads: Number of queries at a time; None for the number of cores.
 
     Returns:
-        One plan a query, in their order. A start or goal that cannot be used is the ``reason`` of a plan without path.
+        One plan for each query, in their order. If a start or goal cannot be used, the plan has no path, and its
+        ``reason`` says why.
 
     Raises:
         UnknownNameError: If there is no planner of that name.
@@ -107,7 +108,7 @@ def plan_many(
 
 
 def _goals(given: Ends, robot: Robot) -> list[Goal]:
-    """Goals as they are given, or rows of configurations as goals."""
+    """Return goals as they are given; rows of configurations, shape (m, dof), become joint goals."""
     if not isinstance(given, Sequence) or not all(isinstance(goal, Goal) for goal in given):
         rows: Any = given
         return [JointGoal(row) for row in finite_array(rows, (None, robot.dof), "goals")]
@@ -122,7 +123,14 @@ def _goals(given: Ends, robot: Robot) -> list[Goal]:
 def _batch(
     world: World, planner: str | None, request: Request, queries: Sequence[tuple[Vector, Goal, int]]
 ) -> list[Plan]:
-    """The plans of some queries: together as far as that goes, the others one after the other."""
+    """Plan some queries: together where that is possible, the others one after the other.
+
+    Args:
+        world: Where they are.
+        planner: Name of the planner; None for "auto".
+        request: What is asked for each query, but for the seed.
+        queries: Start, shape (dof,), goal and seed of each query.
+    """
     known: dict[int, Plan | None] = {}
     if planner is not None and not is_auto(planner) and request.proof != "off":
         joints = {k: Query(q, goal, seed) for k, (q, goal, seed) in enumerate(queries) if isinstance(goal, JointGoal)}
@@ -133,7 +141,7 @@ def _batch(
 
 
 def _planned(world: World, planner: str, request: Request, query: tuple[Vector, Goal, int]) -> Plan:
-    """The plan of one query."""
+    """Plan one query as `plan()` does; an unusable start or goal becomes the reason of a plan without path."""
     start, goal, seed = query
     try:
         problem = Problem(world, start, goal)
@@ -144,7 +152,7 @@ def _planned(world: World, planner: str, request: Request, query: tuple[Vector, 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Query:
-    """What is asked: a start, shape (dof,), a goal, and the seed of everything random."""
+    """One query: start configuration, shape (dof,), goal, and the seed of all random numbers."""
 
     start: Matrix
     goal: JointGoal
@@ -153,7 +161,7 @@ class Query:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Found:
-    """A path that a search has found, and its counts."""
+    """A path that a search has found, with the counts of the search."""
 
     query: Query
     path: JointPath
@@ -163,13 +171,17 @@ class _Found:
 def plans_together(
     world: World, planner: NamedPlanner, queries: Sequence[Query], request: Request
 ) -> list[Plan | None]:
-    """The plans of queries by one planner; None for each that is to be planned alone.
+    """Plan queries by one planner together; None for each query that `plan()` has to plan alone.
+
+    The steps are: select the queries whose start and goal the kernels prove free, determine the clearance of these
+    ends, search for each query, and prove all paths with the clearances of their ends. A query that fails a step gets
+    None.
 
     Args:
         world: Where they are.
-        planner: Searches for each.
-        queries: Configurations inside the limits, or not.
-        request: What is asked for each, but for the seed.
+        planner: The planner that searches for each.
+        queries: Their configurations may be outside the limits.
+        request: What is asked for each query, but for the seed.
     """
     plans: list[Plan | None] = [None] * len(queries)
     if not (queries and serves(world, planner.factory)):
@@ -192,7 +204,8 @@ def plans_together(
         query = found[k].query
         path = found[k].path.with_proof(proof)
         counts = {"attempts": 1, "rejected": 0, **found[k].counts}
-        counts["rejected"] = 0  # paths, whatever a planner counts by that name
+        # This counts rejected paths. Some planners count something else by that name.
+        counts["rejected"] = 0
         problem = known_problem(world, path.start, query.goal)
         plans[k] = Plan(
             True, path, "", seconds_per_query, planner.name, query.seed, MappingProxyType(counts), problem=problem
@@ -201,7 +214,7 @@ def plans_together(
 
 
 def serves(world: World, factory: PlannerFactory) -> bool:
-    """Whether queries may be planned together: by a planner of ours in an exact world whose kernels suffice."""
+    """Check whether queries may be planned together: by an array planner in an exact world whose kernels suffice."""
     robot = world.robot
     kernels_suffice = type(world) is World and world.accuracy == "exact" and world.fast is not None
     joints_are_bounded = bool(np.isfinite([robot.lower, robot.upper]).all()) and not robot.continuous.any()
@@ -210,7 +223,12 @@ def serves(world: World, factory: PlannerFactory) -> bool:
 
 
 def _usable(world: World, ends: Matrix) -> Mask:
-    """Which starts and goals, shape (m, 2, dof), are two configurations inside the limits that kernels prove free."""
+    """Return which queries have two different ends inside the limits that the kernels prove free, shape (m,).
+
+    Args:
+        world: Robot and scene.
+        ends: Start and goal of each query, shape (m, 2, dof).
+    """
     rows = ends.reshape(-1, world.robot.dof)
     inside_limits: Mask = np.logical_and.reduce((rows >= world.robot.lower) & (rows <= world.robot.upper), axis=1)
     conservative = form_of(world, accuracy="conservative")
@@ -226,14 +244,20 @@ class SolvesEach(Protocol):
     def solve_each(
         self, ends: Matrix, seeds: Sequence[int], bounds: tuple[Vector, Vector]
     ) -> Sequence[SearchResult | None]:
-        """What `SafePlanner.solve_rows` does with each seed between free ends, shape (m, 2, dof), and its statistics.
+        """Search for each query as `SafePlanner.solve_rows` does, and return the results with their statistics.
 
-        None for those that are to be searched for one after the other.
+        Args:
+            ends: Free start and goal of each query, shape (m, 2, dof).
+            seeds: The seed of each query.
+            bounds: Lower and upper bounds of the joints, shapes (dof,).
+
+        Returns:
+            One result for each query; None for those that have to be searched for one after the other.
         """
 
 
 class _Searcher:
-    """One planner that searches for one query after the other."""
+    """One planner object that searches for many queries, reseeded for each of them."""
 
     def __init__(self, problem: Problem, planner: NamedPlanner, request: Request) -> None:
         self._robot = problem.world.robot
@@ -246,7 +270,7 @@ class _Searcher:
         self._planner: SafePlanner = safe_planner(planner.factory, planner.name, space, brief, 0, options)
 
     def paths(self, queries: Mapping[int, Query]) -> dict[int, _Found]:
-        """What the first attempts of `plan()` find, by the numbers of the queries."""
+        """Return the paths that the first attempts of `plan()` find, keyed by the numbers of the queries."""
         seeds = [attempt_seeds(query.seed, self._request.restarts)[0] for query in queries.values()]
         quick: Sequence[SearchResult | None] = [None] * len(seeds)
         if isinstance(self._planner, SolvesEach) and queries:
@@ -261,7 +285,7 @@ class _Searcher:
         return made
 
     def _search_one(self, query: Query, seed: int) -> SearchResult:
-        """What a search for one query finds."""
+        """Search for one query with its own seed."""
         reseed(self._planner, seed)
         ends = query.start[None], query.goal.q[None]
         budget = self._request.budget.begun_now()
@@ -269,7 +293,7 @@ class _Searcher:
         return SearchResult(rows, self._planner.statistics)
 
     def _checked_path(self, query: Query, result: SearchResult) -> _Found | None:
-        """What was found, if it is a path from the start to the goal."""
+        """Return a found path if it leads from the start to the goal of the query, else None."""
         if result.path is None:
             return None
         path = JointPath.of(self._robot, result.path)
@@ -279,7 +303,13 @@ class _Searcher:
 
 
 def _proofs(world: World, routes: Mapping[int, tuple[Matrix, Clearances | None]]) -> dict[int, Proof]:
-    """Proofs of those routes that are proven to keep what their ends do, by their numbers."""
+    """Return proofs of the routes that are proven free with the clearance of their ends, keyed by query.
+
+    Args:
+        world: Where the routes are.
+        routes: Waypoints, shape (k, dof), and clearances of the ends of each route, keyed by query. Routes with the
+            same clearance are proven in one call.
+    """
     proofs: dict[int, Proof] = {}
     clearances_wanted = {clearances.proven_clearance for _, clearances in routes.values() if clearances is not None}
     for clearance in sorted(clearances_wanted):

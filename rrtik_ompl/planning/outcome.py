@@ -1,4 +1,4 @@
-"""What `plan()` is asked for, and what it returns."""
+"""The request and the result of `plan()`: `Request`, `Improvement` and `Plan`."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ RESTARTS = 20
 
 @dataclass(frozen=True, slots=True)
 class NamedPlanner:
-    """A planner, and the name by which messages call it."""
+    """A planner class and the name by which messages call it."""
 
     name: str
     factory: PlannerFactory
@@ -27,14 +27,14 @@ class NamedPlanner:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Request:
-    """What `plan()` is asked for beside the problem and the planner; every value has been checked.
+    """Arguments of `plan()` other than the problem and the planner; every value has been checked.
 
     Attributes:
-        budget: Time, iterations of each planner, about, and the seed of everything random.
-        restarts: Further attempts at most.
+        budget: Time limit, approximate number of iterations of each planner, and the seed of all random numbers.
+        restarts: The largest number of further attempts.
         parameters: Options of the planner.
-        proof: Whether motions are to be proven.
-        clearance: To be kept from obstacles [m], or None.
+        proof: Whether motions have to be proven free.
+        clearance: Clearance to keep from obstacles [m], or None.
     """
 
     budget: Budget
@@ -46,12 +46,12 @@ class Request:
 
 @dataclass(frozen=True, slots=True)
 class Improvement:
-    """How a path is to be improved.
+    """How a path is to be improved after it was found.
 
     Attributes:
-        seconds: How much longer it may take [s].
-        objective: What is to be made small.
-        strategy: Whether further plans are made, or the first path alone is shortened.
+        seconds: Limit of the additional time [s].
+        objective: The cost that is minimized.
+        strategy: Whether the problem is planned again, or the first path alone is shortened.
     """
 
     seconds: float
@@ -61,23 +61,23 @@ class Improvement:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Plan:
-    """The outcome of planning.
+    """The result of planning.
 
     Attributes:
         found: Whether there is a path.
         path: The path, or None.
-        reason: A line that says why there is no path or, where not all of it is proven free, which two bodies are not
-            proven apart, where, and how far they are apart there (where obstacles move: as they stand at time 0); else
-            "".
-        seconds: Wall time of everything: planning, restarts and re-checks [s]; without what it took to count how
-            large an OMPL planner's graph has become.
+        reason: One line. Without a path it says why there is none. If the path is not proven free everywhere, it names
+            the first two bodies that are not proven apart, the place, and their distance there (moving obstacles as
+            they stand at time 0). Otherwise "".
+        seconds: Wall time of planning, restarts and re-checks [s], without the time it took to count the vertices and
+            edges of an OMPL planner's graph.
         planner: Name of the planner; with "auto" of the one that found the path, or that tried last.
         seed: The seed that repeats this plan.
-        statistics: Plain counts, added up over all attempts: attempts, rejected paths, and the planner's own. Those
-            that describe the path (``path_statistics`` of the planner's class) are the last attempt's. With
-            ``improve=`` also the course of the length.
-        member: Of a goal set, the number of the member that the path reaches, from 0; None for other goals.
-        problem: What was solved; None in a plan from another process, which is sent without it.
+        statistics: Counts added up over all attempts: attempts, rejected paths, and the planner's own. Statistics that
+            describe the path (``path_statistics`` of the planner's class) are those of the last attempt. With
+            ``improve=`` also the cost over time.
+        member: For a goal set, the index of the member that the path reaches, from 0; None for other goals.
+        problem: The problem that was solved; None in a plan that comes from another process, which is sent without it.
 
     Example:
         >>> plan = rrtik.plan(rrtik.load_problem("planar3_boxes"), seed=1)
@@ -104,7 +104,8 @@ class Plan:
             said = f"not proven free: {gaps[0]}" if gaps else ""
             if self.problem is not None and gaps:
                 said += as_it_stands(self.problem.world.scene)
-            if self.problem is not None or not (gaps and self.reason.startswith(said)):  # a copy knows no scene
+            # A copy has no scene to look at, so it keeps the reason of its original.
+            if self.problem is not None or not (gaps and self.reason.startswith(said)):
                 object.__setattr__(self, "reason", said)
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -112,5 +113,5 @@ class Plan:
 
     @property
     def proven(self) -> bool | None:
-        """Whether every motion of the path is proven free for its whole length; None without a path or a proof."""
+        """Whether all motions of the path are proven free for their whole length; None without a path or a proof."""
         return None if self.path is None or self.path.proof is None else self.path.proof.proven

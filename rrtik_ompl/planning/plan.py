@@ -1,4 +1,4 @@
-"""`plan()`: from a problem to a path that has been checked twice, or to the reason why there is none."""
+"""`plan()`: search for a path, check it twice, and return it or the reason why there is none."""
 
 from __future__ import annotations
 
@@ -47,44 +47,51 @@ def plan(
 ) -> Plan:
     """Find a collision-free path from the start to the goal of a problem.
 
-    A goal of the tip is first turned into free configurations by inverse kinematics, unless the planner finds them
-    itself. If it does not get to them with some effort, more are drawn and it is started anew with twice the effort
-    (see :class:`GoalSearch`).
+    A goal of the tip is first turned into collision-free goal configurations by inverse kinematics, unless the planner
+    finds such configurations itself. If the planner does not reach them within a bounded effort, more configurations
+    are drawn and the planner is started anew with twice the effort (see :class:`GoalSearch`).
 
-    The planner first relies on what the kernels can prove without coal, for a short while; where that finds no path its
-    motions are checked exactly. Either way a path is returned only if a second check agrees: its motions are proven
-    free for their whole length (:meth:`World.prove`), with a clearance. What is not proven gets a detour. Where none is
-    found, the planner is started anew with more room around obstacles. If that does not help in a few attempts, the
-    path is returned that is proven in most parts, the others checked in steps (:meth:`JointPath.violations`).
+    The search runs in three stages:
 
-    If a planner gives up before its time it is started anew with another random stream; if the second check rejects its
-    path, it is started anew and its motions are checked as densely as by the second check.
+    1. For a short while, the planner relies on what the kernels can prove without coal.
+    2. If that finds no path, the motions of the planner are checked exactly.
+    3. A second check examines every path. It accepts a path whose motions are proven free for their whole length, with
+       a clearance (:meth:`World.prove`). Motions that are not proven are replaced by detours. If there is no such
+       detour, the planner is started anew with more room around obstacles. If a few such attempts do not help, the path
+       with the fewest unproven motions is returned; these motions are checked in steps (:meth:`JointPath.violations`).
+
+    A planner that gives up before its time is up is started anew with another random stream. If the second check
+    rejects its path, it is started anew and its motions are checked as densely as by the second check.
 
     Args:
-        problem: What to solve.
-        planner: Name of one of :func:`list_planners` (``geometric::`` may stand before OMPL's names), or a planner
-            class that is built from a SpaceInformation alone. "auto" lets several search one after the other, until
-            one finds a path, and shortens that a little. None: what the problem names, or else "auto".
+        problem: The problem to solve.
+        planner: The name of one of :func:`list_planners` (``geometric::`` may stand before OMPL's names), or a planner
+            class that is built from a SpaceInformation alone. "auto" runs several planners one after the other until
+            one finds a path, and shortens that path a little. None stands for the planner that the problem names, or
+            else for "auto".
         seconds: Limit of wall time for all attempts together [s]; a busy machine gets less done in it.
-        seed: The same seed gives the same path, as long as the time limit does not cut in; drawn if None. PRM and
-            PRMstar work by the clock, so theirs may differ.
-        restarts: Further attempts at most.
-        parameters: Options of the planner; of OMPL's planners in snake case, such as ``range`` or ``goal_bias``.
-        accuracy: "exact", or "conservative" to leave it at what can be proven without coal: faster, and blind to narrow
-            passages. None: that of the problem's world.
-        proof: "preferred": see above. "required": no path is found unless all of it is proven. "off": motions are
-            checked, and nothing is said of proofs.
-        clearance: What the path keeps from every obstacle on top of its margin [m], if there is such a path. None:
-            1 mm, or what start and goal have. At a goal of the tip configurations that keep it are preferred.
-        improve: How long the path may go on getting better after it was found [s], within ``seconds``: further plans
-            with other seeds, each shortened, of which the best is kept. It ends when sixty of them in a row gain
-            nothing, or the path is as short as can be. ``statistics["cost_over_time"]`` has the course, rows of seconds
-            and cost, ``"length_bound"`` a length below which there is none. Ctrl-C ends it, and the best path so far is
-            returned. The clock decides how many plans are tried, so paths of a seed may differ.
-        objective: What ``improve`` makes small: "length" in joint space; "time", which the robot's velocity limits
-            allow at least; or "clearance", the length of which each piece counts more the nearer the arm is to
-            something, double at 5 cm. Paths are shortened in length all the same: the objective chooses among them.
-        strategy: Of ``improve``: "restart-shorten" as above, or "shorten", the first path alone.
+        seed: The same seed gives the same path, as long as the time limit does not cut in. None draws a seed. PRM and
+            PRMstar depend on the clock, so their paths may differ even with the same seed.
+        restarts: The largest number of further attempts.
+        parameters: Options of the planner; those of OMPL's planners in snake case, such as ``range`` or ``goal_bias``.
+        accuracy: "exact", or "conservative" to count as free only what can be proven without coal, which is faster but
+            misses narrow passages. None stands for the accuracy of the problem's world.
+        proof: "preferred" works as described above. "required" accepts a path only if all of it is proven. "off" checks
+            motions in steps and proves nothing.
+        clearance: The distance that the path keeps from every obstacle on top of its margin [m], if there is such a
+            path. None stands for 1 mm, or for the clearance of start and goal if that is less. For a goal of the tip,
+            goal configurations that keep the clearance are preferred.
+        improve: How long the path may be improved after it was found [s], within ``seconds``: the problem is planned
+            again with other seeds, each path is shortened, and the best one is kept. Improvement ends when sixty plans
+            in a row gain nothing, or when the path reaches the lower bound of its cost.
+            ``statistics["cost_over_time"]`` holds rows of seconds and cost, ``"length_bound"`` a lower bound of the
+            length of any path. Ctrl-C ends the improvement, and the best path so far is returned. The clock decides how
+            many plans are tried, so paths of the same seed may differ.
+        objective: The cost that ``improve`` minimizes: "length" is the length in joint space; "time" is the least time
+            that the robot's velocity limits allow; "clearance" is the length with each piece counted more the nearer
+            the arm is to a body, double at 5 cm. The objective only chooses among paths: each of them is still
+            shortened in length.
+        strategy: How ``improve`` works: "restart-shorten" as described above; "shorten" shortens the first path alone.
 
     Raises:
         UnknownNameError: If there is no planner, accuracy, objective or strategy of that name.
@@ -118,7 +125,7 @@ def plan(
 
 
 def time_limit(seconds: float) -> float:
-    """A limit of wall time [s], checked.
+    """Check a limit of wall time [s] and return it.
 
     Raises:
         InputError: If it is not positive, or more than OMPL's clock can bear.
@@ -130,7 +137,7 @@ def time_limit(seconds: float) -> float:
 
 
 def planned(problem: Problem, planner: str | PlannerFactory, request: Request, how: Improvement = NOT_IMPROVED) -> Plan:
-    """What :func:`plan` does with arguments that make sense.
+    """Plan as :func:`plan` does, with arguments that have been checked.
 
     Raises:
         UnknownNameError: If there is no planner of that name.
@@ -153,15 +160,20 @@ def planned(problem: Problem, planner: str | PlannerFactory, request: Request, h
 
 
 def plan_counted(problem: Problem, budget: Budget) -> Plan:
-    """A plan by "auto" that ends after the iterations of a budget, of each planner, about: no clock decides."""
+    """Plan with "auto", limited by iterations instead of the clock, so that the result depends on the seed alone.
+
+    Args:
+        problem: The problem to solve.
+        budget: Its seed, and the approximate number of iterations of each planner.
+    """
     return _found_by_portfolio(problem, Request(budget))
 
 
 def named_planner(planner: str | PlannerFactory) -> NamedPlanner:
-    """A planner with its name; of one that has a name alone, its class.
+    """Return a planner with its name; a name is looked up, a class goes by its own name.
 
     Raises:
-        UnknownNameError: If there is none of that name, as of "auto".
+        UnknownNameError: If there is no planner class of that name; "auto" has none.
     """
     if isinstance(planner, str):
         return NamedPlanner(planner, find_planner(planner))
@@ -169,7 +181,7 @@ def named_planner(planner: str | PlannerFactory) -> NamedPlanner:
 
 
 def _found_by_portfolio(problem: Problem, request: Request) -> Plan:
-    """What "auto" finds."""
+    """Plan with the portfolio of planners behind the name "auto"."""
     from rrtik_ompl.planning.portfolio import run_portfolio  # with shortening, which many plans do without
 
     return run_portfolio(problem, request)

@@ -1,4 +1,4 @@
-"""The planner "auto": planners that make up for each other's weaknesses, by turns, and a little shortening."""
+"""The planner "auto": planners with complementary strengths take turns, and the path found is shortened a little."""
 
 from __future__ import annotations
 
@@ -25,19 +25,19 @@ from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.proof import PROOF_KERNELS
 from rrtik_ompl.world.proven_motions import KERNELS as PROVEN_KERNELS
 
-SHARE = 0.5  # of the time left, for each planner but the last
-SHORTENING_CHECKS = 600  # motions, which take some 10 ms; a count, so that the same seed gives the same path
+SHARE = 0.5  # share of the time left for each planner but the last
+SHORTENING_CHECKS = 600  # motions, about 10 ms; a count, so that the result depends on the seed alone
 
 
 def run_portfolio(problem: Problem, request: Request) -> Plan:
-    """Let one planner after the other search until one finds a path, best a proven one, and shorten that.
+    """Let planners search one after the other until one finds a path, preferably a proven one, and shorten that path.
 
     Args:
-        problem: What to solve.
-        request: Time, seed and the rest; options of planners make no sense here.
+        problem: The problem to solve.
+        request: Time, seed and the rest; options of planners are refused.
 
     Returns:
-        The plan of the planner that found the path, with the time and the counts of all that tried.
+        The plan of the planner that found the path, with the time and the counts of all planners that tried.
 
     Raises:
         InputError: If there are options, or no package offers a planner for this.
@@ -62,9 +62,10 @@ def run_portfolio(problem: Problem, request: Request) -> Plan:
 
 
 def members(problem: Problem) -> tuple[str, ...]:
-    """Names of the planners that try a problem, in their order: those that seek the tip only if the goal is one.
+    """Return the names of the planners that try a problem, in their order.
 
-    With path constraints those that keep them.
+    Planners for a goal of the tip are included only if the goal is one. With path constraints only the planners that
+    keep them are included.
     """
     if problem.constraints:
         wanted = {"path constraints"}
@@ -76,14 +77,14 @@ def members(problem: Problem) -> tuple[str, ...]:
 
 
 def _load_kernels(problem: Problem) -> None:
-    """Load what the first planner and the shortening will use: the first time on a machine that takes a while."""
+    """Load the kernels of the first planner and of the shortening; compiling them takes a while once per machine."""
     if problem.world.fast is not None:
         first = [traits_of(find_planner(name)).kernels for name in members(problem)[:1]]
         load_together((*chain.from_iterable(first), PROOF_KERNELS, SHORTCUT_KERNELS, PROVEN_KERNELS, TAUT_KERNELS))
 
 
 def _turns(problem: Problem, request: Request) -> Iterator[Turn]:
-    """The turns of the planners, each with a share of the time that is left then, as long as there is any."""
+    """Yield the turns of the planners, each with a share of the time that is left then, while there is any."""
     names = members(problem)
     left = request.budget.seconds
     for name in names:
@@ -97,7 +98,10 @@ def _turns(problem: Problem, request: Request) -> Iterator[Turn]:
 
 
 def _best(turns: Sequence[Turn]) -> Plan:
-    """Of the first turn with a proven path, or else with any, or else of the last one whose planner did not break."""
+    """Return the plan of the first turn with a proven path, else of the first with any path, else of the last turn.
+
+    Turns whose planner broke do not count; if all planners broke, the last error is raised.
+    """
     plans = [turn.plan() for turn in turns if turn.error is None]
     if not plans:
         broken = turns[-1].error if turns else None
@@ -112,7 +116,7 @@ def _reason(turn: Turn) -> str:
 
 
 def _totals(turns: Sequence[Turn]) -> dict[str, int | float]:
-    """The counts of all planners that did not break."""
+    """Add up the counts of all planners that did not break."""
     totals: dict[str, int | float] = {}
     for turn in turns:
         if turn.error is not None:
@@ -123,7 +127,7 @@ def _totals(turns: Sequence[Turn]) -> dict[str, int | float]:
 
 
 def _shortened(path: JointPath, problem: Problem, request: Request, budget: Budget) -> JointPath:
-    """The path after a fixed number of checks, as far as there is time."""
+    """Shorten a path with a fixed number of checked motions, as far as there is time."""
     if len(path.waypoints) < 3 or budget.over():
         return path
 

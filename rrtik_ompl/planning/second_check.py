@@ -1,4 +1,4 @@
-"""The second check of what planners find: proven, or made provable by detours, or checked in steps and kept in mind."""
+"""The second check of planners' paths: prove them, add detours where that fails, or else check them in steps."""
 
 from __future__ import annotations
 
@@ -27,27 +27,27 @@ TOUCHING = 1e-6  # [m]; bodies that are nearer to their margin than this count a
 
 
 class SecondCheck:
-    """Accepts paths of planners.
+    """Checks the paths that planners find, and accepts or rejects them.
 
-    A proven path is accepted at once. One that is not proven gets detours; where these do not help it is checked in
-    steps, and the best such path is kept in mind.
+    A proven path is accepted at once. A path that is not proven gets detours around the motions concerned. If these do
+    not help it is checked in steps, and the best such path is remembered.
 
     Attributes:
         best: The best path so far that is valid but not proven with the clearance wanted, or None.
-        reason: Why the last path was not accepted, in a line; "" if it was.
-        num_rejected: How many paths are not valid.
-        num_unproven: How many are valid, but not proven.
+        reason: One line that says why the last path was not accepted; "" if it was.
+        num_rejected: How many paths were invalid.
+        num_unproven: How many paths were valid but not proven.
 
     Args:
-        problem: What is solved.
-        planner: Whose paths are checked.
-        request: Which proofs and which clearance are asked for; where the planner's options say which moves there may
-            be, none are added.
-        seed: Of the detours.
+        problem: The problem that is solved.
+        planner: The planner whose paths are checked.
+        request: Which proofs and which clearance are asked for. If its options restrict the moves of the planner, no
+            detours are made.
+        seed: Seed of the detours.
     """
 
     def __init__(self, problem: Problem, planner: NamedPlanner, request: Request, *, seed: int) -> None:
-        # what is to be checked
+        # Arguments.
         self._problem = problem
         self._name = planner.name
         self._traits = traits_of(planner.factory)
@@ -56,12 +56,12 @@ class SecondCheck:
         self._moves_are_restricted = any(option in request.parameters for option in MOVE_RULES)
         self._seed = seed
 
-        # what has come of the paths so far
+        # Results of the paths so far.
         self.best: JointPath | None = None
         self.reason = ""
         self.num_rejected = 0
         self.num_unproven = 0
-        self._ends_can_be_proven = True  # until the ends of a path could not
+        self._ends_can_be_proven = True  # becomes False once the ends of a path could not be proven
 
     @property
     def wants_proofs(self) -> bool:
@@ -70,11 +70,11 @@ class SecondCheck:
 
     @property
     def cannot_improve(self) -> bool:
-        """Whether there is a path that cannot be made better: its ends themselves are not proven free."""
+        """Whether there is a path that no attempt can improve, because its ends themselves are not proven free."""
         return self.best is not None and not self._ends_can_be_proven
 
     def why_impossible(self) -> str:
-        """Why there can be no proven path if that is required, in a line; "" if there may be one."""
+        """Return why there can be no proven path although one is required, in a line; "" if there may be one."""
         world = self._problem.world
         if self._proof != "required":
             return ""
@@ -89,7 +89,7 @@ class SecondCheck:
         return ""
 
     def resting_path(self) -> JointPath:
-        """The path that stays at the start, with a proof of the clearance, or of what there is of it."""
+        """Return the path that stays at the start, proven with the largest clearance that can be proven there."""
         path = JointPath.of(self._problem.robot, self._problem.start[None])
         if not self.wants_proofs:
             return path
@@ -97,12 +97,11 @@ class SecondCheck:
         return proved_as_clear(path, self._problem.world, 0.0 if clearances is None else clearances.proven_clearance)
 
     def strict_problem(self, *, proving: bool) -> Problem:
-        """The problem for searches that keep a distance: more than the clearance in steps, and perhaps proven.
-
-        Where they are not proven, see :func:`search_form`.
+        """Return the problem for searches that keep more room than the clearance that has to be proven.
 
         Args:
-            proving: Whether motions have to be proven, which searches in kernels cannot.
+            proving: Whether each motion is proven during the search, which searches in kernels cannot do. Otherwise
+                motions are checked in steps, see :func:`search_form`.
         """
         clearances = self._provable_clearances(self._problem.start[None]) or Clearances(0.0, 0.0)
         dense = densely_checked(self._problem)
@@ -112,12 +111,12 @@ class SecondCheck:
         return problem_in(dense, search_form(dense.world, clearances))
 
     def accept(self, outcome: Attempt) -> JointPath | None:
-        """Check the path of an attempt, and take note of what comes of it.
+        """Check the path of an attempt, and update `best`, `reason` and the counts.
 
         Returns:
-            A path that the planner's search may end with: that of the attempt, with its proof and with detours where
-            it needed them, or `best` where no path can be proven. None if the search is to go on: there was no path,
-            it is not valid (`num_rejected`), or it is valid but not proven (`num_unproven`, and perhaps `best`).
+            A path with which the search may end: that of the attempt, with its proof and with detours where it needed
+            them, or `best` where no path can be proven. None if the search has to go on: there was no path, it is
+            invalid (`num_rejected`), or it is valid but not proven (`num_unproven`, and perhaps `best`).
         """
         if outcome.rows is None:
             why = f": {outcome.reason}" if outcome.reason else f" with '{outcome.status}'"  # or else OMPL's words
@@ -139,11 +138,12 @@ class SecondCheck:
         return self._check_in_steps(path)
 
     def _prove_with_detours(self, path: JointPath) -> JointPath | None:
-        """The path, with detours where it needs them, with a proof that all of it keeps the clearance.
+        """Prove that a path keeps the clearance, with detours around the motions where that fails.
 
         Returns:
-            None if there is no such proof: its ends cannot be proven free, which is remembered; detours may not be
-            made, as they might break a rule or a constraint; or they did not help.
+            The proven path. None if there is no proof: the ends of the path cannot be proven free, which is remembered;
+            or detours are not allowed, as they might break a rule of moves or a path constraint; or detours did not
+            help.
         """
         clearances = self._provable_clearances(path.waypoints[[0, -1]])
         if clearances is None:
@@ -154,7 +154,7 @@ class SecondCheck:
         clearance = clearances.proven_clearance
         if self._traits.leaves_room:
             first = proved_as_clear(path, world, clearance)
-            known_proof = None  # perhaps of less clearance
+            known_proof = None  # it may be of less clearance, so it is not reused
         else:
             first = proved(path, world, clearance=clearance)
             known_proof = first.proof
@@ -178,11 +178,11 @@ class SecondCheck:
         return with_detour if with_detour.proven else None
 
     def _check_in_steps(self, path: JointPath) -> JointPath | None:
-        """Check a path without the clearance, by a proof or else in steps, and keep it in mind if it is the best one.
+        """Check a path without the clearance, by a proof or else in steps, and remember it if it is the best one.
 
         Returns:
-            The path if no proof is wanted and it is valid; the best path where none can be proven; else None, and
-            the counts and the reason say why.
+            The path if no proof is wanted and it is valid; `best` if no path can be proven; otherwise None, and the
+            counts and the reason say why.
         """
         world = self._problem.world
         if self.wants_proofs:
@@ -211,20 +211,23 @@ class SecondCheck:
         return clearances_of(self._problem.world, ends, self._clearance)
 
     def _first_gap(self, rows: Matrix) -> str:
-        """The first motion of a route, shape (k, dof), that is not proven, in words; "" if all are."""
+        """Describe the first motion of a route, shape (k, dof), that is not proven free; "" if all are proven."""
         world = self._problem.world
         proof = world.prover.route(rows, clearance=world.settings.required_clearance)
         return str(next(iter(proof.unproven), ""))
 
 
 def fixed_ends(problem: Problem) -> dict[str, Vector]:
-    """The configurations that every path of a problem passes, by what they are."""
+    """Return the configurations that every path of a problem passes, keyed by "start" and "goal"."""
     q = problem.goal.q
     return {"start": problem.start} | ({} if q is None else {"goal": q})
 
 
 def _at_goal(problem: Problem, q: Vector) -> bool:
-    """Whether a configuration, shape (dof,), is at the goal; most are its joint values to the bit."""
+    """Check whether a configuration, shape (dof,), is at the goal.
+
+    The bitwise comparison comes first because it is cheap and decides most cases.
+    """
     wanted = problem.goal.q
     if wanted is not None and (q == wanted).all():
         return True
@@ -232,6 +235,6 @@ def _at_goal(problem: Problem, q: Vector) -> bool:
 
 
 def _rank(path: JointPath) -> tuple[int, float]:
-    """What is to be small: the number of motions that are not proven, then the length."""
+    """Return the rank of a path, smaller is better: the number of its unproven motions, then its length."""
     num_unproven = 0 if path.proof is None else len(path.proof.unproven)
     return num_unproven, path.length
