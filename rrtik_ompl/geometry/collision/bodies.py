@@ -1,4 +1,4 @@
-"""The solids of a world, links and obstacles alike; the pairs that must not touch, and how far those stay apart."""
+"""Bodies of a world (links, attached objects, obstacles), the pairs of them that must not touch, and their margins."""
 
 from __future__ import annotations
 
@@ -25,8 +25,10 @@ from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import AttachedObject, Obstacle, Scene
 
 ALWAYS_COLLIDING_SAMPLES = 64
-DEPTH_TOLERANCE = 1e-9  # [m] of rounding, of depths that files hold
-DISTANCE_TOLERANCE = 1e-5  # [m] for rounding, in our arithmetic and in coal's distances and depths
+# [m] Rounding that is allowed in the contact depths that files hold.
+DEPTH_TOLERANCE = 1e-9
+# [m] Rounding error that is allowed for, both in our own arithmetic and in coal's distances and penetration depths.
+DISTANCE_TOLERANCE = 1e-5
 Pairs: TypeAlias = tuple[tuple[int, int], ...]
 Given = ParamSpec("Given")
 Made = TypeVar("Made")
@@ -37,18 +39,20 @@ class Body:
     """One coal geometry that moves with a joint.
 
     Attributes:
-        name: The link, obstacle or attached object that it belongs to; several bodies may share a name.
-        joint: Pinocchio joint number; 0 stands still.
-        placement: ``pinocchio.SE3`` in the joint's frame.
+        name: Name of the link, obstacle or attached object that the body belongs to; several bodies may share a name.
+        joint: Pinocchio's number of the joint that carries the body; 0 is the world, so such a body stands still.
+        placement: Pose of the body in the joint's frame, a ``pinocchio.SE3``.
         geometry: The coal geometry.
         kind: "link", "attached" or "obstacle".
-        margin: Of an obstacle how far what moves must stay from it, of a link or attached object how far other ones
-            must [m].
-        padding: How much thicker a link or attached object is than its geometry [m]; of the latter with its own margin.
-        within: Of an obstacle or attached object of several pieces: where this one is in the frame of the whole
-            (``pinocchio.SE3``). Whoever puts an obstacle elsewhere puts this piece at ``pose * within``.
-        contacts: Names of what it is in contact with, and how near each other the two may come [m], in the place of
-            margins and paddings; negative is a depth.
+        margin: For an obstacle, the distance that everything that moves must keep from it [m]. For a link or an
+            attached object, the distance that other links and attached objects must keep from it [m].
+        padding: Thickness that is added around a link or an attached object [m]. For an attached object this includes
+            the object's own margin.
+        within: Pose of this piece in the frame of the whole object (``pinocchio.SE3``), for an obstacle or attached
+            object of several pieces. Code that moves the obstacle to ``pose`` must place this piece at ``pose *
+            within``.
+        contacts: Pairs of a name and a distance [m]: the objects that this body is in contact with, and how near they
+            may come. The distance replaces margins and paddings; a negative one is an allowed penetration depth.
     """
 
     name: str
@@ -63,7 +67,11 @@ class Body:
 
 
 def collector_waits(work: Callable[Given, Made]) -> Callable[Given, Made]:
-    """The same work, in which the collector does not look through all objects again and again."""
+    """Return a version of a function that runs with Python's garbage collector switched off.
+
+    Functions that allocate many thousands of objects would otherwise start the collector again and again, and each run
+    looks at every object of the process. If the collector is off already, it stays off.
+    """
 
     @wraps(work)
     def undisturbed(*args: Given.args, **kwargs: Given.kwargs) -> Made:
@@ -80,7 +88,12 @@ def collector_waits(work: Callable[Given, Made]) -> Callable[Given, Made]:
 
 @lru_cache(maxsize=16)
 def link_bodies(robot: Robot, margin: float = 0.0) -> tuple[Body, ...]:
-    """The robot's own bodies, with a margin [m] and their paddings."""
+    """Return the bodies of the robot's links, in the order of its collision model.
+
+    Args:
+        robot: The robot. Its paddings become those of the bodies.
+        margin: Distance that links must keep from one another [m].
+    """
     objects_and_links = [(item, robot.link_of(item)) for item in robot.collision.geometryObjects]
     return tuple(
         Body(link, item.parentJoint, item.placement, solid, "link", margin, robot.padding.get(link, 0.0))
@@ -90,7 +103,14 @@ def link_bodies(robot: Robot, margin: float = 0.0) -> tuple[Body, ...]:
 
 @collector_waits
 def scene_bodies(robot: Robot, scene: Scene, margin: float = 0.0) -> tuple[Body, ...]:
-    """Bodies of all obstacles and attached objects, these with a margin [m].
+    """Return the bodies of all obstacles, then those of all attached objects.
+
+    An object whose shape consists of several coal geometries gives several bodies.
+
+    Args:
+        robot: The robot that carries the attached objects.
+        scene: The obstacles and attached objects.
+        margin: Distance that attached objects must keep from links and from one another [m].
 
     Raises:
         UnknownNameError: If an attached object names a link that the robot does not have.
@@ -144,6 +164,7 @@ def scene_bodies(robot: Robot, scene: Scene, margin: float = 0.0) -> tuple[Body,
     return tuple(bodies)
 
 
+# Return the coal geometries of an object's shape; an error names the object.
 def _pieces(item: Obstacle | AttachedObject) -> tuple[Piece, ...]:
     try:
         return pieces(item.shape)
@@ -152,7 +173,7 @@ def _pieces(item: Obstacle | AttachedObject) -> tuple[Piece, ...]:
 
 
 def in_contact(robot: Robot, scene: Scene, bodies: Sequence[Body]) -> tuple[Body, ...]:
-    """The bodies of a world, with the contacts of its scene.
+    """Return the bodies of a world with the contacts of its scene entered.
 
     Raises:
         UnknownNameError: If a contact names something that does not exist.
@@ -187,12 +208,15 @@ def in_contact(robot: Robot, scene: Scene, bodies: Sequence[Body]) -> tuple[Body
 
 
 def deepest_contact(bodies: Iterable[Body], first: str, second: str) -> float:
-    """How deep two things in contact may overlap at most [m], by their names; infinite if one has no body.
+    """Return the penetration depth that may at most be allowed between two objects in contact [m].
+
+    It is a share of the sum of their least widths (see ``thickness.py``), so that the two cannot pass through each
+    other. It is infinite if one of them has no body.
 
     Args:
         bodies: All bodies of a world.
         first: Name of a link, obstacle or attached object.
-        second: That of the other.
+        second: Name of the other one.
     """
     widths = {first: np.inf, second: np.inf}
     for body in bodies:
@@ -203,15 +227,20 @@ def deepest_contact(bodies: Iterable[Body], first: str, second: str) -> float:
 
 @collector_waits
 def colliding_pairs(robot: Robot, scene: Scene, bodies: tuple[Body, ...]) -> tuple[tuple[int, int], ...]:
-    """Pairs of numbers of bodies that must not touch, sorted: all but what is rigidly joined or allowed, or adjacent.
+    """Return the pairs of bodies that must not touch, as pairs of their numbers, sorted.
 
-    Links are adjacent if one joint of the description joins them (`joined_links`): they overlap at it by construction.
-    What a link holds does not, so it is checked against all links but its own and those that it is allowed to touch.
+    Left out are pairs that are joined rigidly, that the robot or the scene allows to touch, and pairs of adjacent
+    links. Links are adjacent if one joint of the description joins them (`joined_links`): they overlap there by
+    construction. An attached object does not, so it is checked against all links but the one that holds it and those
+    that it may touch.
 
     Args:
         robot: The robot.
-        scene: What surrounds it, and what it holds.
-        bodies: Those of `link_bodies`, then those of `scene_bodies`.
+        scene: Its obstacles, attached objects and allowed collisions.
+        bodies: The bodies from `link_bodies`, followed by those from `scene_bodies`.
+
+    Returns:
+        Pairs of indices into ``bodies``, the smaller index first.
 
     Raises:
         UnknownNameError: If an allowed collision names something that does not exist.
@@ -236,6 +265,9 @@ def colliding_pairs(robot: Robot, scene: Scene, bodies: tuple[Body, ...]) -> tup
     return tuple(sorted(pairs))
 
 
+# Return the pairs of names that the scene allows to touch, checked for unknown names.
+# They include, for each attached object, the link that holds it and those of its ``allow``. Pairs that the robot itself
+# allows are not included.
 def _allowed(robot: Robot, scene: Scene) -> set[frozenset[str]]:
     known_names = {*robot.link_names, *scene.names}
     for pair in scene.allowed_collisions:
@@ -251,12 +283,13 @@ def _allowed(robot: Robot, scene: Scene) -> set[frozenset[str]]:
 
 @lru_cache(maxsize=16)
 def _pairs_of_links(robot: Robot) -> frozenset[tuple[int, int]]:
-    """Pairs of numbers of the bodies of links, the smaller one first, that must not touch.
+    """Return the pairs of link bodies that must not touch, as pairs of their numbers, the smaller one first.
 
-    A description without a list of allowed pairs says nothing about solids that overlap by construction; two that
-    touch in every one of many random postures can only be such ones. They are left out, and a warning names them. With
-    a list that is done only for links between which other programs may not look: those joined by links without solids
-    or by joints that are fixed or held, and those that are asked for although a joint joins them.
+    Some descriptions have links that overlap by construction, without a list of allowed pairs that says so. A pair that
+    touches in each of many random configurations must be of that kind: it is left out, and a warning names it. If the
+    description has a list of allowed pairs, only those pairs are tested for this that other programs may never check:
+    links joined by fixed or held joints or across links without solids, and pairs that are asked for although a joint
+    joins them.
     """
     bodies = link_bodies(robot)
     solid_names = [item.name for item in robot.collision.geometryObjects]
@@ -289,11 +322,11 @@ def _pairs_of_links(robot: Robot) -> frozenset[tuple[int, int]]:
 
 
 def joined_links(robot: Robot) -> frozenset[frozenset[str]]:
-    """Pairs of names of links, with solids, that one joint joins which is not fixed in the description.
+    """Return the pairs of names of links with solids that are joined by one joint that is not fixed in the description.
 
-    A link without solids that is fixed to one with solids is a frame of that: what a joint joins to the frame is joined
-    to the link. Where a frame has several such links, as a flange with a camera and a tool has, no one knows of which
-    it is, and it is joined to none of them.
+    A link without solids that is fixed to one with solids is treated as a frame of that link: a joint at the frame
+    joins the link itself. If such a frame is fixed to several links with solids, as a flange with a camera and a tool
+    is, the joint cannot be attributed to one of them, and the frame counts as joined to none.
 
     Example:
         >>> sorted(map(sorted, joined_links(rrtik.load_robot("planar3", radius=0.02))))
@@ -322,7 +355,7 @@ def joined_links(robot: Robot) -> frozenset[frozenset[str]]:
 
 @dataclass(frozen=True, slots=True)
 class _Link:
-    """A link as its description hangs it on another: by a fixed joint, or by one that moves (or is held)."""
+    """A link and its parent link in the description, joined by a fixed joint or by one that moves or is held."""
 
     name: str
     parent: str
@@ -330,7 +363,11 @@ class _Link:
 
 
 def _links(robot: Robot) -> list[_Link]:
-    """All links but the base. The frames of a model tell how it was described: a link's hangs on that of its joint."""
+    """Return all links but the base, each with its parent.
+
+    The frames of Pinocchio's model still show how the robot was described: the frame of a link is a child of the frame
+    of its joint, which is a child of the parent link's frame.
+    """
     frames = robot.model.frames
     links = []
     for frame in frames:
@@ -350,7 +387,13 @@ def _links(robot: Robot) -> list[_Link]:
 
 
 def _nearest(link: str, fixed_neighbours: Mapping[str, Iterable[str]], solid_links: set[str]) -> frozenset[str]:
-    """The link if it has solids, else those that fixed joints lead to over links without any."""
+    """Return the links with solids that belong to a link: itself, or else the nearest ones that fixed joints lead to.
+
+    Args:
+        link: Name of the link to start from.
+        fixed_neighbours: For each link the names of those that a fixed joint joins to it.
+        solid_links: Names of the links with solids.
+    """
     nearest = set()
     visited = {link}
     to_visit = [link]
@@ -369,12 +412,12 @@ def _nearest(link: str, fixed_neighbours: Mapping[str, Iterable[str]], solid_lin
 
 
 def _may_meet(first: Body, second: Body) -> bool:
-    """Whether two bodies of the robot, or what it holds, are neither one thing nor rigidly joined."""
+    """Check whether two bodies of the robot belong to different objects and to different joints."""
     return first.name != second.name and first.joint != second.joint
 
 
 def _carrying_parents(robot: Robot, bodies: Iterable[Body]) -> dict[int, int]:
-    """For each joint that carries a body: the nearest joint towards the base that also does."""
+    """Return, for each joint that carries a body, the nearest joint towards the base that carries one too."""
     carrying = {0} | {body.joint for body in bodies}
     parents = {0: 0}
     for joint in carrying - {0}:
@@ -391,7 +434,7 @@ def _adjacent(first: int, second: int, parents: Mapping[int, int]) -> bool:
 
 
 def _always_touching(robot: Robot, bodies: tuple[Body, ...], pairs: Sequence[tuple[int, int]]) -> set[tuple[int, int]]:
-    """Those of the pairs that touch in every posture of a sample; a warning names them."""
+    """Return the given pairs that touch in each of a sample of random configurations, and warn about them."""
     rng = np.random.default_rng(0)
     sampled_frames = robot.joint_frames(rng.uniform(*robot.finite_range(), (ALWAYS_COLLIDING_SAMPLES, robot.dof)))
     suspects = set(pairs)
@@ -416,38 +459,43 @@ def _touch(first: Body, second: Body, frames: Sequence[pin.SE3]) -> bool:
 
 
 def _solid_name(bodies: tuple[Body, ...], number: int) -> str:
-    """The link of a body; with its number in the link, counted from 1, if that has several."""
+    """Return the name of a body's link, with the body's number in the link, counted from 1, if the link has several."""
     link = bodies[number].name
     solids_of_link = [k for k, body in enumerate(bodies) if body.name == link]
     return f"'{link}'" if len(solids_of_link) == 1 else f"'{link}' (solid {solids_of_link.index(number) + 1})"
 
 
 def by_motion(bodies: Sequence[Body], pairs: Pairs) -> tuple[Pairs, Pairs]:
-    """The pairs of which at least one body moves, and the pairs of two that stand still."""
+    """Split pairs into those of which at least one body moves, and those of two bodies that stand still."""
     moves = np.array([body.joint > 0 for body in bodies], dtype=bool)
     either_moves: list[bool] = np.logical_or(*moves[pair_array(pairs).T]).tolist()
     return tuple(compress(pairs, either_moves)), tuple(compress(pairs, map(not_, either_moves)))
 
 
 def pair_array(pairs: Sequence[tuple[int, int]]) -> NDArray[np.int64]:
-    """Pairs as an array, shape (n, 2); made of many tuples it takes numpy itself five times as long."""
+    """Return pairs as an integer array of shape (n, 2).
+
+    For many pairs this takes a fifth of the time of ``np.array``.
+    """
     return np.fromiter(chain.from_iterable(pairs), np.int64, 2 * len(pairs)).reshape(-1, 2)
 
 
 def far_apart(first: Body, second: Body, distance: float) -> bool:
-    """Whether the bounding balls of two bodies that stand still are farther apart than a distance [m]."""
+    """Check whether the bounding balls of two bodies that stand still are farther apart than a distance [m]."""
     first_centre, second_centre = (body.placement.act(body.geometry.aabb_center).tolist() for body in (first, second))
     centre_distance_limit = first.geometry.aabb_radius + second.geometry.aabb_radius + distance
     return bool(
         math.dist(first_centre, second_centre) > centre_distance_limit
-    )  # no number where one of them has no end
+        # An unbounded body gives NaN or infinity here, and then the answer is False.
+    )
 
 
 def kept_apart(first: Body, second: Body) -> float:
-    """How far two bodies must stay apart [m]: the margin of an obstacle, or that of the arm's own bodies, and paddings.
+    """Return the distance that two bodies must keep [m]: the applicable margin plus both paddings.
 
-    Negative is the depth to which two that are in contact may overlap. No margin between bodies of which neither moves,
-    for no posture of the arm would give what is missing: they must only not touch.
+    The margin is that of the obstacle or, between bodies of the robot, that of the first. A negative result is the
+    penetration depth that two bodies in contact are allowed. Between two bodies that stand still the margin is 0, as no
+    configuration of the arm could restore a margin that is missing: they only must not touch.
     """
     contact = contact_distance(first, second)
     without_contact = usually_apart(first, second)
@@ -455,26 +503,26 @@ def kept_apart(first: Body, second: Body) -> float:
 
 
 def usually_apart(first: Body, second: Body) -> float:
-    """How far two bodies must stay apart where they are not in contact [m]."""
+    """Return the distance that two bodies must keep if they are not in contact [m]."""
     if first.joint == second.joint == 0:
         return 0.0
     return (second.margin if second.kind == "obstacle" else first.margin) + first.padding + second.padding
 
 
 def keeps_clearance(first: Body, second: Body) -> bool:
-    """Whether a clearance from obstacles is kept between two bodies too: one is an obstacle, and they do not touch."""
+    """Check whether a required clearance applies to two bodies: one is an obstacle, and they are not in contact."""
     return "obstacle" in (first.kind, second.kind) and contact_distance(first, second) is None
 
 
 def contact_distance(first: Body, second: Body) -> float | None:
-    """How near each other two bodies may come that are in contact [m], negative for a depth; None if they are not."""
+    """Return how near two bodies in contact may come [m], negative for a depth; None if they are not in contact."""
     if not first.contacts or not second.contacts:
         return None
     return min((distance for name, distance in first.contacts if name == second.name), default=None)
 
 
 def request(margin: float) -> coal.DistanceRequest:
-    """A fresh request to coal: do two geometries touch, or stay no farther than ``margin`` [m] apart."""
+    """Return a new coal request that reports two geometries as colliding if they are at most ``margin`` [m] apart."""
     collision_request = coal.CollisionRequest()
     collision_request.security_margin = margin
     return collision_request

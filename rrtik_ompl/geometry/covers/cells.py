@@ -1,13 +1,13 @@
-"""A solid cut into small convex elements, so that a ball covers an element if it holds the element's corners.
+"""Cut a solid into small convex elements, so that a ball covers an element if it contains the element's corners.
 
-The box around the solid is cut into cells. The part of a solid in a cell lies in the convex hull of (a) the corners
-of the surface pieces in the cell and (b) the corners of the cell that are inside: an extreme point of that part is
-either on the surface or has a whole neighbourhood in the solid, and then it can only be a corner of the cell. The
-hulls leave no gap, and a ball, being convex, holds a hull if it holds its corners. An open surface has no inside but
-what it encloses, which comes as boxes.
+The box around the solid is cut into cells. The part of the solid in a cell lies in the convex hull of (a) the corners
+of the surface pieces in the cell and (b) the corners of the cell that are inside the solid. This is so because an
+extreme point of that part is either on the surface or has a whole neighbourhood in the solid, and then it can only be a
+corner of the cell. The hulls leave no gap, and a ball, being convex, contains a hull if it contains its corners. An
+open surface has no interior but the boxes that it encloses, which are given with it.
 
-What is inside, winding numbers at the corners of the cells tell: those of a closed surface are whole, and change only
-where it is crossed.
+Winding numbers at the corners of the cells decide which corners are inside: those of a closed surface are integers and
+change only where the surface is crossed.
 """
 
 from __future__ import annotations
@@ -21,12 +21,13 @@ from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.geometry.covers.solids import CORNERS, Solid, Triangles
 
 MAX_CELLS = 120_000
-MAX_CELLS_ALONG_AXIS = 160.0  # cells along an axis: a long triangle is cut into many more pieces than cells
-LATTICE_CROSSED = 1500  # cells of a lattice that the surface crosses, at first
+MAX_CELLS_ALONG_AXIS = 160.0  # limited, as a long triangle is cut into many more pieces than there are cells
+LATTICE_CROSSED = 1500  # number of cells that the surface crosses, in the first lattice that is tried
 MOST_LATTICE_CROSSED = 25_000
-LATTICE_LEAST = 4  # cells along every axis of a lattice, so that even a thin solid has points inside
-MARGINS = (0.0171, 0.0233, 0.0197)  # of a cell: keeps the faces of axis-aligned solids off the planes between cells
-EDGE_TOLERANCE = 1e-9  # [cells] closer than this to an edge or a plane is doubtful, and doubtful counts as inside
+LATTICE_LEAST = 4  # fewest cells along an axis of a lattice, so that even a thin solid has points inside
+MARGINS = (0.0171, 0.0233, 0.0197)  # [cells] shift of the grid that keeps faces of axis-aligned solids off its planes
+# [cells] Points closer than this to an edge or a plane are doubtful; elements take them as inside.
+EDGE_TOLERANCE = 1e-9
 
 Flags = NDArray[np.bool_]
 Shape = tuple[int, int, int]
@@ -37,11 +38,12 @@ class Elements:
     """Convex elements whose union contains the solid.
 
     Attributes:
-        points: Balls (small ones, often points) whose hull contains the element, shape (p, 3).
-        radii: Their radii, shape (p,).
-        start: Number of the first point of every element, shape (e,).
+        points: Centres of small balls (often of radius 0); those of one element have a hull that contains it;
+            shape (p, 3).
+        radii: Radii of these balls, shape (p,).
+        start: Index of the first point of each element; its points run up to the next element's first; shape (e,).
         inside: Lattice points that are surely inside the solid (an open one with its caps), shape (k, 3).
-        on_surface: A point at or near the surface for every element that the surface crosses, shape (s, 3).
+        on_surface: A point at or near the surface for each element that the surface crosses, shape (s, 3).
     """
 
     points: Matrix
@@ -53,33 +55,38 @@ class Elements:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Grid:
-    """Cells of equal size."""
+    """A grid of equal cells: its lowest corner, the sides of a cell, and the number of cells along each axis."""
 
     origin: Vector
     size: Vector
     shape: Shape
 
     def corners(self) -> Matrix:
-        """All corners in the solid's frame, shape (k, 3)."""
+        """Return all corners of cells in the solid's frame, shape (k, 3), the last axis running fastest."""
         number = np.indices((self.shape[0] + 1, self.shape[1] + 1, self.shape[2] + 1))
         return self.from_cells(number.reshape(3, -1).T.astype(np.float64))
 
     def to_cells(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Points, shape (..., 3), counted in cells."""
+        """Convert points of the solid's frame, shape (..., 3), to grid coordinates, in which a cell has unit sides."""
         return np.asarray((points - self.origin) / self.size)
 
     def from_cells(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Points, shape (..., 3), in the solid's frame."""
+        """Convert points in grid coordinates, shape (..., 3), to the solid's frame."""
         return np.asarray(self.origin + points * self.size)
 
 
 def elements(solid: Solid, crossed: int, detail: int = 4) -> Elements:
-    """Cut a solid into elements.
+    """Cut a solid into convex elements.
+
+    First the surface is cut along the planes of a grid; each cell that it crosses becomes an element, whose points are
+    the corners of its surface pieces and its own corners that are inside the solid. Then cells wholly inside are merged
+    into larger boxes, each of which is an element too.
 
     Args:
         solid: The solid.
-        crossed: About how many cells the surface may cross.
-        detail: Points of an element closer than its size over ``detail`` are put together into one small ball.
+        crossed: Approximate number of cells that the surface is to cross.
+        detail: Each cell is divided into ``detail`` parts along every axis, and the points within one part are replaced
+            by one small ball around them.
     """
     grid = _grid(solid.triangles, crossed)
     surface_pieces, cell_of_piece = _cut_at_planes(grid.to_cells(solid.triangles), grid.shape)
@@ -101,7 +108,10 @@ def elements(solid: Solid, crossed: int, detail: int = 4) -> Elements:
 
 
 def lattice_inside(solid: Solid, fewest: int) -> Matrix:
-    """Points of a lattice that are surely inside a closed solid, shape (k, 3): ``fewest`` or more unless it is thin."""
+    """Return points of a lattice that are surely inside a closed solid, shape (k, 3).
+
+    The lattice is refined until at least ``fewest`` points are inside or it has become too fine, as for a thin solid.
+    """
     crossed = LATTICE_CROSSED
     lattice_points = np.empty((0, 3))
 
@@ -113,6 +123,8 @@ def lattice_inside(solid: Solid, fewest: int) -> Matrix:
     return lattice_points
 
 
+# Choose a grid around triangles such that their surface crosses about ``crossed`` cells.
+# The number of cells is bounded, and the grid is shifted by ``MARGINS`` against the bounding box.
 def _grid(triangles: Triangles, crossed: int, min_cells: int = 1) -> Grid:
     low = triangles.min(axis=(0, 1))
     high = triangles.max(axis=(0, 1))
@@ -136,9 +148,18 @@ def _grid(triangles: Triangles, crossed: int, min_cells: int = 1) -> Grid:
 
 
 def winding(triangles: Triangles, shape: Shape) -> tuple[NDArray[np.int64], Flags]:
-    """Winding number of a closed surface at every corner of the grid, and where it is doubtful.
+    """Compute the winding number of a closed surface at every corner of a grid.
 
-    Counted along the lines of corners parallel to x, with sign; a line that comes close to an edge is doubtful.
+    Rays along x through the corners are intersected with the triangles. Each crossing adds its sign to all corners
+    before it; a cumulative sum from the far end adds them up.
+
+    Args:
+        triangles: The closed surface in grid coordinates, shape (m, 3, 3).
+        shape: Number of cells along each axis.
+
+    Returns:
+        The winding numbers and flags of the corners where they are doubtful, because a ray passes close to an edge or a
+        corner lies close to the surface; both of shape (nx + 1, ny + 1, nz + 1).
     """
     corners = (shape[0] + 1, shape[1] + 1, shape[2] + 1)
     crossings = np.zeros(corners, dtype=np.int64)
@@ -175,7 +196,15 @@ def winding(triangles: Triangles, shape: Shape) -> tuple[NDArray[np.int64], Flag
 
 
 def _candidate_lines(triangles: Triangles, corners: Shape) -> tuple[NDArray[np.int64], ...]:
-    """Pairs of a triangle and a line of corners that passes through the box around it, seen along x."""
+    """Pair each triangle with the lines of corners along x that pass through its bounding box.
+
+    Args:
+        triangles: Triangles in grid coordinates, shape (m, 3, 3).
+        corners: Number of corners along each axis.
+
+    Returns:
+        Three index arrays of one entry per pair: the triangle, and the y and z coordinates of the line.
+    """
     low = np.ceil(triangles[:, :, 1:].min(axis=1) - EDGE_TOLERANCE).astype(np.int64)
     high = np.floor(triangles[:, :, 1:].max(axis=1) + EDGE_TOLERANCE).astype(np.int64)
     low = np.maximum(low, 0)
@@ -194,7 +223,13 @@ def _candidate_lines(triangles: Triangles, corners: Shape) -> tuple[NDArray[np.i
 
 
 def _distance_from_edge(p: Matrix, q: Matrix, line: Matrix) -> Vector:
-    """Signed distance of lines along x from the edge p q, seen along x."""
+    """Return the signed distance of lines along x from edges p q, in projection along x.
+
+    Args:
+        p: First ends of the edges, shape (n, 3).
+        q: Second ends of the edges, shape (n, 3).
+        line: Coordinates y and z of the lines, shape (n, 2).
+    """
     side = q[:, 1:] - p[:, 1:]
     offset = line - p[:, 1:]
     length = np.linalg.norm(side, axis=1)
@@ -203,7 +238,7 @@ def _distance_from_edge(p: Matrix, q: Matrix, line: Matrix) -> Vector:
 
 
 def _line_crossings(a: Matrix, b: Matrix, c: Matrix, line: Matrix) -> tuple[Vector, Vector]:
-    """Where lines along x pass through triangles, and how uncertain that is."""
+    """Return the x at which lines along x cross the planes of triangles, and their uncertainties; shape (n,) both."""
     normal = np.cross(b - a, c - a)
     x = a[:, 0] - ((line - a[:, 1:]) * normal[:, 1:]).sum(axis=1) / normal[:, 0]
     slope = np.abs(normal[:, 0]) / np.linalg.norm(normal, axis=1)
@@ -211,7 +246,19 @@ def _line_crossings(a: Matrix, b: Matrix, c: Matrix, line: Matrix) -> tuple[Vect
 
 
 def _cut_at_planes(triangles: Triangles, shape: Shape) -> tuple[Triangles, NDArray[np.int64]]:
-    """Triangles (in cells) cut along the planes between cells, and the number of the cell that each piece is in."""
+    """Cut triangles along all planes between cells.
+
+    Each triangle is cut at the middle one of the planes that pass through it, until none does, one axis after the
+    other.
+
+    Args:
+        triangles: Triangles in grid coordinates, shape (m, 3, 3).
+        shape: Number of cells along each axis.
+
+    Returns:
+        The pieces, shape (k, 3, 3), and for each the number of its cell, shape (k,). A piece that lies in the plane
+        between two cells is listed for both.
+    """
     for axis in range(3):
         finished = []
         unfinished = triangles
@@ -229,12 +276,12 @@ def _cut_at_planes(triangles: Triangles, shape: Shape) -> tuple[Triangles, NDArr
 
 
 def _cut(triangles: Triangles, axis: int, plane: Vector) -> Triangles:
-    """Cut triangles in three by planes that pass through each."""
+    """Cut each triangle into three along its own plane across an axis, which passes through it."""
     if not len(triangles):
         return triangles
 
     is_beyond = triangles[:, :, axis] > plane[:, None]
-    # The corner that lies alone on its side comes first.
+    # Rotate the corners so that the one that is alone on its side of the plane comes first.
     lone_corner = np.where((is_beyond.sum(axis=1) == 1)[:, None], is_beyond, ~is_beyond).argmax(axis=1)
     row = np.arange(len(triangles))
     a, b, c = (triangles[row, (lone_corner + k) % 3] for k in range(3))
@@ -252,7 +299,11 @@ def _edge_crossing(a: Matrix, b: Matrix, axis: int, plane: Vector) -> Matrix:
 
 
 def _with_cells(pieces: Triangles, shape: Shape) -> tuple[Triangles, NDArray[np.int64]]:
-    """Cell of every piece; a piece that lies in the plane between two cells belongs to both."""
+    """Find the cell of each piece; a piece that lies in the plane between two cells is repeated, once for each of them.
+
+    Returns:
+        The pieces, shape (k, 3, 3), and the number of the cell of each, shape (k,).
+    """
     cell_index = np.floor(pieces.mean(axis=1))
     for axis in range(3):
         plane = np.round(pieces[:, 0, axis])
@@ -268,7 +319,16 @@ def _with_cells(pieces: Triangles, shape: Shape) -> tuple[Triangles, NDArray[np.
 
 
 def _inner_corners(cells: Flags, inside: Flags) -> tuple[Matrix, NDArray[np.int64]]:
-    """Corners of the given cells that are inside, and the cell of each."""
+    """Return the corners of the flagged cells that are inside the solid, and the number of the cell of each.
+
+    Args:
+        cells: Flags of cells, shape (nx, ny, nz).
+        inside: Flags of the corners that are inside, shape (nx + 1, ny + 1, nz + 1).
+
+    Returns:
+        Corners in grid coordinates, shape (k, 3), and numbers of cells, shape (k,). Cells share corners, so a corner
+        may occur several times.
+    """
     cell_index = np.argwhere(cells)
     cell_number = np.flatnonzero(cells)
     corner = cell_index[:, None] + CORNERS
@@ -277,7 +337,7 @@ def _inner_corners(cells: Flags, inside: Flags) -> tuple[Matrix, NDArray[np.int6
 
 
 def all_corners(flag: Flags) -> Flags:
-    """Cells of which all corners are flagged."""
+    """Return flags of the cells all of whose corners are flagged; each axis is one shorter than in ``flag``."""
     all_flagged = np.ones(tuple(n - 1 for n in flag.shape), dtype=bool)
     for x, y, z in CORNERS:
         all_flagged &= flag[x : flag.shape[0] - 1 + x, y : flag.shape[1] - 1 + y, z : flag.shape[2] - 1 + z]
@@ -285,7 +345,11 @@ def all_corners(flag: Flags) -> Flags:
 
 
 def _blocks(full: Flags) -> list[tuple[Matrix, int]]:
-    """Full cells put together into cubes of 4, 2 and 1 cells: lowest corners and sizes."""
+    """Merge flagged cells into cubes of 4, 2 and 1 cells along each edge.
+
+    Returns:
+        For each of the three sizes the lowest corners of the cubes, shape (k, 3), and the size, in cells.
+    """
     cubes = []
     remaining = full.copy()
     for size in (4, 2, 1):
@@ -307,7 +371,18 @@ def _boxes(low: Matrix, size: int) -> NDArray[np.float64]:
 def _merged_within_cells(
     points: Matrix, owner: NDArray[np.int64], detail: int, grid: Grid
 ) -> tuple[Matrix, Vector, NDArray[np.int64]]:
-    """Points of one cell that are close together replaced by one ball around them; the cell of each."""
+    """Replace points that are close together in one cell by one ball around them.
+
+    Args:
+        points: Points in grid coordinates, shape (n, 3).
+        owner: Number of the cell of each point, shape (n,).
+        detail: Number of parts of a cell along each axis; points within one part are merged.
+        grid: The grid.
+
+    Returns:
+        Centres of the balls in grid coordinates, shape (k, 3), their radii in the solid's frame, shape (k,), and the
+        number of the cell of each, shape (k,), ascending.
+    """
     cell = np.column_stack(np.unravel_index(owner, grid.shape))
     subcell = np.clip(np.floor((points - cell) * detail).astype(np.int64), 0, detail - 1)
     subcell_key = ((owner * detail + subcell[:, 0]) * detail + subcell[:, 1]) * detail + subcell[:, 2]
@@ -331,7 +406,10 @@ def _as_elements(
     boxes: NDArray[np.float64],
     inside_corners: NDArray[np.int64],
 ) -> Elements:
-    """Elements in the solid's frame; radii make up for surface that pokes into a cell by under ``EDGE_TOLERANCE``."""
+    """Assemble the elements in the solid's frame from the points of crossed cells and the boxes inside.
+
+    All radii grow a little, as pieces of the surface may reach into a neighbouring cell by up to ``EDGE_TOLERANCE``.
+    """
     protrusion = 4.0 * EDGE_TOLERANCE * float(np.linalg.norm(grid.size))
     start = np.flatnonzero(np.r_[True, np.diff(owner) > 0])
     centres = np.add.reduceat(points, start) / np.diff(np.r_[start, len(points)])[:, None]

@@ -1,10 +1,10 @@
-"""Balls around a solid (outer cover, contains it) and balls inside it (inner spheres), for any coal geometry.
+"""Compute balls whose union contains a solid (outer covers) and balls inside it (inner spheres), for any coal geometry.
 
-An outer cover is proven, not sampled: the solid is cut into convex elements without gaps
-(``geometry/covers/cells.py``), and every element lies wholly inside one ball (``geometry/covers/search.py``); capsules,
-cylinders and boxes have covers by formula too. Inner spheres leave little room between themselves and the surface:
-whatever reaches deeper into the solid than that room meets a ball. Each is the one that narrows the room most, on
-average over points of the surface.
+An outer cover is guaranteed, not sampled: the solid is cut into convex elements without gaps
+(``geometry/covers/cells.py``), and each element lies wholly inside one ball (``geometry/covers/search.py``). Capsules,
+cylinders and boxes have covers by formula too. Inner spheres leave little room between themselves and the surface: a
+body that reaches deeper into the solid than that room meets an inner sphere. They are chosen greedily, each as the one
+that reduces that room most, averaged over points of the surface.
 
 Spheres are float64 arrays of shape (n, 4): centre x, y, z and radius [m], in the frame of the geometry. Containment
 holds within 1e-9 of the size of the solid [m per m].
@@ -35,34 +35,34 @@ from rrtik_ompl.geometry.covers.solids import (
 
 BALLS_PER_METRE = 70.0
 MIN_BALLS = 2
-MAX_BALLS = 32  # four full clusters of the kernels; 36 make eight
-BALLS_OF_OPEN = 3  # times as many for a mere surface: nothing of a ball on it is inside
-INNER_SHARE = 1.5  # inner balls for each outer one
-MAX_BALLS_ON_REQUEST = 512  # balls, where a protrusion is given
-# A mesh of more triangles or open edges is taken as its bounding box, and nothing is proven to collide with it.
+MAX_BALLS = 32  # This fills four clusters of the kernels; 36 balls would take eight.
+BALLS_OF_OPEN = 3  # An open surface gets three times as many balls, as no part of a ball on it is inside.
+INNER_SHARE = 1.5  # number of inner spheres per ball of the outer cover
+MAX_BALLS_ON_REQUEST = 512  # limit on the number of balls if a protrusion is given
+# A mesh with more triangles or open edges is replaced by its bounding box, and collisions with it are never proven.
 MAX_TRIANGLES = 300_000
 MAX_OPEN_EDGES = 4000
-CROSSED_CELLS = 1500  # at most
+CROSSED_CELLS = 1500  # most cells that the surface may cross, in the first cut of a solid
 CELLS_PER_BALL = 80
 SURFACE_POINTS = 6000
-SMALLEST = 1e-12  # [m]; what is smaller counts as a point
-ROD_PROTRUSION = 0.06  # share of the radius
+SMALLEST = 1e-12  # [m] A mesh of smaller extent counts as a point.
+ROD_PROTRUSION = 0.06  # usual protrusion of the balls of a capsule, as a share of its radius
 INNER_CENTRES = 300  # points inside from which inner balls start
-FEWEST_INSIDE = 200
+FEWEST_INSIDE = 200  # lattice points inside a solid that are asked for
 INNER_SAMPLES = 400  # points of the surface
 CLIMBS = 4  # steps of the centre of an inner ball away from the surface
 
 
 def outer_cover(geometry: coal.CollisionGeometry, *, protrusion: float | None = None) -> Matrix:
-    """Balls whose union contains a solid, shape (n, 4).
+    """Compute balls whose union contains a solid, shape (n, 4).
 
     Args:
-        geometry: A coal geometry. A mesh is taken with its interior: every point whose winding number is not 0 or,
-            if it is open, what it encloses (:mod:`rrtik_ompl.geometry.collision.enclosure`). A kind that is not known
-            here gets one ball (of infinite radius if the kind has no bounds).
-        protrusion: How far a ball may reach beyond the solid [m]; if that takes too many balls or too fine a cut, the
-            cover reaches farther (see ``protrusion_bound``). None: what a number of balls that suits the size of
-            the solid allows.
+        geometry: A coal geometry. A mesh is taken with its interior: all points whose winding number is not 0 or, if it
+            is open, all points that it encloses (:mod:`rrtik_ompl.geometry.collision.enclosure`). A geometry of an
+            unknown kind gets one ball, of infinite radius if the kind has no bounds.
+        protrusion: Largest distance that a ball may reach beyond the solid [m]. If that takes too many balls or too
+            fine a cut, the cover reaches farther (see ``protrusion_bound``). With None, the cover has a number of balls
+            that suits the size of the solid, and reaches as little beyond it as these allow.
     """
     swept_radius = _swept_radius(geometry)
     core = core_of(geometry)
@@ -90,11 +90,11 @@ def outer_cover(geometry: coal.CollisionGeometry, *, protrusion: float | None = 
 
 
 def inner_spheres(geometry: coal.CollisionGeometry, *, count: int | None = None) -> Matrix:
-    """Balls inside a solid, shape (n, 4), the most useful first; none for an open mesh or an unknown kind.
+    """Compute balls inside a solid, shape (n, 4), the most useful first; none for an open mesh or an unknown kind.
 
     Args:
         geometry: A coal geometry.
-        count: At most so many; None: a number that suits the size.
+        count: Largest number of balls. With None it follows from the size of the solid.
     """
     core = core_of(geometry)
     if core is not None and core.rounded:
@@ -113,9 +113,13 @@ def inner_spheres(geometry: coal.CollisionGeometry, *, count: int | None = None)
 
 
 def protrusion_bound(geometry: coal.CollisionGeometry, spheres: Matrix) -> float:
-    """How far balls, shape (n, 4), reach beyond a solid at most [m]; infinite for kinds that are not known here.
+    """Return an upper bound on how far balls reach beyond a solid [m]; infinite for unknown kinds of geometry.
 
-    An open mesh counts with caps that close it.
+    For an open mesh, the caps that close it count as part of its surface.
+
+    Args:
+        geometry: A coal geometry.
+        spheres: Centres and radii of the balls in the geometry's frame [m], shape (n, 4).
     """
     if not len(spheres):
         return 0.0
@@ -136,7 +140,7 @@ def protrusion_bound(geometry: coal.CollisionGeometry, spheres: Matrix) -> float
 
 
 def balls_for(extent: float) -> int:
-    """Number of balls that suits a body of this extent (diagonal of its box) [m]."""
+    """Return a number of balls that suits a body, from the diagonal of its bounding box [m]."""
     return int(np.clip(round(BALLS_PER_METRE * extent), MIN_BALLS, MAX_BALLS))
 
 
@@ -158,7 +162,15 @@ def _round_cover(core: Core, protrusion: float | None) -> Matrix:
 
 
 def rod_cover(radius: float, half_length: float, limit: int, protrusion: float | None) -> Matrix:
-    """Equal balls in a row along z that hold a capsule, at most ``limit`` (but 2), shape (n, 4)."""
+    """Return equal balls in a row along z whose union contains a capsule, shape (n, 4).
+
+    Args:
+        radius: Radius of the capsule [m].
+        half_length: Half the length of its axis [m].
+        limit: Largest number of balls; a limit below 2 counts as 2.
+        protrusion: Largest distance that the balls may reach beyond the capsule [m]; None for a usual share of the
+            radius.
+    """
     count = balls_on_axis(radius, half_length, ROD_PROTRUSION * radius if protrusion is None else protrusion)
     count = max(min(count, max(limit, 2)), 1 if half_length <= 0.0 else 2)
     step = 2.0 * half_length / max(count - 1, 1)
@@ -166,7 +178,13 @@ def rod_cover(radius: float, half_length: float, limit: int, protrusion: float |
 
 
 def balls_on_axis(radius: float, half_length: float, protrusion: float) -> int:
-    """Number of balls along an axis of length ``2 half`` that hold the rod around it of the given radius."""
+    """Return the number of equal balls along an axis that are needed to contain the rod around it.
+
+    Args:
+        radius: Radius of the rod [m].
+        half_length: Half the length of the axis [m].
+        protrusion: Distance that the balls may reach beyond the rod [m].
+    """
     if half_length <= 0.0:
         return 1
     step = 2.0 * np.sqrt(max(protrusion * (protrusion + 2.0 * radius), 0.0))
@@ -174,12 +192,12 @@ def balls_on_axis(radius: float, half_length: float, protrusion: float) -> int:
 
 
 def spread(half: float, count: int) -> Vector:
-    """Numbers evenly from -half to half, shape (number,)."""
+    """Return ``count`` evenly spaced numbers from -half to half; a single one is 0."""
     return np.linspace(-half, half, count) if count > 1 else np.zeros(max(count, 0))
 
 
 def row_on_z(heights: Vector, radius: float) -> Matrix:
-    """Equal balls on the z axis, shape (n, 4)."""
+    """Return equal balls on the z axis at the given heights, shape (n, 4)."""
     spheres = np.zeros((len(heights), 4))
     spheres[:, 2] = heights
     spheres[:, 3] = radius
@@ -187,7 +205,10 @@ def row_on_z(heights: Vector, radius: float) -> Matrix:
 
 
 def _solid(geometry: coal.CollisionGeometry) -> tuple[Solid, Frame] | None:
-    """The geometry as a solid of about unit size, or None if its kind is not known or it has no volume to speak of."""
+    """Return a geometry as a solid scaled to unit size, and the frame that leads back to the geometry's own.
+
+    The answer is None if the kind is unknown or the geometry has no volume worth mentioning.
+    """
     core = core_of(geometry)
     if core is not None and core.disc is not None:
         sizes = core.disc, core.half_length
@@ -205,6 +226,8 @@ def _solid(geometry: coal.CollisionGeometry) -> tuple[Solid, Frame] | None:
         return None
 
 
+# Return a mesh as a solid and its frame, or its bounding box if it has too many triangles or open edges.
+# The answer is None for a mesh without triangles, with vertices that are not finite, or of no extent.
 def _mesh(geometry: coal.CollisionGeometry) -> tuple[Solid, Frame] | None:
     vertices, triangles = mesh_arrays(geometry)
     used_vertices = vertices[np.unique(triangles)]
@@ -225,10 +248,12 @@ def _mesh(geometry: coal.CollisionGeometry) -> tuple[Solid, Frame] | None:
 
     low = used_vertices.min(axis=0)
     high = used_vertices.max(axis=0)
-    half_sides = np.maximum(0.5 * (high - low), 1e-6 * float((high - low).max()))  # a box may be larger, never flat
+    # A flat mesh gets a box of some thickness: the box may be larger than the mesh, but must not be flat.
+    half_sides = np.maximum(0.5 * (high - low), 1e-6 * float((high - low).max()))
     return convex_solid(box_corners(half_sides) + 0.5 * (low + high))
 
 
+# Return one ball around a geometry of any kind, shape (1, 4); of infinite radius if it has no finite bounds.
 def _bounding_ball(geometry: coal.CollisionGeometry, swept_radius: float) -> Matrix:
     geometry.computeLocalAABB()
     centre = np.array(geometry.aabb_center)
@@ -239,15 +264,27 @@ def _bounding_ball(geometry: coal.CollisionGeometry, swept_radius: float) -> Mat
 
 
 def _finite(geometry: coal.CollisionGeometry) -> bool:
-    """Whether all vertices are finite numbers; coal's box leaves out those that are not."""
+    """Check whether all vertices of a geometry are finite numbers.
+
+    Coal's bounding box ignores vertices that are not finite, so it cannot tell.
+    """
     vertices = vertices_of(geometry)
     return vertices is None or bool(np.isfinite(vertices).all())
 
 
 def _searched_cover(solid: Solid, limit: int, target: float | None) -> Matrix:
-    """A cover found by search, at most ``limit`` balls unless ``target`` takes more; a finer cut if that helps."""
+    """Compute the cover of a solid by search.
+
+    If a target is given and the first cut of the solid into cells does not reach it, a finer cut is tried.
+
+    Args:
+        solid: The solid, of unit size.
+        limit: Largest number of balls, unless the target takes more.
+        target: Protrusion that is good enough, in units of the solid's frame; None to look for the smallest.
+    """
     surface = cKDTree(surface_points(solid.triangles, SURFACE_POINTS))
-    search_target = None if target is None else 0.9 * target  # depths are estimated in the search
+    # The search works with estimated depths, so it aims a little below the target.
+    search_target = None if target is None else 0.9 * target
     cuts = [CROSSED_CELLS, 4 * CROSSED_CELLS]
     if target is None:
         cuts = [min(CROSSED_CELLS, CELLS_PER_BALL * (limit + 4))]
@@ -263,7 +300,14 @@ def _searched_cover(solid: Solid, limit: int, target: float | None) -> Matrix:
 
 
 def regular_cover(core: Core, limit: int, protrusion: float | None) -> Matrix | None:
-    """Boxes as grids of balls, cylinders as rows of balls: the best one of at most ``limit`` balls."""
+    """Return the best regular cover of a box (a grid of balls) or a cylinder (a row of balls); None for other solids.
+
+    Args:
+        core: The box or cylinder.
+        limit: Largest number of balls.
+        protrusion: Distance that the balls may reach beyond the solid [m]: the smallest cover within it is taken. With
+            None, or if none is within it, the cover that reaches least beyond the solid is.
+    """
     half = core.half_sides
     radius = core.disc
     if half is not None:
@@ -282,6 +326,9 @@ def regular_cover(core: Core, limit: int, protrusion: float | None) -> Matrix | 
     return None
 
 
+# Return the smallest grid whose protrusion is small enough or, if there is none, the grid of least protrusion.
+# ``grids``, shape (k, 3), has the numbers of balls along each axis; ``protrusions``, shape (k,), how far the balls of
+# each grid reach beyond the solid [m]; ``protrusion`` is what is small enough, or None.
 def _chosen(grids: NDArray[np.int64], protrusions: Vector, protrusion: float | None) -> NDArray[np.int64]:
     small_enough = np.flatnonzero(protrusions <= protrusion) if protrusion is not None else np.empty(0, dtype=np.int64)
     if len(small_enough):
@@ -302,7 +349,11 @@ def _grid(half_sides: Vector, grid: NDArray[np.int64]) -> Matrix:
 
 
 def _better(geometry: coal.CollisionGeometry, first: Matrix, second: Matrix, protrusion: float | None) -> bool:
-    """Whether the first cover is better: it sticks out less or, if both stay within what is required, is smaller."""
+    """Check whether the first cover is at least as good as the second.
+
+    If both stay within the required protrusion, the one with fewer balls is better, otherwise the one that reaches less
+    far beyond the solid.
+    """
     protrusions = [protrusion_bound(geometry, cover) for cover in (first, second)]
     if protrusion is not None and max(protrusions) <= protrusion * (1.0 + 1e-9):
         return len(first) <= len(second)
@@ -310,18 +361,19 @@ def _better(geometry: coal.CollisionGeometry, first: Matrix, second: Matrix, pro
 
 
 def _closed(geometry: coal.CollisionGeometry, solid: Solid) -> bool:
-    """Whether a body that touches a ball inside the geometry surely collides with it.
+    """Check whether every body that touches a ball inside the geometry surely collides with the geometry.
 
     Coal's meshes are hollow: a body collides with one if it meets the surface, or if its reference point is inside. A
-    body that meets an inner ball but not the surface lies in one piece of the space that the surface leaves. Without
-    open edges the winding number is the same whole number all over that piece, so it is that of the ball, and the
-    reference point is inside. Through an open edge a body may reach in and hold on to the ball: then nothing is proven.
+    body that meets an inner sphere but not the surface lies wholly in one of the regions into which the surface divides
+    space. Without open edges the winding number is constant on that region, so it is that of the sphere, and the
+    reference point is inside. Through an open edge, however, a body could reach in and touch the sphere without
+    crossing the surface; then nothing is proven.
     """
     return not len(solid.rim) and (not is_mesh(geometry) or isinstance(solid, MeshSolid))
 
 
 def _round_inner(core: Core, count: int | None) -> Matrix:
-    """Balls inside a ball or a capsule, as many as its cover has."""
+    """Return balls inside a ball or a capsule, as many as its usual cover has, at most ``count``."""
     radius = core.radius
     half_length = core.half_length
     if len(core.corners) == 1:
@@ -331,10 +383,16 @@ def _round_inner(core: Core, count: int | None) -> Matrix:
 
 
 def inscribed(solid: Solid, surface: cKDTree, count: int) -> Matrix:
-    """At most ``count`` balls in a closed solid, the most useful first, shape (n, 4).
+    """Compute at most ``count`` balls inside a closed solid, the most useful first, shape (n, 4).
 
-    A ball about a point that is known to be inside reaches at most to the surface. Centres are moved from such points;
-    a move is trusted if the ball at its end holds the point where it began.
+    The largest ball about a point that is known to be inside reaches to the surface. Starting from such points, centres
+    are moved away from the surface. A moved centre is only used if the ball about it contains the point where it
+    started: then the segment between them does not cross the surface, so the centre is inside too.
+
+    Args:
+        solid: The solid, of unit size.
+        surface: Points spread over its surface.
+        count: Largest number of balls.
     """
     inside_points = random_subset(lattice_inside(solid, FEWEST_INSIDE), INNER_CENTRES)
     if not len(inside_points):
@@ -352,7 +410,16 @@ def inscribed(solid: Solid, surface: cKDTree, count: int) -> Matrix:
 
 
 def _moved_inwards(points: Matrix, surface: cKDTree) -> tuple[Matrix, Vector, Vector]:
-    """Points moved away from the surface that is nearest, while that makes them deeper; depths before and after."""
+    """Move points away from the nearest surface point for as long as that makes them deeper.
+
+    Args:
+        points: Points inside a solid, shape (n, 3).
+        surface: Points spread over its surface.
+
+    Returns:
+        The moved points, shape (n, 3); the depths of the given points, shape (n,); and those of the moved points,
+        shape (n,). Depths are distances from the nearest of the surface's points.
+    """
     distance, nearest = surface.query(points)
     centres = points
     start_depth = distance
@@ -374,7 +441,17 @@ def _moved_inwards(points: Matrix, surface: cKDTree) -> tuple[Matrix, Vector, Ve
 
 
 def _greedy_choice(centres: Matrix, radii: Vector, samples: Matrix, count: int) -> list[int]:
-    """Numbers of the balls of a greedy choice: each time the one that brings the samples nearest to a ball."""
+    """Choose balls greedily: each time the one that reduces the samples' distances to the nearest ball most.
+
+    Args:
+        centres: Centres of the candidates, shape (n, 3).
+        radii: Their radii, shape (n,).
+        samples: Points of the surface, shape (k, 3).
+        count: Largest number of balls.
+
+    Returns:
+        Indices of the chosen balls, in the order of the choice.
+    """
     gap_to_ball = np.linalg.norm(samples[:, None] - centres, axis=2).astype(np.float32) - radii.astype(np.float32)
     gap = np.full(len(samples), 2.0 * float(gap_to_ball.max()) + 1.0, dtype=np.float32)
     chosen: list[int] = []
