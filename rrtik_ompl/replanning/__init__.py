@@ -61,44 +61,47 @@ def replan(  # noqa: D417 - the settings are described in one place
 ) -> ReplanRun:
     """Move a robot to its goal while obstacles move: DRRT-Con [1, ch. 5.2, algorithms 6 to 8].
 
-    In each tick the scene is read; if anything has moved the path is checked again, in one call; if it is blocked, it
-    is repaired; then the robot goes one step, and only where that step is free now. Nothing is assumed of what
-    obstacles will do, unless ``lookahead_ticks`` says so. Where there is no path the robot waits; where an obstacle
-    comes nearer than allowed the robot evades it. Nobody can predict the motion of a cloud of points: it is evaded as
-    soon as it closes in.
+    Each tick reads the scene, checks the path again in one call if anything has moved, repairs the path if it is
+    blocked, and then moves the robot by one step, provided that this step is free now. Nothing is assumed about the
+    future motion of obstacles unless ``lookahead_ticks`` is set. Where there is no path, the robot waits; where an
+    obstacle comes nearer than allowed, it evades. The motion of a point cloud cannot be predicted, so a cloud is
+    evaded as soon as it closes in.
 
-    What was seen has an age: the robot keeps a distance of ``margin``, and to what moves also the distance that it can
-    have travelled since it was seen and can travel in the tick. An obstacle moves if it states a motion or was seen to
-    move. While the last scene is older than a tick, only steps that are proven are made.
+    A scene has an age. The robot keeps the distance ``margin`` to every obstacle; to a moving one it also keeps the
+    distance which that obstacle can have travelled since it was seen and can travel within the tick. An obstacle
+    counts as moving if it states a motion or was seen to move. While the last scene is older than a tick, the robot
+    makes only proven steps.
 
-    Steps are proven: whatever obstacles did since they were seen and do in the tick, also if they begin to move just
-    now, as long as none is faster than ``speed_bound``, the arm keeps ``margin`` and ``clearance`` in all of it. The
-    record says which steps are not (:attr:`Tick.proven`); without a ``speed_bound`` none is, beside what may move and
-    does not state how.
+    A step is proven if the arm keeps ``margin`` and ``clearance`` at every time of it, whatever the obstacles did since
+    they were seen and do in the tick (they may even begin to move just now), as long as none is faster than
+    ``speed_bound``. The record says which steps are not proven (:attr:`Tick.proven`). Without a ``speed_bound`` no step
+    is proven while there is an obstacle that may move and does not state its motion.
     Contact cannot be avoided where the arm waits or evades and every escape is blocked, or where an obstacle reaches
     the fixed base. :meth:`ReplanRun.violations` judges a record.
 
     Args:
-        problem: Robot, scene at the begin, start and goal. Of a pose, position or region all configurations are goals:
-            if one is blocked another one is tried.
+        problem: Robot, scene at the begin, start and goal. If the goal is a pose, position or region, all
+            configurations that reach it are goals: if one is blocked, another one is tried.
         scene_feed: The scene over time: a scene whose obstacles state their motion, a function of time [s], or
-            pairs of a time and a scene (or a :class:`Snapshot`); the problem's scene if None. The obstacles' names and
-            shapes stay the same, and so do attached objects, which are those of the problem; the pairs that may touch
-            are those of each scene. Times of pairs are counted from the first one [s].
+            pairs of a time and a scene (or a :class:`Snapshot`); the problem's scene if None. Names and shapes of the
+            obstacles must stay the same, and so must the attached objects, which are those of the problem; each scene
+            brings its own pairs that may touch. The times of pairs are counted from the first pair [s].
         step: This and all arguments that are not explained here: see :class:`ReplanSettings`.
         goal_feed: A goal that moves: the configuration at a time [s], in place of the problem's goal.
-            It is reached when the robot is where it was at the begin of the last tick.
-        record: A ``.json`` file for the record; it is written on Ctrl-C and errors too, once there is a tick.
-        clock: Measures the times of the ticks and the ``repair_budget`` [s]; ``time.process_time`` counts the
-            processor's, on a machine that does other things too.
-        feed_patience: How long pairs may have nothing new, by the time of the run [s]: then it ends with the outcome
-            "no scene"; and how long a feed may take for an answer, by the clock: then it ends with an error, and the
-            record has what was before. 2 s and 30 s if None.
-        renamed: None; an old name is answered with the new one.
+            It counts as reached when the robot is where the goal was at the begin of the last tick.
+        record: A ``.json`` file for the record. Once there is a tick, it is written on Ctrl-C and on errors too.
+        clock: Measures the times of the ticks and the ``repair_budget`` [s]. ``time.process_time`` counts processor
+            time, which suits a machine that does other work too.
+        feed_patience: Two limits [s]; 2 s and 30 s if None. The first is how long a stream of pairs may bring nothing
+            new, in the time of the run; after that the run ends with the outcome "no scene". The second is how long a
+            feed may take to answer, in wall time; after that the run ends with an error, and the record holds all
+            ticks before it.
+        renamed: Must be empty. An old name of a setting is refused with a message that gives the new one.
 
     Raises:
-        InputError: If a number is out of range, times cannot be, a half-space turns, an obstacle begins in contact with
-            the robot, no configuration reaches the goal, a feed does not answer, or the problem has path constraints.
+        InputError: If a number is out of range, the feed's times are impossible, a half-space turns, an obstacle begins
+            in contact with the robot, no configuration reaches the goal, a feed does not answer, or the problem has
+            path constraints.
         UnknownNameError: If there is no planner of that name.
 
     Example:
@@ -128,7 +131,7 @@ def replan_with(
     clock: Clock = time.perf_counter,
     feed_patience: float | None = None,
 ) -> ReplanRun:
-    """As :func:`replan`, with settings that were made before.
+    """Replan like :func:`replan`, with the settings given as one object.
 
     Raises:
         InputError: See :func:`replan`.
@@ -158,7 +161,7 @@ def replan_with(
 
 
 def _run(loop: Loop, settings: ReplanSettings, record: str | os.PathLike[str] | None) -> ReplanRun:
-    """Tick until the goal is reached or the time is up; the record is written whatever comes."""
+    """Run ticks until the goal is reached or the time is up, and write the record even if an error ends the run."""
     try:
         for number in range(int(settings.seconds * settings.rate) + 1):
             if not loop.tick(number):

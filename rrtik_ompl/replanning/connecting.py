@@ -1,7 +1,8 @@
-"""RRT-Connect between two pieces of a path, each used as a tree from the beginning: in a kernel, or in Python.
+"""RRT-Connect between two pieces of a path, in a kernel or in Python; all points of a piece are vertices at once.
 
-Source: [1, ch. 5.2, algorithms 1 to 5]; in Python as printed but for three slips: EXTEND has reached a target when
-its new vertex is the target, the second tree is extended until it is trapped, and samples are uniform.
+Source: [1, ch. 5.2, algorithms 1 to 5]. The Python search follows the printed algorithms except for three slips in
+them: EXTEND has reached a target when its new vertex is the target, the second tree is extended until it is trapped,
+and samples are uniform.
 """
 
 from __future__ import annotations
@@ -23,8 +24,8 @@ from rrtik_ompl.world.motion_queries import KernelWorld, MotionFree, MotionQueri
 
 KERNELS = (CONNECT_KERNELS, CUT_KERNELS)  # libraries that replanning in kernels needs
 ITERATIONS = 4000  # samples of one search at most, so that the same seed gives the same run
-SHORTCUT_TRIES = 100  # tries of random shortcuts
-SHORTCUT_PATIENCE = 40  # of them without gain, after which it ends
+SHORTCUT_TRIES = 100  # random shortcuts that are tried
+SHORTCUT_PATIENCE = 40  # shortcuts without gain after which shortening ends
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -32,10 +33,10 @@ class TreeOptions:
     """How the trees of a search grow.
 
     Attributes:
-        lower, upper: The box to sample in, shape (n,).
+        lower, upper: Corners of the box to sample in, shape (n,).
         max_edge: The longest edge [unit of the space].
-        seed: Of the samples.
-        iterations: Samples of one search at most.
+        seed: Seed of the samples.
+        iterations: The largest number of samples of one search.
     """
 
     lower: Vector
@@ -46,7 +47,7 @@ class TreeOptions:
 
     @property
     def rules(self) -> ConnectRules:
-        """The same for the search in Python."""
+        """These options as the search in Python takes them."""
         return ConnectRules(self.lower, self.upper, self.max_edge, max_iterations=self.iterations)
 
 
@@ -55,8 +56,8 @@ class Connection:
     """Two pieces of a path and the connection between them.
 
     Attributes:
-        path: From the begin of one to the end of the other, shape (k, n).
-        begin, end: Numbers of the waypoints between which the path is new.
+        path: Waypoints from the begin of the first piece to the end of the second, shape (k, n).
+        begin, end: Indices of the waypoints between which the path is new.
     """
 
     path: Matrix
@@ -65,10 +66,10 @@ class Connection:
 
 
 class Connect(Protocol):
-    """Connects two pieces of a path.
+    """A search that connects two pieces of a path.
 
     Attributes:
-        samples: Drawn so far.
+        samples: Number of samples drawn so far, in all calls.
     """
 
     samples: int
@@ -76,14 +77,14 @@ class Connect(Protocol):
     def __call__(
         self, first: Matrix, second: Matrix, motions: MotionQueries, stop: Stop, *, chain: bool = True
     ) -> Connection | None:
-        """The whole path from ``first[0]`` by a connection from one piece to the other, or None.
+        """Connect the two pieces and return the whole path from ``first[0]``, or None if no connection is found.
 
         Args:
-            first: Configurations from the robot on, a free chain, shape (a, n).
-            second: Configurations to the goal, a free chain, shape (b, n); with ``chain`` False separate goals.
+            first: Free path from the robot on, shape (a, n).
+            second: Free path to the goal, shape (b, n); separate goals if ``chain`` is False.
             motions: Checks motions.
-            stop: True ends the search.
-            chain: See ``second``.
+            stop: Ends the search when it returns True.
+            chain: Whether the rows of ``second`` are a path, whose rest is followed behind the connection.
         """
 
 
@@ -99,7 +100,7 @@ class KernelConnect:
     def __call__(
         self, first: Matrix, second: Matrix, motions: MotionQueries, stop: Stop, *, chain: bool = True
     ) -> Connection | None:
-        """See :class:`Connect`; conservative: what the kernel cannot prove counts as blocked."""
+        """Connect two pieces, see :class:`Connect`; motions that the kernel cannot prove free count as blocked."""
         seed = int(self._rng.integers(2**63))
         bridge = self._search.solve(first, second, seed, stop=stop, max_iterations=self._iterations)
         self.samples += int(self._search.statistics()["iterations"])
@@ -110,7 +111,7 @@ class PythonConnect:
     """The published search in Python, for any motion check.
 
     Attributes:
-        trees: Of the last search, from both sides; None before the first.
+        trees: The trees of the last search, first and second; None before the first search.
     """
 
     def __init__(self, options: TreeOptions) -> None:
@@ -138,7 +139,7 @@ class KernelCuts:
         self._rng = np.random.default_rng(seed)
 
     def __call__(self, route: Matrix) -> Matrix:
-        """The route, shape (k, n), shortened; all its edges must be free."""
+        """Return the route, shape (k, n), shortened; all its edges must be free."""
         if len(route) < 3:
             return route
         search = ShortcutSearch(self._world.motions, route, seed=int(self._rng.integers(2**62)), asking=False)
@@ -147,12 +148,19 @@ class KernelCuts:
 
 
 def one_by_one(motions: MotionQueries) -> MotionFree:
-    """The check of a single motion by that of a batch."""
+    """Return a check of a single motion that calls the check of a batch."""
     return lambda a, b: bool(motions.motion_valid_batch(a[None], b[None])[0])
 
 
 def connected(first: Matrix, bridge: Matrix, second: Matrix, *, chain: bool) -> Connection:
-    """A piece up to the begin of a bridge, the bridge, and the other piece from its end on; no row twice running."""
+    """Join the first piece up to the bridge, the bridge, and the rest of the second piece, without repeated rows.
+
+    Args:
+        first: Waypoints of the first piece, shape (a, n).
+        bridge: Waypoints from a row of ``first`` to a row of ``second``, shape (k, n).
+        second: Waypoints of the second piece, shape (b, n), or separate goals.
+        chain: Whether the rows of ``second`` are a path, whose rest is appended.
+    """
     begin = int(np.flatnonzero((first == bridge[0]).all(axis=1))[0])
     end = int(np.flatnonzero((second == bridge[-1]).all(axis=1))[-1])
     bridge = without_repeats(bridge)

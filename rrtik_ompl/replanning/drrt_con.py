@@ -1,8 +1,8 @@
-"""DRRT-Con: a path that follows the robot and whose blocked part is cut out from both sides and reconnected.
+"""DRRT-Con: a path that begins at the robot; its blocked part is cut out from both sides and reconnected.
 
-Source: [1, ch. 5.2, algorithms 6 to 8], with these corrections: where the scene has changed but the path is free the
-robot goes on; where no connection is found the path is kept, and what is left of it is tried again at the next call,
-with new samples (a path that becomes free by itself needs none).
+Source: [1, ch. 5.2, algorithms 6 to 8], with two corrections. If the scene has changed but the path is free, the robot
+goes on. If no connection is found, the path is kept, and the next call tries again with new samples to reconnect its
+free pieces (a path that becomes free by itself needs no search).
 
 ``replan()`` and ``rrtik replan`` use it; ``rrtik_planners.DRRTCon`` makes an OMPL planner of it.
 """
@@ -34,29 +34,29 @@ from rrtik_ompl.world.motion_queries import MotionQueries, has_kernels
 from rrtik_ompl.world.moving_world import MovingWorld
 
 MAX_CUTS = 24  # shortcut ends that are tried from one point of a path
-STRAIGHT_TOLERANCE = 1e-9  # change of the unit direction
-REPAIR_TRIES = 16  # of random shortcuts, where only a detour is new; walking shortens it further
-REPAIR_PATIENCE = 6  # of them without gain, after which it ends
+STRAIGHT_TOLERANCE = 1e-9  # change of the unit direction below which two edges count as one straight line
+REPAIR_TRIES = 16  # random shortcuts after a repair, where only a detour is new; walking shortens it further
+REPAIR_PATIENCE = 6  # shortcuts without gain after which shortening ends
 
-Post = Callable[[Matrix], Matrix]  # a free route, shape (k, n), made shorter
+Post = Callable[[Matrix], Matrix]  # shortens a free route, shape (k, n), and returns it
 
 
 class DrrtCon:
     """A path from the robot's configuration to a goal, kept free while the scene changes.
 
     Attributes:
-        path: Shape (k, n), the robot's configuration first; None before :meth:`begin` has found one. It is kept while
-            it is blocked.
+        path: Waypoints, shape (k, n), the robot's configuration first; None before :meth:`begin` has found a path. A
+            blocked path is kept.
         free: Whether every motion of the path was free when it was checked last.
         repairs: Number of searches for a new path so far.
-        name: Of the class, as a setting.
-        forgetting: Of the class: whether each repair plans from scratch.
-        repairs_in_kernels: Of the class: whether :class:`KernelDrrtCon` does its work in a world that has kernels.
+        name: The name of the class as a setting.
+        forgetting: Whether the class plans every repair from scratch.
+        repairs_in_kernels: Whether :class:`KernelDrrtCon` can take the place of the class in a world that has kernels.
 
     Args:
         connect: The search between pieces of a path.
         max_edge: Longest edge of the trees [unit of the space]; the path is cut at points half as far apart.
-        post: Shortens what is new of a path; the sequential cut if None, as published.
+        post: Shortens the new part of a path; the sequential cut if None, as published.
     """
 
     name: ClassVar[Replanner] = "drrt-con"
@@ -71,23 +71,24 @@ class DrrtCon:
         self.free = False
         self.repairs = 0
 
-        # Of the last check: points along the path, shape (k, n), and which motions between them are blocked, (k - 1,).
+        # Results of the last check: points along the path, shape (k, n), and which of the motions between them are
+        # blocked, shape (k - 1,).
         self._points_at_last_check = np.zeros((0, 0))
         self._blocked_at_last_check: Mask = np.zeros(0, dtype=bool)
 
     @classmethod
     def with_trees(cls, options: TreeOptions, post: Post | None) -> DrrtCon:
-        """One whose search, in Python, grows trees so."""
+        """Make a replanner whose trees grow in Python with the given options."""
         return cls(PythonConnect(options), options.max_edge, post=post)
 
     def begin(self, start: Matrix | Vector, goals: Matrix, motions: MotionQueries, stop: Stop = no_stop) -> bool:
-        """Look for a first path; whether there is one.
+        """Look for a first path and return whether one was found.
 
         Args:
-            start: Where it may begin, shape (n,), or several of these, shape (s, n), at once.
-            goals: Where it may end, shape (g, n).
+            start: Configuration where the path begins, shape (n,), or several to choose from, shape (s, n).
+            goals: Configurations where it may end, shape (g, n).
             motions: Checks motions.
-            stop: True ends the search.
+            stop: Ends the search when it returns True.
         """
         starts = np.atleast_2d(start)
         usable = motions.valid_batch(np.vstack([starts, goals]))
@@ -97,12 +98,13 @@ class DrrtCon:
             return False
 
         connection = self.connect(free_starts, free_goals, motions, stop, chain=False)
-        if connection is not None:  # the other starts do not lead to the one where it begins
+        # The rows before the one where the connection begins are other starts and no part of the path.
+        if connection is not None:
             connection = Connection(connection.path[connection.begin :], 0, connection.end - connection.begin)
         return self._take_over(connection, motions)
 
     def check_path(self, motions: MotionQueries) -> bool:
-        """Check the path again, all of it in one call; whether it is free."""
+        """Check the whole path again in one call and return whether it is free."""
         if self.path is None:
             return False
         points = points_along(self.path, 0.5 * self.max_edge)
@@ -112,16 +114,22 @@ class DrrtCon:
         return self.free
 
     def repair(self, motions: MotionQueries, stop: Stop = no_stop) -> bool:
-        """After a :meth:`check_path` that found the path blocked: find another one; whether there is one."""
+        """Look for another path after :meth:`check_path` found the path blocked; return whether one was found."""
         self.repairs += 1
         ends_free = self.path is not None and bool(motions.valid_batch(self.path[[0, -1]]).all())
         connection = self._reconnected(motions, stop) if ends_free else None
         return self._take_over(connection, motions)
 
     def retarget(self, goals: Matrix, motions: MotionQueries, stop: Stop = no_stop) -> bool:
-        """Reconnect the free beginning of the path to the nearest of other goals, shape (g, n), without shortening.
+        """Reconnect the free beginning of the path to one of other goals, without shortening.
 
-        Whether it could be done; if not, the path stays as it is.
+        Args:
+            goals: Configurations where the path may end, shape (g, n).
+            motions: Checks motions.
+            stop: Ends the search when it returns True.
+
+        Returns:
+            Whether a connection was found; if not, the path stays as it is.
         """
         goals = goals[motions.valid_batch(goals)]
         if self.path is None or len(goals) == 0:
@@ -140,22 +148,32 @@ class DrrtCon:
         return connection is not None
 
     def advance(self, place: Vector, passed: int, motions: MotionQueries) -> None:
-        """The robot has gone to ``place``, past ``passed`` waypoints: drop what lies behind it, shorten the rest."""
+        """Drop the part of the path that the robot has left behind, and shorten the rest.
+
+        Args:
+            place: The robot's new configuration on the path, shape (n,).
+            passed: Number of waypoints behind the first one that it has passed.
+            motions: Checks motions.
+        """
         was_free = self.free
         self.rejoin(place, passed)
-        self.free = was_free  # it was, so the part of it that is left is
+        self.free = was_free  # The rest of a free path is free.
         if self.path is not None and was_free and len(self.path) > 2:
             self.path = cut_from_start(self.path, 0.5 * self.max_edge, motions)
 
     def rejoin(self, place: Vector, passed: int = 0) -> None:
-        """The robot is at ``place``, on its path or not, past ``passed`` waypoints: the edge there is unchecked."""
+        """Let the path begin at ``place``, shape (n,), where the robot is now, on its path or not.
+
+        The waypoints that were passed are dropped. The edge from ``place`` to the next waypoint is not checked, so the
+        path no longer counts as free.
+        """
         if self.path is not None:
             rest = self.path[1 + passed :] if len(self.path) > 1 + passed else self.path[-1:]
             self.path = rest if (rest[0] == place).all() else np.vstack([place, rest])
             self.free = False
 
     def _reconnected(self, motions: MotionQueries, stop: Stop) -> Connection | None:
-        """Cut at the first hit seen from the robot and at the first one seen from the goal; join the two pieces."""
+        """Cut the path at its first and its last blocked motion, and connect the two free pieces that are left."""
         blocked = np.flatnonzero(self._blocked_at_last_check)
         first = int(blocked[0])
         last = int(blocked[-1])
@@ -163,7 +181,7 @@ class DrrtCon:
         return self.connect(points[: first + 1], points[last + 1 :], motions, stop)
 
     def _take_over(self, connection: Connection | None, motions: MotionQueries) -> bool:
-        """Make a new path the path, if there is one, what is new of it shortened; whether there is one."""
+        """Take over the path of a connection, with its new part shortened; return whether there is a connection."""
         self.free = connection is not None
         if connection is not None:
             path = connection.path
@@ -189,13 +207,13 @@ class FromScratch(DrrtCon):
 
 
 class KernelDrrtCon(DrrtCon):
-    """As :class:`DrrtCon`, in one world: its path is kept free of what moves there.
+    """DRRT-Con, or planning from scratch, in kernels and in one world.
 
-    What the kernels add to the published algorithm: :mod:`rrtik_ompl.kernels.search.repair_kernels`.
+    :mod:`rrtik_ompl.kernels.search.repair_kernels` says what the kernels add to the published algorithm.
 
     Args:
-        world: Checks motions; the ``motions`` of all methods.
-        options: How the trees grow; the seed is that of the shortcuts too.
+        world: Checks motions; all methods expect it as their ``motions``.
+        options: How the trees grow; its seed is also that of the shortcuts.
         forgetting: Whether each repair plans from scratch, as :class:`FromScratch` does.
 
     Raises:
@@ -203,7 +221,7 @@ class KernelDrrtCon(DrrtCon):
     """
 
     def __init__(self, world: MovingWorld, options: TreeOptions, *, forgetting: bool = False) -> None:
-        self._world = world  # before the check, behind which its type is a lesser one
+        self._world = world  # This stands before has_kernels(), which narrows the static type of ``world``.
         if not has_kernels(world):
             raise InputError("replanning in kernels: the world has none; install numba")
 
@@ -239,12 +257,12 @@ class KernelDrrtCon(DrrtCon):
 
 
 def points_along(path: Matrix, step: float) -> Matrix:
-    """The path with further points, none farther than ``step`` from the next; all waypoints stay. Shape (m, n)."""
+    """Return the waypoints of a path and points between them, each at most ``step`` from the next; shape (m, n)."""
     return _points_and_edges(path, step)[0]
 
 
 def without_points_between(path: Matrix) -> Matrix:
-    """The path without waypoints at which its direction does not change; both ends stay."""
+    """Return the path without the waypoints at which its direction does not change; both ends stay."""
     if len(path) < 3:
         return path
     edges = np.diff(path, axis=0)
@@ -256,10 +274,10 @@ def without_points_between(path: Matrix) -> Matrix:
 
 
 def dense_sequential_cut(path: Matrix, step: float, motions: MotionQueries) -> Matrix:
-    """Shorten a free path: from each kept point straight to the last point that can be reached.
+    """Shorten a free path by going straight from each kept point to the last reachable point.
 
-    Points lie every ``step`` along the path, and ``MAX_CUTS`` of them are tried in one call;
-    :func:`rrtik_ompl.planning.shortening.cuts.sequential_cut` tries every waypoint and no others. Source:
+    The points lie at most ``step`` apart along the path, and ``MAX_CUTS`` of them are tried in one call. In contrast,
+    :func:`rrtik_ompl.planning.shortening.cuts.sequential_cut` tries exactly the waypoints. Source:
     [1, ch. 5.3, method 1], as DRRT-Con uses it.
     """
     points_kept = [path[:1]]
@@ -272,9 +290,13 @@ def dense_sequential_cut(path: Matrix, step: float, motions: MotionQueries) -> M
 
 
 def cut_from_start(path: Matrix, step: float, motions: MotionQueries) -> Matrix:
-    """A free path with its beginning straight to the last point along it that can be reached, asked in one call."""
+    """Return a free path whose beginning goes straight to the last reachable point along it.
+
+    Up to ``MAX_CUTS`` points beyond the first edge are tried in one call; if none can be reached, the path is returned
+    as it is.
+    """
     points, edges = _points_and_edges(path, step)
-    first_beyond = int(np.searchsorted(edges, 1))  # the first point behind the first edge, which is free
+    first_beyond = int(np.searchsorted(edges, 1))  # The first edge is free, so points on it are no gain.
     ends = np.unique(np.linspace(first_beyond, len(points) - 1, MAX_CUTS).round().astype(int))
     if first_beyond >= len(points):
         return path
@@ -288,7 +310,11 @@ def cut_from_start(path: Matrix, step: float, motions: MotionQueries) -> Matrix:
 
 
 def _points_and_edges(path: Matrix, step: float) -> tuple[Matrix, Vector]:
-    """See :func:`points_along`; also the number of the edge on which, or at whose end, each point lies."""
+    """Return points along a path, see :func:`points_along`, and the edges on which they lie.
+
+    Returns:
+        Points, shape (m, n), and for each point the number of the edge on which, or at whose end, it lies; shape (m,).
+    """
     path = path if len(path) > 1 else np.vstack([path, path])
     counts = part_counts(path, step)
     return subdivided(path, counts)

@@ -1,7 +1,7 @@
-"""A judge of runs: what touches in a record, at every time of it, by coal and a bound on the motion.
+"""Independent check of recorded runs: which bodies are too near at any time, by coal and a bound on the motion.
 
-It takes solids and pairs as a new :class:`rrtik_ompl.World` does, puts each where the record has it, and knows nothing
-of the worlds in which obstacles are moved while the arm is on its way.
+It builds bodies and pairs as a new :class:`rrtik_ompl.World` does and places each body where the record has it. It
+does not use :class:`MovingWorld`, in which obstacles are moved while the arm is on its way.
 """
 
 from __future__ import annotations
@@ -33,11 +33,11 @@ from rrtik_ompl.replanning.travels import travel_bound
 from rrtik_ompl.world.arrangement import arrangement_of
 from rrtik_ompl.world.problem import Problem
 
-FINEST_APPROACH = 2e-5  # [m]: of the motion of a pair, below which its middle stands for it
-COARSEST_APPROACH = 2e-3  # [m]: the same where too little is kept there, of which the least is not sought any closer
-RELATIVE_ACCURACY = 0.1  # of what is lacking: no closer either
-ROUNDING = 2e-6  # [m]: of distances and of poses that are computed from times
-TRUTHS_PER_TICK = 4  # times in a tick at which a function of time is asked for the truth
+FINEST_APPROACH = 2e-5  # [m]: an interval in which a pair approaches by less is judged by its middle alone
+COARSEST_APPROACH = 2e-3  # [m]: the same for an interval in whose middle the pair is known to be too near
+RELATIVE_ACCURACY = 0.1  # The same, as a share of the missing distance, if that is larger.
+ROUNDING = 2e-6  # [m]: rounding of distances and of poses that are computed from times
+TRUTHS_PER_TICK = 4  # times per tick at which a function of time is asked for the truth
 
 Frames: TypeAlias = NDArray[np.float64]
 
@@ -47,13 +47,14 @@ class RunViolation:
     """Two bodies that are nearer to each other in a run than they may be.
 
     Attributes:
-        time: When most is lacking in the tick [s].
+        time: Time within the tick at which the most distance is missing [s].
         tick: Number of the tick.
-        event: Of the tick.
-        first, second: Names of the two.
-        distance: Between them [m]; below 0 how deep they overlap, as far as that is known of their shapes.
-        required_distance: What had to be kept [m]: 0 (below it for a contact that the scene names), or margins and
-            clearance where the move is called proven.
+        event: Event of the tick.
+        first, second: Names of the two bodies.
+        distance: Signed distance between them [m]; negative is the penetration depth, where their shapes allow it to be
+            computed, and else 0 stands for an overlap.
+        required_distance: Distance that had to be kept [m]: 0 (negative for a contact that the scene allows), or
+            margins and clearance if the record calls the move proven.
         proven: Whether the record calls the move proven.
     """
 
@@ -70,7 +71,7 @@ class RunViolation:
 
     @property
     def touches(self) -> bool:
-        """Whether the two touch; if not, they are nearer than what had to be kept."""
+        """Whether the two bodies touch or overlap; if not, they are only nearer than required."""
         return self.distance <= 0.0
 
     def __str__(self) -> str:
@@ -91,14 +92,19 @@ def run_violations(
     clearance: float,
     truth: Scene | Feed | None = None,
 ) -> tuple[RunViolation, ...]:
-    """See :meth:`rrtik_ompl.replanning.record.ReplanRun.violations`.
+    """Return the violations of a run; see :meth:`rrtik_ompl.replanning.record.ReplanRun.violations`.
+
+    The run is split into periods in which only poses change, and each tick of a period is judged by itself.
 
     Args:
-        ticks: Of the run.
-        scenes: That were seen; none in an old record.
-        problem: That was run.
-        clearance: What moves that are called proven keep from obstacles beside their margins [m].
-        truth: See there.
+        ticks: All ticks of the run.
+        scenes: The scenes that were seen; empty for an old record, whose ticks hold poses instead.
+        problem: The problem that was run.
+        clearance: Distance that proven moves keep from obstacles in addition to the obstacles' margins [m].
+        truth: Where obstacles really were, or None for where they were seen.
+
+    Returns:
+        For each tick and pair the worst violation, in the order of time, then of names.
     """
     if not ticks:
         return ()
@@ -116,14 +122,22 @@ def run_violations(
 
 
 def _lacking(violation: RunViolation) -> float:
-    """How much is lacking of the distance that had to be kept [m]."""
+    """Return how much of the required distance is missing [m]."""
     return violation.required_distance - violation.distance
 
 
 def _snapshots(
     ticks: Sequence[Tick], scenes: Sequence[Snapshot], scene: Scene, truth: Scene | Feed | None
 ) -> Sequence[Snapshot]:
-    """Where obstacles were: the truth if it is given, what was seen, or what an old record says of poses."""
+    """Return where obstacles were: the truth if it is given, else the seen scenes, else the poses of the ticks.
+
+    Args:
+        ticks: All ticks of the run.
+        scenes: The scenes that were seen; empty for an old record.
+        scene: The problem's scene, which gives an old record its shapes.
+        truth: A scene that states its motions, or a function of time, which is sampled ``TRUTHS_PER_TICK`` times per
+            tick.
+    """
     if isinstance(truth, Scene):
         return [Snapshot(0.0, truth.at(0.0), stated=True)]
     if truth is not None:
@@ -138,7 +152,7 @@ def _snapshots(
 
 
 def _scene_at_tick(scene: Scene, tick: Tick) -> Scene:
-    """A scene at a tick, as its poses say."""
+    """Return a scene with its obstacles, now at rest, at the poses that a tick records."""
     poses = {name: pose(row[:3], row[3:]) for name, row in tick.poses.items()}
     obstacles = (replace(o, motion=None, pose=poses.get(o.name, o.pose)) for o in scene.obstacles)
     return replace(scene, obstacles=tuple(obstacles))
@@ -146,13 +160,13 @@ def _scene_at_tick(scene: Scene, tick: Tick) -> Scene:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Period:
-    """A time of a run in which shapes, margins and allowed pairs stay the same.
+    """A part of a run in which shapes, margins and allowed pairs stay the same.
 
     Attributes:
-        begin, end: Of it [s].
-        is_last: Whether the run ends with it.
-        scene: Its obstacles, which state how they move.
-        knots: When one of them turns, in all of the run [s], shape (m,).
+        begin, end: Begin and end of the period [s].
+        is_last: Whether the run ends with this period.
+        scene: The scene of the period, whose obstacles state how they move.
+        knots: Times in the whole run at which the straight motion of some obstacle may change [s], shape (m,).
     """
 
     begin: float
@@ -163,7 +177,7 @@ class _Period:
 
 
 def _periods(snapshots: Sequence[Snapshot], end: float) -> Iterator[_Period]:
-    """The times of a run in which only poses change."""
+    """Yield the periods of a run until ``end`` [s]; a new one begins where more than the poses changes."""
     motions = {o.name: _motion_of(snapshots, o) for o in snapshots[0].scene.obstacles}
     knots = np.unique([time for motion in motions.values() if motion is not None for time in _turning_times(motion)])
     begins = [
@@ -182,7 +196,7 @@ def _periods(snapshots: Sequence[Snapshot], end: float) -> Iterator[_Period]:
 
 
 def _motion_of(snapshots: Sequence[Snapshot], obstacle: Obstacle) -> Motion | None:
-    """How an obstacle moved: as stated, or straight from where it was seen to where it was seen next."""
+    """Return how an obstacle moved: as its scene states, or straight from each pose where it was seen to the next."""
     name = obstacle.name
     if snapshots[0].stated:
         return obstacle.motion
@@ -196,12 +210,12 @@ def _motion_of(snapshots: Sequence[Snapshot], obstacle: Obstacle) -> Motion | No
 
 
 def _turning_times(motion: Motion) -> Vector:
-    """When a motion turns [s]."""
+    """Return the times at which a motion may change its direction or speed [s]."""
     return motion.times if isinstance(motion, TimedPoses) else np.zeros(1)
 
 
 def _same_but_for_poses(first: Scene, second: Scene) -> bool:
-    """Whether two scenes differ in poses alone."""
+    """Check whether two scenes have the same shapes, margins and allowed pairs, so that at most poses differ."""
     if first is second:
         return True
     pairs = ((each, second.obstacle(each.name)) for each in first.obstacles)
@@ -210,13 +224,13 @@ def _same_but_for_poses(first: Scene, second: Scene) -> bool:
 
 
 class _PeriodJudge:
-    """Says what touches in a period of a run.
+    """Finds the pairs of bodies that are too near in one period of a run.
 
     Args:
-        settings: Of the world of the run; the scene is that of the period.
-        ticks: Of the whole run.
-        period: Of the run.
-        clearance: What moves that are called proven keep from obstacles beside their margins [m].
+        settings: Settings of the world of the run; the scene is taken from the period.
+        ticks: All ticks of the run, also those outside the period.
+        period: The period to judge.
+        clearance: Distance that proven moves keep from obstacles in addition to the obstacles' margins [m].
     """
 
     def __init__(self, settings: WorldSettings, ticks: Sequence[Tick], period: _Period, clearance: float) -> None:
@@ -232,14 +246,14 @@ class _PeriodJudge:
         self._pair_indices: NDArray[np.int64] = np.array(self._pairs, dtype=np.int64).reshape(-1, 2)
 
         self._obstacles = {o.name: o for o in period.scene.obstacles}
-        # Where each solid is in the frame of its joint, or in that of its obstacle.
+        # The pose of each solid in the frame of its joint or of its obstacle.
         self._local_poses = [
             (body.within if body.kind == "obstacle" else body.placement).homogeneous for body in self._bodies
         ]
 
         self._obstacle_names = list(self._obstacles)
         index_of_obstacle = {name: k for k, name in enumerate(self._obstacle_names)}
-        # Index of the obstacle that each body is a part of; -1 for bodies of the arm.
+        # The index of the obstacle that each body is a part of; -1 for bodies of the arm.
         self._obstacle_of_body = np.array(
             [index_of_obstacle[b.name] if b.kind == "obstacle" else -1 for b in self._bodies]
         )
@@ -248,21 +262,22 @@ class _PeriodJudge:
         self._bounding_balls = np.array([_bounding_ball(body) for body in self._bodies]).reshape(-1, 4)
 
         bodies_of_pairs = [(self._bodies[i], self._bodies[j]) for i, j in self._pairs]
-        # What each pair keeps [m]: in moves that are not proven, where it must only not touch, and in proven ones.
+        # The distance that each pair has to keep [m]: in unproven moves, which must only avoid contact, and in proven
+        # moves, which keep margins and clearance too.
         self._contact_distances = np.array([min(contact_distance(*pair) or 0.0, 0.0) for pair in bodies_of_pairs])
         self._required_distances = np.array(
             [kept_apart(*pair) + (clearance if _clearance_applies(*pair) else 0.0) for pair in bodies_of_pairs]
         )
 
     def violations(self) -> Iterator[RunViolation]:
-        """Who is too near to whom, tick after tick; a pair may come several times in a tick."""
+        """Yield the violations tick by tick; a pair may occur several times in a tick."""
         ticks = self._ticks
         period = self._period
         if len(self._pairs) == 0:
             return
 
         for number, tick in enumerate(ticks):
-            is_last_tick = number + 1 == len(ticks)  # the last one is a moment
+            is_last_tick = number + 1 == len(ticks)  # The last tick has no duration.
             end = tick.time if is_last_tick else ticks[number + 1].time
             begin = max(tick.time, period.begin)
             until = min(end, period.end)
@@ -275,10 +290,20 @@ class _PeriodJudge:
                 yield from self._violations_between(number, a, b)
 
     def _violations_between(self, number: int, begin: float, end: float) -> Iterator[RunViolation]:
-        """What is too near in a part of a tick in which all moves straight."""
+        """Yield the pairs that are too near in a part of a tick, at most one violation a pair.
+
+        The broad phase compares bounding balls in the middle of the part, where a pair can be at most half its approach
+        bound farther apart than at its nearest. The narrow phase bisects in time, see :meth:`_nearest_time`.
+
+        Args:
+            number: Number of the tick.
+            begin: Begin of the part [s]; between begin and end every body moves straight.
+            end: End of the part [s].
+        """
         required = self._required_distances if self._ticks[number].proven else self._contact_distances
         approaches = self._approach_bounds(number, begin, end)
 
+        # Broad phase: the gaps between the bounding balls of each pair.
         poses = self._body_poses(number, 0.5 * (begin + end))
         centres = np.einsum("kij,kj->ki", poses[:, :3, :3], self._bounding_balls[:, :3]) + poses[:, :3, 3]
         first, second = self._pair_indices.T
@@ -287,8 +312,10 @@ class _PeriodJudge:
             - self._bounding_balls[first, 3]
             - self._bounding_balls[second, 3]
         )
-        is_near = ~(gaps > required + 0.5 * approaches)  # NaN, of what has no end, is near
+        # The comparison is negated, so that NaN, the gap of an unbounded shape, counts as too near.
+        is_near = ~(gaps > required + 0.5 * approaches)
 
+        # Narrow phase for the remaining pairs.
         for pair in np.flatnonzero(is_near).tolist():
             nearest = self._nearest_time(number, pair, begin, end, float(required[pair]), float(approaches[pair]))
             if nearest is not None:
@@ -302,22 +329,27 @@ class _PeriodJudge:
     def _nearest_time(
         self, number: int, pair: int, begin: float, end: float, required: float, approach: float
     ) -> tuple[float, float] | None:
-        """Look for the time at which a pair lacks most in a part of a tick, by bisection.
+        """Find by bisection in time whether a pair comes too near in a part of a tick, and when it is nearest.
+
+        The distance in the middle of the part can exceed that at any other time of it by at most half the approach. So
+        if the middle keeps the required distance plus half the approach, the whole part is free. Else both halves are
+        searched, until the approach is below the thresholds above.
 
         Args:
-            number: Of the tick.
+            number: Number of the tick.
             pair: Number of the pair.
-            begin: Of the part [s].
-            end: Of the part [s].
-            required: What the pair has to keep [m]; negative where it may overlap.
-            approach: How much nearer it can come in the part at most [m].
+            begin: Begin of the part [s].
+            end: End of the part [s].
+            required: Distance that the pair has to keep [m]; negative if it may overlap.
+            approach: Upper bound on how much the distance of the pair can change in the part [m].
 
         Returns:
-            The time at which the pair is nearest, of those that are looked at [s], and its signed distance then [m];
-            None if it keeps what it has to.
+            The time [s] of the smallest signed distance among the times that were evaluated, and that distance [m];
+            None if the pair keeps the required distance.
         """
         middle = 0.5 * (begin + end)
-        sufficient = required  # to be kept in the middle, so that enough is kept in all of the part
+        # If the pair keeps the sufficient distance in the middle, it keeps the required one in the whole part.
+        sufficient = required
         if approach > FINEST_APPROACH:
             sufficient += 0.5 * approach
         solids = self._solids_of_pair(number, pair, middle)
@@ -326,7 +358,8 @@ class _PeriodJudge:
 
         middle_distance = _signed_distance(solids)
         lacking = middle_distance <= _less_rounding(required)
-        if not lacking and required < 0.0:  # of solids that may overlap the depth may not be known
+        # Where the penetration depth of an overlap is unknown, the distance reads 0, so a second test decides.
+        if not lacking and required < 0.0:
             lacking = gap_beyond(solids, _less_rounding(required)) is None
         if approach <= FINEST_APPROACH and not lacking:
             return None
@@ -345,7 +378,10 @@ class _PeriodJudge:
         return min(candidates, key=lambda candidate: candidate[1], default=None)
 
     def _approach_bounds(self, number: int, begin: float, end: float) -> Vector:
-        """How much nearer each pair can come in a part of a tick [m]."""
+        """Return upper bounds on how much nearer each pair can come in a part of a tick [m], shape (pairs,).
+
+        The bound of a pair is the weighted change of the joints plus the travel of its obstacle.
+        """
         change = np.abs(self._configuration(number, end) - self._configuration(number, begin))
         travels = [
             travel_bound(self._obstacle_pose(name, begin), self._obstacle_pose(name, end), radius)
@@ -355,7 +391,7 @@ class _PeriodJudge:
         return np.asarray(self._approach_weights @ change + travel_of_body[self._pair_indices].sum(axis=1))
 
     def _body_poses(self, number: int, time: float) -> Frames:
-        """Where all bodies are, shape (bodies, 4, 4)."""
+        """Return the poses of all bodies at a time of a tick as homogeneous matrices, shape (bodies, 4, 4)."""
         joint_frames = self._robot.joint_frames(self._configuration(number, time)[None])[0]
         obstacle_poses = [self._obstacle_pose(name, time).homogeneous for name in self._obstacle_names]
         return np.array(
@@ -368,7 +404,7 @@ class _PeriodJudge:
         )
 
     def _solids_of_pair(self, number: int, pair: int, time: float) -> Ends:
-        """The two solids of a pair, and where they are."""
+        """Return the two solids of a pair at a time of a tick: geometry, pose, geometry, pose."""
         joint_frames = self._robot.joint_frames(self._configuration(number, time)[None])[0]
         first, second = self._pairs[pair]
         poses = []
@@ -383,7 +419,7 @@ class _PeriodJudge:
         return self._bodies[first].geometry, poses[0], self._bodies[second].geometry, poses[1]
 
     def _configuration(self, number: int, time: float) -> Vector:
-        """The arm at a time of a tick, on the straight line to the next one; shape (dof,)."""
+        """Return the configuration at a time of a tick, on the straight line to the next tick's; shape (dof,)."""
         ticks = self._ticks
         tick = ticks[number]
         if number + 1 == len(ticks):
@@ -396,17 +432,20 @@ class _PeriodJudge:
 
 
 def _clearance_applies(first: Body, second: Body) -> bool:
-    """Whether margin and clearance of a run are promised between two bodies: an obstacle and what moves."""
+    """Check whether the clearance of a run is promised for two bodies: an obstacle and a part that joints move."""
     return keeps_clearance(first, second) and max(first.joint, second.joint) > 0
 
 
 def _less_rounding(required: float) -> float:
-    """What must be kept, rounding allowed for [m]; what must not touch must not touch."""
+    """Return the required distance less an allowance for rounding [m]; it never turns negative by that.
+
+    So contact stays forbidden where it was forbidden.
+    """
     return required - ROUNDING if required < 0.0 else max(required - ROUNDING, 0.0)
 
 
 def _bounding_ball(body: Body) -> tuple[float, float, float, float]:
-    """Centre and radius of a ball around a solid, in its own frame."""
+    """Return a ball around a solid in its own frame: x, y, z of the centre and the radius [m]; inf for a half-space."""
     if isinstance(body.geometry, coal.Halfspace):
         return 0.0, 0.0, 0.0, float("inf")
     x, y, z = np.asarray(body.geometry.aabb_center).tolist()
@@ -414,7 +453,7 @@ def _bounding_ball(body: Body) -> tuple[float, float, float, float]:
 
 
 def _signed_distance(solids: Ends) -> float:
-    """The distance of two solids [m], below 0 how deep they overlap; 0 where that is not known."""
+    """Return the signed distance of two solids [m]: negative is the penetration depth; 0 if that depth is unknown."""
     if is_ours(solids):
         return float(own_nearest(solids).distance)
     if not coal.collide(*solids, coal.CollisionRequest(), coal.CollisionResult()):

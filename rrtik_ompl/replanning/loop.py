@@ -29,20 +29,20 @@ from rrtik_ompl.world.world import World
 
 Clock = Callable[[], float]
 
-PROOF_TRIES = 3  # to find a path that is proven
-REACTION_TICKS = 6  # before a cloud is too near, at the speed at which it comes: then the arm evades it
+PROOF_TRIES = 3  # searches for a path that is proven
+REACTION_TICKS = 6  # The arm evades a cloud that would be too near within so many ticks at its present speed.
 
 
 class Loop:
-    """One run; :meth:`tick` does one tick.
+    """The state of one run of replanning; :meth:`tick` advances it by one tick.
 
     Attributes:
         q: The robot's configuration, shape (n,).
         run: The record so far.
 
-    Beside its parts (feed, tracker, planner, worlds) it holds from tick to tick: the last snapshot, and what is to be
-    kept from each obstacle because of its age, see :meth:`_read_scene`; the goals, shape (g, n); and the distance to
-    obstacles that was left at the end of the tick before, by which it sees a cloud close in.
+    Apart from its parts (feed, tracker, planner, worlds) a loop keeps from tick to tick: the last snapshot; the
+    distance that is required from each obstacle, see :meth:`_read_scene`; the goals, shape (g, n); and the distance to
+    obstacles that was left at the end of the previous tick, which shows whether a cloud closes in.
     """
 
     def __init__(
@@ -69,7 +69,7 @@ class Loop:
         first_world = problem.world.with_accuracy("exact").with_scene(scene)
         self._make_worlds(first_world)
 
-        # Searches look at steps of a motion alone: half a step on top, and what they clear holds between steps too [m].
+        # A search checks a motion only at steps. Keeping half a step more makes its answer hold between them too [m].
         half_resolution = 0.5 * first_world.motion_resolution
         self._proven_clearance = min(CLEARANCE, half_resolution) if settings.clearance is None else settings.clearance
         self._search_clearance = half_resolution + (settings.clearance or 0.0)
@@ -85,9 +85,9 @@ class Loop:
         else:
             self._goals = goal_now(robot, goal_feed, 0.0)
 
-        self._first_poses = {o.name: o.pose for o in scene.obstacles}  # a record tells of those that have moved since
-        self._distance_left_before = np.nan  # [m]: the distance left at the end of the tick before
-        self._required_distances: dict[str, float] = {}  # [m] to be kept from each obstacle now
+        self._first_poses = {o.name: o.pose for o in scene.obstacles}  # The record holds only poses that differ.
+        self._distance_left_before = np.nan  # distance left at the end of the previous tick [m]
+        self._required_distances: dict[str, float] = {}  # distance to keep from each obstacle now [m]
 
         self.run = ReplanRun(
             problem.name, robot.name, robot.joint_names, settings.planner, settings.seed, settings.step, settings.rate,
@@ -95,19 +95,21 @@ class Loop:
         )  # fmt: skip
 
         self._read_scene(0.0)
-        # A start may be where an obstacle is only predicted: all copies of it stand where it is now.
+        # The start is checked against present places only, since it may lie where an obstacle is merely predicted:
+        # all copies of an obstacle are put where it is now.
         self._world.move(scene, inflation=self._required_distances)
         check_start(self.q, scene, first_world, self._world)
 
         self._box = sampling_box(robot, np.vstack([self.q, self._goals]))
         self._planner = make_planner(settings, self._world, *self._box)
-        self._required_distances = {}  # so that the first tick puts the predicted places in
+        self._required_distances = {}  # This makes the first tick enter the predicted places.
 
     def _make_worlds(self, first_world: World) -> None:
-        """Make the worlds of a run, in which obstacles are moved from then on.
+        """Make the three worlds of a run and store them as attributes.
 
-        ``_world`` is that of searches, with predicted places of obstacles; ``_world_of_obstacles`` has no
-        self-collision, and tells distances of obstacles alone; ``_world_of_arm`` has no obstacles.
+        ``_world`` serves searches and holds the predicted places of obstacles too. ``_world_of_obstacles`` ignores
+        self-collision, so its clearance is that to obstacles. ``_world_of_arm`` has no obstacles. From then on
+        obstacles are moved within the first two.
         """
         scene = first_world.scene
         copies = PREDICTED_PLACES if self._settings.lookahead_ticks else 1
@@ -117,7 +119,14 @@ class Loop:
         self._world_of_arm = first_world.with_accuracy("conservative").with_scene(empty_scene)
 
     def tick(self, number: int) -> bool:
-        """Do one tick and add it to the record; False when the run is over."""
+        """Do one tick, add it to the record and return whether the run goes on.
+
+        A tick stops at once if the goal is reached. Otherwise it reads the scene, follows a moving goal, checks the
+        path if anything has changed, looks for another path if it is blocked, and then goes on, waits or evades.
+
+        Args:
+            number: Number of the tick, from 0; it begins at this number times the length of a tick.
+        """
         now = number * self._settings.tick
         begin = self._clock()
 
@@ -171,13 +180,19 @@ class Loop:
         return False
 
     def _read_feed(self, now: float) -> Snapshot:
-        """What the feed has, in which the arm must hold what it holds in the problem."""
+        """Return the latest snapshot of the feed; an error unless the arm holds the same objects as in the problem."""
         snapshot = self._feed(now)
         check_held(snapshot.scene, self._problem.world.scene)
         return snapshot
 
     def _read_scene(self, now: float) -> bool:
-        """Read the scene; whether anything has moved, or may have since it was seen."""
+        """Read the scene, move the obstacles of the worlds and return whether anything changed.
+
+        A change of the required distances counts too: an obstacle may have gone on since it was seen. The distances
+        that are required from each obstacle [m] are stored as attributes: ``_required_in_tick`` allows for the motion
+        within the tick, ``_required_distances`` also for the time since the obstacle was seen, and
+        ``_required_if_moving`` also for obstacles at rest that may begin to move.
+        """
         snapshot = self._read_feed(now)
         scene = snapshot.scene
         ages = snapshot.ages(now)
@@ -192,16 +207,16 @@ class Loop:
         self._scene_is_old = self._settings.speed_bound is not None and is_old
         self._travels_since_seen = self._travels.since_seen(scene, ages)
 
-        # What to keep from each obstacle [m]: for what it may do in the tick,
+        # The distance to keep from each obstacle [m] allows first for its motion within the tick,
         distance = self._settings.margin + self._search_clearance
         travels_in_tick = self._travels.in_tick(scene)
         self._required_in_tick = required_distances(scene, distance, travels_in_tick)
 
-        # also for what it may have done since it was seen,
+        # then also for its motion since it was seen,
         travels = {name: travel + self._travels_since_seen[name] for name, travel in travels_in_tick.items()}
         distances = required_distances(scene, distance, travels)
 
-        # and, in proofs of moves, for what nobody has ruled out; None where nothing bounds that.
+        # and in proofs of moves for every motion that nothing rules out; None where no bound is known.
         self._possible_travels = self._travels.possible(snapshot, ages)
         required_if_moving: dict[str, float] | None = None
         if self._possible_travels is not None:
@@ -217,7 +232,7 @@ class Loop:
         return True
 
     def _renew_worlds(self, scene: Scene) -> bool:
-        """Make new worlds if other pairs may touch than before; returns whether that was so."""
+        """Make new worlds and a new planner if the pairs that may touch have changed; return whether they have."""
         scene_before = self._world.scene
         if pairs_that_may_touch(scene) == pairs_that_may_touch(scene_before):
             return False
@@ -226,7 +241,7 @@ class Loop:
         return True
 
     def _doubt_moves_since(self, time: float) -> None:
-        """No move is proven in which an obstacle was faster than stated."""
+        """Mark the recorded moves that ended after a time [s] as not proven: an obstacle was faster than stated."""
         ticks = self.run.ticks
         for k in range(len(ticks) - 1, -1, -1):
             if ticks[k].time + self._settings.tick <= time:
@@ -235,24 +250,27 @@ class Loop:
                 ticks[k] = replace(ticks[k], proven=False)
 
     def _lookahead(self) -> list[float]:
-        """Times from now at which obstacles are avoided where they are predicted to be [s]."""
+        """Return the times from now [s] whose predicted obstacle places are avoided; none without a lookahead."""
         ticks = self._settings.lookahead_ticks
         last = PREDICTED_PLACES - 1
         return [ticks * self._settings.tick * k / last for k in range(1, PREDICTED_PLACES)] if ticks else []
 
     def _follow_goal(self) -> bool:
-        """Where the goal has moved away from the end of the path, reconnect it, as far as that is free."""
+        """Reconnect the path to a goal that has moved away from its end; return whether that was done."""
         path = self._planner.path
         if self._goal_feed is None or path is None or self._world.blocked or (path[-1] == self._goals[0]).all():
             return False
         return self._planner.retarget(self._goals, self._world, self._budget_ends())
 
     def _check(self) -> bool:
-        """Check the path again; whether it is free."""
+        """Check the path again and return whether it is free."""
         return self._planner.check_path(self._world)
 
     def _repair(self) -> bool:
-        """Find a free path; without the predicted places of obstacles if there is none with them."""
+        """Look for a free path and return whether one was found.
+
+        If there is none that avoids the predicted places of obstacles too, only their present places are avoided.
+        """
         if self._new_proven_path():
             return True
         if not self._settings.lookahead_ticks:
@@ -261,7 +279,11 @@ class Loop:
         return self._planner.check_path(self._world) or self._new_proven_path()
 
     def _new_proven_path(self) -> bool:
-        """Find a free path, if need be some more times until one is proven; the last one if none is."""
+        """Look for a free path and return whether one was found.
+
+        The search is repeated up to ``PROOF_TRIES`` times until all motions of the path are proven; if none is, the
+        path that was found last is taken.
+        """
         planner = self._planner
         path_before = self._planner.path
         stop = self._budget_ends()
@@ -282,16 +304,23 @@ class Loop:
         return planner.check_path(self._world)
 
     def _proven(self, starts: Matrix, ends: Matrix) -> bool:
-        """Whether motions, shapes (m, n), keep margin and clearance, whatever obstacles do within a tick."""
+        """Check whether motions keep margin and clearance, whatever obstacles that move do within a tick.
+
+        Args:
+            starts: Configurations where the motions begin, shape (m, n).
+            ends: Configurations where they end, shape (m, n).
+        """
         less = self._search_clearance - self._proven_clearance
         return bool(self._world.motions_proven(starts, ends, less=less).all())
 
     def _proven_whatever_moves(self, a: Vector, b: Vector) -> bool:
-        """Whether a motion keeps margin and clearance, whatever obstacles did since they were seen and do in the tick.
+        """Check whether a motion keeps margin and clearance, whatever obstacles did since they were seen and do now.
 
-        Other than in the search for a path, what was at rest so far may begin to move, and nothing may reach the base.
+        Unlike the search for a path, this allows for obstacles at rest that begin to move, and fails if an obstacle
+        may reach the base.
         """
-        if self._possible_travels is None or self._required_if_moving is None:  # nothing bounds how far obstacles go
+        # Without a bound on the travel of obstacles nothing can be proven.
+        if self._possible_travels is None or self._required_if_moving is None:
             return False
         if not self._world.base_apart(self._possible_travels):
             return False
@@ -300,7 +329,10 @@ class Loop:
         return bool(self._world.motions_proven(a[None], b[None], less=less, inflation=inflation)[0])
 
     def _new_path(self, stop: Stop) -> bool:
-        """Find a first path, repair the one that there is, or lead it to another goal; whether there is a free one."""
+        """Find a first path, repair the present one, or lead it to another goal if its goal is blocked.
+
+        Returns whether there is a free path then.
+        """
         planner = self._planner
         if planner.path is None:
             return planner.begin(self.q, self._goals, self._world, stop)
@@ -310,21 +342,36 @@ class Loop:
         return planner.retarget(others, self._world, stop)
 
     def _early_evasion(self) -> tuple[TickEvent, str, Vector] | None:
-        """Evade a cloud that closes in before it is too near, with a path or without; None if that is not needed."""
+        """Evade a cloud that closes in, before it is too near.
+
+        Returns:
+            Event, reason and next configuration, shape (n,); None if evading is not needed or not possible.
+        """
         if self._world.blocked or not (self._closes_in() and self._world.valid(self.q)):
             return None
         q = self._evasion()
         return None if q is None else ("evade", "an obstacle closes in", q)
 
     def _go(self, event: TickEvent) -> tuple[TickEvent, str, Vector]:
-        """Go along the free path. Event, reason, configuration."""
+        """Go along the free path.
+
+        Args:
+            event: The event if the robot moves: "walk", "plan" or "repair".
+
+        Returns:
+            Event, reason ("" unless the robot waits) and next configuration, shape (n,).
+        """
         q = self._step()
         if q is not self.q:
             return event, "", q
         return "wait", "what was seen is too old to go on" if self._scene_is_old else "the goal is not free", q
 
     def _step(self) -> Vector:
-        """Go a step along the path, round corners if that is free; the configuration of the robot then."""
+        """Go one step along the path and return the next configuration, shape (n,).
+
+        A step may cut across the corners of the path if the straight motion is free and proven; otherwise it ends at
+        the first corner. The robot stays where it is if the scene is old and the step is not proven.
+        """
         path = self._planner.path
         settings = self._settings
         if path is None or len(path) < 2:
@@ -341,18 +388,25 @@ class Loop:
         return q
 
     def _closes_in(self) -> bool:
-        """Whether a cloud comes nearer so fast that it will be too near soon; nothing else tells that it moves."""
+        """Check whether a cloud will be too near within ``REACTION_TICKS`` ticks at its present speed.
+
+        A cloud has no pose that changes, so only the shrinking distance shows that it moves.
+        """
         distance_left = self._distance_left(self.q)
         return distance_left < REACTION_TICKS * (self._distance_left_before - distance_left)
 
     def _distance_left(self, q: Vector) -> float:
-        """The distance of a configuration to obstacles beyond what has to be kept [m]; NaN where all is predicted."""
+        """Return the clearance to obstacles less the required distance [m]; NaN if all their motion is predictable."""
         if not self._tracker.unforeseen(0.0):
             return np.nan
         return float(self._world_ahead(0).clearance(q[None])[0]) - max(self._required_in_tick.values())
 
     def _wait_or_evade(self) -> tuple[TickEvent, str, Vector]:
-        """Without a free path: wait, or evade an obstacle that is too near. Event, reason, configuration."""
+        """Wait, or evade an obstacle that is too near, when there is no free path.
+
+        Returns:
+            Event, reason and next configuration, shape (n,).
+        """
         if self._world.blocked:
             return "wait", self._world.blocked, self.q
 
@@ -368,7 +422,7 @@ class Loop:
         return "evade", "an obstacle is too near", q
 
     def _evasion(self) -> Vector | None:
-        """The configuration after an evasive tick, from which the path goes on; None to stand still."""
+        """Return the configuration after an evasive tick, or None to stand still; the path then starts from there."""
         q = evasion(
             self.q, self._planner.path, step=self._settings.step, max_change=self._max_change,
             distance=max(self._required_in_tick.values()), ahead=self._world_ahead, alone=self._world_of_arm,
@@ -379,7 +433,10 @@ class Loop:
         return q
 
     def _world_ahead(self, ticks: int) -> MovingWorld:
-        """The world without self-collision so many ticks ahead; what cannot be predicted may have come nearer."""
+        """Move the world without self-collision to the scene predicted so many ticks ahead, and return it.
+
+        Obstacles whose motion cannot be predicted are inflated by the distance that they may travel until then.
+        """
         seconds = ticks * self._settings.tick
         scene_now = self._world.scene
         scene = self._tracker.later(scene_now, seconds) if ticks else scene_now
@@ -389,17 +446,17 @@ class Loop:
         return self._world_of_obstacles
 
     def _arrived(self) -> bool:
-        """Whether the robot is at one of its goals."""
+        """Check whether the robot is at one of its goals."""
         return bool((np.abs(self._goals - self.q).max(axis=1) <= JOINT_TOLERANCE).any())
 
     def _budget_ends(self) -> Stop:
-        """When a search that begins now has used up the budget of a repair."""
+        """Return a function that says whether a search that begins now has used up the repair budget."""
         clock = self._clock
         end = self._clock() + self._settings.repair_seconds
         return lambda: clock() > end
 
     def _timed(self, seconds_of_part: dict[str, float], name: str, work: Callable[..., bool], *arguments: Any) -> bool:
-        """What a part of a tick returns; how long it took is written to ``seconds_of_part[name]`` [s]."""
+        """Call ``work(*arguments)``, write its duration [s] to ``seconds_of_part[name]`` and return its result."""
         begin = self._clock()
         result = work(*arguments)
         seconds_of_part[name] = self._clock() - begin
@@ -409,6 +466,7 @@ class Loop:
         self, now: float, q: Vector, event: TickEvent, seconds_of_part: Mapping[str, float], checked: int, reason: str,
         path: Matrix | None = None, proven: bool | None = None,
     ) -> None:  # fmt: skip
+        # Only the poses of obstacles that have moved since the first tick are recorded.
         poses = {
             o.name: pose_row(o.pose)
             for o in self._world.scene.obstacles
@@ -418,20 +476,24 @@ class Loop:
 
 
 def one_step(path: Matrix, step: float, max_change: Vector) -> tuple[Vector, int]:
-    """The configuration after a tick, and how many waypoints of the path lie behind it then.
+    """Follow a path for one tick.
 
     Args:
-        path: Shape (k, n), k at least 2, the robot's configuration first.
+        path: Waypoints, shape (k, n), k at least 2, the robot's configuration first.
         step: Length of a step [unit of the space].
-        max_change: How far each joint can move in a tick, shape (n,).
+        max_change: How far each joint can move in a tick [rad or m], shape (n,).
+
+    Returns:
+        The configuration after the tick, shape (n,), and how many waypoints behind the first one it has passed; the
+        last waypoint never counts.
     """
-    ticks_left = 1.0  # of the tick
+    ticks_left = 1.0  # share of the tick that is left
     q = path[0]
     passed = 0
 
     for end in path[1:]:
         edge = end - q
-        ticks_of_edge = _ticks_of(edge, step, max_change)  # of a tick that the whole edge takes
+        ticks_of_edge = _ticks_of(edge, step, max_change)
         if ticks_of_edge > ticks_left:
             return q + edge * (ticks_left / ticks_of_edge), passed
         ticks_left -= ticks_of_edge
@@ -441,12 +503,12 @@ def one_step(path: Matrix, step: float, max_change: Vector) -> tuple[Vector, int
 
 
 def to_first_corner(path: Matrix, step: float, max_change: Vector) -> tuple[Vector, int]:
-    """As :func:`one_step`, but no farther than the next waypoint."""
+    """Follow a path for one tick like :func:`one_step`, but no farther than the next waypoint."""
     return one_step(path[:2], step, max_change)
 
 
 def _ticks_of(edge: Vector, step: float, max_change: Vector) -> float:
-    """How many ticks an edge takes."""
+    """Return how many ticks the motion by ``edge``, shape (n,), takes; fractions count."""
     with np.errstate(divide="ignore", invalid="ignore"):
         rates = np.where(edge == 0.0, 0.0, np.abs(edge) / max_change)
     return max(float(np.linalg.norm(edge)) / step, float(rates.max()))

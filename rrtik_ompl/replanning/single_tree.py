@@ -1,6 +1,6 @@
-"""The baseline of one tree: it grows from the goal, what has become blocked is trimmed, and it is grown again.
+"""The baseline DRRT: a single tree that grows from the goal, is trimmed where it is blocked, and grows again.
 
-Source: Ferguson, Kalra and Stentz, 2006 [8], with the tree's root at the goal; as [1, ch. 5.2] says of this method, a
+Source: Ferguson, Kalra and Stentz, 2006 [8], with the tree's root at the goal. As [1, ch. 5.2] describes this method, a
 sample is the robot's configuration with probability 0.4.
 """
 
@@ -18,15 +18,15 @@ from rrtik_ompl.replanning.connecting import Connection, TreeOptions, connected,
 from rrtik_ompl.replanning.drrt_con import DrrtCon, Post
 from rrtik_ompl.world.motion_queries import MotionQueries
 
-ROBOT_PROBABILITY = 0.4  # of a sample at the robot's configuration
+ROBOT_PROBABILITY = 0.4  # probability that a sample is the robot's configuration
 
 
 class SingleTree(DrrtCon):
-    """DRRT: when the path is blocked all edges of the tree are checked, and branches behind blocked ones are trimmed.
+    """DRRT: if the path is blocked, all edges of the tree are checked and branches behind blocked ones are trimmed.
 
     Args:
         options: How the tree grows.
-        post: See :class:`DrrtCon`.
+        post: Shortens the new part of a path, see :class:`DrrtCon`.
     """
 
     name: ClassVar[Replanner] = "drrt"
@@ -46,7 +46,7 @@ class SingleTree(DrrtCon):
         return cls(options, post=post)
 
     def begin(self, start: Vector, goals: Matrix, motions: MotionQueries, stop: Stop = no_stop) -> bool:
-        """See :meth:`DrrtCon.begin`; the tree's only root is the first goal that is free."""
+        """Look for a first path, see :meth:`DrrtCon.begin`; only the first free goal is used, as the tree's root."""
         self._tree = None
         return super().begin(start, goals, motions, stop)
 
@@ -58,7 +58,17 @@ class SingleTree(DrrtCon):
     def __call__(
         self, first: Matrix, second: Matrix, motions: MotionQueries, stop: Stop, *, chain: bool = True
     ) -> Connection | None:
-        """Grow the tree until it reaches the end of ``first``; the way back to its root, or None."""
+        """Grow the tree until it reaches the robot and return the path from there to its root, see :class:`Connect`.
+
+        The tree of the last call is kept if its root is still ``second[0]``.
+
+        Args:
+            first: Configurations, shape (a, n), of which the last one is the robot's.
+            second: Configurations, shape (b, n), of which the first one is the root.
+            motions: Checks motions.
+            stop: Ends the search when it returns True.
+            chain: Has no effect, since the path always ends at the root.
+        """
         del chain
         robot_configuration = first[-1]
         if self._tree is None or not (self._tree.rows[0] == second[0]).all():
@@ -77,12 +87,13 @@ class SingleTree(DrrtCon):
 
 
 def trimmed(tree: ConfigurationTree, motions: MotionQueries) -> ConfigurationTree:
-    """What is left of a tree when blocked edges and all that hangs on them are cut off; checked in one call."""
+    """Return a tree without its blocked edges and the branches behind them; all edges are checked in one call."""
     rows = tree.rows
     parents = np.array(tree.parents)
     connected: Mask = np.ones(len(rows), dtype=bool)
     connected[1:] = motions.motion_valid_batch(rows[parents[1:]], rows[1:])
-    for k in range(1, len(rows)):  # parents come before their children
+    # Parents come before their children, so one pass passes a cut on to whole branches.
+    for k in range(1, len(rows)):
         connected[k] &= connected[parents[k]]
 
     numbers = np.cumsum(connected) - 1

@@ -20,10 +20,14 @@ GoalFeed = Callable[[float], ArrayLike]
 
 
 def refuse_constraints(problem: Problem, verb: str) -> None:
-    """Refuse a problem with path constraints, of which nothing here knows.
+    """Refuse a problem with path constraints, which replanning does not keep.
+
+    Args:
+        problem: The problem.
+        verb: What was to be done, which begins the message.
 
     Raises:
-        InputError: If it has some.
+        InputError: If the problem has path constraints.
     """
     if problem.constraints:
         raise InputError(f"{verb}: path constraints are not kept there; leave them out, or use plan()")
@@ -32,8 +36,14 @@ def refuse_constraints(problem: Problem, verb: str) -> None:
 def check_start(q: Vector, scene: Scene, world: World, moving: MovingWorld) -> None:
     """Refuse a run that begins in contact, or nearer to contact than the margin.
 
+    Args:
+        q: The start configuration, shape (n,).
+        scene: The scene at the begin of the run.
+        world: The world that checks for contact.
+        moving: The world that checks for the margins of the run too.
+
     Raises:
-        InputError: It names the pair.
+        InputError: If it does; the message names the pair of bodies.
     """
     if not world.valid(q):
         fault = f"scene feed: at its begin the robot is in collision: {world.explain(q)}"
@@ -46,10 +56,15 @@ def check_start(q: Vector, scene: Scene, world: World, moving: MovingWorld) -> N
 
 
 def every_goal(problem: Problem, world_of_arm: World, rng: np.random.Generator) -> Matrix:
-    """Every configuration that may be the goal, also those that obstacles block now, shape (g, n).
+    """Return every configuration that may be the goal, also those that obstacles block now, shape (g, n).
+
+    Args:
+        problem: Its goal is a configuration or a goal region.
+        world_of_arm: The world without obstacles, in which configurations of a region are looked for.
+        rng: Source of random numbers for this search.
 
     Raises:
-        InputError: If there is none.
+        InputError: If there is no such configuration.
     """
     if problem.goal.q is not None:
         return problem.goal.q[None]
@@ -60,10 +75,10 @@ def every_goal(problem: Problem, world_of_arm: World, rng: np.random.Generator) 
 
 
 def goal_now(robot: Robot, goal_feed: GoalFeed, now: float) -> Matrix:
-    """The configuration of a moving goal, shape (1, n).
+    """Return the configuration of a moving goal at a time [s], shape (1, n).
 
     Raises:
-        InputError: If that is no configuration of the robot, or outside the limits.
+        InputError: If it is no configuration of the robot, or outside the limits.
     """
     q = robot.configuration(goal_feed(now), f"goal at {now:g} s")
     if fault := robot.limit_fault(q):
@@ -72,13 +87,20 @@ def goal_now(robot: Robot, goal_feed: GoalFeed, now: float) -> Matrix:
 
 
 def sampling_box(robot: Robot, ends: Matrix) -> tuple[Vector, Vector]:
-    """The box to sample in, shape (n,) each: a joint's limits, or a turn beyond ends, shape (k, n), if it has none."""
+    """Return the lower and upper corner of the box to sample in, shape (n,) each.
+
+    A joint without a limit is sampled up to one turn beyond the given configurations.
+
+    Args:
+        robot: The robot whose limits bound the box.
+        ends: Configurations that must be inside the box, shape (k, n).
+    """
     lower = np.where(np.isfinite(robot.lower), robot.lower, ends.min(axis=0) - TAU)
     upper = np.where(np.isfinite(robot.upper), robot.upper, ends.max(axis=0) + TAU)
     return lower, upper
 
 
 def held_pairs(scene: Scene) -> tuple[tuple[str, str], ...]:
-    """Allowed collisions that do not concern obstacles."""
+    """Return the allowed collisions that do not concern obstacles, as pairs of names."""
     obstacle_names = {o.name for o in scene.obstacles}
     return tuple(pair for pair in scene.allowed_collisions if not obstacle_names & set(pair))

@@ -15,15 +15,16 @@ class Tick:
     """What happened in one tick.
 
     Attributes:
-        time: Of its begin [s].
+        time: Begin of the tick [s].
         q: The robot's configuration then, shape (n,).
-        event: "plan" or "repair": move along a path found just now, the first one or another one; "walk": along the old
-            one; "wait"; "evade"; "arrive": the last configuration.
-        path: The path after the tick's work, shape (k, n), free or blocked; None before the first one was found and in
+        event: "plan" (move along the first path, found just now), "repair" (move along another path, found just now),
+            "walk" (move along the path of the tick before), "wait", "evade", or "arrive" (the last configuration).
+        path: The path at the end of the tick, shape (k, n), free or blocked; None before the first one was found and in
             the last tick.
-        poses: Of the obstacles that have moved since the first tick: x, y, z and quaternion x, y, z, w.
-        seconds: Wall time of its parts [s]: "sense", "retarget", "look" (check of the path), "plan" or
-            "repair" (search and shortening), "prove" (of the step), "all".
+        poses: Poses by name of the obstacles that have moved since the first tick: x, y, z [m] and the quaternion
+            x, y, z, w, shape (7,).
+        seconds: Wall times of the parts of the tick [s]: "sense", "retarget", "look" (check of the path), "plan" or
+            "repair" (search and shortening), "prove" (proof of the step), "all".
         checked: Number of configurations that were checked along the path.
         reason: Why the robot waits or evades, or "".
         proven: Whether the motion to the next tick's configuration is proven to keep margin and clearance, as long as
