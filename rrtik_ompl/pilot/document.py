@@ -1,4 +1,4 @@
-"""The state that the page shows beside its pictures, as plain values; angles in degrees."""
+"""Convert the state of a session to plain values for the page; angles are in degrees."""
 
 from __future__ import annotations
 
@@ -16,7 +16,10 @@ from rrtik_ompl.sensing.scene_from_view import SeenObject
 
 
 def state_document(session: Session) -> dict[str, Any]:
-    """The state of a session; the page in `pilot/web/page` shows it."""
+    """Return the state of a session as a JSON-compatible dictionary, which the page in `pilot/web/page` displays.
+
+    Values that do not exist (no picture yet, no grasp chosen, no route) are None; texts that do not apply are "".
+    """
     state = session.state
     known = session.known
     age = session.time - session.state.pictures.time
@@ -79,7 +82,12 @@ def _object(seen: SeenObject, unseen: float) -> dict[str, Any]:
 
 
 def _joint_range(session: Session) -> dict[str, Any]:
-    """The range of the selected joint, what ends it, and where in it the arm is near a singular posture."""
+    """Return the free range of the selected joint, what ends it on either side, and its near-singular intervals.
+
+    Returns:
+        ``low`` and ``high`` in displayed units, ``below`` and ``above`` in words, and ``singular`` as a list of
+        ``[from, to, name of the case]``.
+    """
     unit = joint_unit(session.robot.prismatic[session.state.selected])
     free = session.joint_range()
     low, high = (reading(end, unit)[0] for end in (free.low, free.high))
@@ -88,7 +96,13 @@ def _joint_range(session: Session) -> dict[str, Any]:
 
 
 def _aim(session: Session) -> dict[str, Any]:
-    """From the tip to the chosen grasp, or else to the chosen object: ahead along the tool, and in the world [m]."""
+    """Return how the tip must move to reach the chosen grasp, or the chosen object if no grasp is chosen.
+
+    Returns:
+        ``tip``: the position of the tip in the base frame [m]; ``to``: the name of the goal, "" without one. With a
+        goal also ``distance``, ``xyz`` in the base frame, ``ahead`` along the z axis of the tool and ``aside`` across
+        it, all in metres, and ``turn_deg``, the angle between the two orientations.
+    """
     tip = session.robot.fk(session.q)
     aim: dict[str, Any] = {"tip": np.round(tip.translation, 4).tolist(), "to": ""}
     target_seen = None if session.target is None else session.surroundings.named(session.target)

@@ -1,6 +1,6 @@
-"""The loop behind the page: a picture updates the session; two pictures and a state are sent to the page.
+"""Update the session with each picture of the camera, and draw the two pictures and the state that the page shows.
 
-A step is cut in stages, so that a command never waits for more than one of them.
+The work is divided into short stages, so that a command never waits for more than one of them.
 """
 
 from __future__ import annotations
@@ -29,17 +29,17 @@ RECORD = "this is a record: it can be watched, paused and viewed from all sides"
 
 
 class Simulated(Protocol):
-    """What has a simulated time."""
+    """A device that runs in simulated time."""
 
     def advance(self, seconds: float) -> None:
-        """Let so much of it pass [s]."""
+        """Advance the simulated time by an interval [s]."""
 
 
 class Engine:
-    """Connects session, perception and pictures. For one thread.
+    """Connect a session, its perception and the pictures of the page. All methods must be called from one thread.
 
     Attributes:
-        paused: A record stands still; who gives the engine its times keeps to that.
+        paused: Whether a replayed record is paused. The caller, who supplies the times, must then stop the clock.
     """
 
     def __init__(
@@ -51,14 +51,14 @@ class Engine:
         further: Mapping[str, FurtherCamera] | None = None,
         pictures: PictureRecord | None = None,
     ) -> None:
-        """Take the parts.
+        """Store the parts.
 
         Args:
             session: The session.
-            perception: Camera and sensor.
-            simulated: What has a simulated time that has to advance: an arm, a vehicle.
-            further: Cameras that may be looked through in place of the view from outside, by name.
-            pictures: Where the pictures are recorded.
+            perception: Camera and sensor of the session.
+            simulated: Devices whose simulated time has to be advanced: an arm, a vehicle.
+            further: Cameras, by name, whose pictures can replace the view from outside.
+            pictures: Where the camera's pictures are recorded; None to record none.
         """
         self.session = session
         self.perception = perception
@@ -66,7 +66,7 @@ class Engine:
         self._camera_view = CameraView(perception.camera, session)
         self.outside = OutsideView(session)
         self._further = dict(further or {})
-        self._through = ""  # the one of them that is looked through
+        self._through = ""  # name of the further camera that is shown; "" for the view from outside
         self._pictures = pictures
         self._advanced = 0.0
         self._drawn: tuple[Hashable, ...] = ()
@@ -75,14 +75,17 @@ class Engine:
     def execute(self, command: dict[str, Any], time: float, sight: Sight | None = None) -> None:
         """Execute a command of the pilot.
 
+        Commands in `VIEW_VERBS` change only the pictures and are executed here; all others go to the session. During a
+        replay only view commands are executed, for the record decides what the arm does.
+
         Args:
-            command: A ``name`` and its arguments; those of `VIEW_VERBS` concern what is shown alone.
-            time: Now [s].
+            command: The ``name`` of the command, and its arguments.
+            time: Current time [s].
             sight: What the pilot's page had shown; None without a page.
         """
         arguments = dict(command)
         name = quoted(arguments.pop("name", ""))
-        if "object" in arguments:  # which one, for "name" is that of the command
+        if "object" in arguments:  # the object's name is sent as "object", because "name" is the command
             arguments["name"] = arguments.pop("object")
 
         recorded = self.session.means.recorded
@@ -113,11 +116,11 @@ class Engine:
                 self.session.say(alarm(ended))
 
     def watch(self, time: float) -> None:
-        """Between two stages of a step: read the arm, and stop it where that is due."""
+        """Read the arm between two stages of a step, and stop it if that is necessary."""
         self._advance(time)
 
     def state(self) -> dict[str, Any]:
-        """What the page shows beside the pictures."""
+        """Return all that the page shows beside the pictures."""
         lost = self.perception.lost
         shown = {"camera_lost": lost, "pictures_ended": lost == ENDED, "hint": self.perception.hint}
         shown |= {"playing": self.outside.share, "aids": self._camera_view.aids.document()}
@@ -133,14 +136,24 @@ class Engine:
             self._pictures.close()
 
     def camera_picture(self) -> bytes:
-        """The picture of the camera with the arm, the route and the chosen grasp drawn over it; JPEG."""
+        """Return the camera's picture as JPEG, with the arm, the route and the chosen grasp drawn over it.
+
+        While the pose of the camera is unknown, the picture is returned as it is.
+        """
         seen = self.perception
         if seen.T_base_camera is None:
             return _jpeg(seen.picture)
         return _jpeg(self._camera_view.draw(seen.picture, seen.T_base_camera, seen.arm_in_picture))
 
     def outside_picture(self, anew: bool = False) -> bytes | None:
-        """The view from outside, JPEG; None if it would be the same as last time and ``anew`` is false."""
+        """Return the view from outside, or the picture of the selected further camera, as JPEG.
+
+        Args:
+            anew: Draw the view even if nothing has changed since the last call.
+
+        Returns:
+            None if the view has not changed and ``anew`` is false, or if the further camera has no picture yet.
+        """
         if self._through:
             picture = self._further[self._through].picture()
             return None if picture is None else _jpeg(picture)
@@ -155,15 +168,15 @@ class Engine:
     # --- commands that concern what is shown ----------------------------------------------------------------------
 
     def turn(self, right: object, up: object) -> None:
-        """Turn the view from outside by angles [rad]."""
+        """Turn the view from outside by two angles [rad]."""
         self.outside.turn(number(right, "right"), number(up, "up"))
 
     def zoom(self, factor: object) -> None:
-        """Change the distance of the view from outside by a factor."""
+        """Multiply the distance of the view from outside by a factor."""
         self.outside.zoom(number(factor, "factor"))
 
     def preset(self, view: object) -> None:
-        """Look from one of the usual viewpoints, or through a further camera."""
+        """Look from one of the standard viewpoints, or through a further camera."""
         name = quoted(view)
         if name not in (*PRESETS, *self._further):
             raise UnknownNameError("view", name, (*PRESETS, *self._further))
@@ -172,7 +185,7 @@ class Engine:
         self.outside.preset(name)
 
     def play(self, share: object) -> None:
-        """Show the arm at a share of the route that is proposed; None shows it as it is."""
+        """Show the arm at a share of the proposed route, from 0 to 1; None shows it at its present configuration."""
         shown = None if share is None else number(share, "share")
         proposed = self.session.mode == PROPOSED
         self.outside.share = shown if proposed else None
@@ -180,13 +193,13 @@ class Engine:
             raise InputError("there is no route to preview: 'plan' proposes one")
 
     def pause(self) -> None:
-        """Let a record stand still, or go on."""
+        """Pause a replayed record, or resume it."""
         self.paused = not self.paused
 
     # --------------------------------------------------------------------------------------------------------------
 
     def _return_to_now(self) -> None:
-        """A preview shows a route that is proposed; whatever comes after is shown as it is."""
+        """End the preview of a route unless a proposed route is still displayed and the arm stands still."""
         if self.session.mode != PROPOSED or self.session.driving:
             self.outside.share = None
 
@@ -205,21 +218,21 @@ def _jpeg(picture: NDArray[np.uint8]) -> bytes:
 
 
 class ViewVerb(NamedTuple):
-    """A command that concerns what is shown, and moves nothing.
+    """A command that changes what is shown, and never moves the arm.
 
     Attributes:
-        act: A method of `Engine`; it takes the command's arguments as they came.
-        of_a_record: Only a record has it.
+        act: A method of `Engine`, called with the command's arguments unchecked.
+        of_a_record: Whether the command is available only while a record is replayed.
     """
 
     act: Callable[..., None]
     of_a_record: bool = False
 
     def execute(self, engine: Engine, name: str, arguments: Mapping[str, object]) -> None:
-        """Execute it.
+        """Execute the command on an engine.
 
         Raises:
-            InputError: If the arguments are not those that it takes, or of no use.
+            InputError: If the arguments are not those that the command takes, or have unusable values.
         """
         _, *wanted = inspect.signature(self.act).parameters
         if set(arguments) != set(wanted):

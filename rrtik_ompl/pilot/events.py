@@ -1,8 +1,9 @@
-"""What happens to a session, what it wants done, and what it says: the words of its state machine.
+"""The values that the state machine of a session exchanges with its surroundings: events, effects and answers.
 
-An event is given to `machine.handle`. An effect is carried out by `Session`; one that asks for something has a
-``then``, which is called with the answer (the event `Reply`) before the next effect is carried out. What is said to the
-pilot is an `Answer`: a line with its level, by which the page shows it.
+An event is passed to `machine.handle`, which returns the next state and a list of effects. `Session` carries the
+effects out. An effect that asks for something has a continuation ``then``: it is called with the answer (by the event
+`Reply`) before the next effect is carried out. An `Answer` is a line for the pilot with its level, which decides how
+the page shows it.
 """
 
 from __future__ import annotations
@@ -24,7 +25,8 @@ from rrtik_ompl.world.world import World
 if TYPE_CHECKING:
     from rrtik_ompl.pilot.state import Means, State
 
-Then: TypeAlias = "Callable[[Means, State, Any], State]"  # the last is the answer; gives the next state
+# Called with means, state and the answer to an effect; returns the next state.
+Then: TypeAlias = "Callable[[Means, State, Any], State]"
 
 
 # --- events ----------------------------------------------------------------------------------------------------------
@@ -32,14 +34,14 @@ Then: TypeAlias = "Callable[[Means, State, Any], State]"  # the last is the answ
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Command:
-    """The pilot commands.
+    """The pilot gives a command.
 
     Attributes:
-        verb: One of `machine.VERBS`, or what a page has sent in its place.
-        time: Now [s].
+        verb: One of `machine.VERBS`, or whatever a page has sent instead.
+        time: Current time [s].
         arm_lost: Why the connection to the arm is lost; "" if it is not.
         sight: What the page had shown; None without a page.
-        arguments: As they came.
+        arguments: By name, as the page sent them: not checked yet.
     """
 
     verb: str
@@ -51,7 +53,12 @@ class Command:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Measured:
-    """The arm was read: its joints, shape (dof,), at a time [s], and why the connection to it is lost."""
+    """The arm was read at a time [s].
+
+    Attributes:
+        q: Joint values, shape (dof,) [rad or m].
+        arm_lost: Why the connection to the arm is lost; "" if it is not.
+    """
 
     q: Vector
     time: float
@@ -60,11 +67,12 @@ class Measured:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Judged:
-    """The supervisor has compared the arm with what it was told.
+    """The supervisor has compared the motion of the arm with the set points it was given.
 
     Attributes:
-        fault: What the arm has done that it was not told; "" if nothing.
-        standing: A driven joint that does not move, by how much it has moved, and in what time; None if none.
+        fault: What the arm did against its set points; "" if nothing.
+        standing: A driven joint that does not move: its number, how far it has moved [rad or m], and within what time
+            [s]; None if there is no such joint.
     """
 
     fault: str
@@ -73,7 +81,7 @@ class Judged:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Seen:
-    """A picture of a time [s] shows objects, or none."""
+    """A picture taken at a time [s] was evaluated; ``objects`` holds the objects found in it, and may be empty."""
 
     objects: Sequence[SeenObject]
     time: float
@@ -81,7 +89,12 @@ class Seen:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TipSeen:
-    """A picture of a time [s] shows the tip, with its covariance, shape (6, 6)."""
+    """A picture taken at a time [s] shows the tip of the arm.
+
+    Attributes:
+        T_base_tip: Measured pose of the tip.
+        covariance: Of this pose, shape (6, 6).
+    """
 
     T_base_tip: pin.SE3
     covariance: Matrix
@@ -97,19 +110,19 @@ class Unusable:
 
 @dataclass(frozen=True, slots=True)
 class Said:
-    """Others have something to say to the pilot: the watchdog, a record that ends, the view."""
+    """Another component has a message for the pilot: the watchdog, a record that ends, or the view."""
 
     answer: Answer
 
 
 @dataclass(frozen=True, slots=True)
 class Broken:
-    """A command has ended in an error that nobody has foreseen."""
+    """A command has ended in an unexpected exception."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reply:
-    """The answer to an effect that has asked for it."""
+    """An effect has produced the answer that it was asked for."""
 
     then: Then
     answer: object
@@ -135,12 +148,12 @@ class Stop:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SetPoint:
-    """The arm shall go on.
+    """The arm shall move towards a set point.
 
     Attributes:
-        aim: Where to, shape (dof,) [rad or m].
-        ahead: How far each joint of it is ahead of the arm at most, shape (dof,).
-        joint: The one that moves; None if all do.
+        aim: The set point, shape (dof,) [rad or m].
+        ahead: Largest distance of the set point from the present value of each joint, shape (dof,) [rad or m].
+        joint: Number of the only joint that moves; None if all do.
     """
 
     aim: Vector
@@ -150,7 +163,7 @@ class SetPoint:
 
 @dataclass(frozen=True, slots=True)
 class Grip:
-    """The gripper shall close or open; the answer are the arm's joints after that, shape (dof,)."""
+    """The gripper shall close or open; the answer is the arm's joint values afterwards, shape (dof,)."""
 
     closed: bool
     then: Then
@@ -158,21 +171,21 @@ class Grip:
 
 @dataclass(frozen=True, slots=True)
 class Read:
-    """Where does the arm stand? The answer are its joints, shape (dof,)."""
+    """The arm shall be read; the answer is its joint values, shape (dof,)."""
 
     then: Then
 
 
 @dataclass(frozen=True, slots=True)
 class ReadMaster:
-    """Where does the master arm stand? The answer are its joints, shape (dof,)."""
+    """The master arm shall be read; the answer is its joint values, shape (dof,)."""
 
     then: Then
 
 
 @dataclass(frozen=True, slots=True)
 class FindRoute:
-    """Is there a route? ``search`` is a function of values alone; the answer is what it gives."""
+    """A route shall be searched for; the answer is the result of ``search``, a function without side effects."""
 
     search: Callable[[], Route | NoRoute]
     then: Then
@@ -180,13 +193,13 @@ class FindRoute:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StepToGrasp:
-    """How does the tool come nearer to a grasp that is seen? The answer is a `ServoStep`.
+    """A step of visual servoing towards a grasp shall be computed; the answer is a `ServoStep`.
 
     Attributes:
-        world: In which the gripper may touch the object.
-        goal: Where the tip shall be, by a picture of now, ``T_base_tip``; None if the object is not in it.
-        seconds: Since the last step.
-        begins: It is the first step.
+        world: World in which the gripper may touch the object.
+        goal: Desired pose of the tip according to the present picture, ``T_base_tip``; None if the object is not in it.
+        seconds: Time since the last step [s].
+        begins: Whether this is the first step.
     """
 
     world: World
@@ -198,19 +211,19 @@ class StepToGrasp:
 
 @dataclass(frozen=True, slots=True)
 class Acknowledge:
-    """The pilot knows of the fault: the arm may be driven again."""
+    """The pilot has acknowledged the fault: the arm may be driven again."""
 
 
 @dataclass(frozen=True, slots=True)
 class Give:
-    """A command shall be given in the pilot's place."""
+    """A command shall be executed on the pilot's behalf."""
 
     verb: str
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Write:
-    """A line of the record of the session."""
+    """A line shall be added to the record of the session."""
 
     kind: str
     time: float
@@ -219,7 +232,7 @@ class Write:
 
 @dataclass(frozen=True, slots=True)
 class WriteAnswer:
-    """The last answer, as a line of the record."""
+    """The last answer shall be added to the record of the session."""
 
     time: float
 
@@ -233,7 +246,10 @@ Effect: TypeAlias = (
 
 
 class Level(str, Enum):
-    """What kind of line it is: what was done, a command that is not executed, or what nobody has commanded."""
+    """The kind of an answer.
+
+    ``NEWS`` reports what was done, ``REFUSAL`` why a command was not executed, ``ALARM`` what nobody has commanded.
+    """
 
     NEWS = "news"
     REFUSAL = "refusal"
@@ -258,15 +274,15 @@ class Answer:
 
 
 def news(text: str) -> Answer:
-    """What was done, or is so now."""
+    """Return an answer that reports what was done, or what is so now."""
     return Answer(Level.NEWS, text)
 
 
 def refused(text: str) -> Answer:
-    """Why a command is not executed, or has not led to what it is for."""
+    """Return an answer that says why a command was not executed, or did not lead to its aim."""
     return Answer(Level.REFUSAL, text)
 
 
 def alarm(text: str) -> Answer:
-    """What nobody has commanded: the arm was stopped, something is lost, a route must not be followed any more."""
+    """Return an answer that reports an uncommanded event: a stop of the arm, a lost device, a withdrawn route."""
     return Answer(Level.ALARM, text)

@@ -1,4 +1,4 @@
-"""Lamps, faults of a grasp, and ranges of joints, kept until what they depend on has changed."""
+"""Cache lamps, grasp faults and joint ranges until the state that they depend on changes."""
 
 from __future__ import annotations
 
@@ -13,11 +13,14 @@ from rrtik_ompl.pilot.routes.manoeuvre import JointRange, joint_range
 from rrtik_ompl.pilot.surroundings import Surroundings
 from rrtik_ompl.world.world import World
 
-PATIENT_SECONDS = 0.05  # for a pose, when a route is asked for
+PATIENT_SECONDS = 0.05  # time limit of inverse kinematics for one pose, once the pilot asks for a route
 
 
 class FeasibilityCache:
-    """What the arm can do from its configuration in some surroundings; the last results are kept."""
+    """Compute what the arm can do from its configuration, and keep the last result of each kind.
+
+    Each cached value is stored with a key of all that it depends on; a different key makes it be computed again.
+    """
 
     def __init__(self) -> None:
         self._lamps: tuple[Hashable, tuple[Lamp, ...]] = ((), ())
@@ -25,7 +28,7 @@ class FeasibilityCache:
         self._range: tuple[Hashable, JointRange | None] = ((), None)
 
     def lamps(self, surroundings: Surroundings, target: str | None, q: Vector) -> tuple[Lamp, ...]:
-        """Lamps of an object where it is; none if it was never seen."""
+        """Return the lamps of all grasps of an object at its last seen pose; an empty tuple if it was never seen."""
         target_seen = None if target is None else surroundings.named(target)
         if target_seen is None:
             return ()
@@ -42,7 +45,20 @@ class FeasibilityCache:
     def patient_lamp(
         self, surroundings: Surroundings, target: str | None, choice: tuple[str, int] | None, q: Vector
     ) -> Lamp | None:
-        """The lamp of a grasp; where the arm has no closed form and nothing was found, after a longer search."""
+        """Return the lamp of a grasp, after a longer search if the first one found no configuration.
+
+        Only robots without closed-form inverse kinematics are searched longer (`PATIENT_SECONDS` a pose). The lamps
+        found then replace the cached ones, so that the page agrees with the route.
+
+        Args:
+            surroundings: The world with the objects seen.
+            target: Name of the object; None if none is chosen.
+            choice: Type and level of the grasp; None if none is chosen.
+            q: Present configuration, shape (dof,).
+
+        Returns:
+            None if there is no such grasp.
+        """
         lamp = self._lamp(surroundings, target, choice, q)
         target_seen = None if target is None else surroundings.named(target)
         if lamp is None or target_seen is None or len(lamp.grasps) or has_closed_form(surroundings.world.robot):
@@ -69,7 +85,7 @@ class FeasibilityCache:
         return next((lamp for lamp in self.lamps(surroundings, target, q) if (lamp.type, lamp.level) == choice), None)
 
     def fault(self, surroundings: Surroundings, target: str, lamp: Lamp, q: Vector) -> str:
-        """What is wrong with a grasp: how far out of reach it is, or what would touch; "" if it can be made."""
+        """Return why a grasp cannot be made: how far it is out of reach, or which pair would touch; "" if it can."""
         seen = surroundings.named(target)
         if seen is None or lamp.stage is None:
             return ""
@@ -81,7 +97,11 @@ class FeasibilityCache:
         return self._fault[1]
 
     def joint_range(self, surroundings: Surroundings, world: World, q: Vector, joint: int) -> JointRange:
-        """The range of a joint in a world of some surroundings now; it stays the same while that joint alone moves."""
+        """Return the free range of one joint while all others stand still.
+
+        The range is reused as long as the other joints, the surroundings and the world stay the same and the joint has
+        not left it.
+        """
         key = (joint, np.delete(q, joint).tobytes(), surroundings, id(world))
         cached = self._range[1]
         if cached is None or key != self._range[0] or not cached.low <= q[joint] <= cached.high:

@@ -1,4 +1,4 @@
-"""The route of a session: proposed, accepted, followed move by move, and withdrawn when it is not free any more.
+"""Commands of a guided route: propose, accept, follow move by move, and withdraw it when it is no longer free.
 
 Source: [1, ch. 6].
 """
@@ -33,7 +33,7 @@ MADE = "all moves are done"
 
 
 def plan(_: Means, state: State) -> State:
-    """Propose a route from where the arm is."""
+    """Propose a route from the present configuration; the arm is stopped and read first."""
     return state.do(Stop(), Read(_search))
 
 
@@ -60,13 +60,14 @@ def _planned(means: Means, state: State, found: Route | NoRoute) -> State:
 
 
 def proposed(means: Means, state: State, route: Route, aimed: SeenObject | None = None) -> State:
-    """A route that begins where the arm is, is proposed.
+    """Return the state in which a route that begins at the present configuration is proposed.
 
     Args:
         means: Of the session.
-        state: Of now.
+        state: Present state.
         route: The route.
-        aimed: What it leads to; it is withdrawn when that has moved.
+        aimed: The object that the route leads to. The route is withdrawn when this object has moved; None for no
+            object.
     """
     kind = Track if route.together else Follower
     list_of_moves = state.way.list_of_moves if route.together else route
@@ -77,7 +78,7 @@ def proposed(means: Means, state: State, route: Route, aimed: SeenObject | None 
 
 
 def together(means: Means, state: State) -> State:
-    """Propose the same route with all joints at once, or the list of moves again."""
+    """Propose the same route with all joints at once; if it is shown so already, propose the list of moves again."""
     route = state.way.route
     list_of_moves = state.way.list_of_moves
     if route is None or list_of_moves is None:
@@ -97,7 +98,7 @@ def _put_together(means: Means, state: State, route: Route | NoRoute) -> State:
 
 
 def accept(_: Means, state: State) -> State:
-    """Follow the route that is proposed."""
+    """Follow the proposed route, if the arm is at its start and the route is still free."""
     if state.way.follower is None:
         raise InputError("there is no route to accept; 'plan' proposes one")
 
@@ -115,12 +116,12 @@ def accept(_: Means, state: State) -> State:
 
 
 def reject(_: Means, state: State) -> State:
-    """Leave the route that is proposed or followed."""
+    """Discard the route that is proposed or followed."""
     return replace(leave(state.do(Stop())), desired=state.q).say(news("rejected"))
 
 
 def back(means: Means, state: State) -> State:
-    """Propose the way back: the moves that were made, reversed."""
+    """Propose the way back: the moves made so far, in reverse."""
     if state.way.follower is None:
         raise InputError("there is no route to go back on")
 
@@ -133,7 +134,7 @@ def back(means: Means, state: State) -> State:
 
 
 def settle(_: Means, state: State) -> State:
-    """Take the current move for made where the arm does not come nearer to its end."""
+    """Treat the current move as completed although the arm does not reach its end exactly."""
     follower_before = state.way.follower
     if follower_before is None or follower_before.joint() is None:
         raise InputError("no move is due")
@@ -149,7 +150,7 @@ def settle(_: Means, state: State) -> State:
 
 
 def watch(means: Means, state: State) -> State:
-    """The progress of an accepted route, where the arm is now."""
+    """Update the progress along the accepted route, and stop the arm if it is off the route."""
     follower_before = state.way.follower
     if follower_before is None or state.mode != FOLLOWING:
         return state
@@ -170,7 +171,7 @@ def watch(means: Means, state: State) -> State:
 
 
 def _ended(robot: Robot, state: State, follower: Follower | Track) -> State:
-    """All moves are made: whether the tip is where the route ends."""
+    """End a completed route, and report whether the tip is where the route ends."""
     ended = replace(state, mode=MANOEUVRE)
 
     distance, turn = apart(robot.fk(follower.path.end), robot.fk(state.q))
@@ -183,7 +184,7 @@ def _ended(robot: Robot, state: State, follower: Follower | Track) -> State:
 
 
 def check(state: State) -> State:
-    """After a change of the scene: a route that is not free any more is withdrawn."""
+    """Withdraw the route if a change of the scene has blocked it; announce when a withdrawn route is free again."""
     if state.way.follower is None or state.mode not in (FOLLOWING, PROPOSED):
         return state
 
@@ -201,14 +202,14 @@ def check(state: State) -> State:
 
 
 def over(state: State, verb: str) -> str:
-    """What there is to say to who wants to go on along a route that was made to its end; "" else."""
+    """Return a message if the pilot asks for the next move of a route that is already completed; "" otherwise."""
     progress = state.way.progress
     ended = verb == "next" and state.mode in (MANOEUVRE, CHOOSING)
     return f"{MADE}; 'plan' proposes another route" if ended and progress and progress.advice == "done" else ""
 
 
 def show_due(state: State) -> State:
-    """Select the joint of the current move; its end is the desired value."""
+    """Select the joint of the current move, and show the end of the move as the desired configuration."""
     follower = state.way.follower
 
     joint = None if follower is None else follower.joint()
@@ -218,13 +219,16 @@ def show_due(state: State) -> State:
 
 
 def withdrawn(state: State, fault: str) -> State:
-    """The rest of the route is not free any more, which is found out when the pilot wants to go on along it."""
+    """Refuse to go on along a route whose remainder is no longer free, and propose it as withdrawn."""
     refusal = refused(WITHDRAWN.format(fault))
     return replace(state.released().on_its_way(withdrawn=fault), mode=PROPOSED).say(refusal)
 
 
 def fault_of_rest(state: State) -> str:
-    """Why what remains of the route must not be followed; "" if it may be."""
+    """Return why the remainder of the route must not be followed; "" if it may be.
+
+    The route is refused if its target has moved, or if the remaining moves collide in the present world.
+    """
     if state.way.follower is None:
         return ""
     if moved := _target_moved(state):
@@ -237,7 +241,7 @@ def fault_of_rest(state: State) -> str:
 
 
 def _target_moved(state: State) -> str:
-    """By how much the target is not where the route ends any more; "" if it is there."""
+    """Return by how much the target has moved since the route was planned, in words; "" within the tolerance."""
     aimed = state.way.aimed
     seen_now = None if aimed is None else state.around.named(aimed.object.name)
     if aimed is None or seen_now is None:
@@ -252,7 +256,7 @@ def _target_moved(state: State) -> str:
 
 
 def leave(state: State) -> State:
-    """Forget the route; a grasp stays chosen."""
+    """Discard the route; the chosen grasp stays chosen."""
     return replace(state, way=Way(), mode=CHOOSING if state.choice else MANOEUVRE)
 
 

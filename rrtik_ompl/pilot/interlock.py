@@ -1,10 +1,9 @@
-"""Which commands are refused, by what is known of the picture, of the arm, and of the route.
+"""Decide which commands are refused, given what is known of the picture, the arm and the route.
 
-The rule: nothing moves, is planned or accepted on a picture that is stale or on joints that are not read any more, and
-no route is followed that was not accepted. Where the vehicle moves, no route is proposed or followed past what was not
-seen lately; driving by hand remains. Commands that stop, choose or leave are never refused here.
-
-Arguments of commands come from outside: only what a command expects is accepted.
+The rule: nothing moves, is planned or is accepted on a stale picture or on joint values that are no longer read, and
+no route is followed that was not accepted. Where the vehicle moves, no route is proposed or followed past objects that
+were not seen recently; driving by hand remains possible. Commands that stop, choose or leave are never refused here.
+Arguments of commands come from outside and are checked: only what a command expects is accepted.
 """
 
 from __future__ import annotations
@@ -29,30 +28,31 @@ FOLLOWING = "following"
 MODES: Final = (MANOEUVRE, CHOOSING, PROPOSED, FOLLOWING)
 STALE_SECONDS = 0.5  # a picture older than that does not show the present
 UNSEEN_SECONDS = 2.0  # what has been out of view for longer is no basis of a route, where the vehicle moves
-LATE_SECONDS = 0.3  # a pilot who sees what the arm does later than that does not drive it
+LATE_SECONDS = 0.3  # a pilot who sees the motion of the arm with a larger delay must not drive it
 
 ACKNOWLEDGE: Final = "STOP acknowledges that"
 
 BY_HAND: Final = (MANOEUVRE, CHOOSING, PROPOSED)
 ON_A_ROUTE: Final = "a route is being followed: 'next' makes its next move, 'stop' leaves it"
 
-MAX_NUMBER = 1e6  # that a command may hold
-MAX_WORD_LENGTH = 100  # of a word in a command
+MAX_NUMBER = 1e6  # largest magnitude of a number in a command
+MAX_WORD_LENGTH = 100  # characters of a word in a command
 
 
 @dataclass(frozen=True, slots=True)
 class Verb:
-    """A command of the pilot: what executes it, and what it needs. A verb that stops, chooses or leaves needs nothing.
+    """A command of the pilot: the function that executes it, and its preconditions. Stop, choose and leave have none.
 
     Attributes:
         act: Called with the `Means`, the `State`, and the command's arguments by their names, numbers as ``float`` and
             words as ``str``; returns the next `State`.
-        present: It needs the arm and a picture of now.
-        held: The arm moves only as long as the command is renewed; the pilot has to see it.
-        guided: It leads past things without the pilot's judgement, and so needs all of them seen.
-        gripping: It is given even while the gripper is closed on something fixed; asked only where ``present``.
-        modes: In which it is given.
-        otherwise: Why it is refused in the others.
+        present: Whether it needs the arm and an up-to-date picture.
+        held: Whether the arm moves only while the command is renewed; the pilot must then see the arm.
+        guided: Whether it leads the arm past objects without the pilot's judgement, so that all of them must be in
+            view.
+        gripping: Whether it is allowed while the gripper is closed on something fixed; consulted only if ``present``.
+        modes: The modes in which it is allowed.
+        otherwise: The refusal in all other modes.
     """
 
     act: Callable[..., State]
@@ -66,11 +66,13 @@ class Verb:
 
 @dataclass(frozen=True, slots=True)
 class Sight:
-    """What a page had shown to the pilot who commands: by the stamps that the page sends back with the command.
+    """How old the information on the pilot's page was when a command was given.
+
+    The ages are computed from the time stamps that the page sends back with the command.
 
     Attributes:
-        state: Age of the last state [s]; inf if the page does not say.
-        picture: Age of the last picture of the camera [s]; inf if the page does not say.
+        state: Age of the last state shown [s]; inf if the page does not say.
+        picture: Age of the last camera picture shown [s]; inf if the page does not say.
     """
 
     state: float
@@ -79,17 +81,17 @@ class Sight:
 
 @dataclass(frozen=True, slots=True)
 class Knowledge:
-    """What is known at a moment.
+    """What is known of the arm and the scene at one moment.
 
     Attributes:
         arm_lost: Why the connection to the arm is lost; "" if it is not.
-        picture_age: Of the last picture [s]; inf if there was none.
-        past: Pictures are photographs or a film, and the arm is a simulated one: no picture is of now, none is stale.
-        arm_off: Why joints and pictures contradict each other; "" if they do not.
+        picture_age: Age of the last picture [s]; inf if there was none.
+        past: Whether the pictures are photographs or a film and the arm is simulated: then no picture counts as stale.
+        arm_off: How joint values and pictures contradict each other; "" if they do not.
         unusable: Why the last photograph or picture of a film could not be used; "" if it could.
-        fault: What the arm has done that it was not told; "" if nothing, or the pilot has acknowledged it.
-        sight: What the pilot sees; None without a page.
-        unseen: What the scene stands on and the camera has not shown lately, in one line; "" if there is no such thing.
+        fault: What the arm did against its set points; "" if nothing, or if the pilot has acknowledged it.
+        sight: What the pilot's page shows; None without a page.
+        unseen: Which object of the scene has not been in view recently, in one line; "" if there is none.
     """
 
     arm_lost: str
@@ -103,7 +105,7 @@ class Knowledge:
 
     @property
     def trouble(self) -> str:
-        """Why the present is not known, or the arm cannot be trusted; "" if all is well."""
+        """Return why the present is not known, or why the arm cannot be trusted; "" if all is well."""
         if self.arm_lost or self.fault or self.arm_off:
             return self.arm_lost or self.fault or self.arm_off
         if self.past or self.picture_age <= STALE_SECONDS:
@@ -112,7 +114,7 @@ class Knowledge:
 
     @property
     def blind(self) -> str:
-        """Why the pilot does not see the arm well enough to drive it; "" if he does."""
+        """Return why the pilot does not see the arm well enough to drive it; "" if he does."""
         sight = self.sight
         if sight is None or (sight.state <= LATE_SECONDS and (self.past or sight.picture <= STALE_SECONDS)):
             return ""
@@ -126,12 +128,12 @@ class Knowledge:
 
 
 def refusal(verb: Verb, mode: str, known: Knowledge) -> str:
-    """Why a command is refused, in one line; "" if it is not.
+    """Return why a command is refused, in one line; "" if it is allowed.
 
     Args:
         verb: The command.
         mode: One of `MODES`.
-        known: Of the moment.
+        known: What is known at this moment.
 
     Example:
         >>> refusal(Verb(print, present=True), FOLLOWING, Knowledge("", picture_age=60.0))
@@ -151,10 +153,10 @@ def refusal(verb: Verb, mode: str, known: Knowledge) -> str:
 
 
 def number(value: object, name: str) -> float:
-    """A finite number of moderate size.
+    """Return a finite number of moderate size as ``float``.
 
     Raises:
-        InputError: If it is none.
+        InputError: If the value is anything else.
     """
     plain = value.item() if isinstance(value, np.number) else value
     if isinstance(plain, bool) or not isinstance(plain, int | float) or not -MAX_NUMBER <= plain <= MAX_NUMBER:
@@ -163,15 +165,16 @@ def number(value: object, name: str) -> float:
 
 
 def fitting(act: Callable[..., object], name: str, arguments: Mapping[str, object]) -> dict[str, float | str]:
-    """The arguments of a command, if they are those that are taken by what executes it.
+    """Check the arguments of a command against the signature of its function, and return them converted.
 
     Args:
-        act: Its first two parameters are not of the command; the others are words, ``str``, or numbers.
-        name: Of the command.
+        act: The function. Its first two parameters are not arguments of the command; the others are annotated ``str``
+            for words, and anything else for numbers.
+        name: Name of the command, for messages.
         arguments: By their names.
 
     Raises:
-        InputError: If one is missing, unknown, or of another kind.
+        InputError: If an argument is missing, unknown, or of another kind.
     """
     wanted = list(inspect.signature(act).parameters.values())[2:]
     if set(arguments) != {each.name for each in wanted}:

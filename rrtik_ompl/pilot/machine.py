@@ -1,6 +1,7 @@
-"""The state machine of a session: a state and an event give the next state, and what is to be done.
+"""The state machine of a session: from a state and an event it computes the next state and a list of effects.
 
-What an event makes of the mode (nothing: the mode stays, and so it does where a command is refused):
+The table shows how the mode changes with each event. An empty cell means that the mode stays; it also stays when a
+command is refused.
 
 | event | manoeuvre | choosing | proposed | following |
 |---|---|---|---|---|
@@ -21,12 +22,12 @@ What an event makes of the mode (nothing: the mode stays, and so it does where a
 | judged: what the route stands on is out of view | | | | proposed |
 | seen: the rest of the route is not free any more | | | proposed, withdrawn | proposed, withdrawn |
 
-What drives the arm is beside that: a press that is held (`Press`, `Drive`). It ends, and the arm stops, when it is not
-renewed in time, when the arm does not follow, when any other command is given, when something comes into the way, and
-whenever the arm or the picture are not known any more. A command that is not in the table of its mode, or that needs
-what is not known, is refused: see `interlock`.
+Driving is independent of the mode: the arm moves while a press is held (`Press`, `Drive`). The press ends, and the arm
+stops, when it is not renewed in time, when the arm does not follow, when any other command is given, when something
+comes into the way, and whenever the arm or the picture is no longer known. Commands that are not allowed in a mode, or
+whose preconditions are not met, are refused: see `interlock`.
 
-A new command is a function and its row in the `VERBS` of a part, and a button of the page.
+To add a command, write its function, add a row to the `VERBS` of its module, and add a button to the page.
 """
 
 from __future__ import annotations
@@ -75,13 +76,14 @@ from rrtik_ompl.pilot.motion import hand, held, leading
 from rrtik_ompl.pilot.queries import grasp_fault, known, out_of_view
 from rrtik_ompl.pilot.state import Means, Pictures, State
 
-READ_SECONDS = 1.0  # a stop so soon after a fault is against the fault: it does not acknowledge it
+# A stop this soon after a fault does not acknowledge it: the pilot cannot have read the message yet.
+READ_SECONDS = 1.0
 
 
 def handle(means: Means, state: State, event: Event) -> tuple[State, tuple[Effect, ...]]:
-    """The state after an event, and what is to be done, in this order.
+    """Return the state after an event, and the effects to carry out, in this order.
 
-    Nothing else is changed by that: the same state and event give the same.
+    The function has no side effects: the same state and event always give the same result.
     """
     after = _HANDLERS[type(event)](means, state, event)
     return replace(after, due=()), after.due
@@ -91,19 +93,19 @@ def handle(means: Means, state: State, event: Event) -> tuple[State, tuple[Effec
 
 
 def goes_on(state: State, verb: str, press: object) -> bool:
-    """Whether a command renews the press of before."""
+    """Check whether a command renews the press that is held."""
     return verb in VERBS and VERBS[verb].held and state.press.is_of(verb, press)
 
 
 def _command(means: Means, state: State, event: Command) -> State:
-    """Execute a command; one that cannot be executed in this mode, or on what is known, says so and moves nothing."""
+    """Execute a command. One that is not allowed in this mode, or on what is known, is refused with a message."""
     verb = event.verb
     press = event.arguments.get("press")
     now = replace(state, time=max(state.time, event.time), arm_lost=event.arm_lost, sight=event.sight)
 
     renewed = goes_on(now, verb, press)
     if renewed and now.press.over:
-        return now  # what ended the press was said
+        return now  # the pilot was already told what ended the press
 
     holds = verb in VERBS and VERBS[verb].held
     given = replace(now, given=(verb, press if holds else None))
@@ -122,7 +124,7 @@ def _executed(means: Means, state: State, event: Command, renewed: bool) -> Stat
         if why:
             raise InputError(why)
 
-        if not row.held and verb != "release":  # which itself says what is left of a move
+        if not row.held and verb != "release":  # `release` ends the motion itself
             state = state.released()
         if not renewed:
             state = state.do(Write("command", event.time, {"name": verb, "arguments": given}))
@@ -157,9 +159,9 @@ def _grasp(means: Means, state: State, type: str, level: float) -> State:
 
 
 def _stop(_: Means, state: State) -> State:
-    """Stop the arm; a fault that the pilot has had time to read is acknowledged."""
+    """Stop the arm; acknowledge a fault if the pilot has had time to read it."""
     stopped, said = _end_motion(state)
-    if not state.fault:  # one that the supervisor has found since the last `Judged` stays: nobody has read it
+    if not state.fault:  # a fault found since the last `Judged` stays: nobody has read it yet
         return stopped.say(news(said))
     if state.time - state.fault_at <= READ_SECONDS:
         return stopped.say(alarm(f"stopped; {state.fault}; {ACKNOWLEDGE}"))
@@ -167,12 +169,16 @@ def _stop(_: Means, state: State) -> State:
 
 
 def _halt(_: Means, state: State) -> State:
-    """Stop the arm, for no page has the pilot any more."""
+    """Stop the arm because no page has the role of the pilot any more."""
     return _end_motion(state)[0].say(alarm("the pilot has left; the arm stands still"))
 
 
 def _end_motion(state: State) -> tuple[State, str]:
-    """Stop the arm, and take back that a route is followed; what there is to say."""
+    """Stop the arm, and stop following a route.
+
+    Returns:
+        The new state, and the message for the pilot.
+    """
     stopped = replace(state.stand_still(), desired=state.q)
     if state.mode != FOLLOWING:
         return stopped, "stopped"
@@ -196,10 +202,13 @@ VERBS: dict[str, Verb] = {
 
 
 def _seen(_: Means, state: State, event: Seen) -> State:
-    """The surroundings are as a picture shows them."""
+    """Update the surroundings by the objects of a picture, and stop what is no longer free.
+
+    The first graspable object that is seen becomes the target if none is chosen.
+    """
     at = {**state.pictures.seen_at, **{each.object.name: event.time for each in event.objects}}
     if state.holds:
-        at[state.holds] = event.time  # it is where the arm is
+        at[state.holds] = event.time  # a held object moves with the arm, so it counts as seen
     now = replace(state, time=max(state.time, event.time), pictures=Pictures(event.time, "", at))
 
     around = state.around.see(event.objects)
@@ -216,7 +225,7 @@ def _seen(_: Means, state: State, event: Seen) -> State:
 
 
 def _tip_seen(means: Means, state: State, event: TipSeen) -> State:
-    """Nothing moves where the joints say another thing than a picture of the tip."""
+    """Compare the pose of the tip in a picture with the joint values; a contradiction blocks all motion."""
     if means.past:
         return state
     check = state.check.see(event.T_base_tip, event.covariance, means.robot.fk(state.q), event.time)
@@ -228,7 +237,7 @@ def _unusable(_: Means, state: State, event: Unusable) -> State:
 
 
 def _measured(means: Means, state: State, event: Measured) -> State:
-    """The arm is where it was read; a press that was not renewed in time ends."""
+    """Store the configuration that was read, and end a press that was not renewed in time."""
     now = replace(state, time=max(state.time, event.time), arm_lost=event.arm_lost, q=frozen(event.q))
     if not np.array_equal(state.q, now.q):
         now = now.do(Write("joints", event.time, {"q": now.q.tolist()}))
@@ -237,11 +246,11 @@ def _measured(means: Means, state: State, event: Measured) -> State:
 
     now = replace(now, check=now.check.read(now.q, event.time))
     now, expired = held.expire(now)
-    return now if means.recorded else now.say(expired)  # of a record it was said when it was made
+    return now if means.recorded else now.say(expired)  # a replayed record holds this message already
 
 
 def _judged(means: Means, state: State, event: Judged) -> State:
-    """The arm stops where it errs, or the present is not known any more; else its progress is noted."""
+    """Stop the arm if it errs or if the present is no longer known; otherwise update its progress."""
     state = replace(held.watch(means, state, event.standing), fault=event.fault)
 
     state = _watch(means, state)
@@ -250,7 +259,7 @@ def _judged(means: Means, state: State, event: Judged) -> State:
 
 
 def _watch(means: Means, state: State) -> State:
-    """Stop when picture or arm are not known any more, and leave the route; say when they are known again."""
+    """Stop and leave the route when the picture or the arm is lost; report when both are known again."""
     trouble = known(means, state).trouble
     if trouble == state.trouble:
         return state
@@ -269,7 +278,7 @@ def _watch(means: Means, state: State) -> State:
 
 
 def _watch_view(means: Means, state: State) -> State:
-    """Leave the route when something that it stands on has been out of view for too long, and say so."""
+    """Leave the route when an object that it depends on has been out of view too long; report when all are seen."""
     unseen = out_of_view(means, state)
     now = replace(state, unseen=unseen)
     if bool(unseen) == bool(state.unseen):
@@ -285,12 +294,12 @@ def _watch_view(means: Means, state: State) -> State:
 
 
 def _write_stop(state: State) -> State:
-    """A replay, whose arm and pictures are never lost, has to stop here as well."""
+    """Record a stop command, because a replay, whose arm and pictures are never lost, would not stop here by itself."""
     return state.do(Write("command", state.time, {"name": "stop", "arguments": {}}))
 
 
 def _check_motion(state: State) -> State:
-    """After a change of the scene: stop if what is driven, followed or proposed is not free any more."""
+    """Stop the arm after a change of the scene if the motion that is driven, followed or proposed is no longer free."""
     if state.mode != FOLLOWING and not held.still_free(state):
         state = state.released().say(alarm("stopped: something has come into the way"))
     return guide.check(state)
@@ -308,7 +317,7 @@ def _broken(_: Means, state: State, event: Broken) -> State:
 
 
 def _reply(means: Means, state: State, event: Reply) -> State:
-    """Go on with a command that has asked for something."""
+    """Continue a command with the answer to its effect."""
     try:
         return event.then(means, state, event.answer)
     except RrtikError as error:
@@ -316,7 +325,7 @@ def _reply(means: Means, state: State, event: Reply) -> State:
 
 
 def _failed(_: Means, state: State, event: Failed) -> State:
-    """The command that has asked for it is refused."""
+    """Refuse the command whose effect could not be carried out."""
     return held.refuse(state, event.why)
 
 

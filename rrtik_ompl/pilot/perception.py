@@ -19,19 +19,19 @@ from rrtik_ompl.sensing.scene_from_view import base_from_camera, tip_seen
 from rrtik_ompl.sensing.sensor import Sensor, View
 
 REPEATS = "the camera repeats its last picture"
-EXPLANATION_SECONDS = 5.0  # between two searches for unknown markers
+EXPLANATION_SECONDS = 5.0  # least time between two searches for unknown markers, which are slow
 
 
 class Perception(Protocol):
-    """Camera and sensor, as the engine uses them.
+    """The camera and its sensor, as the engine uses them.
 
     Attributes:
-        camera: The lens.
+        camera: Model of the camera.
         picture: The last picture, shape (height, width, 3).
-        T_base_camera: Pose of the camera, None if it is not known yet.
+        T_base_camera: Pose of the camera; None if it is not known yet.
         arm_in_picture: Whether the arm itself is in the picture.
-        lost: Why there are no pictures any more; "" if there are.
-        hint: Why no object can be placed by the last picture; "" if one can.
+        lost: Why there are no more pictures; "" while there are.
+        hint: Why no object can be located in the last picture; "" if one can.
     """
 
     camera: Camera
@@ -49,15 +49,15 @@ class Perception(Protocol):
 
 
 class LivePerception:
-    """A camera and the sensor behind it.
+    """A camera, and the sensor that evaluates its pictures.
 
     Attributes:
-        source: Of the pictures.
-        others: The last pictures of the other cameras of a rig.
+        source: Source of the pictures.
+        others: The last pictures of the other cameras of a rig, shape (height, width, 3) each.
     """
 
     def __init__(self, sensor: Sensor, source: PictureSource, *, arm_in_picture: bool = False) -> None:
-        """Take the parts; see `Perception`."""
+        """Store the parts; see `Perception`."""
         self.camera = sensor.camera
         self.arm_in_picture = arm_in_picture
         self.picture = np.zeros((self.camera.height, self.camera.width, 3), dtype=np.uint8)
@@ -70,7 +70,11 @@ class LivePerception:
         self.source = source
 
     def update(self, session: Session, time: float) -> None:
-        """Process the newest picture, and give the objects in it to the session."""
+        """Evaluate the newest picture, and pass the objects in it to the session.
+
+        A picture that repeats the last one bit for bit is dropped: a frozen camera must become stale. The pose of the
+        camera is updated whenever it can be computed.
+        """
         try:
             picture = self.source.latest()
             if picture is None:
@@ -82,7 +86,7 @@ class LivePerception:
             view = self._sensor.view(Picture(picture.pixels, picture.name, time), *other_pictures)
         except RrtikError as error:
             self.lost = str(error)
-            if self.lost != ENDED:  # the last picture of a film was a good one
+            if self.lost != ENDED:  # the end of a film does not make its last picture unusable
                 session.see_unusable(self.lost)
             return
 
@@ -99,7 +103,7 @@ class LivePerception:
             self.T_base_camera, _ = base_from_camera(self._sensor.marker_map, view.seen)
 
     def _frozen(self, picture: Picture) -> bool:
-        """Whether a picture, or that of another camera of the rig, is the last one again: it shows no present."""
+        """Check whether a picture, or that of another camera of the rig, is identical to the previous one."""
         last_picture = self._last_picture
         self._last_picture = picture
         if last_picture is None or len(last_picture.others) != len(picture.others):
@@ -114,12 +118,15 @@ class LivePerception:
         self.source.close()
 
     def reports(self) -> dict[str, Report]:
-        """When the thread of the camera reported last, by name; nothing if it has none."""
+        """Return, by name, functions that give the time of the camera thread's last report; empty without a thread."""
         source = self.source
         return {"the camera": lambda: source.reported} if isinstance(source, Feed) else {}
 
     def _why_nothing(self, view: View, time: float, known: bool) -> str:
-        """Why no object has a pose. The search for unknown markers is slow: only while no object was ever seen."""
+        """Return why no object has a pose, "" if one has.
+
+        The search for unknown markers is slow: it runs only while no object was ever seen, every `EXPLANATION_SECONDS`.
+        """
         if view.placed:
             return ""
         if view.seen:
@@ -136,14 +143,14 @@ class LivePerception:
 
 
 class CameraOfRig:
-    """The second camera of a rig, whose pictures are sensed with those of the first."""
+    """The second camera of a rig, whose pictures are evaluated together with those of the first."""
 
     def __init__(self, perception: LivePerception) -> None:
         self._perception = perception
 
     def picture(self) -> NDArray[np.uint8] | None:
-        """The picture that was sensed last; None if there is none yet."""
+        """Return the picture that was evaluated last; None if there is none yet."""
         return self._perception.others[0] if self._perception.others else None
 
     def close(self) -> None:
-        """Nothing to release: the perception has it."""
+        """Do nothing: the perception owns the camera."""

@@ -1,4 +1,4 @@
-"""What follows from a state: what is known or out of view, which grasps can be reached, how far a joint can go."""
+"""Derive information from a state: what is known or out of view, and which grasps and joint ranges are possible."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from rrtik_ompl.world.world import World
 
 
 def known(means: Means, state: State) -> Knowledge:
-    """What is known now of the arm and of the picture."""
+    """Return what is known at present of the arm and of the picture."""
     return Knowledge(
         state.arm_lost,
         state.time - state.pictures.time,
@@ -28,7 +28,7 @@ def known(means: Means, state: State) -> Knowledge:
 
 
 def out_of_view(means: Means, state: State) -> str:
-    """What the world stands on and was not seen for longer than patience allows, in words; "" if nothing."""
+    """Return, in words, which object that the world depends on has been out of view for too long; "" if none has."""
     if means.past or means.patience == np.inf or state.pictures.time == -np.inf:
         return ""
     for name in state.around.basis:
@@ -41,18 +41,21 @@ def out_of_view(means: Means, state: State) -> str:
 
 
 def unseen_for(state: State, name: str) -> float:
-    """For how long an object has not been in view, by the pictures taken since [s]."""
+    """Return how long an object has been out of view at the time of the last picture [s]."""
     pictures = state.pictures
     return max(pictures.time - pictures.seen_at.get(name, pictures.time), 0.0)
 
 
 def world_by_hand(state: State) -> World:
-    """The world for moves by hand: the gripper may touch what it holds, as long as it does."""
+    """Return the world for moves by hand, in which the gripper may touch the target while it is in contact with it."""
     return state.around.world_at(state.q, state.target)
 
 
 def lamps(means: Means, state: State) -> tuple[Lamp, ...]:
-    """Lamps of the chosen object where it is and for where the arm is; none is green if no route can be led."""
+    """Return the lamps of the chosen object from the present configuration.
+
+    Green lamps become amber while an object that routes depend on is out of view.
+    """
     found = means.feasibility.lamps(state.around, state.target, state.q)
 
     unseen = out_of_view(means, state)
@@ -62,12 +65,12 @@ def lamps(means: Means, state: State) -> tuple[Lamp, ...]:
 
 
 def chosen_lamp(means: Means, state: State) -> Lamp | None:
-    """The lamp of the grasp that is chosen."""
+    """Return the lamp of the chosen grasp; None if no grasp is chosen."""
     return next((lamp for lamp in lamps(means, state) if (lamp.type, lamp.level) == state.choice), None)
 
 
 def grasp_fault(means: Means, state: State) -> str:
-    """What is wrong with the grasp that is chosen: by how much it is out of reach, what touches; "" if nothing."""
+    """Return why the chosen grasp cannot be made: how far it is out of reach, or which pair touches; "" if it can."""
     lamp = chosen_lamp(means, state)
     if lamp is None:
         return ""
@@ -75,5 +78,5 @@ def grasp_fault(means: Means, state: State) -> str:
 
 
 def joint_range(means: Means, state: State) -> JointRange:
-    """The range in which the selected joint can be driven now."""
+    """Return the range within which the selected joint can be driven now."""
     return means.feasibility.joint_range(state.around, world_by_hand(state), state.q, state.selected)

@@ -1,1 +1,1 @@
-"""What a pilot's hand does: joints are driven while a command is held, and the gripper is closed and opened."""
+"""Manual driving: joints move while a command is held, and the gripper is opened and closed."""

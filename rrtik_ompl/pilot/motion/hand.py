@@ -1,4 +1,4 @@
-"""The gripper of a session: opened and closed by command; what it holds is part of the arm until it lets go.
+"""Commands of the gripper: open, close and lift. A held object is part of the arm until it is released.
 
 Source: [1, ch. 4 and 6.2.2] (augmented manipulation, pick and place).
 """
@@ -27,13 +27,13 @@ from rrtik_ompl.sensing.scene_from_view import SeenObject
 from rrtik_ompl.world.world import World
 
 REACH = 0.015  # [m]; a gripper that closes this near to a grasp holds the object
-TURN = np.deg2rad(10.0)  # and turned by no more than this
-LIFT_SECONDS = 0.2  # for the posture at the end of a lift
+TURN = np.deg2rad(10.0)  # and its orientation differs from that of the grasp by no more than this
+LIFT_SECONDS = 0.2  # time limit of inverse kinematics for the end of a lift
 NOTHING = "closed; nothing is between the fingers"
 
 
 def refusal(verb: Verb, state: State) -> str:
-    """Why a command must not move the arm; "" if it may."""
+    """Return why a command must not move the arm in the present state of the gripper; "" if it may."""
     fixed = state.gripper.fixed
     if fixed and verb.present and not verb.gripping:
         return f"refused: the gripper is closed on '{fixed}', which is fixed; open it first"
@@ -41,7 +41,7 @@ def refusal(verb: Verb, state: State) -> str:
 
 
 def close(_: Means, state: State) -> State:
-    """Close the gripper; an object at one of whose grasps it is, is held from now on."""
+    """Close the gripper; if it is at a grasp of an object, it holds this object from now on."""
     if state.gripper.closed:
         return state.say(refused("the gripper is closed already"))
     return state.do(Stop(), Grip(True, _closed))
@@ -84,7 +84,7 @@ def _closed(means: Means, state: State, q: Vector) -> State:
 
 
 def open_hand(_: Means, state: State) -> State:
-    """Open the gripper; what was held stays where it is."""
+    """Open the gripper; a held object stays where it is."""
     if not state.gripper.closed:
         return state.say(refused("the gripper is open already"))
     return state.do(Stop(), Grip(False, _opened))
@@ -104,7 +104,7 @@ def _opened(means: Means, state: State, q: Vector) -> State:
 
 
 def lift(means: Means, state: State) -> State:
-    """Propose a route straight up from where something was taken."""
+    """Propose a route that lifts the held object straight up from its present pose."""
     if not state.holds:
         raise InputError("nothing is held; close the gripper at a grasp first")
 
@@ -117,7 +117,7 @@ def lift(means: Means, state: State) -> State:
 
 
 def _route_up(means: Means, world: World, q: Vector, goal: pin.SE3, name: str) -> Route | NoRoute:
-    """A route to a pose of the tip; where it cannot be reached, the reason says what to do with what is held."""
+    """Return a route to a pose of the tip, or the reason why it cannot be reached and what the pilot can do."""
     result = solve_ik(means.robot, PoseGoal(goal), near=q, world=world, seconds=LIFT_SECONDS)
     if not result.found:
         why = result.detail or result.reason
@@ -133,7 +133,7 @@ def _lifted(means: Means, state: State, made: Route | NoRoute) -> State:
 
 
 def _grasps(surroundings: Surroundings) -> list[tuple[SeenObject, float, pin.SE3]]:
-    """All grasps of what is in view: the object, how far it is lifted, and ``T_base_tip``."""
+    """Return all grasps of all objects seen, as tuples of the object, the height of its lift [m] and ``T_base_tip``."""
     return [
         (seen, grasp.lift, seen.grasp_pose(grasp.name, level))
         for seen in surroundings.seen

@@ -1,4 +1,4 @@
-"""Commands that are held: a joint is driven, or a move of the route is made, as long as they are renewed."""
+"""Held commands: a joint is driven, or a move of the route is made, only as long as the command is renewed."""
 
 from __future__ import annotations
 
@@ -19,21 +19,22 @@ from rrtik_ompl.pilot.routes.follower import MADE, Follower, Track
 from rrtik_ompl.pilot.routes.manoeuvre import check_move, move_refusal, way_out
 from rrtik_ompl.pilot.state import HOLD_SECONDS, LEASH_SECONDS, Means, Press, State
 
-STUCK_SECONDS = 0.8  # an arm that comes no nearer to the end of a move for as long does not get there
-MIN_SPEED = 0.05  # share of the joints' rates
+# If the arm has come no nearer to the end of a move for this long, it will not get there.
+STUCK_SECONDS = 0.8
+MIN_SPEED = 0.05  # least share of the joints' rates
 
 
 # --- commands --------------------------------------------------------------------------------------------------------
 
 
 def set_speed(_: Means, state: State, share: float) -> State:
-    """At which share of their rates joints are driven."""
+    """Set the speed of driving by hand, as a share of the joints' rates; it is clipped to `MIN_SPEED` and 1."""
     speed = float(np.clip(share, MIN_SPEED, 1.0))
     return replace(state, speed=speed).say(news(f"speed {100 * speed:.0f} %"))
 
 
 def release(means: Means, state: State) -> State:
-    """Nothing is pressed any more."""
+    """End the press: stop what is driven, and report what remains of the current move."""
     after = state.released()
     if not state.drive.active:
         return after
@@ -50,7 +51,17 @@ def release(means: Means, state: State) -> State:
 
 
 def jog(means: Means, state: State, direction: float, press: float) -> State:
-    """Drive the selected joint, at a share of the speed from -1 to 1."""
+    """Drive the selected joint while the command is held.
+
+    The joint stops at the end of its free range. If the arm is in contact, the joint may only move so that it gets
+    free.
+
+    Args:
+        means: Of the session.
+        state: Present state.
+        direction: Share of the speed from -1 to 1; 0 ends the drive.
+        press: Number of the press that this command belongs to.
+    """
     sign = float(np.sign(direction))
     pressed, _ = begins(state, "jog", press)
     if sign == 0.0:
@@ -59,7 +70,7 @@ def jog(means: Means, state: State, direction: float, press: float) -> State:
     joint = state.selected
     free_range = joint_range(means, state)
     goal, what_ends_it = (free_range.high, free_range.above) if sign > 0.0 else (free_range.low, free_range.below)
-    if free_range.low == free_range.high:  # the arm touches something where it is
+    if free_range.low == free_range.high:  # an empty range means that the arm is in contact now
         goal = way_out(world_by_hand(state), state.q, joint, sign)
         what_ends_it = "out of contact"
     at_goal = refused(f"end of the range: {what_ends_it}")
@@ -71,7 +82,7 @@ def jog(means: Means, state: State, direction: float, press: float) -> State:
 
 
 def move(means: Means, state: State, target: float) -> State:
-    """Say where the selected joint is to go; `go`, held, drives it there."""
+    """Set the desired value of the selected joint [rad or m] after a check of the move; holding `go` drives it there."""
     joint = state.selected
     warnings = _check(state, joint, target)
 
@@ -81,7 +92,7 @@ def move(means: Means, state: State, target: float) -> State:
 
 
 def go(means: Means, state: State, press: float) -> State:
-    """Drive the selected joint to where it is to go."""
+    """Drive the selected joint to its desired value while the command is held."""
     joint = state.selected
     target = float(state.desired[joint])
     pressed, anew = begins(state, "go", press)
@@ -91,7 +102,10 @@ def go(means: Means, state: State, press: float) -> State:
 
 
 def make_next(means: Means, state: State, press: float) -> State:
-    """Make the current move of the route; each press makes one move at most, but for a route of all joints."""
+    """Make the current move of the route while the command is held.
+
+    A press makes at most one move. On a route of all joints at once it goes on to the end of the route.
+    """
     follower = state.way.follower
     if follower is None:
         raise InputError("there is no route to follow; 'plan' proposes one")
@@ -103,10 +117,10 @@ def make_next(means: Means, state: State, press: float) -> State:
 
 
 def _check(state: State, joint: int, target: float) -> tuple[str, ...]:
-    """What there is to warn of before a joint is driven to a value [rad or m].
+    """Return the warnings for a move of one joint to a value [rad or m].
 
     Raises:
-        InputError: If it must not be driven there.
+        InputError: If the move must not be made.
     """
     world = world_by_hand(state)
     check = check_move(world, state.q, joint, target)
@@ -119,7 +133,7 @@ def _check(state: State, joint: int, target: float) -> tuple[str, ...]:
 
 
 def _along(means: Means, state: State, track: Track, anew: bool) -> State:
-    """Go on along a route of all joints."""
+    """Continue along a route of all joints at once; a new press first checks that the remainder is still free."""
     if anew:
         track, progress = track.update(state.q)
         state = state.on_its_way(follower=track, progress=progress)
@@ -134,7 +148,7 @@ def _along(means: Means, state: State, track: Track, anew: bool) -> State:
 
 
 def _begin_move(means: Means, state: State, due: Follower) -> State:
-    """Begin the move that is due."""
+    """Begin the current move of the route, after a check that the arm is on the route and the remainder is free."""
     follower, progress = due.update(state.q)
     joint = follower.joint()
     updated = state.on_its_way(follower=follower, progress=progress)
@@ -145,13 +159,14 @@ def _begin_move(means: Means, state: State, due: Follower) -> State:
         return guide.withdrawn(updated, fault)
 
     end = float(follower.target[joint])
-    made_within = min(MADE, 0.25 * abs(end - float(state.q[joint])))  # a short move has to be made, too
+    # A move shorter than the usual tolerance must not count as made before it begins.
+    made_within = min(MADE, 0.25 * abs(end - float(state.q[joint])))
     press = replace(updated.press, due=(joint, end), nearest=(np.inf, state.time), near=made_within)
     return _go_on(means, replace(guide.show_due(updated), press=press), follower)
 
 
 def _go_on(means: Means, state: State, follower: Follower) -> State:
-    """Go on with the move that was begun; take it for made where the arm does not get to its end."""
+    """Continue the current move; if the arm stops approaching the end, though near it, `settle` completes the move."""
     joint, end = state.press.due
     remaining = abs(end - float(state.q[joint]))
     nearest, since = state.press.nearest
@@ -168,7 +183,7 @@ def _go_on(means: Means, state: State, follower: Follower) -> State:
 
 
 def refuse(state: State, why: str) -> State:
-    """The last command is refused: what is driven stops, and a press has to be made anew, even if it would now do."""
+    """Refuse the last command: stop the arm, and require a new press even if the command would soon be allowed."""
     verb, number = state.given
     after = state.released().say(refused(why))
     if not isinstance(number, int | float):
@@ -177,19 +192,23 @@ def refuse(state: State, why: str) -> State:
 
 
 def expire(state: State) -> tuple[State, Answer | None]:
-    """End a press that was not renewed in time, and what there is to say; None if nothing."""
+    """End a press that was not renewed in time.
+
+    Returns:
+        The state, and the message for the pilot; None if the press goes on.
+    """
     if not state.drive.expired(state.time):
         return state, None
     return state.released(), alarm(f"no command for {HOLD_SECONDS:g} s: stopped, press again")
 
 
 def watch(means: Means, state: State, standing: tuple[int, float, float] | None) -> State:
-    """End a press that does not move the arm.
+    """End a press whose joint does not move.
 
     Args:
         means: Of the session.
-        state: Of now.
-        standing: See `Judged`.
+        state: Present state.
+        standing: The joint that does not move; see `Judged`.
     """
     if standing is None:
         return state
@@ -203,7 +222,7 @@ def watch(means: Means, state: State, standing: tuple[int, float, float] | None)
     remaining = abs(drive.goal - float(state.q[joint]))
     is_near = joint == drive.joint and remaining <= slack_of(robot)[joint]
     if is_near and state.press.verb == "next":
-        return state  # `next` itself takes the move for made
+        return state  # `next` itself treats the move as completed
 
     released = state.released()
     if is_near:
@@ -215,7 +234,7 @@ def watch(means: Means, state: State, standing: tuple[int, float, float] | None)
 
 
 def still_free(state: State) -> bool:
-    """Whether what is driven by hand is free in the world as it is now."""
+    """Check whether the motion that is driven by hand is still free in the present world."""
     drive = state.drive
     if drive.joint is None:
         return True
@@ -226,14 +245,21 @@ def still_free(state: State) -> bool:
 
 
 def begins(state: State, verb: str, number: float) -> tuple[State, bool]:
-    """With the press of a command, and whether it is a new one; what was driven before a new one stops."""
+    """Register the press of a command; a new press first stops what was driven before.
+
+    Returns:
+        The state, and whether the press is new.
+    """
     if state.press.is_of(verb, number):
         return state, False
     return replace(state.at_rest(), press=Press(verb, number)), True
 
 
 def pace(means: Means, state: State) -> float:
-    """Share of the joints' rates at which none moves farther than a degree in the time that the pilot sees late."""
+    """Return the share of the joints' rates at which the pilot can still react in time.
+
+    At this share no joint moves farther than its tolerance (a degree, or 2 mm) during the delay of the pilot's page.
+    """
     sight = state.sight
     if sight is None or sight.state <= 0.0:
         return state.speed
@@ -241,13 +267,13 @@ def pace(means: Means, state: State) -> float:
 
 
 def lead_to(means: Means, state: State, point: Vector, share: float) -> State:
-    """Send all joints to a set point that is ahead of the arm by `LEASH_SECONDS` at most.
+    """Send all joints towards a set point, which may be at most `LEASH_SECONDS` of motion ahead of the arm.
 
     Args:
         means: Of the session.
-        state: Of now.
-        point: Shape (dof,) [rad or m].
-        share: Of the joints' rates, above 0 and up to 1.
+        state: Present state.
+        point: Set point, shape (dof,) [rad or m].
+        share: Share of the joints' rates, above 0 and up to 1.
     """
     before = state if state.drive.joint is None else state.at_rest()
     led = replace(before, drive=before.drive.led(state.time))
@@ -255,7 +281,16 @@ def lead_to(means: Means, state: State, point: Vector, share: float) -> State:
 
 
 def _drive(means: Means, state: State, joint: int, goal: float, share: float, at_goal: Answer) -> State:
-    """Drive a joint on towards a goal, at a share of the speed; what there is to say where it is there."""
+    """Move one joint a step towards a goal; at the goal, stop it and give the answer ``at_goal``.
+
+    Args:
+        means: Of the session.
+        state: Present state.
+        joint: Number of the joint.
+        goal: Value at which the drive ends [rad or m].
+        share: Share of the present speed.
+        at_goal: Answer once the joint has arrived.
+    """
     value = float(state.q[joint])
     if abs(goal - value) <= state.press.near:
         return state.released().say(at_goal)

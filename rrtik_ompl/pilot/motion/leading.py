@@ -1,4 +1,4 @@
-"""All joints at once, while a command is held: the last centimetres by sight, or after a master arm's joints.
+"""Held commands that move all joints at once: visual servoing to a grasp, and following a master arm.
 
 Source: [1, ch. 2.2 and 6] (visual servoing, position control).
 """
@@ -24,11 +24,12 @@ from rrtik_ompl.pilot.queries import unseen_for, world_by_hand
 from rrtik_ompl.pilot.state import LEASH_SECONDS, Means, State
 from rrtik_ompl.world.world import World
 
-NEAR = 0.15  # [m]; from farther away there may be no straight way to a grasp
-TURNED = np.deg2rad(30.0)  # nor from a tool that is turned more than this
-ALIGNED = np.deg2rad(5.0)  # a master arm any of whose joints is farther away leads nothing
-ALIGNED_SLIDING = 0.01  # [m]; the same of a joint that slides
-MAX_STEP_SECONDS = 0.2  # between two renewals
+NEAR = 0.15  # [m]; from farther away the straight motion to a grasp may be blocked
+TURNED = np.deg2rad(30.0)  # largest angle between the tool and the grasp, for the same reason
+# The master arm leads only if each of its joints is this close to the same joint of the arm.
+ALIGNED = np.deg2rad(5.0)
+ALIGNED_SLIDING = 0.01  # [m]; the same for a sliding joint
+MAX_STEP_SECONDS = 0.2  # longest time step between two renewals
 WHY_NOT = {  # by the state of a `ServoStep`
     "lost": "{} is not in view",
     "jumped": "{} has jumped",
@@ -37,7 +38,7 @@ WHY_NOT = {  # by the state of a `ServoStep`
 
 
 class GraspServo:
-    """Leads the tip to a grasp that is seen: what it has seen of it is kept from one step to the next."""
+    """Visual servoing of the tip to a grasp; what was seen of the grasp is kept from one step to the next."""
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
@@ -45,25 +46,29 @@ class GraspServo:
         self._world: World | None = None
 
     def step(self, q: Vector, world: World, goal: pin.SE3 | None, seconds: float, *, begins: bool) -> ServoStep:
-        """Rates for a time step.
+        """Return the joint rates for a time step.
 
         Args:
-            q: Where the arm is, shape (dof,).
-            world: In which the gripper may touch the object.
-            goal: Where the tip shall be, by a picture of now, ``T_base_tip``; None if the object is not in it.
-            seconds: Since the last step.
-            begins: Forget what was seen before.
+            q: Present configuration, shape (dof,).
+            world: World in which the gripper may touch the object.
+            goal: Desired pose of the tip according to the present picture, ``T_base_tip``; None if the object is not in
+                it.
+            seconds: Time since the last step [s].
+            begins: Whether to discard what was seen before.
         """
         if self._visual is None or begins:
             self._visual = VisualServo(Servo(world), self._robot)
-        elif world is not self._world:  # something has moved
+        elif world is not self._world:  # an object has moved: check collisions in the new world
             self._visual.go_on_with(Servo(world))
         self._world = world
         return self._visual.step(q, goal, seconds)
 
 
 def servo(means: Means, state: State, press: float) -> State:
-    """Go to the grasp that is chosen by what the camera sees of it; only the last centimetres."""
+    """Move the tip to the chosen grasp by visual servoing while the command is held.
+
+    Only the last centimetres are servoed: from farther away (`NEAR`, `TURNED`) the command is refused.
+    """
     if state.target is None or state.choice is None:
         raise InputError("choose a grasp first: servoing leads the tool to it")
     seen = state.around.named(state.target)
@@ -105,7 +110,7 @@ def _stepped(means: Means, state: State, step: ServoStep) -> State:
 
 
 def lead(_: Means, state: State, press: float) -> State:
-    """Follow the joints of the master arm."""
+    """Follow the joints of the master arm while the command is held."""
     pressed, anew = begins(state, "lead", press)
     return pressed.do(ReadMaster(_begin_lead if anew else _go_on_leading))
 

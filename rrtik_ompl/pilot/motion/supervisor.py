@@ -1,19 +1,19 @@
-"""What the arm does against what it was told, by its readings: another joint, the wrong way, a jump, no motion at all.
+"""Compare the readings of the arm with its set points: another joint, the wrong direction, a jump, or no motion at all.
 
-On a route `Follower` compares the arm with the route. This one needs none: it knows the set points of the moment.
+On a route `Follower` compares the arm with the route. The supervisor needs no route: it knows only the present set
+points. A set point and its reading take this way:
 
-How a set point and its reading go:
+1. the session executes a held command: it passes the set point to the supervisor, and then to the arm
+2. an arm behind a line has a thread, `LineArm`, which sends the set point on and receives a reading for it
+3. that thread passes each reading to `Supervisor.read` when it comes. On a fault its next request is a stop, at once,
+   and it sends no further set point until the fault is acknowledged: page, planner and camera have no part in that
+4. the session checks for a fault in its next step: it ends the held command, and reports what has happened
 
-1. the session executes a held command: it tells the supervisor the set point, and gives it to the arm
-2. an arm behind a line has a thread, `LineArm`, which sends the set point on and gets a reading for it
-3. that thread gives each reading to `Supervisor.read` when it comes. On a fault its next request is a stop, at once,
-   and it sends no set point on until the fault is acknowledged: neither page, planner nor camera has a part in that
-4. the session looks for the fault in its next step: it ends what is held, and says what has happened
+A simulated arm has no thread, and no time but the session's: the session itself passes its readings to the supervisor.
+One lock makes each call of the supervisor atomic. While holding it, the supervisor takes no other lock and calls no
+other component, so that it cannot deadlock.
 
-A simulated arm has no thread, and no time but the session's: the session itself gives its readings to the supervisor.
-One lock makes each call of the supervisor whole; it holds no other lock meanwhile, and calls nobody.
-
-A thread of a machine that is busy may be late by more than the 0.1 s in which an arm moves by a degree. So a set point
+On a busy machine a thread may be late by more than the 0.1 s in which an arm moves by a degree. So a set point also
 expires at the arm itself, see `Supervisor.room` and `LineArm`.
 """
 
@@ -28,26 +28,29 @@ from rrtik_ompl.base.units import joint_unit, reading
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.pilot.routes.follower import SLIDING_TOLERANCE, TOLERANCE
 
-FASTEST = 1.5  # times its rate, which a joint may move
-REACTION_SECONDS = 0.08  # from a reading until an arm that is told to stop then stands
-HUNTING_SECONDS = 0.065  # the same for a joint that goes back where it came from, which is free: valves hunt a little
-READING_SECONDS = 0.03  # between two readings, at least: shorter times give no speed
-LONGEST_GAP = 0.3  # [s] between two readings that is allowed for; a joint may move so long unseen
-COAST_SECONDS = 0.4  # a joint that is stopped or reversed may take as long to do it
-REST_SECONDS = 1.5  # for as long after a stop the arm is watched
-GOING_ON = 3  # changes of its readings after a stop, which an arm that was put elsewhere at rest does not have
-FOLLOW_SECONDS = 0.4  # a joint that is driven moves within that time
-NOISE = 0.05  # of the slack: a smaller change of a reading is none
-MIN_LEAD_SHARE = 0.25  # of the way that a set point is ahead: an arm nearer to it need not move
+FASTEST = 1.5  # a joint may move at this multiple of its rate
+REACTION_SECONDS = 0.08  # time from a reading until an arm that is stopped because of it stands still
+# The same for a joint that moves backwards. It may be shorter: the way back is free, and valves oscillate a little.
+HUNTING_SECONDS = 0.065
+READING_SECONDS = 0.03  # least interval for an estimate of speed: shorter ones are too noisy
+LONGEST_GAP = 0.3  # [s]; longest interval between two readings for which motion is allowed for
+COAST_SECONDS = 0.4  # a joint that is stopped or reversed may coast for this long
+REST_SECONDS = 1.5  # the arm is watched for this long after a stop
+# This many changed readings after a stop mean that the arm moves on. An arm that was moved by hand shows fewer.
+GOING_ON = 3
+FOLLOW_SECONDS = 0.4  # a driven joint must begin to move within this time
+NOISE = 0.05  # share of the slack; smaller changes of a reading are noise
+# Share of the largest lead of a set point; a joint that is nearer to its set point need not move.
+MIN_LEAD_SHARE = 0.25
 
 
 def slack_of(robot: Robot) -> Vector:
-    """How far each joint may be from what it was told, shape (dof,) [rad or m]: a degree, or 2 mm."""
+    """Return how far each joint may be from its set point, shape (dof,) [rad or m]: a degree, or 2 mm."""
     return np.where(robot.prismatic, SLIDING_TOLERANCE, TOLERANCE)
 
 
 def amount(value: float, *, prismatic: bool) -> str:
-    """A way of a joint in words.
+    """Return the distance that a joint has moved, with its unit, in words.
 
     Example:
         >>> amount(-0.0105, prismatic=False)
@@ -58,21 +61,21 @@ def amount(value: float, *, prismatic: bool) -> str:
 
 
 class Supervisor:
-    """Watches an arm while it is driven, and until it has come to rest. May be called from several threads.
+    """Watch an arm while it is driven, and until it has come to rest. Its methods may be called from several threads.
 
-    All times given are of one clock [s]: that of whoever reads the arm.
+    All times are of one clock [s]: that of the component that reads the arm.
 
     Attributes:
-        fault: What the arm has done that it was not told, with joint and amount; "" if nothing. It stays until
-            `acknowledge`.
+        fault: What the arm did against its set points, with joint and amount; "" if nothing. It stays until
+            `acknowledge` is called.
     """
 
     def __init__(self, robot: Robot, rates: Vector) -> None:
-        """Begin at rest.
+        """Begin with an arm at rest.
 
         Args:
             robot: The arm.
-            rates: Of its joints at full speed, shape (dof,) [rad/s or m/s].
+            rates: Rates of its joints at full speed, shape (dof,) [rad/s or m/s].
         """
         self.fault = ""
         self._lock = threading.Lock()
@@ -82,45 +85,51 @@ class Supervisor:
         self._slack = slack_of(robot)
         self._q: Vector | None = None
         self._time = -np.inf  # of the last reading
-        self._last_change_time = -np.inf  # of a reading that was another one than that before it
-        self._watch_until = -np.inf  # after a stop
+        self._last_change_time = -np.inf  # of the last reading that differed from the one before it
+        self._watch_until = -np.inf  # end of the watch after a stop
         self._active = False  # whether it is driven
 
         zeros = np.zeros(robot.dof)
-        self._direction = zeros.copy()  # of each joint that is driven: 1 up, -1 down; 0 if it has to stand still
-        self._set_point = zeros.copy()  # where each joint is told to be
-        self._max_lead = zeros.copy()  # how far at most the set point is ahead of the arm
-        self._wrong_way_travel = zeros.copy()  # how far a joint has gone against its way
-        self._slack_used = 0.0  # share of the slack by which the worst joint is off at the last reading
-        self._changes_after_stop = 0  # of the readings, since the arm should stand
-        self._speed_allowance = self._slack.copy()  # how far a joint may be faster than its rate allows
+        self._direction = zeros.copy()  # of each driven joint: 1 up, -1 down; 0 if it must stand still
+        self._set_point = zeros.copy()  # where each joint shall be
+        self._max_lead = zeros.copy()  # largest lead of the set point over the arm
+        self._wrong_way_travel = zeros.copy()  # how far each joint has moved against its direction
+        self._slack_used = 0.0  # error of the worst joint at the last reading, as a share of its slack
+        self._changes_after_stop = 0  # number of changed readings since the arm should stand still
+        # Distance by which each joint may still exceed what its rate allows; a leaky bucket of the size of the slack.
+        self._speed_allowance = self._slack.copy()
         self._last_good_time = zeros.copy()  # when each joint was last where it should be
-        self._coasts_until = np.full(robot.dof, -np.inf)  # after a stop, or a change of direction
-        self._coast_direction = zeros.copy()  # in which a joint that coasts was driven
-        self._position_at_last_move = zeros.copy()  # where each joint has moved last
-        self._time_of_last_move = zeros.copy()  # and when
+        self._coasts_until = np.full(robot.dof, -np.inf)  # end of coasting after a stop or a change of direction
+        self._coast_direction = zeros.copy()  # direction in which a coasting joint was driven
+        self._position_at_last_move = zeros.copy()  # value of each joint at its last motion
+        self._time_of_last_move = zeros.copy()  # and the time of it
 
     def acknowledge(self) -> None:
-        """The fault is known to the pilot: the arm may be driven again."""
+        """Clear the fault, which the pilot has acknowledged: the arm may be driven again."""
         with self._lock:
             self.fault = ""
 
     def room(self) -> float:
-        """Share of the slack that is left at the last reading, 0 to 1; 0 while there is a fault.
+        """Return the share of the slack that is left at the last reading, from 0 to 1; 0 while there is a fault.
 
-        An arm that may move only as long as it takes for that much cannot go farther than the slack unseen.
+        If a set point is valid only for the time in which the arm can use up this share, the arm cannot leave the slack
+        unobserved.
         """
         with self._lock:
             return 0.0 if self.fault else max(1.0 - self._slack_used, 0.0)
 
     def told(self, set_point: Vector, max_lead: Vector, q: Vector, time: float) -> None:
-        """The arm was sent to a set point.
+        """Register a set point that is sent to the arm.
+
+        A joint that changes its direction may coast first, and its error counts from now on. A joint that goes on in
+        the direction it had before a stop keeps its error, so that repeated stops cannot hide a motion in the wrong
+        direction.
 
         Args:
-            set_point: Shape (dof,) [rad or m]; where the arm is, for joints that shall stand still.
-            max_lead: How far the set point of each joint is ahead of the arm at most, shape (dof,).
-            q: Where the arm is.
-            time: Now [s].
+            set_point: Shape (dof,) [rad or m]; for joints that shall stand still, their present value.
+            max_lead: Largest lead of the set point over the arm, shape (dof,) [rad or m].
+            q: Present configuration, shape (dof,) [rad or m].
+            time: Current time [s].
         """
         with self._lock:
             wrong_way_travel = self._wrong_way_travel.copy()
@@ -131,7 +140,7 @@ class Supervisor:
             direction = np.where(np.abs(to_go) > 0.0, np.sign(to_go), self._direction)
             is_reversed = (direction != self._direction) & (self._direction != 0.0)
             has_new_direction = direction != self._direction
-            # A joint that goes on as before a stop: what it did before the stop still counts.
+            # A joint that goes on in its direction of before a stop keeps the error that it had then.
             resumes = (time <= self._watch_until) & (direction == self._coast_direction)
 
             self._coasts_until[is_reversed] = time + COAST_SECONDS
@@ -147,7 +156,7 @@ class Supervisor:
             self._set_point = np.where(direction != 0.0, set_point, self._set_point)
 
     def stopped(self, time: float) -> None:
-        """The arm was told to stop; what was driven comes to rest."""
+        """Register a stop: the driven joints may coast, and the arm is watched until it has come to rest."""
         with self._lock:
             if not self._active:
                 return
@@ -161,7 +170,10 @@ class Supervisor:
             self._direction[:] = 0.0
 
     def read(self, q: Vector, time: float) -> None:
-        """Compare a reading, shape (dof,), with what the arm was told; sets `fault`."""
+        """Compare a reading, shape (dof,), with the set points; sets `fault`.
+
+        The comparison starts anew at the first reading, when time goes backwards, and while the arm is not watched.
+        """
         with self._lock:
             last_q = self._q
             self._q = q.copy()
@@ -178,7 +190,7 @@ class Supervisor:
                 self._changes_after_stop += int((time >= self._coasts_until).all())
 
             speed_fault = self._too_fast(q - last_q, interval)
-            if speed_fault and not self._active:  # at rest an arm may be put elsewhere
+            if speed_fault and not self._active:  # an arm at rest may be moved by hand
                 self._restart(q, time, active=False)
                 return
 
@@ -186,7 +198,12 @@ class Supervisor:
             self._note_motion(q, time)
 
     def standing(self, time: float) -> tuple[int, float, float] | None:
-        """A driven joint that does not move: its number, by how much it has moved, and in what time; None if none."""
+        """Return a driven joint that does not move, if there is one.
+
+        Returns:
+            The number of the joint, how far it has moved [rad or m], and within what time [s]; None if every driven
+            joint moves or is near its set point.
+        """
         with self._lock:
             if not self._active or self._q is None:
                 return None
@@ -204,7 +221,7 @@ class Supervisor:
         return amount(value, prismatic=bool(self._prismatic[joint]))
 
     def _restart(self, q: Vector, time: float, active: bool = True) -> None:
-        """Take the arm's place for right: from here on it is compared."""
+        """Start the comparison anew at a configuration, which is taken as correct."""
         if self._q is None:
             self._q = q.copy()
         self._set_point = np.where(self._direction != 0.0, self._set_point, q)
@@ -218,7 +235,15 @@ class Supervisor:
         self._time_of_last_move = np.full(len(q), time)
 
     def _too_fast(self, change: Vector, interval: float) -> str:
-        """What a joint has done that has moved farther than its rate allows, in words; "" if none has."""
+        """Return, in words, which joint has moved farther than its rate allows; "" if none has.
+
+        Each joint has an allowance of distance, at most its slack. It is refilled at `FASTEST` times the rate and used
+        up by motion, so that irregular readings alone are no fault.
+
+        Args:
+            change: Difference of the last two readings, shape (dof,) [rad or m].
+            interval: Time between them [s].
+        """
         if not change.any():
             return ""
 
@@ -236,7 +261,18 @@ class Supervisor:
         return f"{name} moves faster than {self._amount_in_words(joint, FASTEST * float(self._rates[joint]))}/s"
 
     def _off_course(self, q: Vector, change: Vector, time: float) -> str:
-        """What a joint has done that would be off by more than the slack before the arm could stand; "" if none is."""
+        """Return, in words, which joint would leave its slack before the arm could be stopped; "" if none would.
+
+        The deviation of a driven joint is its travel against its direction; that of another joint is its distance from
+        its set point. Deviation plus speed times reaction time must stay within the slack. Joints that coast are
+        treated leniently: after a stop they may go on in their direction, after a reversal they may still go back. A
+        driven joint must also not overshoot its set point by more than the slack.
+
+        Args:
+            q: The reading, shape (dof,) [rad or m].
+            change: Difference from the reading before, shape (dof,).
+            time: Time of the reading [s].
+        """
         is_coasting = time < self._coasts_until
         is_stopping = is_coasting & (self._direction == 0.0)
         is_turning = is_coasting & (self._direction != 0.0)
@@ -278,7 +314,7 @@ class Supervisor:
         return f"{name} moved by {distance} while {what_was_driven} was driven"
 
     def _note_motion(self, q: Vector, time: float) -> None:
-        """Where joints that are driven have moved last, or need not move."""
+        """Store value and time for each joint that has moved, or that need not move since it is near its set point."""
         must_move: Mask = self._direction * (self._set_point - q) >= MIN_LEAD_SHARE * self._max_lead
         moved = ~must_move | (np.abs(q - self._position_at_last_move) >= NOISE * self._slack)
         self._position_at_last_move[moved] = q[moved]

@@ -1,5 +1,5 @@
-"""The arm drawn over a camera's picture, now or later along a path, hidden by what is in front of it.
+"""Draw the arm over a camera's picture, at its present configuration or along a path, with occlusion.
 
-No graphics card and no window are needed: arrays in, a picture out, by OpenCV's rasteriser. With a virtual camera the
-same drawing is the view from outside.
+No graphics card and no window are needed: OpenCV's rasteriser turns arrays into a picture. With a virtual camera the
+same code draws the view from outside.
 """

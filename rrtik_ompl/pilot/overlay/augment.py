@@ -37,22 +37,23 @@ from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.viewer.drawing import palette
 
 GHOST_TRIANGLES = 5_000
-FINE_PIXELS = 500_000  # of a picture; in larger ones ghosts are drawn half as fine, in a quarter of the time
+# In pictures with more pixels, ghosts are drawn at half the resolution, in a quarter of the time.
+FINE_PIXELS = 500_000
 HALF_COVERED = 127
-MAX_FIGURES = 4  # that are kept from picture to picture
+MAX_FIGURES = 4  # cached from picture to picture
 MAX_LAYERS = 6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Ghost:
-    """The arm at another configuration, in one colour ('#rrggbb') and seen through.
+    """The arm at another configuration, drawn transparently in one colour ('#rrggbb').
 
     Attributes:
-        q: The configuration, shape (dof,); None for the gripper alone, where no configuration gets it.
+        q: The configuration, shape (dof,); None draws only the gripper, for a pose that no configuration reaches.
         color: Its colour.
         opacity: From 0 to 1.
-        T_base_tip: Pose of the gripper without a configuration.
-        outline: Colour of a line around it, for colours alone are not seen by everybody; None for none.
+        T_base_tip: Pose of the gripper if ``q`` is None.
+        outline: Colour of a contour, for viewers who cannot distinguish the colours; None for no contour.
     """
 
     q: Vector | None
@@ -64,13 +65,13 @@ class Ghost:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Layer:
-    """A drawing, ready to be blended into pictures.
+    """A rendered drawing that can be blended into pictures.
 
     Attributes:
-        depths: Along the optical axis [m], shape (height, width).
-        drawn: Where something was drawn, shape (height, width).
-        box: The part of the picture that holds all of it.
-        painted: Its colours there: blue, green, red, of something else where nothing was drawn.
+        depths: Depth along the optical axis [m], shape (height, width).
+        drawn: Mask of the pixels that were drawn, shape (height, width).
+        box: Slices of rows and columns that contain all drawn pixels.
+        painted: Colours inside the box, blue, green, red, shape (rows, columns, 3); undefined where nothing was drawn.
     """
 
     depths: NDArray[np.float32]
@@ -80,7 +81,7 @@ class Layer:
 
     @classmethod
     def of(cls, canvas: Canvas, camera: Camera) -> Layer:
-        """What is on a canvas, which may be coarser than the camera's pictures."""
+        """Convert a canvas to a layer of the camera's size; the canvas may have a lower resolution."""
         colors: Any = canvas.colors
         depths: Any = canvas.depths.copy()
         drawn = canvas.drawn
@@ -88,7 +89,8 @@ class Layer:
             size = camera.width, camera.height
             colors, depths = (cv2.resize(each, size, interpolation=cv2.INTER_NEAREST) for each in (colors, depths))
             share = cv2.resize(255 * drawn.view(np.uint8), size, interpolation=cv2.INTER_LINEAR)
-            drawn = (depths < FARTHEST_DRAWN) & (share > HALF_COVERED)  # without the steps of the coarse one
+            # The interpolated mask has smooth edges, without the steps of the coarse one.
+            drawn = (depths < FARTHEST_DRAWN) & (share > HALF_COVERED)
 
         left, top, width, height = cv2.boundingRect(drawn.view(np.uint8))
 
@@ -100,7 +102,13 @@ class Layer:
         return cls(np.asarray(depths), drawn, box, np.asarray(piece, dtype=np.uint8))
 
     def blend(self, picture: NDArray[np.uint8], mask: NDArray[np.bool_], opacity: float) -> None:
-        """Lay it over a picture where a mask is, in place."""
+        """Blend the layer into a picture where a mask is set; the picture is changed in place.
+
+        Args:
+            picture: Blue, green, red, shape (height, width, 3).
+            mask: Shape (height, width).
+            opacity: From 0 to 1.
+        """
         if self.painted.size == 0:
             return
 
@@ -110,15 +118,15 @@ class Layer:
 
 
 class Augmenter:
-    """Draws one arm over pictures of one camera."""
+    """Draw one arm over the pictures of one camera."""
 
     def __init__(self, robot: Robot, camera: Camera, triangles: int = ROBOT_TRIANGLES) -> None:
         """Prepare the arm's triangles once.
 
         Args:
             robot: The arm.
-            camera: Of the pictures, real or virtual.
-            triangles: Of the whole arm, at most about.
+            camera: Camera of the pictures, real or virtual.
+            triangles: Approximate largest number of triangles of the whole arm.
         """
         self.robot = robot
         self.camera = camera
@@ -135,7 +143,7 @@ class Augmenter:
 
         self._figures: dict[Hashable, tuple[tuple[Obstacle, ...], Figure]] = {}
         self._shapes = ShapeSurfaces()
-        self._last: Layer  # drawn
+        self._last: Layer  # the layer of the arm drawn last
 
     def draw(
         self,
@@ -151,19 +159,21 @@ class Augmenter:
         opacity: float = 0.85,
         color: str | None = None,
     ) -> NDArray[np.uint8]:
-        """A copy of a picture with everything drawn over it. Shape (height, width, 3), blue, green, red.
+        """Return a copy of a picture with everything drawn over it, shape (height, width, 3), blue, green, red.
+
+        Ghosts are drawn first, then the arm with the virtual obstacles, then the trail and the frames.
 
         Args:
-            picture: Of the camera's size; grey or blue, green, red.
-            T_base_camera: Pose of the camera in the frame of the arm's base.
-            q: Configuration of the arm, shape (dof,); no arm if None.
+            picture: Of the camera's size; grey, or blue, green, red.
+            T_base_camera: Pose of the camera in the base frame of the arm.
+            q: Configuration of the arm, shape (dof,); None draws no arm.
             ghosts: Further configurations, or poses of the gripper.
-            obstacles: Virtual ones, drawn.
-            real: Solids that are in the picture already: they are not drawn, but hide what is behind them.
-            trail: Points that are joined by a line, shape (k, 3) in the frame of the base [m].
-            frames: Poses in the frame of the base, drawn as axes.
-            opacity: Of arm and obstacles.
-            color: Of the arm ('#rrggbb') instead of its own.
+            obstacles: Virtual obstacles, which are drawn.
+            real: Solids that the picture shows already: they are not drawn, but hide what is behind them.
+            trail: Points of a polyline, shape (k, 3) in the base frame [m].
+            frames: Poses in the base frame, drawn as axes.
+            opacity: Opacity of arm and obstacles, from 0 to 1.
+            color: Colour of the arm ('#rrggbb') instead of its own colours.
 
         Raises:
             InputError: If the picture does not have the camera's size.
@@ -190,9 +200,9 @@ class Augmenter:
         return np.asarray(drawn, dtype=np.uint8)
 
     def depths(self) -> NDArray[np.float32]:
-        """Depths of the arm and obstacles drawn last. Shape (height, width).
+        """Return the depths of the arm and obstacles drawn last [m], shape (height, width).
 
-        They are `rasterizer.FARTHEST_DRAWN` where there was nothing.
+        They are `rasterizer.FARTHEST_DRAWN` where nothing was drawn.
         """
         return self._last.depths.copy()
 
@@ -228,7 +238,7 @@ class Augmenter:
         color: str | None,
         solids: Figure | None = None,
     ) -> NDArray[np.bool_]:
-        """Draw an arm, or a gripper; where it was drawn."""
+        """Draw an arm or a gripper into a picture in place, and return the mask of its visible pixels."""
         self._last = layer = self._layer(arm, q, solids, T_camera_base, color)
 
         mask = layer.drawn if hidden_by is None else layer.drawn & (layer.depths < hidden_by)
@@ -238,9 +248,14 @@ class Augmenter:
     def _layer(
         self, arm: Figure | None, q: Vector | None, solids: Figure | None, T: NDArray[np.float64], color: str | None
     ) -> Layer:
-        """An arm and solids before the camera; kept for some pictures, for most of what is drawn does not move.
+        """Return the rendered layer of an arm and solids, cached because most of what is drawn does not move.
 
-        The arm is at a configuration, or all of it where one joint is, shape (4, 4).
+        Args:
+            arm: What to draw; None for the solids only.
+            q: A configuration, shape (dof,), or the pose of a single joint that carries all of ``arm``, shape (4, 4).
+            solids: In the base frame; None for the arm only.
+            T: ``T_camera_base``, shape (4, 4).
+            color: Colour of the arm ('#rrggbb'); None for its own colours.
         """
         key = (arm, None if q is None else np.asarray(q).tobytes(), solids, T.tobytes(), color)
         if key not in self._layers:
@@ -256,36 +271,41 @@ class Augmenter:
                 self._layers.pop(next(iter(self._layers)))
             self._layers[key] = Layer.of(canvas, self.camera)
 
-        layer = self._layers[key] = self._layers.pop(key)  # the one that was used last is the last to go
+        layer = self._layers[key] = self._layers.pop(key)  # moved to the end: the least recently used is dropped first
         return layer
 
     def _joint_frames(self, q: Vector) -> NDArray[np.float64]:
-        """``T_base_joint`` of all joints at a configuration. Shape (joints + 1, 4, 4)."""
+        """Return ``T_base_joint`` of all joints at a configuration, shape (joints + 1, 4, 4)."""
         return np.asarray(self.robot.joint_frames(self.robot.configuration(q)[None])[0])
 
     def _all_at(self, pose: NDArray[np.float64]) -> NDArray[np.float64]:
-        """One pose for every joint. Shape (joints + 1, 4, 4)."""
+        """Return the same pose for every joint, shape (joints + 1, 4, 4)."""
         return np.broadcast_to(pose, (self.robot.model.njoints, 4, 4))
 
     def _depths(self, real: Sequence[Obstacle], T_camera_base: NDArray[np.float64]) -> NDArray[np.float32] | None:
-        """Depths of solids that hide what is behind them."""
+        """Return the depths of solids that hide what is behind them, shape (height, width); None without solids."""
         return self._layer(None, None, self._figure(real), T_camera_base, None).depths if real else None
 
     def _figure(self, obstacles: Sequence[Obstacle]) -> Figure:
-        """Triangles of obstacles, kept from picture to picture while they are where they were."""
+        """Return the triangles of obstacles, cached as long as the obstacles do not move."""
         key = tuple((id(obstacle.shape), obstacle.pose.homogeneous.tobytes()) for obstacle in obstacles)
         if key not in self._figures:
             if len(self._figures) >= MAX_FIGURES:
                 self._figures.pop(next(iter(self._figures)))
 
-            held_obstacles = tuple(obstacles)  # so that no other shape gets the identity of one that is gone
+            held_obstacles = tuple(obstacles)  # kept alive: the key holds ids, which Python reuses
             self._figures[key] = (held_obstacles, figure_of(obstacle_surfaces(held_obstacles, self._shapes)))
         return self._figures[key][1]
 
     def _pixels(
         self, points: Matrix, T_camera_base: NDArray[np.float64]
     ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-        """Sixteenths of pixels of points in the base's frame, and which of them are before the camera."""
+        """Project points of the base frame, shape (k, 3) [m], to the picture.
+
+        Returns:
+            Pixel coordinates in sixteenths of a pixel, shape (k, 2), and a mask of the points in front of the camera,
+            shape (k,).
+        """
         in_camera = np.asarray(points, dtype=np.float64) @ T_camera_base[:3, :3].T + T_camera_base[:3, 3]
         is_visible = in_camera[:, 2] > NEAREST_DRAWN
 

@@ -1,4 +1,4 @@
-"""Augmented films: objects are detected in every picture of a film, and an arm that follows a path is drawn in."""
+"""Draw an arm that follows a path into the pictures of a film, in which objects are detected."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ ROOM_BYTES = 65536
 
 
 class ArmInPictures:
-    """Draws an arm that follows a path into pictures, one after the other.
+    """Draw an arm that follows a path into a sequence of pictures.
 
     Attributes:
-        count: How many pictures there were.
-        without_base: How many of them came before the pose of the arm's base was known; they are left unchanged.
+        count: Number of pictures processed.
+        without_base: Number of pictures before the pose of the arm's base was known; these are left unchanged.
     """
 
     def __init__(self, robot: Robot, sensor: Sensor, waypoints: ArrayLike, *, seconds: float, ghosts: int = 1) -> None:
@@ -41,9 +41,9 @@ class ArmInPictures:
         Args:
             robot: The arm.
             sensor: Detects objects in the pictures.
-            waypoints: Of its path, shape (k, dof), k at least 1; with one the arm does not move.
-            seconds: From the first to the last of them.
-            ghosts: So many configurations ahead are drawn as well, the last of them the end of the path.
+            waypoints: Waypoints of the path, shape (k, dof), k at least 1; with one waypoint the arm does not move.
+            seconds: Time from the first to the last waypoint [s].
+            ghosts: Number of further configurations drawn ahead of the arm; the last one is the end of the path.
 
         Raises:
             InputError: If a number is out of range.
@@ -68,9 +68,9 @@ class ArmInPictures:
         self.count = self.without_base = 0
 
     def draw(self, picture: Picture) -> NDArray[np.uint8]:
-        """The picture with arm, ghosts, the trail of the tip, and the frames of tip and objects.
+        """Return the picture with the arm, its ghosts, the trail of the tip, and the frames of tip and objects.
 
-        Objects that were seen hide what is behind them; what is out of view stays where it was seen last.
+        Objects that were seen hide what is behind them; objects out of view stay where they were seen last.
 
         Raises:
             InputError: If the picture does not have the camera's size, or times go backwards.
@@ -102,13 +102,17 @@ class ArmInPictures:
         )  # fmt: skip
 
     def _along(self, shares: Vector) -> Matrix:
-        """Configurations at shares of the path's length. Shape (m, dof)."""
+        """Return the configurations at shares of the path's length, shape (m, dof)."""
         columns = [np.interp(shares, self._shares, column) for column in self._rows.T]
         return np.stack(columns, axis=1)
 
 
 def rate_of(pictures: Iterator[Picture]) -> tuple[float, Iterator[Picture]]:
-    """Pictures a second, by the times of the first two, and all of the pictures."""
+    """Estimate the rate of a sequence of pictures from the times of the first two.
+
+    Returns:
+        Pictures a second, and an iterator over all pictures, including the two that were read.
+    """
     first = list(islice(pictures, 2))
     interval = first[1].time - first[0].time if len(first) == 2 else 0.0
     rate = 1.0 / interval if interval > 1.0 / MAX_RATE else DEFAULT_RATE
@@ -116,7 +120,7 @@ def rate_of(pictures: Iterator[Picture]) -> tuple[float, Iterator[Picture]]:
 
 
 def write_film(path: Path, frames: Iterable[NDArray[np.uint8]], rate: float) -> None:
-    """Write pictures as a film; the file appears when it is whole.
+    """Write pictures to a film; the file appears only when it is complete.
 
     Raises:
         InputError: If the ending is none of `FILMS`, there is no picture, or the file cannot be written.
@@ -148,7 +152,10 @@ def write_film(path: Path, frames: Iterable[NDArray[np.uint8]], rate: float) -> 
 
 
 def _has_room_to_grow(file: Path) -> bool:
-    """Whether a file could be longer: of a full disk the writer of films says nothing, and may lack the index alone."""
+    """Check whether a file can still grow, to detect a full disk.
+
+    OpenCV's writer reports no error on a full disk, and the film may lack nothing but its index.
+    """
     size = file.stat().st_size
     try:
         with open(file, "ab", buffering=0) as film:
@@ -160,7 +167,7 @@ def _has_room_to_grow(file: Path) -> bool:
 
 
 def _pictures_in(film: Path) -> int:
-    """How many pictures a film says that it has; 0 if it cannot be read."""
+    """Return the number of pictures according to the film's header; 0 if the film cannot be read."""
     with quiet():
         opened = cv2.VideoCapture(str(film))
         try:
