@@ -46,37 +46,71 @@ def _coordinates(region: HeldRegion) -> NDArray[np.int64]:
 
 
 def _of_region(robot: Robot, region: HeldRegion, q: Matrix) -> tuple[Vector, Matrix]:
-    D = region.displacements(q)[0]
-    J = twists(robot, region, q)[0]
+    """Return values and derivatives of the equations of one region, shapes (k,) and (k, dof)."""
+    displacement = region.displacements(q)[0]
+    twist = twists(robot, region, q)[0]
     task = region.region
 
-    some = _coordinates(region)
-    away = D[some, 3] - np.clip(D[some, 3], *task.bounds[some].T)
+    bounded = _coordinates(region)
+    position = displacement[bounded, 3]
+    away = position - np.clip(position, *task.bounds[bounded].T)
     values = [away / task.position_tolerance]
-    derivatives = [J[some] * (away != 0.0)[:, None] / task.position_tolerance]
+    derivatives = [twist[bounded] * (away != 0.0)[:, None] / task.position_tolerance]
 
-    R = D[:3, :3]
-    tolerance = np.sin(min(task.orientation_tolerance, 0.5 * np.pi))
-
+    rotation = displacement[:3, :3]
     if region.turning == Turning.AXIS:
-        sides = np.linalg.svd(region.direction[None])[2][1:]
-        lean = sides @ R[:, 2]
-        if R[:, 2] @ region.direction < 0.0:  # behind: farther still
-            lean = lean * (2.0 / max(float(np.linalg.norm(lean)), 1e-9) - 1.0)
-        values.append(lean / tolerance)
-        derivatives.append(np.cross(R[:, 2], sides) @ J[3:] / tolerance)
-    elif region.turning == Turning.BALL and np.trace(R) < 1.0:  # behind: the sine of a half turn is 0 again
-        values.append(pin.log3(R) / tolerance)
-        derivatives.append(pin.Jlog3(R) @ R.T @ J[3:] / tolerance)
+        turned, by_turning = _leaning(rotation[:, 2], region.direction)
+        scale = 1.0 / _sine_of(task.orientation_tolerance)
     elif region.turning == Turning.BALL:
-        values.append(0.5 * np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]]) / tolerance)
-        derivatives.append(0.5 * (np.trace(R) * np.eye(3) - R) @ J[3:] / tolerance)
+        turned, by_turning = _turned(rotation)
+        scale = 1.0 / _sine_of(task.orientation_tolerance)
     elif region.turning == Turning.RANGES:
-        angles = roll_pitch_yaw(R[None])
-        over = (angles - into_range(angles, *task.bounds[3:].T))[0]
-        over[np.abs(over) < SMALL] = 0.0
-        scale = np.sqrt(3.0) / task.orientation_tolerance  # the sum of three counts, which is no more than the length
-        values.append(scale * over)
-        derivatives.append(scale * (rates(R[None])[0] @ J[3:]) * (over != 0.0)[:, None])
+        angles = roll_pitch_yaw(rotation[None])
+        turned = (angles - into_range(angles, *task.bounds[3:].T))[0]
+        turned[np.abs(turned) < SMALL] = 0.0
+        by_turning = rates(rotation[None])[0] * (turned != 0.0)[:, None]
+        # The tolerance bounds the sum of the three excesses, which is at most sqrt(3) times their length.
+        scale = np.sqrt(3.0) / task.orientation_tolerance
+    else:
+        return values[0], derivatives[0]
 
+    values.append(scale * turned)
+    derivatives.append(scale * by_turning @ twist[3:])
     return np.concatenate(values), np.concatenate(derivatives)
+
+
+def _sine_of(tolerance: float) -> float:
+    return float(np.sin(min(tolerance, 0.5 * np.pi)))
+
+
+def _leaning(axis: Vector, direction: Vector) -> tuple[Vector, Matrix]:
+    """Return how far a unit vector leans away from a direction, shape (2,), and its derivatives, shape (2, 3).
+
+    Its length is the sine of the angle between them, and 2 minus the sine beyond a right angle, so that it grows all
+    the way to the opposite direction. The derivatives are with respect to a rotation of the vector.
+    """
+    sides = np.linalg.svd(direction[None])[2][1:]  # two unit vectors that span the plane across the direction
+    lean = sides @ axis
+    slope = np.cross(axis, sides)
+    if axis @ direction >= 0.0:
+        return lean, slope
+
+    sine = max(float(np.linalg.norm(lean)), 1e-9)
+    outward = lean / sine if sine > 1e-9 else np.array([1.0, 0.0])
+    # The derivative of (2 - |v|) v / |v|: along v it falls as |v| grows, across v it turns.
+    along = np.outer(outward, outward)
+    across = np.eye(2) - along
+    return (2.0 - sine) * outward, ((2.0 - sine) / sine * across - along) @ slope
+
+
+def _turned(rotation: Matrix) -> tuple[Vector, Matrix]:
+    """Return a rotation as a vector about its axis, shape (3,), and the derivatives by a rotation, shape (3, 3).
+
+    Its length is the sine of the angle up to a right angle, and the angle itself beyond, where the sine falls again.
+    """
+    if np.trace(rotation) < 1.0:
+        return pin.log3(rotation), pin.Jlog3(rotation) @ rotation.T
+    skew = 0.5 * np.array(
+        [rotation[2, 1] - rotation[1, 2], rotation[0, 2] - rotation[2, 0], rotation[1, 0] - rotation[0, 1]]
+    )
+    return skew, 0.5 * (np.trace(rotation) * np.eye(3) - rotation)

@@ -6,7 +6,7 @@ from ompl import base as ob
 
 import rrtik_ompl as rrtik
 from rrtik_ompl.base.errors import InputError
-from rrtik_ompl.constraints.equations import equation_count, equations
+from rrtik_ompl.constraints.equations import _leaning, equation_count, equations
 from rrtik_ompl.constraints.held_regions import held_regions
 from rrtik_ompl.model.scene import Scene
 from rrtik_ompl.ompl_bridge.region_constraint import RegionConstraint
@@ -31,11 +31,12 @@ def cases():
     }
 
 
+@pytest.mark.parametrize("spread", [0.3, 2.0])
 @pytest.mark.parametrize("kind", cases())
-def test_derivatives_are_those_of_differences(kind):
+def test_derivatives_are_those_of_differences(kind, spread):
     robot = rrtik.load_robot("ur5_limited")
     held = held_regions(robot, Scene(), [cases()[kind]], START)
-    for q in START + np.random.default_rng(1).normal(0.0, 0.3, (20, 6)):
+    for q in START + np.random.default_rng(1).normal(0.0, spread, (20, 6)):
         values, J = equations(robot, held, q)
         assert values.shape == (equation_count(held),)
         steps = 1e-6 * np.eye(6)
@@ -82,3 +83,24 @@ def test_an_orientation_that_is_turned_round_does_not_satisfy_the_equations(turn
     if abs(turn) < 3.1:  # the axis of a half turn has no derivative
         change = equations(robot, held, q + step)[0] - equations(robot, held, q - step)[0]
         np.testing.assert_allclose(change, 2.0 * equations(robot, held, q)[1] @ step, rtol=1e-4, atol=1e-7)
+
+
+@pytest.mark.parametrize("angle", [0.3, 1.5, 1.6, 2.8, 3.14])
+def test_a_leaning_axis_is_farther_the_more_it_leans(angle):
+    """Along the way of its own derivatives too: a step of Gauss and Newton from behind leads back."""
+    direction = np.array([0.0, 0.6, 0.8])
+    across = np.array([1.0, 0.0, 0.0])
+    lengths = []
+    for each in (angle - 1e-4, angle, angle + 1e-4):
+        axis = np.cos(each) * direction + np.sin(each) * np.cross(across, direction)
+        lean, slope = _leaning(axis, direction)
+        lengths.append(np.linalg.norm(lean))
+    assert lengths[0] < lengths[1] < lengths[2]
+    growth = lean @ slope @ across / lengths[2]
+    assert growth == pytest.approx((lengths[2] - lengths[0]) / 2e-4, rel=0.01)
+
+
+def test_an_axis_that_points_the_opposite_way_does_not_satisfy_the_equations():
+    lean, slope = _leaning(np.array([0.0, 0.0, -1.0]), np.array([0.0, 0.0, 1.0]))
+    assert np.linalg.norm(lean) == pytest.approx(2.0)
+    assert np.isfinite(slope).all()
