@@ -45,7 +45,7 @@ class BodyArrays:
     contacts: Mapping[tuple[int, int], float]
 
     def kept_apart(self, pairs: NDArray[np.int64]) -> Vector:
-        """How far the bodies of pairs, shape (k, 2), must stay apart [m]; see :func:`.margins.kept_apart`."""
+        """How far the bodies of pairs, shape (k, 2), must stay apart [m]; see :func:`.bodies.kept_apart`."""
         first, second = pairs.T
         both_stand = (self.joints[first] == 0) & (self.joints[second] == 0)
         margin = self.margins[np.where(self.obstacles[second], second, first)]
