@@ -82,7 +82,7 @@ def jog(means: Means, state: State, direction: float, press: float) -> State:
 
 
 def move(means: Means, state: State, target: float) -> State:
-    """Set the desired value of the selected joint [rad or m] after a check of the move; holding `go` drives it there."""
+    """Set the desired value [rad or m] of the selected joint after checking the move; holding `go` drives it."""
     joint = state.selected
     warnings = _check(state, joint, target)
 
