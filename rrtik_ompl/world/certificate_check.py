@@ -1,9 +1,11 @@
-"""Whether a certificate proves a path: computed again in numpy, from the description of the robot and the scene alone.
+"""Verification of certificates: whether one proves a path free, computed anew in numpy from robot and scene alone.
 
-Seen from the frame that carries both bodies of a pair, a point of one has at most the acceleration C in a motion, and
-stays within C h^2 / 8 of the chord between its places at the ends of an interval of width h. What is farther apart at
-both ends than both sagittas, by a plane or between balls on their chords, is so in between. What coal measures in the
-middle of an interval is apart in it if that is more than both come nearer [16]. Nothing is searched here.
+All motions are seen from the frame of the last joint that carries both bodies of a pair. There a point of a body has at
+most the acceleration C, so within an interval of width h it stays within the sagitta C h^2 / 8 of the chord between its
+positions at the ends. Two solids are apart in the whole interval if, at both ends, a plane separates them by more than
+the sum of both sagittas, or if balls that move along the chords are that far apart. Alternatively, the distance that
+coal measures in the middle of an interval has to exceed the bound on the bodies' approach in half of it [16]. The
+verifier searches for nothing: it only checks what the certificate states.
 """
 
 from __future__ import annotations
@@ -30,10 +32,10 @@ from rrtik_ompl.model.robot import Chain
 if TYPE_CHECKING:
     from rrtik_ompl.world.world import World
 
-ROUNDING = 1e-8  # [m] that every gap has to exceed beside all else
-LARGEST_VALUE = 1e3  # [rad] or [m] of a joint, up to which that is enough
-UNIT = 1e-9  # how far a normal may be from unit length, and from that of a half-space
-AT_ONCE = 20_000  # intervals, to bound memory
+ROUNDING = 1e-8  # [m] added to every required gap, to cover rounding errors
+LARGEST_VALUE = 1e3  # [rad] or [m], joint values up to which ROUNDING is sufficient
+UNIT = 1e-9  # tolerance of a normal's length, and of its deviation from the normal of a half-space
+AT_ONCE = 20_000  # number of intervals that are computed together, to bound memory
 _rotated = partial(np.einsum, "nij,nj->ni")
 
 Numbers = NDArray[np.int64]
@@ -41,14 +43,14 @@ Poses = tuple[NDArray[np.float64], Matrix]  # rotations, shape (n, 3, 3), and or
 
 
 class Entry(NamedTuple):
-    """A solid of each body of a pair, to be shown apart on an interval of a motion.
+    """A claim that two solids, one of each body of a pair, are apart on an interval of a motion.
 
     Attributes:
         motion: Number of the motion, from 0.
-        pair: Number of the pair in ``Motions.pairs``.
-        first, second: Numbers of the solids in ``Motions.solids``, in the order of the pair.
-        begin: Where the interval begins, a share of the motion.
-        width: Of the interval, a share of the motion.
+        pair: Index of the pair in ``Motions.pairs``.
+        first, second: Indices of the solids in ``Motions.solids``, in the order of the pair.
+        begin: Start of the interval as a share of the motion, from 0 to 1.
+        width: Width of the interval as a share of the motion.
     """
 
     motion: int
@@ -60,12 +62,12 @@ class Entry(NamedTuple):
 
     @property
     def solids_of_motion(self) -> tuple[int, int, int, int]:
-        """Motion, pair and both solids, whichever the interval."""
+        """Motion, pair, first and second: what all intervals of the same two solids in a motion share."""
         return self[:4]
 
 
 def certificate_fault(certificate: Certificate, world: World, waypoints: ArrayLike, *, clearance: float = 0.0) -> str:
-    """As :func:`rrtik_ompl.verify_certificate`, which refuses arguments of another kind first.
+    """Verify a certificate, as :func:`rrtik_ompl.verify_certificate` but without checking the types of arguments.
 
     Returns:
         The first fault in one line; "" if the certificate proves the path free.
@@ -80,10 +82,10 @@ def certificate_fault(certificate: Certificate, world: World, waypoints: ArrayLi
 
 
 def _fault_of_header(certificate: Certificate, world: World, rows: Matrix, clearance: float) -> str:
-    """The first thing but its entries by which a certificate does not fit a path, rows of shape (k, dof); "" if none.
+    """Return the first mismatch between a certificate and a path that concerns no entry; "" if there is none.
 
-    A version, robot, scene, clearance [m] or path of another kind, a contact of bodies that no joint moves (of which
-    entries say nothing), a waypoint that is out of bounds, or another number of motions.
+    Checked are the version, robot, scene, clearance [m] and path, contacts between bodies that no joint moves (no entry
+    covers these), the bounds of the waypoints, shape (k, dof), and the number of motions.
     """
     robot = world.robot
     if certificate.version != VERSION:
@@ -97,7 +99,8 @@ def _fault_of_header(certificate: Certificate, world: World, rows: Matrix, clear
     if not max(0.0, clearance) <= certificate.clearance < np.inf:
         return f"it is for a clearance of {certificate.clearance:g} m, not {clearance:g} m"
 
-    if not np.array_equal(rows, certificate.waypoints):  # to the bit, but for the sign of a zero
+    # The waypoints have to agree to the bit, except that 0.0 equals -0.0.
+    if not np.array_equal(rows, certificate.waypoints):
         return "it is for another path: waypoints differ"
 
     pairs_at_rest = tuple(pair for pair in world.pairs if all(world.bodies[k].joint == 0 for k in pair))
@@ -116,14 +119,16 @@ def _fault_of_header(certificate: Certificate, world: World, rows: Matrix, clear
 
 
 class Solid:
-    """A body or a convex part of it in the frame of its joint, in a ball and a box, both endless if it is not convex.
+    """A body, or a convex part of it, in the frame of its joint, with a bounding ball and a bounding box.
+
+    Both are infinitely large if the solid is not convex.
 
     Attributes:
         parts: The convex parts.
-        axes: The box's axes are its columns, shape (3, 3).
+        axes: The axes of the box as columns, shape (3, 3).
         convex: Whether all parts are convex and bounded.
         ball_centre, ball_radius: The ball, shape (3,) and [m].
-        box_centre, box_half: Centre and half sides of the box along its axes, shape (3,) each [m].
+        box_centre, box_half: Centre and half side lengths of the box along its axes, shape (3,) each [m].
     """
 
     def __init__(self, parts: tuple[ConvexSolid, ...], axes: Matrix) -> None:
@@ -145,41 +150,46 @@ class Solid:
             self.ball_radius = self.largest_length(lambda points: points - self.ball_centre)
 
     def largest_length(self, mapping: Callable[[Matrix], Matrix]) -> float:
-        """Return the largest length [m] of what a mapping, (n, 3) -> (n, 3), makes of a point; it may stretch none."""
+        """Return the largest norm [m] that a non-expansive mapping, (n, 3) -> (n, 3), takes on the points of the solid.
+
+        It is evaluated at the corners of each part; the disc and the radius around them are added.
+        """
         lengths = [
             float(np.linalg.norm(mapping(part.corners), axis=1).max()) + part.disc + part.radius for part in self.parts
         ]
         return max(lengths)
 
     def support(self, directions: Matrix) -> Vector:
-        """The support function: how far it reaches along unit vectors of the joint's frame [m], (n, 3) -> (n,)."""
+        """Return the support function [m] at unit vectors in the joint's frame, (n, 3) -> (n,)."""
         heights = []
         for part in self.parts:
-            if part.kind == HALF_SPACE_SOLID:  # it ends along its normal alone
+            if part.kind == HALF_SPACE_SOLID:  # bounded along its normal only
                 along_normal = np.abs(directions - part.axis).max(axis=1) <= UNIT
                 height = np.where(along_normal, part.disc, np.inf)
-            elif part.kind == CONVEX_SOLID:  # the hull of discs about an axis, all within a radius
+            elif part.kind == CONVEX_SOLID:  # the hull of discs about an axis, inflated by a radius
                 sines = np.linalg.norm(np.cross(directions, part.axis), axis=1)
                 height = (directions @ part.corners.T).max(axis=1) + part.disc * sines + part.radius
-            else:  # nothing is known of where it ends
+            else:  # its extent is unknown
                 height = np.full(len(directions), np.inf)
             heights.append(height)
         return np.asarray(np.max(heights, axis=0))
 
 
 class Motions:
-    """The bodies, pairs and solids of a world, and motions of its robot between waypoints, shape (k, dof).
+    """The motions of a world's robot between waypoints, shape (k, dof), with the pairs of solids that must stay apart.
 
     Attributes:
         values: Values of all joints at the waypoints, shape (k, joints).
         solids: The bodies and their convex parts.
-        solid_numbers: Number of each solid, by body and part; part -1 is the whole body.
-        parts: Numbers of the parts of each body.
+        solid_numbers: Index of each solid in ``solids``, by body and part; part -1 is the whole body.
+        parts: For each body the range of its part numbers.
         joint_of_solid: The joint that carries each solid, 0 for the world.
-        pairs: Numbers of two bodies of which one moves; if one of them rests in the frame of the pair it is second.
-        base_of_pair: The joint in whose frame each pair is looked at: the last one that carries both.
-        required_gaps: What each pair has to keep [m], rounding included.
-        approaches, accelerations: Bounds for each pair and motion [m], shape (pairs, motions), motions taking time 1.
+        pairs: Pairs of indices of bodies of which at least one moves. A body that rests in the frame of the pair is
+            second.
+        base_of_pair: The joint in whose frame each pair is seen: the last one that carries both bodies.
+        required_gaps: Distance that each pair has to keep [m], including ``ROUNDING``.
+        approaches, accelerations: Bounds of the sums of both bodies' speeds and accelerations for each pair and
+            motion, if a motion takes time 1, shape (pairs, motions) [m].
     """
 
     def __init__(self, world: World, rows: Matrix, clearance: float) -> None:
@@ -208,7 +218,7 @@ class Motions:
         self.approaches, self.accelerations = bounds.reshape(-1, 2, len(rows) - 1).transpose(1, 0, 2)
 
     def _describe(self, number: int, body: Body) -> range:
-        """Add the solids of a body; returns the numbers of its parts."""
+        """Append the solids of a body to ``solids`` and return the range of its part numbers."""
         convex_parts = convex_solids(body.geometry).around
         pose = body.placement.homogeneous
         parts = tuple(placed_solids(convex_parts, np.array([pose] * len(convex_parts)))) or (UNKNOWN,)
@@ -219,14 +229,14 @@ class Motions:
         return range(len(parts))
 
     def _bounds(self, number: int, base: int) -> Matrix:
-        """Return bounds of how fast a body's points move as seen from a frame, and of their acceleration.
+        """Bound speed and acceleration of all points of a body as seen from a frame, from the body's joint inwards.
 
         Args:
-            number: Of the body.
-            base: The joint whose frame it is, one that carries the body.
+            number: Index of the body.
+            base: The joint whose frame it is; it has to carry the body.
 
         Returns:
-            Bounds of velocity and acceleration [m] in each motion, that takes time 1, shape (2, k - 1).
+            Bounds of speed and acceleration in each motion, which takes time 1, shape (2, k - 1) [m].
         """
         rates = np.abs(np.diff(self.values, axis=0))
         chain = self.chain
@@ -241,7 +251,8 @@ class Motions:
         distance_to_origin = body.largest_length(lambda points: points)
         distance_to_axis = body.largest_length(lambda points: np.cross(points, chain.axis[joint - 1]))
 
-        while joint != base:  # inwards: a turn adds centripetal and Coriolis terms, a slide adds velocity alone
+        # A revolute joint adds centripetal and Coriolis terms, a prismatic joint adds velocity only.
+        while joint != base:
             k = joint - 1
             rate = rates[:, k]
             slides = bool(chain.prismatic[k])
@@ -261,11 +272,11 @@ class Motions:
         return np.array([velocity, acceleration])
 
     def _frames(self, motion: Numbers, share: Vector) -> Poses:
-        """Return frames of all joints, the world first, at places of motions.
+        """Compute the frames of all joints, the world first, at given places of motions.
 
         Args:
-            motion: Numbers of the motions, shape (n,).
-            share: Of each, from 0 to 1, shape (n,).
+            motion: Number of the motion of each place, shape (n,).
+            share: Share of that motion, from 0 to 1, shape (n,).
 
         Returns:
             Rotations, shape (n, joints + 1, 3, 3), and origins, shape (n, joints + 1, 3).
@@ -296,13 +307,17 @@ class Motions:
     def _ball_gaps(
         self, first_numbers: Numbers, second_numbers: Numbers, poses: list[Poses], second_rests: Mask
     ) -> Vector:
-        """Gaps between the first solid's ball on its chord and the second's ball on its own or, at rest, its box.
+        """Compute lower bounds of the gaps between solids on intervals by bounding balls and boxes.
+
+        The centre of the first solid's ball moves along a chord. If the second solid rests in the pair's frame, that
+        chord is compared with its ball and its box, and the larger gap counts. Otherwise the second ball moves along a
+        chord as well.
 
         Args:
-            first_numbers: Numbers of the first solids, shape (n,).
-            second_numbers: Numbers of the second ones, shape (n,).
-            poses: Seen from the pair's frame: the first solid's at begin and end of the interval, then the second's.
-            second_rests: Whether the second one rests in that frame, shape (n,).
+            first_numbers: Indices of the first solids, shape (n,).
+            second_numbers: Indices of the second solids, shape (n,).
+            poses: Poses in the pair's frame: of the first solids at begin and end of the intervals, then of the second.
+            second_rests: Whether each second solid rests in that frame, shape (n,).
 
         Returns:
             The gaps [m], shape (n,).
@@ -337,9 +352,16 @@ class Motions:
     def _plane_gaps(
         self, first_numbers: Numbers, second_numbers: Numbers, poses: list[Poses], normals: Matrix
     ) -> Vector:
-        """Gaps of planes that are beside solids at both ends [m], shape (n,); -inf for a normal not of unit length.
+        """Compute the gaps between solids along given normals: the smaller extents at both ends of the intervals count.
 
-        Arguments as of :meth:`_ball_gaps`; ``normals``: from the first solid to the second, shape (n, 3).
+        Args:
+            first_numbers: Indices of the first solids, shape (n,).
+            second_numbers: Indices of the second solids, shape (n,).
+            poses: See :meth:`_ball_gaps`.
+            normals: Unit normals from the first solid to the second, in the pair's frame, shape (n, 3).
+
+        Returns:
+            The gaps [m], shape (n,); -inf where a normal does not have unit length.
         """
         lengths = np.linalg.norm(normals, axis=1)
         heights = []
@@ -356,16 +378,21 @@ class Motions:
         return np.where(np.abs(lengths - 1.0) <= UNIT, gaps, -np.inf)
 
     def _not_shown_apart(self, entries: list[Entry], normals: Matrix | None = None) -> list[int]:
-        """Numbers of the entries that are not shown apart by planes, or by balls and boxes where no plane is given.
+        """Return the indices of the entries whose solids are not shown apart.
 
-        ``normals``: Of the planes, shape (entries, 3), 0 where an entry has none; None if there are no planes at all.
+        Entries with a plane are checked by that plane, all others by balls and boxes.
+
+        Args:
+            entries: The entries.
+            normals: Normals of the planes, shape (entries, 3), 0 where an entry has none; None if there are no planes
+                at all.
         """
         not_apart: list[int] = []
         for first in range(0, len(entries), AT_ONCE):
             columns = zip(*entries[first : first + AT_ONCE], strict=True)
             motion, pair, first_numbers, second_numbers, begins, widths = map(np.array, columns)
 
-            # Motion and share in one number, exactly, so that frames are computed once for each place.
+            # Motion and share are encoded exactly in one number, so that frames are computed once for each place.
             shares = np.concatenate([begins, begins + widths])
             places = 2.0 * np.concatenate([motion, motion]) + shares
             nodes, where = np.unique(places, return_inverse=True)
@@ -405,7 +432,7 @@ class Motions:
         return bool(whole_bodies and apart and not Containment(bodies, ((0, 1),)).holds((0, 1), frames))
 
     def _on_all_of(self, motion: int, pair: int, a: int = -1, b: int = -1) -> Entry:
-        """Parts ``a`` and ``b`` of a pair, the whole bodies if -1, on all of a motion."""
+        """Return the entry for parts ``a`` and ``b`` of a pair, -1 for a whole body, on the whole of a motion."""
         i, j = self.pairs[pair]
         return Entry(motion, pair, self.solid_numbers[i, a], self.solid_numbers[j, b], 0.0, 1.0)
 
@@ -414,7 +441,11 @@ class Motions:
         return f"motion {entry.motion + 1}: {pair} {what} {entry.begin:g} to {entry.begin + entry.width:g} of it"
 
     def fault(self, motions: tuple[MotionEntries, ...]) -> str:
-        """Return the first thing that entries do not show; "" if they show all pairs apart in all of the motions."""
+        """Return the first fault of the entries of a certificate; "" if they prove all pairs apart in all motions.
+
+        First all given entries are checked: they have to name known parts, cover a motion without a gap, and be apart.
+        All other pairs have to be apart by the balls and boxes of their bodies, or of all their parts.
+        """
         pair_numbers = {pair: k for k, pair in enumerate(self.pairs)}
         entries = list[Entry]()
         for number, motion in enumerate(motions):
@@ -425,7 +456,7 @@ class Motions:
                 solids = self.solid_numbers[i, a], self.solid_numbers[j, b]
                 entries.append(Entry(number, pair_numbers[i, j], *solids, k * width, width))
 
-        # The entries of two solids in a motion have to cover all of it, one interval behind the other.
+        # The intervals of two solids in a motion have to cover it without a gap or an overlap.
         groups = groupby(sorted(entries), lambda entry: entry.solids_of_motion)
         covered = {key: list(intervals) for key, intervals in groups}
         for intervals in covered.values():
@@ -437,7 +468,7 @@ class Motions:
             if not self._measured_apart(entries[k]):
                 return self._fault_of(entries[k], "are not shown apart from")
 
-        # What no entry is about has to be apart by balls and boxes: the whole bodies, or else all parts of them.
+        # Pairs without an entry have to be apart by balls and boxes: as whole bodies, or else all their parts.
         every_pair = (self._on_all_of(*both) for both in product(range(len(motions)), range(len(self.pairs))))
         of_bodies = [entry for entry in every_pair if entry.solids_of_motion not in covered]
         split = [of_bodies[k] for k in self._not_shown_apart(of_bodies)]
@@ -447,13 +478,13 @@ class Motions:
         return self._fault_of(of_parts[open_parts[0]], "are not shown apart from") if open_parts else ""
 
     def _parts_of(self, entry: Entry) -> list[Entry]:
-        """Return all parts of one body of a pair with all parts of the other, on all of a motion."""
+        """Return entries for all pairs of parts of the two bodies of an entry, on the whole motion."""
         i, j = self.pairs[entry.pair]
         return [self._on_all_of(entry.motion, entry.pair, a, b) for a, b in product(self.parts[i], self.parts[j])]
 
 
 def _common_joint(chain: Chain, first: int, second: int) -> int:
-    """Return the last frame that carries both of two frames."""
+    """Return the last joint whose frame carries the frames of both joints, 0 for the world."""
     while first != second:  # parents have smaller numbers
         first, second = min(first, second), int(chain.parent[max(first, second) - 1]) + 1
     return first

@@ -1,9 +1,9 @@
-"""Which configurations and motions are free of collision: kernels first, coal where these are in doubt.
+"""Exact collision checks of configurations and motions: by kernels first, by coal where kernels are in doubt.
 
-The kernels (:mod:`rrtik_ompl.kernels`) give three answers. Their "free" and "colliding", by sphere covers and a narrow
-phase of convex solids, are certain. What stays undecided falls back to coal, pair by pair and only for the pairs that
-are in doubt, so every answer is coal's own. Coal is called with fresh requests: reused collision data start from the
-last support points and have been seen to miss overlaps.
+The kernels (:mod:`rrtik_ompl.kernels`) give three answers. "Free" and "colliding", found by sphere covers and a narrow
+phase of convex solids, are certain. An undecided configuration falls back to coal for those pairs that are in doubt, so
+every answer agrees with coal's. Coal is called with fresh requests: reused collision data start from the last support
+points and have been seen to miss overlaps.
 """
 
 from __future__ import annotations
@@ -36,12 +36,14 @@ from rrtik_ompl.world.proof import Prover
 class ExactChecker:
     """Exact collision checks of configurations within the robot's limits and of straight motions between them.
 
+    An object serves one thread at a time.
+
     Attributes:
         solids: The bodies, and which of them must not touch.
-        clearance: What is kept from obstacles on top of their margins [m].
-        bodies: Those of ``solids``, with the clearance in the margins of obstacles.
-        tables: The checked pairs for the kernels; for one thread at a time.
-        motions: Tables of motions that :func:`rrtik_ompl.kernels.search.motions.motion_table.motions_of` keeps.
+        clearance: Distance kept from obstacles on top of their margins [m].
+        bodies: The bodies of ``solids``, with the clearance added to the margins of obstacles.
+        tables: The kernels' tables of the checked pairs.
+        motions: Cache of :func:`rrtik_ompl.kernels.search.motions.motion_table.motions_of`.
     """
 
     solids: Arrangement
@@ -54,14 +56,14 @@ class ExactChecker:
     @classmethod
     @collector_waits
     def of(cls, solids: Arrangement, clearance: float) -> ExactChecker:
-        """Checks of an arrangement that keep a clearance [m] from obstacles on top of their margins."""
+        """Create the checker of an arrangement that keeps a clearance [m] from obstacles on top of their margins."""
         bodies = solids.with_clearance(clearance)
         packed = arm_cache(solids.robot).pack(bodies.as_tuple, solids.checked, solids.covers())
         return cls(solids, clearance, bodies, TakenTables(packed), _data=working_memory(solids.robot.model))
 
     @property
     def fast(self) -> FastWorld:
-        """The tables; made anew where another checker has taken them over."""
+        """The kernels' tables; built anew if another checker has taken them over."""
         return self.tables.get(self._packed)
 
     def for_thread(self) -> ExactChecker:
@@ -70,9 +72,13 @@ class ExactChecker:
         return replace(self, tables=tables, motions={}, _data=self.solids.robot.model.createData())
 
     def moved(self, solids: Arrangement, numbers: tuple[int, ...]) -> ExactChecker | None:
-        """The same checker with some standing bodies elsewhere, which takes over the tables; None where it cannot.
+        """Return a checker for moved bodies that takes over the tables of this one; None where that is impossible.
 
-        This one makes its tables anew should it be asked again.
+        This checker builds its tables anew if it is used again.
+
+        Args:
+            solids: The arrangement with the bodies at their new poses.
+            numbers: Indices of the bodies that were moved.
 
         Args:
             solids: Where the bodies are now.
@@ -105,13 +111,13 @@ class ExactChecker:
 
     @cached_property
     def _contacts(self) -> Prover:
-        """Proves of the pairs in contact that they overlap no deeper than they may."""
+        """Prover for the pairs in contact: it proves that they overlap no deeper than they may."""
         return Prover(self._robot, self.bodies, self.solids.in_contact)
 
     def free(self, rows: Matrix, *, exact: bool = True) -> Mask:
-        """Return which rows, shape (m, dof), are free of collision. Shape (m,).
+        """Return which rows, shape (m, dof), are free of collision, shape (m,).
 
-        Without ``exact`` nothing falls back to coal: what kernels leave undecided then counts as colliding.
+        Without ``exact`` nothing falls back to coal, and rows that the kernels leave undecided count as colliding.
         """
         answers = self.fast.classify(self._robot.chain.joint_values(rows))
         free: Mask = answers == FREE
@@ -130,9 +136,12 @@ class ExactChecker:
         return free
 
     def contacts_of_meshes_kept(self, row: Matrix) -> frozenset[tuple[int, int]]:
-        """The pairs in contact with a hollow mesh that are proven no deeper than they may be at a row, shape (1, dof).
+        """Return the pairs in contact that involve a mesh and are proven to overlap no deeper than they may.
 
-        Of these coal knows the depth of their hulls only, which are filled.
+        Coal measures the penetration depth of the filled hulls of such meshes, which is too large for hollow ones.
+
+        Args:
+            row: One configuration, shape (1, dof).
         """
         doubtful = [pair for pair in self.solids.in_contact if any(is_mesh(self.bodies[k].geometry) for k in pair)]
         return frozenset(pair for pair in doubtful if Prover(self._robot, self.bodies, (pair,)).proven(row, row).all())
@@ -146,10 +155,15 @@ class ExactChecker:
         exact: bool = True,
         to_be_proven: bool = False,
     ) -> Mask:
-        """Return which straight motions, shape (m, dof), are free at all k / steps, k = 0..steps. Shape (m,).
+        """Return which straight motions are free at the configurations k / steps of the way, k = 0..steps, shape (m,).
 
-        ``exact`` as in :meth:`free`. Of those that have to be proven too, what the kernels leave undecided counts as
-        free: coal takes longer to say so than a proof, which settles it.
+        Args:
+            starts: Start configurations, shape (m, dof).
+            ends: End configurations, shape (m, dof).
+            steps: Number of steps of each motion, shape (m,).
+            exact: Whether undecided motions fall back to coal, as in :meth:`free`.
+            to_be_proven: Whether the caller proves the free motions afterwards. Then motions that the kernels leave
+                undecided count as free, because the proof settles them faster than coal would.
         """
         sides = self._robot.chain.joint_values(starts), self._robot.chain.joint_values(ends)
         answers = self.fast.classify_edges(*sides, steps)
@@ -166,10 +180,10 @@ class ExactChecker:
         return free
 
     def _motion_free_by_coal(self, start: Vector, end: Vector, steps: int) -> bool:
-        """Check whether a motion that the kernels leave undecided is free, by coal.
+        """Check by coal whether a motion that the kernels leave undecided is free at 0..steps.
 
-        Two bodies that are some distance apart at one of the motion's configurations cannot touch at its neighbours,
-        where their distance is therefore not computed.
+        Configurations are visited from coarse to fine. The distance of a pair at one of them, divided by a bound on the
+        approach of its bodies, gives a number of neighbouring steps at which the pair cannot touch and is skipped.
         """
         order = spread_order(steps)
         rows = (1.0 - order / steps)[:, None] * start + (order / steps)[:, None] * end
@@ -236,10 +250,10 @@ def distance(
     second_pose: coal.Transform3s,
     margin: float = 0.0,
 ) -> float | None:
-    """A lower bound of the distance of two coal geometries at coal's poses less a margin [m], None if it is not kept.
+    """Return a lower bound of the distance of two geometries minus a margin [m]; None if the margin is not kept.
 
-    For solids coal's answer to "do they touch" comes with the distance. Meshes take much longer, so their hulls are
-    checked first: where those are apart, the meshes are.
+    For solids coal returns the lower bound together with the answer whether they touch. A check of meshes takes much
+    longer, so their hulls are checked first: where these are apart, so are the meshes.
     """
     ends, margin = solids_of((first, first_pose, second, second_pose), margin)
     if is_ours(ends):
@@ -260,7 +274,15 @@ def distance(
 
 
 def one_way(starts: Matrix, ends: Matrix) -> tuple[Matrix, Matrix]:
-    """Return motions turned so that both directions of one are the same to the bit: the lexically smaller end first."""
+    """Order the ends of motions, lexically smaller end first, so that both directions are checked identically.
+
+    Args:
+        starts: Start configurations, shape (m, dof).
+        ends: End configurations, shape (m, dof).
+
+    Returns:
+        Start and end configurations of the ordered motions, shape (m, dof) each.
+    """
     first_difference = (starts != ends).argmax(axis=1)[:, None]
     first_of_starts = np.take_along_axis(starts, first_difference, axis=1)
     is_turned = first_of_starts > np.take_along_axis(ends, first_difference, axis=1)
@@ -268,7 +290,10 @@ def one_way(starts: Matrix, ends: Matrix) -> tuple[Matrix, Matrix]:
 
 
 def spread_order(count: int) -> NDArray[np.float64]:
-    """0..count with both ends first, then middles of ever finer halves, so that a collision shows early."""
+    """Return the numbers 0..count in a coarse-to-fine order, so that collisions are found early, shape (count + 1,).
+
+    Both ends come first, then the midpoints of ever smaller halves.
+    """
     levels = [np.array([0, count])]
     step = 1 << max(count - 1, 1).bit_length()
     while step > 1:

@@ -1,7 +1,7 @@
-"""A robot among obstacles that move: checks that keep a clearance, and follow a scene within a tick.
+"""Collision checks among moving obstacles, which follow a changing scene within one control tick.
 
-What is free is proven by the kernels alone (:mod:`rrtik_ompl.kernels`); what they cannot prove is refused, so that an
-answer never waits for coal. When the scene changes, only the obstacles that moved are packed again.
+Only the kernels decide (:mod:`rrtik_ompl.kernels`): whatever they cannot prove free counts as blocked, so that no
+answer waits for coal. When the scene changes, only the obstacles that moved are packed again.
 """
 
 from __future__ import annotations
@@ -28,37 +28,39 @@ from rrtik_ompl.world.arm_cache import arm_cache
 from rrtik_ompl.world.proof import Prover
 from rrtik_ompl.world.world import World
 
-SAME_PLACE = 1e-6  # [m] and of directions: of what a link holds, by which two scenes may differ
+SAME_PLACE = 1e-6  # tolerance [m], and of direction vectors, within which two attached objects are held alike
 
 
 class MovingWorld:
-    """Checks of a robot among obstacles that may be moved; replaces a conservative ``World``.
+    """Collision checks of a robot among obstacles that may be moved; takes the place of a conservative ``World``.
 
-    A configuration is free if it is within the limits, proven free of self-collision, and proven to be farther than
-    margin and ``inflation`` from every obstacle, and than the clearance of the world. Motions are checked as a
-    ``World`` does, and proven where it asks for that. While an obstacle overlaps the arm's fixed base nothing is free.
+    A configuration is free if it is within the limits and the kernels prove that there is no self-collision and that
+    every obstacle is farther than its margin, its ``inflation`` and the clearance of the world together. Motions are
+    checked in steps as a ``World`` does, and proven if the world requires it. While an obstacle overlaps the arm's
+    fixed base, nothing is free.
 
     Attributes:
         robot, weights, motion_resolution: Those of the world.
         accuracy: "conservative".
         scene: Where the obstacles are now.
-        fast: The tables, for searches in kernels; None without kernels or while ``blocked``. Moved in place, their
-            address stays.
-        blocked: Which obstacle overlaps which fixed part of the arm, as a line for a person; "" if none does.
-        checked: Configurations checked so far, counted as if no motion had been refused early.
+        fast: The tables, for searches in kernels; None without kernels or while ``blocked``. They are updated in
+            place, so their address never changes.
+        blocked: A line that says which obstacle overlaps which fixed part of the arm; "" if none does.
+        checked: Number of configurations checked so far, counted as if no motion had been refused early.
 
     Args:
-        world: The robot and the scene, obstacles at their first places.
+        world: The robot and the scene, with the obstacles at their initial poses.
         moving: Names of the obstacles that may be moved; all of them if None.
-        copies: In how many places at once each of these may be (where it is, and where it will be).
-        self_collision: False leaves out what does not concern obstacles, so that :meth:`clearance` is of them alone.
+        copies: Number of poses that each of these has at the same time (its current and its predicted ones).
+        self_collision: False leaves out pairs without an obstacle, so that :meth:`clearance` is that of obstacles.
 
     Raises:
         InputError: If the world has path constraints, which are not kept here.
     """
 
     accuracy: Accuracy = "conservative"
-    resolves = False  # outer balls alone: a repair has a fixed share of a tick
+    # Kernels do not compare solids here: a repair of a path has to fit into a fixed share of a tick.
+    resolves = False
 
     def __init__(
         self, world: World, *, moving: Sequence[str] | None = None, copies: int = 1, self_collision: bool = True
@@ -91,13 +93,13 @@ class MovingWorld:
         self._pairs_at_rest = tuple(p for p in world.pairs if all(self._bodies[i].joint == 0 for i in p))
         self.blocked = self._contact_of_base()
 
-        first_bodies = tuple(bodies)  # copies, which come behind them, are not there yet
+        first_bodies = tuple(bodies)  # the bodies without the copies, which come behind them
         pairs_of_first = tuple(p for p in checked_pairs if max(p) < len(first_bodies))
         self._prover = MovingProver(self.robot, first_bodies, pairs_of_first, always_colliding=bool(self.blocked))
 
     @property
     def fast(self) -> FastWorld | None:
-        """The tables, for searches in kernels; None where these must not be asked, see the class."""
+        """The tables for searches in kernels; None where they must not be used, see the class."""
         return self._fast if self._fast.address and self._proving is None and not self.blocked else None
 
     @property
@@ -111,17 +113,19 @@ class MovingWorld:
         return tuple(o.name for o in self.scene.obstacles)
 
     def move(self, *scenes: Scene, inflation: Mapping[str, float] | None = None) -> None:
-        """Put the obstacles where they are now, and their copies where they will be. A cloud may have other points.
+        """Move the obstacles to their poses in the current scene, and their copies to the predicted ones, in place.
+
+        A point cloud may also get other points.
 
         Args:
             *scenes: The scene now, then one for each further copy; the last one for those that are missing as well.
-            inflation: How far the arm has to stay from obstacles beyond their margins [m]; what is not named keeps
-                its own.
+            inflation: How far the arm has to stay from obstacles beyond their margins [m]; what is not named keeps its
+                own.
 
         Raises:
             InputError: If a scene has other obstacles, attached objects or allowed pairs than the world began with, or
                 an inflation is not 0 or more.
-            UnknownNameError: If an inflation is given for what is no obstacle.
+            UnknownNameError: If an inflation is given for an unknown obstacle.
         """
         for scene in scenes:
             _check_obstacles(scene, self._first_obstacles)
@@ -153,7 +157,10 @@ class MovingWorld:
         self._prover.place(self._bodies, self._inflation, always_colliding=bool(self.blocked))
 
     def clearance(self, Q: Matrix) -> Vector:
-        """Lower bounds of the distance to contact of rows of Q, less margins and inflation [m]. (m, dof) -> (m,)."""
+        """Return lower bounds of the clearance of configurations, (m, dof) -> (m,) [m].
+
+        Clearance is the distance to contact, minus margins and inflation.
+        """
         return self._fast.clearance(self.robot.chain.joint_values(Q)).lower
 
     def valid(self, q: Vector) -> bool:
@@ -161,7 +168,7 @@ class MovingWorld:
         return bool(self.valid_batch(q[None])[0])
 
     def valid_batch(self, Q: Matrix) -> Mask:
-        """Return which rows of Q, shape (m, dof), are free. Shape (m,)."""
+        """Return which rows of Q, shape (m, dof), are free, shape (m,)."""
         self.checked += len(Q)
         free: Mask = self._fast.classify(self.robot.chain.joint_values(Q), resolve=False) == FREE
         return free & inside_limits(self.robot, Q) & (not self.blocked)
@@ -171,23 +178,29 @@ class MovingWorld:
         return bool(self.motion_valid_batch(a[None], b[None])[0])
 
     def motion_valid_batch(self, A: Matrix, B: Matrix) -> Mask:
-        """Return which straight motions A[k] -> B[k], shapes (m, dof), are free. Shape (m,)."""
+        """Return which straight motions A[k] -> B[k], shapes (m, dof), are free, shape (m,)."""
         steps = step_counts(A, B, self.weights, self.motion_resolution)
         self.checked += int(steps.sum()) + len(steps)
         sides = self.robot.chain.joint_values(A), self.robot.chain.joint_values(B)
         free: Mask = self._fast.classify_edges(*sides, steps, resolve=False) == FREE
         free &= inside_limits(self.robot, A) & inside_limits(self.robot, B) & (not self.blocked)
-        if self._proving is not None:  # beyond the clearance, which the margins of the bodies hold already
+        # The margins of the bodies contain the clearance already, so only the rest is added to them.
+        if self._proving is not None:
             free[free] = self._prover.proven(A[free], B[free], clearance=self._proving - self._clearance)
         return free
 
     def motions_proven(
         self, A: Matrix, B: Matrix, *, less: float = 0.0, inflation: Mapping[str, float] | None = None
     ) -> Mask:
-        """Return which straight motions A[k] -> B[k], shapes (m, dof), are proven free as a whole. Shape (m,).
+        """Return which straight motions A[k] -> B[k], shapes (m, dof), are proven free as a whole, shape (m,).
 
-        They keep margins and ``inflation``, ``less`` [m] less of these, from where obstacles are now. Copies, which
-        stand where obstacles will be, do not count. ``inflation`` [m] stands for that of :meth:`move` here alone.
+        The proofs hold for the current poses of the obstacles; their copies at predicted poses are ignored.
+
+        Args:
+            A: Start configurations, shape (m, dof).
+            B: End configurations, shape (m, dof).
+            less: By how much margins and inflation may be undercut [m].
+            inflation: As for :meth:`move`, for this call only; None for the current inflation.
         """
         if inflation is None:
             return self._prover.proven(A, B, clearance=-less)
@@ -199,14 +212,19 @@ class MovingWorld:
         return proven
 
     def _with_clearance(self, body: Body, margin: float) -> Body:
-        """Return a body that has a margin [m]; an obstacle with the clearance of the world on top of it."""
+        """Return a body with a given margin [m], to which the clearance of the world is added if it is an obstacle."""
         total_margin = margin + self._clearance
         if body.kind != "obstacle" or total_margin == body.margin:
             return body
         return replace(body, margin=total_margin)
 
     def base_apart(self, ways: Mapping[str, float]) -> bool:
-        """Whether obstacles are apart from what never moves, and stay so even if they go as far as is said [m]."""
+        """Check whether obstacles are apart from the fixed parts of the arm, even after moving by some distances.
+
+        Args:
+            ways: How far each obstacle may still move in any direction [m], by name; 0 for obstacles that are not
+                named.
+        """
         for pair in self._pairs_at_rest:
             base_part, obstacle = sorted((self._bodies[k] for k in pair), key=lambda body: body.kind == "obstacle")
             travel = ways.get(obstacle.name, 0.0)
@@ -223,19 +241,19 @@ class MovingWorld:
 
 
 class MovingProver(Prover):
-    """Proofs among obstacles that are moved, from where they are now: their table is packed once, and written to."""
+    """Prover among obstacles that are moved, at their current poses. Its table is packed once and updated in place."""
 
     _fixed = False
     _new_inflations: Sequence[float] | None = None
     _moved: MovedObstacles | None = None
 
     def place(self, bodies: Sequence[Body], inflations: Sequence[float], *, always_colliding: bool) -> None:
-        """Put obstacles where they are now; it costs nothing until something is to be proven.
+        """Set the poses of the obstacles. The table is updated when the next motion is to be proven, not before.
 
         Args:
-            bodies: As at the beginning, obstacles with other placements and margins.
-            inflations: For each body what is to be kept from it beside its margin [m]; read for obstacles.
-            always_colliding: Whether an obstacle touches what never moves: then nothing is proven.
+            bodies: The bodies in their original order, obstacles with new placements and margins.
+            inflations: For each body the distance to keep on top of its margin [m]; only used for obstacles.
+            always_colliding: Whether an obstacle touches a body that never moves; then nothing is proven.
         """
         self.bodies = tuple(bodies)
         self._new_inflations = inflations
@@ -251,7 +269,10 @@ class MovingProver(Prover):
 
 
 def _check_obstacles(scene: Scene, known: Mapping[str, Obstacle]) -> None:
-    """Raise unless a scene has the obstacles that are known: their names and shapes; clouds may have other points."""
+    """Raise an error unless a scene has the known obstacles, with the same names and shapes.
+
+    Point clouds may have other points.
+    """
     if {o.name for o in scene.obstacles} != known.keys():
         raise InputError(f"scene: expected the obstacles {', '.join(sorted(known))}, got {scene}")
     for obstacle in scene.obstacles:
@@ -262,10 +283,10 @@ def _check_obstacles(scene: Scene, known: Mapping[str, Obstacle]) -> None:
 
 
 def check_held(scene: Scene, before: Scene) -> None:
-    """Refuse a scene in which the arm holds something else than before: that is a part of the arm, and never moved.
+    """Refuse a scene with other attached objects than before, because these are part of the arm's fixed tables.
 
     Raises:
-        InputError: It names what is held.
+        InputError: The message names the attached objects.
     """
     held_now = {item.name: item for item in scene.attached}
     held_before = {item.name: item for item in before.attached}
@@ -282,7 +303,7 @@ def check_held(scene: Scene, before: Scene) -> None:
 
 
 def _held_alike(first: AttachedObject, second: AttachedObject) -> bool:
-    """Check whether the arm holds the same in the same way."""
+    """Check whether two attached objects are the same, at the same pose on the same link."""
     same_link = first.link == second.link and set(first.allow) == set(second.allow)
     same_margins = first.padding == second.padding and first.margin == second.margin
     same_place = np.allclose(first.pose.homogeneous, second.pose.homogeneous, rtol=0.0, atol=SAME_PLACE)
@@ -292,7 +313,12 @@ def _held_alike(first: AttachedObject, second: AttachedObject) -> bool:
 def _with_copies(
     first_bodies: Sequence[Body], pairs_of_first: Pairs, names: set[str], copies: int
 ) -> tuple[list[Body], list[tuple[int, int]], dict[int, int]]:
-    """Bodies and pairs of a world with further copies of some obstacles, and which copy each body is."""
+    """Add copies of some obstacles to the bodies and pairs of a world.
+
+    Returns:
+        All bodies, the copies behind the original ones; all pairs of their indices; and the copy number of each body,
+        by its index, 0 for the original ones.
+    """
     bodies = list(first_bodies)
     pairs = list(pairs_of_first)
     copy_of_body = dict.fromkeys(range(len(bodies)), 0)

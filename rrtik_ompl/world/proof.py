@@ -1,17 +1,18 @@
-"""Proofs that whole motions are free: every configuration between two waypoints, not a sample of them.
+"""Proofs that whole motions are free: every configuration between two waypoints, not only samples of them.
 
 The kernels (:mod:`rrtik_ompl.kernels.proof.proof_kernels`) share the description of the bodies with the checks that
-planners use, and nothing else: their forward kinematics are their own, in float64, and so are their distances.
+planners use, and nothing else: they have forward kinematics and distances of their own, in float64.
 
-Between bodies in contact, which overlap, there is no plane that a search for their distance would find, but a proof
-needs none that parts them: one beyond which neither reaches deeper than it may. Coal knows that one, by the normal of
-the contact, and :func:`suggest_planes` lets the kernels try it first.
+Bodies in contact overlap, so no plane separates them, and a search for their distance finds none. Their proof needs a
+plane beyond which neither body reaches deeper than it may. The contact normal that coal reports gives such a plane, and
+:func:`suggest_planes` lets the kernels try it first.
 
-Two links whose convex pieces stick out of their meshes are proven apart by coal's distances where kernels cannot
-(:class:`CoalProof`), after Schwarzer, Saha and Latombe [16]: bodies whose distance at one place of a motion is larger
-than what they can approach each other on an interval around it are apart in all of that interval. Coal knows surfaces
-alone: whether one body is wholly inside another is asked once a motion, for a closed surface that is never met keeps
-what is inside.
+The kernels represent a link by convex pieces around its mesh. Where the pieces of two links are too close to be proven
+apart, coal's distances between the meshes are used instead (:class:`CoalProof`), after Schwarzer, Saha and Latombe
+[16]: if the distance of two bodies at one configuration of a motion exceeds a bound on their approach within an
+interval around it, they are apart in the whole interval. Coal measures distances between surfaces, so one body could be
+wholly inside the other. This is checked once per motion, which suffices: a body cannot leave a closed surface without
+touching it.
 """
 
 from __future__ import annotations
@@ -49,33 +50,35 @@ from rrtik_ompl.model.proof import Gap, Proof
 from rrtik_ompl.model.robot import Robot, inside_limits
 from rrtik_ompl.world.arm_cache import MAX_ROBOTS, Pairs, strokes
 
-LARGEST_VALUE = 1e3  # [rad] or [m] of a joint, up to which rounding is bounded
+LARGEST_VALUE = 1e3  # [rad] or [m], joint values up to which the rounding errors are bounded
 PROOF_KERNELS = "proof.proof_kernels"
-SPARE = 1e-10  # [m] that a proof which is written down keeps beyond ROOM: who verifies it rounds in other places
-MOTIONS_AT_ONCE = 64  # in one call of the kernel, between two looks at the clock; Ctrl-C waits no longer
-FEW = 200  # configurations
-PROVEN, NOT_LOOKED_AT = -1, -2  # in the place of a pair's number
-MOST_DISTANCES = 400  # distances for a pair in one motion: some tenths of a second
-DEEPEST_LEVEL = 9  # level of an interval: 1/512 of a motion
-APPROACH_SPARE = 1.01  # of the way that bodies come nearer: who verifies it may bound that by other balls
-FAR_APART = 1e6  # [m]; what may overlap by that is apart
+# [m] Certificates keep this distance beyond ROOM, because their verifier rounds in other places.
+SPARE = 1e-10
+MOTIONS_AT_ONCE = 64  # motions per kernel call; the clock and Ctrl-C are only looked at between calls
+FEW = 200  # number of configurations for which no proof table is made
+PROVEN, NOT_LOOKED_AT = -1, -2  # written in place of the index of an unproven pair
+MOST_DISTANCES = 400  # largest number of coal distances for a pair in one motion, which take some tenths of a second
+DEEPEST_LEVEL = 9  # smallest interval of a bisection: 2^-9 of a motion
+# Factor on the bound of the approach of two bodies, because a verifier may bound it by other balls.
+APPROACH_SPARE = 1.01
+FAR_APART = 1e6  # [m]; a pair with the margin -FAR_APART is always proven apart
 DOUBLE, INT = 8, 4  # bytes of a number
 Numbers: TypeAlias = NDArray[np.int32]
-Told: TypeAlias = tuple[MotionEntries, NDArray[np.int64]]  # by kernels; links and intervals that coal measured
-Ends: TypeAlias = tuple[Matrix, Matrix]  # where motions begin, and where they end
+Told: TypeAlias = tuple[MotionEntries, NDArray[np.int64]]  # the kernels' log of a motion; see CoalProof.settle
+Ends: TypeAlias = tuple[Matrix, Matrix]  # start and end configurations of motions, or joint values there
 
 
 @dataclass(eq=False)
 class Prover:
-    """Proofs of motions of an arm among bodies; without kernels, or where bodies always touch, it proves nothing.
+    """Prover of motions of an arm among bodies. It proves nothing without kernels or where two fixed bodies touch.
 
     Attributes:
-        robot, bodies, pairs: What the proofs are about.
-        self_margin: What links, and what they hold, keep from each other [m].
-        always_colliding: Whether two bodies touch that never move.
-        constraints: What a motion must keep too; None if nothing.
-        tables: What the kernels read, once something is to be proven.
-        kin: The same object for all provers that take each other's proofs for their own.
+        robot, bodies, pairs: The geometry that the proofs refer to; ``pairs`` holds indices into ``bodies``.
+        self_margin: Distance that links and attached objects keep from each other [m].
+        always_colliding: Whether two bodies that never move touch.
+        constraints: Path constraints that a motion must keep as well; None if there are none.
+        tables: The kernels' tables, made when they are first needed.
+        kin: An object shared by all provers that accept each other's proofs.
     """
 
     robot: Robot
@@ -88,30 +91,30 @@ class Prover:
     kin: object = field(default_factory=object)
     _coal: CoalProof | None = None
 
-    _fixed: ClassVar[bool] = True  # whether obstacles stay where they are
+    _fixed: ClassVar[bool] = True  # whether obstacles stay at their poses
 
     def for_thread(self) -> Prover:
         """Return the same prover for another thread."""
         return replace(self, tables=self.tables.for_thread(self.bodies), _coal=None)
 
     def holding(self, constraints: HeldRegions) -> Prover:
-        """Return the prover of the same bodies for motions that keep path constraints; its proofs are others."""
+        """Return a prover of the same bodies that also requires path constraints; it does not accept earlier proofs."""
         return replace(self, constraints=constraints, kin=object())
 
     def moved(self, bodies: Sequence[Body], numbers: tuple[int, ...], *, always_colliding: bool) -> Prover:
-        """Return the prover of a world in which some bodies stand elsewhere; it takes over this one's table.
+        """Return the prover of the world after some bodies were moved; it takes over the table of this prover.
 
         Args:
-            bodies: All of them, where they stand now.
-            numbers: Of those that stand elsewhere.
-            always_colliding: Whether two that never move touch.
+            bodies: All bodies at their new poses.
+            numbers: Indices of the bodies that were moved.
+            always_colliding: Whether two bodies that never move touch.
         """
         tables = self.tables.take(numbers)
         return replace(self, bodies=bodies, always_colliding=always_colliding, tables=tables, kin=object())
 
     @property
     def digest(self) -> str:
-        """Of the geometry that its proofs are about, see :attr:`rrtik_ompl.model.proof.Proof.digest`."""
+        """Digest of the geometry that the proofs refer to, see :attr:`rrtik_ompl.model.proof.Proof.digest`."""
         return world_digest(self.robot, tuple(self.bodies), self.pairs)
 
     @cached_property
@@ -120,13 +123,13 @@ class Prover:
         return min((body.margin for body in self.bodies if body.kind == "obstacle"), default=0.0)
 
     def route(self, rows: Matrix, *, clearance: float = 0.0, slack: float = 0.0, seconds: float | None = None) -> Proof:
-        """Prove the motions between waypoints, shape (k, dof).
+        """Prove the motions between waypoints, shape (k, dof), free.
 
         Args:
             rows: The waypoints; a single one counts as a motion that stands still.
-            clearance: To be kept from obstacles beside their margins [m].
-            slack: To be kept between all bodies beside that [m].
-            seconds: When to stop; None for never. What was not looked at by then is not proven.
+            clearance: Distance kept from obstacles on top of their margins [m].
+            slack: Distance kept between all bodies in addition [m].
+            seconds: Time limit [s]; None for none. Motions that were not examined by then count as not proven.
 
         Raises:
             InputError: If there are no waypoints.
@@ -147,7 +150,7 @@ class Prover:
         return Proof(count, clearance, tuple(measured_gaps), self.margin, maker=self)
 
     def _with_breaches(self, constraints: HeldRegions, rows: Matrix, gaps: list[Gap]) -> list[Gap]:
-        """Return the gaps of a route, and a gap for each other motion of it that is not held."""
+        """Add a gap for each motion of a route that violates a path constraint and has no gap yet."""
         motions_with_gap = {gap.motion for gap in gaps}
         not_held = np.flatnonzero(~constraints.route_held(rows)).tolist()
         breaches = [
@@ -164,7 +167,7 @@ class Prover:
             None if not every motion is proven.
 
         Raises:
-            InputError: If the scene has a cloud.
+            InputError: If the scene has a point cloud.
         """
         if clouds := [body.name for body in self.bodies if isinstance(body.geometry, CloudSolid)]:
             raise InputError(
@@ -180,7 +183,12 @@ class Prover:
         return Certificate(self.robot.name, *digests, clearance, self.self_margin, frozen(rows), motions)
 
     def logged(self, rows: Matrix, *, clearance: float = 0.0) -> list[Told] | None:
-        """By what each motion between waypoints, shape (k, dof), is proven; None if one of them is not."""
+        """Prove each motion between waypoints, shape (k, dof), again and log the planes and intervals that prove it.
+
+        Returns:
+            For each motion the entries of the kernels and the intervals of :meth:`CoalProof.settle`; None if a motion
+            is not proven.
+        """
         values = self._joint_values(rows)
         kernels = library(PROOF_KERNELS)
         if kernels is None or not self.route(rows, clearance=clearance).proven:
@@ -203,7 +211,7 @@ class Prover:
         return logs
 
     def proven(self, starts: Matrix, ends: Matrix, *, clearance: float = 0.0) -> Mask:
-        """Return which of the motions starts[k] -> ends[k], shapes (m, dof), are proven free. Shape (m,)."""
+        """Return which motions starts[k] -> ends[k], shapes (m, dof), are proven free, shape (m,)."""
         return in_blocks(partial(self._proven, clearance), starts, ends)
 
     def _proven(self, clearance: float, starts: Matrix, ends: Matrix) -> Mask:
@@ -222,22 +230,24 @@ class Prover:
         return mask
 
     def table(self, clearance: float) -> ProofTable:
-        """Return the table for kernels that prove motions of their own, with a clearance [m] until the next proof.
+        """Return the table for kernels that prove motions themselves, set to a clearance [m] until the next proof.
 
-        They keep a little more, so that a proof from the other end of a motion agrees, and forget earlier planes.
+        The table keeps ``SPARE`` in addition, so that a proof of the reversed motion agrees. Separating planes that
+        earlier proofs stored in it are cleared.
         """
         packed = self._packed_for(clearance, SPARE)
         packed.table.ways[:] = 0.0
         return packed.table
 
     def made(self, proof: Proof) -> bool:
-        """Check whether a proof is one of these bodies, by this object or its like for another thread."""
+        """Check whether a proof was made for these bodies, by this prover or its copy for another thread."""
         return isinstance(proof.maker, Prover) and proof.maker.kin is self.kin
 
     def still_proven(self, rows: Matrix, *, clearance: float) -> Mask:
-        """Return which configurations, shape (m, dof), are proven free, with a clearance [m]. Shape (m,).
+        """Return which configurations, shape (m, dof), are proven free with a clearance [m], shape (m,).
 
-        Of a few none is, as long as the table is not made: that takes longer than coal needs for them.
+        As long as the proof table does not exist, no proof is tried for a few configurations (up to ``FEW``): making
+        the table takes longer than checking them by coal.
         """
         mask = np.full(len(rows), self.tables.packed is not None or len(rows) > FEW)
         if mask.any():
@@ -245,22 +255,29 @@ class Prover:
         return mask
 
     def still_gaps(self, rows: Matrix, *, clearance: float) -> list[Gap]:
-        """The configurations, shape (m, dof), that are not proven free; each counts as a motion that stands still."""
+        """Return a gap for each configuration of rows, shape (m, dof), that is not proven free.
+
+        Each configuration is treated as a motion that stands still; ``Gap.motion`` is its index.
+        """
         values = self._joint_values(rows)
         return self._gaps((rows, rows), (values, values), self._sound(rows, values), (clearance, 0.0), None)
 
     def _distance(self, rows: Matrix, gap: Gap) -> float:
-        """How far the two bodies of a gap in the route through waypoints, shape (k, dof), are apart there [m]."""
+        """Return the distance [m] of the two bodies of a gap in a path, waypoints of shape (k, dof), at the gap."""
         q = rows[gap.motion] + np.nan_to_num(gap.share) * (rows[gap.motion + 1] - rows[gap.motion])
         return distance_between(self.robot, self.bodies, gap.pair, q)
 
     def _joint_values(self, rows: Matrix) -> Matrix:
-        """Return values of every joint of the chain, shape (m, joints), row after row in memory."""
+        """Return the values of all joints of the chain, shape (m, joints), in C order as the kernels read them."""
         gain, offset, _ = _joints(self.robot)
         return np.asarray(rows @ gain + offset)
 
     def _sound(self, rows: Matrix, values: Matrix) -> Mask | None:
-        """Which configurations are inside the limits and not too large for the bound on rounding; None for all."""
+        """Return which configurations allow a sound proof, shape (m,); None if all do.
+
+        They have to be inside the limits, and joint values must not exceed ``LARGEST_VALUE``, up to which rounding is
+        bounded.
+        """
         within_limits = inside_limits(self.robot, rows)
         if within_limits.all() and (_joints(self.robot)[2] or np.abs(values).max(initial=0.0) <= LARGEST_VALUE):
             return None
@@ -269,14 +286,17 @@ class Prover:
     def _gaps(
         self, rows: Ends, values: Ends, sound: Mask | None, distances: tuple[float, float], seconds: float | None
     ) -> list[Gap]:
-        """Return the motions that are not proven.
+        """Return the motions that are not proven, each with the pair of bodies and the place where its proof failed.
+
+        The kernels try all motions first, in batches. Motions that fail at two links of which one is a closed mesh are
+        then tried again with coal's distances (:class:`CoalProof`).
 
         Args:
-            rows: Where they begin and where they end, shapes (m or more, dof) and (m, dof).
-            values: Of all joints there, shapes (m or more, joints) and (m, joints).
-            sound: For which motions the bound on rounding holds at both ends, shape (m,); None for all.
-            distances: To be kept [m]: the clearance, and the slack between all bodies.
-            seconds: When to stop; None for never. What was not looked at by then is not proven.
+            rows: Start and end configurations, shapes (m or more, dof) and (m, dof).
+            values: Values of all joints there, shapes (m or more, joints) and (m, joints).
+            sound: Which motions allow a sound proof at both ends, shape (m,); None for all. See :meth:`_sound`.
+            distances: Distances to keep [m]: the clearance from obstacles, and the slack between all bodies.
+            seconds: Time limit [s]; None for none. Motions that were not examined by then count as not proven.
         """
         tails, heads = values
         count, joints = heads.shape
@@ -294,14 +314,17 @@ class Prover:
         written = pairs.ctypes.data, places.ctypes.data
 
         def prove(first: int, number: int) -> int:
-            """Let the kernels prove so many of the motions, and write the pairs and places; how many stay open."""
+            """Prove ``number`` motions from index ``first`` on by the kernels, and write their pairs and places.
+
+            Returns the number of motions that remain unproven.
+            """
             skipped = DOUBLE * joints * first
             sinks = written[0] + INT * first, written[1] + DOUBLE * first
             return int(kernels.prove(address, read[0] + skipped, read[1] + skipped, number, *sinks))
 
         looked_at = 0
         open_count = 0
-        batch = 1 if packed.touching else MOTIONS_AT_ONCE  # planes of contacts are suggested for one motion
+        batch = 1 if packed.touching else MOTIONS_AT_ONCE  # the planes of contacts differ from motion to motion
         for first in range(0, count, batch):
             if first > 0 and seconds is not None and time.monotonic() - begin > seconds:
                 break
@@ -323,13 +346,13 @@ class Prover:
         return [self._gap(packed, k, int(pairs[k]), float(places[k])) for k in np.flatnonzero(pairs != PROVEN).tolist()]
 
     def _packed_for(self, clearance: float, slack: float) -> ProofPairs:
-        """Return the table, with a clearance and a slack to keep."""
+        """Return the table, set to the clearance and the slack that proofs have to keep [m]."""
         packed = self.tables.get(self.bodies, self._new_table)
         packed.keep(clearance, slack)
         return packed
 
     def _coal_proof(self, packed: ProofPairs) -> CoalProof:
-        """What coal settles of a table: it is about links alone, wherever obstacles are."""
+        """Return the prover by coal for a table. It compares links alone, so it is kept wherever obstacles move."""
         if self._coal is None or self._coal.packed is not packed:
             self._coal = CoalProof(self.robot, self.bodies, packed)
         return self._coal
@@ -347,7 +370,12 @@ class Prover:
 
 @lru_cache(maxsize=MAX_ROBOTS)
 def _joints(robot: Robot) -> tuple[Matrix, Vector, bool]:
-    """How joint values follow from configurations, and whether the limits keep them below half the largest value."""
+    """Return the affine map from configurations to joint values, and whether the limits bound these.
+
+    Returns:
+        Gain, shape (dof, joints), and offset, shape (joints,), with ``values = q @ gain + offset``; whether the limits
+        keep all joint values below half of ``LARGEST_VALUE``.
+    """
     gain = np.ascontiguousarray(robot.chain.gain.T)
     limits = np.stack([robot.lower, robot.upper])
     bounded = bool(np.isfinite(limits).all() and np.abs(robot.chain.joint_values(limits)).max() < 0.5 * LARGEST_VALUE)
@@ -355,9 +383,18 @@ def _joints(robot: Robot) -> tuple[Matrix, Vector, bool]:
 
 
 def _entries(log: MotionEntries, measured_intervals: NDArray[np.int64]) -> MotionEntries:
-    """What a verifier does not find by itself; a motion that stands still is one interval of level 0."""
+    """Return the certificate entries of a motion that a verifier cannot reconstruct by itself.
+
+    Entries on the whole motion without a plane are dropped: a verifier finds them by balls and boxes. So are entries of
+    solids that coal measured, which get the intervals of coal's measurements instead.
+
+    Args:
+        log: The kernels' log of the motion.
+        measured_intervals: See :meth:`CoalProof.settle`, shape (n, 4).
+    """
     intervals = log.intervals.copy()
-    if len(intervals) and (intervals == intervals[0]).all():  # one interval alone is all of the motion
+    # A motion that stands still is logged as one interval, and covers all of it.
+    if len(intervals) and (intervals == intervals[0]).all():
         intervals[:] = 0
 
     settled_by_coal = (log.solids[:, None, ::2] == measured_intervals[None, :, :2]).all(axis=2).any(axis=1)
@@ -371,15 +408,15 @@ def _entries(log: MotionEntries, measured_intervals: NDArray[np.int64]) -> Motio
 
 
 class CoalProof:
-    """What kernels leave open of motions, settled by coal where it is about two links, one of them a closed mesh.
+    """Proofs by coal's distances, for pairs of links that kernels leave unproven and of which one is a closed mesh.
 
     Attributes:
         packed: The table that the kernels read.
-        links: Which pairs of it are such, shape (pairs,).
+        links: Which pairs of the table can be proven this way, shape (pairs,).
 
     Args:
         robot: The arm.
-        bodies: Its bodies and others.
+        bodies: All bodies of the world.
         packed: See above.
     """
 
@@ -398,16 +435,20 @@ class CoalProof:
         self.links: Mask = has_closed_mesh & ~packed.beside_obstacle & ~_groups(packed)
 
     def settle(self, motion: Matrix, pair: Numbers, place: Vector, again: Callable[[], object]) -> NDArray[np.int64]:
-        """Compare links by coal until nothing is left open of a motion, shape (2, dof), or what it cannot settle.
+        """Prove pairs of links apart by coal, until a motion has no unproven pair or one that coal cannot settle.
+
+        Each pair that coal proves apart is excluded from the table, and the kernels prove the motion again. The table
+        is restored at the end.
 
         Args:
-            motion: Its ends.
-            pair: Number of the pair of links that is not proven apart, shape (1,); written, -1 for none.
-            place: Where, shape (1,); written.
-            again: Lets the kernels prove the motion once more, and write both.
+            motion: Start and end configuration, shape (2, dof).
+            pair: Index of the pair of the table that is not proven apart, shape (1,). Written in place; -1 for none.
+            place: Share of the motion where its proof failed, shape (1,). Written in place.
+            again: Lets the kernels prove the motion once more, and write ``pair`` and ``place``.
 
         Returns:
-            The numbers of two links, level and number of an interval in whose middle they are measured, shape (n, 4).
+            Intervals on which coal proves two links apart, shape (n, 4): the numbers of the links, and the level and
+                number of the interval, in whose middle their distance is measured.
         """
         margins = self.packed.table.margins
         bodies = self.packed.bodies
@@ -429,34 +470,46 @@ class CoalProof:
         return np.array(intervals_of_links, dtype=np.int64).reshape(-1, 4)
 
     def logged(self, motion: Matrix, pair: Numbers, place: Vector, run: Callable[[], object]) -> Told:
-        """What kernels tell while they prove a motion, and :meth:`settle` of it; arguments as there."""
+        """Prove a motion by the kernels and :meth:`settle`; return the kernels' log and the intervals of coal.
+
+        Args:
+            motion: As of :meth:`settle`.
+            pair: As of :meth:`settle`.
+            place: As of :meth:`settle`.
+            run: Lets the kernels prove the motion, and write ``pair`` and ``place``.
+        """
         logs = [logged(self.packed, run)]
         intervals_of_links = self.settle(motion, pair, place, lambda: logs.append(logged(self.packed, run)))
         return logs[-1], intervals_of_links
 
     def _intervals(self, motion: Matrix, row: int, place: float) -> list[tuple[int, int]]:
-        """Intervals that cover a motion, on each of which the bodies of a pair are apart, found by bisection.
+        """Cover a motion by intervals on each of which two bodies are apart, by bisection.
+
+        The distance in the middle of an interval is compared with a bound on how far the bodies approach each other in
+        half of it. Where it is too small the interval is halved.
 
         Args:
-            motion: Its ends, shape (2, dof).
-            row: Of the pair in the table.
-            place: The share of the motion where kernels gave up, which is looked at first.
+            motion: Start and end configuration, shape (2, dof).
+            row: Index of the pair in the table.
+            place: Share of the motion where the kernels failed; it is measured first.
 
         Returns:
-            Level and number of each interval; no interval if the two are not shown apart in all of the motion.
+            Level and number of each interval; number k of level n is [k, k + 1] / 2^n of the motion. Empty if the
+            bodies are not proven apart on the whole motion.
         """
         pair = [self._bodies[k] for k in self.packed.bodies[row].tolist()]
         required_gap = float(self.packed.table.margins[row]) + DISTANCE_TOLERANCE
         approach = APPROACH_SPARE * float(
             approach_weights(self._robot, pair, [(0, 1)])[0] @ np.abs(motion[1] - motion[0])
         )
-        if required_gap <= 0.0:  # they may overlap, and coal measures surfaces alone
+        # Bodies that may overlap cannot be settled, for coal measures the distance of surfaces alone.
+        if required_gap <= 0.0:
             return []
         if Containment((*pair,), ((0, 1),)).holds((0, 1), self._robot.chain.joint_frames(motion[:1])[0]):
             return []
 
         def spare_at(share: float) -> float:
-            """Return how much more than they must the two are apart at a share of the motion [m]."""
+            """Return the distance of the bodies at a share of the motion minus the distance they must keep [m]."""
             return _gap_at(self._robot, pair, motion[0] + share * (motion[1] - motion[0])) - required_gap
 
         if spare_at(place) <= 0.0:
@@ -482,7 +535,7 @@ class CoalProof:
 
 
 def distance_between(robot: Robot, bodies: Sequence[Body], names: tuple[str, str], q: Vector) -> float:
-    """Return the distance between bodies of two names at q, shape (dof,) [m]; nan if there are none."""
+    """Return the least distance [m] between bodies with two names at q, shape (dof,); NaN if there are none."""
     first, second = ([body for body in bodies if body.name == name] for name in names)
     return min((_gap_at(robot, [a, b], q) for a in first for b in second), default=float("nan"))
 
@@ -492,14 +545,17 @@ def _gap_at(robot: Robot, pair: Sequence[Body], q: Vector) -> float:
 
 
 def _groups(packed: ProofPairs) -> Mask:
-    """Return which rows of the table are groups of bodies: these are made of pairs that come before them."""
+    """Return which rows of the table are groups of bodies, whose parts are pairs in earlier rows, shape (pairs,)."""
     firsts = packed.table.pairs.reshape(-1, layout.PAIR_SIZE)[:, layout.PARTS_FIRST]
     groups: Mask = (packed.sides[:, [1, 3]] < 0).all(axis=1) & (firsts < np.arange(len(firsts)))
     return groups
 
 
 def suggest_planes(robot: Robot, bodies: Sequence[Body], packed: ProofPairs, ends: Matrix) -> None:
-    """Let the kernels try the planes of contacts first, where a motion begins or ends, shape (2, dof)."""
+    """Let the kernels try the contact normals at the ends of a motion, shape (2, dof), as first planes.
+
+    The normals are written into ``packed``, in the frame of each pair.
+    """
     frames = robot.chain.joint_frames(ends)
     normals_of_rows = packed.table.ways.reshape(-1, 3)
     bases = packed.table.pairs.reshape(-1, layout.PAIR_SIZE)[:, layout.PAIR_BASE]
@@ -514,9 +570,17 @@ def suggest_planes(robot: Robot, bodies: Sequence[Body], packed: ProofPairs, end
 
 
 def _normal(pair: tuple[Body, Body], frames: Matrix) -> tuple[int, Vector]:
-    """Where two bodies are nearer to each other, 0 or 1, and there the unit vector from the first to the second."""
+    """Return the contact normal of two bodies at that end of a motion where they are nearer to each other.
+
+    Args:
+        pair: The bodies.
+        frames: Joint frames at both ends of the motion, shape (2, joints + 1, 4, 4).
+
+    Returns:
+        Index of that end, 0 or 1, and the unit vector from the first body to the second, shape (3,); zero for clouds.
+    """
     if any(isinstance(body.geometry, CloudSolid) for body in pair):
-        return 0, np.zeros(3)  # kernels look for their own
+        return 0, np.zeros(3)  # no suggestion: the kernels search for a plane themselves
 
     least_distance = np.inf
     nearest_end = 0

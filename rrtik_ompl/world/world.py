@@ -36,7 +36,11 @@ P = ParamSpec("P")
 def _with_arguments_of(
     settings: Callable[P, WorldSettings],
 ) -> Callable[[Callable[..., None]], Callable[Concatenate[Any, P], None]]:
-    """Let a constructor take the arguments of another, by name where it does not name them, for people and checkers."""
+    """Decorate a constructor that takes ``**settings`` so that its signature lists the settings one by one.
+
+    `inspect.signature`, `help` and type checkers then show the parameters of ``settings`` in place of ``**settings``.
+    Parameters that the constructor names itself are not repeated.
+    """
 
     def declared(constructor: Callable[Concatenate[Any, ...], None]) -> Callable[Concatenate[Any, P], None]:
         named = {
@@ -50,36 +54,37 @@ def _with_arguments_of(
 
 
 class World(Judge):
-    """Exact collision checks of a robot in a scene; several threads may ask one world, each in memory of its own.
+    """Exact collision checks of a robot in a scene. Several threads may use one world; each has its own working memory.
 
-    Answers are coal's, on the robot's and the scene's own geometry; kernels give most of them without calling coal
-    (:mod:`rrtik_ompl.world.exact_checks`). A conservative world never calls coal and refuses what they cannot prove.
+    The reference is coal on the robot's and the scene's own geometry. Compiled kernels decide most checks without
+    calling coal, and agree with it (:mod:`rrtik_ompl.world.exact_checks`). A conservative world never calls coal: it
+    counts as blocked what the kernels cannot prove free.
 
-    Motions are straight lines in configuration space, checked at both ends and at equal steps in between, so many that
-    no point of the arm moves more than ``motion_resolution`` between two checks. The same configurations are checked
-    in both directions.
+    Motions are straight lines in configuration space. They are checked at both ends and at equal steps in between, with
+    as many steps as are needed so that no point of the arm moves more than ``motion_resolution`` between two checks.
+    The same configurations are checked in both directions.
 
-    What moves of the arm has to stay farther from an obstacle than its margin, and from the arm's other bodies than
-    ``self_margin``; the base, which no posture moves, must only not touch an obstacle.
+    The moving parts of the arm must stay farther from an obstacle than its margin, and farther from the arm's other
+    bodies than ``self_margin``. The base, which no joint moves, must only not touch an obstacle.
 
-    All of it is made from :attr:`settings`. The other forms of a world (``with_...``, :meth:`proving`, :meth:`moved`,
-    copies) are worlds made from the same settings but for what they are asked to change; what does not depend on that
-    they share.
+    A world is defined by :attr:`settings`. The other forms of a world (``with_...``, :meth:`proving`, :meth:`moved`,
+    copies) are worlds with some settings changed; they share all data that does not depend on these.
 
     Attributes:
         settings: The arguments, checked; ``robot``, ``scene``, ``motion_resolution``, ``accuracy`` and ``self_margin``
             are also attributes of the world. ``World.of(replace(world.settings, ...))`` is another form of it.
         bodies: The solids of the robot and the scene.
-        pairs: Numbers of the bodies that must not touch.
-        constraints: What is held (:class:`~rrtik_ompl.constraints.held_regions.HeldRegions`); None if nothing is.
-        checks: Answers what the methods of a world ask, of rows that are trusted; of each thread's own.
+        pairs: Pairs of indices into ``bodies`` that must not touch.
+        constraints: The path constraints (:class:`~rrtik_ompl.constraints.held_regions.HeldRegions`); None if there
+            are none.
+        checks: Implements the methods of the world for arrays that need no validation; one object for each thread.
         weights: No point of the arm moves farther than ``weights @ |b - a|`` [m] from a to b, shape (dof,).
 
     Args:
         robot: The arm.
         scene: Its surroundings; empty if None. Moving obstacles are where they are at time 0.
-        **settings: By their names, the others of :class:`~rrtik_ompl.model.world_settings.WorldSettings`, which says
-            what each means: ``accuracy``, ``motion_resolution``, ``clearance``, ``constraints`` and so on.
+        **settings: The other fields of :class:`~rrtik_ompl.model.world_settings.WorldSettings`, where each is
+            described: ``accuracy``, ``motion_resolution``, ``clearance``, ``constraints`` and so on.
 
     Raises:
         InputError: If the scene names links that do not exist, a length makes no sense, or a region cannot be held.
@@ -87,7 +92,8 @@ class World(Judge):
     """
 
     checks: ThreadOwn[RowChecks] = ThreadOwn()
-    resolves = True  # kernels compare solids too where outer balls leave a motion in doubt
+    # Where the sphere covers leave a motion undecided, kernels also compare the solids.
+    resolves = True
 
     @_with_arguments_of(WorldSettings)
     def __init__(self, robot: Robot, scene: Scene | None = None, **settings: Any) -> None:
@@ -96,16 +102,16 @@ class World(Judge):
 
     @classmethod
     def of(cls, settings: WorldSettings) -> World:
-        """Return a world made from settings: all of them are arguments of its class.
+        """Create a world from its settings, the inverse of :attr:`settings`.
 
         Raises:
-            InputError: If they are none.
+            InputError: If ``settings`` is not a :class:`~rrtik_ompl.model.world_settings.WorldSettings`.
         """
         require(settings, WorldSettings, "settings of a world", "use world.settings, or dataclasses.replace of them")
         return _world_of(settings)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Return a copy answers as the world does, and may be used in another thread or process."""
+        """Pickle the settings alone; a copy gives the same answers, in this or another process."""
         return like, (self.settings,)
 
     def __repr__(self) -> str:
@@ -115,7 +121,7 @@ class World(Judge):
 
     @property
     def settings(self) -> WorldSettings:
-        """What the world is made from."""
+        """The settings that define the world."""
         return self._settings
 
     @property
@@ -140,27 +146,27 @@ class World(Judge):
 
     @property
     def self_margin(self) -> float:
-        """How far links, and what they hold, must stay from each other where they must not touch [m]."""
+        """The distance that links and attached objects must keep from each other [m]."""
         return self._settings.self_margin
 
     @property
     def constraints(self) -> HeldRegions | None:
-        """What is held; None if nothing is."""
+        """The path constraints; None if there are none."""
         return self.checks.constraints
 
     @property
     def prover(self) -> Prover:
-        """Proves motions free; where there are path constraints, free and held."""
+        """Proves whole motions free, and that they keep the path constraints if there are any."""
         return self.checks.prover
 
     @property
     def bodies(self) -> tuple[Body, ...]:
-        """The solids of the robot and the scene, with the margins of obstacles, without the clearance."""
+        """The solids of the robot and the scene. Their margins are those of the obstacles, without the clearance."""
         return self.checks.solids.bodies.as_tuple
 
     @property
     def pairs(self) -> Pairs:
-        """Numbers of the bodies that must not touch."""
+        """Pairs of indices into ``bodies`` that must not touch."""
         return self.checks.solids.pairs
 
     @property
@@ -170,9 +176,10 @@ class World(Judge):
 
     @property
     def fast(self) -> FastWorld | None:
-        """The world's tables, for planners that run in kernels; None without kernels or where these do not suffice.
+        """The tables for planners that run in kernels; None without kernels or where the tables do not suffice.
 
-        They do not where motions have to be proven or held, nor where something is in contact: they know nothing of it.
+        They do not suffice where motions have to be proven or keep path constraints, and where bodies may be in
+        contact: the tables represent none of these.
         """
         tables = self.checks.checker.fast
         settings = self._settings
@@ -181,14 +188,15 @@ class World(Judge):
 
     @property
     def motions(self) -> FastMotions | None:
-        """How motions are checked, for searches in kernels: one table for all of them. None where ``fast`` is."""
+        """The motion checks for searches in kernels, one table for all of them; None where ``fast`` is None."""
         return motions_of(self, self.checks.checker.motions)
 
     @property
     def free_motions(self) -> FastMotions | None:
-        """How kernels check motions for collisions alone, whatever else they must be; None where they cannot.
+        """The kernels' collision checks of motions, without path constraints and proofs; None where there are none.
 
-        Pairs that are in contact are left out: how deep they overlap is proven of what is found.
+        Pairs that may be in contact are left out. How deep they overlap is proven afterwards, of the path that is
+        found.
         """
         free = form_of(self, proving=None, constraints=())
         scene = free.scene
@@ -203,14 +211,14 @@ class World(Judge):
         return self if self.constraints is None else form_of(self, constraints=())
 
     def with_settings(self, **changes: Any) -> World:
-        """Return the same world but for some of its settings; it shares what does not depend on them.
+        """Return the same world with some settings changed; all data that does not depend on them is shared.
 
         Args:
             **changes: Values by the names of :class:`~rrtik_ompl.model.world_settings.WorldSettings`.
 
         Raises:
             InputError: If a value makes no sense.
-            UnknownNameError: If there is no setting of a name.
+            UnknownNameError: If there is no setting with a given name.
 
         Example:
             >>> world = rrtik.World(rrtik.load_robot("planar3")).with_settings(clearance=0.05, self_margin=0.01)
@@ -228,7 +236,7 @@ class World(Judge):
         return self.with_settings(scene=scene)
 
     def with_accuracy(self, accuracy: Accuracy) -> World:
-        """Return the same world, "exact" or "conservative"; shares everything else.
+        """Return the same world with another accuracy, "exact" or "conservative"; everything else is shared.
 
         Raises:
             UnknownNameError: If there is no such accuracy.
@@ -236,20 +244,20 @@ class World(Judge):
         return self.with_settings(accuracy=accuracy)
 
     def with_resolution(self, motion_resolution: float) -> World:
-        """Return the same world, its motions checked in steps of another size [m]; shares everything else.
+        """Return the same world with another motion resolution [m]; everything else is shared.
 
         Raises:
-            InputError: If the size is none, or less than 0.01 mm.
+            InputError: If the resolution is not a number, or less than 0.01 mm.
         """
         return self.with_settings(motion_resolution=motion_resolution)
 
     refined = Renamed("with_resolution")
 
     def with_clearance(self, clearance: float) -> World:
-        """Return the same world, where a distance [m] is kept from obstacles on top of their margins.
+        """Return the same world with a clearance [m] that is kept from obstacles on top of their margins.
 
-        It takes the place of an earlier one; 0 takes it away. Checks, proofs and whatever moves in it keep it;
-        :meth:`contacts` and :meth:`clearance` tell of margins alone.
+        It replaces an earlier clearance; 0 removes it. Checks, proofs and planners keep it. :meth:`contacts` and
+        :meth:`clearance` report distances relative to the margins alone.
 
         Raises:
             InputError: If the clearance is negative or infinite.
@@ -257,9 +265,10 @@ class World(Judge):
         return self.with_settings(clearance=clearance)
 
     def proving(self, clearance: float | None = 0.0) -> World:
-        """Return the same world, where motions have to be proven too, with a clearance [m]; searches in kernels cannot.
+        """Return the same world, in which motions are valid only if proven free with a clearance [m].
 
-        It takes the place of an earlier one; None takes it away.
+        It replaces an earlier value; None removes the requirement. Planners that search in kernels cannot use such a
+        world.
 
         Raises:
             InputError: If the clearance is negative or infinite.
@@ -267,18 +276,18 @@ class World(Judge):
         return self.with_settings(proving=clearance)
 
     def moved(self, name: str, pose: ArrayLike | pin.SE3) -> World:
-        """Return the world in which an obstacle stands elsewhere; what that costs hardly grows with their number.
+        """Return the world with one obstacle at another pose, at a cost that hardly depends on the number of obstacles.
 
-        The new world takes over the tables of this one and writes a few rows of them. This one is as it was; should it
-        be asked again, it makes its tables anew, as it does for other threads.
+        The new world takes over the tables of this one and updates a few rows of them. This world stays as it was: if
+        it is used again, it builds its tables anew.
 
         Args:
-            name: Of the obstacle.
+            name: Name of the obstacle.
             pose: T_world_obstacle, in any form that :func:`rrtik_ompl.base.poses.rigid` takes.
 
         Raises:
             UnknownNameError: If there is no obstacle of that name.
-            InputError: If the pose is none.
+            InputError: If ``pose`` is not a pose.
 
         Example:
             >>> ball = rrtik.Obstacle("ball", rrtik.Sphere(0.1), rrtik.pose([0.4, 0.0, 0.4]))
@@ -299,7 +308,7 @@ class World(Judge):
         return bool(self.checks.free(self._rows(q, 1))[0])
 
     def valid_batch(self, Q: ArrayLike) -> Mask:
-        """Return which rows of Q, shape (m, dof), are inside the limits and free of collision. Shape (m,).
+        """Return which configurations Q, shape (m, dof), are inside the limits and free of collision, shape (m,).
 
         Raises:
             InputError: If Q has the wrong shape or a value that is not finite.
@@ -311,19 +320,19 @@ class World(Judge):
         return bool(self.checks.motions_free(self._rows(a, 1), self._rows(b, 1))[0])
 
     def motion_valid_batch(self, A: ArrayLike, B: ArrayLike) -> Mask:
-        """Return which straight motions A[k] -> B[k], shape (m, dof) each, are valid. Shape (m,)."""
+        """Return which straight motions A[k] -> B[k], shape (m, dof) each, are valid, shape (m,)."""
         return self.checks.motions_free(*self._both_ends(A, B))
 
     def motion_proven(self, a: ArrayLike, b: ArrayLike) -> bool:
-        """Check whether each configuration of the straight motion from a to b, shape (dof,) each, is proven free."""
+        """Check whether every configuration of the straight motion from a to b, shape (dof,) each, is proven free."""
         clearance = self._settings.required_clearance
         return bool(self.prover.proven(self._rows(a, 1), self._rows(b, 1), clearance=clearance)[0])
 
     def motions_proven(self, A: ArrayLike, B: ArrayLike, *, clearance: float | None = None) -> Mask:
-        """Return which straight motions A[k] -> B[k], shape (m, dof) each, are proven free as a whole. Shape (m,).
+        """Return which straight motions A[k] -> B[k], shape (m, dof) each, are proven free as a whole, shape (m,).
 
-        ``clearance`` [m] is kept from every obstacle on top of its margin, by default what the world keeps. What grazes
-        an obstacle cannot be proven.
+        ``clearance`` [m] is kept from every obstacle on top of its margin; by default it is the clearance of the world.
+        A motion that grazes an obstacle cannot be proven.
         """
         required_clearance = self._proven_clearance(clearance)
         return self.prover.proven(*self._both_ends(A, B), clearance=required_clearance)
@@ -339,10 +348,11 @@ class World(Judge):
         """Prove the straight motions between waypoints, shape (k, dof), free for their whole length; after [16].
 
         Args:
-            waypoints: See above; a single one counts as a motion that stands still.
-            clearance: To be kept from every obstacle on top of its margin [m]; what the world keeps if None.
-            slack: To be kept between all bodies on top of that [m]: how far a point may leave the straight motions.
-            seconds: When to stop; what was not looked at by then is not proven.
+            waypoints: The path; a single waypoint counts as a motion that stands still.
+            clearance: Distance kept from every obstacle on top of its margin [m]; that of the world if None.
+            slack: Distance kept between all bodies in addition [m]: how far a point of the arm may deviate from the
+                straight motions.
+            seconds: Time limit [s]; motions that were not examined by then count as not proven.
 
         Raises:
             InputError: If there are no waypoints, one is no finite row of ``dof`` numbers, or a number is out of range.
@@ -354,10 +364,12 @@ class World(Judge):
         return self.prover.route(rows, clearance=required_clearance, slack=required_slack, seconds=time_limit)
 
     def has_proven(self, proof: Proof) -> bool:
-        """Check whether a proof covers every motion, keeps what the world keeps, and was made by a form of the world.
+        """Check whether a proof holds in this world.
+
+        It has to cover every motion, keep the clearance of the world, and be made by a form of this world.
 
         Raises:
-            InputError: If it is no proof.
+            InputError: If ``proof`` is not a proof.
         """
         require(proof, Proof, "proof", "use world.prove(waypoints)")
         return proof.proven and proof.clearance >= self._settings.required_clearance and self.prover.made(proof)
@@ -365,9 +377,9 @@ class World(Judge):
     def violations(self, waypoints: ArrayLike, *, resolution: float | None = None) -> tuple[Violation, ...]:
         """Check the straight motions between waypoints, shape (k, dof), again: the second check of a path.
 
-        A motion that is proven free for its whole length (:meth:`prove`) needs no more. Every other one is checked in
-        steps in which no point of the arm moves more than half of the motion resolution (or ``resolution`` [m], if
-        given), by :meth:`certify`.
+        A motion that is proven free for its whole length (:meth:`prove`) needs no other check. Every other motion is
+        sampled so densely that no point of the arm moves more than half of the motion resolution (or ``resolution``
+        [m], if given) between two samples, and each sample is checked by :meth:`certify`.
 
         Returns:
             The first violation of every motion that has one.
@@ -385,7 +397,9 @@ class World(Judge):
         return violations_of(self.checks, self._rows(waypoints, 2), step)
 
     def judged(self, waypoints: ArrayLike) -> Judged:
-        """What is said of the straight motions between waypoints, shape (k, dof), where they are drawn.
+        """Return a verdict on a path, its clearance curve and its contacts, as pictures of the path show them.
+
+        ``waypoints`` has shape (k, dof); the motions between them are straight.
 
         Raises:
             InputError: If a waypoint is no finite row of ``dof`` numbers.
@@ -393,7 +407,10 @@ class World(Judge):
         return judged_path(self.checks, self._rows(waypoints, 2))
 
     def steps(self, a: ArrayLike, b: ArrayLike, resolution: float | None = None) -> int:
-        """Number of steps in which a motion is checked: the bound on the arm's displacement over the resolution."""
+        """Return the number of steps in which a motion is checked.
+
+        It is a bound on the displacement of the arm's points [m], divided by the resolution [m] and rounded up.
+        """
         step = self.motion_resolution if resolution is None else positive(resolution, "resolution", "give metres")
         return int(step_counts(self._rows(a, 1), self._rows(b, 1), self.weights, step)[0])
 
@@ -402,9 +419,10 @@ class World(Judge):
         return self.checks.contacts(self._rows(q, 1)[0])
 
     def closest(self, q: ArrayLike, *, known_free: bool = False) -> Contact | None:
-        """The pair of bodies that is nearest to contact or to its margin at q, or deepest in it; None if there is none.
+        """Return the pair of bodies with the least clearance at q, or None if no pair can collide.
 
-        ``known_free`` leaves out the check for contacts, where they were ruled out before.
+        Clearance is the signed distance minus the margin. ``known_free`` skips the check for contacts, where the caller
+        has excluded them already.
         """
         row = self._rows(q, 1)[0]
         if known_free is not True and (touching := self.checks.contacts(row)):
@@ -417,22 +435,26 @@ class World(Judge):
         return float("inf") if nearest is None else nearest.clearance
 
     def too_near(self, q: ArrayLike) -> tuple[Contact, ...]:
-        """Every pair that keeps its margin at q, and not the clearance on top of it, nearest first; see ``settings``.
+        """Return every pair that keeps its margin at q but not the clearance on top of it, nearest first.
 
-        The ``margin`` of such a contact is that of the obstacle and the clearance together.
+        The ``margin`` of such a contact is the sum of the obstacle's margin and the clearance.
         """
         return self.checks.too_near(self._rows(q, 1)[0])
 
     def explain(self, q: ArrayLike) -> str:
         """Return a line that says why q is not valid; "" if it is.
 
-        It names the joint outside its limit, the pair in collision, nearer than its margin or than the clearance, or
-        the path constraint that q does not keep.
+        The line names the joint outside its limit, the pair that is in collision or nearer than its margin or the
+        clearance, or the path constraint that q violates.
         """
         return self.checks.explain(self._rows(q, 1)[0])
 
     def certify(self, Q: ArrayLike) -> Mask:
-        """A second opinion on rows of Q, (m, dof) -> (m,), not by the checks of planners: proofs first, then coal."""
+        """Return which rows of Q, shape (m, dof), an independent second check calls free, shape (m,).
+
+        It uses none of the checks of planners: it tries to prove each configuration free, and asks coal about the
+        others.
+        """
         return self.checks.certified(self._rows(Q, 2))
 
     def _proven_clearance(self, asked: float | None) -> float:
@@ -446,7 +468,7 @@ class World(Judge):
         return starts, ends
 
     def _rows(self, Q: ArrayLike, dimensions: int) -> Matrix:
-        """Checked configurations as rows, shape (m, dof)."""
+        """Validate one configuration (``dimensions`` 1) or several (2) and return them as rows, shape (m, dof)."""
         rows = Q if isinstance(Q, np.ndarray) and Q.dtype == np.float64 and Q.size <= MOST_NUMBERS else None
         if rows is None or rows.ndim != dimensions or rows.shape[-1] != self.robot.dof or not np.isfinite(rows).all():
             what = f"configurations of robot '{self.robot.name}'"
@@ -455,7 +477,10 @@ class World(Judge):
 
 
 def form_of(world: World, **known: Any) -> World:
-    """The same world but for some of its settings, which are known to be right; see :meth:`World.with_settings`."""
+    """Return the same world with some settings changed, which the caller knows to be valid.
+
+    As :meth:`World.with_settings`, but without checks of the values. Nothing is made anew if nothing changes.
+    """
     settings = world.settings
     if all(getattr(settings, name) == value for name, value in known.items()):
         return world
@@ -463,7 +488,7 @@ def form_of(world: World, **known: Any) -> World:
 
 
 def _world_of(settings: WorldSettings) -> World:
-    """Return a world of settings that are known to be right: ``World(...)`` without its checks."""
+    """Create a world from valid settings: ``World(...)`` without its checks."""
     return _world_with(checks_of(settings))
 
 
@@ -472,7 +497,7 @@ def _world_with(checks: RowChecks) -> World:
 
 
 def like(settings: WorldSettings) -> World:
-    """Return a world of the settings of one that there was already; what it doubts was said there."""
+    """Create a world from the settings of an earlier world, without repeating the warnings that were given there."""
     with warnings.catch_warnings():
         for doubt in (MeshWarning, DescriptionWarning):
             warnings.simplefilter("ignore", doubt)
@@ -480,10 +505,10 @@ def like(settings: WorldSettings) -> World:
 
 
 def check_world(world: World | None, robot: Robot) -> None:
-    """Refuse what is no robot, no world, or the world of another robot.
+    """Refuse a robot or world of another type, and a world that holds another robot.
 
     Raises:
-        InputError: It says how to make what is needed.
+        InputError: The message says how to make the object that is needed.
     """
     require(robot, Robot, "robot", "use load_robot(name or file)")
     if world is None:
