@@ -1,1 +1,1 @@
-"""What a session talks to: the arm, the camera, and simulations of both."""
+"""Devices of a session: the arm, the camera, and simulations of both."""

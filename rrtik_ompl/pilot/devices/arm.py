@@ -1,4 +1,4 @@
-"""The interface of an arm, which reads its joints and moves one of them, and a simulated arm."""
+"""The interface of an arm that can be read and moved, and a simulated arm without errors."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ class Arm(Protocol):
     lost: str
 
     def read(self) -> Vector:
-        """Joint values. Shape (dof,), rad or m."""
+        """Return the joint values, shape (dof,) [rad or m]."""
 
     def move(self, joint: int, target: float) -> None:
-        """Send one joint to a value [rad or m]; all others stand still. A new move takes the place of the last."""
+        """Send one joint to a value [rad or m] while all others stand still. A new move replaces the last."""
 
     def follow(self, q: ArrayLike) -> None:
-        """Send all joints to a set point, shape (dof,) [rad or m], each as fast as it goes."""
+        """Send all joints to a set point, shape (dof,) [rad or m], each at its full rate."""
 
     def stop(self) -> None:
         """Stop at once."""
@@ -41,7 +41,9 @@ class Arm(Protocol):
 
 
 def joint_rates(robot: Robot, rates: ArrayLike | None = None) -> Vector:
-    """How fast each joint goes when it is driven, shape (dof,) [rad/s or m/s]: given, or default ones below its limit.
+    """Return the rate at which each joint is driven, shape (dof,) [rad/s or m/s].
+
+    Without ``rates`` these are the default rates, limited to the velocity limits of the robot.
 
     Raises:
         InputError: If a rate is not positive.
@@ -74,27 +76,27 @@ class SimulatedArm:
         self._course: Vector | None = None
 
     def read(self) -> Vector:
-        """Joint values. Shape (dof,), rad or m."""
+        """Return the joint values, shape (dof,) [rad or m]."""
         return self._q.copy()
 
     def links(self) -> Vector:
-        """Where the links are, which a camera sees. Shape (dof,), rad or m."""
+        """Return the true joint values of the links, which a camera sees, shape (dof,) [rad or m]."""
         return self._q.copy()
 
     @property
     def moving(self) -> int | None:
-        """The joint that moves, None if it stands still."""
+        """The number of the joint that moves; None if no single joint does."""
         return None if self._goal is None else self._goal[0]
 
     def move(self, joint: int, target: float) -> None:
-        """Send one joint to a value [rad or m], inside its limits."""
+        """Send one joint to a value [rad or m], clipped to its limits."""
         low = float(self.robot.lower[joint])
         high = float(self.robot.upper[joint])
         self._goal = (joint, min(max(target, low), high))
         self._course = None
 
     def follow(self, q: ArrayLike) -> None:
-        """Send all joints to a configuration, each as fast as it goes; for set points that come one after the other.
+        """Send all joints to a set point, shape (dof,) [rad or m], each at its full rate.
 
         Raises:
             InputError: If it does not fit the robot.
@@ -111,7 +113,7 @@ class SimulatedArm:
         self.closed = closed
 
     def advance(self, seconds: float) -> None:
-        """Let simulated time pass [s]: what was sent on its way moves on."""
+        """Advance the simulated time [s]: joints move towards their targets at their rates."""
         if self._course is not None:
             max_step = self._rates * seconds
             self._q = self._q + np.clip(self._course - self._q, -max_step, max_step)

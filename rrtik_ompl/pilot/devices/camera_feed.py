@@ -1,4 +1,4 @@
-"""Pictures from a camera that may be slow, stop, or come back: read in a thread, so that nothing waits for them."""
+"""Read pictures from a camera in a thread, so that nothing waits if the camera is slow, stops, or comes back."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from rrtik_ompl.base.errors import RrtikError
 from rrtik_ompl.sensing.cameras.pictures import CameraLostError, Picture
 
-RETRY_SECONDS = 2.0  # [s] after a camera was lost
+RETRY_SECONDS = 2.0  # [s]; pause before a lost camera is opened again
 ENDED = "no more pictures: the last one stays"
 
 
@@ -21,7 +21,7 @@ class PictureSource(Protocol):
     """A source of pictures, one at a time."""
 
     def latest(self) -> Picture | None:
-        """The newest picture, None if there is none since the last call.
+        """Return the newest picture; None if there is none since the last call.
 
         Raises:
             CameraLostError: While there is no camera.
@@ -32,19 +32,20 @@ class PictureSource(Protocol):
 
 
 class Feed:
-    """The newest picture of a camera, a video or a folder; older ones are dropped.
+    """Hold the newest picture of a camera, a video or a folder; older pictures are dropped.
 
     Attributes:
-        reported: When its thread reported last, by ``time.monotonic()``; inf if it may be silent: pictures of a record,
-            and after the last one.
+        reported: Time of the last sign of life of its thread, by ``time.monotonic()``; inf if the thread may be silent:
+            with recorded pictures, and after the last one.
     """
 
     def __init__(self, open_pictures: Callable[[], Iterator[Picture]], *, paced: bool = False) -> None:
-        """Begin to read.
+        """Start the thread that reads.
 
         Args:
-            open_pictures: Opens the source; called again after a camera was lost.
-            paced: For recorded pictures: give them out at the times at which they were taken, and end with the last.
+            open_pictures: Opens the source; called again after the camera was lost.
+            paced: Whether the pictures are recorded: they are delivered at the times at which they were taken, and the
+                feed ends with the last one.
 
         Raises:
             InputError: If not even the first picture can be read.
@@ -63,7 +64,7 @@ class Feed:
         self._thread.start()
 
     def latest(self) -> Picture | None:
-        """The newest picture, None if there is none since the last call.
+        """Return the newest picture; None if there is none since the last call.
 
         Raises:
             CameraLostError: While there is no camera.
@@ -90,7 +91,7 @@ class Feed:
             pictures = self._opened()
 
     def _read_until_lost(self, pictures: Iterator[Picture]) -> str:
-        """Hand out pictures until there are no more; returns why."""
+        """Deliver pictures until there are no more, and return the reason."""
         begin = time.monotonic()
         try:
             for picture in pictures:
@@ -102,12 +103,12 @@ class Feed:
                 self._report()
         except RrtikError as error:
             return str(error)
-        except Exception as error:  # of a library or a driver: the thread goes on, and says so
+        except Exception as error:  # libraries and drivers may raise anything; the thread must survive
             return f"the camera broke: {str(error) or type(error).__name__}"
         return ENDED
 
     def _opened(self) -> Iterator[Picture]:
-        """The source once more; what is wrong with it comes with the first picture."""
+        """Open the source again; errors appear only when the first picture is read."""
         yield from self._open()
 
     def _report(self) -> None:
@@ -120,24 +121,24 @@ class Feed:
 
 
 class FurtherCamera(Protocol):
-    """A camera that is shown beside the first one."""
+    """A camera that is shown in addition to the first one."""
 
     def picture(self) -> NDArray[np.uint8] | None:
-        """The newest picture, shape (height, width, 3); None if there is none yet."""
+        """Return the newest picture, shape (height, width, 3); None if there is none yet."""
 
     def close(self) -> None:
         """Release the camera."""
 
 
 class LiveCamera:
-    """A camera, or a film."""
+    """A further camera whose pictures come from a camera or a film."""
 
     def __init__(self, source: PictureSource) -> None:
         self._source = source
         self._last: NDArray[np.uint8] | None = None
 
     def picture(self) -> NDArray[np.uint8] | None:
-        """The newest picture, darkened where the camera is lost; None if there was none yet."""
+        """Return the newest picture, shape (height, width, 3), darkened while the camera is lost; None if there was none."""
         try:
             taken = self._source.latest()
         except RrtikError:

@@ -4,23 +4,24 @@ The protocol is one JSON object a line, UTF-8, at most 64 kB. Joints are in the 
 
 - the server greets: ``{"protocol": "rrtik-arm", "version": 1, "joints": ["azimuth", ..]}``
 - ``{"do": "read"}`` is answered by ``{"q": [..]}``
-- ``{"do": "move", "joint": 2, "target": 0.5}`` sends one joint (counted from 0) on its way; a new move takes the place
-  of the last; answered by ``{"q": [..]}``
+- ``{"do": "move", "joint": 2, "target": 0.5}`` sends one joint (counted from 0) to a value; a new move replaces the
+  last; answered by ``{"q": [..]}``
 - ``{"do": "follow", "q": [..]}`` sends all joints to set points, for trajectories; answered by ``{"q": [..]}``
 - ``{"do": "grip", "closed": true}`` closes or opens the gripper; answered by ``{"q": [..]}``
 - ``{"do": "stop"}`` stops at once; answered by ``{"q": [..]}``
-- ``"seconds": 0.04`` in a move or a follow is for how long it holds: if no next one comes, the arm stops then
+- ``"seconds": 0.04`` in a move or a follow limits its validity: if no next request comes in this time, the arm stops
 - a request that cannot be fulfilled is answered by ``{"error": "one line"}``
 
 The client requests the joints about 30 times a second. A server stops the arm when its client has gone, or has sent
-no whole request for half a second; a client counts the line as lost when no whole answer comes in that time, or one
-that is none: too long, too deep, joints that the arm cannot have.
+no complete request for half a second. A client counts the connection as lost when no complete answer comes in that
+time, or an invalid one: too long, nested too deep, or with joint values that the arm cannot have.
 
-An arm that a pilot drives has a judge. It is asked in the thread that talks to the arm, so that nothing else delays it:
-each reading is judged when it comes, and while there is a fault every request is a stop. What was told last is sent
-again until the next comes, for `RENEW_SECONDS` at most, then the arm is stopped. Each time it holds for no longer
-than an arm at its rate takes, together with what was sent before it, to be off by as much as the judge allows. So an
-arm that does another thing than it is told stops by itself where this machine is too busy to stop it.
+An arm that a pilot drives has a judge. It is called in the thread that talks to the arm, so that nothing else delays
+it: each reading is judged when it comes, and while there is a fault every request is a stop. The last set point is
+repeated until the next one comes, for `RENEW_SECONDS` at most; then the arm is stopped. Each set point is valid only
+for a short time: no longer than the arm, at its rate, can move without leaving the error that the judge allows,
+counting what was sent before. So an arm that moves differently from its set points stops by itself even if this
+machine is too busy to stop it.
 """
 
 from __future__ import annotations
@@ -44,19 +45,21 @@ from rrtik_ompl.pilot.devices.arm import SimulatedArm
 PROTOCOL = "rrtik-arm"
 VERSION = 1
 POLL_SECONDS = 1.0 / 30.0  # between two requests for the joints
-DRIVEN_POLL_SECONDS = 0.02  # the same while an arm with a judge is driven
-RENEW_SECONDS = 0.1  # for as long is the last set point sent again: an arm that does what it is told is there by then
-UNSEEN_SECONDS = 0.09  # of motion between the last reading that was judged and the end of what was sent, at most
-SHORTEST_SECONDS = 0.005  # that a set point holds
-TIMEOUT_SECONDS = 0.5  # for a whole answer
-LIMIT_SLACK = 0.2  # [rad] or [m]; an arm may have passed a limit by as much
+DRIVEN_POLL_SECONDS = 0.02  # the same interval while an arm with a judge is driven
+# The last set point is repeated for this long; an arm without faults has reached it by then.
+RENEW_SECONDS = 0.1
+# Longest motion between the last reading that was judged and the end of the validity of a set point.
+UNSEEN_SECONDS = 0.09
+SHORTEST_SECONDS = 0.005  # least validity of a set point
+TIMEOUT_SECONDS = 0.5  # for a complete answer
+LIMIT_SLACK = 0.2  # [rad or m]; by how much a reading may exceed the limits
 RETRY_SECONDS = 1.0
 MAX_LINE_BYTES = 64 * 1024
 SET_POINTS = ("move", "follow")
 
 
 class Line:
-    """Whole JSON objects over a socket."""
+    """Exchange complete JSON objects over a socket."""
 
     def __init__(self, connection: socket.socket) -> None:
         connection.settimeout(TIMEOUT_SECONDS)
@@ -68,14 +71,15 @@ class Line:
         self._socket.sendall(json.dumps(words).encode() + b"\n")
 
     def receive(self) -> dict[str, Any]:
-        """The next object.
+        """Wait for the next object and return it.
 
         Raises:
-            OSError: If the connection ends, nothing comes in time, or what comes is none.
+            OSError: If the connection ends, nothing comes in time, or what comes is no JSON object.
         """
         end = time.monotonic() + TIMEOUT_SECONDS
         while b"\n" not in self._unread_bytes:
-            self._socket.settimeout(max(end - time.monotonic(), 1e-3))  # one deadline, however the bytes trickle in
+            # One deadline applies to the whole line, however slowly its bytes arrive.
+            self._socket.settimeout(max(end - time.monotonic(), 1e-3))
             received = self._socket.recv(4096)
             self._unread_bytes += received
             if not received or len(self._unread_bytes) > MAX_LINE_BYTES:
@@ -95,38 +99,38 @@ class Line:
 
 
 class Judge(Protocol):
-    """Compares readings of an arm with what it was told. Called by the thread that reads the arm.
+    """Compare the readings of an arm with its set points. Called by the thread that reads the arm.
 
     Attributes:
-        fault: What the arm has done that it was not told; "" if nothing.
+        fault: What the arm did against its set points; "" if nothing.
     """
 
     fault: str
 
     def read(self, q: Vector, time: float) -> None:
-        """Judge a reading, shape (dof,), of a time by ``time.monotonic()``."""
+        """Judge a reading, shape (dof,), taken at a time by ``time.monotonic()``."""
 
     def room(self) -> float:
-        """By how much of what is allowed the arm may yet be off, 0 to 1."""
+        """Return the share of the allowed error that is left, from 0 to 1."""
 
 
 class LineArm:
-    """An arm that a server offers. When the connection is lost it keeps the last known joints, and tries again.
+    """An arm that a server offers. If the connection is lost, it keeps the last known joint values and reconnects.
 
     Attributes:
-        robot: The robot that the arm is.
-        judge: Of its readings; an arm without one is not judged.
+        robot: The robot model of the arm.
+        judge: Judges its readings; None for no judge.
         lost: Why the connection is lost; "" if it is not.
-        reported: When its thread reported last, by ``time.monotonic()``.
+        reported: Time of the last sign of life of its thread, by ``time.monotonic()``.
     """
 
     def __init__(self, robot: Robot, host: str, port: int) -> None:
-        """Connect.
+        """Connect to the server, and start the thread that talks to it.
 
         Args:
             robot: The robot that the arm must be.
-            host: Of the server.
-            port: Of the server.
+            host: Host of the server.
+            port: Port of the server.
 
         Raises:
             InputError: If there is no server, or it offers another arm.
@@ -138,10 +142,10 @@ class LineArm:
         self.judge: Judge | None = None
 
         self._request: dict[str, Any] | None = None
-        self._set_point: dict[str, Any] | None = None  # what the arm was told last, if it was not a stop
-        self._set_point_time = -np.inf  # when that was
-        self._valid_seconds = 0.0  # for how long what was sent last does [s]
-        self._grip: dict[str, Any] | None = None  # goes first, and no move takes its place
+        self._set_point: dict[str, Any] | None = None  # the last set point; None after a stop
+        self._set_point_time = -np.inf  # time at which it was given
+        self._valid_seconds = 0.0  # remaining validity of the last request sent [s]
+        self._grip: dict[str, Any] | None = None  # sent before anything else; a move does not replace it
 
         self._lock = threading.Lock()
         self._ended = threading.Event()
@@ -157,7 +161,7 @@ class LineArm:
         self._thread.start()
 
     def read(self) -> Vector:
-        """The joint values received last. Shape (dof,), rad or m."""
+        """Return the joint values received last, shape (dof,) [rad or m]."""
         with self._lock:
             return self._q.copy()
 
@@ -182,7 +186,7 @@ class LineArm:
         self._send_later({"do": "follow", "q": self.robot.configuration(q, "set point").tolist()})
 
     def stop(self) -> None:
-        """Stop at once; without connection the server does so itself."""
+        """Stop at once; without a connection the server stops the arm by itself."""
         self._send_later({"do": "stop"})
 
     def grip(self, closed: bool) -> None:
@@ -198,7 +202,7 @@ class LineArm:
         self._wake.set()
 
     def close(self) -> None:
-        """Stop, and end the connection."""
+        """Stop the arm, and end the connection."""
         self.stop()
         self._ended.set()
         self._thread.join(timeout=5.0)
@@ -228,7 +232,7 @@ class LineArm:
             raise ConnectionError(f"it has the joints {joints}, not those of '{self.robot.name}'")
 
     def _exchange(self, message: dict[str, Any]) -> Vector:
-        """Send a request and receive the joint values."""
+        """Send a request, and return the joint values of the answer, shape (dof,)."""
         self._line.send(**message)
         answer = self._line.receive()
         if "error" in answer:
@@ -242,7 +246,12 @@ class LineArm:
         return q
 
     def _next_request(self) -> dict[str, Any]:
-        """What is sent next: what was asked for, or else the last set point while it is young, or else a reading."""
+        """Return the request to send next.
+
+        A gripper command goes first, then the last command given. Without one, an arm with a judge gets its last set
+        point again while that is recent, then a stop; otherwise the joints are read. While the judge has a fault, every
+        request is a stop. Set points get a validity that keeps the unobserved motion within what the judge allows.
+        """
         with self._lock:
             message = self._grip
             self._grip = None
@@ -265,12 +274,13 @@ class LineArm:
         if message["do"] not in SET_POINTS:
             return message
 
-        allowed_seconds = UNSEEN_SECONDS * self.judge.room() - self._valid_seconds  # what was sent before still holds
+        # The last request is still valid when this one arrives: its time counts, too.
+        allowed_seconds = UNSEEN_SECONDS * self.judge.room() - self._valid_seconds
         self._valid_seconds = max(min(allowed_seconds, 0.5 * UNSEEN_SECONDS), SHORTEST_SECONDS)
         return message | {"seconds": self._valid_seconds}
 
     def _judge(self, q: Vector) -> None:
-        """Have a reading judged; the next request follows at once if that is a stop."""
+        """Have a reading judged; on a new fault, send the stop without delay."""
         if self.judge is None:
             return
         previous_fault = self.judge.fault
@@ -279,7 +289,7 @@ class LineArm:
             self._wake.set()
 
     def _communicate(self) -> None:
-        """Request the joints and send moves, until the end; connect again when the connection is lost."""
+        """Exchange requests and readings until the arm is closed; reconnect when the connection is lost."""
         while True:
             self._wake.wait(DRIVEN_POLL_SECONDS if self._valid_seconds else POLL_SECONDS)
             self._wake.clear()
@@ -288,13 +298,13 @@ class LineArm:
             try:
                 if self.lost:
                     self._line = self._connect()
-                    message = {"do": "read"}  # a move from before is out of date
+                    message = {"do": "read"}  # commands given before the loss are out of date
                 q = self._exchange(message)
                 self._judge(q)
                 with self._lock:
                     self._q = q
                     self.lost = ""
-            except Exception as error:  # nothing that comes over the line ends this thread
+            except Exception as error:  # no message, however malformed, may end this thread
                 self._line.close()
                 with self._lock:
                     self._set_point = None
@@ -308,13 +318,13 @@ class LineArm:
 
 
 class LineServer:
-    """Offers a simulated arm to one client at a time, on this machine; use it as a context manager."""
+    """Offer a simulated arm to one client at a time on this machine; use it as a context manager."""
 
     def __init__(self, arm: SimulatedArm, port: int = 0, host: str = "127.0.0.1") -> None:
-        """Take a port; a free one if 0.
+        """Open a port; 0 chooses a free one.
 
         Raises:
-            InputError: If it cannot be used.
+            InputError: If the port cannot be used.
         """
         self.arm = arm
         try:
@@ -341,12 +351,14 @@ class LineServer:
                 connection, _ = self._listening.accept()
             except TimeoutError:
                 continue
-            except OSError:  # a client that has gone already, or no file handle is left: others will be
+            # The client has left already, or the process is out of file handles: try again later.
+            except OSError:
                 self._ended.wait(POLL_SECONDS)
                 continue
 
             line = Line(connection)
-            with suppress(Exception):  # the client has gone, is silent, or sends what is no request
+            # The client has left, is silent, or sends no valid request.
+            with suppress(Exception):
                 line.send(protocol=PROTOCOL, version=VERSION, joints=list(self.arm.robot.joint_names))
                 self._answer(line)
             self.arm.stop()
@@ -373,7 +385,7 @@ class LineServer:
             line.send(**({"error": fault} if fault else {"q": self.arm.read().tolist()}))
 
     def _execute(self, request: dict[str, Any]) -> str:
-        """Execute a request; returns what is wrong with it, "" if nothing is."""
+        """Execute a request, and return what is wrong with it; "" if nothing is."""
         action = request.get("do")
         joint = request.get("joint")
         target = request.get("target")
@@ -384,7 +396,8 @@ class LineServer:
         if action == "stop":
             self.arm.stop()
         elif action == "move":
-            are_numbers = type(joint) is int and type(target) in (int, float)  # true is neither
+            # Types are compared exactly: bool is a subclass of int, but no number here.
+            are_numbers = type(joint) is int and type(target) in (int, float)
             if not (are_numbers and 0 <= joint < self.arm.robot.dof and abs(target) < LARGEST):  # type: ignore[operator,arg-type]
                 return f"move needs a joint from 0 to {self.arm.robot.dof - 1} and a finite target"
             self.arm.move(int(joint), float(target))  # type: ignore[arg-type]
@@ -403,15 +416,15 @@ class LineServer:
 
 
 class ArmLink:
-    """A simulated arm, or one on the other side of a connection, that follows a trajectory."""
+    """Connect a simulated arm, or a `LineArm`, to the execution of trajectories."""
 
     def __init__(self, arm: SimulatedArm | LineArm) -> None:
         self.arm = arm
 
     def positions(self) -> Vector:
-        """Joint values now, shape (dof,)."""
+        """Return the present joint values, shape (dof,)."""
         return self.arm.read()
 
     def command(self, q: Vector, t: float) -> None:
-        """Send all joints to a set point."""
+        """Send all joints to a set point, shape (dof,) [rad or m]; the time ``t`` is not used."""
         self.arm.follow(q)

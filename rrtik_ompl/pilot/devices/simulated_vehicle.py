@@ -25,23 +25,23 @@ from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.markers.marker_map import MarkerMap
 from rrtik_ompl.sensing.markers.marker_map_file import load_marker_map
 
-FOLDER = "pilot"  # beside the shipped problems
+FOLDER = "pilot"  # folder beside the shipped problems
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SimulatedVehicle:
-    """The camera of a simulated vehicle and what it sees.
+    """The camera of a simulated vehicle, and what it sees.
 
     Attributes:
-        camera: The lens.
-        marker_map: The objects.
-        places: ``T_base_object`` by name.
+        camera: Model of the camera.
+        marker_map: The objects with their markers.
+        places: True poses ``T_base_object`` by name of the object.
         T_base_camera: Pose of the camera.
-        faults: Of the arm; None if it has none.
+        faults: Faults of the arm; None if it has none.
         base_motion: How the vehicle moves; None if it stands still.
-        further: Cameras beside the first one.
+        further: Cameras in addition to the first one.
         structure: Name of the object to which the problem's obstacles are fixed; None if they move with the vehicle.
-        patience: For how long routes stand on what is out of view [s]; None for that of the session.
+        patience: How long routes may depend on objects out of view [s]; None for the default of the session.
     """
 
     camera: Camera
@@ -63,12 +63,12 @@ class FurtherEntry(Section):
     pose: PoseEntry
 
     def build(self) -> Mount:
-        """Where it is."""
+        """Return the place of the camera."""
         return Mount(self.name, self.carried_by == "tip", self.pose.build())
 
 
 class BaseMotionEntry(Section):
-    """How the base moves. In its own frame at the beginning."""
+    """Motion of the base, in its own frame at the beginning."""
 
     drift: Annotated[list[float], Field(min_length=3, max_length=3)] = [0.0, 0.0, 0.0]  # noqa: RUF012 - pydantic copies
     sway: Annotated[list[float], Field(min_length=3, max_length=3)] = [0.0, 0.0, 0.0]  # noqa: RUF012
@@ -76,12 +76,12 @@ class BaseMotionEntry(Section):
     period: Length = Field(5.0, description="of the sway [s]")
 
     def build(self) -> BaseMotion:
-        """The motion."""
+        """Return the motion."""
         return BaseMotion(self.drift, self.sway, np.deg2rad(self.tilt_deg), self.period)
 
 
 class FaultsEntry(Section):
-    """By how much the arm is wrong; angles concern joints that turn, sliding ones have the lag alone."""
+    """Faults of the arm; angles apply to revolute joints, prismatic joints have only the lag."""
 
     lag: NotNegative = Field(0.0, description="commands take effect so much later [s]")
     stick_deg: NotNegative = Field(0.0, description="smaller moves are not made from rest")
@@ -90,7 +90,7 @@ class FaultsEntry(Section):
     offset_deg: Number = Field(0.0, description="what is read beyond where the drive is")
 
     def build(self) -> Faults:
-        """The faults."""
+        """Return the faults."""
         angles = (self.stick_deg, self.overshoot_deg, self.backlash_deg, self.offset_deg)
         return Faults(self.lag, *np.deg2rad(angles).tolist())
 
@@ -153,7 +153,7 @@ def load_vehicle(path: str | os.PathLike[str]) -> SimulatedVehicle:
 
     patience = entry.patience
     if patience is None and base_motion is not None:
-        patience = UNSEEN_SECONDS  # a vehicle that moves does not stay for long where it was seen
+        patience = UNSEEN_SECONDS  # what a moving vehicle saw some time ago may be elsewhere now
 
     return SimulatedVehicle(
         camera=load_camera(folder / entry.camera),
@@ -169,7 +169,7 @@ def load_vehicle(path: str | os.PathLike[str]) -> SimulatedVehicle:
 
 
 def find_vehicle(problem: str) -> Path:
-    """The file of the simulated vehicle that ships for a problem.
+    """Return the file of the simulated vehicle that ships for a problem.
 
     Raises:
         InputError: If there is none.
@@ -185,6 +185,6 @@ def find_vehicle(problem: str) -> Path:
 
 
 def _vehicle_files(folder: Path) -> list[Path]:
-    """Files of simulated vehicles in a folder; camera files and maps lie beside them."""
+    """Return the files of simulated vehicles in a folder, which also contains camera files and maps."""
     problems = {file.stem for file in folder.glob("*.yaml")}
     return [file for file in sorted((folder / FOLDER).glob("*.yaml")) if file.stem in problems]

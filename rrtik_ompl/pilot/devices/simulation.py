@@ -1,4 +1,4 @@
-"""The cameras of a simulated vehicle, and how it moves: pictures of marked objects, surroundings and the arm.
+"""Simulated cameras of a vehicle: pictures of marked objects, surroundings and the arm, and the motion of the base.
 
 Pictures are made at the rate of a camera: solids by the rasteriser, markers as images warped into their plane.
 For measurements of the markers themselves use `rrtik_bench.sensing.synthetic_camera`, which is exact and slow.
@@ -30,17 +30,17 @@ from rrtik_ompl.sensing.markers.marker_map import MarkedObject, MarkerMap
 PIXELS_PER_CELL = 24  # of a marker's image
 WATER = ((96, 84, 60), (60, 52, 40))  # blue, green, red above and below
 NOISE = 2.0  # grey levels
-NOISE_PICTURES = 4  # taken in turn
+NOISE_PICTURES = 4  # number of noise pictures, which are used in turn
 PICTURE_RATE = 30.0  # pictures a second
-TRIANGLES = 8_000  # of the arm
+TRIANGLES = 8_000  # largest number for the arm
 MIN_PERIOD = 0.2  # [s] of the sway of a base
 MAX_SPEED = 2.0  # [m/s]
 MAX_AMPLITUDE = 2.0  # [m]
-FINGERS = 0.02  # [m]; a gripper that closes this near to a grasp takes the object
+FINGERS = 0.02  # [m]; a gripper that closes this close to a grasp takes the object
 
 
 class SimulatedCamera:
-    """A camera before a known scene with a moving arm."""
+    """A camera in front of a known scene with a moving arm."""
 
     def __init__(
         self,
@@ -56,20 +56,20 @@ class SimulatedCamera:
         """Prepare the scene.
 
         Args:
-            camera: The lens; without distortion the picture is exact.
-            marker_map: The objects.
+            camera: Camera model; without distortion the picture is exact.
+            marker_map: The objects with their markers.
             robot: The arm in the picture.
             scene: Further obstacles.
-            places: ``T_base_object`` of objects, by name; objects without one are left out.
+            places: ``T_base_object`` by name of the object; objects without an entry are left out.
             T_base_camera: Pose of the camera.
-            seed: Of the noise.
-            fixed: The obstacles stand on the ground like the objects, and do not move with the base.
+            seed: Seed of the noise.
+            fixed: Whether the obstacles stand on the ground like the objects, instead of moving with the base.
         """
         self.camera = camera
         self.marker_map = marker_map
         self.T_base_camera = rigid(T_base_camera, "pose of the camera")
         self.places = {name: rigid(T, f"pose of object '{name}'") for name, T in places.items()}
-        self.T_start_base = pin.SE3.Identity()  # where the base is
+        self.T_start_base = pin.SE3.Identity()  # present pose of the base
         self._fixed = fixed
         self.robot = robot
         self._scene = scene
@@ -84,13 +84,13 @@ class SimulatedCamera:
         self._cached_arm: Any = (None, None, None)
 
     def picture(self, q: NDArray[np.float64], time: float) -> Picture:
-        """The picture with the arm at a configuration, shape (dof,)."""
+        """Return the picture with the arm at a configuration, shape (dof,), and with noise."""
         noise = self._noise[int(time * PICTURE_RATE) % NOISE_PICTURES]
         noisy = cv2.add(self._clean(q), noise, dtype=cv2.CV_8U)
         return Picture(np.asarray(noisy, dtype=np.uint8), "simulated camera", time)
 
     def _clean(self, q: NDArray[np.float64]) -> NDArray[np.uint8]:
-        """The picture without noise; made anew only when the arm or an object moved."""
+        """Return the picture without noise; it is redrawn only when the arm or an object has moved."""
         background, solids = self._background()
         cached_background, cached_q, clean = self._cached_arm
         if cached_background is not background or not np.array_equal(cached_q, q):
@@ -99,7 +99,11 @@ class SimulatedCamera:
         return np.asarray(clean)
 
     def _background(self) -> tuple[NDArray[np.uint8], list[Obstacle]]:
-        """The picture without the arm, and the solids in it; made anew only when an object moved."""
+        """Draw the scene without the arm; it is redrawn only when an object or the base has moved.
+
+        Returns:
+            The picture, and the solids in it, which hide parts of the arm.
+        """
         T_base_start = self.T_start_base.inverse()
         places = {name: T_base_start * T for name, T in sorted(self.places.items())}
         key: Any = tuple((name, T.homogeneous.tobytes()) for name, T in places.items())
@@ -131,7 +135,14 @@ class SimulatedCamera:
     def _lay_markers(
         self, drawn: NDArray[np.uint8], depths: NDArray[np.float32], thing: MarkedObject, T_camera_object: pin.SE3
     ) -> None:
-        """Draw the markers of an object into the picture where nothing hides them."""
+        """Draw the markers of an object into a picture in place, except where something hides them.
+
+        Args:
+            drawn: Picture, shape (height, width, 3).
+            depths: Depths of the solids in it [m], shape (height, width).
+            thing: The object.
+            T_camera_object: Its pose in the frame of the camera.
+        """
         for marker in thing.markers:
             T = T_camera_object * marker.T_object_marker
             if float(T.rotation[:, 2] @ T.translation) >= 0.0:
@@ -163,7 +174,7 @@ class SimulatedCamera:
         if (high <= low).any():
             return
 
-        ss = 3  # rays through a pixel, squared
+        ss = 3  # samples per pixel along each axis
         shape = (ss * (high - low)).tolist()
         target = ((pixels - low + 0.5) * ss - 0.5).astype(np.float32)
         homography = cv2.getPerspectiveTransform(square, target)
@@ -189,31 +200,32 @@ def _water(camera: Camera) -> NDArray[np.uint8]:
 
 
 class SimulatedSource:
-    """Pictures of a simulated camera, made on demand.
+    """Make pictures of a simulated camera on demand.
 
     Attributes:
-        camera: Makes them.
-        arm: That they show.
+        camera: The simulated camera.
+        arm: The arm in its pictures.
     """
 
     def __init__(self, camera: SimulatedCamera, arm: Arm, motion: BaseMotion | None = None) -> None:
-        """Take camera and arm, and how their base moves."""
+        """Store camera and arm, and the motion of their base; None for a base that stands still."""
         self.camera = camera
         self.arm = arm
         self._motion = motion
         self._count = 0
         self._time = 0.0
         self._was_closed = False
-        self._carried: tuple[str, pin.SE3] | None = None  # an object that the gripper has taken, and T_tip_object
+        # Name of the object that the gripper has taken, and T_tip_object; None if there is none.
+        self._carried: tuple[str, pin.SE3] | None = None
 
     def advance(self, seconds: float) -> None:
-        """Advance the simulated time: the base moves."""
+        """Advance the simulated time [s], and move the base."""
         self._time += seconds
         if self._motion is not None:
             self.camera.T_start_base = self._motion.at(self._time)
 
     def latest(self) -> Picture:
-        """A picture with the arm at its present configuration."""
+        """Return a picture with the arm at its present configuration."""
         self._count += 1
         arm = self.arm
         q = arm.links() if isinstance(arm, SimulatedArm) else arm.read()
@@ -229,7 +241,11 @@ class SimulatedSource:
         return self.camera.picture(q, float(self._count))
 
     def _carry(self, arm: SimulatedArm, T_base_tip: pin.SE3) -> None:
-        """Objects that can be carried move with a closed gripper, if it was closed where they can be grasped."""
+        """Move the object that the gripper has taken with the tip.
+
+        A loose object is taken when the gripper closes within `FINGERS` of one of its grasps, the nearest one first. It
+        is released where the gripper opens.
+        """
         tip = self.camera.T_start_base * T_base_tip
         camera = self.camera
         if arm.closed and not self._was_closed:
@@ -251,21 +267,21 @@ class SimulatedSource:
         if self._carried is not None:
             camera.places = {**camera.places, self._carried[0]: tip * self._carried[1]}
 
-        if not arm.closed:  # it was laid where the gripper has opened
+        if not arm.closed:  # the object stays where the gripper has opened
             self._carried = None
         self._was_closed = arm.closed
 
     def close(self) -> None:
-        """Nothing to release."""
+        """Do nothing: there is nothing to release."""
 
 
 class Mount(NamedTuple):
-    """Where a further camera of a simulated vehicle is.
+    """The place of a further camera of a simulated vehicle.
 
     Attributes:
-        name: For the pilot.
-        at_tip: It is carried by the arm's last link; else by the vehicle.
-        pose: In the frame of the tip, or of the arm's base.
+        name: Name shown to the pilot.
+        at_tip: Whether the camera is carried by the arm's last link, instead of the vehicle.
+        pose: In the frame of the tip, or in the base frame of the arm.
     """
 
     name: str
@@ -274,15 +290,15 @@ class Mount(NamedTuple):
 
 
 class SimulatedFurtherCamera:
-    """A camera of a simulated vehicle."""
+    """A further camera of a simulated vehicle."""
 
     def __init__(self, mount: Mount, camera: SimulatedCamera, first: SimulatedCamera, arm: Arm) -> None:
-        """Take what it sees.
+        """Store the parts.
 
         Args:
-            mount: Where it is.
+            mount: Place of the camera.
             camera: Makes its pictures.
-            first: The vehicle's first camera: things are where that has them.
+            first: The vehicle's first camera, whose scene is shown.
             arm: The arm.
         """
         self._mount = mount
@@ -292,7 +308,7 @@ class SimulatedFurtherCamera:
         self._count = 0
 
     def picture(self) -> NDArray[np.uint8]:
-        """The picture of now."""
+        """Return the present picture, shape (height, width, 3)."""
         camera = self._camera
         arm = self._arm
         q = arm.links() if isinstance(arm, SimulatedArm) else arm.read()
@@ -305,21 +321,21 @@ class SimulatedFurtherCamera:
         return camera.picture(q, float(self._count)).pixels
 
     def close(self) -> None:
-        """Nothing to release."""
+        """Do nothing: there is nothing to release."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BaseMotion:
-    """Drift at a constant velocity, and sway as a sine; both are zero at the beginning.
+    """Motion of a base: drift at a constant velocity, and sway as a sine; both are zero at the beginning.
 
     Attributes:
         drift: Velocity, shape (3,) [m/s].
         sway: Amplitude, shape (3,) [m].
         tilt: Amplitude of roll, pitch and yaw, shape (3,) [rad].
-        period: Of the sway [s].
+        period: Period of sway and tilt [s].
 
     Raises:
-        InputError: If one is not finite, the period is shorter than 0.2 s, or the motion is no vehicle's.
+        InputError: If a value is not finite, the period is shorter than 0.2 s, or the motion is too fast or too wide.
 
     Example:
         >>> BaseMotion(drift=[0.01, 0.0, 0.0]).at(2.0).translation.tolist()
@@ -349,6 +365,6 @@ class BaseMotion:
         object.__setattr__(self, "period", seconds)
 
     def at(self, time: float) -> pin.SE3:
-        """Where the base is at a time [s], in its own frame at time 0: ``T_start_base``."""
+        """Return the pose of the base at a time [s], relative to its pose at time 0: ``T_start_base``."""
         phase = float(np.sin(2.0 * np.pi * time / self.period))
         return pose_from_rpy(self.drift * time + phase * self.sway, phase * self.tilt)

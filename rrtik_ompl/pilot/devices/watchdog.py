@@ -1,4 +1,4 @@
-"""A thread that stops the arm when one of those who have to report at short intervals does not."""
+"""A thread that stops the arm when another thread, which has to report at short intervals, falls silent."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from contextlib import suppress
 
 from rrtik_ompl.pilot.devices.arm import Arm
 
-PATIENCE_SECONDS = 3.0  # longer than it takes to connect again to an arm or a camera
-LOOKS_PER_PATIENCE = 10  # in that time
+PATIENCE_SECONDS = 3.0  # longer than an arm or a camera takes to reconnect
+LOOKS_PER_PATIENCE = 10  # checks within that time
 
 Report = Callable[[], float]
 
 
 class Watchdog:
-    """Watches threads by the times of their last reports; use it as a context manager.
+    """Watch threads by the times of their last reports; use it as a context manager.
 
     Attributes:
-        fault: Who does not report, and that the arm was stopped; "" while all do.
+        fault: Which threads are silent, and that the arm was stopped; "" while all report.
     """
 
     def __init__(
@@ -30,14 +30,14 @@ class Watchdog:
         patience: float = PATIENCE_SECONDS,
         tell: Callable[[str], object] | None = None,
     ) -> None:
-        """Take what is watched.
+        """Store what is watched.
 
         Args:
-            arm: It is stopped, once for each thread that falls silent.
-            reports: By name, the time of the last report of each thread by ``time.monotonic()``; inf: it has ended in
-                good order.
+            arm: The arm, which is stopped once for each thread that falls silent.
+            reports: By name, a function that returns the time of a thread's last report by ``time.monotonic()``; inf if
+                the thread has ended normally.
             patience: How long a thread may be silent [s].
-            tell: Called with each new fault, for where no page shows it.
+            tell: Called with each new fault, where no page shows it.
         """
         self.fault = ""
         self._arm = arm
@@ -62,11 +62,11 @@ class Watchdog:
             oldest = time.monotonic() - self._patience
             silent = {name for name, last in self._reports.items() if max(last(), begin) < oldest}
             if silent - reported_silent:
-                with suppress(Exception):  # whatever is wrong with the arm, the others are watched on
+                with suppress(Exception):  # an error of the arm must not end the watch
                     self._arm.stop()
 
             message = f"{', '.join(sorted(silent))}: no report for {self._patience:g} s; the arm was stopped"
-            self.fault = message if silent else ""  # in one step: another thread reads it
+            self.fault = message if silent else ""  # one assignment, because another thread reads it
             if self._tell is not None and silent - reported_silent:
                 with suppress(Exception):  # a terminal that has gone must not end the watch
                     self._tell(self.fault)

@@ -1,7 +1,7 @@
-"""A simulated arm that is wrong by stated amounts: it lags, sticks, goes too far, has backlash, and reads wrong angles.
+"""A simulated arm with known errors: it lags, sticks, overshoots, has backlash, and reads wrong angles.
 
-Real arms of vehicles are all of that. What the pilot's tool does then can be tested here, since it is known where the
-links truly are.
+Real arms of vehicles have all of these faults. The pilot's tool can be tested against them here, because the true
+configuration of the links is known.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ MAX_LAG = 10.0  # [s]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Faults:
-    """By how much an arm is wrong; one number for all joints that turn [rad], or one for each joint [rad or m].
+    """Errors of an arm: one number for all revolute joints [rad], or one for each joint [rad or m].
 
     Attributes:
-        lag: Commands take effect so much later, those to stop as well [s].
-        stick: A joint at rest does not move for a set point that is nearer than that.
-        overshoot: A joint that ends its motion, or is stopped, goes on by that, and by half of its way at most.
+        lag: Delay of all commands, also of a stop [s].
+        stick: A joint at rest does not move towards a set point that is nearer than this.
+        overshoot: A joint that ends its motion, or is stopped, moves on by this, and by half of its travel at most.
         backlash: Play between the drive, which is measured, and the link.
-        offset: What is read beyond where the drive is; may be negative.
+        offset: Error of the reading relative to the drive; may be negative.
     """
 
     lag: float = 0.0
@@ -40,10 +40,10 @@ class Faults:
     offset: ArrayLike = 0.0
 
     def for_robot(self, robot: Robot) -> dict[str, Vector]:
-        """Each as an array of shape (dof,), except ``lag``.
+        """Return the errors by name as arrays of shape (dof,), without ``lag``.
 
         Raises:
-            InputError: If one does not fit the robot, is not finite, or is negative where it must not be.
+            InputError: If an error does not fit the robot, is not finite, or is negative where it must not be.
         """
         if not 0.0 <= float(self.lag) <= MAX_LAG:
             raise InputError(f"lag of the arm must be between 0 and {MAX_LAG:g} s, got {self.lag:g}")
@@ -58,7 +58,7 @@ class Faults:
 
 
 class WrongArm(SimulatedArm):
-    """A simulated arm with faults; `read` is what it says of itself, `links` is where it is.
+    """A simulated arm with faults: `read` returns its own reading, `links` its true configuration.
 
     Example:
         >>> from rrtik_ompl import load_robot
@@ -69,13 +69,13 @@ class WrongArm(SimulatedArm):
     """
 
     def __init__(self, robot: Robot, start: ArrayLike, faults: Faults, rates: ArrayLike | None = None) -> None:
-        """Begin at a configuration of the links, at rest in the middle of the play.
+        """Begin at a configuration of the links, at rest in the middle of the backlash.
 
         Args:
             robot: The arm.
-            start: Where the links are, shape (dof,).
-            faults: By how much it is wrong.
-            rates: Of the joints, shape (dof,) [rad/s or m/s]; default ones if None.
+            start: Configuration of the links, shape (dof,).
+            faults: Its errors.
+            rates: Of the joints, shape (dof,) [rad/s or m/s]; None for the default rates.
 
         Raises:
             InputError: If one of them does not fit the robot.
@@ -88,25 +88,25 @@ class WrongArm(SimulatedArm):
         self._half = 0.5 * each["backlash"]
         self._offset = each["offset"]
         self._links = self._q.copy()
-        self._coasting = np.zeros(robot.dof)  # way that is left of going too far, with its sign
+        self._coasting = np.zeros(robot.dof)  # remaining overshoot of each joint, signed
         self._began = 0.0
         self._now = 0.0
         self._waiting: deque[tuple[float, Callable[[], None]]] = deque()
 
     def read(self) -> Vector:
-        """What the arm says of its joints. Shape (dof,), rad or m."""
+        """Return the arm's own reading of its joints, shape (dof,) [rad or m]."""
         return self._q + self._offset
 
     def links(self) -> Vector:
-        """Where the links are. Shape (dof,), rad or m."""
+        """Return the true joint values of the links, shape (dof,) [rad or m]."""
         return self._links.copy()
 
     def move(self, joint: int, target: float) -> None:
-        """Send one joint to a value of its own reading [rad or m]."""
+        """Send one joint to a value in terms of its own reading [rad or m]."""
         self._later(lambda: self._begin(joint, target - float(self._offset[joint])))
 
     def follow(self, q: ArrayLike) -> None:
-        """Send all joints to set points of their own reading, shape (dof,).
+        """Send all joints to a set point in terms of their own reading, shape (dof,).
 
         Raises:
             InputError: If they do not fit the robot.
@@ -115,11 +115,11 @@ class WrongArm(SimulatedArm):
         self._later(lambda: SimulatedArm.follow(self, course - self._offset))
 
     def stop(self) -> None:
-        """Stop, as soon as the arm does."""
+        """Stop, after the lag of the arm."""
         self._later(self._end)
 
     def advance(self, seconds: float) -> None:
-        """Advance the simulated time; commands whose time comes meanwhile take effect when it does."""
+        """Advance the simulated time [s]; delayed commands take effect at their time."""
         end = self._now + seconds
         while self._waiting and self._waiting[0][0] <= end:
             due, act = self._waiting.popleft()
@@ -146,7 +146,11 @@ class WrongArm(SimulatedArm):
         super().move(joint, target)
 
     def _go(self, seconds: float) -> None:
-        """Move on, with no command in between."""
+        """Move for an interval [s] in which no command takes effect.
+
+        A joint that arrives within the interval overshoots in the time that is left. The links follow the drive when
+        they touch the end of the backlash.
+        """
         left = np.full(self.robot.dof, seconds)
         goal = self._goal
         if goal is not None:

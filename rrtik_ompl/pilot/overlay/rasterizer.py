@@ -1,9 +1,9 @@
-"""Solids as triangles, placed before a camera, and drawn into a picture by OpenCV's rasteriser.
+"""Convert solids to triangles, place them in front of a camera, and draw them with OpenCV's rasteriser.
 
-From shapes to pixels: a `Surface` is the triangles of one solid; a `Figure` many of them as one set of arrays, sorted
-by the frame that carries them; `placed` puts it before a camera in a few calls, the work of every frame; a `Canvas`
-holds the colours and depths of a picture. The rasteriser takes an opening angle alone: focal lengths, the centre of the
-picture and half a pixel go into the matrix.
+A `Surface` holds the triangles of one solid. A `Figure` joins many surfaces in one set of arrays, sorted by the frame
+that carries them. `placed` transforms a figure to the frame of a camera in a few array operations; this is the work of
+every picture. A `Canvas` holds the colours and depths of a picture. The rasteriser accepts only an opening angle:
+focal lengths, the principal point and half a pixel are folded into the view matrix.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from rrtik_ompl.viewer.drawing.triangles import split_creases, thin_out
 
 ROBOT_TRIANGLES = 20_000
 OBSTACLE_TRIANGLES = 5_000
-MAX_SHAPES = 4_000  # whose surfaces are kept
+MAX_SHAPES = 4_000  # number of shapes whose surfaces are cached
 AMBIENT = 0.35  # share of ambient light; the rest comes from the camera
 NEAREST_DRAWN = 0.05  # [m]
 FARTHEST_DRAWN = 50.0  # [m]
@@ -45,8 +45,8 @@ class Surface:
 
     Attributes:
         vertices: Shape (n, 3) [m].
-        normals: Unit vectors out of the solid, shape (n, 3).
-        faces: Counter-clockwise seen from outside, shape (m, 3).
+        normals: Unit vectors at the vertices that point out of the solid, shape (n, 3).
+        faces: Vertex indices, counter-clockwise seen from outside, shape (m, 3).
         color: Red, green, blue from 0 to 1, shape (3,).
         frame: Number of the frame that carries it: Pinocchio's joint for a link.
     """
@@ -59,29 +59,33 @@ class Surface:
 
 
 def surface_of_shape(shape: Shape, color: str, frame: int = 0, triangles: int = OBSTACLE_TRIANGLES) -> Surface:
-    """The surface of a bounded shape.
+    """Return the surface of a bounded shape.
 
     Raises:
-        InputError: For a half-space, which has no end.
+        InputError: For a half-space, which has no boundary.
     """
     vertices, faces = split_creases(*_triangles(shape, triangles))
     return Surface(vertices, _normals(vertices, faces), faces, np.array(palette.fractions(color)), frame)
 
 
 def robot_surfaces(robot: Robot, triangles: int = ROBOT_TRIANGLES) -> tuple[Surface, ...]:
-    """The links in at most about so many triangles: what is to be seen of them, else what collides."""
+    """Return the surfaces of the links with about ``triangles`` triangles at most.
+
+    The visual geometry is used; a robot without it is drawn by its collision geometry.
+    """
     drawn = _link_surfaces(robot.visual.geometryObjects, triangles)
     return drawn or _link_surfaces(robot.collision.geometryObjects, triangles)
 
 
 class ShapeSurfaces:
-    """Surfaces of obstacles' shapes, each made once: what moves from picture to picture keeps its shape."""
+    """Cache of the surfaces of obstacles' shapes: an obstacle that moves from picture to picture keeps its shape."""
 
     def __init__(self) -> None:
-        self._made: dict[int, tuple[Shape, Surface]] = {}  # with the shape, so that no other gets its identity
+        # Keyed by the id of the shape. The shape is stored, too, because Python reuses ids of deleted objects.
+        self._made: dict[int, tuple[Shape, Surface]] = {}
 
     def of(self, shape: Shape) -> Surface:
-        """The surface of a bounded shape in the colour of obstacles."""
+        """Return the surface of a bounded shape in the colour of obstacles."""
         shape_and_surface = self._made.get(id(shape))
         if shape_and_surface is None:
             if len(self._made) >= MAX_SHAPES:
@@ -94,7 +98,12 @@ class ShapeSurfaces:
 
 
 def obstacle_surfaces(obstacles: Sequence[Obstacle], made: ShapeSurfaces | None = None) -> tuple[Surface, ...]:
-    """Bounded obstacles in the frame of the world, by surfaces that may be made already; half-spaces are left out."""
+    """Return the surfaces of the bounded obstacles in the base frame; half-spaces are left out.
+
+    Args:
+        obstacles: The obstacles.
+        made: Cache of their surfaces; None for a new one.
+    """
     surfaces = ShapeSurfaces() if made is None else made
     bounded = [obstacle for obstacle in obstacles if obstacle.shape.bounded]
     return tuple(
@@ -103,7 +112,7 @@ def obstacle_surfaces(obstacles: Sequence[Obstacle], made: ShapeSurfaces | None 
 
 
 def moved(surface: Surface, rotation: NDArray[np.float64], translation: NDArray[np.float64]) -> Surface:
-    """The same surface elsewhere."""
+    """Return a surface after a rotation, shape (3, 3), and a translation, shape (3,) [m]."""
     vertices = surface.vertices @ rotation.T + translation
     return Surface(vertices, surface.normals @ rotation.T, surface.faces, surface.color, surface.frame)
 
@@ -144,7 +153,7 @@ def _triangles(shape: Shape, limit: int) -> tuple[Matrix, Faces]:
 
 
 def _welded(vertices: Matrix, faces: Faces) -> tuple[Matrix, Faces]:
-    """The same with vertices at one place made one, and without triangles that lose their area by that."""
+    """Merge vertices at the same position, and drop triangles that lose their area by this."""
     _, first_rows, merged_number = np.unique(np.round(vertices, 12), axis=0, return_index=True, return_inverse=True)
     merged = np.asarray(merged_number).reshape(-1)[faces]
 
@@ -153,7 +162,7 @@ def _welded(vertices: Matrix, faces: Faces) -> tuple[Matrix, Faces]:
 
 
 def _normals(vertices: Matrix, faces: Faces) -> Matrix:
-    """Means of the normals of the triangles at each vertex, weighted by their area."""
+    """Return vertex normals: the area-weighted means of the normals of the adjacent triangles, shape (n, 3)."""
     a, b, c = (vertices[faces[:, k]] for k in range(3))
     across = np.cross(b - a, c - a)
 
@@ -170,15 +179,15 @@ def _normals(vertices: Matrix, faces: Faces) -> Matrix:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Figure:
-    """Surfaces put together, sorted by frame.
+    """Several surfaces in one set of arrays, sorted by frame.
 
     Attributes:
         vertices: In the frames that carry them [m], shape (n, 3).
-        normals: Unit vectors out of the solids, in the same frames, shape (n, 3).
-        faces: Shape (m, 3).
-        colors: Of the vertices: red, green, blue from 0 to 1, shape (n, 3).
+        normals: Unit vectors that point out of the solids, in the same frames, shape (n, 3).
+        faces: Vertex indices, shape (m, 3).
+        colors: Colours of the vertices: red, green, blue from 0 to 1, shape (n, 3).
         frames: Numbers of the frames.
-        bounds: Vertices of ``frames[k]`` are those from ``bounds[k]`` to ``bounds[k + 1]``.
+        bounds: The vertices of ``frames[k]`` are the rows from ``bounds[k]`` to ``bounds[k + 1]``.
     """
 
     vertices: NDArray[np.float32]
@@ -191,12 +200,12 @@ class Figure:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Placed:
-    """A figure before a camera, ready to be drawn.
+    """A figure in the frame of a camera, ready to be drawn.
 
     Attributes:
         points: Vertices in the frame of the camera [m], shape (n, 3).
-        faces: Shape (m, 3).
-        colors: What the light makes of those of the vertices: red, green, blue from 0 to 1, shape (n, 3).
+        faces: Vertex indices, shape (m, 3).
+        colors: Shaded colours of the vertices: red, green, blue from 0 to 1, shape (n, 3).
     """
 
     points: NDArray[np.float32]
@@ -205,7 +214,7 @@ class Placed:
 
 
 def figure_of(surfaces: Sequence[Surface]) -> Figure:
-    """Put surfaces together."""
+    """Join surfaces in one figure."""
     ranked = sorted(surfaces, key=lambda surface: surface.frame)
     counts = [len(surface.vertices) for surface in ranked]
     starts = np.concatenate([[0], np.cumsum(counts)]).astype(int)
@@ -224,7 +233,7 @@ def figure_of(surfaces: Sequence[Surface]) -> Figure:
 
 
 def placed(figure: Figure, T_camera_frames: Sequence[ArrayLike] | NDArray[np.float64]) -> Placed:
-    """A figure in the frame of a camera, lit by a lamp at the camera.
+    """Transform a figure to the frame of a camera, and shade it by a lamp at the camera.
 
     Args:
         figure: What is drawn.
@@ -247,7 +256,7 @@ def placed(figure: Figure, T_camera_frames: Sequence[ArrayLike] | NDArray[np.flo
 
 
 def tinted(figure: Placed, color: Sequence[float]) -> Placed:
-    """The same figure in shades of one colour: red, green, blue from 0 to 1. The brightest stay the brightest."""
+    """Return a figure in shades of one colour, given as red, green, blue from 0 to 1; bright parts stay bright."""
     shades = AMBIENT + (1.0 - AMBIENT) * figure.colors.max(axis=1)
     return Placed(figure.points, figure.faces, np.outer(shades, color).astype(np.float32))
 
@@ -256,11 +265,11 @@ def tinted(figure: Placed, color: Sequence[float]) -> Placed:
 
 
 class Canvas:
-    """A picture that figures are drawn into, from the view of a camera.
+    """A picture from the view of a camera, into which figures are drawn.
 
     Attributes:
-        colors: Red, green, blue from 0 to 1, of something else where nothing was drawn. Shape (height, width, 3).
-        depths: Along the optical axis [m]; `FARTHEST_DRAWN` where nothing was drawn. Shape (height, width).
+        colors: Red, green, blue from 0 to 1, shape (height, width, 3); undefined where nothing was drawn.
+        depths: Depth along the optical axis [m], shape (height, width); `FARTHEST_DRAWN` where nothing was drawn.
     """
 
     def __init__(self, camera: Camera) -> None:
@@ -270,20 +279,20 @@ class Canvas:
         self.depths: NDArray[np.float32] = np.full((camera.height, camera.width), FARTHEST_DRAWN, dtype=np.float32)
 
     def clear(self) -> None:
-        """Empty it again."""
+        """Erase the picture."""
         self.depths.fill(FARTHEST_DRAWN)
 
     @property
     def drawn(self) -> NDArray[np.bool_]:
-        """Where something was drawn. Shape (height, width)."""
+        """Mask of the pixels that were drawn, shape (height, width)."""
         return np.asarray(self.depths < 0.999 * FARTHEST_DRAWN)
 
     def draw(self, figure: Placed, both_sides: bool = False) -> None:
-        """Draw a figure; what lies behind what is there already stays hidden.
+        """Draw a figure; parts that are behind what was drawn before stay hidden.
 
         Args:
             figure: What to draw.
-            both_sides: Draw triangles that are seen from inside, too: for surfaces that are not closed.
+            both_sides: Whether to draw triangles seen from inside, too: for surfaces that are not closed.
         """
         if len(figure.faces) == 0:
             return
@@ -309,7 +318,7 @@ class Canvas:
 
 
 def half_as_fine(camera: Camera) -> Camera:
-    """The same view with half as many pixels a side."""
+    """Return a camera with the same view and half as many pixels along each side."""
     matrix = np.array(camera.matrix)
     matrix[:2, :2] *= 0.5
     matrix[:2, 2] = 0.5 * (matrix[:2, 2] + 0.5) - 0.5
@@ -317,7 +326,12 @@ def half_as_fine(camera: Camera) -> Camera:
 
 
 def _matrix(camera: Camera) -> tuple[NDArray[np.float64], float]:
-    """World to OpenGL's camera (y up, looking along -z), the intrinsics folded in, and the opening angle [rad]."""
+    """Return the view matrix and the opening angle for OpenCV's rasteriser.
+
+    Returns:
+        The transformation from the camera's frame to OpenGL's (y up, looking along -z) with the intrinsics folded in,
+        shape (4, 4), and the vertical opening angle [rad].
+    """
     (fx, _, cx), (_, fy, cy), _ = camera.matrix
 
     fold = np.eye(4)
@@ -328,7 +342,7 @@ def _matrix(camera: Camera) -> tuple[NDArray[np.float64], float]:
 
 
 def _bent(points: NDArray[np.float32], camera: Camera) -> NDArray[np.float32]:
-    """Points moved aside so that a pinhole shows them where the lens does; edges between them stay straight."""
+    """Shift points so that a pinhole camera shows them where the lens does; edges between them stay straight."""
     if not camera.distortion.any():
         return points
 
@@ -336,7 +350,8 @@ def _bent(points: NDArray[np.float32], camera: Camera) -> NDArray[np.float32]:
     depth = np.maximum(points[:, 2], NEAREST_DRAWN)
     x = points[:, 0] / depth
     y = points[:, 1] / depth
-    square = np.minimum(x * x + y * y, 4.0)  # far outside the picture the polynomial turns back
+    # Limited, because far outside the picture the distortion polynomial is no longer monotonic.
+    square = np.minimum(x * x + y * y, 4.0)
     radial = 1.0 + square * (k1 + square * (k2 + square * k3))
 
     bent = points.copy()

@@ -11,20 +11,20 @@ from rrtik_ompl.viewer.drawing import palette
 
 
 def pinhole_camera(width: int = 640, height: int = 480, opening: float = np.deg2rad(45.0)) -> Camera:
-    """A camera without distortion whose picture opens by an angle from top to bottom [rad]."""
+    """Return a camera without distortion and with a vertical opening angle [rad]."""
     focal = 0.5 * height / float(np.tan(0.5 * opening))
     matrix = [[focal, 0.0, 0.5 * (width - 1)], [0.0, focal, 0.5 * (height - 1)], [0.0, 0.0, 1.0]]
     return Camera(matrix, width, height)
 
 
 def orbit_pose(centre: ArrayLike, distance: float, azimuth: float, elevation: float) -> pin.SE3:
-    """``T_world_camera`` of a camera directed at a point, the world's z axis upwards in the picture.
+    """Return ``T_world_camera`` of a camera that looks at a point, with the world's z axis upwards in the picture.
 
     Args:
         centre: The point, shape (3,) [m].
-        distance: From there [m].
-        azimuth: Of the camera, seen from the centre, from the x axis towards y [rad].
-        elevation: Above the horizon [rad]; straight from above the x axis points to the right or as azimuth says.
+        distance: Distance of the camera from it [m].
+        azimuth: Direction of the camera seen from the centre, from the x axis towards y [rad].
+        elevation: Angle above the horizon [rad]; for a view straight down, the azimuth defines the picture's right.
     """
     level = np.cos(elevation)
     back = np.array([level * np.cos(azimuth), level * np.sin(azimuth), np.sin(elevation)])
@@ -34,7 +34,7 @@ def orbit_pose(centre: ArrayLike, distance: float, azimuth: float, elevation: fl
 
 
 def background(camera: Camera) -> NDArray[np.uint8]:
-    """A pale background. Shape (height, width, 3), blue, green, red."""
+    """Return a pale background with a vertical gradient, shape (height, width, 3), blue, green, red."""
     ends = np.array([palette.fractions(c)[::-1] for c in (palette.BACKGROUND_TOP, palette.BACKGROUND_BOTTOM)])
 
     share = np.linspace(0.0, 1.0, camera.height)[:, None]
