@@ -138,7 +138,7 @@ class LiveCamera:
         self._last: NDArray[np.uint8] | None = None
 
     def picture(self) -> NDArray[np.uint8] | None:
-        """Return the newest picture, shape (height, width, 3), darkened while the camera is lost; None if there was none."""
+        """Return the newest picture, shape (height, width, 3), darkened while the camera is lost; None without one."""
         try:
             taken = self._source.latest()
         except RrtikError:
