@@ -1,9 +1,9 @@
-"""What all worlds of a robot share, so that a new scene does not cost the arm's part again.
+"""Data that all worlds of a robot share, so that a new scene does not cost the arm's part again.
 
 Two things are kept for each robot: the sphere covers of its links, which depend on nothing else, and the tables that
-were packed last. A new world takes over from those what its scene leaves as it is: the arm's joints, balls and solids,
-if the same pairs of the arm are checked. Tables are never changed through this cache; a moving world, whose obstacles
-are moved in place, shares the arm's part alone.
+were packed last. A new world takes over the arm's part of these (joints, balls and solids) if the same pairs of the arm
+are checked. The cache never changes tables that it shares. A moving world, whose obstacles are moved in place, shares
+only the arm's part.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from rrtik_ompl.kernels import FastWorld, needs_covers
 from rrtik_ompl.kernels.tables.solid_tables import convex_solids
 from rrtik_ompl.model.robot import Robot
 
-SLIDING_MARGIN = 1e-3  # [m] beyond the limits of sliding joints that the tables cover
-MAX_ROBOTS = 16  # whose covers and tables are kept
+SLIDING_MARGIN = 1e-3  # [m] range beyond the limits of prismatic joints that the tables cover
+MAX_ROBOTS = 16  # number of robots whose covers and tables are kept
 NO_SPHERES = np.empty((0, 4))
 
-Spheres = tuple[Matrix, Matrix]  # around and inside a body
+Spheres = tuple[Matrix, Matrix]  # outer and inner cover of a body: centre and radius, shape (n, 4) [m]
 
 
 class ArmCache:
@@ -35,7 +35,7 @@ class ArmCache:
     Made by :func:`arm_cache`, one for each robot.
 
     Attributes:
-        covers: Spheres around and inside each link, in the order of :func:`link_bodies`.
+        covers: Outer and inner sphere cover of each link, in the order of :func:`link_bodies`.
     """
 
     def __init__(self, robot: Robot) -> None:
@@ -44,9 +44,9 @@ class ArmCache:
         self._latest: FastWorld | None = None
 
     def covers_of(self, bodies: Sequence[Body]) -> tuple[Spheres, ...]:
-        """Spheres around and inside all bodies of a world, those of the robot's links first."""
+        """Return the outer and inner sphere covers of all bodies of a world, those of the robot's links first."""
         others = bodies[len(self.covers) :]
-        spheres_of_key: dict[tuple[int, bool], Spheres] = {}  # those of one size share a geometry
+        spheres_of_key: dict[tuple[int, bool], Spheres] = {}  # obstacles of equal size share a geometry
         keys = [(id(body.geometry), body.joint > 0) for body in others]
         for key, body in zip(keys, others, strict=True):
             if key not in spheres_of_key:
@@ -54,13 +54,13 @@ class ArmCache:
         return (*self.covers, *(spheres_of_key[key] for key in keys))
 
     def pack(self, bodies: Sequence[Body], pairs: Pairs, covers: Sequence[Spheres], *, share: bool = True) -> FastWorld:
-        """Return the tables of a world.
+        """Pack the kernels' tables of a world.
 
         Args:
-            bodies: Those of the robot's links first.
-            pairs: Numbers of the bodies that must not touch.
+            bodies: The bodies; those of the robot's links first.
+            pairs: Pairs of indices into ``bodies`` that must not touch.
             covers: See :meth:`covers_of`.
-            share: Whether the arm's part may be that of the tables packed last, and these are kept for the next world.
+            share: Whether to reuse the arm's part of the tables packed last, and to keep the new tables for reuse.
         """
         tables = FastWorld(
             self._robot.chain,
@@ -92,7 +92,10 @@ def _spheres(body: Body) -> Spheres:
 
 
 def strokes(robot: Robot) -> Vector:
-    """How far the limits let each joint of the chain go from its zero, shape (joints,); 0 for continuous joints."""
+    """Return the largest magnitude of each joint value within the limits, shape (joints,) [rad or m].
+
+    Continuous joints count as 0; ``SLIDING_MARGIN`` is added to all.
+    """
     largest_values = np.maximum(np.abs(robot.lower), np.abs(robot.upper))
     largest_values = np.where(np.isfinite(largest_values), largest_values, 0.0)
     reach: Vector = np.abs(robot.chain.gain) @ largest_values + np.abs(robot.chain.offset) + SLIDING_MARGIN

@@ -1,4 +1,4 @@
-"""The solids of a robot in a scene, and what depends on nothing else: the first part of a world."""
+"""The solids of a robot in a scene and all data that depends on these alone, shared by all forms of a world."""
 
 from __future__ import annotations
 
@@ -38,21 +38,24 @@ from rrtik_ompl.world.arm_cache import Spheres, arm_cache
 
 @dataclass(frozen=True, eq=False)
 class Arrangement:
-    """The solids of a robot in a scene, moving obstacles where they are at time 0; made by :func:`arranged`.
+    """The solids of a robot in a scene, with moving obstacles at their poses at time 0; made by :func:`arranged`.
 
     Attributes:
-        robot, scene: See above.
+        robot, scene: The robot and the scene.
         bodies: The solids; those of the robot's links first.
-        pairs: Numbers of the bodies that must not touch.
-        checked: Those of which a body moves, and that may not overlap at all.
-        in_contact: The others of which a body moves. How deep they may overlap is proven; kernels of checks know
-            nothing of them.
+        pairs: Pairs of indices into ``bodies`` that must not touch.
+        checked: Pairs of which at least one body moves and that must not overlap at all.
+        in_contact: Pairs of which at least one body moves and that may overlap to a given depth. That they do not
+            overlap deeper is proven; the collision kernels ignore them.
         weights: No point of the arm moves farther than ``weights @ |b - a|`` [m] from a to b, shape (dof,).
-        always_colliding: Whether two bodies touch that never move.
-        self_margin: How far links, and what they hold, must stay from each other [m].
-        covers: Makes the spheres around and inside each body.
-        approaches: Makes, for each checked pair, how far its bodies can approach each other, shape (dof,) [m].
-        numbers: Makes where the obstacles stand among obstacles and bodies; the same wherever they stand.
+        always_colliding: Whether two bodies that never move touch.
+        self_margin: Distance that links and attached objects must keep from each other [m].
+        covers: Computes on first call the outer and inner sphere covers of each body.
+        approaches: Computes on first call weights of each checked pair, shape (dof,): its bodies come nearer by at
+            most ``weights @ |b - a|`` [m] from a to b.
+        numbers: Computes on first call the indices of obstacles and their bodies, which do not depend on poses.
+        arrays: The bodies as arrays.
+        doubts: Warnings about the description that were not given yet.
     """
 
     robot: Robot
@@ -67,28 +70,28 @@ class Arrangement:
     covers: Once[tuple[Spheres, ...]]
     approaches: Once[dict[tuple[int, int], Vector]]
     numbers: Once[Numbers]
-    arrays: BodyArrays  # held, so that whoever asks for those of the bodies finds them
+    arrays: BodyArrays  # referenced here, so that the cache of body_arrays keeps them
     doubts: list[str] = field(default_factory=list)
 
     @cached_property
     def moving(self) -> Pairs:
-        """The pairs of which a body moves."""
+        """The pairs of which at least one body moves."""
         return tuple(sorted(self.checked + self.in_contact)) if self.in_contact else self.checked
 
     @cached_property
     def containment(self) -> Containment:
-        """Which bodies can be wholly inside others."""
+        """Checks whether a body is wholly inside another."""
         return Containment(self.bodies.as_tuple, self.checked, [outer for outer, _ in self.covers()])
 
     def moved(self, name: str, pose: ArrayLike | pin.SE3) -> tuple[Arrangement, tuple[int, ...]]:
-        """Return the arrangement with an obstacle elsewhere.
+        """Return the arrangement with one obstacle at another pose.
 
         Returns:
-            That arrangement, and the numbers of the obstacle's bodies.
+            The new arrangement, and the indices of the obstacle's bodies.
 
         Raises:
             UnknownNameError: If there is no obstacle of that name.
-            InputError: If the pose is none.
+            InputError: If ``pose`` is not a pose.
         """
         numbers = self.numbers()
         if name not in numbers.obstacles:
@@ -112,7 +115,7 @@ class Arrangement:
         return other, tuple(placements)
 
     def with_clearance(self, clearance: float) -> Items[Body]:
-        """Return the bodies, with a clearance [m] added to the margins of obstacles."""
+        """Return the bodies with a clearance [m] added to the margins of obstacles."""
         if clearance == 0.0:
             return self.bodies
         return Items(
@@ -124,12 +127,12 @@ class Arrangement:
 
 
 def arrangement_of(settings: WorldSettings) -> Arrangement:
-    """Return the solids of a world of some settings; see :func:`arranged`."""
+    """Return the arrangement for the settings of a world; see :func:`arranged`."""
     return arranged(settings.robot, settings.scene, settings.self_margin)
 
 
 def arranged(robot: Robot, scene: Scene, self_margin: float) -> Arrangement:
-    """Return the solids of a robot in a scene.
+    """Arrange the solids of a robot in a scene and sort their pairs; ``self_margin`` is in metres.
 
     Raises:
         InputError: If the scene does not fit the robot.
@@ -163,12 +166,12 @@ def arranged(robot: Robot, scene: Scene, self_margin: float) -> Arrangement:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Numbers:
-    """Where the obstacles of a scene stand among its obstacles and bodies.
+    """Indices that relate the obstacles of a scene to its bodies.
 
     Attributes:
         obstacles: Index of each obstacle in the scene, by its name.
-        bodies: Numbers of the bodies of each obstacle, by its name.
-        fixed: For each body the pairs that it is in and of which no body ever moves.
+        bodies: Indices of the bodies of each obstacle, by its name.
+        fixed: For each body the pairs that contain it and whose bodies never move.
     """
 
     obstacles: dict[str, int]
@@ -177,7 +180,7 @@ class Numbers:
 
     @classmethod
     def of(cls, obstacles: Sequence[Obstacle], bodies: Sequence[Body], standing: Pairs) -> Numbers:
-        """Return those of a scene."""
+        """Collect the indices of a scene; ``standing`` are the pairs whose bodies never move."""
         body_numbers: dict[str, list[int]] = {}
         for k, body in enumerate(bodies):
             if body.kind == "obstacle":
@@ -191,7 +194,7 @@ class Numbers:
         return cls({each.name: k for k, each in enumerate(obstacles)}, body_numbers, pairs_of_body)
 
     def placements(self, obstacle: Obstacle) -> dict[int, pin.SE3]:
-        """Return where the bodies of an obstacle are, by their numbers."""
+        """Return the poses of the bodies of an obstacle, by their indices."""
         pose = pose_at(obstacle, 0.0)
         return {
             number: pose * part.placement
@@ -199,7 +202,7 @@ class Numbers:
         }
 
     def standing(self, moved: Iterable[int] | None) -> Pairs:
-        """Of the pairs that never move those with one of some bodies, given by numbers; all of them if None."""
+        """Return the never-moving pairs that contain one of the given bodies (indices); all such pairs if None."""
         if moved is None:
             return tuple(dict.fromkeys(pair for pairs in self.fixed.values() for pair in pairs))
         return tuple(pair for k in moved for pair in self.fixed.get(k, ()))
@@ -210,13 +213,16 @@ def _approaches(robot: Robot, bodies: Items[Body], pairs: Pairs) -> dict[tuple[i
 
 
 def _touching(robot: Robot, bodies: Sequence[Body], pairs: Pairs) -> bool:
-    """Whether one of some pairs of bodies that never move touches; most are told apart by the balls around them."""
+    """Check whether any of some pairs of fixed bodies touches; bounding balls exclude most pairs first."""
     pairs_nearby = [(bodies[i], bodies[j]) for i, j in pairs if not far_apart(bodies[i], bodies[j], DISTANCE_TOLERANCE)]
     return any(fixed_contact(robot, both, ((0, 1),)) is not None for both in pairs_nearby)
 
 
 def _doubts(robot: Robot, scene: Scene) -> Iterator[str]:
-    """What a world does not take for a solid, where nobody was told when a file was read."""
+    """Yield warnings about geometry that a world does not treat as a solid.
+
+    Nothing is said of meshes that have a file: the user was warned when it was read.
+    """
     if not robot.collision.geometryObjects:
         yield f"robot '{robot.name}' has no collision geometry: all is free"
     for name, shape in ((item.name, item.shape) for items in (scene.obstacles, scene.attached) for item in items):

@@ -418,7 +418,11 @@ class Motions:
         return not_apart
 
     def _measured_apart(self, entry: Entry) -> bool:
-        """Whether coal finds two whole bodies farther apart in the middle of an interval than they come nearer."""
+        """Check whether coal's distance in the middle of an entry's interval proves two whole bodies apart on it.
+
+        The distance has to exceed the required gap by the bodies' approach in half of the interval, and neither body
+        may contain the other.
+        """
         rotations, origins = self._frames(np.array([entry.motion]), np.array([entry.begin + 0.5 * entry.width]))
         frames = np.tile(np.eye(4), (rotations.shape[1], 1, 1))
         frames[:, :3, :3] = rotations[0]

@@ -24,12 +24,12 @@ class HasWaypoints(Protocol):
 
 
 def certificate_of(world: World, path: HasWaypoints | ArrayLike, clearance: float = 0.0) -> Certificate | None:
-    """Return a certificate of a path; None if not every motion of it is proven free.
+    """Certify a path; return None if not every motion of it is proven free.
 
     Args:
         world: The world.
-        path: Of the world's robot, or its waypoints, shape (k, dof).
-        clearance: Kept from every obstacle beside its margin [m].
+        path: A path of the world's robot, or its waypoints, shape (k, dof).
+        clearance: Distance kept from every obstacle on top of its margin [m].
 
     Raises:
         InputError: If the path is another robot's, the clearance is negative or infinite, or the scene has a cloud.
@@ -49,16 +49,17 @@ def certificate_of(world: World, path: HasWaypoints | ArrayLike, clearance: floa
 
 
 def verify_certificate(certificate: Certificate, world: World, waypoints: ArrayLike, *, clearance: float = 0.0) -> str:
-    """Return the first fault of a certificate in one line; "" if it proves that a path is free.
+    """Verify a certificate of a path: return its first fault in one line, or "" if it proves the path free.
 
     Args:
-        certificate: The certificate; nothing in it is believed.
-        world: The robot and the scene; bodies, pairs and the chain of joints are read, no check of it is asked.
-        waypoints: Of the path, shape (k, dof); the certificate has to be for these to the bit.
-        clearance: What the path has to keep from obstacles beside their margins at least [m].
+        certificate: The certificate; nothing in it is trusted.
+        world: The robot and the scene. Only the bodies, pairs and the chain of joints are read; none of the world's
+            own checks are used.
+        waypoints: Waypoints of the path, shape (k, dof); they have to equal those of the certificate to the bit.
+        clearance: Least distance that the path has to keep from obstacles on top of their margins [m].
 
     Raises:
-        InputError: If an argument is of another kind.
+        InputError: If an argument has the wrong type.
 
     Example:
         >>> problem = rrtik.load_problem("planar3_boxes")

@@ -1,4 +1,4 @@
-"""The clearance that a path keeps: what was asked for, or as much of a preference as its own ends have."""
+"""The clearance that a path keeps: the requested one, or by default as much of a preferred one as its ends allow."""
 
 from __future__ import annotations
 
@@ -15,18 +15,19 @@ from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.world_settings import FINEST_RESOLUTION
 from rrtik_ompl.world.world import World, form_of
 
-CLEARANCE = 1e-3  # [m] that is kept where nobody says
-SPARE = 1e-3  # [m] that searches keep on top, but not more than twice: they look at points of a motion alone
-HALVINGS = 10  # of what is kept, until it is given up
-BISECTIONS = 30
+CLEARANCE = 1e-3  # [m] default clearance
+# [m] Searches keep this much more than the clearance (at most twice the clearance), as they only sample motions.
+SPARE = 1e-3
+HALVINGS = 10  # number of halved clearances that are tried
+BISECTIONS = 30  # steps of the search for the largest clearance
 
 
 class Clearances(NamedTuple):
-    """What can be kept between given ends.
+    """Clearances that can be kept between given ends.
 
     Attributes:
-        proven_clearance: To be proven of every motion, beside the margins [m].
-        searched_clearance: To be kept by searches, which look at points of a motion alone [m].
+        proven_clearance: Clearance to prove for every motion, on top of margins [m].
+        searched_clearance: Clearance to keep at the samples that a search checks [m].
     """
 
     proven_clearance: float
@@ -34,12 +35,13 @@ class Clearances(NamedTuple):
 
 
 def clearances_between(world: World, ends: Matrix, clearance: float | None) -> Clearances | None:
-    """What can be kept on the way between configurations, shape (k, dof); None if not even these are proven free.
+    """Return the largest clearances that the ends of a path allow; None if not even the ends are proven free.
 
     Args:
         world: The world.
-        ends: Where a path begins and ends.
-        clearance: Wanted [m]; None for a millimetre, or less if the ends have less, but not less than the world keeps.
+        ends: Configurations at which the path begins and ends, shape (k, dof).
+        clearance: Requested clearance [m]. None for a millimetre, or less if the ends have less. It is never below the
+            clearance that the world requires.
     """
     for clearances in _candidates(world, clearance):
         if world.prover.proven(ends, ends, clearance=clearances.searched_clearance).all():
@@ -64,7 +66,7 @@ def clearances_of_pairs(world: World, ends: NDArray[np.float64], clearance: floa
 
 
 def _candidates(world: World, clearance: float | None) -> Iterator[Clearances]:
-    """What may be kept, the most first."""
+    """Yield the clearances to try, the largest first, down to the one that the world requires."""
     least_clearance = world.settings.required_clearance
     wanted_clearance = max(CLEARANCE if clearance is None else clearance, least_clearance)
     halved = (wanted_clearance * 0.5**k for k in range(HALVINGS))
@@ -74,7 +76,10 @@ def _candidates(world: World, clearance: float | None) -> Iterator[Clearances]:
 
 
 def possible_clearance(world: World, clearance: float | None, rows: Matrix) -> float | None:
-    """What is asked for [m], or as much of it as the ends of a route, shape (k, dof), have; None stays None."""
+    """Return the requested clearance [m], or as much of it as the ends of a path, shape (k, dof), allow.
+
+    None stays None.
+    """
     if clearance is None:
         return None
     clearances = clearances_between(world, rows[[0, -1]], clearance)
@@ -82,12 +87,12 @@ def possible_clearance(world: World, clearance: float | None, rows: Matrix) -> f
 
 
 def keeping(world: World, clearance: float, *, proven: float | None = None) -> World:
-    """Return the same world for searches that keep a distance: what it keeps itself, or more.
+    """Return the world for searches that keep at least a clearance.
 
     Args:
-        world: The world, which may keep a clearance of its own.
-        clearance: That motions keep in steps at least [m].
-        proven: That they are proven to keep at least [m]; None if nothing needs be proven that the world does not ask.
+        world: The world, which may require a clearance itself.
+        clearance: Least clearance of the samples of a motion [m].
+        proven: Least clearance to be proven for motions [m]; None if only what the world requires is proven.
     """
     settings = world.settings
     inflation = max(clearance - settings.clearance, settings.inflation)
@@ -97,10 +102,10 @@ def keeping(world: World, clearance: float, *, proven: float | None = None) -> W
 
 
 def search_form(world: World, clearances: Clearances) -> World:
-    """Return the same world for searches: motions keep more than what is to be kept, at points that lie close enough.
+    """Return the world for searches: with the searched clearance, and with steps small enough for it.
 
-    No point of the arm moves between two of them farther than twice what searches keep beyond what is to be
-    proven, so that what is thin is not stepped over: in between, too, obstacles are that far away [16].
+    Between two samples no point of the arm moves farther than twice the difference of the searched and the proven
+    clearance. So thin obstacles are not stepped over, and the proven clearance also holds in between [16].
     """
     with_clearance = keeping(world, clearances.searched_clearance)
     step = 2.0 * (clearances.searched_clearance - clearances.proven_clearance)
@@ -114,11 +119,11 @@ def check_clearance(world: World, clearance: float | None, ends: dict[str, Matri
 
     Args:
         world: The world.
-        clearance: Wanted [m]; None is never refused.
-        ends: Configurations, shape (dof,) each, by what they are.
+        clearance: Requested clearance [m]; None is never refused.
+        ends: Configurations, shape (dof,) each, by the names that the error gives them.
 
     Raises:
-        InputError: It names the pair of bodies and what is possible.
+        InputError: The message names the pair of bodies and the largest possible clearance.
     """
     if clearance is None:
         return
@@ -135,17 +140,17 @@ def check_clearance(world: World, clearance: float | None, ends: dict[str, Matri
 
 
 def check_route_clearance(world: World, clearance: float | None, rows: Matrix) -> None:
-    """Refuse a clearance that an end of a route, shape (k, dof), cannot keep; see :func:`check_clearance`."""
+    """Refuse a clearance [m] that an end of a path, waypoints of shape (k, dof), cannot keep."""
     check_clearance(world, clearance, {"the start": rows[0], "the end of the path": rows[-1]})
 
 
 def provable_clearances(world: World, rows: Matrix, clearance: float | None) -> Iterator[float]:
-    """The clearances that a route, shape (k, dof), is itself proven to keep: what is wanted, what the world keeps [m].
+    """Yield the clearances that a path is proven to keep: the requested one, then the one that the world requires [m].
 
     Args:
         world: The world.
-        rows: The route.
-        clearance: Wanted [m]; None for a millimetre, or less if the ends have less, but not less than the world keeps.
+        rows: Waypoints, shape (k, dof).
+        clearance: As of :func:`clearances_between`.
     """
     clearances = clearances_between(world, rows[[0, -1]], clearance)
     if clearances is None:
@@ -156,13 +161,16 @@ def provable_clearances(world: World, rows: Matrix, clearance: float | None) -> 
 
 
 def proved(path: JointPath, world: World, *, clearance: float | None = None, seconds: float | None = None) -> JointPath:
-    """As :meth:`rrtik_ompl.JointPath.proved`, of a path of the world's robot."""
+    """Prove a path of the world's robot, as :meth:`rrtik_ompl.JointPath.proved` but without validation."""
     required_clearance = world.settings.required_clearance if clearance is None else clearance
     return path.with_proof(world.prover.route(path.waypoints, clearance=required_clearance, seconds=seconds))
 
 
 def proved_as_clear(path: JointPath, world: World, clearance: float) -> JointPath:
-    """A path with a proof that it keeps a clearance [m], or as much as a millimetre of it, or that it is free."""
+    """Return a path with a proof of the given clearance [m], or of the largest smaller one that can be proven.
+
+    Smaller clearances are a millimetre and what the world requires. If all fail, the last attempt is returned.
+    """
     proved_path = proved(path, world, clearance=clearance)
     least_clearance = world.settings.required_clearance
     fallbacks = {max(min(clearance, CLEARANCE), least_clearance), least_clearance} - {clearance}
@@ -174,7 +182,7 @@ def proved_as_clear(path: JointPath, world: World, clearance: float) -> JointPat
 
 
 def _largest_clearance(world: World, q: Matrix, refused: float) -> float:
-    """Return the largest clearance that a configuration keeps [m], below one that it does not."""
+    """Return the largest clearance [m] that a configuration is proven to keep, found by bisection below ``refused``."""
     low = 0.0
     high = refused
     for _ in range(BISECTIONS):

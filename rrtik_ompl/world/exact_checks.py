@@ -212,13 +212,11 @@ class ExactChecker:
         return True
 
     def _gaps(self, configuration: Vector, pairs: list[tuple[int, int]]) -> list[float] | None:
-        """Return lower bounds of how far pairs of bodies are from touching [m], or None if two of them touch, by coal.
-
-        Bodies touch that do not keep their margin.
+        """Return lower bounds of pairs' distances minus margins [m] by coal; None if a pair does not keep its margin.
 
         Args:
             configuration: Pinocchio's configuration vector.
-            pairs: Numbers of the bodies.
+            pairs: Pairs of indices into ``bodies``.
         """
         pin.forwardKinematics(self._robot.model, self._data, configuration)
         transforms: dict[int, Any] = {}

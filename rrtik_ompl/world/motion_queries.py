@@ -1,7 +1,7 @@
-"""What planners, shortening and replanning need to know of motions: the one interface, kernels, and batches.
+"""The interface by which planners, shortening and replanning check motions, its forms in kernels, and batches.
 
-The interface is :class:`MotionQueries`. Its two optional members are read here alone, so that a stand-in for a world
-may leave them out: ``fast``, the tables for searches in kernels (:func:`has_kernels`), and ``accuracy``
+The interface is :class:`MotionQueries`. Its optional members are only read by functions of this module, so a stand-in
+for a world may leave them out: ``fast``, the tables for searches in kernels (:func:`has_kernels`), and ``accuracy``
 (:func:`is_conservative`).
 """
 
@@ -28,15 +28,15 @@ from rrtik_ompl.model.robot import Chain, Robot
 MotionFree: TypeAlias = Callable[[Vector, Vector], bool]  # as MotionQueries.motion_valid
 
 LARGEST_BATCH = 1024  # motions
-FIRST_BATCH = 64
-CALL_TARGET_SECONDS = 0.01  # [s] of the processor that a batch may take before the next one is made smaller
+FIRST_BATCH = 64  # motions
+CALL_TARGET_SECONDS = 0.01  # [s] processor time of a batch above which the next one is made smaller
 
 
 class MotionQueries(Protocol):
-    """Says which configurations and straight motions are free: a `World`, a stand-in, or the checker of a planner.
+    """Interface of objects that check configurations and straight motions: a `World`, a stand-in, a planner's checker.
 
-    Optional: ``fast`` and ``accuracy``, as of `World`; see :func:`has_kernels` and :func:`is_conservative`. A stand-in
-    that derives from this class need only implement :meth:`motion_valid_batch`.
+    Members ``fast`` and ``accuracy`` are optional and as those of `World`; see :func:`has_kernels` and
+    :func:`is_conservative`. A stand-in that derives from this class need only implement :meth:`motion_valid_batch`.
     """
 
     def valid(self, q: Vector) -> bool:
@@ -57,7 +57,7 @@ class MotionQueries(Protocol):
 
 
 class KernelWorld(MotionQueries, Protocol):
-    """A world whose checks also run in kernels; :func:`has_kernels` says whether a world is one."""
+    """A world whose checks also run in kernels; :func:`has_kernels` tells whether a world is one."""
 
     @property
     def robot(self) -> Robot:
@@ -69,7 +69,7 @@ class KernelWorld(MotionQueries, Protocol):
 
     @property
     def motions(self) -> FastMotions:
-        """How kernels check motions: tables, joint values, step rule."""
+        """The motion checks for kernels: tables, joint values, step rule."""
 
     @property
     def weights(self) -> Vector:
@@ -81,11 +81,11 @@ class KernelWorld(MotionQueries, Protocol):
 
     @property
     def accuracy(self) -> Accuracy:
-        """What counts as free where the kernels cannot decide."""
+        """The treatment of configurations that the kernels cannot decide, see `World`."""
 
 
 class HoldingQueries(MotionQueries, Protocol):
-    """A world with path constraints; :func:`keeps_constraints` says whether a world is one."""
+    """A world with path constraints; :func:`keeps_constraints` tells whether a world is one."""
 
     @property
     def robot(self) -> Robot:
@@ -93,15 +93,15 @@ class HoldingQueries(MotionQueries, Protocol):
 
     @property
     def constraints(self) -> HeldRegions:
-        """What is held."""
+        """The path constraints."""
 
     @property
     def free_motions(self) -> FastMotions | None:
-        """How kernels check motions for collisions alone; None where they cannot."""
+        """The kernels' collision checks of motions without the constraints; None where there are none."""
 
 
 def kernel_tables(world: object) -> FastWorld | None:
-    """Return the tables that kernels read of a world, or None where it has none."""
+    """Return the kernels' tables of a world, or None where it has none."""
     return getattr(world, "fast", None)
 
 
@@ -111,7 +111,8 @@ def has_kernels(world: object, *libraries: str, within: Matrix | None = None) ->
     Args:
         world: A world, a stand-in, or None.
         libraries: Names of the kernel libraries that are needed (:func:`rrtik_ompl.kernels.simd.library.library`).
-        within: Corners of a box of configurations, shape (m, n), in all of which the kernels must be certain.
+        within: Corners of a box of configurations, shape (m, n), in which no joint value may exceed the range of the
+            kernels; None for no such check.
     """
     fast = kernel_tables(world)
     if fast is None:
@@ -122,22 +123,26 @@ def has_kernels(world: object, *libraries: str, within: Matrix | None = None) ->
 
 
 def _certain(fast: FastWorld, chain: Chain, corners: Matrix) -> bool:
-    """Whether no joint value of a box of configurations, given by corners of shape (m, n), is too large for kernels."""
+    """Check whether all joint values in a box of configurations, corners of shape (m, n), are in the kernels' range."""
     largest = np.abs(corners).max(axis=0)
     return bool((np.abs(chain.gain) @ largest + np.abs(chain.offset) <= fast.limits).all())
 
 
 def is_conservative(world: object) -> bool:
-    """Whether a world counts as blocked what its kernels cannot decide; one that does not say is taken to be exact."""
+    """Check whether a world counts undecided configurations as blocked; worlds without ``accuracy`` count as exact."""
     return bool(getattr(world, "accuracy", "exact") == "conservative")
 
 
 def decider(world: object, ask: MotionsFree) -> MotionsFree | None:
-    """Who decides the motions that kernels leave undecided; None if they are left at what outer balls say.
+    """Return the function that decides motions which kernels leave undecided.
 
     Args:
-        world: Any.
-        ask: Decides them in an exact world. A conservative `World` compares solids too, and refuses what they leave.
+        world: Any world.
+        ask: Decides them in an exact world.
+
+    Returns:
+        ``ask`` for an exact world. For a conservative one whose kernels compare solids too, a function that refuses all
+        motions; for other conservative worlds None, as the answer by the sphere covers stands.
     """
     if not is_conservative(world):
         return ask
@@ -155,23 +160,24 @@ def keeps_constraints(world: object) -> TypeGuard[HoldingQueries]:
 
 
 def turning_joints(world: object) -> Mask | None:
-    """Return which joints of a world's arm turn, shape (n,); None for a stand-in without an arm, or no world."""
+    """Return which joints of a world's arm are revolute, shape (n,); None if there is no arm."""
     robot = getattr(world, "robot", None)
     return ~robot.prismatic if isinstance(robot, Robot) else None
 
 
 class OutOfTime(Exception):
-    """It is time to stop, in the middle of a batch."""
+    """Raised when the time limit is reached in the middle of a batch."""
 
 
 class BatchedMotionQueries:
-    """Checks motions in batches that take about ``CALL_TARGET_SECONDS``, so that a search ends soon after it should.
+    """Checks motions in batches of about ``CALL_TARGET_SECONDS``, so that a search ends soon after its time limit.
 
-    Time of the processor counts: on a busy machine small batches would take longer, not end sooner.
+    The batch size is adapted to the processor time of the last batch, not to wall time: on a busy machine smaller
+    batches would take longer without ending the search sooner.
 
     Attributes:
-        asked: Motions so far.
-        stop: True ends the search.
+        asked: Number of motions checked so far.
+        stop: Returns True when the search has to end.
     """
 
     def __init__(self, motions_free: MotionsFree, stop: Stop = no_stop) -> None:
@@ -181,15 +187,15 @@ class BatchedMotionQueries:
         self.stop = stop
 
     def __call__(self, tails: Matrix, heads: Matrix) -> Mask:
-        """Return which motions are free, shapes (m, n) and (m,).
+        """Return which motions from tails to heads, shapes (m, n), are free, shape (m,).
 
         Raises:
-            OutOfTime: If it is time to stop.
+            OutOfTime: If the search has to end.
         """
         return self._answers(tails, heads, self.stop)
 
     def to_the_end(self, tails: Matrix, heads: Matrix) -> Mask:
-        """Return which motions are free, shapes (m, n) and (m,), even when it is time to stop."""
+        """Return which motions, shapes (m, n), are free, shape (m,), even if the search has to end."""
         return self._answers(tails, heads, no_stop)
 
     def _answers(self, tails: Matrix, heads: Matrix, stop: Stop) -> Mask:
@@ -213,7 +219,7 @@ class BatchedMotionQueries:
         return np.concatenate(parts)
 
     def in_time(self, tails: Matrix, heads: Matrix) -> Mask:
-        """Return which motions are free, shapes (m, n) and (m,); none when it is time to stop."""
+        """Return which motions, shapes (m, n), are free, shape (m,); all False if the search has to end."""
         with suppress(OutOfTime):
             return self(tails, heads)
         return np.zeros(len(tails), dtype=bool)

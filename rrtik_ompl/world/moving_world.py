@@ -104,7 +104,7 @@ class MovingWorld:
 
     @property
     def motions(self) -> FastMotions | None:
-        """How motions are checked, for searches in kernels, wherever obstacles are moved; None where ``fast`` is."""
+        """The motion checks for searches in kernels, valid wherever obstacles are; None where ``fast`` is None."""
         return motions_of(self, self._motions)
 
     @property
@@ -118,9 +118,10 @@ class MovingWorld:
         A point cloud may also get other points.
 
         Args:
-            *scenes: The scene now, then one for each further copy; the last one for those that are missing as well.
-            inflation: How far the arm has to stay from obstacles beyond their margins [m]; what is not named keeps its
-                own.
+            *scenes: The current scene, then one for each further copy. If there are fewer, the last one is used for
+                the remaining copies.
+            inflation: Distance to keep from obstacles on top of their margins [m], by name; obstacles that are not
+                named keep their earlier inflation.
 
         Raises:
             InputError: If a scene has other obstacles, attached objects or allowed pairs than the world began with, or
@@ -235,7 +236,7 @@ class MovingWorld:
         return not self.blocked
 
     def _contact_of_base(self) -> str:
-        """See ``blocked``; predicted places do not count, for nothing can be done about them."""
+        """Return the line for ``blocked``. Copies at predicted poses do not count, as the base cannot avoid them."""
         names = fixed_contact(self.robot, tuple(self._bodies), self._pairs_at_rest)
         return "" if names is None else f"'{names[0]}' and '{names[1]}' overlap, and the base cannot give way"
 

@@ -1,4 +1,4 @@
-"""A well-posed problem: a world, a start and a goal. That a `Problem` exists proves that its start is usable."""
+"""A planning problem: a world, a start and a goal. Creating a `Problem` checks that its start is usable."""
 
 from __future__ import annotations
 
@@ -27,34 +27,34 @@ from rrtik_ompl.world.world import World, form_of, like
 
 @dataclass(frozen=True, init=False, eq=False, repr=False)
 class Problem:
-    """A planning problem.
+    """A planning problem: a start and a goal in a world.
 
-    Values up to 1e-5 outside a limit are moved onto it. For continuous joints the goal is turned to the equivalent
-    value nearest to the start, so that the straight motion goes the short way round.
+    Joint values up to 1e-5 outside a limit are moved onto it. The goal values of continuous joints are shifted by whole
+    turns to be nearest to the start, so that the straight motion goes the short way round.
 
-    It is data: it is copied, pickled and changed by its fields.
+    A problem is plain data: it is copied, pickled and changed by its fields.
 
     Attributes:
-        settings: Of its world: robot, scene, and how is checked.
-        start: Shape (dof,), read-only.
-        goal: What to reach; a :class:`JointGoal` has been checked to be free.
-        name: For messages and files.
+        settings: The settings of its world: robot, scene, and how motions are checked.
+        start: Start configuration, shape (dof,), read-only.
+        goal: The goal; a :class:`JointGoal` has been checked to be free.
+        name: Name used in messages and files.
         planner: Name of the planner that :func:`rrtik_ompl.plan` uses where none is named, or None.
 
     Args:
         world: Robot and scene, in which start and goal are checked.
         start: Configuration, shape (dof,), rad or m, or the name of a posture.
         goal: A goal, a configuration, the name of a posture, or a pose (``pinocchio.SE3`` or shape (4, 4)).
-        name: For messages and files.
-        planner: Name of one of :func:`rrtik_ompl.list_planners`; it is looked up when it is used.
-        constraints: Regions that a frame must not leave on the whole path, beside those that the world has. In the
-            world of the problem only motions that keep them are free.
+        name: Name used in messages and files.
+        planner: One of :func:`rrtik_ompl.list_planners`; the name is only looked up when it is used.
+        constraints: Regions that a frame must not leave on the whole path, in addition to those of ``world``. They are
+            added to the world of the problem, where only motions that keep them are valid.
 
     Raises:
         ProblemError: If start or goal is in collision, within an obstacle's margin, outside the limits or outside the
             region of a constraint; pair, margin, joint, limit, or constraint and amount are named.
         InputError: If start or goal has the wrong number of joints or is not finite.
-        UnknownNameError: If there is no posture of a name.
+        UnknownNameError: If the robot has no posture of a given name.
 
     Example:
         >>> world = rrtik.World(rrtik.load_robot("panda"))
@@ -115,7 +115,8 @@ class Problem:
         }
         for field, value in values.items():
             object.__setattr__(self, field, value)
-        object.__setattr__(self, "world", world)  # what has been asked already is asked again
+        # Fills the cached property, so that the tables of the given world are used again.
+        object.__setattr__(self, "world", world)
 
     __reduce__ = as_value
     _repr_html_ = in_notebook
@@ -125,7 +126,7 @@ class Problem:
 
     @cached_property
     def world(self) -> World:
-        """Robot, scene and collision checks: the engine, made from the settings when it is first asked for."""
+        """Robot, scene and collision checks; made from the settings on first use."""
         return like(self.settings)
 
     @property
@@ -139,7 +140,7 @@ class Problem:
         return tuple(self.settings.constraints)
 
     def with_resolution(self, motion_resolution: float) -> Problem:
-        """Return the same problem, its motions checked in steps of another size [m] (:meth:`World.with_resolution`)."""
+        """Return the same problem with another motion resolution [m], see :meth:`World.with_resolution`."""
         return self.with_world(self.world.with_resolution(motion_resolution))
 
     refined = Renamed("with_resolution")
@@ -149,10 +150,10 @@ class Problem:
         return self.with_world(self.world.with_accuracy(accuracy))
 
     def with_world(self, world: World) -> Problem:
-        """Return the same start and goal in another form of the same world; neither is checked again.
+        """Return a problem with the same start and goal in another form of its world; neither is checked again.
 
         Raises:
-            InputError: If it is no world.
+            InputError: If ``world`` is not a world.
         """
         require(world, World, "world of a problem", "use World(robot, scene)")
         return problem_in(self, world)
@@ -163,7 +164,13 @@ class Problem:
 
 
 def known_problem(world: World, start: Vector, goal: JointGoal | Vector) -> Problem:
-    """Return a problem whose start, shape (dof,), and goal somebody has checked already; no joint may be continuous."""
+    """Create a problem from a start and a goal that are known to be valid, without any checks.
+
+    Args:
+        world: The world; the robot must not have continuous joints.
+        start: Shape (dof,).
+        goal: A goal, or its configuration, shape (dof,).
+    """
     values = {
         "settings": world.settings,
         "start": frozen(start),
@@ -177,23 +184,30 @@ def known_problem(world: World, start: Vector, goal: JointGoal | Vector) -> Prob
 
 
 def densely_checked(problem: Problem) -> Problem:
-    """Return the same problem, its motions checked as densely as by the second check of a path."""
+    """Return the same problem with its motions checked at the finer resolution of a path's second check."""
     world = problem.world
     return problem_in(problem, form_of(world, motion_resolution=verification_resolution(world.settings)))
 
 
 def problem_in(problem: Problem, world: World) -> Problem:
-    """As :meth:`Problem.with_world`, of what is known to be a world."""
+    """Return the problem in another form of its world, as :meth:`Problem.with_world` but without a type check."""
     return changed(problem, settings=world.settings, world=world)
 
 
 def usable_configuration(world: World, values: ArrayLike, what: str) -> Vector:
-    """Return one of :func:`usable_configurations`, shape (dof,)."""
+    """Validate one configuration, shape (dof,), as :func:`usable_configurations` does; ``what`` names it in errors."""
     return usable_configurations(world, {what: values})[what]
 
 
 def usable_configurations(world: World, ends: Mapping[str, ArrayLike]) -> dict[str, Vector]:
-    """Configurations given by a user that can be start and goal, by what they are: finite, inside the limits, free.
+    """Validate configurations of a user as start and goal: they have to be finite, inside the limits and free.
+
+    Args:
+        world: The world; its path constraints are not checked here.
+        ends: Configurations, shape (dof,) each, by the names that errors give them, such as "start".
+
+    Returns:
+        The configurations by the same names, those slightly outside a limit moved onto it.
 
     Raises:
         ProblemError: If one is in collision, within an obstacle's margin or outside the limits.
@@ -210,7 +224,7 @@ def usable_configurations(world: World, ends: Mapping[str, ArrayLike]) -> dict[s
     rows = np.array(list(configurations.values()))
     world = world.unheld
 
-    # both opinions must agree, for the path through them will be certified by the second one
+    # Both checks must agree, because the second one will certify the path that begins and ends there.
     for opinion in (world.checks.free, world.checks.certified):
         for (what, q), free in zip(configurations.items(), opinion(rows).tolist(), strict=True):
             if not free:
@@ -219,7 +233,7 @@ def usable_configurations(world: World, ends: Mapping[str, ArrayLike]) -> dict[s
 
 
 def _not_free_error(world: World, q: Vector, what: str) -> ProblemError:
-    """Says what a start or a goal touches, or is too near to."""
+    """Return the error for a start or goal that is in collision or too near, with a remedy."""
     touching = world.contacts(q)
     if not touching:
         return _not_proven_error(world, q, what)
@@ -244,7 +258,7 @@ def _not_free_error(world: World, q: Vector, what: str) -> ProblemError:
 
 
 def _not_proven_error(world: World, q: Vector, what: str) -> ProblemError:
-    """Says why a start or a goal is not free where nothing touches."""
+    """Return the error for a start or goal that touches nothing but is too near or not proven free."""
     pairs = [(c.first, c.second) for c in world.too_near(q)]
     if pairs:
         remedy = "move it, lower the clearance or allow the pair"
@@ -256,7 +270,7 @@ def _not_proven_error(world: World, q: Vector, what: str) -> ProblemError:
 
 
 def _of_a_path(region: TaskRegion) -> bool:
-    """Check whether a region says what only path constraints can."""
+    """Check whether a region uses fields that are reserved for path constraints."""
     return bool(region.frame or region.from_start or region.position_allowance or region.orientation_allowance)
 
 
@@ -267,7 +281,10 @@ def _check_held(robot: Robot, constraints: HeldRegions, q: Vector, what: str) ->
 
 
 def _goal_of(goal: Goal | ArrayLike | pin.SE3) -> Goal:
-    """A goal as it is given; a pose (``pinocchio.SE3`` or shape (4, 4)) of the tip, or a configuration, as one."""
+    """Convert a goal given by a user: a pose, as ``pinocchio.SE3`` or shape (4, 4), is for the tip.
+
+    Everything else that is not a goal already is taken for a configuration.
+    """
     if isinstance(goal, Goal):
         return goal
     pose = isinstance(goal, pin.SE3) or dimensions(goal) == 2
@@ -275,7 +292,10 @@ def _goal_of(goal: Goal | ArrayLike | pin.SE3) -> Goal:
 
 
 def _nearest_turn(world: World, start: Vector, q: Vector) -> Vector:
-    """The goal with its continuous joints turned by whole turns to lie nearest to the start; no turn, no rounding."""
+    """Shift the continuous joints of the goal q by whole turns so that they are nearest to the start.
+
+    The values are returned exactly as they are where no turn is needed.
+    """
     turns = np.where(world.robot.continuous, np.round((start - q) / TAU), 0.0)
     nearest: Vector = q + turns * TAU
     return nearest

@@ -1,7 +1,7 @@
-"""The inner side of a world: what it says of rows of configurations that are trusted.
+"""The implementation of a world: its answers for arrays of configurations that need no validation.
 
-:class:`rrtik_ompl.World` is the door: its methods check what they are given, and ask here. What computes in the library
-has rows that are float64, finite and of shape (m, dof) already, and asks here at once.
+The methods of :class:`rrtik_ompl.World` validate their arguments and call these functions. Code inside the library
+calls them directly with rows that are float64, finite and of shape (m, dof) already.
 """
 
 from __future__ import annotations
@@ -52,24 +52,24 @@ def _second_checker(solids: Arrangement, clearance: float) -> Certificate:
     return Certificate(solids.robot, solids.with_clearance(clearance).as_tuple, solids.pairs)
 
 
-# What a world is made of, and what each part depends on: worlds that are made of the same values share them.
+# The parts of worlds, each with the values that it depends on. Worlds with equal values share a part.
 ARRANGEMENTS = Shared(arranged)  # robot, scene, self_margin
 CHECKERS = Shared(ExactChecker.of)  # arrangement, clearance
 PROVERS = Shared(_prover_of)  # arrangement, held regions
-HELD = Shared(_held_regions)  # robot, what is attached, regions
+HELD = Shared(_held_regions)  # robot, attached objects, regions
 CERTIFICATES = Shared(_second_checker)  # arrangement, clearance
 
 
 @dataclass(frozen=True, eq=False)
 class RowChecks:
-    """What a world says of rows of configurations; for one thread at a time.
+    """The checks of a world for rows of configurations. An object serves one thread at a time.
 
     Attributes:
-        settings: Of the world.
+        settings: The settings of the world.
         solids: Its bodies, and which of them must not touch.
-        checker: Says what is free of collision.
-        prover: Says what is proven.
-        constraints: What is held; None if nothing is.
+        checker: Checks for collisions.
+        prover: Proves motions free.
+        constraints: The path constraints; None if there are none.
     """
 
     settings: WorldSettings
@@ -79,20 +79,24 @@ class RowChecks:
     constraints: HeldRegions | None
 
     def for_thread(self) -> RowChecks:
-        """Return the same for another thread."""
+        """Return the same checks for another thread."""
         return replace(self, checker=self.checker.for_thread(), prover=self.prover.for_thread())
 
     @property
     def unheld(self) -> RowChecks:
-        """The same without path constraints."""
+        """The same checks without path constraints."""
         return self if self.constraints is None else checks_of(changed(self.settings, constraints=()))
 
     def moved(self, name: str, pose: ArrayLike | pin.SE3) -> RowChecks:
-        """Return the same with an obstacle elsewhere; arguments and errors as of :meth:`rrtik_ompl.World.moved`."""
+        """Return the checks with one obstacle moved; arguments and errors as of :meth:`rrtik_ompl.World.moved`.
+
+        The parts for the new scene are derived from the current ones and stored among the shared parts, where
+        :func:`checks_of` finds them.
+        """
         settings = self.settings
         moved, numbers = self.solids.moved(name, pose)
 
-        # These names hold the parts until they have been found again.
+        # The shared parts are held weakly, so these variables keep them alive until checks_of has found them.
         solids = ARRANGEMENTS.keep(moved, settings.robot, moved.scene, settings.self_margin)
         unheld_prover = PROVERS.of(self.solids, None)
         prover = unheld_prover.moved(solids.bodies, numbers, always_colliding=solids.always_colliding)
@@ -105,7 +109,7 @@ class RowChecks:
 
     @cached_property
     def certificate(self) -> Certificate:
-        """The checker behind :meth:`certified`."""
+        """The checker by coal behind :meth:`certified`."""
         return CERTIFICATES.of(self.solids, self.settings.clearance)
 
     def free(self, rows: Matrix) -> Mask:
@@ -113,18 +117,18 @@ class RowChecks:
         return in_blocks(self._free, rows)
 
     def motions_free(self, starts: Matrix, ends: Matrix) -> Mask:
-        """Return which straight motions starts[k] -> ends[k], shapes (m, dof), are valid. Shape (m,)."""
+        """Return which straight motions starts[k] -> ends[k], shapes (m, dof), are valid, shape (m,)."""
         return in_blocks(self._motions_free, starts, ends)
 
     def certified(self, rows: Matrix) -> Mask:
-        """Return which rows, shape (m, dof), a second opinion calls free: proofs first, then coal. Shape (m,)."""
+        """Return which rows, shape (m, dof), the second check calls free, shape (m,): proofs first, then coal."""
         mask = inside_limits(self.settings.robot, rows)
         unproven = mask & ~self.prover.still_proven(rows, clearance=self.settings.clearance)
         mask[unproven] = self.certificate.free(rows[unproven])
         return mask if self.constraints is None else mask & self.constraints.held(rows)
 
     def contacts(self, q: Vector) -> tuple[Contact, ...]:
-        """See :meth:`rrtik_ompl.World.contacts`, at a configuration that is trusted, shape (dof,)."""
+        """Return the contacts at a valid configuration array, shape (dof,); see :meth:`rrtik_ompl.World.contacts`."""
         solids = self.solids
         rows = q[None]
         proven_pairs = self.checker.contacts_of_meshes_kept(rows)
@@ -145,7 +149,7 @@ class RowChecks:
         return min(contacts, key=lambda c: c.clearance, default=None)
 
     def too_near(self, q: Vector) -> tuple[Contact, ...]:
-        """See :meth:`rrtik_ompl.World.too_near`, at a configuration that is trusted, shape (dof,)."""
+        """Return the pairs within the clearance at q, shape (dof,); see :meth:`rrtik_ompl.World.too_near`."""
         clearance = self.settings.clearance
         if clearance == 0.0:
             return ()
@@ -156,7 +160,7 @@ class RowChecks:
         return tuple(sorted(keeping_margin, key=lambda c: c.clearance))
 
     def explain(self, q: Vector) -> str:
-        """See :meth:`rrtik_ompl.World.explain`, at a configuration that is trusted, shape (dof,)."""
+        """Return the reason why q, shape (dof,), is not valid; see :meth:`rrtik_ompl.World.explain`."""
         if limit_fault := self.settings.robot.limit_fault(q):
             return limit_fault
         if touching := self.contacts(q):
@@ -201,17 +205,17 @@ class RowChecks:
 
         if clearance is not None:
             mask[mask] = self.prover.proven(A[free], B[free], clearance=clearance)
-        elif self.constraints is not None:  # a prover says that too
+        elif self.constraints is not None:  # a prover checks the constraints as well
             mask[mask] = self.constraints.motions_held(starts[mask], ends[mask])
         return mask
 
 
 def checks_of(settings: WorldSettings) -> RowChecks:
-    """What answers in a world of some settings."""
+    """Create the checks of a world from its settings, and give the warnings about its geometry once."""
     robot = settings.robot
     scene = settings.scene
     solids = ARRANGEMENTS.of(robot, scene, settings.self_margin)
-    while solids.doubts:  # each is said once
+    while solids.doubts:  # each warning is given once
         warnings.warn(solids.doubts.pop(0), MeshWarning, stacklevel=3)
 
     checker = CHECKERS.of(solids, settings.clearance + settings.inflation)

@@ -136,7 +136,7 @@ class World(Judge):
 
     @property
     def accuracy(self) -> Accuracy:
-        """What counts as free where the kernels cannot decide: "exact" or "conservative"."""
+        """The treatment of configurations that kernels cannot decide: "exact" asks coal, "conservative" blocks them."""
         return self._settings.accuracy
 
     @property
@@ -430,7 +430,7 @@ class World(Judge):
         return self.checks.closest(row)
 
     def clearance(self, q: ArrayLike) -> float:
-        """Smallest signed distance less its margin at q [m]: negative in collision, +inf if nothing can collide."""
+        """Return the least signed distance minus margin at q [m]: negative in collision, +inf without any pairs."""
         nearest = self.closest(q)
         return float("inf") if nearest is None else nearest.clearance
 
