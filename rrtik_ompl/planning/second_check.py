@@ -22,7 +22,8 @@ from rrtik_ompl.world.detours import with_detours
 from rrtik_ompl.world.problem import Problem, densely_checked, problem_in
 from rrtik_ompl.world.route_check import violations_of
 
-MOVE_RULES = ("frozen_joints", "last_joints", "smallest_move")  # options of planners, see MoveRules
+# Options of planners that restrict the moves, see MoveRules.
+MOVE_RULES = ("frozen_joints", "last_joints", "smallest_move")
 TOUCHING = 1e-6  # [m]; bodies that are nearer to their margin than this count as touching
 
 
@@ -119,7 +120,8 @@ class SecondCheck:
             invalid (`num_rejected`), or it is valid but not proven (`num_unproven`, and perhaps `best`).
         """
         if outcome.rows is None:
-            why = f": {outcome.reason}" if outcome.reason else f" with '{outcome.status}'"  # or else OMPL's words
+            # A planner without a reason of its own is quoted with OMPL's status.
+            why = f": {outcome.reason}" if outcome.reason else f" with '{outcome.status}'"
             self.reason = f"{self._name} ended{why}"
             return None
 
@@ -206,7 +208,11 @@ class SecondCheck:
         return self.best if self.cannot_improve else None
 
     def _provable_clearances(self, ends: Matrix) -> Clearances | None:
-        """The clearance that paths between ends, shape (k, dof), can be proven to keep; None if there is none."""
+        """Return the clearances that paths between ends can be proven to keep; None if there are none.
+
+        Args:
+            ends: First and last configuration, shape (k, dof).
+        """
         clearances_of = wide_clearances_between if self._traits.leaves_room else clearances_between
         return clearances_of(self._problem.world, ends, self._clearance)
 

@@ -1,1 +1,1 @@
-"""Single-joint moves: the staircase of a path, the search for the fewest moves and its lower bounds, words."""
+"""Single-joint moves: staircases of paths, the search for the fewest moves, its lower bounds, and moves as text."""

@@ -1,7 +1,8 @@
-"""Fewer single-joint moves: the axis post-processor. Source: [1, ch. 6.3, algorithm 12].
+"""The axis post-processor, which reduces the number of single-joint moves. Source: [1, ch. 6.3, algorithm 12].
 
-Works on arrays: a route is (k, n) waypoints, every edge of which should move one joint; ``motions_free(A, B)`` says
-for batches which straight motions are free. Beyond the published double pass: further rounds in random orders.
+It works on arrays: a route is an array of waypoints, shape (k, n), every edge of which should move one joint.
+``motions_free(A, B)`` returns for batches of shape (m, n) which straight motions are free. Beyond the published double
+pass there are further rounds with random orders of the joints.
 """
 
 from __future__ import annotations
@@ -15,28 +16,30 @@ from rrtik_ompl.base.budget import Budget, Stop, no_stop
 from rrtik_ompl.model.transitions import lower_bound, merge_moves, route_length, transitions
 from rrtik_ompl.world.motion_queries import MotionsFree
 
-PART, LONGER = 16, 4  # moves of the first parts that are cut, and how many times longer they are the next time
-FIRST_TESTS, MORE_TESTS = 4, 4  # waypoints tried together from a pivot, and how many times more the next time
+PART, LONGER = 16, 4  # moves in each of the first parts to be cut, and growth factor of the next parts
+FIRST_TESTS, MORE_TESTS = 4, 4  # waypoints tried together from a pivot, and growth factor
 MAX_CUT_ROUNDS = 20
 
 
 def axis_cut(
     waypoints: Matrix, motions_free: MotionsFree, *, axes: Sequence[int] | None = None, stop: Stop = no_stop
 ) -> Matrix:
-    """One pass of the axis post-processor.
+    """Run one pass of the axis post-processor.
 
-    From the end of the route (the pivot) it looks for the earliest waypoint that a sequence of single-joint moves
-    reaches without collision, goes there, and repeats from there until it has come to the start.
+    The pass begins with the end of the route as pivot. It looks for the earliest waypoint that a sequence of
+    single-joint moves reaches from the pivot without collision, appends these moves, and makes that waypoint the next
+    pivot, until it arrives at the start.
 
     Args:
         waypoints: Shape (k, n), start first. Every edge must be free. An edge that moves several joints is kept as it
             is where no sequence of single-joint moves replaces it.
-        motions_free: Which straight motions are free, for batches of shape (m, n).
-        axes: Order of all joints within a sequence; the last joint first if None, because distal joints sweep less.
-        stop: Called at every pivot; true leaves the rest of the route as it is.
+        motions_free: Returns which straight motions are free, for batches of shape (m, n).
+        axes: Order of all joints within a sequence; None for the last joint first, because distal joints sweep less
+            space.
+        stop: Called at every pivot; True leaves the rest of the route as it is.
 
     Returns:
-        Shape (m, n), start first, ends as given, with no more moves than the route had.
+        Shape (m, n), start first, with the same ends and no more moves than the route had.
     """
     return _backward_pass(merge_moves(waypoints, tolerance=0.0), check_once(motions_free), axes, stop)[::-1]
 
@@ -44,19 +47,20 @@ def axis_cut(
 def double_axis_cut(
     waypoints: Matrix, motions_free: MotionsFree, *, axes: Sequence[int] | None = None, stop: Stop = no_stop
 ) -> Matrix:
-    """The published post-processing: a pass from the end of the route, then one from the start. See :func:`axis_cut`.
+    """Run the published post-processing: a pass from the end of the route, then one from its start.
 
-    Each pass turns the route round, so the second one cuts the other way and restores the direction.
+    Each pass reverses the route, so the second pass cuts from the other end and restores the direction. For the
+    arguments see :func:`axis_cut`.
     """
     free = check_once(motions_free)
     return _backward_pass(_backward_pass(merge_moves(waypoints, tolerance=0.0), free, axes, stop), free, axes, stop)
 
 
 def cut_parts(waypoints: Matrix, motions_free: MotionsFree, *, stop: Stop = no_stop) -> Matrix:
-    """The double cut of short parts of a long route, then of longer ones of what is left, up to the whole.
+    """Run the double cut on short parts of a long route, then on longer parts of the result, up to the whole.
 
-    The cut of a whole route checks about the square of its moves, and far waypoints come first; most of its gain is
-    near. See :func:`axis_cut`.
+    The cut of a whole route checks a number of motions that grows with the square of its moves and begins with far
+    waypoints, although most of the gain is among near ones. For the arguments see :func:`axis_cut`.
     """
     route = merge_moves(waypoints, tolerance=0.0)
     size = PART
@@ -75,19 +79,19 @@ def axis_cut_rounds(
     rounds: int = MAX_CUT_ROUNDS,
     budget: Budget | None = None,
 ) -> Matrix:
-    """The double pass, then ``rounds`` passes with random joint orders in alternating direction; keeps the best.
+    """Run the double pass and ``rounds`` passes with random joint orders in alternating direction; keep the best route.
 
-    A pass never adds a move, but may end in another route with as many. Each round goes on from the last one, so the
-    rounds wander among routes of equal rank and leave where a shorter one opens.
+    A pass never adds a move, but it may end in a different route with as many moves. Each round continues from the
+    route of the last one, so the rounds wander among routes of equal rank until one of them leads to a shorter route.
 
     Args:
         waypoints: Shape (k, n), start first.
-        motions_free: Which straight motions are free, for batches of shape (m, n).
+        motions_free: Returns which straight motions are free, for batches of shape (m, n).
         rounds: Number of further passes, at least 0.
-        budget: When to end, with the best so far, and the seed of the random orders; without an end if None.
+        budget: When to end with the best route so far, and the seed of the random orders; None for no end.
 
     Returns:
-        Shape (m, n), start first: the route with the fewest transitions seen, the shortest among those.
+        Shape (m, n), start first: the route with the fewest moves of all rounds, the shortest one among these.
     """
     budget = Budget() if budget is None else budget
     rng = np.random.default_rng(budget.seed)
@@ -104,12 +108,12 @@ def axis_cut_rounds(
 
 
 def route_rank(route: Matrix) -> tuple[int, float]:
-    """Sort key of a route, shape (k, n): transitions, then length."""
+    """Return the sort key of a route, shape (k, n): number of moves, then length."""
     return transitions(route), route_length(route)
 
 
 def axis_moves(a: Vector, b: Vector, axes: Sequence[int]) -> Matrix:
-    """The waypoints after a of the single-joint moves from a to b, joints in the order ``axes``, shape (moves, n)."""
+    """Return the waypoints after a of the single-joint moves from a to b in the order ``axes``, shape (moves, n)."""
     changing = [axis for axis in axes if a[axis] != b[axis]]
     steps = np.repeat(a[None], len(changing), axis=0)
     for i, axis in enumerate(changing):
@@ -118,14 +122,14 @@ def axis_moves(a: Vector, b: Vector, axes: Sequence[int]) -> Matrix:
 
 
 def check_once(motions_free: MotionsFree) -> MotionsFree:
-    """The same test, but each motion is checked once, from its lexicographically smaller end.
+    """Return a check that asks the given one only once for each motion, from its lexicographically smaller end.
 
-    So both directions have one answer, and what an earlier pass has checked is remembered.
+    Both directions of a motion thus have the same answer, and answers of earlier passes are reused.
     """
     answers: dict[bytes, bool] = {}
 
     def free(A: Matrix, B: Matrix) -> Mask:
-        """Which motions are free, each asked of the given test once."""
+        """Return which motions from rows of A to rows of B are free."""
         swap = np.array([a > b for a, b in zip(A.tolist(), B.tolist(), strict=True)], dtype=bool)[:, None]
         first = np.where(swap, B, A)
         second = np.where(swap, A, B)
@@ -140,7 +144,7 @@ def check_once(motions_free: MotionsFree) -> MotionsFree:
 
 
 def _backward_pass(route: Matrix, motions_free: MotionsFree, axes: Sequence[int] | None, stop: Stop) -> Matrix:
-    """Algorithm 12. The returned route runs from the last waypoint to the first."""
+    """Run algorithm 12; the returned route runs from the last waypoint to the first."""
     order = _order(axes, route.shape[1])
     pivot = len(route) - 1
     new = [route[-1:]]
@@ -154,7 +158,7 @@ def _backward_pass(route: Matrix, motions_free: MotionsFree, axes: Sequence[int]
 
 
 def _earliest_reachable(route: Matrix, pivot: int, motions_free: MotionsFree, order: Sequence[int]) -> int:
-    """The first waypoint that single-joint moves reach from the pivot; its neighbour if there is no other."""
+    """Return the index of the first waypoint that single-joint moves reach from the pivot, or that of its neighbour."""
     first = 0
     count = FIRST_TESTS
     while first < pivot - 1:
@@ -168,8 +172,19 @@ def _earliest_reachable(route: Matrix, pivot: int, motions_free: MotionsFree, or
 
 
 def _reached(a: Vector, goals: Matrix, motions_free: MotionsFree, order: Sequence[int]) -> Mask:
-    """Which goals, shape (m, n), single-joint moves from a reach, the joints in the order given. Shape (m,)."""
-    # What moves last from a, a proximal joint, sweeps most, so it refutes soonest. The answers are the same.
+    """Check which goals single-joint moves from ``a`` reach, joints in the given order.
+
+    Args:
+        a: Shape (n,).
+        goals: Shape (m, n).
+        motions_free: Returns which straight motions are free.
+        order: Order of the joints.
+
+    Returns:
+        Mask, shape (m,).
+    """
+    # The last moves are checked first: these are moves of proximal joints, which sweep most space and collide most
+    # often. The order of checks does not change the result.
     reached = np.ones(len(goals), dtype=bool)
     order = list(order)
     for k, axis in reversed(list(enumerate(order))):
@@ -185,10 +200,10 @@ def _reached(a: Vector, goals: Matrix, motions_free: MotionsFree, order: Sequenc
 
 
 def _moves_to_waypoint(route: Matrix, pivot: int, test: int, motions_free: MotionsFree, order: Sequence[int]) -> Matrix:
-    """The moves from the pivot to a waypoint before it.
+    """Return the waypoints of the moves from the pivot to a waypoint before it, shape (moves, n).
 
-    A neighbour is reached by the original edge. That is not tested again if it moves one joint: a doubt by rounding
-    must not stop the pass.
+    The edge to a neighbour is known to be free. If it moves one joint it is not checked again, so that an answer that
+    differs by rounding cannot stop the pass.
     """
     moves = axis_moves(route[pivot], route[test], order)
 
@@ -199,5 +214,5 @@ def _moves_to_waypoint(route: Matrix, pivot: int, test: int, motions_free: Motio
 
 
 def _order(axes: Sequence[int] | None, dof: int) -> list[int]:
-    """The order of the joints: the last one first if none is given."""
+    """Return the order of the joints; the last joint comes first if none is given."""
     return list(range(dof))[::-1] if axes is None else list(axes)

@@ -1,4 +1,4 @@
-"""Forms of a world that keep less and less clearance: fewest moves come first, clearance second."""
+"""Levels of clearance, from largest to smallest: few moves matter more than clearance."""
 
 from __future__ import annotations
 
@@ -8,19 +8,19 @@ from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.world.clearances import CLEARANCE, Clearances, clearances_between, keeping
 from rrtik_ompl.world.world import World
 
-PREFERRED_CLEARANCE = 0.01  # [m] of single-joint moves, which a person may follow by hand
+PREFERRED_CLEARANCE = 0.01  # [m] preferred by single-joint moves, which a person may carry out by hand
 
 
 class Level:
-    """A form of a world, made when it is first asked for.
+    """A world whose checks keep a clearance; its forms are made when they are first used.
 
     Attributes:
-        clearance: What motions are proven to keep from obstacles [m].
+        clearance: The clearance that motions are proven to keep from obstacles [m].
 
     Args:
-        world: As it is.
-        clearance: See above; None where nothing is proven.
-        searched_clearance: What searches in kernels keep in steps [m].
+        world: The original world.
+        clearance: Clearance to prove [m]; None if nothing is proven.
+        searched_clearance: Clearance that searches in kernels keep in steps [m].
     """
 
     def __init__(self, world: World, clearance: float | None, searched_clearance: float) -> None:
@@ -31,24 +31,25 @@ class Level:
 
     @cached_property
     def searched(self) -> World:
-        """A form whose searches in kernels keep more than the clearance in steps."""
+        """The world for searches in kernels, whose checks in steps keep more than the clearance."""
         return keeping(self._world, self._searched_clearance)
 
     @cached_property
     def proving(self) -> World:
-        """The same, where motions have to be proven."""
+        """The same world where motions have to be proven, too."""
         if self._proven_clearance is None:
             return self.searched
         return keeping(self._world, self._searched_clearance, proven=self._proven_clearance)
 
 
 def clearance_levels(world: World, ends: Matrix, clearance: float | None) -> list[Level]:
-    """The levels, from the clearance wanted down to none, or to checks in steps where no end is proven free.
+    """Return the levels from the clearance wanted down to none, or one level without proofs.
 
     Args:
-        world: As it is.
-        ends: Where moves begin and end, shape (k, dof); all of them keep all levels.
-        clearance: Wanted [m]; None for a centimetre. Less is kept where the ends have less.
+        world: The original world.
+        ends: Begin and end of moves, shape (k, dof); all of them keep all levels. If one of them cannot be proven free,
+            the only level checks motions in steps.
+        clearance: The clearance wanted [m]; None for a centimetre. If the ends have less, less is kept.
     """
     clearances = wide_clearances_between(world, ends, clearance)
     if clearances is None:
@@ -61,10 +62,15 @@ def clearance_levels(world: World, ends: Matrix, clearance: float | None) -> lis
 
 
 def wide_clearances_between(world: World, ends: Matrix, clearance: float | None) -> Clearances | None:
-    """As :func:`clearances_between`, with a centimetre where ``clearance`` is None; never less than the world keeps.
+    """Return :func:`clearances_between` two ends, where None stands for a clearance of one centimetre.
+
+    Args:
+        world: The world; the result is never less than it keeps.
+        ends: Shape (2, dof).
+        clearance: The clearance wanted [m].
 
     Returns:
-        What may be kept between two ends, shape (2, dof); None if an end cannot be proven free.
+        The clearances that can be kept between the ends; None if an end cannot be proven free.
     """
     wanted = PREFERRED_CLEARANCE if clearance is None else clearance
     return clearances_between(world, ends, max(wanted, world.settings.required_clearance))

@@ -1,9 +1,9 @@
-"""Routes with fewer moves on fine grids of all joint values, for arms of which few joints move.
+"""Routes with fewer moves on fine grids of all joint values, for arms with at most three joints that may move.
 
-A route that turns back several times has more free values than the lattices of a search hold. Where three joints or
-fewer may move, a grid of all of them is small enough. Its motions are checked in steps, which is quick; only those of a
-route are proven, and where that fails the grid loses them and is searched again. The search begins without a clearance;
-where that finds fewer moves, the largest clearance is looked for that needs no more.
+A route that turns back several times has more free values than the lattices of a search can hold. With three joints or
+fewer, a grid of all their values is small enough. The motions of a grid are checked in steps, which is quick, and only
+those of a found route are proven. Where that fails, the grid loses these motions and is searched again. The search
+begins without a clearance; if it finds fewer moves, the largest clearance that needs no more moves is chosen.
 """
 
 from __future__ import annotations
@@ -24,32 +24,32 @@ from rrtik_ompl.world.motion_queries import BatchedMotionQueries, OutOfTime
 # Configurations of one grid after the other, and whether their values are near those of the best route. The largest
 # take half a second in the kernels.
 GRIDS = ((2**15, False), (2**18, False), (2**16, True), (2**18, False), (2**16, True))
-MOST_IDLE = 3  # grids in a row without gain
-NEAR = 0.02  # of a joint's range
-MOST_JOINTS = 3  # that may move
-MOST_PAIRS = 2  # of a start and a goal
-MOST_PROOFS = 16  # of routes of one grid
-FEW_ROUNDS = 2  # of improvement before the grids, which do more in less time
+MOST_IDLE = 3  # grids in a row without a gain before the search ends
+NEAR = 0.02  # greatest distance of values near a route, as a share of the joint's range
+MOST_JOINTS = 3  # largest number of joints that may move
+MOST_PAIRS = 2  # pairs of a start and a goal that are tried
+MOST_PROOFS = 16  # routes of one grid that are proven
+FEW_ROUNDS = 2  # rounds of improvement before the grids, which gain more in less time
 
 
 def rounds_before(rounds: int, joints: Sequence[int]) -> int:
-    """How many rounds of improvement to spend where grids come after them, of so many allowed."""
+    """Return how many rounds of improvement to make: ``rounds``, but fewer if grids follow."""
     grids_follow = len(joints) <= MOST_JOINTS
     return min(rounds, FEW_ROUNDS) if grids_follow else rounds
 
 
 @dataclass(frozen=True, eq=False)
 class FineGrids:
-    """Where to look for routes, and what they must keep.
+    """The settings of a search on fine grids: the joints, their limits and costs, and the clearances.
 
     Attributes:
-        joints: Those that may move.
+        joints: The joints that may move.
         lower: Finite limits, shape (n,).
         upper: Finite limits, shape (n,).
         costs: Cost of each joint's travel, shape (n,).
         smallest_move: No move is shorter, shape (n,).
-        levels: Of clearance, the largest first.
-        budget: When to end, with the best so far, and the seed of the places of the grids.
+        levels: Levels of clearance, the largest first.
+        budget: When to end with the best route so far, and the seed that places the grids.
     """
 
     joints: Sequence[int]
@@ -63,16 +63,16 @@ class FineGrids:
     def route(
         self, pairs: Sequence[tuple[Vector, Vector]], best_known: Matrix, lower_bound: int
     ) -> tuple[Matrix, int] | None:
-        """A route with fewer moves than known.
+        """Search for a route with fewer moves than the best known one.
 
         Args:
-            pairs: Of a start and a goal, shapes (n,), that agree in the joints that must not move.
-            best_known: The best route so far, shape (k, n), every edge of which is a move.
-            lower_bound: No route has fewer moves.
+            pairs: Pairs of a start and a goal, shapes (n,), that agree in the joints that must not move.
+            best_known: The best route so far, shape (k, n); every edge is a move.
+            lower_bound: Lower bound of the moves of any route.
 
         Returns:
-            The route, shape (k, n), and the number of the level that it keeps, the first of `levels` is 0; None if
-            there is no such route.
+            The route, shape (k, n), and the index of the level of clearance that it keeps; None if no such route was
+            found.
         """
         best: tuple[Matrix, int] | None = None
         if not 0 < len(self.joints) <= MOST_JOINTS:
@@ -104,7 +104,7 @@ class FineGrids:
         return best
 
     def _grid_values(self, start: Vector, goal: Vector, nodes: int, rng: np.random.Generator) -> Values:
-        """As many values of each joint as a grid of so many configurations has, at equal distances."""
+        """Return equally spaced values of each joint for a grid of ``nodes`` configurations, with start and goal."""
         values = values_of(np.array([start, goal]))
         count = self._values_per_joint(nodes)
         for joint in self.joints:
@@ -113,7 +113,7 @@ class FineGrids:
         return values
 
     def _grid_values_near(self, route: Matrix, nodes: int, rng: np.random.Generator) -> Values:
-        """The values of a route, and as many close to each as a grid of so many configurations has."""
+        """Return the values of a route, and values close to each of them for a grid of ``nodes`` configurations."""
         values = values_of(route)
         count = self._values_per_joint(nodes)
         for joint in self.joints:
@@ -125,14 +125,14 @@ class FineGrids:
         return values
 
     def _values_per_joint(self, nodes: int) -> int:
-        """Of a grid of so many configurations, rounded down."""
+        """Return how many values each joint has in a grid of ``nodes`` configurations, rounded down."""
         return int(nodes ** (1.0 / len(self.joints)))
 
     def _clearest_route(self, values: Values, start: Vector, goal: Vector, max_moves: int) -> tuple[Matrix, int] | None:
-        """The route of a grid with the fewest moves, with the largest clearance that needs no more of them.
+        """Return the route of a grid with the fewest moves, with the largest clearance that needs no more of them.
 
         Returns:
-            The route and the number of its level of clearance; None if no route has at most `max_moves`.
+            The route and the index of its level of clearance; None if no route has at most `max_moves`.
         """
         last_level = len(self.levels) - 1
         route = self._proven_route(self.levels[last_level], values, start, goal, max_moves)
@@ -146,10 +146,10 @@ class FineGrids:
         return route, last_level
 
     def _proven_route(self, level: Level, values: Values, start: Vector, goal: Vector, max_moves: int) -> Matrix | None:
-        """The route of a grid with the fewest moves, at most `max_moves`, that is proven to keep a level, or None.
+        """Return the route of a grid with the fewest moves that is proven to keep a level; None without one.
 
-        Lazy: the grid is checked in steps; where the proof of a route fails, its segments are closed, and the grid is
-        searched again.
+        The grid is checked in steps, and only the motions of a route are proven. Segments whose proof fails are closed,
+        and the grid is searched again. The route has at most `max_moves` moves.
         """
         in_steps = BatchedMotionQueries(level.searched.motion_valid_batch, self.budget.over)
         proving = BatchedMotionQueries(level.proving.motion_valid_batch, self.budget.over)
@@ -161,6 +161,7 @@ class FineGrids:
                 return None
             if proving(route[:-1], route[1:]).all():
                 return route
-            if lattice.close_colliding_segments(route, proving) == 0:  # the same route would come again
+            # Without a closed segment the same route would be found again.
+            if lattice.close_colliding_segments(route, proving) == 0:
                 return None
         return None

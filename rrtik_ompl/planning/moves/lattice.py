@@ -1,7 +1,7 @@
-"""A lattice of joint values, and the best single-joint moves on it: fewest moves first, least travel second.
+"""A lattice of joint values, and the best route of single-joint moves on it: fewest moves first, least travel second.
 
-Source: the level sets of free runs of [1, ch. 6.3], on values at any distance from each other. The values of a
-lattice are those of a route, and further ones thinned out to fit a size.
+Source: the level sets of free runs of [1, ch. 6.3], with values at any distance from each other. The values of a
+lattice are those of a route, and further values, as many as its size allows.
 """
 
 from __future__ import annotations
@@ -17,29 +17,29 @@ from numpy.typing import NDArray
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector, distinct
 from rrtik_ompl.world.motion_queries import MotionsFree
 
-ROUNDING = 1e-12  # of a sum of travels, relative
-MOST_VALUES = 64  # of one joint; with more of them the shift at random does more
-STEPS_ASIDE = 4  # new values on each side of a known one
+ROUNDING = 1e-12  # relative rounding error of a sum of travels
+MOST_VALUES = 64  # limit of the new values of a joint; beyond it a random shift gains more than more values
+STEPS_ASIDE = 4  # limit of the new values on each side of a known one
 
-Values: TypeAlias = list[Vector]  # of a lattice, for each joint, ascending
-Costs: TypeAlias = NDArray[np.float64]  # one number for each configuration of a lattice
-Index: TypeAlias = tuple[int, ...]  # of a configuration in a lattice: for each axis the number of its value
+Values: TypeAlias = list[Vector]  # for each joint the values of a lattice, ascending
+Costs: TypeAlias = NDArray[np.float64]  # one number for each configuration, in the shape of the lattice
+Index: TypeAlias = tuple[int, ...]  # of a configuration in a lattice: for each axis the index of its value
 
 
 class MoveLattice:
-    """All configurations whose every joint takes one of the values given for it.
+    """All configurations whose joints take given values.
 
-    A run is a stretch of the lattice along one joint without collision; a move goes from any configuration of a run to
-    any other.
+    A segment joins two neighbouring configurations along one joint. A run is a sequence of free segments along one
+    joint. A move goes from any configuration of a run to any other.
 
     Attributes:
-        values: For each joint the values it may take, ascending.
+        values: For each joint the values that it may take, ascending.
         size: Number of configurations.
 
     Args:
-        values: For each joint the values it may take, in any order.
-        motions_free: Which straight motions are free, for batches of shape (m, n). Checks
-            all configurations, as motions of no length, and those between free neighbours.
+        values: For each joint the values that it may take, in any order.
+        motions_free: Returns which straight motions are free, for batches of shape (m, n). It is asked for all
+            configurations, as motions of no length, and for the segments between free neighbours.
         costs: Cost of each joint's travel, shape (n,).
     """
 
@@ -57,15 +57,16 @@ class MoveLattice:
     def best_route(
         self, start: Vector, goal: Vector, order: Sequence[int], max_moves: int | None = None
     ) -> Matrix | None:
-        """The route with the fewest moves between two configurations of the lattice, the least travel among those.
+        """Return the route with the fewest moves between two configurations, and the least travel among these.
 
-        Breadth-first by moves: the least travel with which each configuration is reached in at most 0, 1, 2, ... moves.
+        The search is breadth-first by moves: it computes the least travel with which each configuration is reached in
+        at most 0, 1, 2, ... moves until the goal is reached, and then traces the route back.
 
         Args:
-            start: Shape (n,).
-            goal: Shape (n,).
-            order: All joints; among equal routes the one whose last moves come first here.
-            max_moves: Moves that a route may have; any number if None.
+            start: A configuration of the lattice, shape (n,).
+            goal: A configuration of the lattice, shape (n,).
+            order: All joints. Of equally good routes, the one whose last moves come first in this order is returned.
+            max_moves: Limit of the moves of a route; None for no limit.
 
         Returns:
             Shape (moves + 1, n), or None if there is no such route.
@@ -73,7 +74,8 @@ class MoveLattice:
         goal_index = self._index(goal)
         step_costs = self._step_costs()
 
-        # costs_by_moves[k]: the least travel to each configuration in at most k moves, infinite where k do not do
+        # costs_by_moves[k] is the least travel to each configuration in at most k moves, infinite if k moves are not
+        # enough.
         costs_by_moves = [np.full(self._shape, np.inf)]
         costs_by_moves[0][self._index(start)] = 0.0
 
@@ -90,11 +92,11 @@ class MoveLattice:
         return self._route_back_from(costs_by_moves, goal_index, axis_order)
 
     def close_colliding_segments(self, route: Matrix, motions_free: MotionsFree) -> int:
-        """Check the segments of a route of the lattice anew, and close those that are not free.
+        """Check the segments of a route of the lattice again, and close those that are not free, in place.
 
         Args:
             route: Shape (k, n).
-            motions_free: Which straight motions are free, for batches of shape (m, n).
+            motions_free: Returns which straight motions are free, for batches of shape (m, n).
 
         Returns:
             How many segments were closed.
@@ -114,12 +116,17 @@ class MoveLattice:
         return num_closed
 
     def _free_segments(self, motions_free: MotionsFree) -> list[Mask]:
-        """For each axis which motions from one value to the next are free, in the shape of the lattice less one."""
+        """Check all segments of the lattice.
+
+        Returns:
+            For each axis a mask of the free segments along it, in the shape of the lattice with one cell less on that
+            axis.
+        """
         rows = self._configurations(np.indices(self._shape).reshape(len(self._shape), -1))
         is_free = motions_free(rows, rows).reshape(self._shape)
         row_numbers = np.arange(self.size).reshape(self._shape)
 
-        # only segments with two free ends are asked about
+        # Only segments with two free ends are checked.
         candidates = [_both_ends_free(is_free, axis) for axis in range(len(self._shape))]
         tails = [_without_last(row_numbers, axis)[mask] for axis, mask in enumerate(candidates)]
         heads = [_without_first(row_numbers, axis)[mask] for axis, mask in enumerate(candidates)]
@@ -131,19 +138,24 @@ class MoveLattice:
         return candidates
 
     def _configurations(self, indices: NDArray[np.int64]) -> Matrix:
-        """The configurations at indices given for each axis, shape (axes, m), as rows, shape (m, n)."""
+        """Return the configurations at indices given for each axis, shape (axes, m), as rows, shape (m, n)."""
         rows = np.repeat(np.array([[values[0] for values in self.values]]), indices.shape[1], axis=0)
         columns = [values[index] for values, index in zip(self._axis_values, indices, strict=True)]
         rows[:, self._axis_joints] = np.stack(columns, axis=1)
         return rows
 
     def _index(self, q: Vector) -> Index:
-        """Where in the lattice a configuration of it is, shape (n,)."""
+        """Return the index in the lattice of one of its configurations, shape (n,)."""
         pairs = zip(self._axis_values, self._axis_joints, strict=True)
         return tuple(int(np.searchsorted(values, q[joint])) for values, joint in pairs)
 
     def _step_costs(self) -> list[tuple[int, Costs]]:
-        """Axes with more than one value, and what each step along them costs, that axis first; infinite if closed."""
+        """Return the cost of each segment along each axis with more than one value.
+
+        Returns:
+            Pairs of an axis and its costs in the shape of the lattice, that axis moved to the front; infinite where
+            closed.
+        """
         found = []
         for axis, count in enumerate(self._shape):
             if count > 1:
@@ -153,7 +165,7 @@ class MoveLattice:
         return found
 
     def _route_back_from(self, costs_by_moves: list[Costs], goal_index: Index, axis_order: Sequence[int]) -> Matrix:
-        """The route to a configuration, traced from the last move to the first; shape (moves + 1, n)."""
+        """Trace the route to a configuration from its last move to its first, and return it, shape (moves + 1, n)."""
         indices = [goal_index]
         for moves in range(len(costs_by_moves) - 1, 0, -1):
             here = indices[-1]
@@ -164,20 +176,28 @@ class MoveLattice:
     def _predecessors(
         self, costs_before: Costs, here: Index, cost: float, axis_order: Sequence[int]
     ) -> Iterator[Index]:
-        """Where the last move of a route that reaches a configuration at some cost may come from.
+        """Yield the configurations from which the last move of a best route to a configuration may come.
 
-        ``costs_before`` are the least costs with one move fewer.
+        Args:
+            costs_before: Least costs with one move fewer.
+            here: Index of the configuration.
+            cost: Its least cost.
+            axis_order: Axes in the order in which they are tried.
         """
         for axis in axis_order:
             low, high = self._free_run(axis, here)
             travel = np.abs(self._weighted_values[axis][low : high + 1] - self._weighted_values[axis][here[axis]])
             sums = _line(costs_before, here, axis)[low : high + 1] + travel
-            for k in np.flatnonzero(sums <= cost * (1.0 + ROUNDING) + ROUNDING):  # as cheap as the best, but rounding
+            # Equal to the least cost but for rounding.
+            for k in np.flatnonzero(sums <= cost * (1.0 + ROUNDING) + ROUNDING):
                 if low + k != here[axis]:
                     yield (*here[:axis], low + int(k), *here[axis + 1 :])
 
     def _free_run(self, axis: int, here: Index) -> tuple[int, int]:
-        """First and last index on an axis of the run that contains a configuration; segment k joins k and k + 1."""
+        """Return the first and last index on an axis of the run that contains a configuration.
+
+        Segment k joins the values k and k + 1.
+        """
         is_free = _line(self._segment_is_free[axis], here, axis)
         blocked = np.flatnonzero(~is_free)
         next_blocked = int(np.searchsorted(blocked, here[axis]))
@@ -187,7 +207,11 @@ class MoveLattice:
 
 
 def _costs_after_a_move(costs: Costs, step_costs: list[tuple[int, Costs]]) -> Costs:
-    """The least costs after one more move, or as before where no move helps: carried along all runs, both ways.
+    """Return the least cost to reach each configuration with at most one more move.
+
+    Costs are carried along each axis in both directions: at each step the carried cost grows by the cost of the
+    segment, and is replaced by the cost so far of a configuration where that is less. A closed segment makes it
+    infinite.
 
     Args:
         costs: Least costs so far, in the shape of the lattice.
@@ -212,40 +236,40 @@ def _costs_after_a_move(costs: Costs, step_costs: list[tuple[int, Costs]]) -> Co
 
 
 def _line(cells: NDArray[Any], here: Index, axis: int) -> NDArray[Any]:
-    """The cells along an axis through an index, a view."""
+    """Return the cells along an axis through an index, as a view."""
     selection: tuple[Any, ...] = (*here[:axis], slice(None), *here[axis + 1 :])
     line: NDArray[Any] = cells[selection]
     return line
 
 
 def _without_last(cells: NDArray[Any], axis: int) -> NDArray[Any]:
-    """All but the last of the cells along an axis."""
+    """Return all but the last of the cells along an axis."""
     return cells.take(range(cells.shape[axis] - 1), axis=axis)
 
 
 def _without_first(cells: NDArray[Any], axis: int) -> NDArray[Any]:
-    """All but the first of the cells along an axis."""
+    """Return all but the first of the cells along an axis."""
     return cells.take(range(1, cells.shape[axis]), axis=axis)
 
 
 def _both_ends_free(is_free: NDArray[np.bool_], axis: int) -> NDArray[np.bool_]:
-    """Which segments along an axis have two free ends."""
+    """Return a mask of the segments along an axis whose two ends are free."""
     both_free: NDArray[np.bool_] = _without_last(is_free, axis) & _without_first(is_free, axis)
     return both_free
 
 
 def values_of(rows: Matrix) -> Values:
-    """The values that each joint takes in rows, shape (k, n)."""
+    """Return the values that each joint takes in rows, shape (k, n), ascending and distinct."""
     return [distinct(column) for column in rows.T]
 
 
 def lattice_size(values: Sequence[Vector]) -> int:
-    """Number of configurations of a lattice."""
+    """Return the number of configurations of a lattice."""
     return prod(len(v) for v in values)
 
 
 def spread_values(lower: float, upper: float, count: int, rng: np.random.Generator) -> Vector:
-    """``count`` values between two limits at equal distances, shifted at random."""
+    """Return ``count`` equally spaced values between two limits, with a random shift."""
     values: Vector = lower + (np.arange(count) + rng.random()) / count * (upper - lower)
     return values
 
@@ -253,14 +277,14 @@ def spread_values(lower: float, upper: float, count: int, rng: np.random.Generat
 def with_spread(
     values: Values, joints: Sequence[int], lower: Vector, upper: Vector, most_nodes: int, rng: np.random.Generator
 ) -> Values:
-    """The values, and for some joints as many more between their limits as the size of the lattice allows.
+    """Return values with as many more of some joints, between their limits, as the size of the lattice allows.
 
     Args:
         values: For each of the n joints.
-        joints: Those that get more values.
+        joints: The joints that get more values.
         lower: Limits, shape (n,).
         upper: Limits, shape (n,).
-        most_nodes: Largest size.
+        most_nodes: Largest size of the lattice.
         rng: Shifts the new values.
     """
     size_of_others = lattice_size([v for joint, v in enumerate(values) if joint not in joints])
@@ -276,14 +300,15 @@ def with_spread(
 
 
 def near_values(route: Matrix, width: float, lower: Vector, upper: Vector, most_nodes: int) -> Values:
-    """The values of a route, and on both sides of those that are free to change as many as the size allows.
+    """Return the values of a route, with as many new ones around those that are free as the size allows.
 
     Args:
         route: Shape (k, n); the values of its ends are not free.
-        width: The farthest new value [share of the joint's range]; the next ones are half, a quarter ... as far.
+        width: Distance of the farthest new value [share of the joint's range]; the next ones are half, a quarter ... as
+            far.
         lower: Limits, shape (n,).
         upper: Limits, shape (n,).
-        most_nodes: Largest size.
+        most_nodes: Largest size of the lattice.
     """
     values = values_of(route)
     free = [v[(v != ends[0]) & (v != ends[1])] for v, ends in zip(values, route[[0, -1]].T, strict=True)]
@@ -303,14 +328,16 @@ def near_values(route: Matrix, width: float, lower: Vector, upper: Vector, most_
 
 
 def within_travel(values: Values, start: Vector, goal: Vector, costs: Vector, max_travel: float) -> Values | None:
-    """The values that a route of no more than some travel can take; None if there is no such route.
+    """Return the values that a route of limited travel can take; None if there is no such route.
+
+    A value outside the interval between start and goal costs its joint a detour there and back.
 
     Args:
         values: For each joint; those of start and goal are among them.
-        start: Where the route begins, shape (n,).
-        goal: Where it ends.
+        start: Begin of the route, shape (n,).
+        goal: End of the route, shape (n,).
         costs: Cost of each joint's travel, shape (n,).
-        max_travel: Travel of the whole route, in the unit of the costs.
+        max_travel: Limit of the travel of the whole route, in the unit of the costs.
     """
     low = np.minimum(start, goal)
     high = np.maximum(start, goal)

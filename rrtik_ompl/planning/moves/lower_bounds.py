@@ -1,15 +1,15 @@
-"""Proofs that a list of moves cannot be shorter.
+"""Lower bounds of the number of single-joint moves between two configurations.
 
-:func:`sharper_bound`: whatever the one free value of such a list is, something collides. A route of one move more than
-joints must move has a single free value: where the joint that moves twice turns back. The same holds for three moves if
-one joint must move: another leaves and returns. The free value's range is halved until each part is refuted: on every
-route is a collision so deep that no value of the part avoids it.
+:func:`sharper_bound` proves that one move more than there are joints to move is not enough. A route of that many moves
+has a single free value: the value where the joint that moves twice turns back. (If only one joint has to move, the same
+holds for three moves: another joint leaves and returns.) The range of the free value is halved until each part is
+refuted: every route has a collision so deep that no value within the part avoids it.
 
-:func:`reach_bound`, for two joints: how many moves it takes through cells that are not surely in collision. The range
-of both joints is cut into cells. A cell is closed if its middle collides so deeply that nothing within the cell is
-free. Every free route stays in open cells, and a move of one joint stays in a row of them, so a goal whose cell is
-first reached after k moves through open cells is not reached in fewer than k moves. More joints would need cells too
-small for this: the depth of a collision has to exceed the reach of a cell.
+:func:`reach_bound`, for two joints, counts the moves through cells that are not surely in collision. The range of both
+joints is divided into cells. A cell is closed if its middle collides so deeply that no configuration in the cell is
+free. Every free route stays in open cells, and a move of one joint stays in one row of them. So a goal whose cell is
+first reached after k moves through open cells is not reached in fewer than k moves. More joints would need smaller
+cells than are practical, because the depth of a collision has to exceed the reach of a cell.
 """
 
 from __future__ import annotations
@@ -26,41 +26,41 @@ from rrtik_ompl.geometry.collision.overlap_depth import OverlapDepth
 from rrtik_ompl.model.transitions import SAME, moved
 from rrtik_ompl.world.world import World
 
-MOST_WORK = 4096  # parts of a range, times the corners of the other joints
-SMALLEST_PART = 1e-5  # of a range
-PROBES = 4  # stretches of a colliding motion in the middle of which the depth is computed
+MOST_WORK = 4096  # limit of the parts of a range times the corners of the other joints
+SMALLEST_PART = 1e-5  # least size of a part, as a share of the range
+PROBES = 4  # longest colliding stretches of a motion; the depth is computed in their middles
 MOST_CORNERS = 256
-START, FREE, GOAL = range(3)  # where the free joint is
+START, FREE, GOAL = range(3)  # states of the free joint
 
-# what is known of a part of its range, see `OneFreeValue._verdict`
+# Verdicts on a part of the range of the free joint, see `OneFreeValue._verdict`.
 REFUTED = "refuted"
 MIDDLE_IS_FREE = "middle is free"
 UNDECIDED = "undecided"
 
-CELLS = (64, 128, 256)  # along each of two joints, one division after the other; each is cut into the next
-MOST_DEPTHS = 20_000  # computed: each takes some 30 microseconds
-AT_ONCE = 256  # of them between two looks at the clock
+CELLS = (64, 128, 256)  # cells per joint in successive divisions, each a multiple of the one before
+MOST_DEPTHS = 20_000  # limit of computed depths, about 30 microseconds each
+AT_ONCE = 256  # depths computed between two looks at the clock
 
-Place: TypeAlias = tuple[int, int]  # which of the other joints have arrived, a set of bits; where the free joint is
+Place: TypeAlias = tuple[int, int]  # bit mask of the other joints that have arrived, and state of the free joint
 Step: TypeAlias = tuple[Place, Place]
 
 
 def sharper_bound(world: World, joints: Sequence[int], start: Vector, goal: Vector, stop: Stop) -> int:
-    """A lower bound of the moves between two configurations, shape (n,), that are not joined by the least number.
+    """Return a lower bound of the moves between two configurations that no route without detours joins.
 
     Args:
-        world: Checks motions, which are taken as they are, without regard to their resolution.
-        joints: Those that may move.
-        start: Where the moves begin.
-        goal: Where they end.
-        stop: True ends the work; nothing is proven then.
+        world: Checks motions; their collisions are taken as exact, whatever the motion resolution.
+        joints: The joints that may move.
+        start: Shape (n,).
+        goal: Shape (n,).
+        stop: Returns True to end the work; nothing is proven then.
 
     Returns:
-        With c joints that differ, c + 2 (4 for c = 1) if there is a proof that c + 1 (3 for c = 1) moves will not do;
-        else c + 1 (3 for c = 1).
+        With c joints that differ: c + 2 (4 for c = 1) if c + 1 moves (3 for c = 1) are proven not to be enough; else c
+        + 1 (3 for c = 1).
     """
     changing = np.flatnonzero(moved(start, goal)).tolist()
-    if len(changing) == 1:  # another joint leaves and returns
+    if len(changing) == 1:  # another joint has to leave and return
         bound = 3
         may_move_twice = [j for j in joints if j not in changing]
     else:
@@ -71,11 +71,14 @@ def sharper_bound(world: World, joints: Sequence[int], start: Vector, goal: Vect
 
 
 def remembered(world: World, joints: Sequence[int], stop: Stop) -> Callable[[Vector, Vector], int]:
-    """:func:`sharper_bound` of a world, computed once for each start and goal; again if it was stopped."""
+    """Return :func:`sharper_bound` of a world as a function that caches the bound of each start and goal.
+
+    A bound whose computation was stopped is not cached.
+    """
     bounds: dict[tuple[bytes, bytes], int] = {}
 
     def bound(start: Vector, goal: Vector) -> int:
-        """The bound between a start and a goal, shapes (n,)."""
+        """Return the bound between a start and a goal, shapes (n,)."""
         ends = (start.tobytes(), goal.tobytes())
         if ends not in bounds:
             found = sharper_bound(world, joints, start, goal, stop)
@@ -88,14 +91,18 @@ def remembered(world: World, joints: Sequence[int], stop: Stop) -> Callable[[Vec
 
 
 class OneFreeValue:
-    """All routes in which each joint that differs moves once, but one joint moves twice and so has a free value.
+    """All routes on which one joint moves twice and each other joint that differs moves once.
+
+    Such a route is fixed by the order of its moves and one free value: where the joint that moves twice turns back. A
+    place of a route is a pair of the other joints that have arrived and the state of the free joint (START, FREE or
+    GOAL).
 
     Args:
         world: Checks motions.
         start: Shape (n,).
         goal: Shape (n,).
-        joint: The one that moves twice.
-        stop: True ends the work.
+        joint: The joint that moves twice.
+        stop: Returns True to end the work.
     """
 
     def __init__(self, world: World, start: Vector, goal: Vector, joint: int, stop: Stop) -> None:
@@ -114,7 +121,11 @@ class OneFreeValue:
         self._upper = float(min(world.robot.upper[joint], max(ends) + TAU))
 
     def refuted(self) -> bool:
-        """Whether there is a proof that something collides on every such route."""
+        """Check whether every such route is proven to collide.
+
+        Parts of the range of the free value are refuted or halved. A part whose middle gives a free route, a part that
+        is too small, too much work or `stop` ends the attempt, and nothing is proven.
+        """
         if self._all_arrived >= MOST_CORNERS:
             return False
 
@@ -140,10 +151,14 @@ class OneFreeValue:
         return False
 
     def _verdict(self, low: float, high: float) -> str:
-        """Whether some value from ``low`` to ``high`` of the free joint makes a free route.
+        """Decide whether a value from ``low`` to ``high`` of the free joint may give a free route.
+
+        A route is searched that has no step known to be refuted; its steps are then examined, and refuted ones are
+        excluded, until there is no route left or no further step of the route can be refuted.
 
         Returns:
-            REFUTED if none does, MIDDLE_IS_FREE if that in the middle does, UNDECIDED if halves are to be looked at.
+            REFUTED if no value does, MIDDLE_IS_FREE if the value in the middle does, UNDECIDED if the part has to be
+            halved.
         """
         middle = 0.5 * (low + high)
         refuted = set[Step]()
@@ -160,7 +175,13 @@ class OneFreeValue:
             refuted |= fresh
 
     def _route(self, low: float, high: float, refuted: set[Step]) -> list[Place] | None:
-        """A route from start to goal on which nothing is known to collide for all values of a part, or None."""
+        """Return a route from start to goal without a step that is refuted for all values of a part, or None.
+
+        Args:
+            low: Least value of the part.
+            high: Greatest value of the part.
+            refuted: Steps that are refuted while the free joint is in the part.
+        """
         origin: dict[Place, Place | None] = {(0, START): None}
         for here in ((mask, state) for state in (START, FREE, GOAL) for mask in range(self._all_arrived + 1)):
             if here in origin:
@@ -178,29 +199,30 @@ class OneFreeValue:
         return route[::-1]
 
     def _next_places(self, here: Place, low: float, high: float, refuted: set[Step]) -> Iterator[Place]:
-        """The next places of a route."""
+        """Yield the places that one move reaches from a place, as far as the move may be free."""
         mask, state = here
         for step in self._steps_from(here):
             may_be_free = step not in refuted if state == FREE else step in self._free_steps
             if may_be_free:
                 yield step[1]
 
-        if state != GOAL:  # the free joint moves: away from its start, or to its goal
+        # The free joint moves away from its start, or to its goal.
+        if state != GOAL:
             lowest, highest = self._free_ranges[mask, START if state == START else GOAL]
             if low <= highest and high >= lowest:
                 yield mask, state + 1
 
     def _steps_from(self, here: Place) -> list[Step]:
-        """The moves of the other joints from a place."""
+        """Return the moves of the other joints from a place."""
         mask, state = here
         return [(here, (mask | 1 << k, state)) for k in range(len(self._others)) if not mask >> k & 1]
 
     def _steps_of_others(self, state: int) -> list[Step]:
-        """All moves of the other joints while the free joint is in a state."""
+        """Return all moves of the other joints while the free joint is in a state."""
         return [step for mask in range(self._all_arrived + 1) for step in self._steps_from((mask, state))]
 
     def _configuration(self, place: Place, value: float) -> Vector:
-        """Where the arm is at a place; ``value`` is that of the free joint where it is free."""
+        """Return the configuration at a place, shape (n,); ``value`` is that of the free joint if its state is FREE."""
         mask, state = place
         q = self._start.copy()
         arrived = [joint for k, joint in enumerate(self._others) if mask >> k & 1]
@@ -209,20 +231,30 @@ class OneFreeValue:
         return q
 
     def _step_is_free(self, step: Step, value: float) -> bool:
-        """Whether the world finds a move free, the free joint at a value where it is free."""
+        """Check whether the world finds a step free; ``value`` is that of the free joint if its state is FREE."""
         return self._world.motion_valid(*(self._configuration(place, value) for place in step))
 
     def _free_range(self, mask: int, end: int) -> tuple[float, float]:
-        """Between which values the free joint could move to or from an end of its motion, while the others rest."""
+        """Return the range in which the free joint can move from or to an end of its motion while the others rest.
+
+        Args:
+            mask: Which of the other joints have arrived.
+            end: START or GOAL.
+
+        Returns:
+            Least and greatest joint value.
+        """
         rows = self._step_configurations(((mask, FREE), (mask, FREE)), (self._lower, self._upper))
         here = self._configuration((mask, end), 0.0)[self._joint]
         hits = rows[~self._world.valid_batch(rows), self._joint]
         return hits[hits <= here].max(initial=self._lower), hits[hits >= here].min(initial=self._upper)
 
     def _step_configurations(self, step: Step, values: tuple[float, float]) -> Matrix:
-        """Configurations of a move as dense as the world checks it, shape (k, n).
+        """Return configurations of a step, as dense as the world checks it, shape (k, n).
 
-        ``values``: of the free joint, where it is free, at the begin and at the end.
+        Args:
+            step: Begin and end.
+            values: Value of the free joint at begin and end, where its state is FREE.
         """
         a = self._configuration(step[0], values[0])
         b = self._configuration(step[1], values[1])
@@ -231,7 +263,11 @@ class OneFreeValue:
         return rows
 
     def _step_is_refuted(self, step: Step, value: float, half_width: float) -> bool:
-        """Whether a move collides wherever the free joint is within ``half_width`` of a value."""
+        """Check whether a step collides for all values of the free joint within ``half_width`` of ``value``.
+
+        A change of the free joint moves no point of the arm farther than its weight times the change. A deeper overlap
+        therefore persists.
+        """
         rows = self._step_configurations(step, (value, value))
         needed_depth = float(self._world.weights[self._joint]) * half_width
 
@@ -243,18 +279,18 @@ class OneFreeValue:
 
 
 def reach_bound(world: World, joints: Sequence[int], start: Vector, goal: Vector, known_moves: int, stop: Stop) -> int:
-    """No route between two configurations, shapes (n,), that moves these joints alone has fewer moves.
+    """Return a lower bound of the moves of two joints between two configurations.
 
     Args:
-        world: Holds the solids; only joints with limits are bounded.
-        joints: Those that may move.
-        start: Where the moves begin.
-        goal: Where they end; the same as the start in all other joints.
-        known_moves: Moves of a route that is known.
-        stop: True ends the work.
+        world: The world with the obstacles; only joints with limits have a bound.
+        joints: The joints that may move.
+        start: Shape (n,).
+        goal: Shape (n,), the same as the start in all other joints.
+        known_moves: Number of moves of a known route.
+        stop: Returns True to end the work; the bound so far is returned then.
 
     Returns:
-        At most ``known_moves``; 0 if there are not two joints, one has no limits, or there was no time.
+        At most ``known_moves``; 0 if there are not two joints, if one of them has no limits, or if there was no time.
     """
     chosen = list(joints)
     lower = world.robot.lower[chosen]
@@ -293,7 +329,7 @@ def reach_bound(world: World, joints: Sequence[int], start: Vector, goal: Vector
 
 
 def _deeper_than(depth: OverlapDepth, rows: Matrix, reach: float, stop: Stop) -> Mask | None:
-    """Which configurations, shape (m, n), collide more deeply than a reach [m]; None if there is no time."""
+    """Check which configurations, shape (m, n), collide more deeply than a reach [m]; None if there is no time."""
     is_deep = np.zeros(len(rows), dtype=bool)
 
     for k, q in enumerate(rows):
@@ -304,13 +340,13 @@ def _deeper_than(depth: OverlapDepth, rows: Matrix, reach: float, stop: Stop) ->
 
 
 def _cell(values: Vector, lower: Vector, half_cell: Vector, cells_per_joint: int) -> tuple[int, int]:
-    """The cell that two joint values are in."""
+    """Return the indices of the cell that contains two joint values."""
     first, second = np.clip((values - lower) // (2.0 * half_cell), 0, cells_per_joint - 1).astype(int).tolist()
     return first, second
 
 
 def _moves_between(cell_is_closed: Mask, start: tuple[int, int], goal: tuple[int, int], max_moves: int) -> int:
-    """Fewest moves along rows of open cells, at most so many."""
+    """Return the fewest moves along rows and columns of open cells from one cell to another, at most ``max_moves``."""
     reached = np.zeros_like(cell_is_closed)
     reached[start] = True
     for moves in range(max_moves):
@@ -321,8 +357,8 @@ def _moves_between(cell_is_closed: Mask, start: tuple[int, int], goal: tuple[int
 
 
 def _swept(reached: Mask, cell_is_closed: Mask) -> Mask:
-    """The cells that a move along the second axis reaches."""
-    runs = np.cumsum(np.insert(cell_is_closed, 0, True, axis=1), axis=1)[:, 1:]  # grows at closed cells
+    """Return a mask of the open cells that moves along the second axis reach from the reached cells."""
+    runs = np.cumsum(np.insert(cell_is_closed, 0, True, axis=1), axis=1)[:, 1:]  # a number for each run of open cells
     runs += (cell_is_closed.shape[1] + 2) * np.arange(len(cell_is_closed))[:, None]
     met = np.zeros(int(runs.max()) + 1, dtype=bool)
     met[runs[reached & ~cell_is_closed]] = True

@@ -1,4 +1,4 @@
-"""Rules for a list of single-joint moves, so that planners and shortening keep to the same."""
+"""Rules for lists of single-joint moves, shared by planners and shortening."""
 
 from __future__ import annotations
 
@@ -13,28 +13,28 @@ from rrtik_ompl.description.joint_weights import weights_as_costs
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.transitions import merge_moves
 
-MOST_JOINTS = 1_000  # of an arm
+MOST_JOINTS = 1_000  # largest number of joints of an arm
 
 Joints = Sequence[int | str]
 PerJoint = float | Sequence[float]
 
 
 class MoveRules:
-    """The options of the planners that move one joint at a time, for what comes after them.
+    """The options of planners of single-joint moves, for code that processes their routes.
 
     Attributes:
         joint_costs: Cost of each joint's travel, shape (n,).
-        frozen_joints: Numbers of the joints that must not move.
-        last_joints: Numbers of the joints that move once each, after all others have arrived.
-        smallest_move: No move is shorter, shape (n,) [rad or m].
+        frozen_joints: Indices of the joints that must not move.
+        last_joints: Indices of the joints that move once each, after all others have arrived.
+        smallest_move: Least change of each joint in one move, shape (n,) [rad or m].
 
     Args:
-        names: Of the n joints; empty if they have none, and then ``dof`` is needed.
-        joint_costs: Greater than 0, one number or one for each joint; all 1 if None.
-        frozen_joints: By number, from 0, or by name.
-        last_joints: Likewise.
-        smallest_move: One number or one for each joint, at least 0.
-        dof: Number of joints; that of their names if None.
+        names: Names of the n joints; if they have none, an empty list, and ``dof`` is needed.
+        joint_costs: One number greater than 0, or one for each joint; all 1 if None.
+        frozen_joints: By index, from 0, or by name.
+        last_joints: By index, from 0, or by name.
+        smallest_move: One number of at least 0, or one for each joint.
+        dof: Number of joints; the number of names if None.
 
     Raises:
         InputError: If a number is out of range.
@@ -67,12 +67,12 @@ class MoveRules:
 
     @classmethod
     def of_robot(cls, robot: Robot, **options: Any) -> MoveRules:
-        """Those of a robot; weights of its joints are their costs, unless others are given."""
+        """Return the rules for a robot; weights of its joints are their costs unless ``joint_costs`` is given."""
         require(robot, Robot, "robot")
         return cls(robot.joint_names, **weights_as_costs(robot) | options)
 
     def kept_by(self, route: Matrix) -> bool:
-        """Whether a route of single-joint moves, shape (k, n), keeps to all of them.
+        """Check whether a route of single-joint moves, shape (k, n), keeps all rules.
 
         Raises:
             InputError: If it is no route of n joints, or has no row.
@@ -90,7 +90,7 @@ class MoveRules:
         return long_enough(route, self.smallest_move)
 
     def head(self, route: Matrix) -> int:
-        """How many waypoints of a route, shape (k, n), come before the last joints move.
+        """Return how many waypoints of a route, shape (k, n), come before the last joints begin to move.
 
         Raises:
             InputError: As :meth:`kept_by`.
@@ -100,7 +100,7 @@ class MoveRules:
         return len(route) if waiting.all() else int(waiting.argmin())
 
     def _route(self, given: Matrix) -> Matrix:
-        """A checked route, shape (k, n), of at least one row."""
+        """Return a route as an array, shape (k, n), checked to have at least one row."""
         route = finite_array(given, (None, len(self.joint_costs)), "route")
         if len(route) == 0:
             raise InputError("route: needs at least one row")
@@ -108,7 +108,7 @@ class MoveRules:
 
 
 def long_enough(route: Matrix, smallest_move: Vector) -> bool:
-    """Whether no move of a route, shape (k, n), is too short, once those of the same joint in a row are joined."""
+    """Check whether all moves of a route, shape (k, n), are long enough, with consecutive moves of a joint merged."""
     if not smallest_move.any():
         return True
     moves = np.abs(np.diff(merge_moves(route, tolerance=0.0), axis=0))
@@ -116,7 +116,7 @@ def long_enough(route: Matrix, smallest_move: Vector) -> bool:
 
 
 def costs_of_joints(costs: PerJoint | None, dof: int) -> Vector:
-    """Costs of travel, one number or one for each joint, checked. Shape (dof,).
+    """Return checked costs of travel, shape (dof,), from one number for all joints or one for each.
 
     Raises:
         InputError: If one is not greater than 0.
@@ -128,7 +128,7 @@ def costs_of_joints(costs: PerJoint | None, dof: int) -> Vector:
 
 
 def smallest_moves(size: PerJoint, dof: int) -> Vector:
-    """Smallest moves, one number or one for each joint [rad or m], checked. Shape (dof,).
+    """Return checked smallest moves, shape (dof,) [rad or m], from one number for all joints or one for each.
 
     Raises:
         InputError: If one is negative.
@@ -140,13 +140,13 @@ def smallest_moves(size: PerJoint, dof: int) -> Vector:
 
 
 def _per_joint(value: PerJoint, dof: int, what: str) -> Vector:
-    """One number for each joint, shape (dof,), of one for all or one for each."""
+    """Return one number for each joint, shape (dof,), from one number for all joints or one for each."""
     shape = () if isinstance(value, int | float) else (dof,)
     return np.broadcast_to(finite_array(value, shape, what), dof).astype(np.float64)
 
 
 def joint_numbers(joints: Joints, names: Sequence[str], dof: int, option: str) -> list[int]:
-    """Numbers of joints that are given by number or name, each once.
+    """Return the indices of joints that are given by index or name, without repetition.
 
     Raises:
         InputError: If they are not a list of joint numbers.

@@ -1,8 +1,9 @@
-"""A search for the fewest single-joint moves, least travel second, that can be stopped at any time.
+"""An anytime search for routes of single-joint moves: fewest moves first, least travel second.
 
-It looks for the best route on one small lattice of joint values after another. A route of a few moves more than joints
-must move has few values that are not those of the start or the goal, so lattices of all corners between start and goal
-and many values of one, two or three joints hold such routes. Others are made of the values of the routes known so far.
+The search solves one small lattice of joint values after another for its best route. A route of only a few moves more
+than there are joints to move has few values other than those of the start and the goal. Lattices of all corners between
+start and goal, with many values of one, two or three joints, therefore hold such routes. Other lattices are made of the
+values of the routes that are known so far.
 """
 
 from __future__ import annotations
@@ -31,22 +32,22 @@ from rrtik_ompl.planning.moves.rules import long_enough
 from rrtik_ompl.planning.moves.staircase import staircase_orders
 from rrtik_ompl.world.motion_queries import BatchedMotionQueries, MotionsFree, OutOfTime
 
-MOST_NODES = 4096  # of a lattice: some milliseconds in the kernels
+MOST_NODES = 4096  # largest size of a lattice; it takes some milliseconds in the kernels
 MOST_FREE = 3  # joints with free values in one lattice
-WIDTHS = 0.1 * 0.5 ** np.arange(0, 16, 3)  # of the search for less travel, shares of a joint's range
-NEAR_NODES = 512  # of a lattice close to a route
-CUTS = 3  # in random orders, without gain, in every round
-SPARE = 8  # configurations for each of a known part when further values come in
-REPEATS = 8  # of a search for less travel at the same width
+WIDTHS = 0.1 * 0.5 ** np.arange(0, 16, 3)  # steps in the search for less travel, shares of a joint's range
+NEAR_NODES = 512  # largest size of a lattice close to a route
+CUTS = 3  # cuts in random orders without a gain before a round goes on
+SPARE = 8  # share of a lattice's size that is left for further values, as a factor
+REPEATS = 8  # repetitions of the search for less travel with the same step
 
-DIGITS = 9  # of the travel after the point; the rest is rounding
-NONE = 2**31  # moves, if there is no route
+DIGITS = 9  # decimals of the travel that are compared; the rest is rounding
+NONE = 2**31  # number of moves if there is no route
 
-Proof: TypeAlias = Callable[[Vector, Vector], int]  # a lower bound between a start and a goal
+Proof: TypeAlias = Callable[[Vector, Vector], int]  # returns a lower bound of the moves between a start and a goal
 
 
 class MoveSearch:
-    """Routes from starts to goals, better and better.
+    """A search for routes from starts to goals that improves its best route round by round.
 
     Attributes:
         pairs: Each start with each goal.
@@ -56,15 +57,16 @@ class MoveSearch:
         starts: Free configurations, shape (s, n).
         goals: Free configurations, shape (g, n).
         lower, upper: Finite limits of the joint values, shapes (n,).
-        motions_free: Which straight motions are free, for batches of shape (m, n).
-        budget: When to end, with the best so far, and the seed of all random choices; without an end if None.
+        motions_free: Returns which straight motions are free, for batches of shape (m, n).
+        budget: When to end with the best route so far, and the seed of all random choices; None for no end.
         costs: Cost of each joint's travel, shape (n,); all 1 if None.
         frozen: Joints that must not move.
-        smallest_move: No move is shorter, shape (n,); any may be if None.
-        most_nodes: Size of the lattices.
-        prove: Sharpens the bound between a start and a goal; called once, when one move more than it remains.
-        all_free: Which motions are free where no clearance is kept and nothing has to be proven: only what these say
-            is not free raises the bound. As ``motions_free`` if None.
+        smallest_move: Least change of each joint in one move, shape (n,); None for no minimum.
+        most_nodes: Largest size of a lattice.
+        prove: Computes a sharper lower bound between a start and a goal; called once, when the best route has one move
+            more than the bound.
+        all_free: Returns which motions are free without clearance and without proofs. A lower bound may only rely on
+            these collisions. None if they are the same as those of ``motions_free``.
     """
 
     def __init__(
@@ -85,8 +87,8 @@ class MoveSearch:
     ) -> None:
         budget = Budget() if budget is None else budget
         self.pairs = [(s, g) for s, g in product(starts, goals)]
-        self._bounds = [lower_bound(s, g) for s, g in self.pairs]  # for each pair; no route of it has fewer moves
-        self._min_bound = min(self._bounds)  # at the begin
+        self._bounds = [lower_bound(s, g) for s, g in self.pairs]  # lower bound of the moves of each pair
+        self._min_bound = min(self._bounds)  # the bound before the search
         self._lower = lower
         self._upper = upper
 
@@ -99,7 +101,7 @@ class MoveSearch:
         travel = np.ones(count) if costs is None else costs
         self._best = BestRoute(self._queries, travel, order, shortest)
 
-        # what raises the bound, see `all_free`; the same as above if no clearance is kept
+        # Only collisions without clearance may raise the bound, see `all_free`.
         self._queries_without_clearance: BatchedMotionQueries | None = None
         self._best_without_clearance = self._best
         if all_free is not None:
@@ -114,17 +116,17 @@ class MoveSearch:
 
     @property
     def route(self) -> Matrix | None:
-        """The best so far, shape (k, n), or None."""
+        """The best route so far, shape (k, n), or None."""
         return self._best.route
 
     @property
     def moves(self) -> int:
-        """Of the best route; more than any number if there is none."""
+        """Number of moves of the best route; a very large number if there is none."""
         return self._best.moves
 
     @property
     def bound(self) -> int:
-        """No route has fewer moves. Sharpened by :meth:`try_corner_routes` and :meth:`raise_bound`."""
+        """Lower bound of the moves of any route; :meth:`try_corner_routes` and :meth:`raise_bound` sharpen it."""
         return min(*self._bounds, self.moves)
 
     @property
@@ -134,7 +136,7 @@ class MoveSearch:
 
     @property
     def direct(self) -> bool:
-        """Whether each joint of the best route moves once, straight to the goal: nothing can be better."""
+        """Whether each joint of the best route moves once, straight to the goal, so that no route can be better."""
         return self.route is not None and self.proven and self.moves <= lower_bound(self.route[0], self.route[-1])
 
     @property
@@ -146,20 +148,21 @@ class MoveSearch:
         return asked
 
     def raise_bound(self, pair: int, bound: int) -> None:
-        """Take note that no route between a start and a goal, counted as in ``pairs``, has fewer moves."""
+        """Record that no route of a pair has fewer than ``bound`` moves; ``pair`` is an index of ``pairs``."""
         self._bounds[pair] = max(self._bounds[pair], bound)
 
     def offer(self, route: Matrix) -> None:
-        """Take in a free route of single-joint moves, shape (k, n), ends as given."""
+        """Take in a free route of single-joint moves, shape (k, n), from one of the starts to one of the goals."""
         merged = merge_moves(route, tolerance=0.0)
         self._offers.append(merged)
         self._best.take(merged)
 
     def try_corner_routes(self) -> None:
-        """Find out for each start and goal whether they are joined without a detour of any joint; sharpens the bound.
+        """Check for each start and goal whether a route without detours joins them, and sharpen the bound if not.
 
-        Such routes have no free values: they pass the corners of the box between start and goal, all of which are
-        tried. If there is none, a joint has to move twice. A joint alone cannot: another has to leave and return.
+        A route without detours has no free values: it passes corners of the box between start and goal, all of which
+        are tried. If there is no such route, a joint has to move twice, so the bound rises by one. If only one joint
+        differs it rises from 1 to 3, because that joint cannot move twice alone: another joint has to leave and return.
         """
         with suppress(OutOfTime):
             for number, (start, goal) in enumerate(self.pairs):
@@ -180,14 +183,14 @@ class MoveSearch:
                     self.raise_bound(number, 3 if fewest == 1 else fewest + 1)
 
     def _try_plain_orders(self, start: Vector, goal: Vector) -> None:
-        """Take in the moves of the joints from the last to the first, or from the first to the last, if free."""
+        """Take in the moves of the joints from the last to the first, or from first to last, if they are free."""
         for order in (range(len(start))[::-1], range(len(start))):
             route = np.vstack([start, axis_moves(start, goal, order)])
             if self._queries(route[:-1], route[1:]).all():
                 self._best.take(route)
 
     def _try_corners_of_large_boxes(self) -> None:
-        """Take in a route without a detour if one is found where the corners are too many for all to be tried."""
+        """Take in routes without detours, if found, for pairs with too many corners to try them all on a lattice."""
         for start, goal in self.pairs:
             too_many = lattice_size(values_of(np.array([start, goal]))) > self._most_nodes
             if not too_many or self.direct:
@@ -199,7 +202,9 @@ class MoveSearch:
     def improve(self, rounds: int) -> None:
         """Look for better routes, for at most ``rounds`` rounds or until it is time to stop.
 
-        Once it is proven that no route has fewer moves, only the travel is still made less, in a few steps.
+        The steps are: cut the offered routes; search with free values of each joint; rearrange the offered routes; then
+        in each round search with free values of several joints, cut the best route and improve a random part of it. The
+        rounds end once the best route is proven to have the fewest moves. At the end a few steps reduce the travel.
         """
         if self.direct:
             return
@@ -229,11 +234,11 @@ class MoveSearch:
             self._reduce_travel()
 
     def _cut(self, offered: Matrix) -> Matrix:
-        """A free route cut by both methods, whichever is better."""
+        """Cut a free route by both methods, and return the better result."""
         return min(self._best.cut_parts(offered), self._best.cut(offered), key=self._best.rank)
 
     def _cut_again(self) -> None:
-        """Further cuts of the best route, joints in random orders, until several in a row gain no move."""
+        """Cut the best route with random orders of the joints, until several cuts in a row gain no move."""
         cuts_without_gain = 0
         while self.route is not None and not self.proven and cuts_without_gain < CUTS:
             if self._queries.stop():
@@ -246,7 +251,7 @@ class MoveSearch:
                 cuts_without_gain = 0
 
     def _rearrange(self, route: Matrix) -> None:
-        """The best route that the values of a route allow; part by part if they are many."""
+        """Search for the best route on the values of a route, part by part if they are too many for one lattice."""
         first = 0
         while first < len(route) - 1:
             last = self._window(route, first)
@@ -254,27 +259,29 @@ class MoveSearch:
             first = last
 
     def _window(self, route: Matrix, first: int) -> int:
-        """The number of the last waypoint of the longest part from ``first`` on whose values fit in a lattice."""
+        """Return the index of the last waypoint of the longest part from ``first`` on whose values fit in a lattice."""
         last = first + 1
         while last + 1 < len(route) and lattice_size(values_of(route[first : last + 2])) <= self._most_nodes:
             last += 1
         return last
 
     def _sharpen_bound(self) -> None:
-        """Prove a better bound where that would settle the matter."""
+        """Prove a sharper bound if it could show that the best route has the fewest moves; done at most once."""
         if self._prove is None or self.moves != self.bound + 1:
             return
 
         prove = self._prove
         self._prove = None
         for number, (start, goal) in enumerate(self.pairs):
-            if lower_bound(start, goal) < self._bounds[number] < self.moves:  # its corners are settled
+            # Only if all corners of the pair have been tried.
+            if lower_bound(start, goal) < self._bounds[number] < self.moves:
                 self.raise_bound(number, prove(start, goal))
 
     def _search_with_free_values(self, joints: Sequence[int]) -> None:
-        """Search for a route between corners where some joints take many values, unless the corners alone are too many.
+        """Search for a route between corners where some joints take many values.
 
-        The pair of a start and a goal is drawn among those that may have a better route.
+        The pair of start and goal is drawn at random from those that may have a better route. Nothing is searched if
+        the corners alone are too many for a lattice.
         """
         promising = [k for k, bound in enumerate(self._bounds) if bound <= self.moves]
         if promising:
@@ -284,7 +291,7 @@ class MoveSearch:
                 self._best.search(values, start, goal, shorter=self.proven)
 
     def _improve_part(self, route: Matrix) -> None:
-        """Replace a part of a route, at random, by the best on its values and further ones of some joints."""
+        """Replace a random part of a route by the best part on its values and further values of some joints."""
         first = int(self._rng.integers(len(route) - 1))
         last = self._window(route, first)
         while first > 0 and lattice_size(values_of(route[first - 1 : last + 1])) <= self._most_nodes // SPARE:
@@ -294,7 +301,7 @@ class MoveSearch:
         self._best.replace(route, first, last, self._with_spread(route[first : last + 1], joints))
 
     def _reduce_travel(self) -> None:
-        """Move the free values of the best route by less and less, as long as its travel gets less."""
+        """Shift the free values of the best route by smaller and smaller steps, as long as its travel decreases."""
         for width in WIDTHS:
             for _ in range(REPEATS):
                 before = self.route
@@ -308,7 +315,7 @@ class MoveSearch:
                     break
 
     def _reorder_detours(self) -> None:
-        """Let the joints that make detours in the best route make others, in other orders."""
+        """Search with free values of the joints that make detours in the best route, so that others may be found."""
         if self.route is not None:
             values = values_of(self.route)
             ends = values_of(self.route[[0, -1]])
@@ -317,11 +324,11 @@ class MoveSearch:
                 self._search_with_free_values(detours)
 
     def _with_spread(self, rows: Matrix, joints: Sequence[int]) -> Values:
-        """The values of rows, shape (k, n), and as many more of some joints as a lattice may have."""
+        """Return the values of rows, shape (k, n), with as many more of some joints as fit in a lattice."""
         return with_spread(values_of(rows), joints, self._lower, self._upper, self._most_nodes, self._rng)
 
     def _some_joints(self, max_count: int) -> list[int]:
-        """One to ``max_count`` joints that may move, at random."""
+        """Draw one to ``max_count`` joints that may move."""
         if not self._movable:
             return []
         count = int(self._rng.integers(1, min(max_count, len(self._movable)) + 1))
@@ -329,9 +336,10 @@ class MoveSearch:
         return chosen
 
     def _free_joints(self) -> Iterator[list[int]]:
-        """Which joints are free, without end: all pairs in random order, all sets of three, each alone, and again.
+        """Yield sets of joints to be given free values, forever.
 
-        Never more than can have free values in a route that is better by a move.
+        All pairs come in random order, then all sets of three, then each joint alone, and so on. A set is never larger
+        than the number of joints that can have free values in a route with one move fewer than the best one.
         """
         smallest_size = 2  # `improve` has tried each joint alone before
         while self._movable:
@@ -344,7 +352,7 @@ class MoveSearch:
 
 
 class BestRoute:
-    """The route with the fewest moves that is known, the least travel among those.
+    """The best route known: fewest moves first, least travel second.
 
     Attributes:
         route: Shape (k, n), or None.
@@ -352,7 +360,8 @@ class BestRoute:
     Args:
         queries: Checks motions.
         costs: Cost of each joint's travel, shape (n,).
-        order: All joints; among equal routes on a lattice the one whose last moves come first here.
+        order: All joints. Of equally good routes on a lattice, the one whose last moves come first in this order is
+            chosen.
         smallest_move: A route with a shorter move is not kept, shape (n,).
     """
 
@@ -368,37 +377,48 @@ class BestRoute:
 
     @property
     def moves(self) -> int:
-        """Of the route; more than any number if there is none."""
+        """Number of moves of the route; a very large number if there is none."""
         return self._rank[0]
 
     def take(self, route: Matrix) -> None:
-        """Take in a free route, shape (k, n); it is kept if it is better."""
+        """Take in a free route, shape (k, n), and keep it if it is better than the best one."""
         if self._is_better(route):
             self.route = route
             self._rank = self.rank(route)
 
     def rank(self, route: Matrix) -> tuple[int, float]:
-        """What is to be made small: moves, then travel; a gain of rounding is none."""
+        """Return the rank of a route, smaller is better: number of moves, then travel.
+
+        The travel is rounded, so that rounding errors do not count as a gain.
+        """
         travel = float((np.abs(np.diff(route, axis=0)) @ self._costs).sum())
         return transitions(route), round(travel, DIGITS)
 
     def cut(self, route: Matrix, axes: Sequence[int] | None = None) -> Matrix:
-        """The published double axis cut of a free route: on long ones it gains much more in a second than a lattice.
+        """Cut a free route with the published double axis cut, take in the result and return it.
 
-        As far as it comes in time; what has been cut by then stays cut.
+        On long routes this gains much more per second than a lattice does. If time runs out, the part that has been cut
+        until then stays cut.
         """
         return self._take_if_free(
             double_axis_cut(route, self._queries.in_time, axes=axes, stop=self._queries.stop), route
         )
 
     def cut_parts(self, route: Matrix) -> Matrix:
-        """Cuts of parts of a free route that get longer: much of what the cut of the whole gains, much sooner."""
+        """Cut parts of a free route, then longer parts, take in the result and return it.
+
+        This gets most of the gain of cutting the whole route, much sooner.
+        """
         return self._take_if_free(cut_parts(route, self._queries.in_time, stop=self._queries.stop), route)
 
     def search(self, values: Values, start: Vector, goal: Vector, *, shorter: bool = False) -> Matrix | None:
-        """The best route between a start and a goal on a lattice of values, if there is one.
+        """Return the best route between a start and a goal on a lattice of values, or None, and take it in.
 
-        With ``shorter`` one of as many moves and more travel than the best so far need not be found.
+        Args:
+            values: For each joint the values of the lattice.
+            start: Shape (n,).
+            goal: Shape (n,).
+            shorter: Whether to search only for routes of no more travel than the best one, on a smaller lattice.
 
         Raises:
             OutOfTime: If it is time to stop.
@@ -410,14 +430,21 @@ class BestRoute:
         return found
 
     def replace(self, route: Matrix, first: int, last: int, values: Values, *, shorter: bool = False) -> None:
-        """Take in a free route whose waypoints from ``first`` to ``last`` are replaced by the best part on a lattice.
+        """Replace a part of a free route by the best part on a lattice, and take in the result if it is better.
 
-        With ``shorter`` as in :meth:`search`.
+        Args:
+            route: Shape (k, n).
+            first: Index of the waypoint at which the part begins.
+            last: Index of the waypoint at which it ends.
+            values: For each joint the values of the lattice.
+            shorter: As in :meth:`search`.
 
         Raises:
             OutOfTime: If it is time to stop.
         """
-        if shorter and last - first == len(route) - 1:  # where a part begins or ends moves may become one
+        # Only for whole routes: at the ends of a part two moves may be merged into one, which changes the travel
+        # allowed.
+        if shorter and last - first == len(route) - 1:
             values = self._values_of_less_travel(values, route[0], route[-1])
 
         part = self._lattice_route(values, route[first], route[last])
@@ -428,7 +455,7 @@ class BestRoute:
                 self._rank = self.rank(replaced)
 
     def _values_of_less_travel(self, values: Values, start: Vector, goal: Vector) -> Values:
-        """Those values that a route between two ends can take with no more travel than the best one."""
+        """Return the values that a route between two ends can take with no more travel than the best route."""
         if self.route is None:
             return values
         left = within_travel(values, start, goal, self._costs, self._rank[1])
@@ -436,14 +463,14 @@ class BestRoute:
         return nothing_to_search if left is None else left
 
     def _is_better(self, route: Matrix) -> bool:
-        """Whether a route, shape (k, n), is to take the place of the best one."""
+        """Check whether a route, shape (k, n), is better than the best one and has no move that is too short."""
         return self.rank(route) < self._rank and long_enough(route, self._smallest_move)
 
     def _take_if_free(self, cut_route: Matrix, route: Matrix) -> Matrix:
-        """Take in the cut of a route if it is free, which is found out even when it is time to stop.
+        """Take in the cut of a route if it is free; this check is completed even when it is time to stop.
 
         Returns:
-            The cut route, or else the route.
+            The cut route if it is free, else the route.
         """
         if not self._is_free(cut_route, route, self._queries.to_the_end):
             return route
@@ -451,7 +478,10 @@ class BestRoute:
         return cut_route
 
     def _lattice_route(self, values: Values, start: Vector, goal: Vector) -> Matrix | None:
-        """The best route on a lattice of values, each of its moves checked as a whole; None if there is none."""
+        """Return the best route on a lattice of values if each of its moves is free as a whole, else None.
+
+        The lattice checks each move in pieces, from one value to the next.
+        """
         if lattice_size(values) < 2:
             return None
 
@@ -462,7 +492,13 @@ class BestRoute:
         return found
 
     def _is_free(self, route: Matrix, known_free: Matrix, motions_free: MotionsFree | None = None) -> bool:
-        """Whether every edge of a route is free; those of the known one are. Runs have been checked in pieces."""
+        """Check whether all edges of a route are free; edges of the known route are not checked again.
+
+        Args:
+            route: Shape (k, n).
+            known_free: Another route, shape (m, n), whose edges are known to be free.
+            motions_free: The check to use; None for that of the search.
+        """
         motions_free = self._queries if motions_free is None else motions_free
         known_edges = set(edge_keys(known_free))
         fresh = [k for k, edge in enumerate(edge_keys(route)) if edge not in known_edges]

@@ -1,7 +1,7 @@
-"""From any path to one that moves one joint at a time: staircases beside its edges, as coarse as the world allows.
+"""Conversion of any path to single-joint moves: staircases along its edges, as coarse as the world allows.
 
 Source: the discretisation of an ordinary route of [1, ch. 6.3]. The ``n!`` orders of a piece are not tried one by one:
-together they pass no more than the ``2^n`` corners of the piece's box, and its edges are what is checked.
+together they pass at most the ``2^n`` corners of the piece's box, and only the edges of this box are checked.
 """
 
 from __future__ import annotations
@@ -26,12 +26,15 @@ from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.route_check import VERIFICATION_DENSITY, violations_of
 from rrtik_ompl.world.world import World, form_of
 
-Order: TypeAlias = tuple[int, ...]  # the joints of a piece, the first to move first
+Order: TypeAlias = tuple[int, ...]  # joints in the order in which they move
 
-# Of the checks of single-joint moves, relative to the world's; the next one where the second check rejects the path.
+# Densities of the checks of single-joint moves, relative to the world's. If the second check rejects the moves, the
+# next density is tried.
 DENSITIES = (1.0, VERIFICATION_DENSITY, 2.0 * VERIFICATION_DENSITY)
-FINEST = 1.0 / 64.0  # of the world's motion resolution: no point of the arm moves less in a piece that is still cut
-WIDEST = 64  # corners followed per step; a piece of up to seven joints has no more, so its search is exact
+# A piece in which no point of the arm moves farther than this share of the motion resolution is not halved again.
+FINEST = 1.0 / 64.0
+# Limit of the corners followed per step. A piece of up to seven joints has no more, so its search is exact.
+WIDEST = 64
 
 
 def one_joint_moves(
@@ -39,25 +42,27 @@ def one_joint_moves(
 ) -> JointPath:
     """Turn a path of any planner into single-joint moves.
 
-    Every edge becomes a staircase, one step per joint that changes, in an order that is free. An edge for which no
-    order is free is halved, and its halves again: the grid is fine only where the path passes close to something.
+    Every edge becomes a staircase, one step for each joint that changes, in an order that is free. An edge for which no
+    order is free is halved, and its halves again, so that the steps are small only where the path passes close to a
+    body.
 
     Args:
         path: A valid path.
         problem: Its problem, or the world that checks the moves.
-        finest: Where no point of the arm moves farther than this [m], a piece is not halved again; a 64th of the
-            motion resolution if None.
-        clearance: What the moves keep from every obstacle on top of its margin [m], if the path keeps it. None: 1 mm,
-            or what the ends of the path have.
+        finest: A piece in which no point of the arm moves farther than this is not halved again [m]; None for a 64th of
+            the motion resolution.
+        clearance: The clearance of the moves from every obstacle on top of its margin [m], if the path keeps it. None
+            for 1 mm, or for the clearance of the ends if that is less.
 
     Returns:
-        A path with the same ends, bit for bit, every edge of which moves exactly one joint, with its proof. If the
-        path is proven free, so are the moves, with the clearance if the path has it; else they have passed the same
-        second check as a plan. They follow the path closely, so there are many: ``shorten`` makes fewer of them.
+        A path with the same ends, bit for bit, every edge of which moves exactly one joint, with its proof. If the path
+        is proven free, so are the moves, with the clearance if the path has it; otherwise they have passed the same
+        second check as a plan. The moves follow the path closely, so there are many of them: ``shorten`` reduces their
+        number.
 
     Raises:
-        InputError: If the path is not valid, or comes so close to something that no staircase passes there; if an end
-            of the path cannot keep the clearance.
+        InputError: If the path is not valid, or passes too close to a body for any staircase; or if an end of the path
+            cannot keep the clearance.
 
     Example:
         >>> problem = rrtik.load_problem("titan4_prisms")
@@ -80,7 +85,8 @@ def one_joint_moves(
     check_route_clearance(world, clearance, path.waypoints)
 
     for required_clearance in provable_clearances(world, path.waypoints, clearance):
-        with suppress(InputError):  # no staircase keeps so much; one that keeps less may
+        # If no staircase keeps this clearance, one with the next smaller clearance may exist.
+        with suppress(InputError):
             rows = _converted(path.waypoints, keeping(world, 0.0, proven=required_clearance), finest_step)
             return proved(path_through(path, rows), world, clearance=required_clearance)
 
@@ -94,15 +100,15 @@ def one_joint_moves(
 
 
 def staircase_orders(a: Vector, b: Vector, motions_free: MotionsFree) -> list[Order]:
-    """Orders in which the joints may change one after the other from a to b.
+    """Return free orders in which the joints can move one after the other from a to b.
 
     Args:
-        a: Beginning of a piece, shape (n,).
-        b: Its end, shape (n,).
-        motions_free: Which straight motions are free, for batches of shape (m, n).
+        a: Begin of a piece, shape (n,).
+        b: End of the piece, shape (n,).
+        motions_free: Returns which straight motions are free, for batches of shape (m, n).
 
     Returns:
-        One free order for every joint that can move first; empty if no order is free.
+        One free order for each joint that can move first; empty if no order is free.
     """
     joints = np.flatnonzero(a != b)
     steps = _free_steps(a, b, joints, motions_free)
@@ -118,7 +124,18 @@ def staircase_orders(a: Vector, b: Vector, motions_free: MotionsFree) -> list[Or
 
 
 def _free_steps(a: Vector, b: Vector, joints: NDArray[np.int64], motions_free: MotionsFree) -> dict[int, list[int]]:
-    """The free steps that lead from a to b, by the corner of the box where they begin; a corner is a set of bits."""
+    """Return the free steps of all orders from a to b.
+
+    Args:
+        a: Shape (n,).
+        b: Shape (n,).
+        joints: Indices of the joints that differ.
+        motions_free: Returns which straight motions are free.
+
+    Returns:
+        For each corner of the box, a bit mask of positions in ``joints`` that have the values of b, the positions of
+        the joints that may move next.
+    """
     places = range(len(joints))[::-1]  # the last joint first: distal joints sweep less
     frontier = [0]
     layers = []
@@ -145,7 +162,7 @@ def _free_steps(a: Vector, b: Vector, joints: NDArray[np.int64], motions_free: M
 
 
 def _corner(a: Vector, b: Vector, joints: NDArray[np.int64], corner: int) -> Vector:
-    """The corner of the box between a and b, shape (n,): joints whose bits are set have the values of b."""
+    """Return a corner of the box between a and b, shape (n,): joints whose bits are set have the values of b."""
     q = a.copy()
     for place, joint in enumerate(joints):
         if corner >> place & 1:
@@ -155,7 +172,7 @@ def _corner(a: Vector, b: Vector, joints: NDArray[np.int64], corner: int) -> Vec
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Piece:
-    """A part of edge number ``edge``, and the orders known to be free on it."""
+    """A part of the edge with index ``edge``, from a to b, shapes (n,), with the orders known to be free on it."""
 
     a: Vector
     b: Vector
@@ -164,7 +181,11 @@ class _Piece:
 
 
 def _converted(waypoints: Matrix, world: World, finest: float) -> Matrix:
-    """Waypoints of the staircases along a route: all pieces of a level are checked together, then the next level."""
+    """Return the waypoints of the staircases along a route, shape (m, n).
+
+    All pieces of a level are checked together. Pieces without a free order are halved, and their halves are the next
+    level.
+    """
     rows = _without_tremble(waypoints)
     pieces = [_Piece(a, b, edge, []) for edge, (a, b) in enumerate(pairwise(rows)) if (a != b).any()]
     while any(not piece.orders for piece in pieces):
@@ -178,14 +199,19 @@ def _converted(waypoints: Matrix, world: World, finest: float) -> Matrix:
     parts_of_route = [rows[:1]]
     last = -1
     for piece in pieces:
-        order = next((order for order in piece.orders if order[0] == last), piece.orders[0])  # two moves become one
+        # An order that begins with the joint that moved last saves a move.
+        order = next((order for order in piece.orders if order[0] == last), piece.orders[0])
         parts_of_route.append(_staircase(piece, order)[1:])
         last = order[-1]
     return merge_moves(np.vstack(parts_of_route), tolerance=0.0)
 
 
 def _free_orders(pieces: list[_Piece], world: World) -> list[list[Order]]:
-    """For every piece: last joint first and first joint first, as far as they are free, else whichever order is."""
+    """Return free orders for every piece.
+
+    The two simple orders, last joint first and first joint first, are checked for all pieces together. A piece for
+    which neither is free gets the orders of `staircase_orders`.
+    """
     joints = [tuple(np.flatnonzero(piece.a != piece.b).tolist()) for piece in pieces]
     trials = [
         (piece, order)
@@ -210,7 +236,7 @@ def _free_orders(pieces: list[_Piece], world: World) -> list[list[Order]]:
 
 
 def _halves(piece: _Piece, world: World, finest: float) -> list[_Piece]:
-    """The two halves of a piece.
+    """Return the two halves of a piece, without a half that does not move.
 
     Raises:
         InputError: If they would be too small.
@@ -227,7 +253,7 @@ def _halves(piece: _Piece, world: World, finest: float) -> list[_Piece]:
 
 
 def _staircase(piece: _Piece, order: Order) -> Matrix:
-    """The corners that an order passes, both ends of the piece included, shape (moves + 1, n)."""
+    """Return the corners that an order passes, with both ends of the piece, shape (moves + 1, n)."""
     rows = np.repeat(piece.a[None], len(order) + 1, axis=0)
     for k, joint in enumerate(order, start=1):
         rows[k:, joint] = piece.b[joint]
@@ -235,7 +261,7 @@ def _staircase(piece: _Piece, order: Order) -> Matrix:
 
 
 def _without_tremble(waypoints: Matrix) -> Matrix:
-    """The same route without changes too small to count as moves; start and end stay as they are, bit for bit."""
+    """Return the route without changes too small to count as moves; start and end stay the same bit for bit."""
     rows = waypoints.copy()
     for k in range(len(rows) - 2, 0, -1):
         rows[k] = np.where(np.abs(rows[k] - rows[k + 1]) <= SAME, rows[k + 1], rows[k])

@@ -1,4 +1,4 @@
-"""Lists of single-joint moves as text: lines to be read aloud, CSV, and plain values for JSON."""
+"""Single-joint moves as text: sentences to be read aloud, CSV, and plain values for JSON."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ COLUMNS = ("move", "joint", "from", "to", "change", "unit")
 
 
 def moves_csv(path: JointPath) -> str:
-    """One line per move: number, joint, from, to and change in degrees (metres if it slides), unit.
+    """Return the moves as CSV, one line each: number, joint, from, to, change, unit (degrees, metres if sliding).
 
     Raises:
         InputError: If the path does not move one joint at a time.
@@ -33,7 +33,7 @@ def moves_csv(path: JointPath) -> str:
 
 
 def moves_document(path: JointPath) -> list[dict[str, Any]]:
-    """The moves as plain values that json can write: joint, from, to [rad or m] and the unit.
+    """Return the moves as plain values for json: joint, from and to [rad or m], and the unit.
 
     Raises:
         InputError: If the path does not move one joint at a time.
@@ -42,10 +42,10 @@ def moves_document(path: JointPath) -> list[dict[str, Any]]:
 
 
 def spoken_moves(path: JointPath) -> list[str]:
-    """One sentence per move, to be read aloud to a pilot: "joint 2 up 36 degrees to 55".
+    """Return one sentence per move, to be read aloud to a pilot: "joint 2 up 36 degrees to 55".
 
-    A joint with limits goes up and down (to larger and to smaller values), a sliding joint goes out and in. A joint
-    without limits turns forward and back, and is told where it stops as an angle from minus 180 to 180 degrees.
+    A joint with limits moves up or down (to larger or smaller values), a sliding joint out or in. A joint without
+    limits turns forward or back, and its target is an angle from minus 180 to 180 degrees.
 
     Raises:
         InputError: If the path does not move one joint at a time.
@@ -54,7 +54,7 @@ def spoken_moves(path: JointPath) -> list[str]:
 
 
 def _sentence(move: Move) -> str:
-    """A move as a sentence, see `spoken_moves`."""
+    """Return the sentence for one move, see `spoken_moves`."""
     end = move.end
     if move.unit == "m":
         words = ("out", "in")
@@ -76,13 +76,13 @@ def _sentence(move: Move) -> str:
 
 
 def _rounded(value: float) -> str:
-    """Tenths, and thousandths of what is smaller; no zeros that say nothing: "36", "0.5", "0.025"."""
+    """Return a number as text with one decimal, or three below 0.1, without trailing zeros: "36", "0.5", "0.025"."""
     text = f"{value:.{1 if abs(value) >= 0.1 else 3}f}".rstrip("0").rstrip(".")
     return "0" if text == "-0" else text
 
 
 def _said(name: str) -> str:
-    """The name of a joint with a gap between word and number: "joint2" and "joint_2" as "joint 2"."""
+    """Return the name of a joint with a space between word and number: "joint 2" for "joint2" and "joint_2"."""
     words = name.replace("_", " ").replace("-", " ")
     head = words.rstrip("0123456789")
     return f"{head.rstrip()} {words[len(head) :]}" if head and head != words else words

@@ -1,4 +1,4 @@
-"""A roadmap of a world: made once, asked many times, saved to a file, checked again when an obstacle moves."""
+"""Roadmaps of a world: made once, queried many times, saved to files, checked again when an obstacle moves."""
 
 from __future__ import annotations
 
@@ -26,16 +26,16 @@ from rrtik_ompl.world.motion_queries import MotionQueries, decider, has_kernels,
 from rrtik_ompl.world.problem import usable_configurations
 from rrtik_ompl.world.world import World
 
-VERTICES = 2000  # of a roadmap that is made for many queries
-NEAR = 10  # vertices with which a new one is joined
-SECONDS = 60.0  # that making one takes at most, where next to nothing is free
+VERTICES = 2000  # vertices of a new roadmap
+NEAR = 10  # near vertices with which a new one is joined
+SECONDS = 60.0  # [s] limit for making a roadmap in a world where next to nothing is free
 MOST_VERTICES = 1_000_000
 FORMAT = 1
-NOT_PROVING = -1.0  # in a file, in the place of a clearance [m]
+NOT_PROVING = -1.0  # stored in place of the clearance of proofs [m]
 
 
 class Graph(Protocol):
-    """A roadmap without its world: a :class:`KernelGraph` or a :class:`PythonGraph`."""
+    """A roadmap without a world: a :class:`KernelGraph` or a :class:`PythonGraph`."""
 
     @property
     def size(self) -> int:
@@ -51,29 +51,29 @@ class Graph(Protocol):
 
     @property
     def states(self) -> NDArray[np.int32]:
-        """What is known of the edges, shape (m,)."""
+        """State of each edge, shape (m,): UNKNOWN, SURE or BLOCKED."""
 
     def restore(self, rows: Matrix, edges: NDArray[np.int32], states: NDArray[np.int32]) -> None:
-        """Fill an empty one."""
+        """Fill an empty graph with the vertices, edges and states of another one."""
 
     def grow(self, wanted: int, stop: Stop) -> int:
-        """Add free samples; how many were added."""
+        """Add up to ``wanted`` free samples, and return how many were added."""
 
     def learn(self, path: Matrix) -> int:
-        """Make a free path, shape (k, n), part of it."""
+        """Add the waypoints of a free path, shape (k, n), as vertices, and return how many."""
 
     def check(self, stop: Stop) -> None:
-        """Check all edges."""
+        """Check all edges whose state is unknown."""
 
     def route(self, starts: Matrix, goals: Matrix, stop: Stop) -> Matrix | None:
-        """The shortest path on it from a start to a goal, shape (k, n), or None."""
+        """Return the shortest path on the graph from a start to a goal, shape (k, n), or None."""
 
     def statistics(self) -> dict[str, int | float]:
-        """Counts."""
+        """Return counts of vertices, edges, checked motions and samples."""
 
 
 def checked_near(near: object) -> int:
-    """With how many of the vertices near it a new one is joined.
+    """Return the checked number of near vertices with which a new vertex is joined.
 
     Raises:
         InputError: If it is none of 1 to 100.
@@ -86,11 +86,21 @@ def checked_near(near: object) -> int:
 def graph_in(
     world: MotionQueries | None, lower: Vector, upper: Vector, *, near: int, seed: int, checks: MotionQueries
 ) -> Graph:
-    """An empty roadmap in a box of a world: in kernels where it has some; ``checks`` answers what these do not."""
+    """Return an empty graph in a box of configurations: in kernels if the world has them, else in Python.
+
+    Args:
+        world: The world; None for the graph in Python.
+        lower: Lower bounds of the box, shape (n,).
+        upper: Upper bounds of the box, shape (n,).
+        near: With how many near vertices a new one is joined.
+        seed: Seed of the samples.
+        checks: Answers the checks that the kernels cannot decide, or all of them.
+    """
     if not has_kernels(world, KERNELS):
         return PythonGraph(lower, upper, near=near, seed=seed, valid=checks.valid, motion_free=checks.motion_valid)
     ask = decider(world, checks.motion_valid_batch)
-    lower = np.maximum(lower, world.robot.lower)  # kernels know no place beyond the limits
+    # The kernels only accept configurations inside the limits.
+    lower = np.maximum(lower, world.robot.lower)
     upper = np.minimum(upper, world.robot.upper)
     return KernelGraph(world.motions, lower, upper, near=near, seed=seed, ask=ask)
 
@@ -98,20 +108,21 @@ def graph_in(
 class Roadmap:
     """A roadmap of a world: free configurations joined by free motions, for any number of queries.
 
-    A query joins its start and goal with the vertices near them and searches the shortest path on the roadmap, in a
-    tenth of a millisecond or so. Its motions are checked in steps. `plan()` with the planner "roadmap" proves them too,
-    and where the roadmap has no path it adds one that RRT-Connect finds. For one thread at a time.
+    A query joins its start and goal with the vertices near them and searches for the shortest path on the roadmap,
+    which takes about a tenth of a millisecond. Its motions are checked in steps. `plan()` with the planner "roadmap"
+    also proves them, and adds a path of RRT-Connect where the roadmap has none. A roadmap must not be used by several
+    threads at once.
 
     Attributes:
-        world: Where it is.
-        seed: Of its samples.
-        near: With how many of the vertices near it a new one is joined.
+        world: The world of the roadmap.
+        seed: Seed of its samples.
+        near: With how many of the vertices near it a new vertex is joined.
 
     Args:
         world: Robot and scene.
-        vertices: How many free configurations to begin with; fewer where they are not found within a minute.
+        vertices: Number of free configurations to begin with; there are fewer if they are not found within a minute.
         seed: The same seed gives the same roadmap.
-        near: See above.
+        near: With how many of the vertices near it a new vertex is joined, from 1 to 100.
 
     Raises:
         InputError: If a number makes no sense, or the world has path constraints, which a roadmap does not keep.
@@ -130,7 +141,8 @@ class Roadmap:
         require(world, World, "world of a roadmap", "use World(robot, scene)")
         if not 0 <= whole_number(vertices, "vertices") <= MOST_VERTICES:
             raise InputError(f"vertices must be {MOST_VERTICES} or less, got {vertices}")
-        if keeps_constraints(world):  # no sample keeps them, and files say nothing of them
+        # Random samples do not satisfy path constraints, and files do not store them.
+        if keeps_constraints(world):
             raise InputError("world of a roadmap: it has path constraints, which a roadmap does not keep; use cbirrt")
 
         self.near = checked_near(near)
@@ -158,18 +170,18 @@ class Roadmap:
         return edges
 
     def grow(self, vertices: int, *, seconds: float = SECONDS) -> int:
-        """Add so many vertices and check their edges, for some seconds at most; how many were added."""
+        """Add vertices and check their edges, for at most ``seconds``; return how many vertices were added."""
         deadline = time.perf_counter() + positive(seconds, "seconds")
         added = self.graph.grow(whole_number(vertices, "vertices"), lambda: time.perf_counter() > deadline)
         self.graph.check(lambda: time.perf_counter() > deadline)
         return added
 
     def path(self, start: ArrayLike, goal: ArrayLike, *, seconds: float = 1.0) -> JointPath | None:
-        """The shortest path on the roadmap between two configurations, its motions checked in steps.
+        """Return the shortest path on the roadmap between two configurations, its motions checked in steps.
 
         Args:
-            start: Shape (dof,), rad or m.
-            goal: Likewise.
+            start: Shape (dof,) [rad or m].
+            goal: Shape (dof,) [rad or m].
             seconds: Wall time after which to give up [s].
 
         Returns:
@@ -185,9 +197,14 @@ class Roadmap:
         return None if rows is None else JointPath.of(self.world.robot, rows)
 
     def route(self, starts: Matrix, goals: Matrix, stop: Stop) -> Matrix | None:
-        """As :meth:`path`, between free configurations of shapes (s, dof) and (g, dof); shape (k, dof).
+        """Return the shortest path between free configurations as waypoints, shape (k, dof), or None.
 
-        Joints without limits are turned by whole turns, so that the first start lies on the roadmap.
+        Joints without limits are shifted by whole turns, so that the first start lies in the box of the roadmap.
+
+        Args:
+            starts: Shape (s, dof).
+            goals: Shape (g, dof).
+            stop: Returns True to give up.
         """
         called(stop, "stop of a roadmap")
         starts, goals = (filled_rows(rows, self.world.robot.dof, "ends of a route") for rows in (starts, goals))
@@ -199,14 +216,15 @@ class Roadmap:
             return None
 
         rows = rows + turns
-        first = _nearest(starts, rows[0])  # to the bit; by way of the turns it was rounded
+        # Shifting by turns has rounded the ends, so they are replaced by the given ones.
+        first = _nearest(starts, rows[0])
         last = _nearest(goals, rows[-1])
         rows[0] = first
         rows[-1] = last
         return rows
 
     def learn(self, path: Matrix) -> None:
-        """Make a free path, shape (k, dof), part of the roadmap, as far as it lies in its box."""
+        """Add the part of a free path, shape (k, dof), that lies in the box of the roadmap."""
         rows = filled_rows(path, self.world.robot.dof, "path to learn")
         self.graph.learn(rows - self._turns(rows[0]))
 
@@ -216,10 +234,10 @@ class Roadmap:
         return turns
 
     def moved_to(self, world: World) -> Roadmap:
-        """The same roadmap in another world of the robot, for instance after an obstacle has moved.
+        """Return the same roadmap in another world of the robot, for instance after an obstacle has moved.
 
-        Its vertices are checked at once and edges that end at one that is not free are left out; the motions of the
-        others are checked again as soon as a query comes to them. This roadmap stays as it is.
+        Its vertices are checked at once, and edges of vertices that are not free are left out. The motions of the other
+        edges are checked again when a query needs them. This roadmap stays as it is.
 
         Raises:
             InputError: If the world is of another robot or has path constraints.
@@ -235,7 +253,7 @@ class Roadmap:
         return _restored(world, rows, edges, states, seed=self.seed, near=self.near)
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write everything as .npz, whole or not at all.
+        """Write the roadmap as .npz file; if writing fails, no incomplete file is left.
 
         Raises:
             InputError: If the ending is another one or the file cannot be written.
@@ -256,8 +274,8 @@ def load_roadmap(path: str | os.PathLike[str], world: World, *, moved: bool = Fa
 
     Args:
         path: The file.
-        world: The world that it is of.
-        moved: Whether the world may be another one of the same robot; then all is checked again, as by
+        world: The world of the roadmap.
+        moved: Whether the world may be another one of the same robot; if so, everything is checked again as by
             :meth:`Roadmap.moved_to`.
 
     Raises:
@@ -300,7 +318,7 @@ def load_roadmap(path: str | os.PathLike[str], world: World, *, moved: bool = Fa
 
 
 def _fit(edges: NDArray[np.int64], states: NDArray[np.int64], count: int) -> bool:
-    """Whether edges and what is known of each are those of a graph of so many vertices."""
+    """Check whether edges and their states belong to a graph of ``count`` vertices."""
     if edges.ndim != 2 or edges.shape[1] != 2 or states.shape != (len(edges),):
         return False
     if not len(edges):
@@ -309,7 +327,7 @@ def _fit(edges: NDArray[np.int64], states: NDArray[np.int64], count: int) -> boo
 
 
 def _clearances_of(world: World) -> list[float]:
-    """What free motions of a world keep: its clearance, and that of its proofs [m]."""
+    """Return the clearance that free motions of a world keep, and that of its proofs or `NOT_PROVING` [m]."""
     proving = world.settings.proving
     return [world.settings.clearance + world.settings.inflation, NOT_PROVING if proving is None else proving]
 
@@ -317,7 +335,7 @@ def _clearances_of(world: World) -> list[float]:
 def _restored(
     world: World, rows: Matrix, edges: NDArray[np.int32], states: NDArray[np.int32], *, seed: int, near: int
 ) -> Roadmap:
-    """A roadmap from what another one had; what it adds later begins with other samples."""
+    """Return a roadmap with the graph of another one; samples that are added later are different ones."""
     roadmap = Roadmap(world, vertices=0, seed=seed, near=near)
     roadmap.graph = graph_in(world, *_box(world.robot), near=near, seed=seed + len(rows), checks=world)
     roadmap.graph.restore(rows, edges, states)
@@ -330,6 +348,6 @@ def _box(robot: Robot) -> tuple[Vector, Vector]:
 
 
 def _nearest(rows: Matrix, row: Vector) -> Vector:
-    """The row nearest to another one."""
+    """Return the row that is nearest to another one, shape (dof,)."""
     nearest: Vector = rows[np.linalg.norm(rows - row, axis=1).argmin()]
     return nearest

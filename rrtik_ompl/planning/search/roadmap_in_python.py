@@ -13,7 +13,7 @@ from rrtik_ompl.base.budget import Stop
 from rrtik_ompl.kernels.search.roadmap.layout import BLOCKED, SURE, UNKNOWN
 from rrtik_ompl.world.motion_queries import MotionFree
 
-ROOT = -1  # by which edge a start was reached
+ROOT = -1  # stands for the edge by which a start was reached
 
 
 class PythonGraph:
@@ -21,10 +21,10 @@ class PythonGraph:
 
     Args:
         lower, upper: The box of configurations, shape (n,), finite.
-        near: With how many of the vertices near it a new one is joined, at least 1.
-        seed: Of the samples.
-        valid: Whether a configuration, shape (n,), is free.
-        motion_free: Whether a straight motion is free.
+        near: With how many of the vertices near it a new vertex is joined, at least 1.
+        seed: Seed of the samples.
+        valid: Returns whether a configuration, shape (n,), is free.
+        motion_free: Returns whether a straight motion is free.
     """
 
     def __init__(
@@ -65,11 +65,11 @@ class PythonGraph:
 
     @property
     def states(self) -> NDArray[np.int32]:
-        """What is known of the edges, shape (m,): UNKNOWN, SURE or BLOCKED."""
+        """State of each edge, shape (m,): UNKNOWN, SURE or BLOCKED."""
         return np.array(self._states, dtype=np.int32)
 
     def restore(self, rows: Matrix, edges: NDArray[np.int32], states: NDArray[np.int32]) -> None:
-        """Fill an empty roadmap with what another one gave."""
+        """Fill an empty graph with the vertices, edges and states of another one."""
         for row in rows:
             self._add(row)
         for (first, second), state in zip(edges.tolist(), states.tolist(), strict=True):
@@ -77,7 +77,7 @@ class PythonGraph:
             self._states[-1] = state
 
     def grow(self, wanted: int, stop: Stop) -> int:
-        """Add free samples until there are ``wanted`` more, or it is time to stop; how many were added."""
+        """Add free samples until there are ``wanted`` more or it is time to stop, and return how many were added."""
         added = 0
         while added < wanted and not stop():
             self.samples += 1
@@ -88,7 +88,7 @@ class PythonGraph:
         return added
 
     def learn(self, path: Matrix) -> int:
-        """Make the rows of a free path, shape (k, n), vertices; how many."""
+        """Add the waypoints of a free path, shape (k, n), as vertices joined in a row, and return how many."""
         for k, row in enumerate(path):
             before = self.size
             self._add_near(row, before)
@@ -97,18 +97,21 @@ class PythonGraph:
         return len(path)
 
     def check(self, stop: Stop) -> None:
-        """Check all edges that nobody has looked at, until it is time to stop."""
+        """Check all edges whose state is unknown, until it is time to stop."""
         for edge in range(len(self._edges)):
             if stop():
                 return
             self._is_blocked(edge)
 
     def doubt(self) -> None:
-        """Forget what is known of the edges, since an obstacle has moved."""
+        """Set the state of all edges to unknown, because an obstacle has moved."""
         self._states = [UNKNOWN] * len(self._states)
 
     def route(self, starts: Matrix, goals: Matrix, stop: Stop) -> Matrix | None:
-        """The shortest path on the roadmap from a start to a goal, shape (k, n); None if there is none in time."""
+        """Return the shortest path from a start to a goal, shape (k, n); None if none is found in time.
+
+        Starts and goals are added as vertices for the time of the search and removed again.
+        """
         num_vertices = self.size
         num_edges = len(self._edges)
         for k, row in enumerate(np.concatenate([starts, goals])):
@@ -119,7 +122,7 @@ class PythonGraph:
         found = self._search(range(num_vertices, num_vertices + len(starts)), goals, stop)
         path = None if found is None else self._rows[found].copy()
 
-        # starts and goals are no part of the roadmap: all that was added for them is taken away, the last first
+        # Starts and goals are not part of the roadmap: remove them and their edges, the last ones first.
         while len(self._edges) > num_edges:
             for vertex in self._edges.pop():
                 self._leaving[vertex].pop()
@@ -129,12 +132,16 @@ class PythonGraph:
         return path
 
     def statistics(self) -> dict[str, int | float]:
-        """Counts since the roadmap was made."""
+        """Return counts since the roadmap was made."""
         counts = {"vertices": self.size, "edges": len(self._edges)}
         return {**counts, "motions": self.motions, "iterations": self.samples}
 
     def _search(self, starts: range, goals: Matrix, stop: Stop) -> list[int] | None:
-        """Vertices of the shortest path from a start to the last vertices, which are the goals."""
+        """Search by A* with lazy checks of edges, and return the vertices of the shortest path, or None.
+
+        The goals are the last vertices. The cost-to-go is estimated by the distance from the nearest goal. An edge is
+        checked when the search takes it from the queue.
+        """
         least_to_go = np.linalg.norm(self._rows[:, None] - goals, axis=2).min(axis=1)
         heap: list[tuple[float, float, int, int]] = [(float(least_to_go[start]), 0.0, start, ROOT) for start in starts]
         heapq.heapify(heap)
@@ -156,7 +163,7 @@ class PythonGraph:
         return None
 
     def _path_to(self, vertex: int, edge_into: dict[int, int]) -> list[int]:
-        """Vertices from a start to a vertex, by the edges over which they were reached."""
+        """Return the vertices from a start to a vertex, by the edges over which they were reached."""
         found = [vertex]
         while edge_into[vertex] != ROOT:
             vertex = self._other(edge_into[vertex], vertex)
@@ -164,12 +171,12 @@ class PythonGraph:
         return found[::-1]
 
     def _other(self, edge: int, vertex: int) -> int:
-        """The other end of an edge."""
+        """Return the other end of an edge."""
         first, second = self._edges[edge]
         return second if vertex == first else first
 
     def _is_blocked(self, edge: int) -> bool:
-        """Whether an edge is blocked; the motion of one of which nothing is known is checked, and the answer kept."""
+        """Check whether an edge is blocked; if its state is unknown its motion is checked, and the answer is stored."""
         if self._states[edge] == UNKNOWN:
             self.motions += 1
             first, second = self._edges[edge]
@@ -177,20 +184,20 @@ class PythonGraph:
         return self._states[edge] == BLOCKED
 
     def _add(self, row: Vector) -> int:
-        """Add a vertex without edges; returns its number."""
+        """Add a vertex without edges, and return its number."""
         self._rows = np.vstack([self._rows, row])
         self._leaving.append([])
         return self.size - 1
 
     def _add_near(self, row: Vector, below: int) -> None:
-        """Add a vertex, joined with those nearest to it among the first ``below`` ones."""
+        """Add a vertex, and join it with the nearest of the first ``below`` vertices."""
         near = np.argsort(np.linalg.norm(self._rows[:below] - row, axis=1), kind="stable")[: self._near]
         vertex = self._add(row)
         for other in near.tolist():
             self._join(vertex, other)
 
     def _join(self, first: int, second: int) -> None:
-        """Add an edge of which nothing is known."""
+        """Add an edge whose state is unknown."""
         for vertex in (first, second):
             self._leaving[vertex].append(len(self._edges))
         self._edges.append((first, second))

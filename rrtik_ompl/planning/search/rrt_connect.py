@@ -19,14 +19,14 @@ ROOT = -1  # the parent of a root
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ConnectRules:
-    """How the trees grow.
+    """Parameters of the growth of the trees.
 
     Attributes:
         lower, upper: The box in which samples are drawn, shape (n,).
-        max_edge: Length of an edge at most [unit of the space].
-        domain: Radius within which a vertex is extended once an extension of it was blocked; +inf: as before.
-        balanced: Whether the smaller tree grows next; otherwise they take turns.
-        max_iterations: Samples at most, None for no limit.
+        max_edge: Greatest length of an edge [unit of the space].
+        domain: Radius within which a vertex is extended once an extension of it was blocked; +inf for no limit.
+        balanced: Whether the smaller tree grows next; otherwise the trees take turns.
+        max_iterations: Limit of the samples; None for no limit.
     """
 
     lower: Vector
@@ -38,17 +38,17 @@ class ConnectRules:
 
 
 class RrtConnect:
-    """A search between two sets of configurations.
+    """An RRT-Connect search between two sets of configurations.
 
     Attributes:
-        trees: From the starts and from the goals.
+        trees: The tree from the starts and the tree from the goals.
         iterations: Samples drawn so far.
 
     Args:
         starts: Free configurations, shape (s, n).
         goals: Free configurations, shape (g, n).
-        rules: How the trees grow.
-        motion_free: Whether a straight motion is free.
+        rules: Parameters of the growth of the trees.
+        motion_free: Returns whether a straight motion is free.
         rng: Draws the samples.
     """
 
@@ -65,14 +65,14 @@ class RrtConnect:
 
     @property
     def vertices(self) -> int:
-        """Vertices of both trees."""
+        """Number of vertices of both trees."""
         return sum(tree.size for tree in self.trees)
 
     def run(self, stop: Stop) -> Matrix | None:
-        """Grow until the trees meet: the path from a start to a goal, shape (k, n); None if the search has ended first.
+        """Grow the trees until they meet, and return the path from a start to a goal, shape (k, n), or None.
 
         Args:
-            stop: Called before every sample and every edge; true ends the search.
+            stop: Called before every sample and every edge; True ends the search without a path.
         """
         rules = self._rules
         motion_free = self._motion_free
@@ -95,7 +95,7 @@ class RrtConnect:
         return None
 
     def _next_side(self) -> int:
-        """Number of the tree that grows next."""
+        """Return the index of the tree that grows next."""
         side = 1 - self._last_side
         is_larger = self.trees[side].size > self.trees[1 - side].size
         if self._rules.balanced and is_larger:
@@ -104,13 +104,16 @@ class RrtConnect:
 
 
 def straight_path(starts: Matrix, goals: Matrix, motion_free: MotionFree, stop: Stop) -> Matrix | None:
-    """A straight motion from the nearest start to a goal, shape (2, n) or (1, n) if they are one; None if none is free.
+    """Return a free straight motion from the nearest start to a goal, or None.
 
     Args:
         starts: Shape (s, n).
         goals: Shape (g, n), tried in this order.
-        motion_free: Whether a straight motion is free.
-        stop: Called before every motion; true leaves it out.
+        motion_free: Returns whether a straight motion is free.
+        stop: Called before every motion; True skips the motion.
+
+    Returns:
+        Shape (2, n), or (1, n) if start and goal are the same.
     """
     for goal in goals:
         start = starts[np.linalg.norm(starts - goal, axis=1).argmin()]
@@ -120,9 +123,9 @@ def straight_path(starts: Matrix, goals: Matrix, motion_free: MotionFree, stop: 
 
 
 def extend(tree: ConfigurationTree, sample: Vector, rules: ConnectRules, motion_free: MotionFree) -> int | None:
-    """EXTEND: an edge from the nearest vertex towards a sample, shape (n,); the new vertex, or None.
+    """EXTEND: add an edge from the nearest vertex towards a sample, shape (n,); return the new vertex, or None.
 
-    A vertex that was blocked before takes only samples within the domain.
+    A vertex whose extension was blocked before is only extended towards samples within the domain.
     """
     near = tree.nearest(sample)
     start = tree.row(near)
@@ -139,10 +142,11 @@ def extend(tree: ConfigurationTree, sample: Vector, rules: ConnectRules, motion_
 def reach(
     tree: ConfigurationTree, target: Vector, rules: ConnectRules, motion_free: MotionFree, stop: Stop
 ) -> int | None:
-    """CONNECT: edges towards a target, shape (n,), until one is blocked.
+    """CONNECT: add edges towards a target, shape (n,), until one is blocked.
 
     Returns:
-        The vertex from which the target itself is reached, which is not added to the tree; None if it is not reached.
+        The vertex from which the target itself is reached; the target is not added to the tree. None if it is not
+        reached.
     """
     vertex = tree.nearest(target)
     while not stop():
@@ -164,9 +168,9 @@ def path_between(first: Matrix, second: Matrix) -> Matrix:
 
 
 def _towards(start: Vector, end: Vector, length: float, max_length: float) -> Vector:
-    """The end, or the point at a distance of ``max_length`` from the start on the straight line to it.
+    """Return the point at a distance of at most ``max_length`` from start on the straight line to end, shape (n,).
 
-    ``length`` is the distance of the two.
+    ``length`` is the distance from start to end. If it is not too long, the point is the end itself.
     """
     if length <= max_length:
         return end
@@ -174,11 +178,11 @@ def _towards(start: Vector, end: Vector, length: float, max_length: float) -> Ve
 
 
 class ConfigurationTree:
-    """Configurations in the order in which they were added, the roots first.
+    """A tree of configurations in the order in which they were added, the roots first.
 
     Attributes:
         size: Number of vertices.
-        parents: Number of each vertex's parent, -1 for a root.
+        parents: Index of each vertex's parent, -1 for a root.
         radii: Distance up to which a vertex is extended towards a sample; +inf until an extension of it was blocked.
 
     Args:
@@ -193,20 +197,20 @@ class ConfigurationTree:
 
     @property
     def rows(self) -> Matrix:
-        """The configurations, shape (size, n); a view that holds until a vertex is added."""
+        """The configurations, shape (size, n), as a view that is valid until a vertex is added."""
         return self._rows[: self.size]
 
     def grown(self) -> tuple[Matrix, NDArray[np.int64]]:
-        """The configurations, shape (size, n), and their parents, shape (size,), -1 for a root."""
+        """Return copies of the configurations, shape (size, n), and of their parents, shape (size,), -1 for a root."""
         return self.rows.copy(), np.array(self.parents, dtype=np.int64)
 
     def row(self, vertex: int) -> Vector:
-        """The configuration of a vertex, shape (n,)."""
+        """Return the configuration of a vertex, shape (n,)."""
         row: Vector = self._rows[vertex]
         return row
 
     def add(self, row: Vector, parent: int) -> int:
-        """Append a vertex below another one; returns its number."""
+        """Append a vertex below a parent, and return its index."""
         if self.size == len(self._rows):
             self._rows = np.vstack([self._rows, np.empty_like(self._rows)])
         self._rows[self.size] = row
@@ -216,12 +220,12 @@ class ConfigurationTree:
         return self.size - 1
 
     def nearest(self, row: Vector) -> int:
-        """The vertex nearest to a configuration, shape (n,), by the Euclidean distance; among equals the oldest."""
+        """Return the vertex nearest to a configuration, shape (n,), by Euclidean distance; of equal ones the oldest."""
         gaps = self.rows - row
         return int(np.einsum("ij,ij->i", gaps, gaps).argmin())
 
     def branch(self, vertex: int) -> Matrix:
-        """Configurations from the root to a vertex, shape (k, n)."""
+        """Return the configurations from the root to a vertex, shape (k, n)."""
         vertices = []
         while vertex != ROOT:
             vertices.append(vertex)

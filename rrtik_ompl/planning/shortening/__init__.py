@@ -1,4 +1,4 @@
-"""Post-processing behind one interface: a valid path in, a path with the same ends that is no worse out."""
+"""Shortening of paths behind one interface: a valid path in, a path with the same ends that is no worse out."""
 
 from __future__ import annotations
 
@@ -34,17 +34,16 @@ __all__ = ["METHODS", "Method", "MoveRules", "Task", "Wishes", "shorten", "short
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Method:
-    """A method of shortening.
+    """A method of shortening and its properties.
 
     Attributes:
-        run: Shortens a route, shape (k, n), of a problem, as a task says.
-        keeps_moves: Whether a path of single-joint moves stays one, wanted or not, and has no more moves afterwards;
-            its length may grow then.
-        can_keep_moves: Whether it stays one if that is wanted.
-        moves_only: Whether it takes nothing but such a path.
-        leaves_room: Whether it keeps a clearance itself, where that costs no move.
-        samples: Whether it checks motions in steps, by the problem's world alone.
-        delegates_moves: Whether it leaves single-joint moves to other methods, and takes no path that is longer.
+        run: Shortens a route, shape (k, n), of a problem within the limits of a task.
+        keeps_moves: Whether a path of single-joint moves always stays one, with no more moves; it may become longer.
+        can_keep_moves: Whether a path of single-joint moves can stay one if that is wanted.
+        moves_only: Whether the method only accepts paths of single-joint moves.
+        leaves_room: Whether the method keeps a clearance itself where that costs no move.
+        samples: Whether the method checks motions in steps, with the problem's world only.
+        delegates_moves: Whether the method leaves single-joint moves to other methods, and rejects longer paths.
     """
 
     run: Callable[[Matrix, Task, Problem], Matrix]
@@ -92,10 +91,11 @@ METHODS: Mapping[ShorteningMethod, Method] = MappingProxyType(
         "auto": Method(lambda route, task, _: best_in_time(route, task), delegates_moves=True),
     }
 )
-# under path constraints in place of these
+# Replaces the methods of `_CUTS` under path constraints.
 _ALONG_CONSTRAINTS = Method(along_constraints, can_keep_moves=False, samples=True)
 _CUTS = ("auto", "random", "shortcut")
-_SINGLE_JOINT = METHODS["fewest-moves"], METHODS["axis-rounds"]  # in whose place "auto" is asked for single-joint moves
+# The methods to which "auto" leaves paths of single-joint moves, in this order.
+_SINGLE_JOINT = METHODS["fewest-moves"], METHODS["axis-rounds"]
 
 
 def shorten(
@@ -114,38 +114,41 @@ def shorten(
 ) -> JointPath:
     """Shorten a path of a problem.
 
+    Under path constraints "auto", "random" and "shortcut" walk along the constraints from one place of the path to
+    another.
+
     Args:
         path: A valid path of the problem.
         problem: Its world checks the new motions.
-        method: "auto" pulls several cut paths taut and is the best choice for straight motions; single-joint moves it
-            leaves to "fewest-moves". "axis" is the published double axis cut: fewer moves of one joint at a time.
-            "axis-rounds" goes on with twenty passes in random joint orders: fewer moves still, several times as long.
-            Both return a path as it is, with a warning, if it moves several joints at once. "fewest-moves" takes
-            single-joint moves and looks for the fewest, with the least travel among those. "sequential", "random" and
-            "retraction" are the published methods for straight motions: quick, simple, and near the shortest path of
-            the same class. "corners" pulls every bend to the corner that it goes round: nearer to that shortest path
-            than "retraction" in its finest steps, with fewer checks. "shortcut" is a random cut that takes waypoints
-            as ends too and pulls them straight. "ompl" is OMPL's PathSimplifier.
-        seconds: Limit of wall time [s]. With one, random methods go on until nothing is gained any more; without one
+        method: The method of shortening. "auto" pulls several cut paths taut and is the best choice for straight
+            motions; it leaves single-joint moves to "fewest-moves". "axis" is the published double axis cut: fewer
+            moves of one joint at a time. "axis-rounds" continues with twenty passes in random joint orders: fewer moves
+            still, in several times the time. Both return a path that moves several joints at once as it is, with a
+            warning. "fewest-moves" accepts single-joint moves and looks for the fewest, with the least travel among
+            these. "sequential", "random" and "retraction" are the published methods for straight motions: quick,
+            simple, and near the shortest path of the same homotopy class. "corners" pulls every bend to the corner that
+            it goes round: this comes nearer to that shortest path than the finest steps of "retraction", with fewer
+            checks. "shortcut" is a random cut that also uses waypoints as ends and pulls them straight. "ompl" is
+            OMPL's PathSimplifier.
+        seconds: Limit of wall time [s]. With a limit, random methods continue until nothing more is gained; without one
             they make a fixed number of tries, so that a seed always gives the same path.
-        checks: Most motions that are checked (tries, in random methods), a limit that always gives the same path: 100
-            take some milliseconds. None for no such limit; "ompl" and "fewest-moves" know no other than time.
-        seed: Of the random methods.
-        one_joint: Keep a path of single-joint moves one: fewer moves first, length second. None: "auto" does.
-        rules: What the path, of single-joint moves, keeps to and has to keep to: joints that must not move or move
-            last, the smallest move, costs. Its last moves, of the joints that move last, stay as they are.
+        checks: Limit of the checked motions (of the tries, in random methods), which always gives the same path; 100
+            take some milliseconds. None for no such limit; "ompl" and "fewest-moves" are limited by time only.
+        seed: Seed of the random methods.
+        one_joint: Whether a path of single-joint moves stays one; fewer moves come first then, length second. None
+            stands for True with "auto" and such a path.
+        rules: Rules that the path of single-joint moves keeps and the result has to keep: joints that must not move or
+            move last, the smallest move, costs. The last moves, of the joints that move last, stay as they are.
         on_better: Called with every better path in between; these have not yet passed the second check.
-        stop: Called from time to time; True ends the work, and the best so far is returned.
-        clearance: What the new motions keep from every obstacle on top of its margin [m]. None: 1 mm, or what the ends
-            of the path have; with "fewest-moves" 1 cm where that costs no move.
-
-    Under path constraints "auto", "random" and "shortcut" walk along them from one place of the path to another.
+        stop: Called repeatedly; True ends the work, and the best path so far is returned.
+        clearance: Clearance of the new motions from every obstacle on top of its margin [m]. None for 1 mm, or for the
+            clearance of the ends if that is less; with "fewest-moves" for 1 cm where that costs no move.
 
     Returns:
-        A path with the same ends, and with its proof. If the input is proven free so is the result, with the clearance
-        if the input has it: what is not gets a detour, or else only proven motions are used; if that does not help,
-        the input is returned. It is not longer than the input (:func:`rrtik_ompl.weighted` where joints have weights),
-        and where one joint moves at a time it has no more moves.
+        A path with the same ends, and with its proof. If the input is proven free, so is the result, with the clearance
+        if the input has it: motions that are not proven get detours; if that fails, only proven motions are used; if
+        that does not help either, the input is returned. The result is not longer than the input (by
+        :func:`rrtik_ompl.weighted` if joints have weights), and a path of single-joint moves has no more moves.
 
     Raises:
         UnknownNameError: If there is no such method.
@@ -217,14 +220,25 @@ def shortened(
 
 
 def _with_proof(path: JointPath, problem: Problem) -> JointPath:
-    """The path with what is proven of it."""
+    """Return the path with its proof, which may be incomplete."""
     return path if path.proven_in(problem.world) else proved(path, problem.world)
 
 
 def _shorten_in_forms(
     path: JointPath, problem: Problem, chosen: Method, parts: tuple[Matrix, Matrix], wishes: Wishes
 ) -> JointPath:
-    """The path after a method, in the first form of the problem in which that leads to one that is accepted."""
+    """Apply a method in one form of the problem after another, and return the first result that is accepted.
+
+    Args:
+        path: The given path.
+        problem: Its problem.
+        chosen: The method.
+        parts: The route up to where the last joints begin to move, which is shortened, and the rest, which is kept.
+        wishes: Limits, rules and clearance.
+
+    Returns:
+        The accepted path, or the given one with its proof.
+    """
     head, tail = parts
     rules = wishes.rules
     single = wishes.one_joint or chosen.keeps_moves
@@ -252,7 +266,11 @@ def _shorten_in_forms(
 
 
 def _run(chosen: Method, form: Form, route: Matrix, wishes: Wishes, single: bool) -> tuple[Task, Matrix]:
-    """What a method makes of a route, in coordinates in which lengths are weighted where joints have weights."""
+    """Run a method on a route; if joints have weights, in coordinates in which lengths are weighted.
+
+    Returns:
+        The task with its counts, and the new route in joint values, shape (m, n).
+    """
     if single or not has_weights(form.problem):
         task = Task(form.motions, wishes)
         return task, chosen.run(route, task, form.problem)
@@ -268,14 +286,14 @@ def _run(chosen: Method, form: Form, route: Matrix, wishes: Wishes, single: bool
 
 
 def _keeps_single_joint_moves(path: JointPath, method: ShorteningMethod, one_joint: bool | None) -> bool:
-    """Whether the moves of a path have to stay single-joint moves."""
+    """Check whether a path has to stay one of single-joint moves."""
     if one_joint is not None:
         return one_joint
     return method == "auto" and path.one_joint_at_a_time
 
 
 def _split_before_last_joints(route: Matrix, rules: MoveRules | None) -> tuple[Matrix, Matrix]:
-    """A route up to where the joints that move last begin, and the rest."""
+    """Split a route where the joints that move last begin to move, into two arrays of waypoints."""
     if rules is None:
         return route, route[:0]
     if not rules.kept_by(route):
@@ -284,14 +302,14 @@ def _split_before_last_joints(route: Matrix, rules: MoveRules | None) -> tuple[M
 
 
 def _method_for(name: ShorteningMethod, problem: Problem, one_joint: bool) -> Method:
-    """The method of a name, or what takes its place under path constraints."""
+    """Return the method of a name, or its replacement under path constraints."""
     if problem.constraints and name in _CUTS and not one_joint:
         return _ALONG_CONSTRAINTS
     return METHODS[name]
 
 
 def _refuse_what_cannot_be_shortened(path: JointPath, problem: Problem) -> None:
-    """Refuse a path that cannot be shortened."""
+    """Raise an InputError if a path has nothing to shorten or is not valid."""
     if len(path.waypoints) < 2:
         raise InputError("path to shorten: it has one waypoint, so there is nothing to shorten")
     faults = () if path.proven_in(problem.world) else path.violations(problem.world)

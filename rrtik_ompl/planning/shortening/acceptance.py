@@ -1,4 +1,4 @@
-"""Which shortened paths may be returned: proven ones with the clearance, or what is no worse than the input in that."""
+"""The second check of shortened paths: which of them may be returned in place of the input."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ SPARE = 2.5e-4  # [m] beyond the clearance that searches keep if the ends have i
 
 
 class Form(NamedTuple):
-    """A form of the problem in which to shorten.
+    """A form of the problem in which a path is shortened.
 
     Attributes:
-        problem: With a world that checks what methods check themselves.
-        motions: What the others ask.
-        share: Of the time left.
+        problem: Its world checks motions for methods that check them in steps.
+        motions: Checks motions for all other methods.
+        share: Share of the time left.
     """
 
     problem: Problem
@@ -37,16 +37,16 @@ class Acceptance:
     """The second check of shortened paths.
 
     Attributes:
-        input: The given path, with what is proven of it.
+        input: The given path with its proof, which may be incomplete.
 
     Args:
-        path: Given, valid.
-        problem: What it solves.
-        wishes: Which clearance is to be kept, None for a millimetre or what the ends of the path have; and the seed of
-            the detours.
-        one_joint: Whether its moves of one joint have to stay such, so that there are no detours.
-        leaves_room: Whether the method keeps a clearance itself, where that costs no move.
-        samples: Whether the method checks motions in steps, by the problem's world alone.
+        path: The given path, valid.
+        problem: The problem that it solves.
+        wishes: The clearance to keep, where None stands for a millimetre or for the clearance of the path's ends, and
+            the seed of detours.
+        one_joint: Whether single-joint moves have to stay such, so that there are no detours.
+        leaves_room: Whether the method keeps a clearance itself where that costs no move.
+        samples: Whether the method checks motions in steps, with the problem's world only.
     """
 
     def __init__(
@@ -72,11 +72,12 @@ class Acceptance:
         self._input_keeps_clearance = self._keeps_clearance(self.input)
 
     def forms(self) -> list[Form]:
-        """The problem in the forms in which to shorten, one after the other.
+        """Return the forms of the problem in which to shorten, in the order in which they are tried.
 
-        What is as short as can be touches what it goes round, so motions must be proven to count as free. Methods that
-        ask the world alone check as densely as the second check, with room to spare; then with proofs too. Where the
-        input does not keep the clearance, neither may help.
+        A path that cannot become shorter touches the obstacles that it goes round, so only proven motions should count
+        as free. Methods that check motions with the world in steps do this as densely as the second check, with some
+        extra room, and if that fails with proofs as well. If the input does not keep the clearance, the last form does
+        not ask for it.
         """
         dense = densely_checked(self._problem)
         if self._leaves_room:
@@ -88,7 +89,10 @@ class Acceptance:
         return forms
 
     def _forms_with_clearance(self, dense: Problem, clearances: Clearances) -> list[Form]:
-        """Those that leave room; where the input does not keep the clearance, with time left for one that need not."""
+        """Return the forms that keep the clearance.
+
+        If the input does not keep it, time is left for a further form that need not.
+        """
         searched_clearance = min(clearances.searched_clearance, clearances.proven_clearance + SPARE)
         last_share = 1.0 if self._input_keeps_clearance else 0.5
         if not self._checks_in_steps:
@@ -99,11 +103,11 @@ class Acceptance:
         return [Form(problem_in(dense, clear), clear, 0.7), Form(problem_in(dense, proving), proving, last_share)]
 
     def accepted(self, shorter: JointPath) -> JointPath | None:
-        """Whether a shortened path may be returned in place of the input.
+        """Return a shortened path with its proof if it may be returned in place of the input.
 
         Returns:
-            The path, with what is proven of it and with detours where it needs them. None if it may not: it keeps less
-            of the clearance than the input, or is proven in less, or is not valid.
+            The path with its proof, and with detours where it needs them. None if it keeps less of the clearance than
+            the input, if less of it is proven, or if it is not valid.
         """
         proved = self._proved(shorter)
         if self._keeps_clearance(proved):
@@ -116,7 +120,7 @@ class Acceptance:
             if rows is not None:
                 return self._proved(path_through(shorter, rows))
 
-        # the clearance cannot be had: a path that is no worse than the input in what is proven will do
+        # The clearance cannot be kept. A path will do that is not worse proven than the input.
         if self._leaves_room and proved.proven:
             return proved
         is_worse = self._input_keeps_clearance or (self.input.proven and not proved.proven)
@@ -125,12 +129,12 @@ class Acceptance:
         return proved
 
     def _proved(self, path: JointPath) -> JointPath:
-        """The path with a proof of the clearance, or of less."""
+        """Return the path with a proof of the clearance, or of less."""
         clearance = 0.0 if self._clearances is None else self._clearances.proven_clearance
         return proved_as_clear(path, self._problem.world, clearance)
 
     def _keeps_clearance(self, proved: JointPath) -> bool:
-        """Whether a path is proven to keep the clearance."""
+        """Check whether a path is proven to keep the clearance."""
         proof = proved.proof
         if self._clearances is None or proof is None:
             return False

@@ -1,4 +1,4 @@
-"""Shortcuts under path constraints: a walk along the regions from one waypoint straight towards a later one.
+"""Shortcuts under path constraints: walks along the constraints from one waypoint straight towards a later one.
 
 Source: the shortcuts of [17, section 5] for paths of CBiRRT2.
 """
@@ -15,15 +15,15 @@ from rrtik_ompl.planning.shortening.task import Task
 from rrtik_ompl.world.motion_queries import HoldingQueries, decider, keeps_constraints
 from rrtik_ompl.world.problem import Problem
 
-TRIES = 200  # where there is no end to the time
-PATIENCE = 40  # tries without gain that end the work
-SHORTER = 1e-6  # [rad or m] by which a way must be
+TRIES = 200  # limit of the tries
+PATIENCE = 40  # tries in a row without a gain that end the work
+SHORTER = 1e-6  # [rad or m] least gain of a shortcut
 
 
 def along_constraints(route: Matrix, task: Task, problem: Problem) -> Matrix:
-    """Random shortcuts of a route, shape (k, n), each a walk along the constraints of a problem.
+    """Shorten a route, shape (k, n), by random shortcuts, each a walk along the constraints of a problem.
 
-    The whole way is tried first. Where the world has no kernels the route stays as it is.
+    The shortcut from start to goal is tried first. If the world has no kernels the route stays as it is.
     """
     world = problem.world
     if not keeps_constraints(world) or (motions := world.free_motions) is None:
@@ -58,7 +58,7 @@ def along_constraints(route: Matrix, task: Task, problem: Problem) -> Matrix:
 
 
 def _box(world: HoldingQueries, route: Matrix) -> tuple[Vector, Vector]:
-    """Finite bounds around a route, within the limits, shapes (n,)."""
+    """Return finite bounds around a route, within the limits, shapes (n,)."""
     lower = np.maximum(world.robot.lower, route.min(axis=0) - np.pi)
     upper = np.minimum(world.robot.upper, route.max(axis=0) + np.pi)
     return lower, upper

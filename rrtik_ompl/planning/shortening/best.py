@@ -1,7 +1,7 @@
-"""The best that several methods find together: a few starts, each pulled taut, then rounds of shortcuts and pulling.
+"""The method "auto": pull a few cut routes taut, then alternate random shortcuts and pulling.
 
-Few bends are pulled taut in a few dozen checks, so every start is first cut to a handful of waypoints. Where a route is
-taut only new bends can make it shorter: random shortcuts make them. All of it counts checks, not time.
+A route with few bends is pulled taut in a few dozen checks, so every start is first cut to a handful of waypoints. Only
+new bends can make a taut route shorter; random shortcuts make them. All limits count checks, not time.
 """
 
 from __future__ import annotations
@@ -16,19 +16,19 @@ from rrtik_ompl.planning.shortening.retraction import STEPS, retract
 from rrtik_ompl.planning.shortening.task import Task
 from rrtik_ompl.world.motion_queries import KernelWorld, has_kernels
 
-STARTS = 3  # random shortcuts end in different classes of routes
+STARTS = 3  # starts; random shortcuts lead to different homotopy classes of routes
 START_TRIES = 20  # shortcuts of a start
-START_CHECKS = 60  # motions that are checked to pull a start taut, as far as that goes
+START_CHECKS = 60  # limit of the motions checked to pull a start taut
 ROUND_TRIES = 60  # shortcuts of a round
-ROUND_CHECKS = 60  # motions that are checked to pull it taut, at most
-ROUNDS_WITHOUT_LIMIT = 4  # where there is no end to time or checks
-LEAST_GAIN = 1e-4  # of the length, or a round gained nothing
-IDLE_ROUNDS = 6  # without gain end the work
-FINEST = 16  # times finer than usual are the steps of the last retraction where there are no kernels
+ROUND_CHECKS = 60  # limit of the motions checked to pull it taut
+ROUNDS_WITHOUT_LIMIT = 4  # rounds if neither time nor checks are limited
+LEAST_GAIN = 1e-4  # share of the length that counts as a gain
+IDLE_ROUNDS = 6  # rounds in a row without a gain that end the work
+FINEST = 16  # factor by which the last retraction is finer if there are no kernels
 
 
 def best_in_time(route: Matrix, task: Task) -> Matrix:
-    """Shorten a route, shape (k, n), by whatever helps."""
+    """Shorten a route, shape (k, n), by several starts and rounds until time, checks or patience run out."""
     if task.one_joint:
         return task.better(route, axis_cut_rounds(route, task.free_batch, budget=task.rest))
     world = task.kernel_world
@@ -48,7 +48,7 @@ def best_in_time(route: Matrix, task: Task) -> Matrix:
 
 
 def _best_start(route: Matrix, task: Task, world: KernelWorld) -> Matrix:
-    """The best of several starts: the published cut from waypoint to waypoint, and random shortcuts."""
+    """Return the best of several starts, each pulled taut: the sequential cut, and random shortcuts."""
     first = sequential_cut(route, task)
     best = task.better(route, _taut(first, task, world, 0, ROUND_CHECKS))
     task.report(best)
@@ -61,14 +61,14 @@ def _best_start(route: Matrix, task: Task, world: KernelWorld) -> Matrix:
 
 
 def _cut(route: Matrix, task: Task, seed: int, tries: int, pull: float) -> Matrix:
-    """The route after some random shortcuts."""
+    """Return the route after some random shortcuts."""
     search = kernel_search(route, task, seed=_seed(task, seed), share=WAYPOINTS, pull=pull, asking=False)
     run(search, task, tries)
     return search.waypoints
 
 
 def _taut(route: Matrix, task: Task, world: KernelWorld, seed: int, checks: int) -> Matrix:
-    """The route pulled taut, as far as a number of checks goes."""
+    """Pull a route taut with at most ``checks`` checked motions."""
     work = Tightening(world.motions, route, seed=_seed(task, seed))
     before = task.asked
 
@@ -86,7 +86,7 @@ def _seed(task: Task, number: int) -> int:
 
 
 def _without_kernels(route: Matrix, task: Task) -> Matrix:
-    """Retraction of a sequential cut or a random cut, whichever is better, and retraction of that in small steps."""
+    """Shorten without kernels: retract the better one of a retracted sequential cut and a random cut in small steps."""
     cut = sequential_cut(route, task)
     found = task.better(cut, retract(cut, task))
     found = task.better(found, random_cut(route, task))

@@ -1,10 +1,10 @@
 """Corner snapping: every bend is pulled by bisection to the corner that it goes round.
 
 Three waypoints span a triangle, in which the bend between the other two is moved: along its second edge to the last
-place that the first waypoint sees, then back along that sight line to the last place that the third one sees. With one
-corner in the triangle both sight lines touch it, and the bend is there. With several, or with something round, chords
-then cut the bend off. What a motion could gain at most is known before it is checked (the triangle inequality), so no
-motion is checked that cannot gain.
+point that the first waypoint sees, then back along that sight line to the last point that the third waypoint sees. If
+there is one corner in the triangle, both sight lines touch it, and the bend is there. If there are several corners, or
+a round obstacle, chords then cut the bend off. The triangle inequality bounds the gain of a motion before it is
+checked, so no motion is checked that cannot gain.
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ CHORD = 1.3  # a chord is found to this factor
 def snap_corners(route: Matrix, task: Task) -> Matrix:
     """Pull a route, shape (k, n), taut; deterministic.
 
-    Parts of free motions count as free on the way, and the answer is checked as a whole; if that fails (checks at a
-    finite density may miss a graze that others hit) the work is done again with every part checked.
+    Parts of free motions count as free at first, and the result is checked as a whole. If that fails (checks at a
+    finite density may miss a contact that others find), the work is repeated with every part checked.
 
     Args:
         route: Free, start first.
-        task: Checks motions, straight ones, so single-joint moves are lost.
+        task: Checks motions. The result has straight motions, so single-joint moves are lost.
 
     Returns:
         The new route, or the given one if that is not worse.
@@ -50,11 +50,11 @@ def snap_corners(route: Matrix, task: Task) -> Matrix:
 
 
 class _Corners:
-    """The answers so far, and how small a gain is worth a check.
+    """The state of one run: the answers of checks so far, and the gain that is worth a check.
 
     Attributes:
         min_gain: The smallest gain of length that is worth a check.
-        checks_parts: Whether parts of free motions are checked too.
+        checks_parts: Whether parts of free motions are checked, too.
     """
 
     def __init__(self, task: Task, checks_parts: bool) -> None:
@@ -64,7 +64,7 @@ class _Corners:
         self._answers: dict[frozenset[bytes], bool] = {}
 
     def pulled(self, route: Matrix) -> Matrix:
-        """Rounds of pulling and cutting, until the chords gain nothing more."""
+        """Run rounds of pulling and cutting bends, until they gain next to nothing."""
         rows = self._keep_last_seen(list(route))
         share = FIRST_GAIN
         self.task.report(np.array(rows))
@@ -83,18 +83,18 @@ class _Corners:
         return without_repeats(np.array(rows))
 
     def _free(self, a: Vector, b: Vector) -> bool:
-        """Whether a motion is free either way; each is checked once."""
+        """Check whether a motion is free; each motion is checked once for both directions."""
         edge = frozenset((a.tobytes(), b.tobytes()))
         if edge not in self._answers:
             self._answers[edge] = self.task.free(a, b)
         return self._answers[edge]
 
     def _part_free(self, a: Vector, b: Vector) -> bool:
-        """Whether a part of a free motion is free."""
+        """Check a part of a free motion, which counts as free unless `checks_parts`."""
         return not self.checks_parts or self._free(a, b)
 
     def _keep_last_seen(self, route: list[Vector]) -> list[Vector]:
-        """From waypoint to waypoint, each the last one seen by bisection; as the first phase of retraction."""
+        """Keep from waypoint to waypoint the last one seen by bisection, as in the first phase of retraction."""
         rows = [route[0]]
         here = 0
         last = len(route) - 1
@@ -108,7 +108,7 @@ class _Corners:
         return rows
 
     def _pull_bends(self, rows: list[Vector], *, nearly_done: bool) -> list[Vector]:
-        """Every bend dropped or pulled to its corner, one after the other."""
+        """Drop every bend or pull it to its corner, one after the other."""
         rows = list(rows)
         k = 1
         while k < len(rows) - 1:
@@ -123,7 +123,7 @@ class _Corners:
         return rows
 
     def _pulled(self, a: Vector, bend: Vector, b: Vector, nearly_done: bool) -> Vector:
-        """The bend between a and b, pulled to a corner of what it goes round, or as it is."""
+        """Return the bend between a and b, pulled to a corner of the obstacle that it goes round, or as it is."""
         seen = self._last_seen(a, bend, b, nearly_done)
         if not self._part_free(seen, b):
             return bend
@@ -131,9 +131,13 @@ class _Corners:
         return corner if self._part_free(a, corner) else seen
 
     def _last_seen(self, eye: Vector, visible_end: Vector, hidden_end: Vector, nearly_done: bool) -> Vector:
-        """The last place that the eye sees from ``visible_end``, which it sees, to ``hidden_end``, which it does not.
+        """Find the last point that the eye sees on the segment from ``visible_end`` to ``hidden_end``.
 
-        Where the route is nearly done little is to be expected: the search then begins at the near end.
+        Args:
+            eye: Shape (n,).
+            visible_end: Known to be visible, shape (n,).
+            hidden_end: Known to be hidden, shape (n,).
+            nearly_done: Whether little is to be gained, so that the search begins at the visible end.
         """
         segment = hidden_end - visible_end
         segment_length = float(np.linalg.norm(hidden_end - visible_end))
@@ -147,14 +151,14 @@ class _Corners:
         first = _first_below(length, length(0.0) - self.min_gain) if nearly_done else 1.0
         seen, hidden = _bracket(visible, first)
         if nearly_done and seen == 0.0:
-            return visible_end  # and what is nearer than the first place is not worth a check
+            return visible_end  # a nearer point is not worth a check
         while length(seen) - length(hidden) > self.min_gain:
             middle = 0.5 * (seen + hidden)
             seen, hidden = (middle, hidden) if visible(middle) else (seen, middle)
         return visible_end if seen == 0.0 else visible_end + seen * segment
 
     def _cut_bends(self, rows: list[Vector]) -> list[Vector]:
-        """Bends replaced by two where a chord across them is free and gains enough, and these two likewise."""
+        """Replace bends by two where a chord across them is free and gains enough, and treat the new bends likewise."""
         done = [rows[0]]
         ahead = rows[:0:-1]
         while len(ahead) > 1:
@@ -166,7 +170,10 @@ class _Corners:
         return [*done, *ahead]
 
     def _chord(self, a: Vector, bend: Vector, b: Vector) -> tuple[Vector, Vector] | None:
-        """The ends of the longest chord, as far from the bend on one side as on the other; None if it gains little."""
+        """Return the ends of the longest free chord across a bend; None if it gains too little.
+
+        Both ends are at the same distance from the bend. This distance is found by bisection.
+        """
         sides = float(np.linalg.norm(a - bend)), float(np.linalg.norm(b - bend))
         if min(sides) == 0.0:
             return None
@@ -177,9 +184,10 @@ class _Corners:
         def is_free(distance: float) -> bool:
             return self._free(bend + distance * to_a, bend + distance * to_b)
 
-        # distances from the bend: the shortest that is worth a chord, and one at which a chord is not free, or too far
+        # The shortest distance from the bend that is worth a chord, and one at which a chord is blocked or leaves the
+        # edges.
         gain_per_distance = 2.0 - float(np.linalg.norm(to_a - to_b))
-        free = self.min_gain / max(gain_per_distance, 1e-300)  # an infinite distance where nothing can be gained
+        free = self.min_gain / max(gain_per_distance, 1e-300)  # practically infinite if nothing can be gained
         blocked = min(sides)
         if free >= blocked or not is_free(free):
             return None
@@ -197,7 +205,10 @@ class _Corners:
 
 
 def _bracket(visible: Callable[[float], bool], first: float) -> tuple[float, float]:
-    """A share that is visible (or 0) and a larger one that is not (or 1); the first is tried, then four times that."""
+    """Return a visible share (or 0) and a larger hidden one (or 1).
+
+    The shares tried are ``first`` and then four times as much each time.
+    """
     seen = 0.0
     while first < 1.0:
         if not visible(first):
@@ -212,7 +223,7 @@ def _length(rows: list[Vector]) -> float:
 
 
 def _detour(a: Vector, bend: Vector, b: Vector) -> float:
-    """How much longer the path from a to b is over the bend than straight."""
+    """Return how much longer the path from a to b over the bend is than the straight one."""
     return float(np.linalg.norm(bend - a) + np.linalg.norm(b - bend) - np.linalg.norm(b - a))
 
 

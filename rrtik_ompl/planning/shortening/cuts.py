@@ -1,9 +1,9 @@
 """Cuts from one place of a route straight to another. Source: [1, ch. 5.3, methods 1 and 2].
 
 The sequential cut goes from each waypoint to the last one that can be reached, the random cut from one random place to
-another. Where the world has kernels the whole loop of the latter runs in one
-(:mod:`rrtik_ompl.kernels.search.shortcut`): first without the shortcuts that the kernels cannot decide, for those take
-a hundred times as long, then with them.
+another. If the world has kernels, the whole loop of random cuts runs in a kernel
+(:mod:`rrtik_ompl.kernels.search.shortcut`): first without the shortcuts that the kernels cannot decide, as checking
+these takes a hundred times as long, then with them.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ from rrtik_ompl.model.transitions import without_repeats
 from rrtik_ompl.planning.shortening.task import Task
 from rrtik_ompl.world.motion_queries import decider
 
-TRIES = 400  # where there is no end to the time
-PATIENCE = 2000  # tries without gain that end the search where there is one
-TRIES_PER_CALL = 64  # of the kernel, until the task may end it
-# what shortcuts do beyond the published random cut: see the kernel
+TRIES = 400  # tries if neither time nor checks are limited
+PATIENCE = 2000  # tries in a row without a gain that end the search
+TRIES_PER_CALL = 64  # tries of the kernel between two calls of `stop`
+# Additions of "shortcut" to the published random cut, see the kernel.
 WAYPOINTS = 0.5  # share of ends that are waypoints
 PULLS = 0.3  # share of tries that pull a waypoint
 
@@ -28,7 +28,7 @@ PULLS = 0.3  # share of tries that pull a waypoint
 def sequential_cut(route: Matrix, task: Task) -> Matrix:
     """Cut a route, shape (k, n), from its start; deterministic.
 
-    Waypoints are tried from the last one on back to the next, which needs no check.
+    From each waypoint the later ones are tried from the last one back to the next one, which needs no check.
     """
     cut_route = [route[:1]]
     pivot = 0
@@ -46,17 +46,25 @@ def sequential_cut(route: Matrix, task: Task) -> Matrix:
 
 
 def random_cut(route: Matrix, task: Task, *, tries: int = TRIES) -> Matrix:
-    """The published random cut of a route, shape (k, n): both ends of a cut are uniform in arc length."""
+    """Apply the published random cut to a route, shape (k, n): both ends of a cut are uniform in arc length."""
     return _cut(route, task, tries, share=0.0, pull=0.0)
 
 
 def shortcut(route: Matrix, task: Task, *, tries: int = TRIES) -> Matrix:
-    """Random cuts whose ends may be waypoints too, and (in a kernel) pulls of single waypoints."""
+    """Apply random cuts whose ends may be waypoints, too, and (in a kernel) pulls of single waypoints."""
     return _cut(route, task, tries, share=WAYPOINTS, pull=PULLS)
 
 
 def _cut(route: Matrix, task: Task, tries: int, *, share: float, pull: float) -> Matrix:
-    """A route after random cuts, in kernels where the world has some; ``share`` and ``pull`` see the kernel."""
+    """Apply random cuts to a route, in kernels if the world has them.
+
+    Args:
+        route: Shape (k, n).
+        task: Checks motions.
+        tries: Limit of the tries if the task has none.
+        share: Share of the ends of cuts that are waypoints.
+        pull: Share of the tries that pull a waypoint, in kernels only.
+    """
     limit = NO_LIMIT if task.bounded else tries
     if task.kernel_world is None or len(route) < 3:
         return _plain(route, task, limit, share)
@@ -69,7 +77,10 @@ def _cut(route: Matrix, task: Task, tries: int, *, share: float, pull: float) ->
 
 
 def kernel_search(route: Matrix, task: Task, *, seed: int, share: float, pull: float, asking: bool) -> ShortcutSearch:
-    """A search in the kernels of a task's world, which must have them; it asks where the world decides anything."""
+    """Return a search in the kernels of a task's world, which must have them.
+
+    With ``asking``, the world decides what the kernels cannot, if it can decide more.
+    """
     world = task.kernel_world
     assert world is not None
     return ShortcutSearch(
@@ -83,7 +94,7 @@ def kernel_search(route: Matrix, task: Task, *, seed: int, share: float, pull: f
 
 
 def run(search: ShortcutSearch, task: Task, tries: int, patience: int = PATIENCE) -> None:
-    """Let a search work until its tries, its patience or the time is up."""
+    """Run a search until its tries, its patience or the time is up, and add its tries to the task's count."""
     before = task.asked
     listened = task.listened
 
@@ -99,7 +110,7 @@ def run(search: ShortcutSearch, task: Task, tries: int, patience: int = PATIENCE
 
 
 def _plain(route: Matrix, task: Task, tries: int, share: float) -> Matrix:
-    """The loop without kernels."""
+    """Apply random cuts without kernels."""
     rng = np.random.default_rng(task.seed)
     failures = 0
     route = without_repeats(route)
@@ -115,7 +126,7 @@ def _plain(route: Matrix, task: Task, tries: int, share: float) -> Matrix:
 
 
 def _one_cut(route: Matrix, task: Task, rng: np.random.Generator, share: float) -> Matrix | None:
-    """The route after a random cut, or None if that gains nothing or is not free."""
+    """Return the route after one random cut, or None if that gains nothing or is not free."""
     places = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(route, axis=0), axis=1)))
     first, second = sorted(_place(places, rng, share) for _ in range(2))
     first_edge = _edge_at(places, first)
@@ -133,18 +144,23 @@ def _one_cut(route: Matrix, task: Task, rng: np.random.Generator, share: float) 
 
 
 def _edge_at(places: Vector, place: float) -> int:
-    """The number of the edge on which a place is; ``places`` are those of the waypoints."""
+    """Return the index of the edge on which a place is.
+
+    Args:
+        places: Arc length of each waypoint from the start, shape (k,).
+        place: Arc length of the place.
+    """
     return min(int(np.searchsorted(places, place, side="right")) - 1, len(places) - 2)
 
 
 def _place(places: Vector, rng: np.random.Generator, share: float) -> float:
-    """A random place on a route, by its distance from the start."""
+    """Draw a random place on a route as arc length from the start; with a probability of ``share`` it is a waypoint."""
     at_waypoint = share > 0.0 and rng.random() < share
     return float(rng.choice(places)) if at_waypoint else float(rng.uniform(0.0, places[-1]))
 
 
 def _point(route: Matrix, places: Vector, edge: int, place: float) -> Vector:
-    """The configuration at a place on an edge, never outside the box between its ends."""
+    """Return the configuration at a place on an edge, never outside the box between its ends."""
     share = (place - places[edge]) / (places[edge + 1] - places[edge])
     a = route[edge]
     b = route[edge + 1]

@@ -1,4 +1,4 @@
-"""Fewest single-joint moves: make a route better, and say how good it is."""
+"""The method "fewest-moves": improve a route of single-joint moves, and bound the number of moves of any route."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ MAX_IMPROVEMENT_ROUNDS = 10
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MovesFound:
-    """A route of single-joint moves, and how good it is.
+    """A route of single-joint moves with a lower bound.
 
     Attributes:
         route: Shape (k, n), start first.
-        moves: Its moves.
-        bound: No route between its ends has fewer.
+        moves: Number of its moves.
+        bound: Lower bound of the moves of any route between its ends.
     """
 
     route: Matrix
@@ -46,24 +46,25 @@ def fewest_moves(
     rules: MoveRules | None = None,
     clearance: float | None = None,
 ) -> MovesFound:
-    """Look for a route with fewer moves, or with as many and less travel.
+    """Search for a route with fewer moves, or with as many moves and less travel.
 
-    It keeps a clearance where that costs no move, and its motions are proven free.
+    The search runs on levels of clearance, the largest first; a level with less clearance has to save a move. Fine
+    grids follow if the number of moves is not yet proven to be the fewest. The motions of the route are proven free.
 
     Args:
-        route: Free, shape (k, n), every edge of which moves one joint.
+        route: A free route, shape (k, n), every edge of which moves one joint.
         world: Checks motions.
-        rounds: Of improvement at most, after the first; the work ends earlier if it is proven that no route has fewer
-            moves. The same number and seed give the same route.
-        budget: When to end, with the best so far, and the seed of all random choices; without an end if None.
-        rules: Kept by the route and by what comes out. Joints that move last stay where they are.
-        clearance: Wanted from obstacles, on top of their margins [m]; None for a centimetre. Less is kept where more
-            moves would be needed, or where the ends have less.
+        rounds: Limit of the rounds of improvement; the work ends earlier if it is proven that no route has fewer moves.
+            The same number and seed give the same route.
+        budget: When to end with the best route so far, and the seed of all random choices; None for no end.
+        rules: Rules that the route keeps and the result has to keep. Joints that move last stay where they are.
+        clearance: Clearance from obstacles that is wanted on top of their margins [m]; None for a centimetre. Less is
+            kept where more moves would be needed, or where the ends have less.
 
     Returns:
-        A route with the same ends, bit for bit, that is no worse. Its bound is the number of joints that differ, and
-        more where that has been refuted (:mod:`rrtik_ompl.planning.moves.lower_bounds`), never with more than 12
-        such joints.
+        A route with the same ends, bit for bit, that is no worse. Its bound is the number of joints that differ, or
+        more where that many moves are proven not to be enough (:mod:`rrtik_ompl.planning.moves.lower_bounds`), which is
+        never proven for more than 12 such joints.
 
     Raises:
         InputError: If an edge moves several joints.
@@ -80,7 +81,7 @@ def fewest_moves(
 
     best = route
     bound = lower_bound(route[0], route[-1])
-    moves_to_save = 0  # 1 once `best` is from a level: a later one, which keeps less, has to save a move
+    moves_to_save = 0  # 1 once `best` is from a level
     for level in levels:
         if moves_to_save > 0 and (transitions(best) == bound or budget.over()):
             break
@@ -97,7 +98,7 @@ def fewest_moves(
 
 @dataclass(frozen=True, eq=False)
 class _Work:
-    """What is asked of :func:`fewest_moves`."""
+    """Arguments of :func:`fewest_moves`."""
 
     rows: Matrix
     world: World
@@ -107,17 +108,17 @@ class _Work:
 
     @property
     def joints(self) -> list[int]:
-        """Those that may move."""
+        """Indices of the joints that may move."""
         resting = [*self.rules.frozen_joints, *self.rules.last_joints]
         return [joint for joint in range(self.world.robot.dof) if joint not in resting]
 
     @cached_property
     def sharper_bound_of_ends(self) -> Proof:
-        """A function that sharpens the bound between a start and a goal, the same on all levels; it remembers both."""
+        """A function that sharpens the bound between a start and a goal; its cache serves all levels."""
         return remembered(self.world, self.joints, self.budget.over)
 
     def search_level(self, level: Level, offered: Matrix) -> MoveSearch:
-        """A search on a level of clearance that starts from a route, if that keeps it."""
+        """Search on a level of clearance, beginning with the offered route if that keeps the level."""
         search = MoveSearch(
             self.rows[:1],
             self.rows[-1:],
@@ -137,10 +138,11 @@ class _Work:
         return search
 
     def search_fine_grids(self, levels: list[Level], best: Matrix, bound: int) -> tuple[Matrix, int]:
-        """Look for fewer moves on fine grids.
+        """Search for fewer moves on fine grids.
 
         Returns:
-            The best route, shape (k, n), which may be the one given, and a bound of its moves that is no lower.
+            The best route, shape (k, n), which may be the given one, and a lower bound of the moves that is at least
+            the given one.
         """
         ends = self.rows[0], self.rows[-1]
         limits = turning_limits(self.world.robot, self.rows)
@@ -158,12 +160,15 @@ class _Work:
 
 
 def _keeps_level(level: Level, route: Matrix) -> bool:
-    """Whether a route keeps a level."""
+    """Check whether the motions of a route keep a level."""
     return bool(level.proving.motion_valid_batch(route[:-1], route[1:]).all())
 
 
 def turning_limits(robot: Robot, rows: Matrix) -> tuple[Vector, Vector]:
-    """Limits of the joints, shapes (n,); of those that turn for ever, one turn more than rows, shape (k, n), go."""
+    """Return finite limits of the joints, shapes (n,).
+
+    A joint without limits may turn one turn farther than the rows, shape (k, n), do.
+    """
     lower = np.where(np.isfinite(robot.lower), robot.lower, rows.min(axis=0) - TAU)
     upper = np.where(np.isfinite(robot.upper), robot.upper, rows.max(axis=0) + TAU)
     return lower, upper

@@ -1,7 +1,7 @@
-"""Retraction: bends slide back along the lines of sight until they touch what they go round.
+"""Retraction: bends slide back along lines of sight until they touch the obstacles that they go round.
 
-Source: [1, ch. 5.3, method 3], in three phases with bisection. Visibility is not monotone along a route,
-so a bisection finds some visible point that an invisible one follows, not the farthest.
+Source: [1, ch. 5.3, method 3], in three phases with bisection. Visibility is not monotone along a route, so a bisection
+finds some visible point that is followed by a hidden one, not necessarily the farthest.
 """
 
 from __future__ import annotations
@@ -14,18 +14,22 @@ from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.model.transitions import merge_moves, part_counts, route_length, subdivided, without_repeats
 from rrtik_ompl.planning.shortening.task import Task
 
-STEPS = 40  # of the planner along a route, where nobody says how large they are
-FINENESS = 5.0  # the third phase's steps are this many times as small
+STEPS = 40  # steps along a route if their size is not given
+FINENESS = 5.0  # factor by which the steps of the third phase are smaller
 
 
 def retract(route: Matrix, task: Task, *, step: float | None = None, fineness: float = FINENESS) -> Matrix:
     """Retract a route, shape (k, n); deterministic.
 
+    From a pivot, the last visible waypoint is found (phase 1). Along the edge behind it the last visible point is found
+    (phase 2), and then, back along the sight line to this point, the bend that still sees the next point (phase 3). The
+    bend is the next pivot.
+
     Args:
         route: Free, start first.
         task: Checks motions.
-        step: Of the second phase, in the unit of the route's length; a fortieth of the route if None.
-        fineness: How many times smaller the steps of the third phase are.
+        step: Step of the second phase, in the unit of the route's length; None for a fortieth of the route.
+        fineness: Factor by which the steps of the third phase are smaller.
 
     Returns:
         The new route, or the given one if that is better or an edge of the new one turns out not to be free.
@@ -58,14 +62,22 @@ def retract(route: Matrix, task: Task, *, step: float | None = None, fineness: f
 
 
 def _joined(done: list[Matrix], ahead: Matrix, task: Task) -> Matrix:
-    """The route so far, and the moves from there to what is ahead."""
+    """Join the waypoints so far, the moves to the next waypoint ahead, and the waypoints ahead."""
     return np.vstack([*done, task.moves(done[-1][-1], ahead[0]), ahead[1:]] if len(ahead) else done)
 
 
 def _one_bend(pivot: Vector, ahead: Matrix, coarse: float, fine: float, task: Task) -> tuple[Matrix, Matrix]:
-    """Phases 2 and 3: the waypoints after the pivot up to the next one, and what is ahead of that.
+    """Run phases 2 and 3 for one bend.
 
-    The first of the points ahead, shape (k, n), is visible from the pivot, the second is not.
+    Args:
+        pivot: Shape (n,).
+        ahead: Waypoints ahead, shape (k, n); the first is visible from the pivot, the second is not.
+        coarse: Step of phase 2.
+        fine: Step of phase 3.
+        task: Checks motions.
+
+    Returns:
+        The waypoints after the pivot up to the next one, and the waypoints ahead of that.
     """
     on_edge = _divided(ahead[:2], coarse)
     seen = _last_visible(len(on_edge), _seen_from(pivot, on_edge, task), last_is_hidden=True)
@@ -75,19 +87,20 @@ def _one_bend(pivot: Vector, ahead: Matrix, coarse: float, fine: float, task: Ta
     sight_line = _divided(np.vstack([pivot[None], task.moves(pivot, on_edge[seen])]), fine)
     last = len(sight_line) - 1
     back = _last_visible(last + 1, lambda k: task.link(sight_line[last - k], beyond) is not None, last_is_hidden=True)
-    if back == last:  # nothing is left of the sight line: the point that was out of sight is the next pivot
+    # Nothing is left of the sight line, so the hidden point is the next pivot.
+    if back == last:
         return beyond[None], ahead[1:]
     bend = sight_line[: last - back + 1]
     return (merge_moves(bend, tolerance=0.0)[1:] if task.one_joint else bend[-1:]), rest
 
 
 def _seen_from(pivot: Vector, points: Matrix, task: Task) -> Callable[[int], bool]:
-    """Which of the points are visible from the pivot, by number."""
+    """Return a function that checks whether the point of an index is visible from the pivot."""
     return lambda k: task.link(pivot, points[k]) is not None
 
 
 def _last_visible(count: int, visible: Callable[[int], bool], *, last_is_hidden: bool = False) -> int:
-    """Bisection: the number of a visible point that is the last one or that an invisible one follows.
+    """Find, by bisection, the index of a visible point that is the last one or is followed by a hidden one.
 
     The first point is known to be visible.
     """
@@ -105,10 +118,11 @@ def _last_visible(count: int, visible: Callable[[int], bool], *, last_is_hidden:
 
 
 def _divided(corners: Matrix, step: float) -> Matrix:
-    """A polyline with further points, none farther than ``step`` from the next; its corners stay as they are."""
+    """Subdivide a polyline so that no point is farther than ``step`` from the next; its corners stay."""
     counts = part_counts(corners, step)
     points, edges = subdivided(corners, counts)
     a = corners[edges]
     b = corners[edges + 1]
-    divided: Matrix = np.clip(points, np.minimum(a, b), np.maximum(a, b))  # a joint that does not move stays to the bit
+    # Clipped, so that a joint that does not move keeps its exact value.
+    divided: Matrix = np.clip(points, np.minimum(a, b), np.maximum(a, b))
     return divided
