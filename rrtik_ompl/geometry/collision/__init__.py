@@ -1,4 +1,4 @@
-"""Solids, the bodies of a world and the pairs that must not touch; how far an arm moves; the second opinion.
+"""Model the bodies of a world and the pairs that must not touch, bound the arm's motion, and check a second time.
 
-`World` is the face of all this.
+`World` is the public interface to all of this.
 """

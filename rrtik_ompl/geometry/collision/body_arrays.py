@@ -1,4 +1,4 @@
-"""What the checks of a world ask of every body, as arrays: one call for thousands of bodies, whatever their number."""
+"""Hold the data of all bodies of a world in arrays, so that checks need one call however many bodies there are."""
 
 from __future__ import annotations
 
@@ -19,18 +19,19 @@ UNBOUNDED_METRES = 1e9  # [m] half extent of a half-space's box
 
 @dataclass(frozen=True, eq=False)
 class BodyArrays:
-    """Numbers of n bodies.
+    """The data of n bodies.
 
     Attributes:
-        joints: Pinocchio's numbers of their joints, 0 for what stands still, shape (n,).
+        joints: Pinocchio's numbers of their joints, 0 for bodies that stand still, shape (n,).
         placements: Their poses in the joints' frames, shape (n, 4, 4).
-        centres, halves: Of their bounding boxes in their own frames [m], shape (n, 3) each; a half-space has an endless
-            box about its origin.
-        half_spaces, obstacles: Which are half-spaces and which obstacles, shape (n,) each.
-        margins: What has to stay away from each [m], shape (n,).
-        paddings: How much thicker each is than its geometry [m], shape (n,).
-        touching: Which are in contact with another body, shape (n,).
-        contacts: The least distance of two bodies that are in contact [m], by their numbers, the smaller one first.
+        centres, halves: Centres and half extents of their bounding boxes in their own frames [m], shape (n, 3) each; a
+            half-space has a practically endless box about its origin.
+        half_spaces, obstacles: Masks of the half-spaces and of the obstacles, shape (n,) each.
+        margins: Distance that others must keep from each body [m], shape (n,).
+        paddings: Thickness that is added around each body [m], shape (n,).
+        touching: Mask of the bodies that are in contact with another one, shape (n,).
+        contacts: Least allowed distance of two bodies in contact [m], negative for a penetration depth, by the numbers
+            of the bodies, the smaller one first.
     """
 
     joints: NDArray[np.int64]
@@ -45,7 +46,7 @@ class BodyArrays:
     contacts: Mapping[tuple[int, int], float]
 
     def kept_apart(self, pairs: NDArray[np.int64]) -> Vector:
-        """How far the bodies of pairs, shape (k, 2), must stay apart [m]; see :func:`.bodies.kept_apart`."""
+        """Return the distances that bodies must keep [m], for pairs of shape (k, 2); see :func:`.bodies.kept_apart`."""
         first, second = pairs.T
         both_stand = (self.joints[first] == 0) & (self.joints[second] == 0)
         margin = self.margins[np.where(self.obstacles[second], second, first)]
@@ -56,7 +57,7 @@ class BodyArrays:
         return separation
 
     def in_contact(self, pairs: NDArray[np.int64]) -> Mask:
-        """Which of some pairs of bodies, shape (k, 2), are in contact, shape (k,)."""
+        """Return a mask, shape (k,), of the pairs, shape (k, 2), whose bodies are in contact."""
         in_contact: Mask = np.asarray(self.touching[pairs].all(axis=1))
         for row in np.flatnonzero(in_contact):
             in_contact[row] = _ordered(pairs[row]) in self.contacts
@@ -69,7 +70,7 @@ def _ordered(pair: NDArray[np.int64]) -> tuple[int, int]:
 
 
 def _contacts(bodies: Sequence[Body]) -> dict[tuple[int, int], float]:
-    """See :attr:`BodyArrays.contacts`."""
+    """Return the least allowed distances of bodies in contact; see :attr:`BodyArrays.contacts`."""
     contacts = {}
     touching = [k for k, body in enumerate(bodies) if body.contacts]
     for i, j in combinations(touching, 2):
@@ -79,12 +80,12 @@ def _contacts(bodies: Sequence[Body]) -> dict[tuple[int, int], float]:
     return contacts
 
 
-# Several checks of one world ask for the same; kept for as long as one of them holds them.
+# Several checks of one world use the same arrays, which are kept for as long as one of the checks holds them.
 _KNOWN: WeakValueDictionary[tuple[Body, ...], BodyArrays] = WeakValueDictionary()
 
 
 def body_arrays(bodies: Sequence[Body]) -> BodyArrays:
-    """Numbers of bodies."""
+    """Return the data of bodies as arrays; the same object for the same bodies, while it is in use."""
     key = tuple(bodies)
     arrays = _KNOWN.get(key)
     if arrays is None:

@@ -1,8 +1,8 @@
-"""A second, independent answer to "is this configuration free?", used to certify paths before they are returned.
+"""Decide a second time, independently, whether configurations are free, to certify paths before they are returned.
 
-It shares no state with the checks that planners use: forward kinematics in numpy instead of Pinocchio, its own bounding
-boxes instead of a broadphase tree, and a fresh coal request for every pair. Reused collision data keep the last
-support points as a first guess and have been seen to miss about 3 overlaps in 100,000 near contacts.
+These checks share no state with those that planners use: they have forward kinematics in numpy instead of Pinocchio,
+their own bounding boxes instead of a broad-phase tree, and a new coal request for every pair. Coal's data keep the last
+support points as a first guess; data that were reused have been seen to miss about 3 overlaps in 100,000 near contacts.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ from rrtik_ompl.geometry.collision.distances import gap_beyond
 from rrtik_ompl.geometry.collision.motion_bound import approach_weights
 from rrtik_ompl.model.robot import Robot
 
-MAX_PAIR_CHECKS = 1 << 16  # runs of rows times pairs checked together, to bound memory
-RUNS = (64, 16, 4, 1)  # rows that are checked together
-FEW = 16  # rows that are checked one by one: mostly they do not follow a path
+MAX_PAIR_CHECKS = 1 << 16  # pairs of a run and a body pair that are checked in one batch, to bound memory
+RUNS = (64, 16, 4, 1)  # lengths of the runs of rows that are checked together, from coarse to fine
+FEW = 16  # Up to so many rows are checked one by one, as they mostly do not follow a path.
 
 Numbers: TypeAlias = NDArray[np.int64]
 
 
 class Certificate:
-    """Collision test of configurations against fixed pairs of bodies."""
+    """Collision check of configurations for fixed pairs of bodies."""
 
     def __init__(self, robot: Robot, bodies: tuple[Body, ...], pairs: tuple[tuple[int, int], ...]) -> None:
         self._robot = robot
@@ -44,21 +44,25 @@ class Certificate:
         self._containment = Containment(bodies, pairs)
 
     def free(self, Q: Matrix) -> Mask:
-        """Which rows of Q, shape (m, dof), are collision-free. Shape (m,). Quickest where rows follow a path."""
+        """Check which rows of Q, shape (m, dof), are collision-free; return a mask of shape (m,).
+
+        This is fastest if the rows are neighbouring waypoints of a path.
+        """
         return np.array([not colliding_pair for colliding_pair in self._colliding_pairs(Q)], dtype=bool)
 
     def first_pairs(self, Q: Matrix) -> tuple[tuple[str, str] | None, ...]:
-        """For each row of Q the names of one colliding pair, or None."""
+        """Return the names of one colliding pair for each row of Q, shape (m, dof); None for a free row."""
         return tuple(
             None if not colliding_pair else (self._bodies[colliding_pair[0]].name, self._bodies[colliding_pair[1]].name)
             for colliding_pair in self._colliding_pairs(Q)
         )
 
     def _colliding_pairs(self, Q: Matrix) -> list[tuple[int, ...]]:
-        """For each row of Q, shape (m, dof), the numbers of one colliding pair of bodies; () where there is none.
+        """Return the body numbers of one colliding pair for each row of Q, shape (m, dof); () for a free row.
 
-        Neighbouring rows are checked together: where two bodies are farther apart at the middle one than they can
-        come nearer within the run of rows, they are apart in all of it. What is left open is checked in shorter runs.
+        Runs of neighbouring rows are checked together, at their middle row. If two bodies are farther apart there than
+        they can approach each other within the run, they are apart in all of its rows. Pairs that remain undecided are
+        checked again in shorter runs, down to single rows.
         """
         colliding: list[tuple[int, ...]] = [()] * len(Q)
         run_lengths = RUNS if len(Q) > FEW else RUNS[-1:]
@@ -71,7 +75,8 @@ class Certificate:
                 may_touch = self._examine(Q, starts, run_length, run_of, pair_of, colliding)
                 if not may_touch.any():
                     break
-                if next_length:  # 0 after the shortest runs, which are single rows
+                # The shortest runs are single rows, after which nothing is left to divide.
+                if next_length:
                     starts, run_of, pair_of = _divided(
                         starts, run_of[may_touch], pair_of[may_touch], run_length, next_length, len(Q)
                     )
@@ -87,15 +92,20 @@ class Certificate:
         pair_of: Numbers,
         colliding: list[tuple[int, ...]],
     ) -> Mask:
-        """Which pairs may touch somewhere in their runs of rows, shape (k,); enters collisions that it finds.
+        """Find the pairs that may collide in their runs of rows, and enter the collisions found into ``colliding``.
+
+        Bounding boxes decide first (broad phase); the distances of the remaining pairs are measured one by one.
 
         Args:
             Q: All configurations, shape (m, dof).
             starts: First row of each run, shape (runs,).
-            run_length: Rows in a run.
-            run_of: For each of k pairs the run in which it is examined, shape (k,).
-            pair_of: Their numbers, shape (k,).
-            colliding: For each row of Q a colliding pair of bodies, or (); is added to.
+            run_length: Number of rows in a run.
+            run_of: Index of the run in which each of k pairs is examined, shape (k,).
+            pair_of: Number of each pair, shape (k,).
+            colliding: One colliding pair of bodies, or (), for each row of Q; changed in place.
+
+        Returns:
+            Mask of the pairs that are not yet decided, shape (k,).
         """
         middles = np.minimum(starts + run_length // 2, len(Q) - 1)
         ends = np.minimum(starts + run_length, len(Q))
@@ -108,7 +118,7 @@ class Certificate:
         approach_bounds = DISTANCE_TOLERANCE + self._approach_within_runs(largest_change, run_of, pair_of)
         may_touch: Mask = self._gaps(placed, run_of, pair_of) <= approach_bounds
 
-        # What the boxes leave open is measured, one pair at a time.
+        # Narrow phase: measure the distances of the pairs whose boxes are too near, one pair at a time.
         candidates = np.flatnonzero(may_touch)
         runs = run_of[candidates]
         pairs = pair_of[candidates]
@@ -121,23 +131,35 @@ class Certificate:
             if gap is None:
                 colliding[middles[run]] = (i, j)
             elif may_be_inside and self._containment.holds((i, j), frames[run]):
-                # Where surfaces stay apart in the whole run, what is inside in the middle is inside all along.
+                # If the surfaces stay apart in the whole run, a body inside at the middle is inside in every row.
                 rows = slice(middles[run], middles[run] + 1) if may_touch[row] else slice(starts[run], ends[run])
                 colliding[rows] = [(i, j)] * (rows.stop - rows.start)
 
         return may_touch
 
     def _approach_within_runs(self, largest_change: Matrix, run_of: Numbers, pair_of: Numbers) -> Vector:
-        """How much nearer the pairs can come in their runs than at the middle [m], shape (k,).
+        """Return how much nearer than at the middle row the bodies of each pair can come in their run [m], shape (k,).
 
-        ``largest_change``, shape (runs, dof), is how far each joint gets from its value at the middle.
+        Args:
+            largest_change: For each run the largest change of each joint from the middle row, shape (runs, dof).
+            run_of: Index of the run of each pair, shape (k,).
+            pair_of: Number of each pair, shape (k,).
         """
         weights = self._approach_weights
         joints = range(largest_change.shape[1])
         return np.asarray(sum(largest_change[run_of, k] * weights[pair_of, k] for k in joints))
 
     def _may_contain(self, frames: NDArray[np.float64], run_of: Numbers, pair_of: Numbers) -> Mask:
-        """In which pairs one body may be inside the other, a hollow one, in the middle of their runs, shape (k,)."""
+        """Find the pairs in which one body may be inside the other, a hollow mesh, at the middle of the run.
+
+        Args:
+            frames: Poses of all joint frames at the middle of each run, shape (runs, joints + 1, 4, 4).
+            run_of: Index of the run of each pair, shape (k,).
+            pair_of: Number of each pair, shape (k,).
+
+        Returns:
+            Mask of these pairs, shape (k,).
+        """
         may_contain = np.zeros(len(pair_of), dtype=bool)
         for rows in self._containment.rows_of_pairs[pair_of].T:
             listed = np.flatnonzero(rows >= 0)
@@ -145,7 +167,10 @@ class Certificate:
         return may_contain
 
     def _gaps(self, placed: PlacedBoxes, run_of: Numbers, pair_of: Numbers) -> Vector:
-        """Lower bounds of the distances between the pairs' boxes less their margins [m], shape (k,)."""
+        """Return lower bounds of the pairs' distances, from their bounding boxes, minus their margins [m], shape (k,).
+
+        A pair with a fixed half-space is measured from the box to the plane.
+        """
         sides = [placed.rows(run_of, self._pairs[pair_of, k]) for k in (0, 1)]
         gaps = np.full(len(pair_of), -np.inf)
 
@@ -166,13 +191,15 @@ class Certificate:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlacedBoxes:
-    """Axis-parallel boxes around bodies at m configurations of the arm; what does not move is held once.
+    """Axis-parallel boxes around bodies at m configurations of the arm; bodies that stand still have one row for all.
 
     Attributes:
-        centres, halves: Centres and half extents [m], shape (rows, 3) each; see :meth:`rows`.
+        centres: Centres of the boxes [m], shape (rows, 3); see :meth:`rows`.
+        halves: Half extents of the boxes [m], shape (rows, 3).
         poses: Poses of the bodies, shape (rows, 4, 4).
-        first_row: For each body its row in the first configuration.
-        row_step: For each body how many rows further on the next configuration is, 0 for what does not move.
+        first_row: Row of each body in the first configuration, shape (bodies,).
+        row_step: Number of rows from one configuration to the next for each body, 0 for bodies that stand still,
+            shape (bodies,).
     """
 
     centres: Matrix
@@ -182,16 +209,16 @@ class PlacedBoxes:
     row_step: NDArray[np.int64]
 
     def rows(self, configurations: NDArray[np.int64], bodies: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Rows of bodies at configurations, by their numbers, shape (k,) each."""
+        """Return the rows of bodies at configurations, from their numbers, shape (k,) each."""
         return np.asarray(self.first_row[bodies] + self.row_step[bodies] * configurations)
 
     def pose(self, configuration: int, body: int) -> Matrix:
-        """Pose of a body at a configuration, shape (4, 4)."""
+        """Return the pose of a body at a configuration, shape (4, 4)."""
         return np.asarray(self.poses[self.first_row[body] + self.row_step[body] * configuration])
 
 
 class Boxes:
-    """Axis-parallel boxes around bodies: a first test that never misses what touches."""
+    """Axis-parallel boxes around bodies: a broad phase that never misses a collision."""
 
     def __init__(self, bodies: Sequence[Body]) -> None:
         arrays = body_arrays(bodies)
@@ -204,7 +231,7 @@ class Boxes:
         self._standing_boxes = self._boxes_at(self._placements[self._standing], self._standing)
 
     def placed(self, frames: NDArray[np.float64]) -> PlacedBoxes:
-        """The boxes where the joints' frames, shape (m, joints + 1, 4, 4), have these poses."""
+        """Return the boxes of all bodies for given poses of the joint frames, shape (m, joints + 1, 4, 4)."""
         poses = (frames[:, self._joints] @ self._placements[self._moving]).reshape(-1, 4, 4)
         centres, halves = self._boxes_at(poses, np.tile(self._moving, len(frames)))
         standing_poses = self._placements[self._standing]
@@ -223,26 +250,31 @@ class Boxes:
         )
 
     def _boxes_at(self, poses: NDArray[np.float64], bodies: NDArray[np.int64]) -> tuple[Matrix, Matrix]:
-        """Centres and half extents of the boxes around bodies at poses, shape (k, 4, 4): (k, 3) each."""
+        """Return the centres and half extents of the axis-parallel boxes around bodies, shape (k, 3) each.
+
+        Args:
+            poses: Pose of each body, shape (k, 4, 4).
+            bodies: Number of each body, shape (k,).
+        """
         rotations = poses[:, :3, :3]
         centres = np.einsum("kij,kj->ki", rotations, self._centres[bodies]) + poses[:, :3, 3]
         return centres, np.einsum("kij,kj->ki", np.abs(rotations), self._halves[bodies])
 
 
 def fixed_contact(robot: Robot, bodies: tuple[Body, ...], pairs: tuple[tuple[int, int], ...]) -> tuple[str, str] | None:
-    """Names of two bodies that touch and never move (the base and the obstacles), None if all are clear of each other.
+    """Return the names of two bodies that touch and never move (such as base and obstacle); None if there are none.
 
     Args:
         robot: The arm.
-        bodies: All solids.
-        pairs: Numbers of those that never move and must not touch.
+        bodies: All bodies of the world.
+        pairs: Numbers of the bodies that never move and must not touch.
     """
     meeting = _boxes_meet(bodies, pairs)
     return Certificate(robot, bodies, meeting).first_pairs(np.zeros((1, robot.dof)))[0] if meeting else None
 
 
 def _boxes_meet(bodies: tuple[Body, ...], pairs: tuple[tuple[int, int], ...]) -> tuple[tuple[int, int], ...]:
-    """The pairs of standing bodies whose bounding boxes meet."""
+    """Return the pairs of standing bodies whose axis-parallel bounding boxes overlap or touch."""
     arrays = body_arrays(bodies)
     first, second = np.array(pairs, dtype=np.int64).reshape(-1, 2).T
     poses = arrays.placements
@@ -257,7 +289,20 @@ def _boxes_meet(bodies: tuple[Body, ...], pairs: tuple[tuple[int, int], ...]) ->
 def _divided(
     starts: Numbers, run_of: Numbers, pair_of: Numbers, run_length: int, next_length: int, end: int
 ) -> tuple[Numbers, Numbers, Numbers]:
-    """The runs named in ``run_of`` divided into shorter ones: their first rows, and the run and number of each pair."""
+    """Divide the undecided runs into shorter ones.
+
+    Args:
+        starts: First row of each run, shape (runs,).
+        run_of: Index of the run of each undecided pair, shape (k,).
+        pair_of: Number of each undecided pair, shape (k,).
+        run_length: Length of the runs.
+        next_length: Length of the shorter runs.
+        end: Number of rows of all configurations.
+
+    Returns:
+        First rows of the shorter runs, shape (new_runs,), and for each of n pairs the index of its run and its number,
+        shape (n,) both.
+    """
     open_runs, position = np.unique(run_of, return_inverse=True)
     parts = run_length // next_length
 
@@ -276,7 +321,7 @@ def distance(
     second_pose: Matrix,
     margin: float = 0.0,
 ) -> float | None:
-    """As :func:`.distances.gap_beyond`, of two coal geometries at poses, shape (4, 4)."""
+    """Return what :func:`.distances.gap_beyond` does, for two coal geometries at poses of shape (4, 4)."""
     transforms = [coal.Transform3s(pose[:3, :3], pose[:3, 3]) for pose in (first_pose, second_pose)]
     return gap_beyond((first, transforms[0], second, transforms[1]), margin)
 
@@ -284,7 +329,12 @@ def distance(
 def _half_space_pairs(
     bodies: tuple[Body, ...], pairs: tuple[tuple[int, int], ...]
 ) -> dict[int, tuple[int, Vector, float]]:
-    """Pairs with a half-space that does not move, by number: side of the other body, outward normal and offset."""
+    """Return the pairs with a half-space that does not move, by pair number.
+
+    Returns:
+        For each such pair: the position of the other body in the pair (0 or 1), the outward normal of the plane in the
+        world, shape (3,), and its offset along the normal [m].
+    """
     arrays = body_arrays(bodies)
     planes = {}
     is_fixed_plane = (arrays.half_spaces & (arrays.joints == 0))[np.array(pairs, dtype=np.int64).reshape(-1, 2)]

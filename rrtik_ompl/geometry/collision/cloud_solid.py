@@ -1,6 +1,6 @@
-"""Clouds of points for exact checks: coal has no such kind, so it is asked for a ball at each point that is near.
+"""Check clouds of points exactly. Coal has no clouds, so it is asked about a ball at each point that is near enough.
 
-Near is what lies close to the other body's bounding box; the cloud's tree finds it. The answers are coal's own.
+Only points close to the other geometry's bounding box are asked about; the cloud's tree finds them.
 """
 
 from __future__ import annotations
@@ -18,11 +18,12 @@ from rrtik_ompl.geometry.collision.solids import Ends as Ends
 from rrtik_ompl.geometry.collision.solids import inside_mesh, is_closed, is_mesh, mesh_arrays
 from rrtik_ompl.model.shapes import PointCloud
 
-LOOK_AHEAD = 0.05  # [m] beyond what was asked for; what is farther away than this is not measured further
+# [m] Points up to this much farther than required are measured; beyond that, a gap is only known to be at least this.
+LOOK_AHEAD = 0.05
 
 
 class CloudSolid(coal.Sphere):  # type: ignore[misc]
-    """A cloud where a coal geometry is expected; to coal itself it is the ball around its frame that holds it.
+    """A cloud as a coal geometry; coal itself takes it for a ball around the cloud's origin that contains the cloud.
 
     Attributes:
         cloud: The cloud.
@@ -33,7 +34,7 @@ class CloudSolid(coal.Sphere):  # type: ignore[misc]
         self.cloud = cloud
 
     def computeLocalAABB(self) -> None:
-        """Set the bounding box and sphere to those of the points' balls."""
+        """Set the bounding box and sphere to those of the balls around the cloud's points."""
         super().computeLocalAABB()
         low, high = self.cloud.bounds
         self.aabb_local.min_ = low
@@ -43,10 +44,10 @@ class CloudSolid(coal.Sphere):  # type: ignore[misc]
 
 
 def cloud_solid(cloud: PointCloud) -> CloudSolid:
-    """What collision checks take a cloud for: the same object each time, for as long as a world holds it.
+    """Return the coal geometry of a cloud: the same object at each call, for as long as a world holds it.
 
-    The cloud does not hold it: Python cannot see what an object of coal's refers to, so that a circle of the two would
-    never be freed.
+    The cloud refers to it only weakly: Python's garbage collector cannot see the references of coal's objects, so a
+    reference cycle between the two would never be freed.
     """
     solid = cloud.solid() if hasattr(cloud, "solid") else None
     if solid is None:
@@ -57,14 +58,18 @@ def cloud_solid(cloud: PointCloud) -> CloudSolid:
 
 
 def has_cloud(ends: Ends) -> bool:
-    """Whether one of two geometries is a cloud."""
+    """Check whether one of two geometries is a cloud."""
     return isinstance(ends[0], CloudSolid) or isinstance(ends[2], CloudSolid)
 
 
 def cloud_gap(ends: Ends, margin: float) -> float | None:
-    """A lower bound of the distance of two geometries, one of them a cloud, less a margin [m]; None if it is not kept.
+    """Return a lower bound of the distance of a cloud and another geometry minus a margin [m]; None if it is not kept.
 
-    What lies wholly inside a hollow mesh touches it.
+    A point that is wholly inside a hollow mesh counts as touching it.
+
+    Args:
+        ends: Two geometries with their poses, one of them a cloud.
+        margin: Distance that must be kept [m].
     """
     cloud, other, to_other, _ = _sides(ends)
     points, _ = _points_near_box(cloud, other, to_other, cloud.radius + margin + LOOK_AHEAD)
@@ -87,7 +92,7 @@ def cloud_gap(ends: Ends, margin: float) -> float | None:
 
 
 class Nearest(NamedTuple):
-    """Signed distance of two geometries [m], and the points in the world that it is between, shape (3,) each."""
+    """The signed distance of two geometries [m] and the nearest point on each in the world [m], shape (3,)."""
 
     distance: float
     first: Vector
@@ -95,7 +100,10 @@ class Nearest(NamedTuple):
 
 
 def nearest_of_cloud(ends: Ends) -> Nearest:
-    """The distance of two geometries, one of them a cloud."""
+    """Return the signed distance and the nearest points of two geometries, one of which is a cloud.
+
+    The search starts near the other's bounding box and widens until it finds points of the cloud.
+    """
     cloud, other, to_other, swapped = _sides(ends)
 
     reach = cloud.radius + LOOK_AHEAD
@@ -109,7 +117,7 @@ def nearest_of_cloud(ends: Ends) -> Nearest:
     identity = coal.Transform3s()
     nearest = None
     for point, box_distance in zip(points, box_distances, strict=True):
-        # The points come nearest to the box first: none that follows can be nearer than the best one.
+        # Points are sorted by their distance from the box, so no later one can be nearer than the best so far.
         if nearest is not None and box_distance - cloud.radius >= nearest.min_distance:
             break
         result = coal.DistanceResult()
@@ -123,7 +131,12 @@ def nearest_of_cloud(ends: Ends) -> Nearest:
 
 
 def _sides(ends: Ends) -> tuple[PointCloud, coal.CollisionGeometry, coal.Transform3s, bool]:
-    """The cloud, the other geometry, the cloud's pose in the other's frame, and whether the cloud is the second one."""
+    """Return the parts of a pair with a cloud.
+
+    Returns:
+        The cloud, the other geometry, the cloud's pose in the other's frame, and whether the cloud is the second of the
+        two.
+    """
     first, first_pose, second, second_pose = ends
     if isinstance(first, CloudSolid):
         return first.cloud, second, second_pose.inverseTimes(first_pose), False
@@ -133,9 +146,17 @@ def _sides(ends: Ends) -> tuple[PointCloud, coal.CollisionGeometry, coal.Transfo
 def _points_near_box(
     cloud: PointCloud, other: coal.CollisionGeometry, to_other: coal.Transform3s, reach: float
 ) -> tuple[Matrix, Vector]:
-    """Points of a cloud within a reach [m] of the other's bounding box, deepest inside it first, in the other's frame.
+    """Return the points of a cloud within a distance of another geometry's bounding box.
 
-    Also their distances from that box.
+    Args:
+        cloud: The cloud.
+        other: The other geometry.
+        to_other: Pose of the cloud in the other's frame.
+        reach: Largest distance from the box [m].
+
+    Returns:
+        The points in the other's frame [m], shape (n, 3), those deepest inside the box first, and their distances from
+        the box [m], 0 inside, shape (n,).
     """
     rotation = np.array(to_other.getRotation())
     translation = np.array(to_other.getTranslation())
@@ -156,7 +177,7 @@ def _points_near_box(
 
 
 def _any_inside(mesh: coal.BVHModelBase, points: Matrix) -> bool:
-    """Whether one of some points is inside a hollow mesh, whose surface they do not touch."""
+    """Check whether any of the points is inside a hollow mesh; none of them touches its surface."""
     box = mesh.aabb_local
     points = points[((points >= np.array(box.min_)) & (points <= np.array(box.max_))).all(axis=1)]
     if not len(points):

@@ -1,4 +1,4 @@
-"""Bodies wholly inside a mesh. Coal's meshes are hollow surfaces, so what has slipped through one looks free to it."""
+"""Find bodies that are wholly inside a mesh. Coal's meshes are hollow, so coal sees no collision there."""
 
 from __future__ import annotations
 
@@ -27,42 +27,47 @@ from rrtik_ompl.geometry.collision.solids import (
 )
 
 ROUNDING = 1e-9  # [m]
-END_POINTS = np.concatenate([np.eye(3), -np.eye(3)])  # of a body about its origin, in half extents
+# End points of a body about its origin, in units of its half extents, shape (6, 3).
+END_POINTS = np.concatenate([np.eye(3), -np.eye(3)])
 
 
 class Containment:
-    """The pairs of a world in which one body is a mesh large enough to hold the other.
+    """The pairs of a world in which one body is a mesh large enough to contain the other.
 
-    If two surfaces do not cross, one body is either wholly inside the other or wholly outside, so one point decides;
-    a few more, at the body's ends, show quickly that most bodies are too large for the other's bounding box.
+    If two surfaces do not cross, one body is either wholly inside the other or wholly outside, so a single point
+    decides. Six points are used, at the ends of the body: most bodies have an end outside the other's bounding box,
+    which shows quickly that they are not inside.
 
     Attributes:
-        pairs: Numbers of the bodies, the one that may hold first.
-        rows_of_pairs: For each pair that was given its rows in ``pairs``, in the order given and the other one; -1
-            where the second body cannot be inside the first. Shape (given, 2).
+        pairs: Pairs of body numbers, the body that may contain the other first.
+        rows_of_pairs: For each pair given, its indices in ``pairs``: with the first body as the outer one, and with the
+            second as the outer one; -1 where that is impossible. Shape (given, 2).
     """
 
     def __init__(
         self, bodies: tuple[Body, ...], pairs: tuple[tuple[int, int], ...], covers: Sequence[Matrix] | None = None
     ) -> None:
-        """Prepare the pairs.
+        """Select the pairs in which one body may contain the other.
 
         Args:
-            bodies: The solids of a world.
-            pairs: Numbers of those that must not touch.
-            covers: For each body balls that contain it, shape (n, 4), as a first look for :meth:`between`.
+            bodies: The bodies of a world.
+            pairs: Numbers of the bodies that must not touch.
+            covers: For each body balls that contain it, shape (n, 4), in the body's frame. :meth:`between` uses them to
+                reject points quickly.
         """
         arrays = body_arrays(bodies)
         pair_array = np.array(pairs, dtype=np.int64).reshape(-1, 2)
 
-        holding_radius = np.full(len(bodies), -np.inf)  # [m] around the middle of a hollow body that may hold others
+        # [m] Radius of the ball around each hollow body that may contain others, -inf for the rest.
+        holding_radius = np.full(len(bodies), -np.inf)
         for k in distinct(pair_array).tolist():
             if _has_inside(bodies[k]):
                 holding_radius[k] = bodies[k].geometry.aabb_radius
 
         both_ways = np.concatenate([pair_array, pair_array[:, ::-1]])
         sizes = arrays.halves.max(axis=1, initial=0.0)
-        sizes[[isinstance(body.geometry, CloudSolid) for body in bodies]] = np.inf  # its points are asked one by one
+        # Clouds are excluded, as each of their points is checked for itself.
+        sizes[[isinstance(body.geometry, CloudSolid) for body in bodies]] = np.inf
         may_hold = sizes[both_ways[:, 1]] <= holding_radius[both_ways[:, 0]]
 
         outer, inner = both_ways[may_hold].T
@@ -89,15 +94,15 @@ class Containment:
 
     @cached_property
     def _row_of_pair(self) -> dict[tuple[int, int], int]:
-        """For each of the pairs its row in ``pairs``."""
+        """Return the index in ``pairs`` of each pair."""
         return {pair: k for k, pair in enumerate(self.pairs)}
 
     def holds(self, pair: tuple[int, int], frames: NDArray[np.float64]) -> bool:
-        """Whether one of two bodies holds the other.
+        """Check whether one of two bodies contains the other, whose surfaces do not cross.
 
         Args:
             pair: Numbers of the bodies, in either order.
-            frames: Pose of every joint frame in the world, world first, shape (joints + 1, 4, 4).
+            frames: Pose of every joint frame in the world, the world's own first, shape (joints + 1, 4, 4).
         """
         rows = (self._row_of_pair[p] for p in (pair, pair[::-1]) if p in self._row_of_pair)
         return any(self._holds_in_row(row, frames) for row in rows)
@@ -114,11 +119,16 @@ class Containment:
         return self._inside(row, local)
 
     def reached(self, rows: NDArray[np.int64], frames: NDArray[np.float64]) -> Mask:
-        """Which of some pairs may be such: the ends of the inner body are in the bounding box of the outer one.
+        """Check in which pairs all end points of the inner body are in the bounding box of the outer body.
+
+        Only in these may the outer body contain the inner one.
 
         Args:
-            rows: Rows in ``pairs``, shape (k,).
+            rows: Indices in ``pairs``, shape (k,).
             frames: Poses of all joint frames for each of them, shape (k, joints + 1, 4, 4).
+
+        Returns:
+            Mask of shape (k,).
         """
         every_row = np.arange(len(rows))
         inner = frames[every_row, self._inner_joint[rows]]
@@ -132,11 +142,11 @@ class Containment:
         return may_be_inside
 
     def between(self, pairs: Iterable[tuple[int, int]], joints: Sequence[pin.SE3]) -> bool:
-        """Whether in one of some pairs, in either order, a body holds the other.
+        """Check whether in any of the given pairs one body contains the other.
 
         Args:
-            pairs: Numbers of the bodies.
-            joints: ``pinocchio.SE3`` of every joint frame in the world, world first.
+            pairs: Numbers of the bodies, in either order.
+            joints: ``pinocchio.SE3`` of every joint frame in the world, the world's own first.
         """
         both_ways = (pair for i, j in pairs for pair in ((i, j), (j, i)) if pair in self._row_of_pair)
         for pair in both_ways:
@@ -154,25 +164,25 @@ class Containment:
         return False
 
     def _inside(self, row: int, local: Matrix) -> bool:
-        """Whether the end points of a body, shape (6, 3), are inside the mesh that may hold it.
+        """Check whether the end points of a body, shape (6, 3), are inside the mesh that may contain it.
 
-        Surfaces that do not cross have all of a body on one side, but the cells at an open mesh's surface belong to no
-        side; hence all of the points are tried there.
+        For a closed mesh one point decides, as surfaces that do not cross have all of the body on one side. For an open
+        mesh all points are tried, as the cells near its surface count neither as inside nor as outside.
         """
         mesh = self._meshes[self.pairs[row][0]]
         return inside_mesh(*mesh_arrays(mesh), local[0]) if is_closed(mesh) else enclosure(mesh).holds(local)
 
 
 def _has_inside(body: Body) -> bool:
-    """Whether a body is a hollow mesh that stands for a solid: a link's always does, another one if it is closed."""
+    """Check whether a body is a hollow mesh that represents a solid: a link's always does, others only if closed."""
     return is_mesh(body.geometry) and (body.kind == "link" or is_closed(body.geometry))
 
 
 def _end_points(geometries: Sequence[Any], halves: Matrix) -> NDArray[np.float64]:
-    """Six points of each body in its own frame, its extremes along the axes, shape (n, 6, 3).
+    """Return six points of each body in its own frame, its extremes along the axes, shape (n, 6, 3).
 
     Args:
-        geometries: The bodies.
+        geometries: The geometries of n bodies.
         halves: Half extents of their bounding boxes [m], shape (n, 3).
     """
     points: NDArray[np.float64] = END_POINTS * halves[:, None, :]
@@ -184,10 +194,11 @@ def _end_points(geometries: Sequence[Any], halves: Matrix) -> NDArray[np.float64
 
 @once_per_geometry
 def _extremes(geometry: coal.CollisionGeometry) -> Matrix:
-    """The vertices of a mesh or a convex solid that are farthest along the axes, shape (6, 3); 0 of other kinds."""
+    """Return the extreme vertices of a mesh or a convex solid along the axes, shape (6, 3); zeros for other kinds."""
     points = vertices_of(geometry)
     if points is None:
         return np.zeros((6, 3))
-    if is_mesh(geometry):  # not all vertices need be of a triangle
+    # Vertices that belong to no triangle are left out.
+    if is_mesh(geometry):
         points = points[distinct(mesh_arrays(geometry)[1])]
     return frozen(points[np.concatenate([points.argmin(axis=0), points.argmax(axis=0)])])

@@ -1,7 +1,7 @@
-"""Short names of what a proof is about: the robot's geometry and joints, the scene's geometry, pairs and margins.
+"""Compute digests of what a proof is about: the robot's geometry and joints, the scene's geometry, pairs and margins.
 
-Numbers are rounded before they are hashed, so that machines whose sines differ in the last bit agree. A digest says in
-one word why a certificate does not belong to a world; what it proves is computed again all the same.
+Numbers are rounded before they are hashed, so that machines whose sines differ in the last bit agree. A digest is a
+short reason why a certificate does not belong to a world; a verifier computes everything else again in any case.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from rrtik_ompl.geometry.collision.cloud_solid import CloudSolid
 from rrtik_ompl.geometry.collision.shape_table import numbers_of
 from rrtik_ompl.model.robot import Robot
 
-DIGITS = 16  # of a digest, in hexadecimal
-DECIMALS = 12  # [m] or [rad]
+DIGITS = 16  # hexadecimal digits of a digest
+DECIMALS = 12  # decimals to which lengths [m] and angles [rad] are rounded
 
 
 @lru_cache(maxsize=16)
 def robot_digest(robot: Robot) -> str:
-    """Of a robot's joint tree and the geometry of its links."""
+    """Return a digest of a robot's joint tree and the geometry of its links."""
     chain = robot.chain
     numbers = (chain.parent, chain.placement, chain.axis, chain.prismatic, chain.gain, chain.offset)
     names = " ".join([robot.name, *robot.joint_names]).encode()
@@ -33,14 +33,14 @@ def robot_digest(robot: Robot) -> str:
 
 
 def scene_digest(bodies: tuple[Body, ...], pairs: Iterable[tuple[int, int]]) -> str:
-    """Of the bodies that are no links, all margins, and the numbers of those that must not touch and move."""
+    """Return a digest of all bodies but links, of all margins, and of the pairs that move and must not touch."""
     moving = [_numbers(pair) for pair in pairs if any(bodies[k].joint > 0 for k in pair)]
     margins = [_numbers(body.margin) for body in bodies if body.kind == "link" and body.margin > 0.0]
     return _hash([*_bodies(body for body in bodies if body.kind != "link"), *margins, b"pairs", *moving])
 
 
 def world_digest(robot: Robot, bodies: tuple[Body, ...], pairs: tuple[tuple[int, int], ...]) -> str:
-    """Both digests, one behind the other."""
+    """Return the digest of the robot followed by that of the scene."""
     return robot_digest(robot) + scene_digest(bodies, pairs)
 
 
@@ -57,7 +57,7 @@ def _bodies(bodies: Iterable[Body]) -> Iterable[bytes]:
 
 
 def _shape(geometry: coal.CollisionGeometry) -> Iterable[ArrayLike]:
-    """The numbers that give a coal geometry, as arrays."""
+    """Return the numbers that define a coal geometry, as arrays."""
     numbers = numbers_of(geometry)
     if numbers is not None:
         return numbers
@@ -65,7 +65,7 @@ def _shape(geometry: coal.CollisionGeometry) -> Iterable[ArrayLike]:
         return (geometry.cloud.points, geometry.cloud.radius)
     if isinstance(geometry, coal.Halfspace):
         return (np.array(geometry.n), geometry.d)
-    return (np.array(geometry.aabb_center), geometry.aabb_radius)  # a kind of which nothing is ever proven
+    return (np.array(geometry.aabb_center), geometry.aabb_radius)  # Nothing is ever proven about other kinds.
 
 
 def _swept(geometry: coal.CollisionGeometry) -> list[float]:
@@ -74,7 +74,7 @@ def _swept(geometry: coal.CollisionGeometry) -> list[float]:
 
 def _numbers(values: ArrayLike) -> bytes:
     array = np.asarray(values, dtype=np.float64)
-    return f"{array.shape}".encode() + (np.round(array, DECIMALS) + 0.0).tobytes()  # + 0.0 makes one zero of both
+    return f"{array.shape}".encode() + (np.round(array, DECIMALS) + 0.0).tobytes()  # Adding 0.0 turns -0.0 into 0.0.
 
 
 def _hash(parts: Iterable[bytes]) -> str:

@@ -1,8 +1,8 @@
-"""Distances of placed geometries, and the pairs of bodies that touch or come too near.
+"""Measure distances between placed geometries, and find the pairs of bodies that touch or come too near.
 
-Coal measures them, but for clouds of points, of which it has none, and for two capsules: it takes their axes for
-parallel where the product of their squared lengths and of the squared sine of their angle is below 2e-14 m^4, so that
-two of a millimetre may overlap by a tenth of their length unseen.
+Coal measures most of them. Our own code measures clouds of points, which coal does not have, and pairs of capsules:
+coal takes their axes for parallel if the product of their squared lengths and of the squared sine of their angle is
+below 2e-14 m^4, so that two capsules of a millimetre may overlap by a tenth of their length unnoticed.
 """
 
 from __future__ import annotations
@@ -28,13 +28,14 @@ Segment: TypeAlias = tuple[Vector, Vector]
 def measured(
     bodies: Sequence[Body], pairs: Sequence[tuple[int, int]], frames: NDArray[np.float64], *, near_only: bool
 ) -> Iterator[Contact]:
-    """The pairs of bodies and their distances [m]; with ``near_only`` only those that touch or come too near.
+    """Yield the contact of each pair of bodies: names, distance, nearest points and required distance.
 
     Args:
-        bodies: The solids.
-        pairs: Numbers of those that must not touch.
-        frames: Pose of every joint frame in the world, world first, shape (joints + 1, 4, 4).
-        near_only: Leave out what keeps its margin.
+        bodies: The bodies of a world.
+        pairs: Numbers of the bodies that must not touch.
+        frames: Pose of every joint frame in the world, the world's own first, shape (joints + 1, 4, 4).
+        near_only: Whether to leave out pairs that keep their required distance. If so, overlapping meshes are measured
+            by their penetration depth too.
     """
     poses = [pin.SE3(frames[b.joint]) * b.placement for b in bodies]
     transforms = [coal.Transform3s(p.rotation, p.translation) for p in poses]
@@ -51,9 +52,9 @@ def measured(
 
 
 def gap_beyond(ends: Ends, margin: float) -> float | None:
-    """A lower bound of the distance of two placed geometries less a margin [m]; None if it is not kept.
+    """Return a lower bound of the distance of two placed geometries minus a margin [m]; None if the margin is not kept.
 
-    Computed with a fresh request and result.
+    Each call uses a new request and result, as reused ones may miss overlaps.
     """
     ends, margin = solids_of(ends, margin)
     if is_ours(ends):
@@ -66,9 +67,15 @@ def gap_beyond(ends: Ends, margin: float) -> float | None:
 
 
 def _distance(ends: Ends, *, with_depth: bool) -> tuple[float, Vector, Vector]:
-    """Signed distance of two placed geometries [m], and the points in the world that it is between, shape (3,) each.
+    """Return the signed distance of two placed geometries and their nearest points.
 
-    ``with_depth`` asks for the depth of two meshes that overlap, which takes longer.
+    Args:
+        ends: Two geometries with their poses.
+        with_depth: Whether to compute the penetration depth of two overlapping meshes, which takes longer.
+
+    Returns:
+        The distance [m], negative for a penetration depth, and the nearest (or deepest) point on each geometry in the
+        world [m], shape (3,) each.
     """
     if is_ours(ends):
         return own_nearest(ends)
@@ -77,7 +84,7 @@ def _distance(ends: Ends, *, with_depth: bool) -> tuple[float, Vector, Vector]:
     result = coal.DistanceResult()
     distance = float(coal.distance(*ends, coal.DistanceRequest(), result))
 
-    # Between two meshes that overlap coal knows no distance, but a depth of collision.
+    # Coal has no signed distance for two overlapping meshes, but collide() gives their penetration depth.
     meshes_overlap = distance <= 0.0 and is_mesh(ends[0]) and is_mesh(ends[2])
     if with_depth and meshes_overlap and coal.collide(*ends, request(0.0), collision):
         result = collision.getContact(0)
@@ -86,18 +93,21 @@ def _distance(ends: Ends, *, with_depth: bool) -> tuple[float, Vector, Vector]:
 
 
 def inside(first: str, second: str) -> Contact:
-    """A body wholly inside another: there are no witness points and no meaningful depth."""
+    """Return the contact of a body wholly inside another: its nearest points are NaN, and its distance is 0."""
     unknown_point = np.full(3, np.nan)
     return Contact(first, second, 0.0, unknown_point, unknown_point)
 
 
 def is_ours(ends: Ends) -> bool:
-    """Whether the distance of two geometries is measured here, and not by coal."""
+    """Check whether the distance of two geometries is measured by our own code instead of coal."""
     return has_cloud(ends) or (_is_capsule(ends[0]) and _is_capsule(ends[2]))
 
 
 def own_gap(ends: Ends, margin: float) -> float | None:
-    """A lower bound of the distance of two geometries less a margin [m]; None if it is not kept."""
+    """Return a lower bound of the distance of two geometries minus a margin [m]; None if the margin is not kept.
+
+    One of the geometries is a cloud, or both are capsules.
+    """
     if has_cloud(ends):
         return cloud_gap(ends, margin)
     gap = own_nearest(ends).distance - margin
@@ -105,7 +115,7 @@ def own_gap(ends: Ends, margin: float) -> float | None:
 
 
 def own_nearest(ends: Ends) -> Nearest:
-    """The signed distance of two geometries and the points that it is between."""
+    """Return the signed distance and the nearest points of two geometries: one of them a cloud, or two capsules."""
     if has_cloud(ends):
         return nearest_of_cloud(ends)
 
@@ -124,11 +134,11 @@ def own_nearest(ends: Ends) -> Nearest:
 
 
 def nearest_points(first: Segment, second: Segment) -> tuple[Vector, Vector]:
-    """The points of two segments that are nearest to each other, shape (3,) each.
+    """Return the points of two segments that are nearest to each other, shape (3,) each.
 
-    They are ends of one of them, or the feet of the common perpendicular. Each candidate lies on its segment, so that
-    none is nearer than the segments are; the perpendicular is found by cross products, which hold for all lengths and
-    nearly parallel segments too.
+    They are an end of one segment and the nearest point of the other, or the feet of the common perpendicular. Each
+    candidate lies on its segment, so that no candidate pair is nearer than the segments are. The perpendicular is
+    computed by cross products, which are accurate for all lengths and for nearly parallel segments too.
     """
     candidates = [(end, _foot(end, second)) for end in first]
     candidates += [(_foot(end, first), end) for end in second]
@@ -147,7 +157,7 @@ def nearest_points(first: Segment, second: Segment) -> tuple[Vector, Vector]:
 
 
 def _foot(point: Vector, segment: Segment) -> Vector:
-    """The point of a segment that is nearest to a point."""
+    """Return the point of a segment that is nearest to a given point."""
     direction = segment[1] - segment[0]
     squared_length = float(direction @ direction)
     if squared_length == 0.0:
@@ -157,7 +167,7 @@ def _foot(point: Vector, segment: Segment) -> Vector:
 
 
 def _is_capsule(geometry: coal.CollisionGeometry) -> bool:
-    """Whether a geometry is all that is no farther than a radius from a segment."""
+    """Check whether a geometry is a capsule: all points within a radius of a segment."""
     core = core_of(geometry)
     return core is not None and core.rounded and len(core.corners) == 2
 
@@ -167,14 +177,14 @@ def _core(capsule: coal.CollisionGeometry) -> Core:
 
 
 def _axis(capsule: coal.CollisionGeometry, pose: coal.Transform3s) -> Segment:
-    """Ends of a capsule's axis in the world."""
+    """Return both ends of a capsule's axis in the world, shape (3,) each."""
     rotation = np.array(pose.getRotation())
     first, second = _core(capsule).corners @ rotation.T + np.array(pose.getTranslation())
     return first, second
 
 
 def _across(first: Segment, second: Segment) -> Vector:
-    """A unit vector across two segments that meet."""
+    """Return a unit vector perpendicular to two segments that intersect; any one if they are parallel."""
     normal = np.cross(first[1] - first[0], second[1] - second[0])
     length = float(np.linalg.norm(normal))
     return normal / length if length > 0.0 else np.array([1.0, 0.0, 0.0])

@@ -1,7 +1,7 @@
-"""What an open mesh encloses. Many links' meshes have holes or torn edges, so that they have no inside to speak of.
+"""Find the space that an open mesh encloses: many meshes of links have holes or torn edges, and so no defined inside.
 
-A grid of cells decides: what cannot be reached from outside without coming near the surface is enclosed. Holes smaller
-than about a cell are closed by that; a surface with a wide opening encloses nothing.
+Space is divided into a grid of cells: those that cannot be reached from outside without coming near the surface are
+enclosed. This closes holes that are smaller than about a cell; a surface with a wide opening encloses nothing.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     import coal
 
 
-CELLS = 32  # along the longest side of the mesh
-HALVINGS = 24  # of triangles, at most: until they are smaller than a cell
+CELLS = 32  # number of cells along the longest side of the mesh
+HALVINGS = 24  # most times that triangles are halved to make them smaller than a cell
 
 
 class Enclosure:
@@ -28,7 +28,7 @@ class Enclosure:
     Attributes:
         origin: Lowest corner of the grid [m], shape (3,).
         size: Edge of a cell [m].
-        inside: Flags of the enclosed cells, three-dimensional.
+        inside: Mask of the enclosed cells, shape (nx, ny, nz).
     """
 
     def __init__(self, vertices: Matrix, triangles: NDArray[np.int64]) -> None:
@@ -46,15 +46,19 @@ class Enclosure:
         self.inside = ~near_surface & ~_outside(near_surface)
 
     def boxes(self) -> tuple[Matrix, Matrix]:
-        """Boxes that make up the enclosed cells: lowest and highest corners [m], shape (k, 3) each."""
+        """Return boxes that make up the enclosed cells: their lowest and highest corners [m], shape (k, 3) each.
+
+        Each box is a run of cells along z.
+        """
         runs = np.diff(self.inside.astype(np.int8), axis=2, prepend=0, append=0)
         begin = np.argwhere(runs == 1)
-        end = np.argwhere(runs == -1)  # along z, in the same order
+        # Runs along z do not overlap, so their ends come in the same order as their beginnings.
+        end = np.argwhere(runs == -1)
         high = np.column_stack([end[:, :2] + 1, end[:, 2]])
         return self.origin + self.size * begin, self.origin + self.size * high
 
     def holds(self, points: Matrix) -> bool:
-        """Whether one of some points, shape (k, 3), is enclosed."""
+        """Check whether any of the points, shape (k, 3), is in an enclosed cell."""
         cells = np.floor((points - self.origin) / self.size).astype(np.int64)
         in_grid = ((cells >= 0) & (cells < self.inside.shape)).all(axis=1)
         return bool(self.inside[tuple(cells[in_grid].T)].any())
@@ -62,19 +66,21 @@ class Enclosure:
 
 @once_per_geometry
 def enclosure(geometry: coal.CollisionGeometry) -> Enclosure:
-    """What a coal mesh encloses."""
+    """Return the enclosed cells of a coal mesh."""
     return Enclosure(*mesh_arrays(geometry))
 
 
 def _cut_small(triangles: NDArray[np.float64]) -> list[NDArray[np.float64]]:
-    """Triangles, shape (k, 3, 3), cut across their longest edges until none is longer than a cell along any axis."""
+    """Halve triangles, shape (k, 3, 3), across their longest edges until each fits into a cell along every axis."""
     small_triangles = []
     for _ in range(HALVINGS):
         is_large = (np.ptp(triangles, axis=1) > 1.0).any(axis=1)
         small_triangles.append(triangles[~is_large])
         triangles = triangles[is_large]
 
-        edges = np.linalg.norm(np.roll(triangles, -1, axis=1) - triangles, axis=2)  # from each corner to the next
+        edges = np.linalg.norm(
+            np.roll(triangles, -1, axis=1) - triangles, axis=2
+        )  # lengths, from each corner to the next
         longest_edge = edges.argmax(axis=1)
         rows = np.arange(len(triangles))
         a, b, c = (triangles[rows, (longest_edge + k) % 3] for k in range(3))
@@ -84,7 +90,7 @@ def _cut_small(triangles: NDArray[np.float64]) -> list[NDArray[np.float64]]:
 
 
 def _flag_cells(near_surface: NDArray[np.bool_], triangles: NDArray[np.float64]) -> None:
-    """Flag all cells that the boxes around triangles reach into."""
+    """Flag all cells that the bounding boxes of triangles reach into, in place."""
     low = np.floor(triangles.min(axis=1)).astype(np.int64)
     high = np.floor(triangles.max(axis=1)).astype(np.int64)
     for steps in np.ndindex(*(np.max(high - low, axis=0, initial=0) + 1)):
@@ -93,9 +99,9 @@ def _flag_cells(near_surface: NDArray[np.bool_], triangles: NDArray[np.float64])
 
 
 def _outside(near_surface: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Cells that can be reached from the border through faces of cells that are not near the surface."""
-    from scipy.ndimage import label  # loads slower than most plans take, and few meshes are open
+    """Return a mask of the cells that can be reached from the border through cells that are not near the surface."""
+    from scipy.ndimage import label  # Loading it takes longer than most plans, and few meshes are open.
 
     region, _ = label(~near_surface)
-    outside: NDArray[np.bool_] = region == region[0, 0, 0]  # the outermost cells are free, so this is the outside
+    outside: NDArray[np.bool_] = region == region[0, 0, 0]  # The outermost cells are never near the surface.
     return outside

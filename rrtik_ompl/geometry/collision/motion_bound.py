@@ -1,4 +1,4 @@
-"""How far any point of the arm can move when joints move [16]: bounds by which motions are divided into steps."""
+"""Bound how far any point of the arm can move when joints move [16]; the bounds give the steps of motion checks."""
 
 from __future__ import annotations
 
@@ -13,26 +13,29 @@ from rrtik_ompl.model.robot import Robot
 
 
 def displacement_weights(robot: Robot, bodies: Iterable[Body]) -> Vector:
-    """Weights w, shape (dof,), such that no point of the arm moves farther than ``w @ |b - a|`` [m] from a to b.
+    """Return weights w such that no point of the arm moves farther than ``w @ |b - a|`` [m] from configuration a to b.
 
-    The bound adds what each joint contributes, hence holds for joint motion along a straight line in configuration
-    space. The tip counts as a point of the arm.
+    The bound is the sum of the joints' contributions, so it holds for straight-line motion in configuration space. The
+    tip counts as a point of the arm.
+
+    Returns:
+        The weights [m per rad, or 1 for prismatic joints], shape (dof,).
     """
     return _displacement_weights(robot, tuple(bodies))
 
 
 @lru_cache(maxsize=16)
 def _displacement_weights(robot: Robot, bodies: tuple[Body, ...]) -> Vector:
-    """See above; kept, for the links of a robot are those of all its worlds."""
+    """Return the weights of `displacement_weights`; cached, as all worlds of a robot share the bodies of its links."""
     tip = robot.model.frames[robot.model.getFrameId(robot.tip)]
     points = [*_balls(bodies), (tip.parentJoint, tip.placement.translation, 0.0)]
     return frozen(np.abs(robot.chain.gain).T @ joint_weights(robot, points))
 
 
 def approach_weights(robot: Robot, bodies: Sequence[Body], pairs: Sequence[tuple[int, int]]) -> Matrix:
-    """Weights w, shape (pairs, dof): two bodies come nearer by ``w @ |b - a|`` [m] from a to b at most.
+    """Return weights w, shape (pairs, dof): two bodies come nearer by at most ``w @ |b - a|`` [m] between a and b.
 
-    A joint that carries both of them turns them as one.
+    A joint that carries both bodies moves them as one, so it has weight 0.
     """
     weights_of_body = np.zeros((len(bodies), len(robot.chain.parent)))
     for k, body in enumerate(bodies):
@@ -45,20 +48,26 @@ def approach_weights(robot: Robot, bodies: Sequence[Body], pairs: Sequence[tuple
 
 @lru_cache(maxsize=512)
 def _body_weights(robot: Robot, body: Body) -> Vector:
-    """See :func:`joint_weights`; cached, for the links of a robot are those of all its worlds."""
+    """Return the `joint_weights` of one body; cached, as all worlds of a robot share the bodies of its links."""
     return frozen(joint_weights(robot, _balls([body])))
 
 
 def _balls(bodies: Iterable[Body]) -> list[tuple[int, Vector, float]]:
-    """Joint, centre in its frame and radius of a ball around each body."""
+    """Return a ball around each body: the number of its joint, the centre in the joint's frame, and the radius [m]."""
     return [(b.joint, b.placement.act(b.geometry.aabb_center), b.geometry.aabb_radius) for b in bodies]
 
 
 def joint_weights(robot: Robot, balls: list[tuple[int, Vector, float]]) -> Vector:
-    """For each joint how far a point of the balls moves at most per unit of it, shape (joints,).
+    """Return for each joint how far a point of the balls moves at most per unit of the joint, shape (joints,).
 
-    For a revolute joint that is the largest distance that any point beyond it can have from its axis (over all
-    postures), for a prismatic joint 1; 0 for one that carries none of the balls.
+    For a revolute joint this is the largest distance that a point beyond the joint can have from its axis in any
+    configuration; for a prismatic joint it is 1, and for a joint that carries none of the balls 0. The distances are
+    propagated from the tip to the base: each is bounded by the length of the child's offset plus the reach beyond the
+    child.
+
+    Args:
+        robot: The robot.
+        balls: Number of the joint, centre in the joint's frame [m] and radius [m] of each ball.
     """
     chain = robot.chain
     count = len(robot.chain.parent)
@@ -66,7 +75,8 @@ def joint_weights(robot: Robot, balls: list[tuple[int, Vector, float]]) -> Vecto
     around_axis = np.zeros(count)
     carries = np.zeros(count, dtype=bool)
 
-    for k in range(count - 1, -1, -1):  # children come after their parents, so they are done first
+    # Children have higher numbers than their parents, so this order visits them first.
+    for k in range(count - 1, -1, -1):
         axis = chain.axis[k]
         for joint, centre, radius in balls:
             if joint == k + 1:
@@ -89,7 +99,8 @@ def _from_axis(point: Vector, axis: Vector) -> float:
 
 
 def _stroke(robot: Robot, row: int) -> float:
-    """Largest distance of a sliding joint from its zero [m]."""
-    is_driven = robot.chain.gain[row] != 0.0  # joints with limits all of them, or the robot would have been refused
+    """Return the largest distance of a prismatic joint from its zero position [m]."""
+    # All of these joints have limits; a robot for which that does not hold is refused when it is made.
+    is_driven = robot.chain.gain[row] != 0.0
     largest_values = np.maximum(np.abs(robot.lower[is_driven]), np.abs(robot.upper[is_driven]))
     return float(np.abs(robot.chain.gain[row, is_driven]) @ largest_values + abs(robot.chain.offset[row]))

@@ -1,4 +1,4 @@
-"""How far an arm in collision may move in any way and is surely still in collision."""
+"""Bound how far an arm in collision may move in any way and surely stay in collision."""
 
 from __future__ import annotations
 
@@ -16,15 +16,16 @@ from rrtik_ompl.model.robot import Robot
 
 
 class OverlapDepth:
-    """Depths of overlap between the solids of a world.
+    """Penetration depths between the bodies of a world.
 
-    The depth of two convex solids is the shortest translation that parts them, by their margin if they have one. A
-    motion in which no point moves that far does not part them either: along no direction do their extents then cease to
-    overlap. Pairs with a mesh or a cloud, for which coal knows no depth, are left out.
+    The penetration depth of two convex solids is the length of the shortest translation that separates them (by their
+    margin, if they have one). A motion in which no point moves that far does not separate them either, as their extents
+    still overlap along every direction. Pairs with a mesh or a cloud, for which coal has no penetration depth, are left
+    out.
 
     Args:
         robot: The arm.
-        bodies: Solids of the robot and the scene.
+        bodies: Bodies of the robot and the scene.
         pairs: Numbers of the bodies that must not touch.
     """
 
@@ -35,13 +36,19 @@ class OverlapDepth:
         self._data = working_memory(robot.model)
 
     def travel(self, q: Vector) -> float:
-        """Whatever moves each point of the arm by less than this [m] leaves a collision at q, shape (n,), standing.
+        """Return a distance [m]: a motion that moves each point of the arm by less keeps a configuration in collision.
 
-        0 if there is no collision, or none whose depth is known.
+        Args:
+            q: The configuration, shape (dof,).
+
+        Returns:
+            The distance [m]; 0 if there is no collision, or none whose penetration depth is known.
         """
         pin.forwardKinematics(self._robot.model, self._data, self._robot.pinocchio_configuration(q[None])[0])
         return max((self._pair_travel(*pair) for pair in self._pairs), default=0.0)
 
+    # Return the distance that each point of two bodies may move while they surely stay in collision [m].
+    # If both bodies move, each may cover half of the penetration depth.
     def _pair_travel(self, i: int, j: int) -> float:
         first = self._bodies[i]
         second = self._bodies[j]

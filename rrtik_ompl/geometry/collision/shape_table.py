@@ -1,7 +1,7 @@
-"""Shapes as coal solids, and back: one table with a row for each kind of shape.
+"""Convert shapes to coal geometries and back: one table with a row for each kind of shape.
 
-All that the library does by the kind of a coal geometry starts here. Kinds that are in no row (cones, ellipsoids,
-planes, which URDF files may bring) are checked by coal alone.
+Everything in the library that depends on the kind of a coal geometry starts here. Kinds without a row (cones,
+ellipsoids and planes, which URDF files may contain) are checked by coal alone.
 """
 
 from __future__ import annotations
@@ -54,13 +54,14 @@ BOX_CORNERS = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Core:
-    """A solid as all that is no farther than a radius from a core: a point, a segment of the z axis, a disc, a box.
+    """A solid described as all points within a radius of its core: a point, a segment of the z axis, a disc or a box.
 
     Attributes:
-        corners: Of the core, centred on the origin: one, two on the z axis (the upper one first), or the eight of a
-            box, the one of the largest coordinates last; shape (n, 3) [m].
-        disc: Radius of the disc across z around each corner [m], None if there is no disc.
-        radius: Of the ball around every point of the core [m].
+        corners: Corners of the core, centred on the origin, shape (n, 3) [m]: one for a point, two on the z axis
+            (the upper one first) for a segment or a cylinder, eight for a box, the one with the largest coordinates
+            last.
+        disc: Radius of the disc perpendicular to z around each corner [m]; None if there is no disc.
+        radius: Radius of the ball around every point of the core [m].
     """
 
     corners: Matrix
@@ -69,29 +70,29 @@ class Core:
 
     @property
     def rounded(self) -> bool:
-        """Whether it is a ball or a capsule, which stay one when they grow."""
+        """Check whether the solid is a ball or a capsule, which stay a ball or a capsule when they grow."""
         return self.disc is None and len(self.corners) <= 2
 
     @property
     def half_length(self) -> float:
-        """Half the length of a point, a segment or a cylinder [m]."""
+        """Return half the length along z of a point, a segment or a cylinder [m]."""
         return float(self.corners[0, 2])
 
     @property
     def half_sides(self) -> Vector | None:
-        """Half sides of a box, shape (3,) [m]; None if it is no box."""
+        """Return the half sides of a box, shape (3,) [m]; None for other cores."""
         return self.corners[-1] if len(self.corners) == len(BOX_CORNERS) else None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CoalSolid:
-    """What coal has for one kind of shape.
+    """The coal geometry that represents one kind of shape.
 
     Attributes:
-        geometry: Its class.
-        sizes: Sizes of such a geometry, in coal's own measures.
-        shape: The shape from these sizes.
-        core: Its core from these sizes; None if it has none of the simple ones.
+        geometry: The class of the coal geometry.
+        sizes: Function that returns the sizes of such a geometry, in coal's own measures.
+        shape: Function that makes the shape from these sizes.
+        core: Function that makes the `Core` from these sizes; None if the solid has no simple core.
     """
 
     geometry: type
@@ -102,13 +103,14 @@ class CoalSolid:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ShapeRow:
-    """How coal checks one kind of shape.
+    """One row of the table: how coal checks one kind of shape.
 
     Attributes:
-        shape: Its class.
-        solids: Coal geometries whose union is the shape.
-        coal: What coal has for it; None if it becomes convex solids or a mesh.
-        places: Where in the shape's frame each of these geometries is (``pinocchio.SE3``); all at its origin if None.
+        shape: The class of the shape.
+        solids: Function that returns the coal geometries whose union is the shape.
+        coal: The coal geometry of this kind; None if the shape becomes convex solids or a mesh.
+        places: Function that returns the poses of the geometries in the shape's frame (``pinocchio.SE3``); None if all
+            are at its origin.
     """
 
     shape: type[Shape]
@@ -118,7 +120,7 @@ class ShapeRow:
 
 
 def box_corners(half: Vector) -> Matrix:
-    """Corners of a box about the origin with these half sides, shape (8, 3)."""
+    """Return the corners of a box about the origin, shape (8, 3), from its half sides, shape (3,)."""
     return frozen(BOX_CORNERS * half)
 
 
@@ -142,7 +144,7 @@ def _mesh(mesh: Mesh) -> list[Any]:
 
 
 def _solids_of_pile(pile: BoxPile) -> list[Any]:
-    """A box of coal for each box; those of one size share it."""
+    """Return one coal box for each box of the pile; boxes of equal size share one object."""
     sizes = pile.boxes[1].tolist()
     box_of_size = {tuple(size): coal.Box(*size) for size in sizes}
     return [box_of_size[tuple(size)] for size in sizes]
@@ -206,7 +208,7 @@ _BY_GEOMETRY: dict[type, CoalSolid] = {}
 
 
 def add_row(row: ShapeRow) -> None:
-    """Make a kind of shape known, beside those of ``ROWS``."""
+    """Add a kind of shape to the table, in addition to those of ``ROWS``."""
     _BY_SHAPE[row.shape] = row
     if row.coal is not None:
         _BY_GEOMETRY[row.coal.geometry] = row.coal
@@ -225,7 +227,7 @@ class Piece:
 
 
 def pieces(shape: Shape) -> tuple[Piece, ...]:
-    """Coal geometries whose union is the shape; shapes of the same measures have the same ones.
+    """Return the coal geometries whose union is the shape; shapes with equal measures share them.
 
     Raises:
         InputError: If a part of it is too flat, too small or too large to check.
@@ -240,7 +242,7 @@ def pieces(shape: Shape) -> tuple[Piece, ...]:
 
 @dataclass(frozen=True, slots=True)
 class _Measured:
-    """A shape as a key: equal to others of its kind and measures."""
+    """A cache key for a shape: equal for shapes of the same kind and measures."""
 
     kind: type[Shape]
     numbers: tuple[bytes, ...]
@@ -260,15 +262,15 @@ def _pieces(shape: Shape) -> tuple[Piece, ...]:
 
 
 def sizes_of(geometry: coal.CollisionGeometry) -> Vector | None:
-    """The numbers that give a coal geometry; None if its kind is in no row."""
+    """Return the sizes that define a coal geometry, in the order of its row; None if its kind has no row."""
     row = _BY_GEOMETRY.get(type(geometry))
     return None if row is None else row.sizes(geometry)
 
 
 def numbers_of(geometry: coal.CollisionGeometry) -> tuple[NDArray[Any], ...] | None:
-    """All numbers that give a coal geometry: its sizes, the arrays of a mesh, the vertices of a convex solid.
+    """Return all numbers that define a coal geometry: its sizes, a mesh's arrays, or a convex solid's vertices.
 
-    None if its kind has none of them: a half-space, a cloud, a kind that is in no row.
+    The answer is None for the other kinds: half-spaces, clouds, and kinds without a row.
     """
     sizes = sizes_of(geometry)
     if sizes is not None:
@@ -280,7 +282,7 @@ def numbers_of(geometry: coal.CollisionGeometry) -> tuple[NDArray[Any], ...] | N
 
 
 def resized(geometry: coal.CollisionGeometry, factor: float) -> coal.CollisionGeometry | None:
-    """A coal geometry whose sizes are a factor larger, about its own frame; None if its kind is in no row."""
+    """Return a coal geometry scaled by a factor about the origin of its frame; None if its kind has no row."""
     row = _BY_GEOMETRY.get(type(geometry))
     if row is None:
         return None
@@ -289,17 +291,17 @@ def resized(geometry: coal.CollisionGeometry, factor: float) -> coal.CollisionGe
 
 
 def has_core(geometry: coal.CollisionGeometry) -> bool:
-    """Whether a coal geometry has one of the simple cores."""
+    """Check whether a coal geometry has one of the simple cores."""
     row = _BY_GEOMETRY.get(type(geometry))
     return row is not None and row.core is not None
 
 
 def core_of(geometry: coal.CollisionGeometry) -> Core | None:
-    """The core of a coal geometry; None if it has none of the simple ones."""
+    """Return the core of a coal geometry; None if it has none of the simple ones."""
     return _core(geometry) if has_core(geometry) else None
 
 
-@once_per_geometry  # a solid that moves keeps its own
+@once_per_geometry
 def _core(geometry: coal.CollisionGeometry) -> Core:
     row = _BY_GEOMETRY[type(geometry)]
     assert row.core is not None
@@ -307,7 +309,7 @@ def _core(geometry: coal.CollisionGeometry) -> Core:
 
 
 def shape_of(geometry: coal.CollisionGeometry) -> Shape | None:
-    """The shape of a coal geometry, for whoever draws; None if there is no such shape (a plane, a cone).
+    """Return the shape of a coal geometry, for drawing; None if there is no such shape (as for a plane or a cone).
 
     Raises:
         InputError: If it is a mesh without area.
@@ -325,11 +327,11 @@ def shape_of(geometry: coal.CollisionGeometry) -> Shape | None:
 
 
 def farthest(shape: Shape, pose: pin.SE3) -> float:
-    """An upper bound of the distance of a shape's points from the origin [m]; of a half-space that is infinite.
+    """Return an upper bound on the distance of a shape's points from the origin [m]; infinite for a half-space.
 
     Args:
-        shape: What it is.
-        pose: Where it is, ``pinocchio.SE3``.
+        shape: The shape.
+        pose: Its pose, a ``pinocchio.SE3``.
     """
     if not shape.bounded:
         return float("inf")

@@ -1,4 +1,4 @@
-"""Coal geometries: convex hulls and their planes, meshes, what is inside them, and those of a robot."""
+"""Make and examine coal geometries: convex hulls and their planes, meshes and their interiors, a robot's solids."""
 
 from __future__ import annotations
 
@@ -19,26 +19,29 @@ if TYPE_CHECKING:
     pass
 
 Found = TypeVar("Found")
-Ends: TypeAlias = tuple[Any, Any, Any, Any]  # first geometry, its coal.Transform3s, second geometry, its
+# Two placed geometries: the first geometry, its coal.Transform3s, the second geometry, its coal.Transform3s.
+Ends: TypeAlias = tuple[Any, Any, Any, Any]
 
-# A mesh no triangle of which lies deeper [m] below its convex hull is taken as convex: its hull stands for it. The hull
-# contains the mesh, so nothing that touches the mesh is missed. Volumes are compared first, as that is quick.
+# contains the mesh, so no collision with the mesh is missed. Volumes are compared first, as that is quick.
+# A mesh counts as convex, and is replaced by its convex hull, if no triangle lies deeper below the hull than this [m].
+# The hull contains the mesh, so no collision is missed. Volumes are compared first, as that is quick.
+# contains the mesh, so no collision with the mesh is missed. Volumes are compared first, as that is quick.
 DEEPEST_DENT = 1e-6
 CONVEX_VOLUME_RATIO = 0.999
-COMPARED_AT_ONCE = 20_000  # triangles times faces of the hull
-MOST_COMPARED = 400_000_000  # the same; a mesh of more stays a mesh
+COMPARED_AT_ONCE = 20_000  # pairs of a triangle and a face of the hull that are compared in one step
+MOST_COMPARED = 400_000_000  # A mesh with more pairs of a triangle and a face of the hull stays a mesh.
 
-SMALLEST_AREA = 1e-18  # [m^2] of a triangle that has a normal, twice
+SMALLEST_AREA = 1e-18  # [m^2] twice the area below which a triangle has no usable normal
 
-FLATTEST = 1e-7  # thickness of a hull over its extent; what is flatter is refused
-SMALLEST = 1e-6  # [m] extent of a hull
-MOST_PLANES = 64  # of the outer polyhedron of a convex solid: fewer planes make it larger, never smaller
+FLATTEST = 1e-7  # least ratio of a hull's thickness to its extent; flatter hulls are refused
+SMALLEST = 1e-6  # [m] least extent of a hull
+MOST_PLANES = 64  # most planes of an outer polyhedron; with fewer planes it only becomes larger
 
 
 def once_per_geometry(find: Callable[[Any], Found]) -> Callable[[Any], Found]:
-    """A function of a coal geometry that is called once for each object, and forgets its answer when that is gone.
+    """Return a function of a coal geometry that computes its answer once per object and forgets it with the object.
 
-    What it returns must not hold the geometry, which would otherwise never go.
+    The answer must not refer to the geometry, as otherwise the geometry would never be freed.
     """
     answers: dict[int, tuple[weakref.ref[Any], Found]] = {}
 
@@ -56,7 +59,7 @@ def once_per_geometry(find: Callable[[Any], Found]) -> Callable[[Any], Found]:
 
 
 def bvh(vertices: Matrix, triangles: NDArray[np.int64]) -> coal.BVHModelBase:
-    """Coal mesh (bounding-volume hierarchy) from vertices, shape (n, 3), and triangles, shape (m, 3)."""
+    """Return a coal mesh (bounding volume hierarchy) from vertices, shape (n, 3), and triangles, shape (m, 3)."""
     model = coal.BVHModelOBBRSS()
     model.beginModel(len(triangles), len(vertices))
     model.addVertices(np.ascontiguousarray(vertices))
@@ -66,10 +69,11 @@ def bvh(vertices: Matrix, triangles: NDArray[np.int64]) -> coal.BVHModelBase:
 
 
 def hull(points: Matrix) -> coal.Convex:
-    """Convex hull of points, shape (n, 3), as a coal solid.
+    """Return the convex hull of points, shape (n, 3), as a coal solid.
 
     Raises:
-        InputError: If the points lie (nearly) in a plane or are too far apart; qhull would end the process.
+        InputError: If the points lie (nearly) in a plane or are too close together or too far apart; qhull would end
+            the process.
     """
     extent = _extent(points)
     thickness = _thickness(points)
@@ -89,12 +93,15 @@ def _extent(points: Matrix) -> float:
 
 
 def _thickness(points: Matrix) -> float:
-    """Spread of points, shape (n, 3), along the direction in which they spread least [m]."""
+    """Return a measure of the points' spread along the direction in which they spread least [m].
+
+    It is the smallest singular value of the centred points, shape (n, 3).
+    """
     return float(np.linalg.svd(points - points.mean(axis=0), compute_uv=False)[-1])
 
 
 def convexified(geometry: coal.CollisionGeometry) -> coal.CollisionGeometry:
-    """The convex hull of a mesh that is convex (see ``DEEPEST_DENT``); any other geometry as it is."""
+    """Return the convex hull of a mesh that is convex (see ``DEEPEST_DENT``), and any other geometry unchanged."""
     if not fills_its_hull(geometry):
         return geometry
 
@@ -107,14 +114,14 @@ def convexified(geometry: coal.CollisionGeometry) -> coal.CollisionGeometry:
 
 
 def fills_its_hull(geometry: coal.CollisionGeometry) -> bool:
-    """Whether a coal geometry is a mesh whose volume is nearly that of its convex hull; False for what is no mesh."""
+    """Check whether a coal geometry is a mesh whose volume is nearly that of its convex hull."""
     return is_mesh(geometry) and _fills_its_hull(geometry)
 
 
 @once_per_geometry
 def _fills_its_hull(geometry: coal.CollisionGeometry) -> bool:
     hull_solid = around(geometry)
-    if is_mesh(hull_solid):  # which is flat
+    if is_mesh(hull_solid):  # A flat mesh has no hull.
         return False
 
     vertices, triangles = mesh_arrays(geometry)
@@ -124,10 +131,15 @@ def _fills_its_hull(geometry: coal.CollisionGeometry) -> bool:
 
 
 def _depth(vertices: Matrix, triangles: NDArray[np.int64], solid: coal.Convex) -> float:
-    """At most how far triangles lie below the surface of their convex hull [m].
+    """Return an upper bound on how far triangles lie below the surface of their convex hull [m].
 
-    All of a triangle is as near to a plane beside the hull as its farthest corner; the plane is that of the face which
-    is nearest to the triangle's middle.
+    Each triangle is compared with one face of the hull, the one nearest to the triangle's middle: no point of the
+    triangle is farther from that face's plane than the farthest of its corners.
+
+    Args:
+        vertices: Vertices of the mesh, shape (n, 3).
+        triangles: Indices of vertices, shape (m, 3).
+        solid: The convex hull.
     """
     normals, _ = face_normals(*convex_arrays(solid))
     corners = vertices[triangles]
@@ -141,12 +153,12 @@ def _depth(vertices: Matrix, triangles: NDArray[np.int64], solid: coal.Convex) -
 
 
 def is_mesh(geometry: coal.CollisionGeometry) -> bool:
-    """Whether a coal geometry is a hollow triangle mesh (everything else is solid)."""
+    """Check whether a coal geometry is a hollow triangle mesh (all other kinds are solid)."""
     return isinstance(geometry, coal.BVHModelBase)
 
 
 def vertices_of(geometry: coal.CollisionGeometry) -> Matrix | None:
-    """The vertices of a mesh or of a convex solid, shape (n, 3) [m]; None of other kinds."""
+    """Return the vertices of a mesh or of a convex solid, shape (n, 3) [m]; None for other kinds."""
     if is_mesh(geometry):
         return mesh_arrays(geometry)[0]
     if isinstance(geometry, coal.ConvexBase):
@@ -155,7 +167,7 @@ def vertices_of(geometry: coal.CollisionGeometry) -> Matrix | None:
 
 
 def of_each(geometries: Iterable[Any], find: Callable[[Any], Found]) -> list[Found]:
-    """What is found of each of some coal geometries; looked for once where several are one object."""
+    """Apply a function to each geometry and return the results; it is called once for each distinct object."""
     answers: dict[int, Found] = {}
     found = []
     for geometry in geometries:
@@ -167,14 +179,17 @@ def of_each(geometries: Iterable[Any], find: Callable[[Any], Found]) -> list[Fou
 
 
 def around(geometry: coal.CollisionGeometry) -> coal.CollisionGeometry:
-    """A convex solid that contains a coal geometry: a mesh's hull (the mesh, if it is flat), a solid itself."""
+    """Return a convex solid that contains a coal geometry.
+
+    For a mesh it is the convex hull, or the mesh itself if it is flat; any other geometry is returned as it is.
+    """
     hull_solid = _hull_of_mesh(geometry) if is_mesh(geometry) else None
     return geometry if hull_solid is None else hull_solid
 
 
 @once_per_geometry
 def _hull_of_mesh(mesh: coal.CollisionGeometry) -> coal.CollisionGeometry | None:
-    """The convex hull of a mesh; None if it is flat."""
+    """Return the convex hull of a mesh; None if the mesh is flat."""
     vertices, triangles = mesh_arrays(mesh)
     used_vertices = vertices[distinct(triangles)]
     if len(used_vertices) < 4 or not _thickness(used_vertices) >= FLATTEST * _extent(used_vertices):
@@ -184,9 +199,9 @@ def _hull_of_mesh(mesh: coal.CollisionGeometry) -> coal.CollisionGeometry | None
     return solid
 
 
-@once_per_geometry  # coal hands out one triangle at a time
+@once_per_geometry  # This is slow, as coal hands out one triangle at a time.
 def mesh_arrays(geometry: coal.CollisionGeometry) -> tuple[Matrix, NDArray[np.int64]]:
-    """Vertices, shape (n, 3), and triangles, shape (m, 3), of a coal mesh, read-only."""
+    """Return the vertices, shape (n, 3), and the triangles, shape (m, 3), of a coal mesh, both read-only."""
     vertices = np.array(geometry.vertices(), dtype=np.float64).reshape(-1, 3)
     corners = (geometry.tri_indices(k) for k in range(geometry.num_tris))
     triangles = np.array([(t[0], t[1], t[2]) for t in corners], dtype=np.int64).reshape(-1, 3)
@@ -196,16 +211,23 @@ def mesh_arrays(geometry: coal.CollisionGeometry) -> tuple[Matrix, NDArray[np.in
 
 
 def convex_arrays(solid: coal.Convex) -> tuple[Matrix, NDArray[np.int64]]:
-    """Corners, shape (n, 3), and triangles, shape (m, 3), of a coal convex solid; its triangles turn either way."""
+    """Return the corners, shape (n, 3), and the triangles, shape (m, 3), of a coal convex solid.
+
+    The triangles are not oriented consistently.
+    """
     points = np.array(solid.points(), dtype=np.float64).reshape(-1, 3)
     corners = (solid.polygons(k) for k in range(solid.num_polygons))
     return points, np.array([(t[0], t[1], t[2]) for t in corners], dtype=np.int64).reshape(-1, 3)
 
 
 def face_normals(points: Matrix, triangles: NDArray[np.int64]) -> tuple[Matrix, Vector]:
-    """Outward unit normals of the faces of a convex solid, shape (k, 3), and twice their areas [m^2], shape (k,).
+    """Return the outward unit normals of a convex solid's faces, shape (k, 3), and twice their areas [m^2], shape (k,).
 
-    Faces that have none are left out.
+    Faces without area are left out, so k may be smaller than the number of triangles.
+
+    Args:
+        points: Corners of the solid, shape (n, 3).
+        triangles: Indices of corners, shape (m, 3).
     """
     a, b, c = (points[triangles[:, k]] for k in range(3))
     normals = np.cross(b - a, c - a)
@@ -219,16 +241,20 @@ def face_normals(points: Matrix, triangles: NDArray[np.int64]) -> tuple[Matrix, 
 
 @once_per_geometry
 def outer_planes(solid: coal.Convex) -> Matrix:
-    """The planes of the outer polyhedron of a convex solid."""
+    """Return the planes of a polyhedron around a convex solid: outward unit normals and offsets, shape (k, 4).
+
+    It has at most ``MOST_PLANES`` of the planes of `outward_planes`.
+    """
     return most_different(cast(Matrix, outward_planes(solid)), MOST_PLANES)
 
 
 @once_per_geometry
 def outward_planes(solid: coal.Convex) -> Matrix | None:
-    """Outward unit normals and offsets of a coal convex solid's faces, shape (k, 4); None if it has no thickness.
+    """Return outward unit normals and offsets of a convex solid's faces, shape (k, 4); None if it has no thickness.
 
-    Each plane is moved to the outermost corner along its normal, so that the solid lies behind all of them whatever
-    the faces' own precision; almost parallel faces share one plane.
+    A plane is the set of points x with ``normal @ x == offset``. Each plane is moved to the outermost corner along its
+    normal, so that the solid lies behind all of them whatever the precision of the faces; almost parallel faces share
+    one plane.
     """
     points, triangles = convex_arrays(solid)
     if len(triangles) < 4:
@@ -238,13 +264,17 @@ def outward_planes(solid: coal.Convex) -> Matrix | None:
     if len(normals) < 4:
         return None
 
-    normals = normals[np.argsort(-areas)]  # of almost parallel faces the largest stands for the others
+    # The largest of several almost parallel faces comes first and represents them.
+    normals = normals[np.argsort(-areas)]
     normals = normals[np.sort(np.unique(np.round(normals, 6), axis=0, return_index=True)[1])]
     return np.column_stack([normals, (points @ normals.T).max(axis=0)])
 
 
 def most_different(planes: Matrix, count: int) -> Matrix:
-    """At most ``count`` of the planes, each time the one whose normal is farthest from those already taken."""
+    """Choose at most ``count`` planes of different normals, from planes of shape (n, 4).
+
+    The first plane is taken, then again and again the one whose normal is farthest from all those already taken.
+    """
     if len(planes) <= count:
         return planes
 
@@ -258,12 +288,12 @@ def most_different(planes: Matrix, count: int) -> Matrix:
 
 @once_per_geometry
 def is_closed(geometry: coal.CollisionGeometry) -> bool:
-    """Whether a coal mesh has an inside: every edge is passed as often one way as the other.
+    """Check whether a coal mesh is closed: triangles pass every edge equally often in both directions.
 
-    Then winding numbers are whole, and change only where the surface is crossed.
+    The winding numbers of a closed mesh are integers and change only where the surface is crossed.
     """
     vertices, triangles = mesh_arrays(geometry)
-    # Vertices at one place are one: many files give each triangle its own.
+    # Vertices at the same place are merged, as many files give each triangle its own vertices.
     _, welded = np.unique(vertices, axis=0, return_inverse=True)
     corners = np.asarray(welded).ravel()[triangles]
 
@@ -276,21 +306,26 @@ def is_closed(geometry: coal.CollisionGeometry) -> bool:
 
 @lru_cache(maxsize=16)
 def robot_solids(robot: Robot) -> tuple[Any, ...]:
-    """Coal geometry of every collision object of a robot, convex meshes as solids, in the order of the model."""
+    """Return the coal geometries of a robot's collision objects in the model's order, convex meshes as solids."""
     return tuple(measured(convexified(body.geometry)) for body in robot.collision.geometryObjects)
 
 
 def measured(geometry: coal.CollisionGeometry) -> coal.CollisionGeometry:
-    """The geometry with its bounding box and sphere computed, which coal leaves undone for some kinds."""
+    """Compute a geometry's bounding box and sphere in place, which coal does not always do, and return the geometry."""
     geometry.computeLocalAABB()
     return geometry
 
 
 def inside_mesh(vertices: Matrix, triangles: NDArray[np.int64], point: Vector) -> bool:
-    """Whether a point lies inside a mesh: generalised winding number above one half (also for slightly open meshes).
+    """Check whether a point is inside a mesh: whether its generalised winding number is beyond one half in size.
 
-    The solid angle of each triangle is van Oosterom and Strackee's formula [37]; their sum over 4 pi is the winding
-    number [38].
+    This works for slightly open meshes too. The solid angle of each triangle is van Oosterom and Strackee's formula
+    [37]; their sum over 4 pi is the winding number [38].
+
+    Args:
+        vertices: Vertices of the mesh, shape (n, 3).
+        triangles: Indices of vertices, shape (m, 3).
+        point: The point, shape (3,).
     """
     a, b, c = (vertices[triangles[:, k]] - point for k in range(3))
     length_a, length_b, length_c = (np.linalg.norm(v, axis=1) for v in (a, b, c))
@@ -300,14 +335,23 @@ def inside_mesh(vertices: Matrix, triangles: NDArray[np.int64], point: Vector) -
     denominator = denominator + np.einsum("ij,ij->i", a, b) * length_c
     denominator = denominator + np.einsum("ij,ij->i", b, c) * length_a
     denominator = denominator + np.einsum("ij,ij->i", c, a) * length_b
-    return bool(abs(np.arctan2(numerator, denominator).sum()) > np.pi)  # half of 4 pi, as each angle is counted halved
+    # Each arctangent is half of a solid angle, so one half of 4 pi becomes pi.
+    return bool(abs(np.arctan2(numerator, denominator).sum()) > np.pi)
 
 
 def solids_of(ends: Ends, margin: float) -> tuple[Ends, float]:
-    """Two geometries at their places as coal compares them for a margin [m], and the margin that it takes.
+    """Return the two geometries that coal is to compare for a required distance, and the distance it is to use.
 
-    Of hollow meshes coal knows no depth: where bodies may overlap to one, their hulls stand for them. A flat mesh has
-    none, and may not be touched.
+    Coal has no penetration depth for hollow meshes. If the margin is negative, so that the two may overlap by some
+    depth, meshes are therefore replaced by their convex hulls. A flat mesh has no hull with a depth, so the margin
+    becomes 0 and it must not be touched.
+
+    Args:
+        ends: Two geometries with their poses.
+        margin: Distance that they must keep [m], negative for an allowed penetration depth.
+
+    Returns:
+        The geometries to compare, with their poses, and the margin to use [m].
     """
     if margin >= 0.0:
         return ends, margin

@@ -1,7 +1,7 @@
-"""How thin solids are: two in contact may not overlap so deep that they could pass through each other.
+"""Measure how thin solids are: two in contact may not overlap so deeply that they could pass through each other.
 
-Two that pass through each other are at some time as deep in one another as half of both thicknesses together. Half of
-that is left to what nobody measures: turns, and the depth at which a contact is seen.
+Two solids that pass through each other have, at some moment, a penetration depth of at least half of both thicknesses
+together. Half of that is kept in reserve for rotations and for the error of the measured penetration depth.
 """
 
 from __future__ import annotations
@@ -22,18 +22,20 @@ from rrtik_ompl.geometry.collision.solids import (
     once_per_geometry,
 )
 
-SHARE = 0.25  # of both thicknesses together, to which two bodies in contact may overlap
-MOST_RAYS = 256  # through the wall of a hollow mesh
-COMPARED = 2_000_000  # rays times triangles
-PARALLEL = 1e-12  # of a ray and a triangle, times twice its area [m^2]
+SHARE = 0.25  # share of both thicknesses together to which two bodies in contact may overlap
+MOST_RAYS = 256  # most rays by which the wall of a hollow mesh is measured
+COMPARED = 2_000_000  # most pairs of a ray and a triangle that are compared
+# [m^2] A ray counts as parallel to a triangle if the cosine of its angle to the normal, times twice the area, is less.
+PARALLEL = 1e-12
 
 
 @once_per_geometry
 def least_width(geometry: coal.CollisionGeometry) -> float:
-    """A lower bound of a geometry's width in any direction [m]; 0 for a surface without an inside.
+    """Return a lower bound of a geometry's width in any direction [m]; 0 for a surface without an inside.
 
-    It is exact for boxes, cylinders, capsules, balls, and the balls of a cloud. Of another convex solid it is the
-    diameter of a ball inside. The wall of a hollow mesh is measured along rays, and counts half.
+    It is exact for boxes, cylinders, capsules and balls, and for the balls of a cloud. For other convex solids it is
+    the diameter of a ball inside. For a hollow mesh it is half the thickness of the wall as measured along rays, so it
+    is an estimate.
     """
     if isinstance(geometry, coal.Halfspace):
         return float("inf")
@@ -42,7 +44,7 @@ def least_width(geometry: coal.CollisionGeometry) -> float:
 
     if is_mesh(geometry):
         wall = _thinnest_wall(*mesh_arrays(geometry)) if is_closed(geometry) else 0.0
-        return 0.5 * wall if np.isfinite(wall) else 0.0  # no ray came through: its wall is not known
+        return 0.5 * wall if np.isfinite(wall) else 0.0  # If no ray hit anything, the wall is unknown.
 
     core = core_of(geometry)
     if core is not None:
@@ -62,7 +64,7 @@ def least_width(geometry: coal.CollisionGeometry) -> float:
 
 
 def _thinnest_wall(vertices: Matrix, triangles: NDArray[np.int64]) -> float:
-    """The shortest way through the wall of a closed mesh [m], from the middles of its largest triangles."""
+    """Return the least way through a closed mesh's wall [m], along rays from the middles of its largest triangles."""
     a, b, c = (vertices[triangles[:, k]] for k in range(3))
     normals = np.cross(b - a, c - a)
     areas = np.linalg.norm(normals, axis=1)
@@ -75,7 +77,16 @@ def _thinnest_wall(vertices: Matrix, triangles: NDArray[np.int64]) -> float:
 
 
 def _way_through(number: int, corners: tuple[Matrix, Matrix, Matrix], normals: Matrix, areas: Vector) -> float:
-    """From the middle of a triangle straight to the next one [m], on either side; after Moeller and Trumbore."""
+    """Return the distance from a triangle's middle along its normal to the nearest other triangle [m], on either side.
+
+    The intersection test is after Moeller and Trumbore.
+
+    Args:
+        number: Index of the triangle.
+        corners: First, second and third corners of all triangles, shape (m, 3) each.
+        normals: Normals of all triangles, of length twice the area, shape (m, 3).
+        areas: Lengths of the normals, shape (m,).
+    """
     a, b, c = corners
     origin = (a[number] + b[number] + c[number]) / 3.0
     direction = normals[number] / areas[number]

@@ -1,1 +1,4 @@
-"""Sphere covers and convex pieces of solids, made once a robot and cached. No kernels: an edit recompiles none."""
+"""Compute sphere covers and convex pieces of solids, once per geometry, and cache them.
+
+No kernel depends on the source of these modules, so that an edit recompiles none.
+"""

@@ -1,7 +1,8 @@
-"""Covers kept on disk, so that a geometry is covered once per machine. Nothing here ever fails: no cache, no gain.
+"""Keep covers on disk, so that each geometry is covered only once per machine.
 
-One file per geometry, parameters and algorithm, named by a hash of all three; the package brings those of the robots
-that come along, which ``python -m bench ship_covers`` writes.
+There is one file per geometry, parameters and version of the algorithm, named by a hash of all three. The package
+brings the covers of its own robots, written by ``python -m bench ship_covers``. Nothing here raises an error: if the
+cache cannot be used, the cover is computed again.
 """
 
 from __future__ import annotations
@@ -27,15 +28,18 @@ LAYOUT = 1
 ALGORITHM = 3  # counts up when rrtik_ompl.geometry.covers.spheres makes other spheres of the same geometry
 PIECES = 2  # counts up when rrtik_ompl.geometry.covers.mesh_pieces makes other pieces of the same mesh
 STORE = Path(__file__).with_name("shipped.npz")
-COLUMNS = 4  # numbers of a row of any cover
+COLUMNS = 4  # numbers in a row of a cover
 
 
 def cached_outer_cover(geometry: coal.CollisionGeometry, *, protrusion: float | None = None) -> Matrix:
-    """``outer_cover``, from the cache if it is there; of the hull of a mesh that nearly fills it, which is tighter."""
+    """Return the ``outer_cover`` of a geometry, from the cache if it is there.
+
+    A mesh that nearly fills its convex hull is replaced by the hull, whose cover is tighter.
+    """
     solid = around(geometry) if fills_its_hull(geometry) else geometry
 
     def make() -> Matrix:
-        # It comes with scipy, which takes longer to load than covers to read.
+        # Imported late, as it loads scipy, which takes longer than reading covers from the cache.
         from rrtik_ompl.geometry.covers.spheres import outer_cover
 
         return outer_cover(solid, protrusion=protrusion)
@@ -44,7 +48,7 @@ def cached_outer_cover(geometry: coal.CollisionGeometry, *, protrusion: float | 
 
 
 def cached_inner_spheres(geometry: coal.CollisionGeometry, *, count: int | None = None) -> Matrix:
-    """``inner_spheres``, from the cache if they are there."""
+    """Return the ``inner_spheres`` of a geometry, from the cache if they are there."""
 
     def make() -> Matrix:
         from rrtik_ompl.geometry.covers.spheres import inner_spheres
@@ -55,7 +59,11 @@ def cached_inner_spheres(geometry: coal.CollisionGeometry, *, count: int | None 
 
 
 def cached_convex_pieces(mesh: coal.BVHModelBase) -> tuple[list[Matrix], ...]:
-    """``convex_pieces``, from the cache if they are there; as rows of a corner and a number of piece and kind."""
+    """Return the ``convex_pieces`` of a mesh, from the cache if they are there.
+
+    The cache holds them as rows of a corner and a number, which is 3 times the index of the piece plus the index of its
+    kind.
+    """
 
     def make() -> Matrix:
         from rrtik_ompl.geometry.covers.mesh_pieces import convex_pieces
@@ -74,7 +82,7 @@ def cached_convex_pieces(mesh: coal.BVHModelBase) -> tuple[list[Matrix], ...]:
 
 
 def geometry_bytes(geometry: coal.CollisionGeometry) -> bytes | None:
-    """All that a cover depends on, or None for a kind that is not cached."""
+    """Return all data of a geometry on which a cover depends, or None for a kind that is not cached."""
     numbers = numbers_of(geometry)
     if numbers is None:
         return None
@@ -87,7 +95,7 @@ def geometry_bytes(geometry: coal.CollisionGeometry) -> bytes | None:
 
 
 def cover_key(geometry: coal.CollisionGeometry, parameters: str) -> str | None:
-    """Hash of a geometry, of parameters and of the algorithm; None for a kind that is not cached."""
+    """Return a hash of the geometry, the parameters and the algorithm's version; None for a kind that is not cached."""
     data = geometry_bytes(geometry)
     if data is None:
         return None
@@ -96,7 +104,13 @@ def cover_key(geometry: coal.CollisionGeometry, parameters: str) -> str | None:
 
 
 def _cached(geometry: coal.CollisionGeometry, parameters: str, make: Callable[[], Matrix]) -> Matrix:
-    """A cover from the package, from the user's cache, or made and kept there."""
+    """Return a cover from the package or from the user's cache, or compute it and store it in that cache.
+
+    Args:
+        geometry: The geometry that is covered.
+        parameters: Text that describes how; part of the key.
+        make: Function that computes the cover, shape (n, 4).
+    """
     folder = cache_folder("covers")
     key = cover_key(geometry, parameters)
 
@@ -117,12 +131,12 @@ def _cached(geometry: coal.CollisionGeometry, parameters: str, make: Callable[[]
 
 
 def needs_long(geometry: coal.CollisionGeometry) -> bool:
-    """Whether a cover takes so long that somebody may wonder: of a mesh or a hull, a second or so."""
+    """Check whether a cover takes so long (a second or so) that the user is told: for meshes and convex hulls."""
     return is_mesh(geometry) or isinstance(geometry, coal.ConvexBase)
 
 
 def _read(file: Path, key: str) -> Matrix | None:
-    """The spheres in a file, or None if it is absent, damaged or another's."""
+    """Return the spheres in a file, shape (n, 4); None if it is absent, damaged or belongs to another key."""
     try:
         stored = NamedArrays(file)
         spheres = stored["spheres"]
@@ -149,15 +163,16 @@ def _write(file: Path, key: str, spheres: Matrix) -> None:
 
 
 def shipped_cover(key: str, file: Path = STORE) -> Matrix | None:
-    """The cover of that hash, shape (n, 4), read-only; None if the package has none."""
+    """Return the cover with that hash from the package, shape (n, 4), read-only; None if there is none."""
     packed = _stored(file).get(key)
     return None if packed is None else _unpacked(packed)
 
 
 def write_store(covers: Mapping[str, Matrix], file: Path = STORE) -> None:
-    """Write covers by their hashes; the same ones always make the same file.
+    """Write covers by their hashes into one file; the same covers always give the same file.
 
-    Each is packed by itself: a robot needs few of them, and to unpack all takes longer than to load the robot.
+    Each cover is compressed separately: a robot needs few of them, and to decompress all would take longer than loading
+    the robot.
     """
     keys = sorted(covers)
     packed = [zlib.compress(np.ascontiguousarray(covers[key].T, dtype=np.float64).tobytes(), 9) for key in keys]
@@ -169,7 +184,7 @@ def write_store(covers: Mapping[str, Matrix], file: Path = STORE) -> None:
 
 @cache
 def _stored(file: Path) -> dict[str, bytes]:
-    """All covers of a file by their hashes, packed; none if it is absent or damaged."""
+    """Return all covers of a file by their hashes, still compressed; none if the file is absent or damaged."""
     try:
         stored = NamedArrays(file)
         keys = stored["keys"]
@@ -184,7 +199,7 @@ def _stored(file: Path) -> dict[str, bytes]:
 
 @cache
 def _unpacked(packed: bytes) -> Matrix | None:
-    """A cover; None if it is damaged."""
+    """Decompress a cover, shape (n, 4); None if it is damaged."""
     try:
         columns = np.frombuffer(zlib.decompress(packed)).reshape(COLUMNS, -1)
     except (zlib.error, ValueError):

@@ -1,8 +1,8 @@
-"""A mesh as a few convex pieces whose union contains it and all that it encloses.
+"""Divide a mesh into a few convex pieces whose union contains it and everything that it encloses.
 
-Planes along the axes cut space into cells. Within a cell, an extreme point of a solid lies on the surface or is a
-corner of the cell: from any other point of the solid there is a way on in some direction and back. So the hull of the
-surface within a cell, and of the cell's corners that are inside the solid, contains what the cell holds of it.
+Planes along the axes divide space into cells. An extreme point of the solid's part in a cell lies on the surface or is
+a corner of the cell: any other point of the solid is the middle of a segment in that part. Therefore the convex hull of
+the surface within the cell and of the cell's corners inside the solid contains that part.
 """
 
 from __future__ import annotations
@@ -28,25 +28,31 @@ if TYPE_CHECKING:
 
 MAX_PIECES = 12
 MAX_TRIANGLES = 300_000
-SMALLEST_GAIN = 0.01  # of the whole hull's volume: what a cut takes away at least
-SHARES = (0.25, 0.5, 0.75)  # of a cell, where it may be cut
-GRID = 24  # steps along the longest side, to which corners are moved for a sketch of a mesh
-MAX_PLANES = 90  # of a piece inside
-SHRINKAGE = 1e-6  # of a cell's size, by which a piece inside keeps away from the surface
-THINNEST = 1e-3  # [m] radius of the largest ball in a piece inside that is worth the while
-UNBOUNDED = [(None, None)] * 4  # bounds of a ball's centre and radius, for linprog: none
-DIRECTIONS = 100  # in which extreme points are sought where volumes are compared
+SMALLEST_GAIN = 0.01  # least volume that a cut must remove, as a share of the whole hull's
+SHARES = (0.25, 0.5, 0.75)  # positions of possible cuts, as shares of a cell's length
+GRID = 24  # steps along the longest side of the grid to which the sketch of a mesh is rounded
+MAX_PLANES = 90  # most planes of the hull that are used to bound an inner piece
+SHRINKAGE = 1e-6  # distance that an inner piece keeps from the surface, as a share of the cell's size
+THINNEST = 1e-3  # [m] Inner pieces that do not contain a ball of this radius are dropped.
+UNBOUNDED = [(None, None)] * 4  # linprog's bounds of a ball's centre and radius: there are none
+DIRECTIONS = 100  # number of directions in which extreme points are sought
 NO_BOXES = np.empty((0, 2, 3))
-CORNER_IS_HIGH = np.array(list(np.ndindex(2, 2, 2)), dtype=bool)  # of a box's 8 corners, along each axis, shape (8, 3)
+# For each of a box's 8 corners, whether it is at the upper end along each axis, shape (8, 3).
+CORNER_IS_HIGH = np.array(list(np.ndindex(2, 2, 2)), dtype=bool)
 
 Triangles = NDArray[np.float64]  # shape (m, 3, 3): triangle, corner, coordinate
 
 
 @dataclass(frozen=True, eq=False)
 class _Cell:
-    """What a cell (``low``, ``high``) holds: surface, and boxes inside the solid, shape (k, 2, 3): low, high.
+    """A box-shaped cell and the part of the mesh in it.
 
-    ``shell`` is the number of the closed surface that it belongs to.
+    Attributes:
+        low: Lowest corner of the cell, shape (3,).
+        high: Highest corner of the cell, shape (3,).
+        surface: Triangles of the surface within the cell, shape (m, 3, 3).
+        boxes: Boxes inside the solid within the cell, as pairs of lowest and highest corner, shape (k, 2, 3).
+        shell: Number of the closed surface that the cell belongs to.
     """
 
     low: Vector
@@ -57,13 +63,13 @@ class _Cell:
 
     @cached_property
     def points(self) -> Matrix:
-        """Corners of the surface and of the boxes, shape (n, 3)."""
+        """Return the corners of the surface's triangles and of the boxes, each once, shape (n, 3)."""
         box_corners = np.where(CORNER_IS_HIGH, self.boxes[:, None, 1], self.boxes[:, None, 0])
         return np.unique(np.concatenate([self.surface.reshape(-1, 3), box_corners.reshape(-1, 3)]), axis=0)
 
     @cached_property
     def volume(self) -> float:
-        """About the volume of the hull of the points [m^3]."""
+        """Return the approximate volume of the convex hull of the points [m^3]; 0 if they lie in a plane."""
         if not len(self.points):
             return 0.0
         try:
@@ -73,17 +79,17 @@ class _Cell:
 
     @cached_property
     def halves(self) -> tuple[_Cell, _Cell]:
-        """The two cells of the best cut: below it and above it."""
+        """Return the lower and the upper cell of the best cut, whose hulls have the least total volume."""
         cuts = [self._cut(axis, share) for axis in range(3) for share in SHARES]
         return min(cuts, key=lambda pair: pair[0].volume + pair[1].volume)
 
     @property
     def gain(self) -> float:
-        """How much volume the best cut takes away [m^3]."""
+        """Return the volume that the best cut removes from the hulls [m^3]."""
         return self.volume - self.halves[0].volume - self.halves[1].volume
 
     def _cut(self, axis: int, share: float) -> tuple[_Cell, _Cell]:
-        """The cells below and above a plane across an axis, at a share of this cell's length."""
+        """Divide the cell by a plane at a share of its length along an axis; return the lower and the upper cell."""
         coordinate = float((1.0 - share) * self.low[axis] + share * self.high[axis])
         surface_below, surface_above = clipped(self.surface, axis, coordinate)
 
@@ -102,14 +108,17 @@ class _Cell:
 
 
 def convex_pieces(mesh: coal.BVHModelBase) -> tuple[list[Matrix], list[Matrix], list[Matrix]]:
-    """Convex pieces whose union contains a coal mesh and what it encloses, convex pieces inside it, and points of it.
+    """Divide a coal mesh into convex pieces that contain it, and find convex pieces inside it.
 
-    The cell whose pieces come out smallest is cut first (compare [44]), until cuts gain little. A
-    sketch of the mesh is enough to choose the cuts. Nothing is known to be inside a mesh that is not closed, and
-    there are no pieces of a mesh that is a point or has more than ``MAX_TRIANGLES``.
+    Starting with the box around each closed surface, the cell whose cut removes most volume from the hulls is cut first
+    (compare [44]), until cuts gain little or there are enough pieces. The cuts are chosen on a coarse sketch of the
+    mesh; the pieces are then made from the mesh itself. For a mesh that is not closed nothing is known to be inside.
+    There are no pieces for a mesh that is a single point or has more than ``MAX_TRIANGLES`` triangles.
 
     Returns:
-        Corners of the pieces around and of those inside, and points of the solid by cells, shape (n, 3) each.
+        Three lists of arrays of shape (n, 3) [m]: the corners of each outer piece, whose union contains the mesh and
+        what it encloses; the corners of each inner piece; and for each cell some extreme points of the mesh's surface
+        in it.
     """
     vertices, triangles = mesh_arrays(mesh)
     surface = vertices[triangles]
@@ -134,10 +143,11 @@ def _without_empty(pieces: list[Matrix]) -> list[Matrix]:
 
 
 def _closed_pieces(shells: list[Triangles]) -> tuple[list[Matrix], list[Matrix], list[Matrix]]:
-    """Pieces of closed surfaces; see `convex_pieces`.
+    """Make the pieces of a mesh whose surfaces are all closed; see `convex_pieces`.
 
-    Most of the volume tells which way triangles of this mesh turn. A shell that turns the other way bounds a cavity;
-    what is in a shell that bounds a solid, and in no cavity, is inside the mesh.
+    The sign of the total volume tells the orientation of the mesh's triangles. A shell of that orientation bounds a
+    solid, one of the opposite orientation bounds a cavity; what is inside a shell that bounds a solid, and in no
+    cavity, is inside the mesh.
     """
     volumes = np.array([_signed_volume(shell) for shell in shells])
     orientation = volumes * volumes.sum()
@@ -156,7 +166,7 @@ def _closed_pieces(shells: list[Triangles]) -> tuple[list[Matrix], list[Matrix],
         corner_is_inside = np.array([_shell_contains(shell, corner) for corner in corners])
         planes, hull_corners = _hull(np.concatenate([cell_with_surface.points, corners[corner_is_inside]]))
         outer_pieces.append(hull_corners)
-        # Of the surface alone: a corner of a cell may lie in another shell's hollow.
+        # Only points of the surface are used, as a corner of the cell may lie in the cavity of another shell.
         surface_points.append(_extreme_points(cell_with_surface.surface.reshape(-1, 3)))
         if not len(planes) or not bounds_solid[cell.shell]:
             continue
@@ -174,7 +184,7 @@ def _closed_pieces(shells: list[Triangles]) -> tuple[list[Matrix], list[Matrix],
 
 
 def _shells(vertices: Matrix, triangles: NDArray[np.int64]) -> list[Triangles]:
-    """The connected parts of a surface; all of it if there are many."""
+    """Divide a surface into its connected parts; if there are too many, return the whole surface as one."""
     _, welded = np.unique(vertices, axis=0, return_inverse=True)
     corners = np.asarray(welded).ravel()[triangles]
 
@@ -197,18 +207,18 @@ def _shell_contains(shell: Triangles, point: Vector) -> bool:
 
 
 def _first_cell(surface: Triangles, boxes: NDArray[np.float64], shell: int = 0) -> _Cell:
-    """The cell around all of a surface and of some boxes, with a sketch of the surface."""
+    """Return the cell around a whole surface and some boxes, which holds a coarse sketch of the surface."""
     bounds = np.concatenate([surface.reshape(-1, 3), boxes.reshape(-1, 3)])
     return _Cell(bounds.min(axis=0), bounds.max(axis=0), _sketch(surface), boxes, shell)
 
 
 def _with_whole_surface(cell: _Cell, surface: Triangles) -> _Cell:
-    """A cell with what it holds of the surface itself, in the place of its sketch."""
+    """Return a cell whose sketch is replaced by the part of the actual surface within it."""
     return replace(cell, surface=_clipped_to_box(surface, cell.low, cell.high))
 
 
 def _split_into_cells(cells: list[_Cell]) -> list[_Cell]:
-    """The cells after the best cuts, the one that takes most volume away first, while that is worth it."""
+    """Cut the cell with the largest gain again and again, until gains are small or there are ``MAX_PIECES`` cells."""
     min_gain = SMALLEST_GAIN * sum(cell.volume for cell in cells)
     while len(cells) < MAX_PIECES:
         best = max(cells, key=lambda cell: cell.gain)
@@ -220,7 +230,7 @@ def _split_into_cells(cells: list[_Cell]) -> list[_Cell]:
 
 
 def _sketch(surface: Triangles) -> Triangles:
-    """Fewer triangles of about the same shape: corners moved to a grid, what coincides left out."""
+    """Return a coarse version of a surface: corners rounded to a grid, without flat and repeated triangles."""
     low = surface.min(axis=(0, 1))
     grid_step = max(float(np.ptp(surface, axis=(0, 1)).max()) / GRID, 1e-12)
 
@@ -232,7 +242,7 @@ def _sketch(surface: Triangles) -> Triangles:
 
 
 def _clipped_to_box(surface: Triangles, low: Vector, high: Vector) -> Triangles:
-    """The parts of triangles inside a box, as triangles."""
+    """Return the parts of triangles inside a box, as triangles, shape (m, 3, 3)."""
     overlaps_box = (surface.min(axis=1) <= high) & (surface.max(axis=1) >= low)
     surface = surface[overlaps_box.all(axis=1)]
     for axis in range(3):
@@ -242,7 +252,19 @@ def _clipped_to_box(surface: Triangles, low: Vector, high: Vector) -> Triangles:
 
 
 def clipped(surface: Triangles, axis: int, coordinate: float) -> tuple[Triangles, Triangles]:
-    """The parts of triangles on both sides of a plane across an axis, as triangles: below, above."""
+    """Divide triangles by the plane where a coordinate has a given value.
+
+    A triangle that the plane crosses has one corner alone on its side: the part with this corner is a triangle, and the
+    other part, a quadrilateral, becomes two.
+
+    Args:
+        surface: Triangles, shape (m, 3, 3).
+        axis: Index of the coordinate.
+        coordinate: Its value in the plane.
+
+    Returns:
+        The triangles below the plane and those above it, shape (k, 3, 3) each.
+    """
     above = surface[:, :, axis] >= coordinate
     count = above.sum(axis=1)
     crossing = (count == 1) | (count == 2)
@@ -267,7 +289,14 @@ def clipped(surface: Triangles, axis: int, coordinate: float) -> tuple[Triangles
 
 
 def _plane_crossings(first: Matrix, second: Matrix, axis: int, coordinate: float) -> Matrix:
-    """Where edges from first to second, shape (k, 3) each, cross the plane; their ends lie on different sides of it."""
+    """Return the points where edges cross the plane, shape (k, 3).
+
+    Args:
+        first: First ends of the edges, shape (k, 3).
+        second: Second ends, on the other side of the plane, shape (k, 3).
+        axis: Index of the coordinate that is constant in the plane.
+        coordinate: Its value in the plane.
+    """
     first_offset = first[:, axis] - coordinate
     second_offset = second[:, axis] - coordinate
     share = first_offset / (first_offset - second_offset)
@@ -277,9 +306,14 @@ def _plane_crossings(first: Matrix, second: Matrix, axis: int, coordinate: float
 
 
 def _hull(points: Matrix) -> tuple[Matrix, Matrix]:
-    """Planes (outward unit normal, offset) of the hull of points and the points that span it.
+    """Return the planes of the convex hull of points and the points that span it.
 
-    No planes and all of the points if they are too flat to decide.
+    Args:
+        points: The points, shape (n, 3).
+
+    Returns:
+        Outward unit normals and offsets of the planes, shape (k, 4), and the spanning points, shape (m, 3). If the
+        points are too flat for a hull, there are no planes, and all points are returned.
     """
     try:
         hull = ConvexHull(points)
@@ -289,21 +323,26 @@ def _hull(points: Matrix) -> tuple[Matrix, Matrix]:
 
 
 def _convex_body_inside(planes: Matrix, cell: _Cell) -> Matrix | None:
-    """Corners of a convex body in the cell that no surface reaches into, shape (n, 3); None if there is none.
+    """Return the corners of a convex body in a cell that no surface reaches into, shape (n, 3); None if there is none.
 
-    Each triangle is kept out by the plane that has to move inwards least for it.
+    The body is bounded by the planes of the cell and of the hull. For each triangle, the plane that needs the smallest
+    inward shift to exclude the triangle is shifted by that much.
+
+    Args:
+        planes: Outward unit normals and offsets of the hull, shape (k, 4).
+        cell: The cell, with all surfaces that the body must not reach.
     """
     cell_planes = np.concatenate([np.column_stack([np.eye(3), cell.high]), np.column_stack([-np.eye(3), -cell.low])])
     all_planes = np.concatenate([cell_planes, most_different(planes, MAX_PLANES)])
 
-    # Of each triangle along each normal.
+    # Least coordinate of each triangle along each normal, shape (triangles, planes).
     lowest = np.min([cell.surface[:, k] @ all_planes[:, :3].T for k in range(3)], axis=0)
     nearest = (all_planes[:, 3] - lowest).argmin(axis=1)
     offsets = all_planes[:, 3].copy()
     np.minimum.at(offsets, nearest, lowest[np.arange(len(nearest)), nearest])
     offsets -= SHRINKAGE * float((cell.high - cell.low).max())
 
-    # The largest ball behind all planes: its centre is a point inside, which qhull asks for.
+    # Qhull needs a point inside the body: the centre of the largest ball that is behind all planes.
     largest_ball = linprog(
         [0.0, 0.0, 0.0, -1.0], np.column_stack([all_planes[:, :3], np.ones(len(all_planes))]), offsets, bounds=UNBOUNDED
     )
@@ -319,12 +358,12 @@ def _convex_body_inside(planes: Matrix, cell: _Cell) -> Matrix | None:
 
 
 def _extreme_points(points: Matrix) -> Matrix:
-    """Some of the points that lie farthest in some direction."""
+    """Return the points that lie farthest in one of a fixed set of directions, each once."""
     return points[np.unique((points @ _unit_directions().T).argmax(axis=0))] if len(points) else points
 
 
 def _unit_directions() -> Matrix:
-    """Unit vectors spread over all directions, shape (DIRECTIONS, 3)."""
+    """Return unit vectors that are spread evenly over all directions, shape (DIRECTIONS, 3)."""
     z = (2.0 * np.arange(DIRECTIONS) + 1.0) / DIRECTIONS - 1.0
     azimuth = np.pi * (3.0 - np.sqrt(5.0)) * np.arange(DIRECTIONS)
     radius = np.sqrt(1.0 - z * z)

@@ -1,10 +1,11 @@
-"""Few balls that hold all elements of a solid and reach little beyond it.
+"""Search for few balls that contain all elements of a solid and reach little beyond it.
 
-A ball sticks out by at most its radius minus the depth of its centre. Greedy set cover [41] with a bisection
-of the protrusion finds a first set of balls; then elements and balls are matched and every ball is moved to where it
-sticks out least, in turns, and balls that others can replace are moved to where the protrusion is largest (after
-[42]). All this only searches for good places: whatever they are, each ball is made large enough for its elements, so
-the cover holds the solid.
+A ball reaches beyond the solid by at most its radius minus the depth of its centre: its protrusion. First, greedy set
+cover [41] with a bisection over the protrusion finds a set of balls. Then three steps alternate: each element is
+assigned to the ball that needs the least protrusion for it; each ball is moved to where it protrudes least; and balls
+that others can replace are moved to where the protrusion is largest (after [42]). All of this only searches for good
+centres: whatever they are, each ball is finally made large enough for its elements, so that the cover contains the
+solid.
 """
 
 from __future__ import annotations
@@ -20,20 +21,24 @@ from rrtik_ompl.geometry.covers.cells import Elements
 from rrtik_ompl.geometry.covers.solids import Triangles
 
 CANDIDATES = 400
-LEAST_ON_SURFACE = 80  # candidates for what is thin or open
+LEAST_ON_SURFACE = 80  # least number of candidates at the surface, for thin or open parts of the solid
 BISECTIONS = 7
-MATCHINGS = 7  # of matching elements with balls
-RECENTRING_STEPS = 10  # of every ball in a round
-MAX_RELOCATIONS = 4  # balls moved elsewhere in a round, at most
-RELOCATION_GAIN = 0.95  # a ball is moved elsewhere if the protrusion it leaves behind is below this share of the worst
-CHUNK = 64
+MATCHINGS = 7  # rounds of assigning elements to balls and moving the balls
+RECENTRING_STEPS = 10  # steps by which each ball is moved in a round
+MAX_RELOCATIONS = 4  # largest number of balls that are moved elsewhere in a round
+# A ball is moved elsewhere if the protrusion that results without it is below this share of the largest one.
+RELOCATION_GAIN = 0.95
+CHUNK = 64  # centres whose radii are computed in one step
 
 CentreElementTable = NDArray[np.float32]  # shape (centres, elements)
 
 
 @dataclass(slots=True, eq=False)
 class Places:
-    """Centres of balls, shape (n, 3), and their (estimated) depths, shape (n,), not above 0 where they cannot move."""
+    """Centres of balls, shape (n, 3), and their estimated depths inside the solid, shape (n,).
+
+    A depth that is not positive marks a centre at or beyond the surface, which is not moved.
+    """
 
     centres: Matrix
     depth: Vector
@@ -45,15 +50,16 @@ class Places:
 def smallest_cover(
     elements: Elements, surface: cKDTree, limit: int, target: float | None, *, lenient: bool = False
 ) -> Matrix:
-    """Balls that hold all elements, at most ``limit``, shape (n, 4).
+    """Find balls that contain all elements, shape (n, 4), at most ``limit`` of them.
 
     Args:
-        elements: What has to be held.
-        surface: Points spread over the surface (``surface_points``).
-        limit: Largest number of balls, unless the protrusion ``target`` takes more.
-        target: Protrusion that is good enough; None for the smallest.
-        lenient: Not to count a protrusion that no candidate can save an element: one such element, as an open mesh has
-            at its rim, would end the search with few balls that stick out as far everywhere.
+        elements: The elements to contain.
+        surface: Points spread over the solid's surface (``surface_points``).
+        limit: Largest number of balls, unless the ``target`` takes more.
+        target: Protrusion that is good enough; None to look for the smallest.
+        lenient: Whether to subtract from each element's protrusion the part that no candidate avoids. Otherwise a
+            single element with a large protrusion, such as at the rim of an open mesh, would end the search with few
+            balls that protrude as far everywhere.
     """
     candidate_places = candidates(elements, surface)
     protrusions = reaches(elements, candidate_places.centres) - candidate_places.depth[:, None].astype(np.float32)
@@ -75,7 +81,11 @@ def smallest_cover(
 
 
 def surface_points(triangles: Triangles, count: int) -> Matrix:
-    """Points spread evenly over triangles, the same every time, and all corners if they are few."""
+    """Return points spread evenly over triangles, always the same ones, and corners of the triangles.
+
+    About ``count`` points are spread by area. All corners are added if there are at most ``count`` triangles, otherwise
+    those of every k-th triangle.
+    """
     a, b, c = (triangles[:, k] for k in range(3))
     sizes = np.cumsum(np.linalg.norm(np.cross(b - a, c - a), axis=1))
     which = np.searchsorted(sizes, (np.arange(count) + 0.5) / count * sizes[-1]).clip(0, len(triangles) - 1)
@@ -88,7 +98,10 @@ def surface_points(triangles: Triangles, count: int) -> Matrix:
 
 
 def candidates(elements: Elements, surface: cKDTree) -> Places:
-    """Places for centres: lattice points inside, and points at the surface for what is thin or open."""
+    """Return candidate centres: lattice points inside, and points at the surface for thin or open parts.
+
+    Their depths are distances to the nearest of the surface's points, negative for candidates at the surface.
+    """
     inside = random_subset(elements.inside, CANDIDATES)
     near_surface = random_subset(elements.on_surface, max(CANDIDATES - len(inside), LEAST_ON_SURFACE))
     centres = np.concatenate([inside, near_surface])
@@ -97,14 +110,14 @@ def candidates(elements: Elements, surface: cKDTree) -> Places:
 
 
 def random_subset(points: Matrix, count: int) -> Matrix:
-    """At most ``count`` of the points, drawn by lot (the same ones every time)."""
+    """Return at most ``count`` of the points, chosen at random with a fixed seed."""
     if len(points) <= count:
         return points
     return points[np.sort(np.random.default_rng(0).choice(len(points), count, replace=False))]
 
 
 def reaches(elements: Elements, centres: Matrix) -> CentreElementTable:
-    """Radius that a ball around each centre needs to hold each element, shape (centres, elements)."""
+    """Return the radius that a ball about each centre needs to contain each element, shape (centres, elements)."""
     points = elements.points.astype(np.float32).T
     squared_norms = (points**2).sum(axis=0)
     ball_radii = elements.radii.astype(np.float32)
@@ -112,7 +125,7 @@ def reaches(elements: Elements, centres: Matrix) -> CentreElementTable:
 
     for k in range(0, len(centres), CHUNK):
         chunk = centres[k : k + CHUNK].astype(np.float32)
-        # |p - c|^2 = |p|^2 - 2 p c + |c|^2, in one array.
+        # Compute |p - c|^2 = |p|^2 - 2 p c + |c|^2 in place, to save memory.
         distances = chunk @ points
         distances *= -2.0
         distances += squared_norms
@@ -126,7 +139,16 @@ def reaches(elements: Elements, centres: Matrix) -> CentreElementTable:
 
 
 def _cover_by_bisection(protrusions: CentreElementTable, limit: int, target: float | None) -> NDArray[np.int64]:
-    """Numbers of the centres of a cover, whose largest protrusion is found by bisection; at most ``limit`` of them."""
+    """Find a cover of at most ``limit`` balls by a bisection over the largest protrusion.
+
+    Args:
+        protrusions: Protrusion of each centre's ball if it contains each element, shape (centres, elements).
+        limit: Largest number of balls.
+        target: Protrusion that is good enough; if it allows a cover of at most ``limit`` balls, that is returned.
+
+    Returns:
+        Indices of the chosen centres.
+    """
     low = float(protrusions.min(axis=0).max())
     high = float(protrusions.max(axis=1).min())
 
@@ -149,11 +171,16 @@ def _cover_by_bisection(protrusions: CentreElementTable, limit: int, target: flo
 
 
 def _greedy_set_cover(holds: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Greedy set cover: rows that together hold every column, the one that adds most first."""
+    """Return rows that together hold every column, by greedy set cover: the row that adds most columns comes next.
+
+    Args:
+        holds: Whether each row holds each column, shape (rows, columns).
+    """
     not_held = np.ones(holds.shape[1], dtype=bool)
     chosen = []
     columns = np.array(holds.T, dtype=np.float32, order="C")
-    gains = columns.sum(axis=0)  # whole numbers, exact
+    # Gains are counts, so their float32 sums are exact.
+    gains = columns.sum(axis=0)
 
     while not_held.any():
         row = int(gains.argmax())
@@ -175,7 +202,18 @@ def _improved(
     limit: int,
     target: float | None,
 ) -> Places:
-    """Better places for the balls of a cover, found by turns of matching and moving: the best set of all rounds."""
+    """Improve the places of a cover's balls in rounds of relocating, matching and recentring; return the best round's.
+
+    Args:
+        elements: The elements to contain.
+        surface: Points spread over the solid's surface.
+        candidate_places: All candidate centres.
+        candidate_protrusions: Their protrusions for each element, shape (candidates, elements).
+        unavoidable: Part of each element's protrusion that does not count, shape (elements,).
+        places: Centres of the cover to improve.
+        limit: Largest number of balls.
+        target: Protrusion that is good enough, which ends the search; None for the smallest.
+    """
     element_of_point = np.repeat(np.arange(len(elements.start)), np.diff(np.r_[elements.start, len(elements.points)]))
     best = places
     best_protrusion = np.inf
@@ -206,7 +244,14 @@ def _relocated(
     candidate_protrusions: CentreElementTable,
     limit: int,
 ) -> tuple[Places, CentreElementTable]:
-    """Balls that others can replace moved (or, below the limit, new ones put) to where the protrusion is worst."""
+    """Add balls where the protrusion is largest, or move balls there that others can replace.
+
+    As long as there are fewer than ``limit`` balls, the candidate that is best for the worst elements is added as a new
+    ball. Then, the ball whose removal costs least is moved there. Both end when the gain is too small.
+
+    Returns:
+        The new places and their protrusions for each element, shape (balls, elements); the inputs are not changed.
+    """
     centres = places.centres.copy()
     depth = places.depth.copy()
     protrusions = protrusions.copy()
@@ -244,10 +289,16 @@ def _relocated(
 
 
 def _recentred(elements: Elements, surface: cKDTree, places: Places, owner: NDArray[np.int64]) -> Places:
-    """Each ball moved to where it sticks out least while it holds its points.
+    """Move each ball to where it protrudes least while it contains its points.
 
-    It goes away from the surface that is nearest and towards the point that is farthest, in ever shorter steps (after
-    [43]). A step is shorter than the depth, so a centre stays inside.
+    A centre moves away from the nearest surface point and towards its farthest point, in ever shorter steps
+    (after [43]). A step is shorter than the depth, so a centre stays inside.
+
+    Args:
+        elements: The elements to contain.
+        surface: Points spread over the solid's surface.
+        places: Centres of the balls and their depths.
+        owner: Index of the ball that must contain each point of the elements, shape (p,).
     """
     order = np.argsort(owner, kind="stable")
     points = elements.points[order]
@@ -293,7 +344,10 @@ def _unit(vectors: Matrix) -> Matrix:
 
 
 def _fitted_to_elements(elements: Elements, places: Places) -> Matrix:
-    """Balls no larger than what they have to hold; each element goes to the ball that sticks out least for it."""
+    """Return balls with the smallest radii that contain their elements, shape (n, 4); unused balls are dropped.
+
+    Each element belongs to the ball that needs the least protrusion for it.
+    """
     protrusions = reaches(elements, places.centres) - places.depth[:, None]
     element_of_point = np.repeat(np.arange(len(elements.start)), np.diff(np.r_[elements.start, len(elements.points)]))
     owner = protrusions.argmin(axis=0)[element_of_point]

@@ -1,7 +1,7 @@
-"""Solids as covers see them: a surface of triangles, and how deep a point lies inside.
+"""Represent solids as covers need them: a surface of triangles, and the depth of points inside.
 
 Everything here is in the solid's own frame, moved and scaled so that the solid is about one unit across; ``Frame``
-leads back.
+converts to and from the frame of the geometry.
 """
 
 from __future__ import annotations
@@ -18,7 +18,8 @@ from scipy.spatial import ConvexHull
 from rrtik_ompl.base.arrays import TAU, Matrix, Vector
 from rrtik_ompl.geometry.collision.solids import inside_mesh
 
-ROUNDING = 1e-12  # relative to the extent of the solid; far above float64's rounding, far below any length that matters
+# Allowance for rounding, relative to the extent of the solid: far above float64's, far below any length that matters.
+ROUNDING = 1e-12
 CYLINDER_SIDES = 64
 CORNERS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])  # of a cell
 
@@ -27,18 +28,24 @@ Triangles = NDArray[np.float64]  # shape (m, 3, 3): triangle, corner, coordinate
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Frame:
-    """Where the unit-sized solid stands: ``point = centre + scale * rotation @ local``."""
+    """The frame of a unit-sized solid: ``point = centre + scale * rotation @ local``."""
 
     centre: Vector
     rotation: Matrix
     scale: float
 
     def to_local(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Points, shape (..., 3), in the frame of the unit-sized solid."""
+        """Convert points of the geometry's frame, shape (..., 3), to the frame of the unit-sized solid."""
         return np.asarray((points - self.centre) @ self.rotation / self.scale)
 
     def spheres_out(self, spheres: Matrix, slack: float) -> Matrix:
-        """Spheres, shape (n, 4), in the geometry's frame, each radius grown by ``slack`` (relative) and rounding."""
+        """Convert spheres, shape (n, 4), to the geometry's frame.
+
+        Args:
+            spheres: Centres and radii in the frame of the unit-sized solid.
+            slack: Length relative to the solid's extent that is added to each radius, together with an allowance for
+                rounding; negative to shrink the spheres.
+        """
         centres = self.centre + self.scale * spheres[:, :3] @ self.rotation.T
         rounding = 4e-15 * float(np.abs(self.centre).max())
         grow = slack * self.scale + np.sign(slack) * rounding
@@ -46,34 +53,34 @@ class Frame:
 
 
 class Solid(Protocol):
-    """What a cover needs to know of a solid."""
+    """The properties of a solid that the search for a cover uses."""
 
     @property
     def triangles(self) -> Triangles:
-        """The surface, oriented; it may lie outside the true surface, never inside."""
+        """The outward-oriented surface, shape (m, 3, 3); it may lie outside the true surface, never inside."""
 
     @property
     def rim(self) -> Triangles:
-        """Caps, shape (b, 3, 3), that close an open surface; empty where it is closed."""
+        """Triangles that close an open surface, shape (b, 3, 3); empty for a closed one."""
 
     @property
     def enclosed(self) -> NDArray[np.float64]:
-        """Corners of boxes that an open surface encloses, shape (k, 8, 3); none where it is closed."""
+        """Corners of boxes that an open surface encloses, shape (k, 8, 3); none for a closed one."""
 
     @property
     def slack(self) -> float:
-        """How far the true solid may reach beyond ``triangles`` by rounding."""
+        """How far the true solid may reach beyond ``triangles`` because of rounding."""
 
     def depth(self, points: Matrix) -> Vector:
-        """Distance of points, shape (n, 3), to the surface, negative outside; rounding is on the safe side."""
+        """Return a lower bound, tight up to rounding, of the depth of points, shape (n, 3): negative outside."""
 
     def distance(self, points: Matrix) -> Vector:
-        """The same for points that are known to be inside; quicker."""
+        """Return the same as ``depth``, more quickly, for points that are known to be inside."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ConvexSolid:
-    """Convex hull of points; ``normals @ x <= offsets`` inside."""
+    """The convex hull of points: all x with ``normals @ x <= offsets``."""
 
     triangles: Triangles
     normals: Matrix
@@ -83,17 +90,17 @@ class ConvexSolid:
     enclosed: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 8, 3)))
 
     def depth(self, points: Matrix) -> Vector:
-        """Smallest distance to the planes."""
+        """Return the smallest distance of each point, shape (n, 3), to one of the planes, negative outside."""
         return np.asarray((self.offsets - points @ self.normals.T).min(axis=1) - self.slack)
 
     def distance(self, points: Matrix) -> Vector:
-        """The same."""
+        """Return the same as ``depth``."""
         return self.depth(points)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CylinderSolid:
-    """Cylinder about z; ``triangles`` is a prism around it."""
+    """A cylinder about z; ``triangles`` is the surface of a prism around it."""
 
     radius: float
     half_length: float
@@ -103,21 +110,22 @@ class CylinderSolid:
     enclosed: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 8, 3)))
 
     def depth(self, points: Matrix) -> Vector:
-        """Smallest distance to mantle and caps (outside: to the farther of the two)."""
+        """Return the distance of each point, shape (n, 3), to the surface of the cylinder, negative outside."""
         radial = self.radius - np.hypot(points[:, 0], points[:, 1])
         axial = self.half_length - np.abs(points[:, 2])
         outside = -np.hypot(np.minimum(radial, 0.0), np.minimum(axial, 0.0))
         return np.asarray(np.where(outside < 0.0, outside, np.minimum(radial, axial)) - ROUNDING)
 
     def distance(self, points: Matrix) -> Vector:
-        """The same."""
+        """Return the same as ``depth``."""
         return self.depth(points)
 
 
 class MeshSolid:
-    """A triangle mesh: its surface and, if that is closed, all points whose winding number is not 0; else ``enclosed``.
+    """A triangle mesh, taken as a solid.
 
-    Depth is measured to the surface and to the caps that close it, if it is open.
+    If the mesh is closed, the solid consists of all points whose winding number is not 0, otherwise of the surface and
+    the boxes ``enclosed``. For an open mesh, depth is measured to the surface and to the caps that close it.
     """
 
     slack = ROUNDING
@@ -132,12 +140,12 @@ class MeshSolid:
         self._indices = np.arange(len(self._corners)).reshape(-1, 3)
 
     def depth(self, points: Matrix) -> Vector:
-        """Distance to the surface, negative outside."""
+        """Return the distance of each point, shape (n, 3), to the surface and its caps, negative outside."""
         inside = np.array([inside_mesh(self._corners, self._indices, p) for p in points], dtype=bool)
         return np.asarray(np.where(inside, 1.0, -1.0) * (self.distance(points) + ROUNDING) - ROUNDING)
 
     def distance(self, points: Matrix) -> Vector:
-        """Distance to the surface."""
+        """Return the distance of each point, shape (n, 3), to the surface and its caps."""
         return np.asarray(np.array([self._distance(p) for p in points]) - ROUNDING)
 
     def _distance(self, point: Vector) -> float:
@@ -148,9 +156,9 @@ class MeshSolid:
 
 
 def convex_solid(points: Matrix) -> tuple[ConvexSolid, Frame]:
-    """The hull of points, shape (n, 3), in the frame of its principal axes.
+    """Return the convex hull of points, shape (n, 3), as a solid in the frame of its principal axes, and that frame.
 
-    The hull is found after stretching every axis to the same size, which keeps it sound for very thin solids.
+    The hull is computed after every axis is stretched to the same size, which keeps it accurate for very thin solids.
 
     Raises:
         ValueError: If the points lie in a plane.
@@ -186,7 +194,7 @@ def convex_solid(points: Matrix) -> tuple[ConvexSolid, Frame]:
 
 
 def cylinder_solid(radius: float, half_length: float) -> tuple[CylinderSolid, Frame]:
-    """A cylinder about z, inside a regular prism."""
+    """Return a cylinder about z as a solid, whose triangles are those of a regular prism around it, and its frame."""
     frame = Frame(np.zeros(3), np.eye(3), 2.0 * float(np.hypot(radius, half_length)))
     unit_radius = radius / frame.scale
     unit_half_length = half_length / frame.scale
@@ -196,7 +204,12 @@ def cylinder_solid(radius: float, half_length: float) -> tuple[CylinderSolid, Fr
 
 
 def _prism(ring: Matrix, high: float) -> Triangles:
-    """Outward triangles of a prism over a convex counter-clockwise ring."""
+    """Return the outward triangles of a prism, shape (m, 3, 3).
+
+    Args:
+        ring: Corners of its convex base in counter-clockwise order, shape (n, 2).
+        high: Half its height.
+    """
     low, top = (np.column_stack([ring, np.full(len(ring), z)]) for z in (-high, high))
     low_next = np.roll(low, -1, axis=0)
     top_next = np.roll(top, -1, axis=0)
@@ -209,12 +222,14 @@ def _prism(ring: Matrix, high: float) -> Triangles:
 
 
 def mesh_solid(vertices: Matrix, triangles: NDArray[np.int64], boxes: tuple[Matrix, Matrix]) -> tuple[MeshSolid, Frame]:
-    """A mesh and, if it is open, boxes that it encloses; degenerate triangles are kept, they are part of the surface.
+    """Return a mesh as a solid, and its frame.
+
+    Degenerate triangles are kept, as they are part of the surface.
 
     Args:
-        vertices: Shape (n, 3).
-        triangles: Vertex numbers, shape (m, 3).
-        boxes: Lowest and highest corners, shape (k, 3) each.
+        vertices: Vertices of the mesh, shape (n, 3).
+        triangles: Indices of vertices, shape (m, 3).
+        boxes: Lowest and highest corners of boxes that an open mesh encloses, shape (k, 3) each.
     """
     used_vertices, point_of_corner = np.unique(triangles, return_inverse=True)
     points, welded = np.unique(vertices[used_vertices], axis=0, return_inverse=True)
@@ -229,20 +244,21 @@ def mesh_solid(vertices: Matrix, triangles: NDArray[np.int64], boxes: tuple[Matr
 
 
 def _bounding_balls(triangles: Triangles) -> tuple[Matrix, Vector]:
-    """A ball around each triangle: centres, shape (m, 3), and radii, shape (m,)."""
+    """Return a ball around each triangle: centres, shape (m, 3), and radii, shape (m,)."""
     centres = 0.5 * (triangles.min(axis=1) + triangles.max(axis=1))
     return centres, np.linalg.norm(triangles - centres[:, None], axis=2).max(axis=1)
 
 
 def rim_caps(vertices: Matrix, faces: NDArray[np.int64]) -> Triangles:
-    """Triangles that close a surface: one for each edge that the orientations of its triangles leave open.
+    """Return triangles that close a surface, shape (b, 3, 3): one for each open edge.
 
-    The open edges form loops (the boundary of a boundary is empty), so coning each group of loops that hang together
-    to one point closes the surface. The open edge of a cap is the one opposite to its first corner.
+    An edge is open if the surface's oriented triangles do not pass it equally often in both directions. The open edges
+    form loops (the boundary of a boundary is empty), so the surface is closed by triangles that join the edges of each
+    connected group of loops to one point. The open edge of a cap is the one opposite to its first corner.
 
     Args:
-        vertices: Shape (n, 3), no two of them equal.
-        faces: Vertex numbers, shape (m, 3).
+        vertices: Vertices, no two of them equal, shape (n, 3).
+        faces: Indices of vertices, shape (m, 3).
     """
     start = faces.T.ravel()
     end = np.roll(faces, -1, axis=1).T.ravel()
@@ -265,7 +281,11 @@ def rim_caps(vertices: Matrix, faces: NDArray[np.int64]) -> Triangles:
 
 
 def _loop_centres(ends: NDArray[np.float64]) -> Matrix:
-    """For each edge, shape (b, 2, 3): the middle of all edges that hang together with it, shape (b, 3)."""
+    """Return for each edge the mean of the middles of all edges connected with it, shape (b, 3).
+
+    Args:
+        ends: Both ends of each edge, shape (b, 2, 3).
+    """
     _, number = np.unique(ends.reshape(-1, 3), axis=0, return_inverse=True)
     start, end = number.reshape(-1, 2).T
     size = int(number.max()) + 1
@@ -280,7 +300,11 @@ def _loop_centres(ends: NDArray[np.float64]) -> Matrix:
 
 
 def distance_to_triangles(points: Matrix, triangles: Triangles) -> Vector:
-    """Distance of each point, shape (n, 3), to its own triangle, shape (n, 3, 3)."""
+    """Return the distance of each point, shape (n, 3), to the triangle of the same index, shape (n, 3, 3).
+
+    It is the distance to the plane if the point projects into the triangle, otherwise the distance to the nearest edge.
+    Degenerate triangles are allowed.
+    """
     a = triangles[:, 0]
     b = triangles[:, 1]
     c = triangles[:, 2]
