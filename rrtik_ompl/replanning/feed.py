@@ -1,6 +1,6 @@
 """The scene over time: from the motions that a scene states, from a function, or from a stream of snapshots.
 
-What was seen has an age: an obstacle may have gone on since then, as far as its speed allows.
+A snapshot has an age: an obstacle may have gone on since it was seen, as far as its speed allows.
 """
 
 from __future__ import annotations
@@ -16,20 +16,20 @@ import numpy as np
 from rrtik_ompl.base.errors import InputError, called, require
 from rrtik_ompl.model.scene import Scene
 
-SILENCE_SECONDS = 2.0  # without a new scene, after which a run ends
-TIME_RESOLUTION = 1e-6  # [s]: a double holds a time since 1970 to a quarter of it
-LATEST = 1e11  # [s]: a clock in seconds is there in three thousand years
+SILENCE_SECONDS = 2.0  # A run ends after so long without a new scene [s].
+TIME_RESOLUTION = 1e-6  # [s]: a double holds a time since 1970 to a quarter of this
+LATEST = 1e11  # [s]: a clock that counts seconds reaches this in three thousand years
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Snapshot:
-    """A scene as it was seen, and when; it can be taken apart as a pair of a time and a scene.
+    """A scene and the time at which it was seen; it unpacks as a pair of time and scene.
 
     Attributes:
-        time: When it was taken [s].
-        scene: What was seen.
-        unseen: For obstacles that were out of view then: how long before they had been seen last [s].
-        stated: Whether the scene states how its obstacles move; those without a motion are at rest.
+        time: Time at which the scene was taken [s].
+        scene: The scene that was seen.
+        unseen: For each obstacle that was out of view then, how long before ``time`` it was seen last [s].
+        stated: Whether the scene states how its obstacles move; then obstacles without a motion are at rest.
 
     Example:
         >>> from rrtik_ompl.replanning.feed import Snapshot
@@ -53,21 +53,21 @@ class Snapshot:
         return 2
 
     def seen_at(self, name: str) -> float:
-        """When an obstacle was seen last [s]."""
+        """Return the time at which an obstacle was seen last [s]."""
         return self.time - self.unseen.get(name, 0.0)
 
     def ages(self, now: float) -> dict[str, float]:
-        """How long ago each obstacle was seen [s]."""
+        """Return how long ago each obstacle was seen last [s], by name."""
         return {o.name: max(now - self.seen_at(o.name), 0.0) for o in self.scene.obstacles}
 
 
 Feed: TypeAlias = Callable[[float], Scene]
 Source: TypeAlias = Scene | Feed | Iterable[tuple[float, Scene] | Snapshot]
-Watch: TypeAlias = Callable[[float], Snapshot]  # what was seen last at a time
+Watch: TypeAlias = Callable[[float], Snapshot]  # returns the last snapshot that is not later than a time
 
 
 def feed_of(source: Source, patience: float = SILENCE_SECONDS) -> Watch:
-    """What was seen last at a time, from any kind of source.
+    """Return a function from a time [s] to the last snapshot then, from any kind of source.
 
     Args:
         source: A scene whose obstacles state their motion; a function from a time [s] to the scene at that time; or
@@ -75,7 +75,7 @@ def feed_of(source: Source, patience: float = SILENCE_SECONDS) -> Watch:
         patience: How far apart the first two of such pairs may be [s].
 
     Raises:
-        InputError: If it is none of these; later, if its times cannot be.
+        InputError: If the source is none of these. The function raises it later if times are impossible.
     """
     if isinstance(source, Scene):
         return lambda time: Snapshot(time, source.at(time), stated=True)
@@ -88,7 +88,7 @@ def feed_of(source: Source, patience: float = SILENCE_SECONDS) -> Watch:
 
 
 def _checked(source: Feed) -> Watch:
-    """A function of time whose results are checked."""
+    """Return a function that calls ``source`` and checks that it returns a scene."""
 
     def at(time: float) -> Snapshot:
         scene = source(time)
@@ -99,9 +99,9 @@ def _checked(source: Feed) -> Watch:
 
 
 class Stream:
-    """Snapshots one after the other; called with a time, the last one that is not later.
+    """A stream of snapshots; called with a time, it returns the last snapshot that is not later.
 
-    Their times are counted from the first one and read to a microsecond, so that any clock will do.
+    Times are counted from the first snapshot and rounded to a microsecond, so any clock in seconds may be used.
     """
 
     def __init__(self, snapshots: Iterable[tuple[float, Scene] | Snapshot], patience: float = SILENCE_SECONDS) -> None:
@@ -121,11 +121,11 @@ class Stream:
         self._has_ended = False
 
     def __call__(self, time: float) -> Snapshot:
-        """The last snapshot that is not later than ``time`` [s].
+        """Return the last snapshot that is not later than ``time`` [s].
 
         Raises:
-            InputError: If a snapshot is no pair of a time and a scene, or not later than the one before it; if the
-                second one is so much later than the first that no run could wait for it.
+            InputError: If a snapshot is no pair of a time and a scene, or not later than the one before it, or if the
+                second one is later than the first by more than the patience.
         """
         while True:
             if self._next is None and not self._has_ended:
@@ -137,7 +137,7 @@ class Stream:
             self._next = None
 
     def _read(self) -> Snapshot | None:
-        """The next snapshot, its time counted from the first one."""
+        """Read the next snapshot, with its time counted from the first one; None at the end of the stream."""
         snapshot = next(self._remaining, None)
         if snapshot is None:
             return None
@@ -159,7 +159,7 @@ class Stream:
 
 
 def _snapshot(item: object) -> Snapshot:
-    """A snapshot, or a pair of a time and a scene, checked."""
+    """Check an item of a stream, a snapshot or a pair of a time and a scene, and return it as a snapshot."""
     pair = (item.time, item.scene) if isinstance(item, Snapshot) else item
     match pair:
         case (float() | int() | np.number() as time, Scene() as scene) if np.isfinite(time):
@@ -170,16 +170,16 @@ def _snapshot(item: object) -> Snapshot:
 
 Answer = TypeVar("Answer")
 
-PATIENCE_SECONDS = 30.0  # far more than any picture takes, on a busy machine too
+PATIENCE_SECONDS = 30.0  # far more than any camera picture takes, on a busy machine too
 
 
 class PatientFeed(Generic[Answer]):
-    """A function of time that is made and called in one thread; use it as a context manager.
+    """A function of time that is made and called in a thread of its own, with a time limit; a context manager.
 
     Args:
-        made: Makes the function; that may already wait for a first picture.
-        patience: How long an answer may take [s], by the wall clock.
-        what: Its name, for messages.
+        made: Makes the function; making it may already wait for a first camera picture.
+        patience: How long an answer may take in wall time [s].
+        what: Name of the feed, for messages.
     """
 
     def __init__(self, made: Callable[[], Callable[[float], Answer]], patience: float, what: str) -> None:
@@ -198,10 +198,10 @@ class PatientFeed(Generic[Answer]):
         self._times.put(None)
 
     def __call__(self, time: float) -> Answer:
-        """The answer for a time [s]; what the function raises is raised here.
+        """Return the function's answer for a time [s]; an exception of the function is raised here.
 
         Raises:
-            InputError: If there is no answer in time; the thread is given up then.
+            InputError: If there is no answer in time; the thread is abandoned then.
         """
         self._times.put(time)
         try:

@@ -1,6 +1,6 @@
 """The record of a run: every tick with configuration, path, poses of obstacles and times; written and read as JSON.
 
-Of the scenes that were seen it holds each shape once, and else only what has changed.
+Each shape of the seen scenes is written once, and of each scene only what differs from the scene before it.
 """
 
 from __future__ import annotations
@@ -35,9 +35,9 @@ from rrtik_ompl.replanning.tick import Tick
 from rrtik_ompl.world.problem import Problem
 
 KIND = "replan_run"
-NOWHERE = np.full(3, np.nan)  # a fault tells of no place
-MOST_POINTS = 2_000_000  # of all clouds that a record keeps
-MAX_RECORD_BYTES = 512 * 1024 * 1024  # bytes of a record, half an hour of 20 obstacles at 50 Hz
+NOWHERE = np.full(3, np.nan)  # Violations have no known point of contact.
+MOST_POINTS = 2_000_000  # number of points in all clouds that a record keeps
+MAX_RECORD_BYTES = 512 * 1024 * 1024  # size of a record, enough for half an hour of 20 obstacles at 50 Hz
 EVENTS: tuple[TickEvent, ...] = get_args(TickEvent)
 OUTCOMES: tuple[RunOutcome, ...] = get_args(RunOutcome)
 
@@ -49,13 +49,14 @@ class ReplanRun:
     """The record of a robot that moved to its goal through a scene that changes.
 
     Attributes:
-        problem, robot, joint_names, planner, seed: What ran.
+        problem, robot, joint_names, planner, seed: Names of the problem, robot, joints and planner, and the seed.
         step, rate, margin, speed_bound: As given to :func:`replan` [unit of the space, Hz, m, m/s].
-        ticks: One after the other.
-        clearance: What moves that are proven keep from obstacles beside ``margin`` [m]; None in old records.
-        scenes: What was seen, in the order of time; a scene that states its motions stands for all times.
-        scenes_end: From when on scenes are not kept, since their clouds of points were too large [s]; inf if all are.
-        outcome: One of ``OUTCOMES``; "no scene": the feed had nothing new for too long.
+        ticks: The ticks in the order of time.
+        clearance: Distance that proven moves keep from obstacles in addition to ``margin`` [m]; None in old records.
+        scenes: The scenes that were seen, in the order of time; a scene that states its motions stands for all times.
+        scenes_end: Time from which on scenes were not kept, because their point clouds were too large [s]; inf if all
+            were kept.
+        outcome: One of ``OUTCOMES``; "no scene" means that the feed had nothing new for too long.
         reason: Why the robot has not arrived, or "".
 
     Example:
@@ -85,7 +86,11 @@ class ReplanRun:
     reason: str = ""
 
     def see(self, seen: Snapshot) -> None:
-        """Keep what was seen, if it is new."""
+        """Add a snapshot to ``scenes`` if it is new.
+
+        Nothing is added after a scene that states its motions, or once the clouds of the record are too large. If the
+        same scene was seen three times running, the second of the three is replaced.
+        """
         scenes = self.scenes
         if seen.time >= self.scenes_end or (scenes and (scenes[0].stated or seen.time <= scenes[-1].time)):
             return
@@ -93,25 +98,25 @@ class ReplanRun:
         if self._points > MOST_POINTS and scenes:
             self.scenes_end = seen.time
         elif len(scenes) > 1 and scenes[-2].scene is scenes[-1].scene is seen.scene and not seen.unseen:
-            scenes[-1] = seen  # all has stayed where it was
+            scenes[-1] = seen  # Nothing has moved, so only the time of the last sighting matters.
         else:
             scenes.append(seen)
 
     def violations(self, problem: Problem, truth: Scene | Feed | None = None) -> tuple[RunViolation, ...]:
-        """What touches in the run, judged anew: at every time, not in steps, by coal and a bound on the motion.
+        """Judge the run independently and return the pairs of bodies that were too near.
 
-        In a tick the arm goes straight from one configuration to the next. Obstacles go as their scene states, or
-        straight from where they were seen to where they were seen next; after the last time they stay. Moves that
-        are called proven have to keep margins and the clearance, all else must not touch. Nothing of
-        :class:`MovingWorld` is used.
+        The check holds at every time, not only at steps, by coal and a bound on the motion. Within a tick the arm goes
+        straight from one configuration to the next. Obstacles move as their scene states, or straight from each pose
+        where they were seen to the next; after the last one they stay. Moves that are called proven have to keep
+        margins and clearance; all others only must not touch. :class:`MovingWorld` is not used.
 
         Args:
-            problem: That was run: its robot, and the scene of a record that has none.
+            problem: The problem that was run: it gives the robot, and the scene if the record has none.
             truth: Where obstacles really were, if that is known: a scene that states their motion, or a function of
                 time [s]; what was seen if None.
 
         Returns:
-            For each tick and pair the place where most is lacking, in the order of time.
+            For each tick and pair the violation in which most distance is missing, in the order of time.
 
         Raises:
             InputError: If the run is another robot's, or its scenes were too large to be kept.
@@ -130,10 +135,10 @@ class ReplanRun:
         return run_violations(self.ticks, self.scenes, problem, clearance=clearance, truth=truth)
 
     def judged(self, problem: Problem | None) -> Judged:
-        """What is said of the run where it is replayed: what its record calls proven, and :meth:`violations`.
+        """Return the judgement that a replay of the run shows: what its record calls proven, and :meth:`violations`.
 
         Args:
-            problem: That was run; None if it is not known, and nothing is judged anew.
+            problem: The problem that was run; None if it is not known, and then there are no violations.
         """
         made, proven = self.moves
         unproven_ticks = {k for k, tick in enumerate(self.ticks) if tick.proven is False}
@@ -149,7 +154,7 @@ class ReplanRun:
                 text += f"; not judged anew: {error}"
 
         unproven_ticks |= {each.tick for each in violations}
-        last_drawn = len(self.ticks) - 2  # from the last tick on nothing is drawn
+        last_drawn = len(self.ticks) - 2  # No move begins at the last tick, so it has nothing to draw.
         drawn = tuple(sorted({min(k, last_drawn) for k in unproven_ticks} if last_drawn >= 0 else ()))
         contacts = tuple(_contact(each) for each in violations)
         return Judged(Verdict(made > 0 and proven == made and not violations, text, drawn), None, contacts)
@@ -175,22 +180,27 @@ class ReplanRun:
         return route_length(self.configurations) if self.ticks else 0.0
 
     def count(self, event: TickEvent) -> int:
-        """Number of ticks of a kind."""
+        """Return the number of ticks with an event."""
         return sum(tick.event == event for tick in self.ticks)
 
     @property
     def moves(self) -> tuple[int, int]:
-        """Number of the motions from one tick to the next that were made, and how many of them are proven."""
+        """How many motions from one tick to the next were made, and how many of them are proven."""
         made = [tick.proven for tick in self.ticks if tick.proven is not None]
         return len(made), sum(made)
 
     def seconds(self, part: str, *events: TickEvent) -> NDArray[np.float64]:
-        """Wall times of a part of the ticks (of some kinds alone) that have it [s], shape (m,)."""
+        """Return the wall times of a part of the ticks [s], shape (m,), for the ticks that have this part.
+
+        Args:
+            part: A key of :attr:`Tick.seconds`, such as "repair".
+            events: Only ticks with one of these events count; all ticks if none is given.
+        """
         chosen = [tick for tick in self.ticks if not events or tick.event in events]
         return np.array([tick.seconds[part] for tick in chosen if part in tick.seconds])
 
     def summary(self) -> str:
-        """What has become of the run, in one line: outcome, repairs, waits, evasions, length and what is proven."""
+        """Return one line on the run: outcome, numbers of repairs, waits and evasions, length, and proven moves."""
 
         def counted(event: TickEvent, noun: str) -> str:
             number = self.count(event)
@@ -207,7 +217,13 @@ class ReplanRun:
         return f"{end}: {events}, length {self.length:.2f}{proven_moves}"
 
     def figures(self) -> dict[str, Any]:
-        """The run in numbers, for JSON: outcome, times [s], counts of events, length, and wall times of repairs [s]."""
+        """Return the run in numbers, for JSON.
+
+        Returns:
+            Names, seed, outcome and reason; "seconds", the time at the last tick [s]; "length" of the motion; the
+            number of ticks for each event; "moves" and "moves_proven"; "repair_median" and "repair_p95", the wall times
+            of repairs [s], None without any.
+        """
         repairs = self.seconds("repair", "repair")
         return {
             **{name: getattr(self, name) for name in ("problem", "robot", "planner", "seed", "outcome", "reason")},
@@ -239,7 +255,7 @@ _HEADS += ("speed_bound", "outcome", "reason")
 
 
 def _contact(fault: RunViolation) -> PathContact:
-    """A fault as what is drawn red in its tick."""
+    """Return a violation as a contact that a replay draws red during its tick."""
     contact = Contact(fault.first, fault.second, fault.distance, NOWHERE, NOWHERE, fault.required_distance)
     names = frozenset((fault.first, fault.second))
     return PathContact(float(fault.tick), float(fault.tick + 1), contact, names)
@@ -270,7 +286,7 @@ def load_run(path: str | os.PathLike[str]) -> ReplanRun:
 
 
 def _heads(document: Mapping[str, Any]) -> dict[str, Any]:
-    """What a record says beside its ticks, each entry of the right kind."""
+    """Return the checked entries of a record other than ticks and scenes, as arguments of :class:`ReplanRun`."""
     heads = {name: document[name] for name in _HEADS}
 
     for name in ("problem", "robot", "planner", "outcome", "reason"):
@@ -284,7 +300,7 @@ def _heads(document: Mapping[str, Any]) -> dict[str, Any]:
         positive(heads["speed_bound"], "speed_bound")
 
     outcome = one_of(OUTCOMES, heads["outcome"], "outcome")
-    clearance = document.get("clearance")  # older records have none
+    clearance = document.get("clearance")  # Older records do not have this entry.
     heads["clearance"] = None if clearance is None else not_negative(clearance, "clearance")
     if "scenes_end" in document:
         heads["scenes_end"] = finite_number(document["scenes_end"], "scenes_end")
@@ -292,7 +308,7 @@ def _heads(document: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _check_times(ticks: list[Tick]) -> None:
-    """Raise unless there are ticks in the order of time."""
+    """Raise an error unless there is a tick and the times of the ticks increase."""
     if not ticks:
         raise InputError("the record has no tick; run it again")
     for before, after in pairwise(ticks):
@@ -324,7 +340,7 @@ def _tick(entry: Mapping[str, Any], joints: int) -> Tick:
 
 
 def _pose_row(values: ArrayLike, name: str) -> Vector:
-    """x, y, z and a unit quaternion of an obstacle or attached object, as written."""
+    """Check the pose of an obstacle or attached object and return it as written: x, y, z, quaternion; shape (7,)."""
     what = f"pose of '{name}'"
     row = finite_array(values, (7,), what)
     pose(row[:3], row[3:], what)
@@ -332,15 +348,21 @@ def _pose_row(values: ArrayLike, name: str) -> Vector:
 
 
 def _new_points(snapshot: Snapshot, before: Snapshot | None) -> int:
-    """How many points the clouds of a scene have that were not in the one before it."""
+    """Return the number of points in the clouds of a scene that are not shapes of the scene before it."""
     known_shapes = set[int]() if before is None else {id(o.shape) for o in before.scene.obstacles}
     clouds = (o.shape for o in snapshot.scene.obstacles if isinstance(o.shape, PointCloud))
     return sum(len(cloud.points) for cloud in clouds if id(cloud) not in known_shapes)
 
 
 def scenes_data(snapshots: Sequence[Snapshot]) -> Json:
-    """Shapes and snapshots for JSON; of a snapshot only the obstacles that differ from the one before it."""
-    shapes: dict[int, Json] = {}  # by identity: a cloud need not be compared
+    """Return snapshots for JSON, each only with what differs from the snapshot before it.
+
+    Returns:
+        "shapes", a list of all shapes, and "scenes", a list of entries whose obstacles refer to shapes by their number
+        in that list.
+    """
+    # Shapes are told apart by identity, so that large clouds need not be compared.
+    shapes: dict[int, Json] = {}
     numbers: dict[int, int] = {}
 
     def number_of(shape: Shape) -> int:
@@ -376,10 +398,13 @@ def scenes_data(snapshots: Sequence[Snapshot]) -> Json:
 
 
 def scenes_of(document: Mapping[str, Any]) -> list[Snapshot]:
-    """The snapshots of a record; none if it has none.
+    """Return the snapshots of a record, the inverse of :func:`scenes_data`; an old record has none.
+
+    An entry holds only what differs from the one before it, so obstacles, allowed pairs and contacts are carried on
+    from entry to entry.
 
     Raises:
-        InputError: If one is malformed.
+        InputError: If a snapshot is malformed.
     """
     if "scenes" not in document:
         return []
@@ -413,7 +438,7 @@ def scenes_of(document: Mapping[str, Any]) -> list[Snapshot]:
 
 @lru_cache
 def _arguments(kind: type[Shape]) -> tuple[str, ...]:
-    """Names of the numbers that make a shape: attributes that its class is called with."""
+    """Return the names of the constructor's arguments of a shape that are also its fields, without "source"."""
     own = {f.name for f in fields(kind)}  # type: ignore[arg-type]
     return tuple(name for name in inspect.signature(kind).parameters if name in own and name != "source")
 
@@ -424,7 +449,7 @@ def _shape_data(shape: Shape) -> Json:
 
 
 def _plain(value: object) -> object:
-    """Numbers as JSON has them; NaN, for a column that is not there, as null."""
+    """Return a value as JSON can hold it: arrays as lists, with null for NaN (a missing column of a height map)."""
     if not isinstance(value, np.ndarray):
         return value
     if np.issubdtype(value.dtype, np.integer) or np.isfinite(value).all():

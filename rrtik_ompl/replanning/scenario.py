@@ -26,12 +26,12 @@ SETTINGS = {field.name for field in fields(ReplanSettings)}
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scenario:
-    """What is needed for a run.
+    """A problem among moving obstacles, with the settings to replan in it.
 
     Attributes:
         problem: Robot, scene with its motions, start and goal.
         settings: Steps, ticks, distances and limits.
-        goal_feed: A goal that moves, or None.
+        goal_feed: Function from a time [s] to the configuration of a moving goal, or None.
 
     Example:
         >>> scenario = rrtik.load_scenario("replan_planar_arm")
@@ -55,10 +55,10 @@ class Scenario:
         """Replan, with some settings changed; see :func:`rrtik_ompl.replanning.replan`.
 
         Args:
-            scene_feed: This and the next three: see :func:`rrtik_ompl.replanning.replan`.
-            record: The same.
-            clock: The same.
-            feed_patience: The same.
+            scene_feed: See :func:`rrtik_ompl.replanning.replan`.
+            record: See :func:`rrtik_ompl.replanning.replan`.
+            clock: See :func:`rrtik_ompl.replanning.replan`.
+            feed_patience: See :func:`rrtik_ompl.replanning.replan`.
             changes: Attributes of :class:`rrtik_ompl.replanning.ReplanSettings` that differ from the scenario's.
 
         Raises:
@@ -80,7 +80,7 @@ def load_scenario(name_or_file: str | os.PathLike[str], *, trust_xacro: bool = F
         trust_xacro: Whether the macros of a robot's file are trusted, see `load_robot`.
 
     Raises:
-        InputError: If the file cannot be used or has no such section; one line with file, key and remedy.
+        InputError: If the file cannot be used or has no such section; the message has file, key and remedy in one line.
         ProblemError: If start or goal is in collision or outside the limits.
 
     Example:
@@ -98,7 +98,7 @@ def load_scenario(name_or_file: str | os.PathLike[str], *, trust_xacro: bool = F
 
 
 def _settings(entry: RunSection, robot: Robot) -> ReplanSettings:
-    """The settings of a file; what it leaves out is as in :class:`ReplanSettings`.
+    """Return the settings of a file's ``run:`` section, with limits for the given robot.
 
     Raises:
         InputError: If a setting does not fit the robot.

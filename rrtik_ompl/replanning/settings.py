@@ -23,8 +23,10 @@ from rrtik_ompl.world.moving_world import MovingWorld
 REPLANNERS: dict[Replanner, type[DrrtCon]] = {each.name: each for each in (DrrtCon, FromScratch, SingleTree)}
 PLANNERS: tuple[Replanner, ...] = tuple(REPLANNERS)
 MAX_RATE = 1e5  # [Hz]
-MIN_EDGE_SHARE = 1e-3  # of the usual max_edge: a path is checked in pieces of half of it, which must fit into memory
-PREDICTED_PLACES = 3  # places of an obstacle that are avoided at once where its motion is predicted
+# The least max_edge, as a share of the usual one. A path is checked in pieces of half max_edge, and all of them must
+# fit into memory.
+MIN_EDGE_SHARE = 1e-3
+PREDICTED_PLACES = 3  # number of places of an obstacle that are avoided at once if its motion is predicted
 
 _POSITIVE = {
     "step": "how far to go in a tick [rad or m]",
@@ -42,23 +44,23 @@ class ReplanSettings:
 
     Attributes:
         step: How far the robot goes in a tick [rad, metres counted alike], unless its joints are too slow.
-        rate: Ticks a second [Hz].
+        rate: Number of ticks per second [Hz].
         planner: One of ``PLANNERS``.
-        max_edge: Longest edge of the trees [as step]; what suits the robot's range if None.
+        max_edge: Longest edge of the trees [unit of ``step``]; a length that suits the robot's range if None.
         margin: Distance to obstacles that is always kept [m].
-        clearance: What motions are proven to keep from obstacles beside ``margin`` [m], if they are; 1 mm if None, or
-            half the world's motion resolution if that is less. Searches keep one that is stated, too.
-        speed_bound: No point of an obstacle is faster [m/s]. One that is gives a ``SpeedWarning``.
-        limits: Of the joints' speeds; those of the robot if None. Accelerations are not considered.
-        lookahead_ticks: Predict the obstacles' motion this many ticks ahead: they are avoided where they will be then
-            and half-way, by the motion that the scene states or else by their velocity. 0: no prediction, as
-            published.
-        seconds: Simulated time at most [s].
+        clearance: Distance to obstacles that proven motions keep in addition to ``margin`` [m]; if None, 1 mm or half
+            the world's motion resolution, whichever is less. If it is given, searches keep it too.
+        speed_bound: Speed that no point of an obstacle exceeds [m/s]. If one does, there is a ``SpeedWarning``.
+        limits: Speed limits of the joints; those of the robot if None. Accelerations are not considered.
+        lookahead_ticks: How many ticks ahead the motion of obstacles is predicted, by the motion that the scene states
+            or else by the measured velocity. Obstacles are then avoided where they are now, where they will be then,
+            and at half that time. 0 means no prediction, as published.
+        seconds: Largest simulated time [s].
         repair_budget: Time that a repair may take [s]; one tick if None.
         seed: The same seed gives the same run, as long as no repair is cut short by its budget.
 
     Raises:
-        InputError: If a number is out of range; it names the setting and the remedy.
+        InputError: If a number is out of range; the message names the setting and the remedy.
         UnknownNameError: If there is no planner of that name.
     """
 
@@ -106,7 +108,7 @@ class ReplanSettings:
         return self.tick if self.repair_budget is None else self.repair_budget
 
     def max_change(self, robot: Robot) -> Vector:
-        """How far each joint of a robot can move in a tick [rad or m], shape (n,).
+        """Return how far each joint of a robot can move in a tick [rad or m], shape (n,).
 
         Raises:
             InputError: If the limits are for another number of joints.
@@ -115,7 +117,7 @@ class ReplanSettings:
         return rates.velocity / self.rate
 
     def edge_length(self, robot: Robot) -> float:
-        """Longest edge of the trees for a robot [unit of the space].
+        """Return the longest edge of the trees for a robot [unit of the space].
 
         Raises:
             InputError: If ``max_edge`` is far too small for the robot's range.
@@ -132,11 +134,11 @@ class ReplanSettings:
 
 
 def refuse_renamed(options: Mapping[str, object]) -> None:
-    """Refuse settings by names that they no longer have.
+    """Refuse keyword arguments that are no settings, or are old names of settings; do nothing if there are none.
 
     Raises:
-        InputError: It names the old name and the new one.
-        TypeError: If a name never was one of a setting.
+        InputError: If a name is the old name of a setting; the message gives the new one.
+        TypeError: If a name never was the name of a setting.
     """
     for name in options:
         if name in RENAMED:
@@ -145,7 +147,14 @@ def refuse_renamed(options: Mapping[str, object]) -> None:
 
 
 def make_planner(settings: ReplanSettings, world: MovingWorld, lower: Vector, upper: Vector) -> DrrtCon:
-    """The replanner of the name, for a world and a box of configurations to sample in."""
+    """Make the replanner that the settings name, in kernels where the world has them.
+
+    Args:
+        settings: Name, seed and longest edge of the replanner.
+        world: The world that checks motions.
+        lower: Lower corner of the box to sample in, shape (n,).
+        upper: Upper corner of the box to sample in, shape (n,).
+    """
     options = TreeOptions(lower, upper, settings.edge_length(world.robot), settings.seed)
     kind = REPLANNERS[settings.planner]
     cuts = KernelCuts(world, settings.seed) if has_kernels(world, *KERNELS) else None

@@ -1,6 +1,6 @@
-"""How far obstacles may have gone since they were seen, and where they will be: as they state, or as was measured.
+"""How far obstacles may have travelled since they were seen, and where they will be.
 
-What was seen has an age: an obstacle may have gone on since then, as far as its speed allows.
+Both follow from the motion that an obstacle states, or else from the velocity that was measured between two sightings.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from rrtik_ompl.model.scene import ConstantVelocity, Obstacle, Scene, TimedPoses
 from rrtik_ompl.model.shapes import same_shape
 from rrtik_ompl.replanning.feed import TIME_RESOLUTION, Snapshot
 
-SPEED_WARNING_RATIO = 1.0 + 1e-6  # of a speed to the bound, above which a warning is given
-ROUNDING = 1e-9  # [m]: of places that are computed from times
-ROTATION_NOISE = 1e-9  # [rad] between two snapshots; less is rounding
+SPEED_WARNING_RATIO = 1.0 + 1e-6  # ratio of a speed to the bound above which a warning is given
+ROUNDING = 1e-9  # [m]: rounding of places that are computed from times
+ROTATION_NOISE = 1e-9  # [rad]: a smaller rotation between two snapshots is rounding
 
 
 class SpeedWarning(UserWarning):
@@ -33,12 +33,17 @@ class MotionTracker:
     """Measures how fast obstacles move between two sightings, and predicts where they will be.
 
     Attributes:
-        speeds: Largest speed measured so far of each obstacle that has moved [m/s]: no point of it was faster.
-        faster_since: Since when an obstacle was faster than the bound, as the last update has shown [s]; inf if none.
+        speeds: Largest speed measured so far of each obstacle that has moved [m/s]; a bound for all of its points.
+        faster_since: Time since when an obstacle was faster than the bound, as the last update showed [s]; inf if none
+            was.
+
+    Args:
+        scene: The first scene, which gives the shapes.
+        bound: Largest speed that was stated for obstacles [m/s]; None if none was.
     """
 
     def __init__(self, scene: Scene, bound: float | None) -> None:
-        # a point's distance from its obstacle's origin counts where the obstacle turns
+        # The largest distance of a point of each obstacle from its origin [m] bounds the way of its points in a turn.
         self._radii = {o.name: farthest(o.shape, pin.SE3.Identity()) for o in scene.obstacles}
         self._bound = bound
         self._warned = set[str]()
@@ -49,7 +54,11 @@ class MotionTracker:
         self.faster_since = float("inf")
 
     def update(self, seen: Snapshot) -> bool:
-        """Measure what was seen; whether anything about the obstacles is new (at the first call: True)."""
+        """Measure speeds from a new snapshot and return whether anything about the obstacles has changed.
+
+        Names, shapes, poses and margins are compared with those of the last sighting; the first call returns True if
+        there are obstacles. Warns once for each obstacle that is faster than the bound.
+        """
         changed = {o.name for o in seen.scene.obstacles} != self._sightings.keys()
         self.faster_since = float("inf")
 
@@ -61,7 +70,8 @@ class MotionTracker:
             moved = not np.array_equal(last_seen.pose.homogeneous, obstacle.pose.homogeneous)
             changed |= reshaped or moved or obstacle.margin != last_seen.margin
 
-            if reshaped:  # a cloud that was seen anew: its points may have moved
+            # A cloud that was seen anew has new points, which may have moved; its speed cannot be measured.
+            if reshaped:
                 self.speeds.setdefault(name, 0.0)
                 self._reshaped.add(name)
             if time > last_time:
@@ -73,12 +83,15 @@ class MotionTracker:
         return changed
 
     def later(self, scene: Scene, seconds: float, ages: Mapping[str, float] | None = None) -> Scene:
-        """Where the obstacles of the last scene will be: by the motion that they state, or else by their velocity.
+        """Predict the scene at a later time, by the motion that each obstacle states or else by its velocity.
 
         Args:
-            scene: The last one.
-            seconds: From now [s].
-            ages: How long ago obstacles were seen [s]; now if it does not say.
+            scene: The last scene.
+            seconds: How far ahead to predict, from now [s].
+            ages: How long ago obstacles were seen [s], by name; 0 for those that are not in it.
+
+        Returns:
+            The scene with obstacles at their predicted poses; those with neither motion nor velocity stay.
         """
         age_of_obstacle = ages or {}
         return replace(
@@ -87,7 +100,7 @@ class MotionTracker:
         )
 
     def _predicted(self, obstacle: Obstacle, seconds: float) -> Obstacle:
-        """An obstacle where it will be, so long after it was seen [s]."""
+        """Return an obstacle at its predicted pose, ``seconds`` after it was seen [s]."""
         if obstacle.motion is not None:
             pose = obstacle.motion.pose_at(obstacle.pose, seconds)
             return replace(obstacle, pose=pose, motion=obstacle.motion.seen_from(seconds))
@@ -96,7 +109,7 @@ class MotionTracker:
         return replace(obstacle, pose=pin.SE3(*_extrapolated(obstacle.pose, self._velocities[obstacle.name], seconds)))
 
     def unforeseen(self, seconds: float) -> dict[str, float]:
-        """How far obstacles whose motion nobody can predict may go in a time [s]: clouds that are seen anew [m]."""
+        """Return how far clouds whose points have changed, which cannot be predicted, may go in a time [s] [m]."""
         return dict.fromkeys(self._reshaped, (self._bound or 0.0) * seconds)
 
     def _measure(self, obstacle: Obstacle, old_pose: pin.SE3, last_time: float, now: float) -> None:
@@ -124,15 +137,15 @@ class MotionTracker:
 
 
 def turns_without_end(name: str) -> InputError:
-    """The error that no speed bounds the points of an obstacle."""
+    """Return the error for an unbounded obstacle that turns, so that no speed bounds its points."""
     return InputError(f"obstacle '{name}' has no end and turns: no bound on its way; use a box in its place")
 
 
 def refuse_endless_turns(scene: Scene) -> None:
-    """Refuse a scene in which an obstacle without an end states a motion that turns it.
+    """Refuse a scene in which an unbounded obstacle, such as a half-space, states a motion that turns it.
 
     Raises:
-        InputError: It names the obstacle.
+        InputError: If there is one; the message names it.
     """
     for obstacle in scene.obstacles:
         if obstacle.shape.bounded or not isinstance(obstacle.motion, TimedPoses):
@@ -144,7 +157,7 @@ def refuse_endless_turns(scene: Scene) -> None:
 
 
 def speed_warning(name: str, speed: float, time: float, bound: float) -> str:
-    """The warning that an obstacle is faster than the bound."""
+    """Return the text of the warning that an obstacle is faster than the bound [m/s] at a time [s]."""
     return (
         f"obstacle '{name}' moves at {speed:.3g} m/s at {time:.3g} s, faster than the stated speed_bound of "
         f"{bound:g} m/s: a contact cannot be ruled out; raise speed_bound"
@@ -152,18 +165,18 @@ def speed_warning(name: str, speed: float, time: float, bound: float) -> str:
 
 
 def required_distances(scene: Scene, margin: float, travels: Mapping[str, float]) -> dict[str, float]:
-    """Distance that the arm keeps to each obstacle, beyond its own margin: the given one plus its travel [m]."""
+    """Return the distance to keep from each obstacle beyond its own margin [m]: ``margin`` plus its travel."""
     return {o.name: margin + travels[o.name] for o in scene.obstacles}
 
 
 def stated_way(obstacle: Obstacle, seconds: float) -> float:
-    """How far a point of an obstacle goes at most from time 0 on, by the motion that it states [m]."""
+    """Return an upper bound on the way of any point of an obstacle until a time [s], by its stated motion [m]."""
     motion = obstacle.motion
     if motion is None:
         return 0.0
 
     times = [0.0, seconds]
-    if isinstance(motion, TimedPoses):  # it may turn at its own times
+    if isinstance(motion, TimedPoses):  # The motion may change its direction at its own times.
         times[1:1] = motion.times[(motion.times > 0.0) & (motion.times < seconds)].tolist()
     poses = [motion.pose_at(obstacle.pose, time) for time in times]
     radius = farthest(obstacle.shape, pin.SE3.Identity())
@@ -171,12 +184,15 @@ def stated_way(obstacle: Obstacle, seconds: float) -> float:
 
 
 def travel_bound(a: pin.SE3, b: pin.SE3, radius: float) -> float:
-    """How far a point of an obstacle goes at most from one pose to another [m].
+    """Return an upper bound on the way of any point of an obstacle from one pose to another [m].
+
+    The bound is the way of the origin plus the arc of the farthest point.
 
     Args:
-        a: Where it is at first.
-        b: Where it is then.
-        radius: How far its farthest point is from its origin [m]; inf for what has no end, whose turns no way bounds.
+        a: First pose.
+        b: Second pose.
+        radius: Distance of the farthest point from the origin [m]; inf for an unbounded shape, and then the bound is
+            inf if the obstacle turns.
     """
     angle = float(np.linalg.norm(pin.log3(a.rotation.T @ b.rotation)))
     arc = radius * angle if angle > ROTATION_NOISE else 0.0
@@ -184,12 +200,15 @@ def travel_bound(a: pin.SE3, b: pin.SE3, radius: float) -> float:
 
 
 class Travels:
-    """How far obstacles may be from where they were seen, now and by the end of a tick.
+    """Bounds how far obstacles may be from where they were seen, now and by the end of a tick.
+
+    All methods return a distance for each obstacle by name.
 
     Args:
         seconds: Length of a tick [s].
-        bound: Largest speed of what moves [m/s]; None if it is not stated.
-        measured: Speeds that were measured of what was seen to move [m/s]; a larger one than the bound counts.
+        bound: Largest speed of obstacles that move [m/s]; None if it is not stated.
+        measured: Measured speeds of obstacles that were seen to move, by name [m/s]; one that exceeds the bound takes
+            its place. It may be updated after the call.
     """
 
     def __init__(self, seconds: float, bound: float | None, measured: Mapping[str, float]) -> None:
@@ -198,19 +217,33 @@ class Travels:
         self._measured = measured
 
     def since_seen(self, scene: Scene, ages: Mapping[str, float]) -> dict[str, float]:
-        """How far each obstacle that moves may have gone since it was seen [m]; without a bound as fast as it was."""
+        """Return how far each moving obstacle may have gone since it was seen [m]; others count as at rest.
+
+        Without a bound on speeds, the largest measured speed is assumed.
+
+        Args:
+            scene: The last scene.
+            ages: How long ago each obstacle was seen [s], by name.
+        """
         return {o.name: self._speed(o) * ages[o.name] for o in scene.obstacles}
 
     def in_tick(self, scene: Scene) -> dict[str, float]:
-        """How far each obstacle that moves may go within a tick [m]; nothing where no bound is stated."""
+        """Return how far each moving obstacle may go within a tick [m]; 0 for all if no bound is stated."""
         bound_is_stated = self._bound is not None
         return {o.name: self._speed(o) * self._seconds if bound_is_stated else 0.0 for o in scene.obstacles}
 
     def possible(self, seen: Snapshot, ages: Mapping[str, float]) -> dict[str, float] | None:
-        """How far each obstacle may be by the end of the tick, even if it begins to move just now [m].
+        """Return how far each obstacle may be from where it was seen by the end of the tick [m].
 
-        Whatever is not stated to be at rest may begin to move. Without a bound what states its motion goes as it says.
-        None if nothing bounds that.
+        Obstacles that are not stated to be at rest may begin to move just now. Without a bound on speeds, obstacles
+        that state their motion follow it.
+
+        Args:
+            seen: The last snapshot.
+            ages: How long ago each obstacle was seen [s], by name.
+
+        Returns:
+            Distances by name [m]; None if nothing bounds the motion of some obstacle.
         """
         travels = {}
         for obstacle in seen.scene.obstacles:
@@ -226,12 +259,12 @@ class Travels:
         return travels
 
     def _stays(self, obstacle: Obstacle) -> bool:
-        """Whether an obstacle states that it does not move, and was not seen to."""
+        """Check whether an obstacle states that it is at rest and was not seen to move."""
         stated = isinstance(obstacle.motion, ConstantVelocity) and not obstacle.motion.velocity.any()
         return stated and obstacle.name not in self._measured
 
     def _speed(self, obstacle: Obstacle) -> float:
-        """Of an obstacle that states a motion or was seen to move [m/s]; else 0."""
+        """Return the assumed speed of an obstacle that states a motion or was seen to move [m/s]; else 0."""
         measured = self._measured.get(obstacle.name)
         if self._stays(obstacle) or (obstacle.motion is None and measured is None):
             return 0.0

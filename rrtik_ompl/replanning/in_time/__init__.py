@@ -1,4 +1,4 @@
-"""Planning in configuration and time: where the course of what moves is known, a motion that is free at every time."""
+"""Planning in configuration and time: motions that are free at every time, among obstacles whose motion is known."""
 
 from __future__ import annotations
 
@@ -29,22 +29,22 @@ from rrtik_ompl.world.proof import PROOF_KERNELS
 
 NAME = "in-time"  # of the planner, in records
 MOST_SLOTS = 10_000
-SLOWEST = 1e-300  # [rad or m] in a slot: a number by which can be divided
+SLOWEST = 1e-300  # least motion in a slot [rad or m], so that it can be divided by
 ROUNDING = 1e-9
 WAITS = "what moves has to pass first"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TimedPlan:
-    """A motion among obstacles whose course is known.
+    """A motion among obstacles whose motion is known, or the reason why there is none.
 
     Attributes:
-        run: The motion, a tick for each slot of time, as :func:`rrtik_ompl.replan` records it: it can be saved, drawn
-            and judged. None if none was found.
-        reason: Why there is none, or "".
-        least_seconds: Sooner no motion can arrive, by the limits of speed alone [s].
-        iterations: Of the search.
-        seconds: That it took [s].
+        run: The motion, one tick for each slot of time, as :func:`rrtik_ompl.replan` records it: it can be saved, drawn
+            and judged. None if no motion was found.
+        reason: Why no motion was found, or "".
+        least_seconds: Lower bound on the time of arrival by the speed limits alone [s].
+        iterations: Number of iterations of the search.
+        seconds: Wall time of the search [s].
 
     Example:
         >>> scenario = rrtik.load_scenario("replan_planar_arm")
@@ -63,7 +63,7 @@ class TimedPlan:
 
     @property
     def found(self) -> bool:
-        """Whether there is a motion."""
+        """Whether a motion was found."""
         return self.run is not None
 
     @property
@@ -85,35 +85,39 @@ def plan_in_time(
     seconds: float = 20.0,
     seed: int = 0,
 ) -> TimedPlan:
-    """Plan in configuration and time: a motion to the goal among obstacles that do what their motions state.
+    """Plan a motion in configuration and time to the goal, among obstacles that move as they state.
 
-    [1, ch. 5.2] names the space, configurations at times from 0 on in which a path never goes backwards in time, for
-    scenes that are fully predictable, and leaves it for DRRT-Con, which assumes nothing. The search follows [70].
+    [1, ch. 5.2] describes this space, configurations at times from 0 on in which a path never goes backwards in time,
+    for fully predictable scenes, and prefers DRRT-Con, which assumes nothing. The search follows [70].
 
-    The motion is straight at constant speed in every slot of time, no joint faster than its limit; between slots speeds
-    jump, accelerations are not considered, as in :func:`rrtik_ompl.replan`. It is **proven** at every time, not at
-    steps: in a slot the arm keeps from the place of an obstacle in the middle of the slot as far as any of its points
-    travels until an end of it, beside margins and the clearance. What kernels cannot prove counts as blocked. The arm
-    arrives before an obstacle reaches what no joint moves, or not at all. The proof is worth as much as the stated
-    courses: an obstacle that strays farther than margin and clearance can be hit. Nothing is promised after the
-    arrival.
+    Within each slot of time the motion is straight at constant speed, and no joint exceeds its speed limit. Speeds jump
+    between slots, since accelerations are not considered, as in :func:`rrtik_ompl.replan`. The motion is **proven**
+    free at every time, not only at steps: in each slot the arm keeps margins, clearance, and the largest travel of any
+    point of an obstacle between the middle of the slot and its ends from that obstacle's place in the middle. Motions
+    that kernels cannot prove count as blocked. The arm arrives before an obstacle reaches a part that no joint moves,
+    or there is no plan. The proof holds as far as obstacles follow their stated motions: one that deviates by more than
+    margin and clearance can be hit. Nothing is promised after the arrival.
 
     Args:
-        problem: Robot, scene whose obstacles state their motions, start and goal. Of a pose, position or region all
-            configurations are goals.
-        rate: Slots a second [Hz]. With more of them the arm comes nearer to what is fast, and searches take longer.
+        problem: Robot, scene whose obstacles state their motions, start and goal. If the goal is a pose, position or
+            region, all configurations that reach it are goals.
+        rate: Number of slots per second [Hz]. With more slots the arm can pass nearer to fast obstacles, and searches
+            take longer.
         horizon: The latest arrival [s].
-        speed: The configuration's, all joints counted alike [rad/s or m/s]; None: the joints' limits alone.
-        margin: Distance to obstacles that is always kept, beside their own margins [m].
-        clearance: What is proven beside it [m]; 1 mm if None, or as much as the world asks proofs for.
-        limits: Of the joints' speeds; those of the robot if None.
-        iterations: Of the search at most; it goes on for earlier arrivals until it finds no more for a while.
-        seconds: That the search may take by the clock [s].
-        seed: The same seed gives the same motion, as long as the clock does not cut in.
+        speed: Largest speed of the configuration, all joints counted alike [rad/s or m/s]; if None only the joints'
+            limits apply.
+        margin: Distance to obstacles that is always kept, in addition to their own margins [m].
+        clearance: Distance that is proven in addition to ``margin`` [m]; if None 1 mm, or as much as the world asks
+            proofs for if that is more.
+        limits: Speed limits of the joints; those of the robot if None.
+        iterations: Largest number of iterations; the search goes on for earlier arrivals until it has found no more for
+            a while.
+        seconds: Largest wall time of the search [s].
+        seed: The same seed gives the same motion, as long as the time limit does not end the search.
 
     Raises:
-        InputError: If a number is out of range, no configuration reaches the goal, an obstacle without an end turns, or
-            the problem has path constraints.
+        InputError: If a number is out of range, no configuration reaches the goal, an unbounded obstacle turns, or the
+            problem has path constraints.
 
     Example:
         >>> scenario = rrtik.load_scenario("replan_planar_arm")
@@ -142,7 +146,7 @@ def plan_in_time(
 
     search, reaches_base = _search(problem, options)
     reason = _why_impossible(search, options, reaches_base)
-    # kernels may have been compiled and goals been looked for until now
+    # The time limit begins here, after kernels were compiled and goals were looked for.
     rows = None if reason else search.run(options.budget.begun_now())
     if rows is None and not reason:
         reason = _why_not_found(search, reaches_base)
@@ -153,7 +157,7 @@ def plan_in_time(
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class _Options:
-    """What was asked for; see :func:`plan_in_time`."""
+    """The checked arguments of :func:`plan_in_time`; ``slot`` is the length of a slot [s]."""
 
     slot: float
     horizon: float
@@ -165,7 +169,11 @@ class _Options:
 
 
 def _search(problem: Problem, options: _Options) -> tuple[TimeSearch, str]:
-    """The search of a problem, and a line that says when an obstacle reaches the base before the horizon, or ""."""
+    """Prepare the search of a problem: goals, sampling box, worlds and the last slot in which to arrive.
+
+    Returns:
+        The search, and a line that says when an obstacle reaches the fixed base before the horizon, or "".
+    """
     robot = problem.robot
     scene = problem.world.scene
     rng = np.random.default_rng(options.budget.seed)
@@ -187,7 +195,7 @@ def _search(problem: Problem, options: _Options) -> tuple[TimeSearch, str]:
 
 
 def _why_impossible(search: TimeSearch, options: _Options, reaches_base: str) -> str:
-    """Why a search need not begin, or ""."""
+    """Return the reason why there cannot be a plan, so that the search need not begin, or ""."""
     if library(PROOF_KERNELS) is None:
         return "motions in time are proven by kernels, and there are none here; install numba"
     if options.slot * search.least_slots > options.horizon + ROUNDING:
@@ -200,7 +208,7 @@ def _why_impossible(search: TimeSearch, options: _Options, reaches_base: str) ->
 
 
 def _why_not_found(search: TimeSearch, reaches_base: str) -> str:
-    """Why a search has ended with nothing."""
+    """Return the reason why a search has found no plan."""
     if search.blocked_arrivals:
         what = f"the goal is not proven free at any of the {search.blocked_arrivals} arrivals that were tried"
         remedy = "raise horizon, or lower margin or clearance"
@@ -211,7 +219,14 @@ def _why_not_found(search: TimeSearch, reaches_base: str) -> str:
 
 
 def _record(problem: Problem, search: TimeSearch, rows: Matrix, options: _Options) -> ReplanRun:
-    """The motion as a run: a tick for each slot, obstacles where they are when it begins."""
+    """Return the motion as a record of a run, one tick for each slot.
+
+    Args:
+        problem: The problem that was planned.
+        search: The finished search, whose worlds give the obstacles' poses at the begin of each slot.
+        rows: The configuration at the begin of each slot, shape (k, n).
+        options: The arguments of the plan.
+    """
     robot = problem.robot
     slot = options.slot
     step = min(search.pace.step, float(np.linalg.norm(search.pace.change)))
@@ -222,7 +237,8 @@ def _record(problem: Problem, search: TimeSearch, rows: Matrix, options: _Option
     )  # fmt: skip
 
     run.see(Snapshot(0.0, search.worlds.scene_at(0.0), stated=True))
-    first_poses = {o.name: o.pose for o in search.worlds.scene_at(0.0).obstacles}  # stated poses may be others
+    # The poses at time 0 can differ from those that the scene holds.
+    first_poses = {o.name: o.pose for o in search.worlds.scene_at(0.0).obstacles}
 
     for number, q in enumerate(rows):
         rows_left = rows[number:]

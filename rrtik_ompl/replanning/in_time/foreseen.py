@@ -1,8 +1,8 @@
-"""The scene in each slot of time, as stated motions put it: what is free there is proven for the whole slot.
+"""The scene in each slot of time by the stated motions; motions of the arm are proven free for the whole slot.
 
-In a slot an obstacle stands where it is in the middle of it, and the arm keeps as far from it as any of its points
-travels from there to an end of the slot. So a straight motion of the arm that is proven against the obstacle at rest is
-free at every time of the slot.
+For a slot, each obstacle is put where it is in the middle of the slot, and inflated by the largest travel of any of its
+points from there to an end of the slot. So a straight motion of the arm that is proven free of the inflated obstacle at
+rest is free of the moving one at every time of the slot.
 """
 
 from __future__ import annotations
@@ -24,21 +24,21 @@ from rrtik_ompl.replanning.travels import travel_bound, turns_without_end
 from rrtik_ompl.world.moving_world import MovingWorld
 from rrtik_ompl.world.world import World
 
-ROUNDING = 1e-9  # [m]: of places that are computed from times
-MOST_WORLDS = 1024  # that are kept at once: 0.5 to 1.5 MB each, and there may be ten thousand slots
-FINEST = 1e-4  # [m]: of an obstacle's way; if it may touch the base within so little, it counts as touching it
+ROUNDING = 1e-9  # [m]: rounding of places that are computed from times
+MOST_WORLDS = 1024  # Worlds that are kept at once: each takes 0.5 to 1.5 MB, and there may be ten thousand slots.
+FINEST = 1e-4  # [m]: an obstacle that may touch the base within a way of this length counts as touching it
 
 
 class ForeseenWorlds:
-    """Which straight motions are free in which slot; each slot's world is made when it is asked for.
+    """Checks which straight motions are free in which slot; the world of a slot is made when it is needed.
 
     Args:
         world: The robot and the scene, whose obstacles state their motions.
         slot: Length of a slot [s].
-        clearance: What the arm keeps from every obstacle beside its margin [m].
+        clearance: Distance that the arm keeps from every obstacle in addition to that obstacle's margin [m].
 
     Raises:
-        InputError: If an obstacle without an end turns.
+        InputError: If an unbounded obstacle turns.
     """
 
     def __init__(self, world: World, slot: float, clearance: float) -> None:
@@ -47,21 +47,21 @@ class ForeseenWorlds:
         self._clearance = clearance
         self._radii = {o.name: farthest(o.shape, pin.SE3.Identity()) for o in world.scene.obstacles}
         self._worlds: dict[bytes, MovingWorld] = {}
-        self._keys: dict[int, bytes] = {}  # of the slots' worlds
+        self._keys: dict[int, bytes] = {}  # key in ``_worlds`` for each slot
         self._rng = np.random.default_rng(0)
 
     def free(self, slot: int, a: Vector, b: Vector) -> bool:
-        """Whether the straight motion from a to b, shape (n,), both inside the limits, is proven free in a slot."""
+        """Check whether the straight motion from a to b, shape (n,), inside the limits, is proven free in a slot."""
         return bool(self._world_in_slot(slot).motions_proven(a[None], b[None])[0])
 
     def steps_free(self, slot: int, rows: Matrix, onward: int, stop: Stop) -> int:
-        """How many of the motions from row to row, shape (k, n), are free, the first in a slot, the next in that after.
+        """Return how many of the motions from row to row are free, one slot for each, up to the first blocked one.
 
         Args:
-            slot: Of the first motion.
-            rows: In the order of time where ``onward`` is 1, backwards where it is -1.
-            onward: See there.
-            stop: Ends it; what was not looked at is not free.
+            slot: Slot of the first motion.
+            rows: Configurations, shape (k, n): in the order of time if ``onward`` is 1, backwards if it is -1.
+            onward: 1 if each motion is one slot later than the one before it, -1 if it is one slot earlier.
+            stop: Ends the check when it returns True; motions that were not checked count as blocked.
         """
         for number, (a, b) in enumerate(pairwise(rows)):
             first, second = (a, b) if onward > 0 else (b, a)
@@ -70,10 +70,16 @@ class ForeseenWorlds:
         return len(rows) - 1
 
     def base_reached(self, until: float) -> tuple[float, str]:
-        """When an obstacle first reaches what no joint moves before a time [s], and a line about it; inf, "" if never.
+        """Find when a moving obstacle first touches a part of the robot that no joint moves.
 
-        Nothing is free from then on. The places in the middle of slots would not show it: an obstacle may touch the
-        base between them.
+        Nothing is free from then on. The worlds of the slots do not show this contact reliably, since an obstacle may
+        touch the base between the middles of two slots.
+
+        Args:
+            until: Only contacts before this time count [s].
+
+        Returns:
+            The time [s] and a line that says which obstacle touches which body; inf and "" if there is no contact.
         """
         obstacles = {o.name: o for o in self._world.scene.obstacles if o.motion is not None}
         bodies = self._world.bodies
@@ -93,7 +99,13 @@ class ForeseenWorlds:
     def _first_touch(
         self, base_part: Body, obstacle_body: Body, obstacle: Obstacle, begin: float, end: float
     ) -> float | None:
-        """When an obstacle first touches a body at rest, None if it is proven apart from it from begin to end [s]."""
+        """Find by bisection when an obstacle first touches a body at rest between two times [s].
+
+        An interval is free if the distance at its middle exceeds the obstacle's travel to its ends.
+
+        Returns:
+            The time [s], or None if the two are proven apart in the whole interval.
+        """
         middle = 0.5 * (begin + end)
         reach = travel(obstacle, begin, end, self._radii[obstacle.name])
         pose = pose_at(obstacle, middle) * obstacle_body.within
@@ -109,12 +121,12 @@ class ForeseenWorlds:
         return self._first_touch(base_part, obstacle_body, obstacle, middle, end)
 
     def scene_at(self, time: float) -> Scene:
-        """Where obstacles are at a time [s]."""
+        """Return the scene with obstacles at their poses at a time [s]."""
         scene = self._world.scene
         return replace(scene, obstacles=tuple(replace(o, pose=pose_at(o, time)) for o in scene.obstacles))
 
     def _world_in_slot(self, slot: int) -> MovingWorld:
-        """The world in a slot; where all is at rest one world serves every slot."""
+        """Return the world of a slot; slots with the same places and distances share one world."""
         key = self._keys.get(slot)
         if key is not None and key in self._worlds:
             return self._worlds[key]
@@ -135,9 +147,9 @@ class ForeseenWorlds:
         return self._worlds[key]
 
     def _world_to_place(self) -> MovingWorld:
-        """A new world, or any of those that are kept.
+        """Return a new world, or a random one of those that are kept if there are too many.
 
-        Not the oldest one: searches go through the slots in order, and would always come for what was just taken.
+        The oldest one would be a bad choice: searches go through the slots in order, so it would be needed next.
         """
         if len(self._worlds) < MOST_WORLDS:
             return MovingWorld(self._world)
@@ -145,16 +157,16 @@ class ForeseenWorlds:
 
 
 def travel(obstacle: Obstacle, begin: float, end: float, radius: float) -> float:
-    """How far a point of an obstacle travels at most between the middle of a slot and one of its ends [m].
+    """Return an upper bound on the way of any point of an obstacle from the middle of a slot to either end [m].
 
     Args:
-        obstacle: With its motion.
-        begin: Of the slot [s].
-        end: Of the slot [s].
-        radius: Of the obstacle about its origin [m].
+        obstacle: The obstacle with its stated motion.
+        begin: Begin of the slot [s].
+        end: End of the slot [s].
+        radius: Distance of the obstacle's farthest point from its origin [m].
 
     Raises:
-        InputError: If it turns and has no end.
+        InputError: If the obstacle turns and is unbounded.
     """
     motion = obstacle.motion
     if motion is None:
