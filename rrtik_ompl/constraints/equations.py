@@ -1,7 +1,8 @@
-"""Path constraints as equations f(q) = 0 with a tolerance of 1, for anybody's solver: values and derivatives.
+"""Path constraints as equations f(q) = 0 with a tolerance of 1, for any solver: values and derivatives.
 
-The values of a region are smooth and are 0 where it would be without tolerances; their Euclidean length is at most 1
-inside it. Positions count in tolerances of the position, orientations in (sines of) that of the orientation.
+The values of a region are smooth and are 0 where the region would be without tolerances; inside the region their
+Euclidean norm is at most 1. Positions are divided by the tolerance of the position, orientations (or their sines) by
+that of the orientation.
 """
 
 from __future__ import annotations
@@ -21,32 +22,32 @@ TURN_EQUATIONS = {Turning.FREE: 0, Turning.AXIS: 2, Turning.BALL: 3, Turning.RAN
 
 
 def equation_count(constraints: HeldRegions) -> int:
-    """Return how many equations there are."""
+    """Return the number of equations."""
     return sum(len(_coordinates(region)) + TURN_EQUATIONS[region.turning] for region in constraints.regions)
 
 
 def equations(robot: Robot, constraints: HeldRegions, q: Vector) -> tuple[Vector, Matrix]:
-    """Return values and derivatives of the equations.
+    """Compute the values and derivatives of the equations.
 
     Args:
         robot: The arm.
-        constraints: One region or more.
+        constraints: One or more regions.
         q: A configuration, shape (dof,).
 
     Returns:
-        Without unit, shapes (k,) and (k, dof).
+        Values without unit, shape (k,), and their derivatives with respect to q, shape (k, dof).
     """
     parts = [_of_region(robot, region, q[None]) for region in constraints.regions]
     return np.concatenate([part[0] for part in parts]), np.concatenate([part[1] for part in parts])
 
 
 def _coordinates(region: HeldRegion) -> NDArray[np.int64]:
-    """Return the coordinates of the position that a region bounds."""
+    """Return the indices of the position coordinates that a region bounds."""
     return np.flatnonzero((np.abs(region.region.bounds[:3]) < ANYWHERE).any(axis=1))
 
 
 def _of_region(robot: Robot, region: HeldRegion, q: Matrix) -> tuple[Vector, Matrix]:
-    """Return values and derivatives of the equations of one region, shapes (k,) and (k, dof)."""
+    """Compute the values and derivatives of the equations of one region, shapes (k,) and (k, dof)."""
     displacement = region.displacements(q)[0]
     twist = twists(robot, region, q)[0]
     task = region.region
@@ -84,12 +85,12 @@ def _sine_of(tolerance: float) -> float:
 
 
 def _leaning(axis: Vector, direction: Vector) -> tuple[Vector, Matrix]:
-    """Return how far a unit vector leans away from a direction, shape (2,), and its derivatives, shape (2, 3).
+    """Compute how far a unit vector leans from a direction, shape (2,), and its derivatives, shape (2, 3).
 
-    Its length is the sine of the angle between them, and 2 minus the sine beyond a right angle, so that it grows all
-    the way to the opposite direction. The derivatives are with respect to a rotation of the vector.
+    The norm is the sine of the angle between them, or 2 minus the sine beyond a right angle, so that it grows up to the
+    opposite direction. The derivatives are with respect to a rotation of the vector.
     """
-    sides = np.linalg.svd(direction[None])[2][1:]  # two unit vectors that span the plane across the direction
+    sides = np.linalg.svd(direction[None])[2][1:]  # two unit vectors that span the plane normal to the direction
     lean = sides @ axis
     slope = np.cross(axis, sides)
     if axis @ direction >= 0.0:
@@ -104,9 +105,10 @@ def _leaning(axis: Vector, direction: Vector) -> tuple[Vector, Matrix]:
 
 
 def _turned(rotation: Matrix) -> tuple[Vector, Matrix]:
-    """Return a rotation as a vector about its axis, shape (3,), and the derivatives by a rotation, shape (3, 3).
+    """Convert a rotation to a vector along its axis, shape (3,), with its derivatives by a rotation, shape (3, 3).
 
-    Its length is the sine of the angle up to a right angle, and the angle itself beyond, where the sine falls again.
+    The norm is the sine of the angle up to a right angle. Beyond, where the sine decreases again, it is the angle
+    itself.
     """
     if np.trace(rotation) < 1.0:
         return pin.log3(rotation), pin.Jlog3(rotation) @ rotation.T

@@ -1,10 +1,10 @@
-"""One task-space region that is held along a path: how far configurations are from it, how far motions may leave it.
+"""A task-space region held along a path: measures of how far configurations are from it, and bounds for motions.
 
-Each region is a convex set of a few smooth functions of the configuration ("measures"), so that a straight motion in
-configuration space leaves it by no more than its ends do and a second-order term: where ``f`` is such a function,
-``|f(t) - (1 - t) f(0) - t f(1)| <= t (1 - t) max |f''| / 2``. The second derivatives are bounded by the ways of the
-joints, after the geometric Jacobian: those of a frame's origin by levers, those of its axes and of its quaternion by
-angles alone.
+A region is described by a few smooth functions of the configuration ("measures") and is a convex set of their values.
+So on a straight motion in configuration space a measure exceeds its values at the ends by no more than a second-order
+term: ``|f(t) - (1 - t) f(0) - t f(1)| <= t (1 - t) max |f''| / 2`` for such a function ``f``. The second derivatives
+are bounded by the displacements of the joints, after the geometric Jacobian: those of a frame's origin by lever arms,
+those of its axes and of its quaternion by angles alone.
 """
 
 from __future__ import annotations
@@ -25,42 +25,45 @@ from rrtik_ompl.model.goal_kind import TaskRegion, into_range, roll_pitch_yaw
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import Scene
 
-LARGEST_PITCH = np.radians(75.0)  # of ranges of roll, pitch and yaw: beyond, roll and yaw run away
-STEEPEST_PITCH = np.radians(89.0)  # that a frame may come to on its way, with the tolerance
-KEPT_SHARE = 0.95  # of a tolerance, less the inset, up to which configurations are left where they are
-AIMED_SHARE = 0.8  # of a tolerance, less the inset, to which others are moved
-ANYWHERE = 1000.0  # [m]; bounds of a position from here on are none: farther than any arm reaches
-BEHIND = 2.0  # measure of an axis that points more than a quarter turn away; more than any that is allowed
+# [rad] Largest pitch of a region with ranges of roll, pitch and yaw: near a quarter turn roll and yaw are singular.
+LARGEST_PITCH = np.radians(75.0)
+STEEPEST_PITCH = np.radians(89.0)  # [rad] largest pitch that a frame may reach including the tolerances
+# Projection leaves a configuration where it is if it is within this share of the tolerance minus the inset,
+KEPT_SHARE = 0.95
+# and moves others to this share of it.
+AIMED_SHARE = 0.8
+ANYWHERE = 1000.0  # [m]; position bounds of this size or more count as none, being out of reach of any arm
+BEHIND = 2.0  # measure of an axis that is more than a quarter turn off; larger than any allowed measure
 
 
 class Turning(IntEnum):
-    """What a region says of the orientation."""
+    """How a region constrains the orientation of its frame."""
 
     FREE = 0
-    AXIS = 1  # an axis of the frame keeps a direction within a cone
-    BALL = 2  # one orientation, within an angle
-    RANGES = 3  # of roll, pitch and yaw
+    AXIS = 1  # an axis of the frame stays within a cone about a direction
+    BALL = 2  # the orientation stays within an angle of a given one
+    RANGES = 3  # roll, pitch and yaw stay within ranges
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HeldRegion:
-    """A region of a frame, prepared for a robot.
+    """A region of a frame, prepared for a robot. Poses are matrices; w is the frame of the region.
 
     Attributes:
         robot: The arm.
-        region: In the world, not ``from_start``.
-        label: Of the region, for messages.
-        link: Frame of the robot on which it is.
-        joint: Number of the joint that carries it, 0 for the world.
-        T_joint_d: Frame of the displacement in that of the joint, shape (4, 4); turned so that for AXIS its z axis
-            is the one that is kept, and for BALL it is the world's frame w where the orientation is the right one.
-        T_w_world: World seen from the region's frame, shape (4, 4).
-        turning: What is said of the orientation.
-        direction: Of AXIS, where z has to point in w, shape (3,).
-        levers: Largest distance of the frame's origin from the axis of each joint that turns it, 1 for one that slides
-            it, shape (joints,); all 0 where the region says nothing of the position.
-        turns: Which joints turn the frame, 1 or 0, shape (joints,).
-        inset: How much deeper inside the tolerances configurations are sought, so that motions between them have room
+        region: The region, placed in the world (not ``from_start``).
+        label: Name of the region in messages.
+        link: Frame of the robot that carries the region's frame.
+        joint: Index of the joint that carries it, 0 for the world.
+        T_joint_d: Pose of the displacement's frame d in the joint's frame, shape (4, 4). For AXIS it is turned so that
+            the constrained axis is its z axis; for BALL so that d coincides with w at the right orientation.
+        T_w_world: Pose of the world in w, shape (4, 4).
+        turning: How the orientation is constrained.
+        direction: For AXIS the direction in w to which the z axis of d has to point, shape (3,).
+        levers: For each joint that rotates the frame the largest distance of the frame's origin from its axis [m], 1
+            for each prismatic joint that moves it, shape (joints,). All 0 if the position is free.
+        turns: 1 for each joint that rotates the frame, 0 for others, shape (joints,).
+        inset: How much deeper than the tolerances configurations are projected, so that motions between them have room
             to bend [m; rad], shape (2,).
     """
 
@@ -79,28 +82,29 @@ class HeldRegion:
 
     @property
     def T_world_w(self) -> NDArray[np.float64]:
-        """Frame of the region, shape (4, 4)."""
+        """Pose of the region's frame w in the world, shape (4, 4)."""
         placed: NDArray[np.float64] = self.region.T_world_w.homogeneous
         return placed
 
     @property
     def rows(self) -> list[int]:
-        """Rows of the chain's joints that move the frame, base first."""
+        """Indices of the chain's joints that move the frame, base first."""
         return _rows_to(self.robot, self.joint)
 
     @property
     def frame(self) -> str:
-        """Name of the frame."""
+        """Name of the constrained frame."""
         return self.robot.tip if self.region.frame is None else self.region.frame
 
     def displacements(self, Q: Matrix) -> NDArray[np.float64]:
-        """Return the frame as seen from the region's frame for configurations, shape (m, dof): (m, 4, 4)."""
+        """Compute the poses of frame d in w for configurations, (m, dof) -> (m, 4, 4)."""
         return self.T_w_world @ self.robot.chain.joint_frames(Q)[:, self.joint] @ self.T_joint_d
 
     def measures(self, Q: Matrix) -> Matrix:
-        """Return how far configurations, shape (m, dof), are from the region, without its tolerances, shape (m, 2).
+        """Compute the position and orientation measures of configurations, (m, dof) -> (m, 2).
 
-        Metres, and for the orientation what `limits` makes of an angle.
+        The first is the distance from the position bounds [m]. The second is 0 for the right orientation and grows with
+        the angle as :meth:`measured` says. Tolerances are not subtracted.
         """
         D = self.displacements(Q)
         away = D[:, :3, 3] - np.clip(D[:, :3, 3], *self.region.bounds[:3].T)
@@ -108,20 +112,23 @@ class HeldRegion:
 
     @property
     def tolerances(self) -> Vector:
-        """Of the position and of the orientation at stored configurations [m; rad], shape (2,)."""
+        """Tolerances of position and orientation at waypoints [m; rad], shape (2,)."""
         return np.array([self.region.position_tolerance, self.region.orientation_tolerance])
 
     @property
     def allowances(self) -> Vector:
-        """How far motions between stored configurations may go beyond the tolerances [m; rad], shape (2,)."""
+        """By how much motions between waypoints may exceed the tolerances [m; rad], shape (2,)."""
         return np.array([self.region.position_allowance, self.region.orientation_allowance])
 
     def limits(self, *, between: bool = False) -> Vector:
-        """Return the largest measures allowed: at stored configurations, or between them; shape (2,)."""
+        """Return the largest measures allowed at waypoints, or ``between`` them, shape (2,)."""
         return self.measured(self.tolerances + self.allowances if between else self.tolerances)
 
     def measured(self, amounts: Vector) -> Vector:
-        """Return the measures of a distance [m] and an angle [rad], shape (2,)."""
+        """Convert a distance [m] and an angle [rad] to measures, shape (2,).
+
+        The measure of an angle is its sine for AXIS, the sine of its half for BALL, and the angle itself for RANGES.
+        """
         metres, angle = amounts
         angle = min(angle, 0.5 * np.pi)
         if self.turning == Turning.AXIS:
@@ -131,7 +138,7 @@ class HeldRegion:
         return np.array([metres, angle])
 
     def angle_of(self, measure: float) -> float:
-        """Return the angle [rad] that a small measure of the orientation stands for."""
+        """Convert a measure of the orientation to the angle [rad], the inverse of :meth:`measured`."""
         if self.turning == Turning.AXIS:
             return float(np.arcsin(min(measure, 1.0)))
         if self.turning == Turning.BALL:
@@ -140,37 +147,48 @@ class HeldRegion:
 
     @property
     def accepted(self) -> Vector:
-        """Measures up to which a search leaves configurations where they are, shape (2,)."""
+        """Measures up to which a projection leaves configurations where they are, shape (2,)."""
         within: Vector = KEPT_SHARE * self.limits() - self.measured(self.inset)
         return within
 
     @property
     def aimed(self) -> Vector:
-        """How near to a region a search moves others [m; rad], shape (2,)."""
+        """Distance and angle from the region to which a projection moves other configurations [m; rad], shape (2,)."""
         near: Vector = AIMED_SHARE * self.tolerances - self.inset
         return near
 
     def deviations(self, A: Matrix, B: Matrix) -> Matrix:
-        """How far the measures of motions A[k] -> B[k], shapes (m, dof), exceed those of their ends, shape (m, 2)."""
+        """Bound by how much the measures on motions exceed the interpolation of those at the ends.
+
+        This is max |f''| / 8 of the module's inequality, at the middle of the motion. Velocities of the joints are
+        bounded by their displacements, as a motion takes time 1.
+
+        Args:
+            A: Start configurations, shape (m, dof).
+            B: End configurations, shape (m, dof).
+
+        Returns:
+            Bounds for position and orientation, shape (m, 2).
+        """
         ways = np.abs((B - A) @ self.robot.chain.gain.T)
         turned = ways * self.turns
-        before = np.cumsum(turned, axis=1) - turned  # of the joints nearer to the base, which come first
+        before = np.cumsum(turned, axis=1) - turned  # sum over the joints nearer to the base, which come first
         origin = (ways * self.levers * (turned + 2.0 * before)).sum(axis=1)
         angle = turned.sum(axis=1)
         return np.column_stack([origin, self.curvature * angle * angle]) / 8.0
 
     @property
     def curvature(self) -> float:
-        """Second derivative of the orientation's measure for joint speeds whose sum is 1 rad."""
+        """Bound of the second derivative of the orientation's measure for joint speeds whose sum is 1 rad."""
         if self.turning == Turning.RANGES:
             tolerance = float(self.limits(between=True)[1])
             pitch = float(np.abs(self.region.bounds[4]).max()) + tolerance
-            # a motion that is bounded turns by sqrt(8 tolerance / curvature) at most, its pitch by half of that
+            # A motion within the bound turns by at most sqrt(8 tolerance / curvature), its pitch by half of that.
             return _curvature(pitch + np.sqrt(2.0 * tolerance / _curvature(pitch)))
         return {Turning.FREE: 0.0, Turning.AXIS: 1.0, Turning.BALL: 0.25}[self.turning]
 
     def outside(self, q: Vector) -> tuple[float, float]:
-        """By how much a configuration, shape (dof,), is outside the tolerances [m; rad]."""
+        """Return by how much a configuration, shape (dof,), exceeds the tolerances: position [m], orientation [rad]."""
         metres, angle = self.measures(q[None])[0]
 
         if self.turning == Turning.AXIS:
@@ -203,16 +221,16 @@ class HeldRegion:
 
 
 def _curvature(pitch: float) -> float:
-    """Second derivative of the sum of roll, pitch and yaw up to a pitch [rad], for joint speeds whose sum is 1 rad."""
+    """Bound the second derivative of roll + pitch + yaw up to a pitch [rad], for joint speeds whose sum is 1 rad."""
     steep = 1.0 / np.cos(min(pitch, STEEPEST_PITCH))
     return float(3.0 * (0.5 * steep + 2.0 * steep * steep))
 
 
 def held_region(robot: Robot, scene: Scene, region: TaskRegion, label: str) -> HeldRegion:
-    """Return a region prepared for a robot in a scene.
+    """Prepare a region for a robot in a scene.
 
     Raises:
-        InputError: If its ranges of angles cannot be held: pitch too near to a quarter turn.
+        InputError: If its ranges of angles cannot be held because the pitch comes too near to a quarter turn.
         UnknownNameError: If its frame is neither a link nor an attached object.
     """
     link, joint, T_joint_frame = frame_place(robot, scene, region.frame, label)
@@ -234,7 +252,12 @@ def held_region(robot: Robot, scene: Scene, region: TaskRegion, label: str) -> H
 
 
 def frame_place(robot: Robot, scene: Scene, frame: str | None, label: str) -> tuple[str, int, Any]:
-    """Return the robot's frame that a frame is on, the joint that carries it, and its pose in the joint's frame."""
+    """Locate a frame on the robot; ``label`` names the region in errors.
+
+    Returns:
+        Name of the robot's frame that carries it (the tip if ``frame`` is None), index of the joint that carries that,
+        and the pose of the frame in the joint's frame, a ``pinocchio.SE3``.
+    """
     held = next((each for each in scene.attached if each.name == frame), None)
     name = robot.tip if frame is None else frame if held is None else held.link
     if not name.isprintable() or not robot.model.existFrame(name):
@@ -245,7 +268,13 @@ def frame_place(robot: Robot, scene: Scene, frame: str | None, label: str) -> tu
 
 
 def _turning(region: TaskRegion, label: str) -> tuple[Turning, Vector, NDArray[np.float64]]:
-    """What a region says of the orientation, where z has to point, and by what the frame is turned to say it so."""
+    """Classify how a region constrains the orientation.
+
+    Returns:
+        The kind; for AXIS the direction in w to which the z axis has to point, shape (3,), zeros otherwise; the
+        rotation by which the region's frame is turned so that :attr:`HeldRegion.T_joint_d` is as described, shape (3,
+        3).
+    """
     low, high = region.bounds[3:].T
     full = high - low >= TAU - 1e-9
     single = low == high
@@ -258,7 +287,7 @@ def _turning(region: TaskRegion, label: str) -> tuple[Turning, Vector, NDArray[n
 
     if full.sum() == 1 and single.sum() == 2:
         k = int(np.flatnonzero(full)[0])
-        # R = Rz Ry Rx, and one of the three turns freely: what stands before it, and behind it.
+        # R = Rz Ry Rx, of which one factor is free: split R into the factors before and behind it.
         x, y, z = (rpy_matrices((np.where(full, 0.0, low) * unit)[None])[0] for unit in np.eye(3))
         before, after = ((z @ y, np.eye(3)), (z, x), (np.eye(3), y @ x))[k]
         return Turning.AXIS, before[:, k], after.T @ turned_z(np.eye(3)[k])
@@ -280,7 +309,7 @@ def _turning(region: TaskRegion, label: str) -> tuple[Turning, Vector, NDArray[n
 
 
 def _rows_to(robot: Robot, joint: int) -> list[int]:
-    """Return rows of the chain from the base to a joint, given by its number; none to the world, 0."""
+    """Return the chain's indices of the joints from the base to a joint, given by its number; none for the world, 0."""
     rows = list[int]()
     row = joint - 1
     while row >= 0:

@@ -1,4 +1,4 @@
-"""Several regions held at once: which configurations and motions keep all of them, and what breaks one."""
+"""Several regions held at once: checks of configurations and motions, and messages about violations."""
 
 from __future__ import annotations
 
@@ -17,30 +17,30 @@ from rrtik_ompl.model.goal_kind import TaskRegion
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import Scene
 
-HALVINGS = 7  # of a motion, at most, to see that it keeps to a region
-ROUNDING = 1e-9  # without unit; of a measure
-INSET = np.array([5e-4, np.radians(0.2)])  # [m; rad] that configurations are kept inside a region, at most ...
-INSET_SHARE = 0.45  # ... and of its tolerance
-SMALLEST_STEP = 2e-4  # [rad or m] of a motion that is no longer divided
+HALVINGS = 7  # largest number of times that a motion is halved to show that it keeps a region
+ROUNDING = 1e-9  # tolerance of measures
+INSET = np.array([5e-4, np.radians(0.2)])  # [m; rad] largest inset of configurations in a region ...
+INSET_SHARE = 0.45  # ... which is also at most this share of its tolerance
+SMALLEST_STEP = 2e-4  # [rad or m] length of a motion that is not divided any further
 
 
 class HeldRegions:
     """The path constraints of a problem.
 
-    A configuration is held if its frames are in all regions, within their tolerances. A straight motion is held if that
-    is so at each of its points; beyond the tolerances between its ends by what a region allows there, which is nothing
-    unless somebody asked for it. This is proven, by the bound of :meth:`HeldRegion.deviations` on parts of it, not
-    looked up at samples.
+    A configuration is held if its frames are in all regions, within their tolerances. A straight motion is held if all
+    its configurations are; between its ends they may exceed the tolerances by the allowances of a region, which are 0
+    by default. This is proven by the bound of :meth:`HeldRegion.deviations` on parts of the motion, not checked at
+    samples.
 
     Attributes:
-        regions: One or more.
+        regions: One or more prepared regions.
     """
 
     def __init__(self, regions: Iterable[HeldRegion]) -> None:
         self.regions = tuple(regions)
 
     def of_robot(self, robot: Robot) -> HeldRegions:
-        """Return the same regions of the same arm whose joints are counted in other units (its chain's ``gain``)."""
+        """Return the same regions for the same arm with its joints scaled (another ``gain`` of its chain)."""
         return HeldRegions(replace(region, robot=robot) for region in self.regions)
 
     def held(self, Q: Matrix) -> Mask:
@@ -68,7 +68,7 @@ class HeldRegions:
         return mask
 
     def explain(self, q: Vector) -> str:
-        """A line that says which region a configuration, shape (dof,), is outside, and by how much; "" for none."""
+        """Return a line that says by how much a configuration, shape (dof,), is outside a region; "" if it is held."""
         for region in self.regions:
             kept = region.measures(q[None])[0] <= region.limits() + ROUNDING
             if not kept.all():
@@ -79,22 +79,22 @@ class HeldRegions:
         return ""
 
     def why(self, a: Vector, b: Vector) -> str:
-        """Return a line that says what is wrong with a motion, shapes (dof,), that is not held."""
+        """Return a line that says why the motion from a to b, shapes (dof,), is not held."""
         between = ", ".join(f"'{region.frame}'" for region in self.regions)
         return self.explain(a) or self.explain(b) or f"it leaves the region of {between} in between"
 
 
 def held_regions(robot: Robot, scene: Scene, regions: Iterable[TaskRegion], start: Vector | None) -> HeldRegions:
-    """Path constraints prepared for a robot in a scene.
+    """Prepare path constraints for a robot in a scene.
 
     Args:
         robot: The arm.
-        scene: With the attached objects that may carry a frame.
-        regions: What is to be held.
-        start: Configuration in which regions ``from_start`` begin, shape (dof,).
+        scene: The scene, whose attached objects may carry a frame.
+        regions: The regions to hold.
+        start: Configuration at which regions ``from_start`` are placed, shape (dof,); None if they have been already.
 
     Raises:
-        InputError: If one of them is no region, names no frame, or cannot be held.
+        InputError: If one is not a region, names no existing frame, or cannot be held.
     """
     prepared = []
     for number, region in enumerate(regions, 1):
@@ -109,14 +109,15 @@ def held_regions(robot: Robot, scene: Scene, regions: Iterable[TaskRegion], star
 
 
 def _placed(robot: Robot, scene: Scene, region: TaskRegion, label: str, start: Vector | None) -> HeldRegion:
-    """Return one of them, in the world."""
+    """Prepare one region, placed in the world and with its inset."""
     if region.from_start and start is not None:
         _, joint, T_joint_frame = frame_place(robot, scene, region.frame, label)
         region = region.started_at(pin.SE3(robot.joint_frames(start)[0, joint]) * T_joint_frame)
 
     held = held_region(robot, scene, region, label)
     tolerance = region.orientation_tolerance
-    if held.turning != Turning.FREE and tolerance > 0.5 * np.pi:  # whose sine would shrink again
+    # Beyond a right angle the sine, which measures the angle, decreases again.
+    if held.turning != Turning.FREE and tolerance > 0.5 * np.pi:
         raise InputError(
             f"{label}: orientation_tolerance is {np.degrees(tolerance):g} degrees, and more than 90 cannot be held; "
             "take less, or leave the angles free"
@@ -129,7 +130,7 @@ def _placed(robot: Robot, scene: Scene, region: TaskRegion, label: str, start: V
 
 
 def _refuse_too_narrow(region: HeldRegion) -> None:
-    """Refuse tolerances that not even the smallest motions of all joints at once keep."""
+    """Refuse tolerances that even the smallest motions of all joints together would exceed."""
     dof = region.robot.dof
     step = np.full((1, dof), SMALLEST_STEP / np.sqrt(dof))
     needed = region.deviations(np.zeros((1, dof)), step)[0] / INSET_SHARE
@@ -146,9 +147,20 @@ def _refuse_too_narrow(region: HeldRegion) -> None:
 
 
 def _keeps(region: HeldRegion, A: Matrix, B: Matrix, ends: NDArray[np.float64]) -> Mask:
-    """Which motions keep one region: halved until the bound on each part is small enough, or an end of one is outside.
+    """Check which motions keep a region.
 
-    ``ends``: the measures of both ends, shape (2, m, 2).
+    A motion is kept if its ends are within the tolerances and the bound on its measures does not exceed the limits.
+    Motions for which the bound is too large are halved repeatedly, which divides the bound's second-order term by four
+    each time. They are given up when a node is outside or after ``HALVINGS``.
+
+    Args:
+        region: The region.
+        A: Start configurations, shape (m, dof).
+        B: End configurations, shape (m, dof).
+        ends: Measures of both ends, shape (2, m, 2).
+
+    Returns:
+        Which motions are kept, shape (m,).
     """
     deviations = region.deviations(A, B)
     most = region.limits(between=True) + ROUNDING
@@ -175,9 +187,9 @@ def _keeps(region: HeldRegion, A: Matrix, B: Matrix, ends: NDArray[np.float64]) 
 def _highest(
     first: NDArray[np.float64], last: NDArray[np.float64], deviation: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return the largest that measures can be on motions, from those of both ends; arrays of one shape.
+    """Return upper bounds of the measures on motions, from those at both ends; arrays of one shape.
 
-    The top of ``first + t (last - first) + 4 t (1 - t) deviation`` for t in [0, 1].
+    The bound is the maximum of ``first + t (last - first) + 4 t (1 - t) deviation`` for t in [0, 1].
     """
     way = last - first
     inner = np.abs(way) < 4.0 * deviation
@@ -188,13 +200,13 @@ def _highest(
 
 
 def _nodes(A: Matrix, B: Matrix, parts: int) -> Matrix:
-    """Ends of equal parts of motions, shape (m, parts + 1, dof)."""
+    """Divide motions A[k] -> B[k], shapes (m, dof), into equal parts: ends of shape (m, parts + 1, dof)."""
     shares = np.linspace(0.0, 1.0, parts + 1)[:, None]
     return (1.0 - shares) * A[:, None] + shares * B[:, None]
 
 
 def goal_regions(robot: Robot, scene: Scene, goal: Goal) -> tuple[HeldRegion, ...]:
-    """Return the regions of all tips of a goal of several.
+    """Return the regions of all tips of a goal that concerns several.
 
     Raises:
         UnknownNameError: If a tip is no link of the robot.

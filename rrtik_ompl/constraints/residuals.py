@@ -1,6 +1,6 @@
-"""How a configuration has to move to come into regions: residuals, their derivatives, and projection, in numpy.
+"""Projection of configurations into task-space regions: residuals, their derivatives and the iteration, in numpy.
 
-:mod:`rrtik_ompl.kernels.search.constrained.projection_kernels` is the same in kernels.
+:mod:`rrtik_ompl.kernels.search.constrained.projection_kernels` is the same algorithm in kernels.
 
 Sources: damped Gauss-Newton steps on the residuals of all regions at once [17, 22].
 """
@@ -19,26 +19,26 @@ from rrtik_ompl.constraints.held_regions import HeldRegions
 from rrtik_ompl.model.goal_kind import into_range, roll_pitch_yaw
 from rrtik_ompl.model.robot import PER_RADIAN, Robot, reach_of
 
-# Added to the squares of the derivatives: a constant, and so much of the squared residual.
+# The damping of a Gauss-Newton step is DAMPING plus SHARE times the squared norm of the residual.
 DAMPING = 1e-9
 SHARE = 0.5
-LARGEST_STEP = 0.5  # [rad] or [m] of any joint in one step
-STEPS = 60  # of a projection from anywhere
-SMALL = 1e-12  # [rad]; of a smaller angle the axis is not known, or it is none
-STEEPEST = 1e-3  # cosine of the pitch, at least
+LARGEST_STEP = 0.5  # [rad] or [m] largest change of any joint in one step
+STEPS = 60  # default number of steps of a projection
+SMALL = 1e-12  # [rad] angles below this count as 0, for their axis is not determined
+STEEPEST = 1e-3  # lower bound of the cosine of the pitch in divisions
 
 
 def projected_rows(robot: Robot, constraints: HeldRegions, rows: Matrix, steps: int = STEPS) -> tuple[Matrix, Mask]:
-    """Move configurations into all regions, inside the joint limits.
+    """Move configurations into all regions, inside the joint limits, by damped Gauss-Newton steps.
 
     Args:
         robot: The arm.
         constraints: The regions.
-        rows: Shape (m, dof).
-        steps: At most.
+        rows: Configurations, shape (m, dof).
+        steps: Largest number of steps.
 
     Returns:
-        Where each has come to, shape (m, dof), and which are in all regions, shape (m,).
+        The configurations after the last step, shape (m, dof), and which are in all regions, shape (m,).
     """
     Q = np.array(rows, dtype=np.float64)
     there = np.zeros(len(rows), dtype=bool)
@@ -62,7 +62,7 @@ def projected_rows(robot: Robot, constraints: HeldRegions, rows: Matrix, steps: 
 
 
 def residual(robot: Robot, region: HeldRegion, Q: Matrix) -> tuple[Matrix, NDArray[np.float64]]:
-    """Return the way into a region, a little beyond its rim, and the derivative of what has to move it.
+    """Compute the residual that moves a frame into a region, a little beyond its boundary, and its Jacobian.
 
     Args:
         robot: The arm.
@@ -70,7 +70,8 @@ def residual(robot: Robot, region: HeldRegion, Q: Matrix) -> tuple[Matrix, NDArr
         Q: Configurations, shape (m, dof).
 
     Returns:
-        Without unit, shape (m, 6), 0 where the region is kept; and shape (m, 6, dof).
+        Residual without unit, shape (m, 6): three numbers for the position, three for the orientation, 0 where the
+            region is kept. Jacobian, shape (m, 6, dof).
     """
     D = region.displacements(Q)
     measures = region.measures(Q)
@@ -88,7 +89,7 @@ def residual(robot: Robot, region: HeldRegion, Q: Matrix) -> tuple[Matrix, NDArr
 
 
 def twists(robot: Robot, region: HeldRegion, Q: Matrix) -> NDArray[np.float64]:
-    """Geometric Jacobians of the displacement, in the axes of the region, shape (m, 6, dof)."""
+    """Compute the geometric Jacobians of the displacement in the region's axes, shape (m, 6, dof)."""
     poses, J = robot.fk_jacobian_batch(Q, region.link)
     origin = (region.T_world_w @ region.displacements(Q))[:, :3, 3]
     lever = np.repeat(origin - poses[:, :3, 3], robot.dof, axis=0)
@@ -101,7 +102,18 @@ def twists(robot: Robot, region: HeldRegion, Q: Matrix) -> NDArray[np.float64]:
 def _turn(
     region: HeldRegion, R: NDArray[np.float64], measure: Vector, J: NDArray[np.float64]
 ) -> tuple[Matrix, NDArray[np.float64], Matrix]:
-    """Return the turn into the region [rad], what turns change of it, and which of its numbers count."""
+    """Compute the rotation into the region and the derivative that belongs to it.
+
+    Args:
+        region: The region.
+        R: Orientations of frame d in w, shape (m, 3, 3).
+        measure: Measures of the orientation, shape (m,).
+        J: Angular Jacobians in the region's axes, shape (m, 3, dof).
+
+    Returns:
+        Rotation vector, or changes of roll, pitch and yaw for RANGES [rad], shape (m, 3); its Jacobian, shape (m, 3,
+        dof); 1 for each component that counts and 0 for others, shape (m, 3).
+    """
     aimed = region.aimed[1]
     ones = np.ones((len(R), 3))
     if region.turning == Turning.FREE:
@@ -131,7 +143,7 @@ def _turn(
 
 
 def rates(R: NDArray[np.float64]) -> NDArray[np.float64]:
-    """What angular velocities make of roll, pitch and yaw, shape (m, 3, 3)."""
+    """Compute the matrices that map angular velocities to rates of roll, pitch and yaw, shape (m, 3, 3)."""
     a = R[:, 0, 0]
     b = R[:, 1, 0]
     level = np.maximum(np.hypot(a, b), STEEPEST)
@@ -145,13 +157,14 @@ def rates(R: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.moveaxis(np.stack([roll, np.stack([-b, a, zero]), yaw]), 2, 0)
 
 
-DRAWN = 64  # configurations that are moved towards the regions
+DRAWN = 64  # number of random configurations that are projected into the regions
 
 
 def contradiction(robot: Robot, constraints: HeldRegions) -> str:
-    """Return a line that names two path constraints of which no configuration was found to keep both; "" for none.
+    """Search for path constraints that no configuration keeps and return a line about them; "" if there are none.
 
-    One that no configuration was found to keep at all is named alone. This is a finding of a search, no proof.
+    Random configurations are projected into each region alone, then into each pair of regions. A failure of all of them
+    suggests that a region is out of reach or that the pair contradicts itself, but is no proof.
     """
     rows = np.random.default_rng(0).uniform(*robot.finite_range(), (DRAWN, robot.dof))
     each_alone = [HeldRegions((region,)) for region in constraints.regions]

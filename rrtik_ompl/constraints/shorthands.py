@@ -1,4 +1,4 @@
-"""Path constraints by name: task-space regions [17] of a frame of the arm, to be held along a whole path."""
+"""Constructors of common path constraints: task-space regions [17] of a frame of the arm, held along a whole path."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from rrtik_ompl.model.goal_kind import TaskRegion
 from rrtik_ompl.model.robot import Robot
 
 LARGEST_TILT_DEG = 80.0
-TURN_TOLERANCE = 1e-2  # [rad] of ranges of angles, at most
-RIM_SHARE = 0.5  # the same of the smallest range
+TURN_TOLERANCE = 1e-2  # [rad] largest tolerance of ranges of angles ...
+RIM_SHARE = 0.5  # ... which is also at most this share of the smallest range
 
 
 def upright(
@@ -36,8 +36,7 @@ def upright(
         axis: "x", "y" or "z" of the frame.
         tolerance_deg: Largest angle [deg], at most 80.
         frame: A link or an attached object; the robot's tip if None.
-        allowance_deg: How far motions may leave the tolerance between the waypoints of a path [deg]: not at all unless
-            this says so.
+        allowance_deg: How far motions may exceed the tolerance between the waypoints of a path [deg].
 
     Raises:
         InputError: If there is no such axis, or the tolerance is out of range.
@@ -82,12 +81,11 @@ def on_plane(
     """Keep the origin of a frame on a plane of the world, its orientation free.
 
     Args:
-        point: Of the plane [m], shape (3,).
-        normal: Of length 1, shape (3,).
+        point: A point of the plane [m], shape (3,).
+        normal: Unit normal, shape (3,).
         tolerance: Largest distance from the plane [m].
         frame: A link or an attached object; the robot's tip if None.
-        allowance: How far motions may leave the tolerance between the waypoints of a path [m]: not at all unless
-            this says so.
+        allowance: How far motions may exceed the tolerance between the waypoints of a path [m].
 
     Raises:
         InputError: If the normal is not of length 1, or the tolerance is not positive.
@@ -112,12 +110,11 @@ def on_line(
     """Keep the origin of a frame on a straight line of the world, its orientation free.
 
     Args:
-        point: Of the line [m], shape (3,).
-        direction: Of length 1, shape (3,).
+        point: A point of the line [m], shape (3,).
+        direction: Unit vector, shape (3,).
         tolerance: Largest distance from the line [m].
         frame: A link or an attached object; the robot's tip if None.
-        allowance: How far motions may leave the tolerance between the waypoints of a path [m]: not at all unless
-            this says so.
+        allowance: How far motions may exceed the tolerance between the waypoints of a path [m].
 
     Raises:
         InputError: If the direction is not of length 1, or the tolerance is not positive.
@@ -138,14 +135,13 @@ def orientation_of(
 
     Args:
         pose: ``pinocchio.SE3`` or a matrix of shape (4, 4) whose orientation is kept.
-        tolerances_deg: Largest angle from it [deg]; or three, of roll, pitch and yaw about its axes, shape (3,),
-            where 0 is as near as 0.57 degrees, or half of the smallest other one.
+        tolerances_deg: Largest angle from it [deg]; or three, of roll, pitch and yaw about its axes, shape (3,). A 0
+            among three is kept to 0.57 degrees, or to half of the smallest other one if that is less.
         frame: A link or an attached object; the robot's tip if None.
-        allowance_deg: How far motions may leave the tolerance between the waypoints of a path [deg]: not at all unless
-            this says so.
+        allowance_deg: How far motions may exceed the tolerance between the waypoints of a path [deg].
 
     Raises:
-        InputError: If the pose is none, or a tolerance is negative or too large.
+        InputError: If ``pose`` is not a pose, or a tolerance is negative or too large.
 
     Example:
         >>> robot = rrtik.load_robot("ur5")
@@ -167,7 +163,8 @@ def orientation_of(
 
     turns = np.radians(np.minimum(angles, 180.0))
     bounded = turns[(turns > 0.0) & (turns < np.pi)]
-    rim = min(TURN_TOLERANCE, RIM_SHARE * bounded.min(initial=np.pi))  # the tolerance of the region, within the angles
+    # The region's own tolerance is taken from inside the given angles, so that these are not exceeded.
+    rim = min(TURN_TOLERANCE, RIM_SHARE * bounded.min(initial=np.pi))
     turns = np.where((turns > 0.0) & (turns < np.pi), turns - rim, turns)
     bounds[3:] = turns[:, None] * [-1.0, 1.0]
     return TaskRegion(placed, bounds, orientation_tolerance=rim, frame=frame, orientation_allowance=allowance)
@@ -179,15 +176,14 @@ def inside(
     """Keep the origin of a frame inside a box of the world, its orientation free.
 
     Args:
-        pose: Of the box's centre, ``pinocchio.SE3`` or a matrix of shape (4, 4).
+        pose: Pose of the box's centre, ``pinocchio.SE3`` or a matrix of shape (4, 4).
         sides: Full side lengths [m], shape (3,).
         tolerance: Largest distance from the box [m].
         frame: A link or an attached object; the robot's tip if None.
-        allowance: How far motions may leave the tolerance between the waypoints of a path [m]: not at all unless
-            this says so.
+        allowance: How far motions may exceed the tolerance between the waypoints of a path [m].
 
     Raises:
-        InputError: If the pose is none, a side is negative, or the tolerance is not positive.
+        InputError: If ``pose`` is not a pose, a side is negative, or the tolerance is not positive.
 
     Example:
         >>> fence = rrtik.inside(rrtik.pose([0.4, 0, 0.4]), [0.4, 0.8, 0.6])
@@ -204,12 +200,12 @@ def inside(
 
 
 def _anywhere() -> Matrix:
-    """Return bounds that leave everything free."""
+    """Return bounds of a region that constrains nothing, shape (6, 2) [m; rad]."""
     return np.outer([ANYWHERE] * 3 + [np.pi] * 3, [-1.0, 1.0])
 
 
 def _tilt(degrees: ArrayLike, what: str) -> float:
-    """Return a largest angle [rad], given in degrees."""
+    """Validate an angle [deg] of at most ``LARGEST_TILT_DEG`` and convert it to radians."""
     tilt = positive(degrees, what)
     if tilt > LARGEST_TILT_DEG:
         raise InputError(f"{what} must be {LARGEST_TILT_DEG:g} or less, got {tilt:g}")
@@ -217,6 +213,6 @@ def _tilt(degrees: ArrayLike, what: str) -> float:
 
 
 def _placed(point: ArrayLike, direction: ArrayLike, caller: str, what: str) -> pin.SE3:
-    """Return a frame at a point, its z axis along a direction."""
+    """Return a frame whose origin is a point and whose z axis is a direction."""
     R = turned_z(unit_vector(direction, f"{caller}: {what}"))
     return pin.SE3(R, finite_array(point, (3,), f"{caller}: point"))

@@ -1,9 +1,10 @@
-"""Values that a joint cannot take while a region is held: what lies on both sides of one cannot be connected.
+"""Proofs that a held orientation separates two configurations: values that a joint cannot take ("walls").
 
-The orientation of a frame depends on the turning joints alone, and consecutive joints with parallel axes count as one.
-With one joint held at a value, the others' angles are divided into boxes; in a box the frame turns by no more than the
-sum of the half sides away from where it is at the middle, so that a box may be seen to hold nothing of the region. If
-that is seen of all boxes, the value is a wall. A path that keeps the region cannot pass it: this is a proof.
+The orientation of a frame depends on the revolute joints alone; consecutive joints with parallel axes count as one. To
+test a value of one joint, the angles of the others are divided into boxes. Within a box the frame turns away from its
+orientation at the middle by at most the sum of the half sides, so a box may be shown to contain no configuration of the
+region. If this is shown for all boxes, the value is a wall, and no path that keeps the region passes it. This is a
+proof.
 """
 
 from __future__ import annotations
@@ -17,28 +18,38 @@ from rrtik_ompl.base.arrays import TAU, Mask, Matrix, Vector
 from rrtik_ompl.constraints.held_region import HeldRegion, Turning
 from rrtik_ompl.constraints.held_regions import HeldRegions
 
-GRID = np.radians(15.0)  # between two values of a joint that are tried
-PARALLEL = 1e-9  # sine of an angle between axes
-MOST_ANGLES = 3  # that are divided into boxes
-MOST_BOXES = 200_000  # at a time
-ROUNDING = 1e-6  # [rad]
+GRID = np.radians(15.0)  # [rad] spacing of the joint values that are tested
+PARALLEL = 1e-9  # axes are parallel if the sine of the angle between them is below this
+MOST_ANGLES = 3  # largest number of angles that are divided into boxes
+MOST_BOXES = 200_000  # number of boxes at which a test is given up
+ROUNDING = 1e-6  # [rad] added to the tolerances
 Rotations = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
 class Turn:
-    """Consecutive joints that turn about parallel axes: a fixed rotation, then one about an axis."""
+    """Consecutive joints that turn about parallel axes: a fixed rotation, then one about an axis.
+
+    Attributes:
+        before: The fixed rotation, shape (3, 3).
+        axis: The unit axis, shape (3,).
+        joints: Indices of the joints in the chain.
+        signs: For each joint 1, or -1 where its axis points the other way.
+    """
 
     before: Rotations
     axis: Vector
-    joints: tuple[int, ...]  # rows of the chain
-    signs: tuple[float, ...]  # -1 where a joint's axis points the other way
+    joints: tuple[int, ...]
+    signs: tuple[float, ...]
 
 
 def separation(constraints: HeldRegions, start: Vector, goals: Matrix) -> str:
-    """Why a start, shape (dof,), cannot be connected with any goal, shape (g, dof), in a line; "" if that is not seen.
+    """Return a line that says why a start cannot be connected with any goal; "" if that is not proven.
 
-    What is said is proven; where nothing is said they may still be apart.
+    Args:
+        constraints: The path constraints.
+        start: Shape (dof,).
+        goals: Shape (g, dof).
     """
     said = ""
     for goal in goals:
@@ -50,14 +61,17 @@ def separation(constraints: HeldRegions, start: Vector, goals: Matrix) -> str:
 
 
 def _between(region: HeldRegion, start: Vector, goal: Vector) -> str:
-    """Return the line about a wall of one region between two configurations."""
+    """Return a line about a wall of one region between two configurations, shape (dof,) each; "" if none is found.
+
+    For joints without limits there have to be walls on both ways round.
+    """
     if region.turning not in (Turning.AXIS, Turning.BALL) or region.joint == 0:
         return ""
 
     turns, end = _turns(region)
     for place, turn in enumerate(turns):
         first, last = (_angle_of(region, turn, q) for q in (start, goal))
-        if _turns_without_limits(region, turn):  # the same posture lies the other way round too
+        if _turns_without_limits(region, turn):  # the goal can be reached both ways round
             there = first + (last - first) % TAU
             ways = [(first, there), (there, first + TAU)]
         else:
@@ -75,7 +89,7 @@ def _between(region: HeldRegion, start: Vector, goal: Vector) -> str:
 
 
 def _walls(region: HeldRegion, turns: list[Turn], end: Rotations, place: int, low: float, high: float) -> Vector:
-    """Return values between two of the joint of one turn that are walls, each once for all whole turns."""
+    """Return the walls [rad] between two values of one turn's angle, those a whole turn apart only once."""
     values = GRID * np.arange(np.floor(low / GRID) + 1, np.ceil(high / GRID))
     values = values[np.unique(np.round((values % TAU) / GRID) % round(TAU / GRID), return_index=True)[1]]
     walls: Vector = values[_blocked(region, turns, end, place, values)]
@@ -95,7 +109,7 @@ def _angle_of(region: HeldRegion, turn: Turn, q: Vector) -> float:
 
 
 def _named(region: HeldRegion, turn: Turn) -> str:
-    """Return the joints of a turn, and the verb that follows."""
+    """Return the names of a turn's joints with the verb that follows them in a message."""
     gains = np.array(turn.signs) @ region.robot.chain.gain[list(turn.joints)]
     moving = [(region.robot.joint_names[k], gains[k]) for k in np.flatnonzero(gains)]
     if len(moving) == 1:
@@ -105,7 +119,12 @@ def _named(region: HeldRegion, turn: Turn) -> str:
 
 
 def _turns(region: HeldRegion) -> tuple[list[Turn], Rotations]:
-    """The turns from the base to the frame that matter for the orientation, and the fixed rotation after the last."""
+    """Split the rotation from the base to the constrained frame into turns about axes.
+
+    Returns:
+        The turns from base to frame that affect the constraint, and the fixed rotation behind the last one, shape (3,
+        3).
+    """
     chain = region.robot.chain
     turns = list[Turn]()
     after = np.eye(3)
@@ -129,7 +148,10 @@ def _turns(region: HeldRegion) -> tuple[list[Turn], Rotations]:
 
 
 def _without_idle_turns(region: HeldRegion, turns: list[Turn], end: Rotations) -> tuple[list[Turn], Rotations]:
-    """Return the turns without a last one about the axis that is kept, and a first one about where it has to point."""
+    """Remove turns that cannot change the direction of the constrained axis.
+
+    These are a last turn about the constrained axis itself, and a first turn about the direction where it has to point.
+    """
     if turns and np.linalg.norm(np.cross(turns[-1].axis, end[:, 2])) < PARALLEL:
         end = turns[-1].before @ end
         turns = turns[:-1]
@@ -146,14 +168,19 @@ def _without_idle_turns(region: HeldRegion, turns: list[Turn], end: Rotations) -
 
 
 def _blocked(region: HeldRegion, turns: list[Turn], end: Rotations, place: int, values: Vector) -> Mask:
-    """Return which values of the joint of one turn are walls, shape (k,)."""
+    """Test which values [rad] of one turn's angle are walls, shape (k,).
+
+    The box of all other angles is halved in all directions as long as it is undecided: a box whose middle is in the
+    region shows that the value is no wall; a box whose frames are all outside is dropped. A value is a wall if all its
+    boxes are dropped.
+    """
     others = [number for number in range(len(turns)) if number != place]
     blocked = np.zeros(len(values), dtype=bool)
     if len(others) > MOST_ANGLES or len(values) == 0:
         return blocked
 
     limit = region.tolerances[1] + region.allowances[1] + ROUNDING
-    if not others:  # one turn alone, as of an arm in a plane: there is nothing to divide
+    if not others:  # there is only one turn, as of a planar arm, and nothing to divide
         blocked |= _angles(region, turns, end, values[:, None]) > limit
         return blocked
 
@@ -181,7 +208,7 @@ def _blocked(region: HeldRegion, turns: list[Turn], end: Rotations, place: int, 
 
 
 def _span(region: HeldRegion, turn: Turn) -> tuple[float, float]:
-    """Return all angles that a turn may have: a whole turn, or less if the limits of a single joint say so."""
+    """Return the range of a turn's angle [rad]: a whole turn, or less if it is a single joint with narrower limits."""
     chain = region.robot.chain
     robot = region.robot
     row = turn.joints[0]
@@ -200,7 +227,7 @@ def _span(region: HeldRegion, turn: Turn) -> tuple[float, float]:
 
 
 def _angles(region: HeldRegion, turns: list[Turn], end: Rotations, angles: Matrix) -> Vector:
-    """Return how far the frame is from what is kept [rad] for angles of all turns, shape (m, turns): (m,)."""
+    """Compute how far the frame is from the held orientation [rad] for angles of all turns, (m, turns) -> (m,)."""
     R = np.broadcast_to(region.T_w_world[:3, :3], (len(angles), 3, 3))
     for turn, values in zip(turns, angles.T, strict=True):
         R = R @ turn.before @ _rotations(turn.axis, values)
@@ -215,7 +242,7 @@ def _angles(region: HeldRegion, turns: list[Turn], end: Rotations, angles: Matri
 
 
 def _rotations(axis: Vector, values: Vector) -> Rotations:
-    """Rotations about a unit axis, shape (m, 3, 3)."""
+    """Compute rotations about a unit axis by angles [rad], (m,) -> (m, 3, 3)."""
     x, y, z = axis
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     sine = np.sin(values)[:, None, None]

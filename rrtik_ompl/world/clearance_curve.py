@@ -1,4 +1,4 @@
-"""How far the arm stays from obstacles along a path, where that is least, and which motions are not proven free."""
+"""The clearance curve of a path: how far the arm stays from obstacles, where that is least, and what is not proven."""
 
 from __future__ import annotations
 
@@ -14,21 +14,22 @@ from rrtik_ompl.model.judgement import FARTHEST, ClearanceCurve
 from rrtik_ompl.model.proof import Gap, Proof
 from rrtik_ompl.world.row_checks import RowChecks
 
-PLACES = 240  # on a path, beside its waypoints
-NEAREST = 1e-5  # [m] of clearances that are told apart
-STEPS = 255  # between that and the farthest, in equal ratios: one is 5 % more than the one before
+PLACES = 240  # number of samples on a path, in addition to its waypoints
+NEAREST = 1e-5  # [m] least clearance that is distinguished from 0
+STEPS = 255  # number of levels from NEAREST to FARTHEST in equal ratios, each 5 % above the one before
 LEVELS = frozen(np.append(0.0, np.geomspace(NEAREST, FARTHEST, STEPS)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Course:
-    """A motion in pieces, such as those between the waypoints of a path, and how it is proven.
+    """A motion in pieces, such as those between the waypoints of a path, with a function that proves it.
 
     Attributes:
-        motions: Number of the piece of each place that is looked at, shape (m,).
-        shares: Where on it, from 0 to 1, shape (m,).
-        at: The configurations, shape (k, dof), at some numbers and shares, shape (k,) each.
-        prove: Proves all of it with a clearance [m], that of the world if None; gaps are numbered by the pieces.
+        motions: Index of the piece that each sampled place is on, shape (m,).
+        shares: Position of each place on its piece, from 0 to 1, shape (m,).
+        at: Computes the configurations, shape (k, dof), at given pieces and shares, shape (k,) each.
+        prove: Proves all pieces free with a clearance [m], that of the world if None; the gaps' motions are indices of
+            pieces.
     """
 
     motions: NDArray[np.int64]
@@ -38,12 +39,15 @@ class Course:
 
 
 def clearance_along(checks: RowChecks, waypoints: Matrix) -> ClearanceCurve:
-    """Return the curve of a path, waypoints of shape (k, dof), at places spread evenly over how far the arm moves."""
+    """Compute the clearance curve of a path, waypoints of shape (k, dof).
+
+    Its samples are spread evenly over the bound on the arm's displacement.
+    """
     return clearance_on(checks, course_along(checks, waypoints))
 
 
 def course_along(checks: RowChecks, waypoints: Matrix) -> Course:
-    """Return a path, waypoints of shape (k, dof), as a course; a single one is a motion that stands still."""
+    """Return a path, waypoints of shape (k, dof), as a course; a single waypoint is a motion that stands still."""
     rows = np.vstack([waypoints, waypoints]) if len(waypoints) == 1 else waypoints
     motions, shares, _ = places_along(checks, rows)
 
@@ -55,10 +59,12 @@ def course_along(checks: RowChecks, waypoints: Matrix) -> Course:
 
 
 def clearance_on(checks: RowChecks, course: Course) -> ClearanceCurve:
-    """Return the curve of a course.
+    """Compute the clearance curve of a course.
 
-    The least distance is that of the whole course, as far as it is proven free, and not of the places alone: proofs
-    with larger clearances name the places at which these are not kept, and so does the one without.
+    The distances at the sampled places come from proofs of single configurations. The least distance on the curve holds
+    for all proven pieces as a whole and not only for the samples: proofs of the pieces with larger clearances report
+    the places at which these are not kept, and these places are added to the curve. So are the places at which the
+    proof with the required clearance fails.
     """
     proof = course.prove(None)
     unproven = tuple(gap.motion for gap in proof.unproven)
@@ -66,7 +72,7 @@ def clearance_on(checks: RowChecks, course: Course) -> ClearanceCurve:
     levels, pairs = _proven_levels(checks, course.at(course.motions, course.shares))
     levels_of_proven = levels[~np.isin(course.motions, unproven)]
 
-    # The last level below what is to be kept, or -1.
+    # Index of the last level below the required clearance, or -1.
     level_of_unproven = int(np.searchsorted(LEVELS, proof.clearance)) - 1
     gaps = [(gap, level_of_unproven) for gap in proof.unproven]
     gaps += _nearest_of_proven(course, int(levels_of_proven.min()), set(unproven)) if levels_of_proven.size else []
@@ -92,15 +98,18 @@ def clearance_on(checks: RowChecks, course: Course) -> ClearanceCurve:
 
 
 def _nearest_of_proven(course: Course, level_of_places: int, unproven: set[int]) -> list[tuple[Gap, int]]:
-    """Where the proven pieces are nearest, and the level that is proven there; nothing if all keep what places keep.
+    """Find the largest level that all proven pieces keep, and the places where the next one fails.
+
+    The level is found by bisection over ``LEVELS`` between 0 and the level of the samples.
 
     Args:
         course: The course.
-        level_of_places: Number of the level that all places on proven pieces keep.
-        unproven: Numbers of the pieces that are not proven free.
+        level_of_places: Index of the level that all samples on proven pieces keep.
+        unproven: Indices of the pieces that are not proven free.
 
     Returns:
-        The places at which the next level above the proven one is not kept, and the number of the proven level.
+        The gaps at the next level above the proven one, each with the index of the proven level; empty if the pieces
+        keep the level of the samples.
     """
     gaps: list[Gap] = []
     proven_level = 0
@@ -121,10 +130,11 @@ def _nearest_of_proven(course: Course, level_of_places: int, unproven: set[int])
 
 
 def places_along(checks: RowChecks, waypoints: Matrix) -> tuple[NDArray[np.int64], Vector, Matrix]:
-    """Places on a path, waypoints of shape (k, dof), spread evenly over how far the arm moves; the last one its end.
+    """Sample a path, waypoints of shape (k, dof), evenly over the bound on the arm's displacement; its end is the last.
 
     Returns:
-        The motion that each is on, shape (m,); where on it, from 0 to 1, shape (m,); configurations, shape (m, dof).
+        The motion that each sample is on, shape (m,); its position on the motion, from 0 to 1, shape (m,); the
+        configurations, shape (m, dof).
     """
     rows = np.vstack([waypoints, waypoints]) if len(waypoints) == 1 else waypoints
     travel = np.abs(np.diff(rows, axis=0)) @ checks.solids.weights
@@ -135,18 +145,26 @@ def places_along(checks: RowChecks, waypoints: Matrix) -> tuple[NDArray[np.int64
 
 
 def distances_at(checks: RowChecks, places: Matrix) -> Vector:
-    """What each configuration, shape (m, dof), is proven to keep from obstacles, of the distances told apart [m]."""
+    """Return the distance [m] that configurations, shape (m, dof), are proven to keep from obstacles, shape (m,).
+
+    Distances are rounded down to the levels of a curve.
+    """
     return np.asarray(LEVELS[np.maximum(_proven_levels(checks, places)[0], 0)])
 
 
 def _between(rows: Matrix, motions: NDArray[np.int64], shares: Vector) -> Matrix:
-    """Return configurations on the motions between waypoints, shape (m, dof)."""
+    """Interpolate between the waypoints ``rows`` at given motions and shares, shape (m,) each: shape (m, dof)."""
     configurations: Matrix = (1.0 - shares)[:, None] * rows[motions] + shares[:, None] * rows[motions + 1]
     return configurations
 
 
 def _proven_levels(checks: RowChecks, places: Matrix) -> tuple[NDArray[np.int64], tuple[tuple[str, str], ...]]:
-    """The largest level that each configuration, shape (m, dof), is proven to keep, -1 for none; the nearest pair."""
+    """Find by bisection the largest level that each configuration, shape (m, dof), is proven to keep.
+
+    Returns:
+        Indices into ``LEVELS``, shape (m,), -1 where not even 0 is proven; for each configuration the names of the two
+        bodies at which the last proof failed, "" if none did.
+    """
     proven_levels = np.full(len(places), -1)
     refused_levels = np.full(len(places), len(LEVELS))
     pairs = [("", "")] * len(places)

@@ -1,6 +1,7 @@
-"""Detours around what is not proven: two motions in the place of one, or of a few, through a point near by.
+"""Local repair of paths: a motion, or a few, that cannot be proven free are replaced by a detour.
 
-In a path that moves one joint at a time another joint moves out of the way before, and back afterwards.
+A detour passes through a point near by. In a path that moves one joint at a time, another joint moves out of the way
+before the motion and back after it.
 """
 
 from __future__ import annotations
@@ -15,11 +16,11 @@ from rrtik_ompl.model.proof import Proof
 from rrtik_ompl.model.transitions import length_of
 from rrtik_ompl.world.world import World
 
-SIZES = (0.01, 0.03, 0.1, 0.3)  # of a detour, shares of the stretch's length
-POINTS = 12  # of each size
-WIDER = 3  # stretches that are tried, each with a motion more at both ends
+SIZES = (0.01, 0.03, 0.1, 0.3)  # distances of a detour's point, as shares of the stretch's length
+POINTS = 12  # number of random points for each size
+WIDER = 3  # number of stretches that are tried, each with one motion more at both ends
 SIDESTEPS = tuple(0.005 * 2.0**k for k in range(8))  # [rad] or [m] by which another joint moves out of the way
-MOST_REPAIRS = 24  # of a route
+MOST_REPAIRS = 24  # largest number of repairs of a path
 
 
 def with_detours(
@@ -31,18 +32,18 @@ def with_detours(
     one_joint: bool = False,
     proof: Proof | None = None,
 ) -> Matrix | None:
-    """A route, shape (k, dof), with detours in the place of what is not proven; None if one of them is not found.
+    """Replace the unproven motions of a path, shape (k, dof), by detours; return None if one has no detour.
 
     Args:
         world: The world.
-        rows: The route.
-        clearance: To be kept from obstacles beside their margins [m].
-        rng: Of the points that are tried.
-        one_joint: Whether each motion moves one joint alone, and has to.
-        proof: What is proven of the route with this clearance, if that is known.
+        rows: The waypoints.
+        clearance: Distance kept from obstacles on top of their margins [m].
+        rng: Source of the random points.
+        one_joint: Whether each motion moves only one joint, and has to.
+        proof: The proof of the path with this clearance, if known.
 
     Returns:
-        A route of proven motions with the same ends, shape (m, dof); the given one if it is proven.
+        Waypoints of proven motions with the same ends, shape (m, dof); ``rows`` if the path is proven already.
     """
     given_proof = world.prover.route(rows, clearance=clearance) if proof is None else proof
     unproven = [gap.motion for gap in given_proof.unproven]
@@ -64,14 +65,19 @@ def with_detours(
 
 
 class Repair(NamedTuple):
-    """A route with a detour in it, and which waypoint of the one before it leads back to."""
+    """A path with a detour.
+
+    Attributes:
+        rows: Waypoints with the detour, shape (m, dof).
+        last: Index of the waypoint of the path without the detour at which the detour ends.
+    """
 
     rows: Matrix
     last: int
 
 
 def _repaired(world: World, rows: Matrix, motion: int, clearance: float, rng: np.random.Generator) -> Repair | None:
-    """Return the route with a detour around one of its motions, or around a stretch with that in the middle."""
+    """Replace a motion, or a longer stretch with it in the middle, by a detour; return None if none is found."""
     for more in range(WIDER):
         first = max(motion - more, 0)
         last = min(motion + 1 + more, len(rows) - 1)
@@ -82,7 +88,7 @@ def _repaired(world: World, rows: Matrix, motion: int, clearance: float, rng: np
 
 
 def _sidestepped(world: World, rows: Matrix, motion: int, clearance: float) -> Repair | None:
-    """The route with one of its moves made beside its place: another joint moves away before and back afterwards."""
+    """Make one single-joint move while another joint is displaced: it moves away before, and back afterwards."""
     a = rows[motion]
     b = rows[motion + 1]
     others = np.flatnonzero(a == b)
@@ -93,9 +99,9 @@ def _sidestepped(world: World, rows: Matrix, motion: int, clearance: float) -> R
     sidesteps: Matrix = offsets.reshape(-1, len(a))
 
     proven = partial(world.prover.proven, clearance=clearance)
-    sidesteps = sidesteps[proven(a + sidesteps, b + sidesteps)]  # beside the move
-    sidesteps = sidesteps[proven(a + 0.0 * sidesteps, a + sidesteps)]  # out of its way
-    sidesteps = sidesteps[proven(b + sidesteps, b + 0.0 * sidesteps)]  # and back to it
+    sidesteps = sidesteps[proven(a + sidesteps, b + sidesteps)]  # the displaced move
+    sidesteps = sidesteps[proven(a + 0.0 * sidesteps, a + sidesteps)]  # the way there
+    sidesteps = sidesteps[proven(b + sidesteps, b + 0.0 * sidesteps)]  # the way back
 
     if len(sidesteps) == 0:
         return None
@@ -103,7 +109,14 @@ def _sidestepped(world: World, rows: Matrix, motion: int, clearance: float) -> R
 
 
 def _waypoints_around(world: World, stretch: Matrix, clearance: float, rng: np.random.Generator) -> Matrix | None:
-    """What to pass between the ends of a stretch, shape (0 or 1, dof), on proven motions; None if nothing is found."""
+    """Find what replaces the inner waypoints of a stretch so that its motions are proven; None if nothing is found.
+
+    The straight motion between its ends is tried first, then random points from small to large distances, of which the
+    one with the shortest way is taken.
+
+    Returns:
+        Inner waypoints, shape (0, dof) or (1, dof).
+    """
     a = stretch[0]
     b = stretch[-1]
     proven = partial(world.prover.proven, clearance=clearance)
@@ -124,7 +137,7 @@ def _waypoints_around(world: World, stretch: Matrix, clearance: float, rng: np.r
 
 
 def _points_near(world: World, stretch: Matrix, size: float, rng: np.random.Generator) -> Matrix:
-    """Return random points within the limits, about ``size`` from places spread over a stretch, shape (POINTS, dof)."""
+    """Draw random points within the limits, about ``size`` away from random places on a stretch: (POINTS, dof)."""
     places = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(stretch, axis=0), axis=1)))
     lengths_along = places[-1] * rng.uniform(0.0, 1.0, POINTS)
     points_on = np.stack([np.interp(lengths_along, places, column) for column in stretch.T], axis=1)

@@ -1,6 +1,6 @@
-"""What is said of a motion where it is drawn: proven or not, how near obstacles are, what touches.
+"""The verdict on a motion that is drawn: whether it is proven, how near obstacles are, and what touches.
 
-All of it is said of the motion itself, a path or a timed one, however many pictures of it are drawn.
+It describes the motion itself, a path or a timed one, and does not depend on how many pictures of it are drawn.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ from rrtik_ompl.world.clearance_curve import Course, clearance_on, course_along,
 from rrtik_ompl.world.route_check import as_it_stands, route_violations, verification_resolution
 from rrtik_ompl.world.row_checks import RowChecks
 
-BISECTIONS = 12  # of a place at which a contact begins or ends
+BISECTIONS = 12  # steps in which the place where a contact begins or ends is located
 
-Fault: TypeAlias = tuple[int, float, str]  # the piece, where on it, and what is wrong there
+Fault: TypeAlias = tuple[int, float, str]  # index of the piece, position on it from 0 to 1, and the reason
 
 
 def judged_path(checks: RowChecks, rows: Matrix) -> Judged:
-    """Return the verdict on a path, waypoints of shape (k, dof); if it is a single one, on the posture."""
+    """Return the verdict on a path, waypoints of shape (k, dof); a single waypoint is judged as a posture."""
     course = course_along(checks, rows)
     judged, faults = judged_course(checks, course, partial(_faults_of_path, checks, rows))
 
@@ -49,7 +49,17 @@ def judged_path(checks: RowChecks, rows: Matrix) -> Judged:
 def judged_course(
     checks: RowChecks, course: Course, faults_of: Callable[[], list[Fault]]
 ) -> tuple[Judged, list[Fault] | None]:
-    """What is said of a course by its pieces, without words, and its faults; None if it is too long for its checks."""
+    """Judge a course: its proof, clearance curve and contacts.
+
+    Args:
+        checks: The checks of the world.
+        course: The course.
+        faults_of: Computes the faults; only called if the course is not proven. It may raise InputError if the course
+            needs too many checks.
+
+    Returns:
+        The judgement, whose verdict has no text yet; and the faults, None if the course needs too many checks.
+    """
     curve = clearance_on(checks, course) if checks.settings.scene.obstacles else None
     unproven = tuple(gap.motion for gap in course.prove(None).unproven) if curve is None else curve.unproven
     verdict = Verdict(not unproven, "", unproven)
@@ -71,10 +81,11 @@ def judged_course(
 
 
 def _with_ends(checks: RowChecks, course: Course, at: Vector) -> Vector:
-    """Places, shape (m,), and those at which what is not free begins or ends between them."""
+    """Add to places on a course, shape (m,), those where the arm becomes blocked or free, located by bisection."""
     free = checks.free(_configurations(course, at))
     changes = np.flatnonzero(free[:-1] != free[1:])
 
+    # Each change lies between a blocked and a free place, which approach each other by bisection.
     last_blocked = np.where(free[changes], at[changes + 1], at[changes])
     last_free = np.where(free[changes], at[changes], at[changes + 1])
 
@@ -88,19 +99,19 @@ def _with_ends(checks: RowChecks, course: Course, at: Vector) -> Vector:
 
 
 def _configurations(course: Course, at: Vector) -> Matrix:
-    """Configurations at places that are written as the number of a piece plus the share of it, shape (m, dof)."""
+    """Return the configurations, shape (m, dof), at places written as index of a piece plus share, shape (m,)."""
     pieces = np.clip(at.astype(np.int64), 0, course.motions[-1])
     return course.at(pieces, at - pieces)
 
 
 def with_reason(verdict: Verdict, scene: Scene, faults: list[str], *, checked: bool) -> Verdict:
-    """Return a verdict that says too what the first fault is, and of which world that is said.
+    """Append to a verdict's text the first fault, and for which state of the scene it holds.
 
     Args:
-        verdict: Without these.
-        scene: Of the world.
-        faults: Those that were found.
-        checked: Whether they were looked for; not if that takes too long.
+        verdict: The verdict without these.
+        scene: The scene of the world.
+        faults: The faults that were found.
+        checked: Whether faults were searched for; they are not if that takes too long.
     """
     text = verdict.text
     if not verdict.proven:
@@ -109,7 +120,7 @@ def with_reason(verdict: Verdict, scene: Scene, faults: list[str], *, checked: b
 
 
 def _faults_of_path(checks: RowChecks, rows: Matrix) -> list[Fault]:
-    """Return the first violation of each motion of a path."""
+    """Return the first violation of each motion of a path, waypoints of shape (k, dof)."""
     rows = np.vstack([rows, rows]) if len(rows) == 1 else rows
     faults = []
     for each in route_violations(checks, rows, verification_resolution(checks.settings)):
@@ -122,15 +133,18 @@ def _faults_of_path(checks: RowChecks, rows: Matrix) -> list[Fault]:
 def contacts_along(checks: RowChecks, waypoints: Matrix) -> tuple[PathContact, ...]:
     """Return the contacts of a path, waypoints of shape (k, dof), at places spread evenly over how far the arm moves.
 
-    A contact that is shorter than the way between two places can be missed: this shows what is wrong with a path, and
-    is no check of it.
+    A contact that is shorter than the distance between two samples can be missed. The result explains what is wrong
+    with a path, but does not check it.
     """
     motions, shares, places = places_along(checks, waypoints)
     return contacts_at(checks, motions + shares, places)
 
 
 def contacts_at(checks: RowChecks, at: Vector, places: Matrix) -> tuple[PathContact, ...]:
-    """Return the contacts at configurations, shape (m, dof), that stand at places, shape (m,), in their order."""
+    """Return the contacts at configurations, shape (m, dof), that lie in order at places, shape (m,).
+
+    Consecutive places at which the same bodies touch form one contact, which is described by its deepest pair.
+    """
     blocked = np.flatnonzero(~checks.free(places))
     contacts_of_place = {int(k): found for k in blocked if (found := checks.contacts(places[k]))}
     names_of_place = {
@@ -138,7 +152,7 @@ def contacts_at(checks: RowChecks, at: Vector, places: Matrix) -> tuple[PathCont
     }
 
     def stretch(item: tuple[int, int]) -> tuple[int, frozenset[str]]:
-        """What is the same for blocked places that follow each other and at which the same bodies touch."""
+        """Return a key that is equal for consecutive blocked places at which the same bodies touch."""
         count, place = item
         return place - count, names_of_place[place]
 

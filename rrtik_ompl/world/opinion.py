@@ -1,4 +1,4 @@
-"""What the library says of a path that somebody else has found: proven, free in steps, or refused."""
+"""Assessment of a path that another planner has found: proven, free in steps, or refused."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ Said: TypeAlias = Literal["proven", "checked", "refused"]
 
 @dataclass(frozen=True, slots=True)
 class Opinion:
-    """An opinion on a path.
+    """An assessment of a path.
 
     Attributes:
         verdict: "proven", "checked" (free in steps, but not proven) or "refused".
-        text: The same for a person, in one line.
+        text: The same as a line for a person.
     """
 
     verdict: Said
@@ -30,16 +30,16 @@ class Opinion:
 
 
 def opinion_on(world: World, start: ArrayLike, goal: ArrayLike, waypoints: ArrayLike) -> Opinion:
-    """Return an opinion on a path.
+    """Assess a path of another planner.
 
     Args:
-        world: In which it has to be free.
+        world: The world in which it has to be free.
         start: Where it has to begin, shape (dof,).
         goal: Where it has to end, shape (dof,).
-        waypoints: Of the path, shape (k, dof).
+        waypoints: The waypoints, shape (k, dof).
 
     Raises:
-        InputError: If rows do not have one value per joint, or are no numbers.
+        InputError: If rows do not have one value per joint, or contain other things than numbers.
         ProblemError: If an end is in collision or outside the limits.
     """
     Problem(world, start, goal)

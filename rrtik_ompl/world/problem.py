@@ -136,7 +136,7 @@ class Problem:
 
     @property
     def constraints(self) -> tuple[TaskRegion, ...]:
-        """Regions that a frame must not leave on the whole path, those ``from_start`` placed in the world."""
+        """Regions that a frame must not leave on the whole path; those ``from_start`` are placed in the world."""
         return tuple(self.settings.constraints)
 
     def with_resolution(self, motion_resolution: float) -> Problem:
@@ -146,7 +146,7 @@ class Problem:
     refined = Renamed("with_resolution")
 
     def with_accuracy(self, accuracy: Accuracy) -> Problem:
-        """Return the same problem, its world "exact" or "conservative" (see :meth:`rrtik_ompl.World.with_accuracy`)."""
+        """Return the same problem with accuracy "exact" or "conservative" (:meth:`rrtik_ompl.World.with_accuracy`)."""
         return self.with_world(self.world.with_accuracy(accuracy))
 
     def with_world(self, world: World) -> Problem:

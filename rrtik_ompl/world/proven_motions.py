@@ -1,4 +1,4 @@
-"""Straight motions of a world that count as free only if they are proven: for searches that need no second look."""
+"""Motion checks that accept only proven motions, for searches whose results need no second check."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ KERNELS = "search.motions.proven_kernels"
 
 
 class ProvenMotions(MotionQueries):
-    """Motions between configurations within the limits, free only if proven to keep a clearance at every point.
+    """Motion checks within the limits, by which a motion is free only if it is proven to keep a clearance.
 
-    A proof costs less than a check in small steps, and leaves nothing undecided.
+    A proof is cheaper than a check in small steps, and leaves nothing undecided.
 
     Attributes:
         robot, weights, motion_resolution: Those of the world.
-        accuracy: "conservative", for there is nothing to ask about.
-        fast: The tables of the world's checks, which see collisions sooner than a proof fails.
-        motions: How kernels judge motions.
+        accuracy: "conservative", as no motion is left undecided.
+        fast: The tables of the world's checks, which find collisions sooner than a proof fails.
+        motions: The motion checks for kernels.
 
     Args:
-        world: With kernels.
-        clearance: To be kept from obstacles beside their margins [m].
+        world: A world with kernels.
+        clearance: Distance kept from obstacles on top of their margins [m].
 
     Raises:
         InputError: If the world has no kernels.
@@ -76,12 +76,12 @@ class ProvenMotions(MotionQueries):
 
 
 def proven_motions(world: World, clearance: float, within: Matrix) -> MotionQueries:
-    """Return motions that must be proven to keep a clearance [m], in kernels where these can do it.
+    """Return motion checks that require a proof with a clearance, in kernels where possible.
 
     Args:
         world: The world.
-        clearance: To be kept from obstacles beside their margins [m].
-        within: Corners of a box of configurations within the limits, shape (m, n), in which all motions are.
+        clearance: Distance kept from obstacles on top of their margins [m].
+        within: Corners of a box of configurations within the limits that contains all motions, shape (m, n).
     """
     known: object = world
     required_clearance = max(clearance, world.settings.clearance)

@@ -1,4 +1,4 @@
-"""The arm's own body in what its sensors see: points on it are no obstacles."""
+"""Removal of the arm's own body from sensor data: points on the arm are not obstacles."""
 
 from __future__ import annotations
 
@@ -27,16 +27,16 @@ def without_robot(
     pose: ArrayLike | pin.SE3 | None = None,
     scene: Scene | None = None,
 ) -> PointCloud:
-    """Return a cloud without the points that are on the arm, or on what it holds.
+    """Remove from a cloud the points that are on the arm or on an attached object, and return the rest.
 
     Args:
-        cloud: What was seen.
+        cloud: The point cloud of the sensor.
         robot: The arm.
-        q: Where it was when that was seen, shape (dof,).
-        margin: Points whose balls are no farther from a link than this are left out [m]: what the sensor, its place and
-            the joints' angles may be wrong by.
-        pose: T_world_cloud; that of the world if None.
-        scene: Whose attached objects are part of the arm.
+        q: Configuration of the arm when the cloud was recorded, shape (dof,).
+        margin: Points whose balls are not farther from a link than this are removed [m]. It covers the errors of the
+            sensor, its pose and the joint values.
+        pose: T_world_cloud; the identity if None.
+        scene: Scene whose attached objects are part of the arm; None for none.
 
     Raises:
         InputError: If q is no configuration of the robot, the margin is negative, or no point is left.
@@ -68,7 +68,17 @@ def without_robot(
 
 
 def _on_body(cloud: PointCloud, from_body: pin.SE3, body: Body, balls: Matrix, margin: float) -> Mask:
-    """Return which points of a cloud, whose pose is seen from a body, are on it, shape (n,)."""
+    """Return which points of a cloud are within a margin of a body, shape (n,).
+
+    The body's bounding box and its outer balls select candidates, whose distance is then computed exactly.
+
+    Args:
+        cloud: The cloud.
+        from_body: Pose of the cloud in the body's frame.
+        body: The body.
+        balls: Outer cover of the body, shape (k, 4) [m]; empty if it has none.
+        margin: The margin [m].
+    """
     box = body.geometry.aabb_local
     reach = margin + cloud.radius
     points = cloud.points.astype(np.float64) @ from_body.rotation.T + from_body.translation
@@ -76,7 +86,7 @@ def _on_body(cloud: PointCloud, from_body: pin.SE3, body: Body, balls: Matrix, m
     candidates = np.flatnonzero(in_box.all(axis=1))
 
     is_on_body = np.zeros(len(cloud.points), dtype=bool)
-    is_on_body[candidates] = len(balls) == 0  # what stands still and has a formula has no cover
+    is_on_body[candidates] = len(balls) == 0  # fixed bodies of a simple shape have no cover
     for ball in balls:
         close = np.linalg.norm(points[candidates] - ball[:3], axis=1) <= ball[3] + reach
         is_on_body[candidates[close]] = True

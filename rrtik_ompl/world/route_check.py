@@ -1,4 +1,4 @@
-"""The second check of a path: its motions proven, and those that cannot be proven checked densely."""
+"""The second check of a path: its motions are proven, and those that cannot be proven are sampled densely."""
 
 from __future__ import annotations
 
@@ -19,24 +19,24 @@ from rrtik_ompl.model.transitions import in_parts, subdivided
 from rrtik_ompl.model.world_settings import FINEST_RESOLUTION, WorldSettings
 from rrtik_ompl.world.row_checks import RowChecks
 
-VERIFICATION_DENSITY = 2.0  # how many times finer than the motion resolution a motion is checked again
-MAX_CHECKS = 30_000_000  # of a path; more than that take minutes
-AT_ONCE = 200_000  # of them, so that a long path needs no more memory than a short one
+VERIFICATION_DENSITY = 2.0  # factor by which the second check is finer than the motion resolution
+MAX_CHECKS = 30_000_000  # largest number of checks of a path; more would take minutes
+AT_ONCE = 200_000  # number of checks at a time, which bounds the memory of long paths
 
 
 def verification_resolution(settings: WorldSettings) -> float:
-    """Largest step of any point of the arm between two configurations of the second check [m]."""
+    """Return the largest step of any point of the arm between two configurations of the second check [m]."""
     return max(settings.motion_resolution / VERIFICATION_DENSITY, FINEST_RESOLUTION)
 
 
 def violations_of(checks: RowChecks, rows: Matrix, resolution: float | None = None) -> tuple[Violation, ...]:
-    """As :meth:`rrtik_ompl.World.violations`, of waypoints that are trusted, shape (k, dof)."""
+    """Return the violations of a path, as :meth:`rrtik_ompl.World.violations` but without validation of waypoints."""
     step = verification_resolution(checks.settings) if resolution is None else resolution
     return route_violations(checks, np.vstack([rows, rows]) if len(rows) == 1 else rows, step)
 
 
 def motion_taken(checks: RowChecks, a: Vector, b: Vector) -> bool:
-    """Check whether a motion is free in the world's own steps, and the second check takes it as part of a path."""
+    """Check whether a motion is free in the world's own steps and also passes the second check of a path."""
     rows = np.stack([a, b])
     if not checks.motions_free(rows[:1], rows[1:])[0]:
         return False
@@ -44,14 +44,20 @@ def motion_taken(checks: RowChecks, a: Vector, b: Vector) -> bool:
 
 
 def as_it_stands(scene: Scene) -> str:
-    """Return a clause for what is said of a scene as if it stood still: "" where nothing in it moves by itself."""
+    """Return a clause for texts that treat a scene as static; "" if no obstacle in it moves by itself."""
     if all(obstacle.motion is None for obstacle in scene.obstacles):
         return ""
     return ", with moving obstacles as they stand at time 0 (replan and plan_in_time go by their motion)"
 
 
 def how_checked(checks: RowChecks, rows: Matrix, given_proof: Proof | None = None) -> str:
-    """Return how the second check sees that the motions between waypoints, shape (k, dof), are free, in a few words."""
+    """Describe in a few words how the second check finds a path free.
+
+    Args:
+        checks: The checks of the world.
+        rows: The waypoints, shape (k, dof).
+        given_proof: A proof of the path, which is used if it is complete and keeps the required clearance.
+    """
     proof = given_proof
     if proof is None or not proof.proven or proof.clearance < checks.settings.required_clearance:
         proof = checks.prover.route(rows, clearance=checks.settings.required_clearance)
@@ -70,15 +76,15 @@ def how_checked(checks: RowChecks, rows: Matrix, given_proof: Proof | None = Non
 
 
 def route_violations(checks: RowChecks, rows: Matrix, resolution: float) -> tuple[Violation, ...]:
-    """Return the first violation of every motion between waypoints that has one.
+    """Return the first violation of every motion between waypoints that has one, ordered by motions.
 
     Args:
-        checks: Of the world.
-        rows: Waypoints, two at least, shape (k, dof).
-        resolution: Largest step of any point of the arm between two checks of a motion that is not proven [m].
+        checks: The checks of the world.
+        rows: At least two waypoints, shape (k, dof).
+        resolution: Largest step of any point of the arm between two samples of a motion that is not proven [m].
 
     Raises:
-        InputError: If the path is too long for its checks.
+        InputError: If the path needs too many checks.
     """
     if checks.constraints is not None:
         breaches = _not_held(checks.constraints, rows)
@@ -96,13 +102,17 @@ def route_violations(checks: RowChecks, rows: Matrix, resolution: float) -> tupl
 
     unproven = np.flatnonzero(~checks.prover.proven(rows[:-1], rows[1:], clearance=checks.settings.required_clearance))
     violations = []
+    # Consecutive unproven motions form a run, which is sampled at once.
     for run in np.split(unproven, np.flatnonzero(np.diff(unproven) > 1) + 1) if len(unproven) else ():
         violations += _sampled(checks, rows, counts, run)
     return tuple(violations if checks.settings.proving is None else _with_unproven(checks, rows, unproven, violations))
 
 
 def _steps(checks: RowChecks, rows: Matrix, resolution: float) -> Vector:
-    """In how many steps each motion between waypoints is checked, shape (k - 1,); one by one, as everywhere."""
+    """Return the number of steps of each motion between waypoints, shape (k - 1,).
+
+    Motions are counted one by one, so that the numbers are the same wherever they are computed.
+    """
     pairs = pairwise(rows[:, None])
     return np.array([step_counts(a, b, checks.solids.weights, resolution)[0] for a, b in pairs], dtype=np.float64)
 
@@ -110,7 +120,10 @@ def _steps(checks: RowChecks, rows: Matrix, resolution: float) -> Vector:
 def _with_unproven(
     checks: RowChecks, rows: Matrix, unproven: NDArray[np.int64], violations: list[Violation]
 ) -> Iterator[Violation]:
-    """What was found, and each other motion that is not proven to keep what it must, of those given by numbers."""
+    """Yield the violations found, and one for each other motion that is not proven to keep the required clearance.
+
+    ``unproven`` holds the indices of the motions to consider.
+    """
     violation_of_edge = {violation.edge: violation for violation in violations}
     clearance = checks.settings.proving or 0.0
     proven = checks.prover.proven(rows[unproven], rows[unproven + 1], clearance=clearance)
@@ -122,13 +135,13 @@ def _with_unproven(
 
 
 def not_proven(settings: WorldSettings) -> str:
-    """What is said of a motion that has to be proven, and is not."""
+    """Return the reason that is given for a motion that has to be proven but is not."""
     millimetres = 1e3 * (settings.proving or 0.0)
     return f"not proven to keep {millimetres:.4g} mm from every obstacle" if millimetres else "not proven free"
 
 
 def _not_held(constraints: HeldRegions, rows: Matrix) -> list[Violation]:
-    """Return the motions that do not keep path constraints."""
+    """Return a violation for each motion that does not keep the path constraints."""
     edges = np.flatnonzero(~constraints.route_held(rows))
     ends = [rows[k] if constraints.explain(rows[k]) else rows[k + 1] for k in edges]
     return [
@@ -137,12 +150,19 @@ def _not_held(constraints: HeldRegions, rows: Matrix) -> list[Violation]:
 
 
 def _sampled(checks: RowChecks, rows: Matrix, counts: Vector, run: NDArray[np.int64]) -> Iterator[Violation]:
-    """Yield the violations of consecutive motions, whose numbers are given, checked in steps."""
+    """Yield the violations of a run of consecutive motions, which are checked at ``counts`` steps each.
+
+    Args:
+        checks: The checks of the world.
+        rows: The waypoints, shape (k, dof).
+        counts: Number of steps of all motions, shape (k - 1,).
+        run: Indices of the motions to check, in order and without a gap.
+    """
     for part in in_parts(counts[run], AT_ONCE):
         edges = run[part]
         samples, owners = subdivided(rows[edges[0] : edges[-1] + 2], counts[edges])
         refused = np.flatnonzero(~checks.certified(samples))
-        # The point at which a part begins is the last one of the part before.
+        # The first sample of a part is the last one of the part before, so it has been reported already.
         refused = refused[(refused > 0) | (part[0] == 0)]
         _, first = np.unique(owners[refused], return_index=True)
         for k in refused[first]:

@@ -113,7 +113,7 @@ class RowChecks:
         return CERTIFICATES.of(self.solids, self.settings.clearance)
 
     def free(self, rows: Matrix) -> Mask:
-        """Return which rows, shape (m, dof), are inside the limits and free. Shape (m,)."""
+        """Return which rows, shape (m, dof), are inside the limits, free and within the constraints, shape (m,)."""
         return in_blocks(self._free, rows)
 
     def motions_free(self, starts: Matrix, ends: Matrix) -> Mask:
@@ -143,7 +143,7 @@ class RowChecks:
         return tuple(sorted(contacts, key=lambda c: c.clearance))
 
     def closest(self, q: Vector) -> Contact | None:
-        """The pair of bodies that is nearest to contact or to its margin at q, shape (dof,), where nothing touches."""
+        """Return the pair of bodies with the least clearance at q, shape (dof,), if nothing touches, or None."""
         frames = self.settings.robot.chain.joint_frames(q[None])[0]
         contacts = measured(self.solids.bodies.as_tuple, self.solids.pairs, frames, near_only=False)
         return min(contacts, key=lambda c: c.clearance, default=None)

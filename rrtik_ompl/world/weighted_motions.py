@@ -1,6 +1,6 @@
-"""Motions in coordinates in which each joint's way is multiplied by its weight: Euclidean lengths there are weighted.
+"""Motions in weighted coordinates: joint values are multiplied by weights, so Euclidean lengths are weighted lengths.
 
-Searches that know nothing of weights are given these coordinates, and what they find is turned back.
+Searches that have no notion of weights run in these coordinates, and their results are divided by the weights again.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ class WeightedMotions(MotionQueries):
     """The motions of a world in weighted coordinates.
 
     Attributes:
-        robot: The arm with limits and joint values of these coordinates.
-        fast, motions: What kernels read; None where the world has none.
+        robot: The arm with limits and joint values in these coordinates.
+        fast, motions: The tables for kernels; None where the world has none.
         constraints, free_motions: See :class:`rrtik_ompl.World`; None where there are none.
         weights, motion_resolution, accuracy: See :class:`rrtik_ompl.World`.
 
     Args:
-        world: A world, or another one that checks motions of its robot.
-        weights: Of the joints, shape (dof,).
+        world: A world, or a stand-in that checks motions of its robot.
+        weights: Weights of the joints, shape (dof,).
     """
 
     def __init__(self, world: World, weights: Vector) -> None:
@@ -71,5 +71,5 @@ class WeightedMotions(MotionQueries):
         return np.asarray(self._world.motion_valid_batch(self._unweighted(A), self._unweighted(B)))
 
     def _unweighted(self, Q: Matrix) -> Matrix:
-        """Return configurations of the world of those in weighted coordinates, shape (m, n)."""
+        """Convert configurations in weighted coordinates to joint values of the world, shape (m, n)."""
         return np.asarray(Q / self._scale)
