@@ -229,7 +229,7 @@ class Roadmap:
         self.graph.learn(rows - self._turns(rows[0]))
 
     def _turns(self, start: Vector) -> Vector:
-        """The whole turns of joints without limits that lie between the roadmap and a configuration, shape (dof,)."""
+        """Return the whole turns of joints without limits between the roadmap and a configuration [rad]."""
         turns: Vector = np.where(self.world.robot.continuous, np.rint(start / TAU) * TAU, 0.0)
         return turns
 

@@ -1,4 +1,4 @@
-"""A roadmap in Python, for any motion check; :mod:`rrtik_ompl.kernels.search.roadmap.kernels` is its twin."""
+"""A roadmap in Python for any motion check; :mod:`rrtik_ompl.kernels.search.roadmap.kernels` is its twin in kernels."""
 
 from __future__ import annotations
 

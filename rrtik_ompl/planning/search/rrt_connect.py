@@ -1,6 +1,6 @@
-"""RRT-Connect in Python, for any motion check; :mod:`rrtik_ompl.kernels.search.connect_kernels` is its twin in kernels.
+"""RRT-Connect in Python for any motion check; :mod:`rrtik_ompl.kernels.search.connect_kernels` is its twin in kernels.
 
-Sources: [4]; the smaller tree grows: [5]; the dynamic domain, in which a vertex that was blocked is extended: [6].
+Sources: [4]; the smaller tree grows: [5]; the dynamic domain, which limits the extension of blocked vertices: [6].
 """
 
 from __future__ import annotations
@@ -162,7 +162,7 @@ def reach(
 
 
 def path_between(first: Matrix, second: Matrix) -> Matrix:
-    """A branch from a start, then a branch from a goal in reverse, shapes (k, n); an end of both occurs once."""
+    """Join a branch from a start and the reverse of a branch from a goal, shapes (k, n); a common end occurs once."""
     shared = bool((first[-1] == second[-1]).all())
     return np.vstack([first, second[::-1][int(shared) :]])
 

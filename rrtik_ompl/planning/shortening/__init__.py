@@ -203,7 +203,7 @@ def shortened(
     method: ShorteningMethod = "auto",
     on_better: Callable[[JointPath], object] | None = None,
 ) -> JointPath:
-    """What :func:`shorten` does with a path that is known to be valid, by wishes that make sense for it."""
+    """Shorten a path as :func:`shorten` does; the path is known to be valid, and the wishes have been checked."""
     chosen = _method_for(method, problem, wishes.one_joint)
     head, tail = _split_before_last_joints(path.waypoints, wishes.rules)
     if len(head) < 2:

@@ -17,12 +17,12 @@ from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.model.transitions import route_length, without_repeats
 from rrtik_ompl.planning.shortening.task import Task
 
-FIRST_GAIN = 2e-3  # of the length: what the first round does not bother to gain at a bend
-LEAST_GAIN = 1.2e-4  # likewise for the second round; the rounds after it are finer still
-FINER = 0.4  # from one round to the next
-ROUND = 2e-4  # of the length: where chords still gain as much, something round is left to be gone round
+FIRST_GAIN = 2e-3  # share of the length; smaller gains at a bend are ignored by the first round
+LEAST_GAIN = 1.2e-4  # the same for the second round; later rounds are finer
+FINER = 0.4  # factor of this share from one round to the next
+ROUND = 2e-4  # share of the length; while chords gain more, a further round follows
 MAX_CORNER_ROUNDS = 8
-CHORD = 1.3  # a chord is found to this factor
+CHORD = 1.3  # relative accuracy of the length of a chord
 
 
 def snap_corners(route: Matrix, task: Task) -> Matrix:
@@ -228,7 +228,10 @@ def _detour(a: Vector, bend: Vector, b: Vector) -> float:
 
 
 def _first_below(length: Callable[[float], float], max_length: float) -> float:
-    """The smallest share, to a part in a million, at which a length that falls is as small as wanted; 1 if nowhere."""
+    """Return the smallest share at which a decreasing length is at most ``max_length``; 1 if nowhere.
+
+    The share is found by bisection to one millionth.
+    """
     low = 0.0
     high = 1.0
     while high - low > 1e-6:

@@ -1,4 +1,4 @@
-"""What a method of shortening is given: a check of motions, its budget, what is wished for, and a listener."""
+"""The input of a method of shortening: a check of motions, a budget, wishes, and a listener."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ class Wishes:
     """How a route is to be shortened.
 
     Attributes:
-        budget: Time, the seed of all random choices, and as its iterations the motions that are checked at most.
+        budget: Time limit, the seed of all random choices, and as iterations the limit of checked motions.
         one_joint: Whether every edge of the result must move one joint, as the edges of the given route do.
-        rules: What single-joint moves have to keep to, or None.
-        clearance: What new motions keep from obstacles [m], or None.
+        rules: Rules that single-joint moves have to keep, or None.
+        clearance: Clearance of new motions from obstacles [m], or None.
         on_better: Called with every better route, shape (k, n).
     """
 
@@ -38,18 +38,18 @@ class Wishes:
 class Task:
     """One request to shorten a route.
 
-    When the time is up, nothing else counts as free, so that a method ends soon with a free
-    route: whatever it has replaced by then stays replaced.
+    When the time is up, no further motion counts as free. A method thus ends soon, with a free route that has all
+    replacements made until then.
 
     Attributes:
-        motions: As given.
-        wishes: As given.
+        motions: The given check of motions.
+        wishes: The given wishes.
         asked: How many straight motions have been checked, or tried in kernels.
-        confirmed_again: How many motions of a result have been checked on top of that, as parts of free ones.
+        confirmed_again: How many motions of a result have been checked again, as parts of free ones.
 
     Args:
-        motions: A world, or anything else that checks straight motions.
-        wishes: What is asked for; none in particular if None.
+        motions: A world, or another object that checks straight motions.
+        wishes: Limits and conditions; None for the defaults.
     """
 
     def __init__(self, motions: MotionQueries, wishes: Wishes | None = None) -> None:
@@ -63,7 +63,7 @@ class Task:
 
     @property
     def seed(self) -> int:
-        """Of all random choices."""
+        """Seed of all random choices."""
         return self.wishes.budget.seed
 
     @property
@@ -73,33 +73,33 @@ class Task:
 
     @property
     def bounded(self) -> bool:
-        """Whether there is an end to the time, or to the checks."""
+        """Whether time or checks are limited."""
         return self.wishes.budget.limited
 
     @property
     def listened(self) -> bool:
-        """Whether anybody is told of better routes."""
+        """Whether there is a listener for better routes."""
         return self.wishes.on_better is not None
 
     @property
     def rest(self) -> Budget:
-        """The budget of a search that knows no task: it ends with this one."""
+        """A budget for searches that do not know tasks; it ends with this task."""
         return Budget(self.seed, stop=self.expired)
 
     @property
     def kernel_world(self) -> KernelWorld | None:
-        """The world, if random shortcuts can be searched for in its kernels, else None."""
+        """The world if its kernels can search for random shortcuts, else None."""
         world = self.motions
         return world if not self.one_joint and has_kernels(world, KERNELS) else None
 
     @property
     def checks_left(self) -> float:
-        """Motions that may still be checked; +inf without a limit."""
+        """Number of motions that may still be checked; +inf without a limit."""
         checks = self.wishes.budget.iterations
         return np.inf if checks is None else max(checks - self.asked, 0)
 
     def expired(self) -> bool:
-        """Whether the time is up, or the checks are spent."""
+        """Check whether the time is up or the checks are used up."""
         budget = self.wishes.budget
         if budget.iterations is not None and self.asked >= budget.iterations:
             return True
@@ -114,10 +114,10 @@ class Task:
         return self._checked(A, B)
 
     def confirmed(self, new: Matrix, old: Matrix) -> bool:
-        """Whether every edge of a route, shape (k, n), is free; those of the old route and those found free are known.
+        """Check whether every edge of a new route, shape (k, n), is free; edges known to be free are not checked again.
 
-        Parts of free edges are checked at other configurations than the whole, so they count as new. They are checked
-        even when the time is up.
+        Known edges are those of the old route and those found free before. A part of a free edge is checked at other
+        configurations than the whole edge, so it counts as new. The check is completed even when the time is up.
         """
         known_free = self._known.union(edge_keys(old))
         fresh = [k for k, edge in enumerate(edge_keys(new)) if edge not in known_free and edge[::-1] not in known_free]
@@ -125,30 +125,33 @@ class Task:
         return not fresh or bool(self._checked(new[fresh], new[np.add(fresh, 1)]).all())
 
     def _checked(self, A: Matrix, B: Matrix) -> Mask:
-        """Which motions are free, whatever time it is; the free ones are remembered."""
+        """Check which motions are free, even when the time is up, and remember the free ones."""
         free: Mask = self.motions.motion_valid_batch(A, B)
         self._known.update((A[k].tobytes(), B[k].tobytes()) for k in np.flatnonzero(free))
         return free
 
     def free(self, a: Vector, b: Vector) -> bool:
-        """Whether a straight motion is free; not when the time is up."""
+        """Check whether a straight motion is free; it is not when the time is up."""
         return bool(self.free_batch(a[None], b[None])[0])
 
     def moves(self, a: Vector, b: Vector) -> Matrix:
-        """The waypoints after a on the path to b, shape (k, n): b alone, or those of single-joint moves."""
+        """Return the waypoints after a of the path to b, shape (k, n): b alone, or those of single-joint moves."""
         if not self.one_joint:
             return b[None]
         return axis_moves(a, b, range(len(a))[::-1])
 
     def link(self, a: Vector, b: Vector) -> Matrix | None:
-        """The waypoints after a of a free path to b, shape (k, n), or None."""
+        """Return the waypoints after a of a free path to b, shape (k, n), or None."""
         found = self.first_link(a, b[None])
         return None if found is None else found[1]
 
     def first_link(self, a: Vector, goals: Matrix) -> tuple[int, Matrix] | None:
-        """The first of the goals, shape (m, n), to which there is a free path, and its waypoints after a; or None.
+        """Find the first of the goals, shape (m, n), to which there is a free path from a.
 
         The first goal is checked alone, then twice as many together each time.
+
+        Returns:
+            The index of the goal, and the waypoints after a, shape (k, n); None if there is no free path.
         """
         first = 0
         count = 1
@@ -166,15 +169,15 @@ class Task:
         return None
 
     def rank(self, route: Matrix) -> tuple[float, float]:
-        """What is to be made small: the length, after the number of moves where one joint moves at a time."""
+        """Return the rank of a route, smaller is better: number of moves (0 unless single-joint), then length."""
         return (float(transitions(route)) if self.one_joint else 0.0), length_of(route)
 
     def better(self, *routes: Matrix) -> Matrix:
-        """The best of several routes, the first of equal ones."""
+        """Return the best of several routes, the first of equal ones."""
         return min(routes, key=self.rank)
 
     def report(self, route: Matrix) -> None:
-        """Pass a route to the listener if it is better than those before."""
+        """Pass a route to the listener if it is better than those reported before."""
         if self.wishes.on_better is not None and self.rank(route) < self._reported:
             self._reported = self.rank(route)
             self.wishes.on_better(route)

@@ -1,4 +1,4 @@
-"""Motions of the tip along straight lines, arcs and screws: joints that follow them without jumps and collisions."""
+"""Motions of the tip along straight lines, arcs and screws, which the joints follow without jumps or collisions."""
 
 from __future__ import annotations
 
@@ -25,17 +25,18 @@ from rrtik_ompl.world.world import World
 
 DEVIATION = 1e-4  # [m]
 TURN_DEVIATION = 0.1 * DEGREE  # [rad]
-BRANCHES = 16  # configurations of a pose from which it is tried
+BRANCHES = 16  # configurations at a start pose that are tried
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StraightResult:
-    """How far the tip came.
+    """The result of a motion of the tip: how far it came, and why it ended.
 
     Attributes:
-        path: Its configurations, every motion of it proven free; None if the fraction is 0.
-        fraction: Share of the way that it covers, from 0 to 1.
-        reason: Why it ends there: the limit of a joint, a singular posture, the pair in contact; "" if it is whole.
+        path: Its configurations, every motion proven free; None if the fraction is 0.
+        fraction: Share of the way that the path covers, from 0 to 1.
+        reason: Why it ends there: a joint at its limit, a singular posture, the bodies in contact; "" if it is
+            complete.
 
     Example:
         >>> world, q = rrtik.World(rrtik.load_robot("ur5")), np.array([0.0, -1.6, 1.8, -0.2, 1.6, 0.0])
@@ -59,23 +60,23 @@ def straight(
     clearance: float | None = None,
     seed: int = 0,
 ) -> StraightResult:
-    """Move the tip in a straight line, its axes turning about one axis, as far as the arm can and nothing is touched.
+    """Move the tip in a straight line while its axes turn about one axis, as far as the arm can without collision.
 
-    The tip stays within the deviations at every point of the motions between the waypoints, not only at these: that is
-    bounded by the derivatives of the kinematics. Joints move without jumps, at most 0.25 rad or m between waypoints.
-    All motions are proven free (:meth:`World.prove`). A redundant arm uses its freedom to stay away from its limits
-    [60], and tries other ways to use it if it is stopped.
+    The tip stays within the deviations during the motions between waypoints, not only at the waypoints: the deviation
+    is bounded by derivatives of the kinematics. Joints move without jumps, at most 0.25 rad or m between waypoints. All
+    motions are proven free (:meth:`World.prove`). A redundant arm uses its freedom to stay away from its limits [60],
+    and tries other ways to use it if it is stopped.
 
     Args:
         world: Robot and scene.
-        q: Where to begin: a configuration, shape (dof,), the name of a posture, or a pose of the tip as ``SE3`` or
-            matrix, shape (4, 4). Of the configurations at a pose that is taken from which the tip comes farthest.
+        q: Start: a configuration, shape (dof,), the name of a posture, or a pose of the tip as ``SE3`` or matrix, shape
+            (4, 4). Of the configurations at a pose, the one from which the tip comes farthest is used.
         T_world_goal: Pose of the tip at the end, see :func:`rrtik_ompl.base.poses.rigid`. A position alone, [x, y, z],
-            keeps the orientation of the beginning.
-        deviation: Of the tip from the line at most [m].
-        turn_deviation: Of its orientation at most [rad].
-        clearance: To be kept from every obstacle on top of its margin [m]; what the world keeps if None or less.
-        seed: Of the random numbers with which a redundant arm tries other ways.
+            keeps the orientation of the start.
+        deviation: Greatest distance of the tip from the line [m].
+        turn_deviation: Greatest deviation of its orientation [rad].
+        clearance: Clearance from every obstacle on top of its margin [m]; that of the world if None or less.
+        seed: Seed of the random numbers with which a redundant arm tries other ways.
 
     Raises:
         ProblemError: If q is in collision or outside the limits.
@@ -107,17 +108,17 @@ def arc(
     clearance: float | None = None,
     seed: int = 0,
 ) -> StraightResult:
-    """Move the tip on the circle that leads through a point to a goal; all else is as for :func:`straight`.
+    """Move the tip on the circle through a point to a goal; everything else is as for :func:`straight`.
 
     Args:
         world: Robot and scene.
-        q: Where to begin, see :func:`straight`.
+        q: Start, see :func:`straight`.
         T_world_goal: Pose of the tip at the end, see :func:`straight`.
-        through: Point of the world that the tip passes [m], shape (3,).
-        deviation: Of the tip from the line at most [m].
-        turn_deviation: Of its orientation at most [rad].
-        clearance: To be kept from every obstacle on top of its margin [m]; what the world keeps if None or less.
-        seed: Of the random numbers with which a redundant arm tries other ways.
+        through: Point in the world that the tip passes [m], shape (3,).
+        deviation: Greatest distance of the tip from the line [m].
+        turn_deviation: Greatest deviation of its orientation [rad].
+        clearance: Clearance from every obstacle on top of its margin [m]; that of the world if None or less.
+        seed: Seed of the random numbers with which a redundant arm tries other ways.
 
     Raises:
         ProblemError: See :func:`straight`.
@@ -148,17 +149,17 @@ def screw(
     clearance: float | None = None,
     seed: int = 0,
 ) -> StraightResult:
-    """Move the tip about and along one line of the world at once, as a screw, a door or a valve goes.
+    """Move the tip about and along one line of the world at the same time, like a screw, a door or a valve.
 
     Args:
         world: Robot and scene.
-        q: Where to begin, see :func:`straight`.
+        q: Start, see :func:`straight`.
         T_world_goal: Pose of the tip at the end, see :func:`straight`.
         turns: Whole turns on top of the shortest way to the goal; a negative number turns the other way.
-        deviation: Of the tip from the line at most [m].
-        turn_deviation: Of its orientation at most [rad].
-        clearance: To be kept from every obstacle on top of its margin [m]; what the world keeps if None or less.
-        seed: Of the random numbers with which a redundant arm tries other ways.
+        deviation: Greatest distance of the tip from the line [m].
+        turn_deviation: Greatest deviation of its orientation [rad].
+        clearance: Clearance from every obstacle on top of its margin [m]; that of the world if None or less.
+        seed: Seed of the random numbers with which a redundant arm tries other ways.
 
     Raises:
         ProblemError: See :func:`straight`.
@@ -189,16 +190,16 @@ def linear(
     clearance: float | None = None,
     seed: int = 0,
 ) -> StraightResult:
-    """Move the tip in straight lines from pose to pose; all else is as for :func:`straight`.
+    """Move the tip in straight lines from pose to pose; everything else is as for :func:`straight`.
 
     Args:
         world: Robot and scene.
-        q: Where to begin, see :func:`straight`.
-        poses: Poses of the tip one after the other, each as ``T_world_goal`` of :func:`straight`.
-        deviation: Of the tip from the line at most [m].
-        turn_deviation: Of its orientation at most [rad].
-        clearance: To be kept from every obstacle on top of its margin [m]; what the world keeps if None or less.
-        seed: Of the random numbers with which a redundant arm tries other ways.
+        q: Start, see :func:`straight`.
+        poses: Poses of the tip in their order, each as ``T_world_goal`` of :func:`straight`.
+        deviation: Greatest distance of the tip from the line [m].
+        turn_deviation: Greatest deviation of its orientation [rad].
+        clearance: Clearance from every obstacle on top of its margin [m]; that of the world if None or less.
+        seed: Seed of the random numbers with which a redundant arm tries other ways.
 
     Raises:
         ProblemError: See :func:`straight`.
@@ -224,7 +225,7 @@ def linear(
 
 
 def _goal(value: ArrayLike | pin.SE3, begin: pin.SE3, what: str) -> pin.SE3:
-    """A pose (SE3); a position alone keeps the orientation of the beginning."""
+    """Return a pose as SE3; a position alone keeps the orientation of the start."""
     goal = rigid(value, what)
     if not isinstance(value, pin.SE3) and np.shape(value) == (3,):
         return pin.SE3(begin.rotation, goal.translation)
@@ -240,7 +241,7 @@ def _moved(
     clearance: float | None,
     seed: int,
 ) -> StraightResult:
-    """Follow the rails that begin where the tip is."""
+    """Check the arguments, and follow the rails that ``rails`` builds from the pose of the tip at the start."""
     tolerance = Tolerance(positive(deviation, "deviation"), positive(turn_deviation, "turn_deviation"))
     if tolerance.turn > 1.0:
         raise InputError(f"turn_deviation must be 1 rad at most, got {tolerance.turn:g}; is it in radians?")
@@ -259,7 +260,10 @@ def _moved(
 
 
 def _begin(world: World, q: ArrayLike | str | pin.SE3, seed: int) -> tuple[pin.SE3, Matrix]:
-    """Where the tip begins (SE3), and configurations from which it may, shape (k, dof): that given, or those of a pose.
+    """Return the pose of the tip at the start, and the start configurations to try.
+
+    Returns:
+        The pose (SE3), and configurations, shape (k, dof): the given one, or those of inverse kinematics for a pose.
 
     Raises:
         ProblemError: If it is in collision or outside the limits.

@@ -1,4 +1,4 @@
-"""One attempt after the other to follow rails without collision, and why a tip cannot go on along one."""
+"""Attempts to follow rails without collision, and explanations of why the tip cannot go on along one."""
 
 from __future__ import annotations
 
@@ -28,28 +28,28 @@ from rrtik_ompl.planning.tip_motion.following import (
 from rrtik_ompl.planning.tip_motion.rails import Rail
 from rrtik_ompl.world.world import World
 
-HALVINGS = 14  # of a motion that is not proven, to find how far it is
-LEFT = 1e-5  # [m] between what stops the arm and its last configuration, from which it has to get away again
-ENDS = 8  # configurations at the end of the rails towards which a redundant arm is drawn
+HALVINGS = 14  # halvings of a motion to find how far it is proven
+LEFT = 1e-5  # [m] room left at the last configuration, so that the arm can move away again
+ENDS = 8  # configurations at the end of a rail that a redundant arm tries to approach
 RANDOM_REFERENCES = 6
-STRONG = 5.0  # how much a random reference draws
-NO_LENGTH = 1e-12  # [m], a turn counted as `Way.measures` does
-IK_SECONDS = 1e9  # no limit: the rounds of inverse kinematics are counted, some 10 ms of them
-AT_LIMIT = 1e-3  # [rad] or [m]
+STRONG = 5.0  # pull towards a random reference, see `Leaning`
+NO_LENGTH = 1e-12  # [m] of `Way.measures`
+IK_SECONDS = 1e9  # no limit of time; the rounds of inverse kinematics are limited, to some 10 ms
+AT_LIMIT = 1e-3  # [rad or m] distance from a limit at which a joint counts as at its limit
 CUT_OFF = 1e-6  # share of the largest singular value below which a direction counts as lost
-LOST = 1e-3  # share of a twist that the joints cannot make, from which on they are too few
+LOST = 1e-3  # share of a twist that the joints cannot produce, above which there are too few of them
 LOOKS = 16  # configurations of a motion at which contacts are looked for
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Way:
-    """Where the tip is to go, and how.
+    """The rails that the tip is to follow, and the conditions.
 
     Attributes:
-        rails: One after the other.
-        tolerance: How exactly to follow them.
-        clearance: To be kept from obstacles [m]; None for what the world keeps.
-        seed: Of the ways that a redundant arm tries.
+        rails: The rails in their order.
+        tolerance: Allowed deviation from the rails.
+        clearance: Clearance to keep from obstacles [m]; None for that of the world.
+        seed: Seed of the random references that a redundant arm tries.
     """
 
     rails: tuple[Rail, ...]
@@ -58,22 +58,29 @@ class Way:
     seed: int = 0
 
     def clearance_in(self, world: World) -> float:
-        """The clearance to be kept from obstacles in a world [m]."""
+        """Return the clearance to keep from obstacles in a world [m]."""
         return world.settings.required_clearance if self.clearance is None else self.clearance
 
     def leads_nowhere(self, robot: Robot) -> bool:
-        """Whether its end is where it begins."""
+        """Check whether the end of the rails is where they begin."""
         return bool(self.measures(robot).sum() <= NO_LENGTH)
 
     def measures(self, robot: Robot) -> Vector:
-        """How much each rail counts [m]: its length, and its turn at the lever of half the arm's reach."""
+        """Return the measure of each rail [m], shape (rails,): its length, plus its turn times half the arm's reach."""
         per_radian = metres_per_radian(robot)
         return np.array([rail.length + per_radian * abs(rail.turn_angle) for rail in self.rails])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Attempt:
-    """How far one attempt came: configurations, shape (k, dof), their proof, the fraction, and why not farther."""
+    """The result of one attempt.
+
+    Attributes:
+        rows: Configurations, shape (k, dof).
+        proof: Their proof, or None.
+        fraction: Share of the way that they cover, from 0 to 1.
+        reason: Why they end there; "" if they cover the whole way.
+    """
 
     rows: Matrix
     proof: Proof | None
@@ -82,14 +89,19 @@ class Attempt:
 
     @property
     def length(self) -> float:
-        """Of the joints' way [rad, metres counted alike]."""
+        """Length of the path in joint space [rad; metres count the same]."""
         return route_length(self.rows)
 
 
 def farthest(world: World, way: Way, starts: Matrix) -> Attempt:
-    """The attempt that comes farthest from any of some configurations, shape (k, dof); of several the shortest.
+    """Return the attempt that comes farthest from any of some start configurations; of equal ones the shortest.
 
     A redundant arm that is stopped tries other ways to use its freedom.
+
+    Args:
+        world: Robot and scene.
+        way: Rails and conditions.
+        starts: Shape (k, dof), at least one.
     """
     best: Attempt | None = None
     for q in starts:
@@ -106,7 +118,11 @@ def farthest(world: World, way: Way, starts: Matrix) -> Attempt:
 
 
 def leanings(world: World, way: Way, q: Vector) -> Iterator[Leaning]:
-    """Ways to use the freedom that rails leave an arm at q, shape (dof,), the best first."""
+    """Yield ways to use the freedom that rails leave a redundant arm at q, shape (dof,), the best first.
+
+    These are: away from the limits; no pull; towards configurations at the end of a single rail; towards random
+    configurations.
+    """
     robot = world.robot
     usual = centred(robot)
     yield usual
@@ -126,7 +142,7 @@ def leanings(world: World, way: Way, q: Vector) -> Iterator[Leaning]:
 
 
 def attempt(world: World, way: Way, q: Vector, leaning: Leaning) -> Attempt:
-    """Follow the rails from a configuration, shape (dof,), and keep what is proven free."""
+    """Follow the rails from a configuration, shape (dof,), and return the part that is proven free."""
     robot = world.robot
     reason = ""
     parts = [robot.clamp(q)[None]]
@@ -154,7 +170,15 @@ def attempt(world: World, way: Way, q: Vector, leaning: Leaning) -> Attempt:
 
 
 def _proven_part(world: World, way: Way, rows: Matrix, shares: Vector, proof: Proof) -> Attempt:
-    """The part before the first place that is not proven, which is found by halving the motion."""
+    """Return the part before the first place that is not proven, which is found by bisection of that motion.
+
+    Args:
+        world: Proves motions.
+        way: Rails and conditions.
+        rows: All configurations, shape (k, dof).
+        shares: Share of the way at each of them, shape (k,).
+        proof: Their proof, which is incomplete.
+    """
     gap = proof.unproven[0]
     a = rows[gap.motion]
     b = rows[gap.motion + 1]
@@ -182,7 +206,7 @@ def _proven_part(world: World, way: Way, rows: Matrix, shares: Vector, proof: Pr
 
 
 def path_of(world: World, found: Attempt) -> JointPath | None:
-    """The path of an attempt with its proof; None if it did not begin to move."""
+    """Return the path of an attempt with its proof; None if the tip did not move."""
     if found.fraction <= 0.0:
         return None
     path = JointPath.of(world.robot, found.rows)
@@ -190,7 +214,7 @@ def path_of(world: World, found: Attempt) -> JointPath | None:
 
 
 def why_stopped(robot: Robot, rail: Rail, followed: Followed) -> str:
-    """Why the joints cannot follow a rail farther than they did: the joint at its limit, or the singular posture."""
+    """Return why the joints cannot follow a rail any farther: joints at their limits, or a singular posture."""
     if len(followed.rows) >= MOST_ROWS:
         return f"the line takes more than {MOST_ROWS} configurations: allow more deviation"
     q = followed.rows[-1]
@@ -199,7 +223,8 @@ def why_stopped(robot: Robot, rail: Rail, followed: Followed) -> str:
     jacobian = plain * scale[:, None]
     twist = rail.twist(float(followed.shares[-1])) * scale
 
-    at_limit = np.zeros(robot.dof, dtype=bool)  # one at its limit leaves its part to others, which may get to theirs
+    # A joint at its limit leaves its share of the motion to others, which may then reach their limits too.
+    at_limit = np.zeros(robot.dof, dtype=bool)
     while (driven_beyond := _driven_beyond_limit(robot, q, jacobian, twist, at_limit)).any():
         at_limit |= driven_beyond
 
@@ -226,7 +251,15 @@ def why_blocked(world: World, a: Vector, b: Vector, pair: tuple[str, str]) -> st
 
 
 def _driven_beyond_limit(robot: Robot, q: Vector, jacobian: Vector, twist: Vector, left_out: Mask) -> Mask:
-    """Which joints at a limit a motion of the tip would drive beyond it, those held left out. Shape (dof,)."""
+    """Return which joints at a limit a motion of the tip would drive beyond it, shape (dof,).
+
+    Args:
+        robot: The arm.
+        q: Shape (dof,).
+        jacobian: Of the tip at q, shape (6, dof).
+        twist: Wanted velocity of the tip, shape (6,), scaled like the Jacobian.
+        left_out: Joints that are held in place, shape (dof,).
+    """
     change = np.zeros(robot.dof)
     change[~left_out] = np.linalg.pinv(jacobian[:, ~left_out], CUT_OFF) @ twist
     low = q <= robot.lower + AT_LIMIT
@@ -236,7 +269,7 @@ def _driven_beyond_limit(robot: Robot, q: Vector, jacobian: Vector, twist: Vecto
 
 
 def _limits_in_words(robot: Robot, q: Vector, at_limit: Mask) -> str:
-    """Which joints are at a limit, and where they are, in words."""
+    """Return which joints are at a limit, and their values, in words."""
     shown = []
     for joint in np.flatnonzero(at_limit):
         factor, unit = shown_unit(robot.prismatic[joint])

@@ -1,4 +1,4 @@
-"""Joints that follow a rail as far as they can: in kernels, or in numpy where there are none.
+"""Following of a rail by the joints, as far as they can: in kernels, or in numpy if there are none.
 
 :func:`follow_plainly` is the reference implementation of :mod:`rrtik_ompl.kernels.ik.rail_kernels`.
 """
@@ -32,20 +32,21 @@ from rrtik_ompl.kernels.tables.memory import PlannedTable, TablePlan, sizes_of
 from rrtik_ompl.model.robot import Robot, reach_of
 from rrtik_ompl.planning.tip_motion.rails import Rail
 
-MOST_ROWS = 4096  # of one rail
+MOST_ROWS = 4096  # limit of the configurations along one rail
 FIRST_STEP = 0.05  # share of the rail
-SMALLEST_STEP = 1e-6  # share of the rail: where it has to be smaller, the arm cannot go on
-POSE_JOINTS = 6  # with more of them a pose leaves some freedom
-CENTRING = 2.0  # how much of its way to the middle of its limits a joint is drawn over a rail, if it is free
+SMALLEST_STEP = 1e-6  # share of the rail; if a step has to be smaller, the arm cannot go on
+POSE_JOINTS = 6  # an arm with more joints than this is redundant for a pose
+CENTRING = 2.0  # pull of a free joint towards the middle of its limits, see `Leaning`
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Leaning:
-    """Where what a rail leaves free is drawn.
+    """A reference configuration towards which a redundant arm is pulled while it follows a rail.
 
     Attributes:
         reference: Configuration, shape (dof,).
-        pull: Share of the way there for a whole rail, by joint, shape (dof,).
+        pull: For each joint the share of the distance from the reference that is covered over a whole rail, shape
+            (dof,).
         homing: Whether the reference is to be reached at the end of the rail.
     """
 
@@ -56,14 +57,14 @@ class Leaning:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tolerance:
-    """How far the tip may leave a rail: ``deviation`` [m], ``turn`` [rad]."""
+    """How far the tip may deviate from a rail: ``deviation`` [m] in position, ``turn`` [rad] in orientation."""
 
     deviation: float
     turn: float
 
     @property
     def chord(self) -> float:
-        """The turn as 2 sin(angle / 2)."""
+        """The turn as chord of the unit circle, 2 sin(angle / 2)."""
         return float(2.0 * np.sin(0.5 * self.turn))
 
 
@@ -76,13 +77,16 @@ class Followed:
 
     @property
     def complete(self) -> bool:
-        """Whether the end of the rail is reached."""
+        """Whether the end of the rail was reached."""
         return bool(self.shares[-1] >= 1.0 - SMALLEST_STEP)
 
 
 @lru_cache(maxsize=64)
 def levers_of(robot: Robot) -> Vector:
-    """How far the tip is from each joint between it and the base at most [m], shape (joints,): offsets in a row."""
+    """Return the greatest distance of the tip from each joint between it and the base [m], shape (joints,).
+
+    It is the sum of the lengths and strokes from the joint to the tip, as if the arm were stretched.
+    """
     tip = tip_columns(robot)
     lengths = np.linalg.norm(tip.fixed[1:, :3, 3], axis=1)
     lower, upper = (np.where(np.isfinite(x), x, 0.0) for x in (robot.lower, robot.upper))
@@ -92,19 +96,19 @@ def levers_of(robot: Robot) -> Vector:
 
 @lru_cache(maxsize=64)
 def moving_the_tip(robot: Robot) -> tuple[int, ...]:
-    """Numbers of the joints of q that move the tip."""
+    """Return the indices of the joints that move the tip."""
     return tuple(np.flatnonzero((tip_columns(robot).gain != 0.0).any(axis=0)).tolist())
 
 
 @lru_cache(maxsize=64)
 def redundant(robot: Robot) -> bool:
-    """Whether a pose of the tip leaves the joints some freedom."""
+    """Check whether a pose of the tip leaves the joints some freedom."""
     return len(moving_the_tip(robot)) > POSE_JOINTS
 
 
 @lru_cache(maxsize=64)
 def centred(robot: Robot) -> Leaning:
-    """Away from the limits, where the rail leaves that free [60]."""
+    """Return the leaning away from the joint limits, towards the middle of each range [60]."""
     bounded = np.isfinite(robot.lower) & np.isfinite(robot.upper)
     low, high = robot.finite_range()
     pull = np.zeros(robot.dof)
@@ -114,7 +118,7 @@ def centred(robot: Robot) -> Leaning:
 
 
 def follow(robot: Robot, rail: Rail, q: Vector, tolerance: Tolerance, leaning: Leaning) -> Followed:
-    """Follow a rail from a configuration at its beginning, shape (dof,), until its end or as far as possible."""
+    """Follow a rail from a configuration at its beginning, shape (dof,), to its end or as far as possible."""
     kernels = library(rail_layout.KERNELS)
     limb = limb_of(robot)
     if kernels is None or limb is None:
@@ -133,7 +137,7 @@ def follow(robot: Robot, rail: Rail, q: Vector, tolerance: Tolerance, leaning: L
 
 
 def packed_rail(robot: Robot, rail: Rail, q: Vector, tolerance: Tolerance, leaning: Leaning) -> RailTable:
-    """The table of one call, see :mod:`rrtik_ompl.kernels.ik.rail_layout`."""
+    """Return the table of arguments and results of one kernel call, see :mod:`rrtik_ompl.kernels.ik.rail_layout`."""
     levers = levers_of(robot)
     table = RailTable(PlannedTable(_plan(robot.dof, len(levers))))
     table.rail[:] = rail.numbers()
@@ -169,7 +173,12 @@ def _plan(dof: int, joints: int) -> TablePlan:
 
 
 def follow_plainly(robot: Robot, rail: Rail, q: Vector, tolerance: Tolerance, leaning: Leaning) -> Followed:
-    """Follow a rail from a configuration at its beginning, shape (dof,), until its end or as far as possible."""
+    """Follow a rail from a configuration at its beginning, shape (dof,), to its end or as far as possible.
+
+    Each step guesses the next configuration, corrects it by Newton's method so that the tip is on the rail, and bounds
+    the deviation of the motion from the rail. A step that deviates too much is repeated with a smaller size; the size
+    of the next step follows from the bound.
+    """
     rows = [robot.clamp(q)]
     shares = [0.0]
     step = FIRST_STEP
@@ -194,7 +203,10 @@ def follow_plainly(robot: Robot, rail: Rail, q: Vector, tolerance: Tolerance, le
 
 
 def _guess(robot: Robot, rows: list[Vector], shares: list[float], step: float, leaning: Leaning) -> Vector:
-    """The configuration with which a step begins."""
+    """Return the initial guess of a step, shape (dof,): the last configuration, pulled towards the reference.
+
+    An arm that is not redundant is extrapolated from its last two configurations.
+    """
     share = step / (1.0 - shares[-1]) if leaning.homing else step
     guess = rows[-1] + share * leaning.pull * (leaning.reference - rows[-1])
     if len(rows) > 1 and not redundant(robot):
@@ -203,7 +215,7 @@ def _guess(robot: Robot, rows: list[Vector], shares: list[float], step: float, l
 
 
 def _correct(robot: Robot, rail: Rail, share: float, q: Vector, tolerance: Tolerance) -> Vector | None:
-    """Bring the tip to a point of the rail by Newton's method, inside the limits; None if it does not get there."""
+    """Move the tip to a point of the rail by Newton's method, inside the limits; None if it does not converge."""
     aim = rail.poses(share)[0]
     scale = np.repeat([1.0 / reach_of(robot), PER_CHORD], 3)
     for k in range(NEWTON_STEPS + 1):
@@ -227,7 +239,7 @@ def _residual(aim: Matrix, tip: Matrix) -> Vector:
 
 
 def _newton_step(robot: Robot, q: Vector, jacobian: Matrix, error: Vector) -> Vector:
-    """The shortest step that removes a residual, without joints at a limit that would go on beyond it."""
+    """Return the shortest step that removes a residual, without joints at a limit that would go beyond it."""
     pull = jacobian.T @ error
     pinned = ((q <= robot.lower) & (pull < 0.0)) | ((q >= robot.upper) & (pull > 0.0))
     free = np.where(pinned, 0.0, jacobian)
@@ -238,7 +250,18 @@ def _newton_step(robot: Robot, q: Vector, jacobian: Matrix, error: Vector) -> Ve
 def _deviation_bound(
     robot: Robot, rail: Rail, q: Vector, trial: Vector, at: tuple[float, float], tolerance: Tolerance
 ) -> float:
-    """How far the tip leaves the rail on a motion at most, 1 is what it may; ``at``: share and step."""
+    """Bound the deviation of the tip from the rail during a motion, relative to the tolerance: at most 1 is allowed.
+
+    The bound is the deviation in the middle of the motion, plus the remainder of a Taylor expansion.
+
+    Args:
+        robot: The arm.
+        rail: The rail.
+        q: Begin of the motion, shape (dof,).
+        trial: End of the motion, shape (dof,).
+        at: Share of the rail at the begin, and length of the step as a share.
+        tolerance: Allowed deviation.
+    """
     if np.abs(trial - q).max() > LARGEST_CHANGE:
         return float(np.inf)
     share, step = at

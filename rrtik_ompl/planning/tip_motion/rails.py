@@ -1,4 +1,4 @@
-"""Rails: where the tip shall go, as poses over a share from 0 to 1: straight lines, arcs of circles, screws."""
+"""Rails: poses of the tip over a share from 0 to 1, along straight lines, arcs of circles and screws."""
 
 from __future__ import annotations
 
@@ -22,21 +22,22 @@ from rrtik_ompl.kernels.ik.rail_layout import (
 )
 
 NO_TURN = 1e-12  # [rad]
-LEAST_SCREW = 1e-8  # [rad]; the line of a smaller one is so far away that places about it lose their digits
+LEAST_SCREW = 1e-8  # [rad]; the axis of a smaller turn is so far away that positions lose their precision
 MOST_TURNS = 1_000
-STRAIGHT = 1e-9  # share of its length by which three points may leave a line
+STRAIGHT = 1e-9  # relative deviation from a line up to which three points count as collinear
 Z = (0.0, 0.0, 1.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rail:
-    """One piece of the tip's way: the place turns about a line and slides, the axes turn about an axis.
+    """One piece of the tip's way: the position turns about a line and slides, the orientation turns about an axis.
 
     Attributes:
         begin: T_world_tip at its beginning, shape (4, 4).
-        slide: Shift over the whole rail [m], shape (3,).
-        turn_axis, turn_angle: Turn of the tip's axes, a unit vector of the world, shape (3,), and an angle [rad].
-        centre, arc_axis, arc_angle: The line about which the place turns, and by how much [m, -, rad].
+        slide: Translation over the whole rail [m], shape (3,).
+        turn_axis, turn_angle: Turn of the orientation: a unit vector in the world, shape (3,), and an angle [rad].
+        centre, arc_axis, arc_angle: The line about which the position turns, as a point [m] and a unit vector, shapes
+            (3,), and the angle [rad].
     """
 
     begin: Matrix
@@ -49,16 +50,16 @@ class Rail:
 
     @property
     def length(self) -> float:
-        """How far the tip moves [m]."""
+        """Length of the way of the tip [m]."""
         return float(np.hypot(np.linalg.norm(self.slide), self.arc_radius * abs(self.arc_angle)))
 
     @property
     def arc_radius(self) -> float:
-        """Distance of the place from the line about which it turns [m]."""
+        """Distance of the tip from the line about which it turns [m]."""
         return float(np.linalg.norm(np.cross(self.arc_axis, self.begin[:3, 3] - self.centre)))
 
     def poses(self, shares: ArrayLike) -> NDArray[np.float64]:
-        """T_world_tip at shares of the rail, shape (k,): (k, 4, 4)."""
+        """Return T_world_tip at shares of the rail, shape (k, 4, 4); the shares have shape (k,) or are one number."""
         s = np.atleast_1d(np.asarray(shares, dtype=np.float64))
         poses = np.tile(np.eye(4), (len(s), 1, 1))
         lever = (self.begin[:3, 3] - self.centre)[:, None]
@@ -68,13 +69,13 @@ class Rail:
         return poses
 
     def twist(self, share: float) -> Vector:
-        """Velocity of the tip per share, in world axes: linear [m], then angular [rad], shape (6,)."""
+        """Return the velocity of the tip per share in world axes, shape (6,): linear [m], then angular [rad]."""
         place = self.poses(share)[0, :3, 3] - share * self.slide
         linear = self.slide + self.arc_angle * np.cross(self.arc_axis, place - self.centre)
         return np.concatenate([linear, self.turn_angle * self.turn_axis])
 
     def numbers(self) -> Vector:
-        """The rail as kernels read it, see :mod:`rrtik_ompl.kernels.ik.rail_layout`."""
+        """Return the rail as an array for the kernels, see :mod:`rrtik_ompl.kernels.ik.rail_layout`."""
         row = np.zeros(RAIL_NUMBERS)
         row[:9] = self.begin[:3, :3].ravel()
         row[9:12] = self.begin[:3, 3]
@@ -92,13 +93,15 @@ class Rail:
 
 
 def straight_rail(T_begin: pin.SE3, T_end: pin.SE3) -> Rail:
-    """From one pose to another (SE3): the place in a straight line, the axes the shortest way about one axis."""
+    """Return the rail from one pose to another (SE3): a straight line, and the shortest turn about one axis."""
     axis, angle = _turn_between(T_begin, T_end)
     return _rail(T_begin, T_end.translation - T_begin.translation, axis, angle)
 
 
 def arc_rail(T_begin: pin.SE3, T_end: pin.SE3, through: ArrayLike) -> Rail:
-    """From one pose to another (SE3): the place on the circle through a point [m], the axes as on a straight line.
+    """Return the rail from one pose to another (SE3) on the circle through a point [m].
+
+    The orientation turns as on a straight rail.
 
     Raises:
         InputError: If the three points lie on a line or coincide.
@@ -143,7 +146,7 @@ def screw_rail(T_begin: pin.SE3, T_end: pin.SE3, turns: int = 0) -> Rail:
             )
         return straight_rail(T_begin, T_end)
 
-    # the point of the line that is nearest to the origin, for the line does not move
+    # The point of the screw axis that is nearest to the origin. The screw motion maps this axis to itself.
     shift = T_end.translation - _turns(axis, np.array([angle]))[0] @ T_begin.translation
     along = float(axis @ shift) * axis
     across = shift - along
@@ -164,7 +167,7 @@ def _turn_between(T_begin: pin.SE3, T_end: pin.SE3) -> tuple[Vector, float]:
 
 
 def _turns(axis: Vector, angles: Vector) -> NDArray[np.float64]:
-    """Rotations about a unit axis, shape (k,) -> (k, 3, 3)."""
+    """Return rotations by angles, shape (k,), about a unit axis, shape (k, 3, 3)."""
     x, y, z = axis
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     sine = np.sin(angles)[:, None, None]
