@@ -1,4 +1,4 @@
-"""Which configurations a planner may aim at: the goal's own, or free ones that inverse kinematics finds for it."""
+"""The goal configurations of a planner: the goal's own, or free ones that inverse kinematics finds for it."""
 
 from __future__ import annotations
 
@@ -26,54 +26,59 @@ from rrtik_ompl.model.goal import GoalPart, GoalSet, Target, TipGoal, has_contin
 from rrtik_ompl.model.robot import Robot, poses
 from rrtik_ompl.world.problem import Problem
 
-STARTS = 48  # random postures of one round
-MAX_PARTS = (
-    6  # of a grasp set, among which the starts of a round are shared out, or to which it is said how near it came
-)
-MAX_ROUNDS = 4  # at most, until one free configuration is found
-LAST_ROUND = 64  # after which no more configurations come
-NO_LIMIT = 1e9  # [s]; the passes of MB-RRT are counted, some 0.1 to 0.4 s of them
-LEAST_SECONDS = 1e-3  # [s] of MB-RRT when the time is up
-MAX_CONFIGURATIONS = 16  # configurations that one round adds
-MAX_TOTAL = 96  # configurations altogether
+STARTS = 48  # random configurations of one round
+MAX_PARTS = 6  # parts of a grasp set that share the starts of a round, or that are looked at to explain a failure
+MAX_ROUNDS = 4  # largest number of rounds to find one free configuration
+LAST_ROUND = 64  # number of rounds after which no more configurations come
+NO_LIMIT = 1e9  # [s]: MB-RRT then ends by the number of its passes, after some 0.1 to 0.4 s
+LEAST_SECONDS = 1e-3  # time that MB-RRT gets when the time is up [s]
+MAX_CONFIGURATIONS = 16  # largest number of configurations that one round adds
+MAX_TOTAL = 96  # largest number of configurations altogether
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GoalConfigurations:
-    """Free configurations at the goal, nearest to the start first, shape (k, dof); if there is none, the reason."""
+    """Free configurations at a goal.
+
+    Attributes:
+        rows: The configurations, nearest to the start first, shape (k, dof).
+        reason: Why there is none, or "".
+    """
 
     rows: Matrix
     reason: str = ""
 
 
 def goal_configurations(problem: Problem, rng: np.random.Generator, *, all_turns: bool = True) -> GoalConfigurations:
-    """Free configurations that satisfy the goal of a problem: those of the first round that finds any.
+    """Return free configurations that satisfy the goal of a problem: those of the first round that finds any.
 
     Args:
         problem: The problem.
         rng: Random numbers for the starts of inverse kinematics.
-        all_turns: For a goal in joint values: whether continuous joints may also reach it the long way round.
+        all_turns: For a goal in joint values, whether continuous joints may also reach it the long way round.
     """
     search = GoalSearch(problem, rng, all_turns=all_turns)
     return GoalConfigurations(search.first(), search.reason)
 
 
-# First rounds that take all branches of a closed form, in which nothing is random: rows, all that was found, and
-# whether that is all there is. A portfolio, and a path that is being improved, ask for them plan after plan.
+# Results of first rounds that take all branches of a closed form and so use no random numbers: ``rows``, all
+# configurations at the goal, and ``exhausted``. They are kept because a portfolio of planners, and the improvement of a
+# path, search the goal of the same problem again and again.
 _known_first_rounds: WeakKeyDictionary[Problem, tuple[Matrix, Matrix, bool]] = WeakKeyDictionary()
 
 
 class GoalSearch:
-    """Free configurations at the goal of a problem, more of them round after round, the same for the same generator.
+    """A search for free configurations at the goal of a problem, which adds more of them round by round.
 
-    The first round takes all branches of the analytic solver, or numeric inverse kinematics from many starts; the
-    second the tree of MB-RRT; further ones draw further targets from a goal that leaves freedom, and start anew from
-    random postures. Of a singular pose the branches are but members of a curve, so that further rounds follow too.
+    The first round takes all branches of the closed form, or numeric inverse kinematics from many starts; the second
+    one takes the tree of MB-RRT. Further rounds draw new targets from a goal that leaves freedom, and start again from
+    random configurations. For a singular pose the branches are only samples of a curve, so further rounds follow there
+    too. Results depend only on the problem and the generator.
 
     Attributes:
-        rows: Those found so far, each round's nearest to the start first, shape (k, dof).
-        exhausted: Whether no more will come: all branches of the goal are known, or the limits are reached of rounds
-            and configurations.
+        rows: The configurations found so far, those of each round nearest to the start first, shape (k, dof).
+        exhausted: Whether no more will come: all branches of the goal are known, or the largest number of rounds or
+            configurations is reached.
     """
 
     def __init__(
@@ -84,9 +89,14 @@ class GoalSearch:
         all_turns: bool = True,
         seconds_left: Callable[[], float] = lambda: NO_LIMIT,
     ) -> None:
-        """Prepare the search; see :func:`goal_configurations`. A seed will do for a generator.
+        """Prepare the search.
 
-        ``seconds_left`` says how long there is time: a later round begins only then, and MB-RRT ends with it.
+        Args:
+            problem: The problem.
+            rng: Source of random numbers, or a seed.
+            all_turns: See :func:`goal_configurations`.
+            seconds_left: Returns how much time is left [s]. :meth:`first` begins no later round when time is up, and
+                MB-RRT ends with it.
         """
         self._problem = problem
         self._seconds_left = seconds_left
@@ -101,24 +111,24 @@ class GoalSearch:
             self.exhausted = False
             self._rng = np.random.default_rng(rng)
 
-        # what has come of the rounds so far
+        # The results of the rounds so far.
         self._rounds = 0
-        self._all_at_goal = none_yet  # in collision or not
-        self._before_constraints = none_yet  # at the goal, whether or not they keep path constraints
-        self._first_round_is_deterministic = False  # nothing random was in it
+        self._all_at_goal = none_yet  # configurations at the goal, in collision or not
+        self._before_constraints = none_yet  # configurations at the goal, whether or not they keep path constraints
+        self._first_round_is_deterministic = False  # whether the first round used no random numbers
 
     def first(self) -> Matrix:
-        """Search until there is a free configuration, for a few rounds; all rows."""
+        """Search for at most `MAX_ROUNDS` rounds until there is a free configuration, and return all rows."""
         for _ in range(MAX_ROUNDS):
             if len(self.rows) == 0 and (self._rounds == 0 or self._seconds_left() > 0.0):
                 self.more()
         return self.rows
 
     def more(self) -> bool:
-        """Search for one round more.
+        """Search for one more round and add what it finds to ``rows``.
 
         Returns:
-            Whether it found a free configuration that is new.
+            Whether a new free configuration was found.
         """
         if self.exhausted:
             return False
@@ -141,13 +151,14 @@ class GoalSearch:
         return len(self.rows) > num_known
 
     def _recall_first_round(self) -> bool:
-        """Take what another search of this problem has found in its first round.
+        """Take over what another search of this problem has found in its first round.
 
         Returns:
-            Whether that is any.
+            Whether there is any configuration.
         """
         goal = self._problem.goal
-        if isinstance(goal, TipGoal):  # the random numbers that the round would draw: later ones stay the same
+        # The random numbers of the round are drawn all the same, so that later rounds get the same ones.
+        if isinstance(goal, TipGoal):
             skip_targets(goal, DRAWS, self._rng)
             self._rng.integers(2**31)
         self._rounds = 1
@@ -155,10 +166,10 @@ class GoalSearch:
         return len(self.rows) > 0
 
     def _search_round(self) -> Matrix:
-        """Configurations at the goal that keep path constraints, in collision or not, by one round, shape (m, dof)."""
+        """Find configurations at the goal that keep path constraints, in collision or not, shape (m, dof)."""
         world = self._problem.world
         goal = self._problem.goal
-        if not isinstance(goal, TipGoal):  # of several tips
+        if not isinstance(goal, TipGoal):  # a goal of several tips
             regions = () if world.constraints is None else world.constraints.regions
             return at_all_tips(
                 world.robot, goal, self._problem.start, self._rng, scene=world.scene, path_regions=regions
@@ -171,7 +182,11 @@ class GoalSearch:
         return found
 
     def _solve_ik_round(self, goal: TipGoal) -> Matrix:
-        """Configurations at the goal, in collision or not, by the method whose turn it is, shape (m, dof)."""
+        """Find configurations at the goal, in collision or not, by the method whose turn it is, shape (m, dof).
+
+        The closed form is due in the first round and, for a goal with freedom, in every second one; MB-RRT in the
+        second round; numeric inverse kinematics in all others and wherever these two do not fit.
+        """
         problem = self._problem
         rng = self._rng
         round_number = self._rounds
@@ -200,7 +215,7 @@ class GoalSearch:
 
     @property
     def reason(self) -> str:
-        """Why there is no free configuration, in a line; "" if there is one."""
+        """A line that says why there is no free configuration; "" if there is one."""
         goal = self._problem.goal
         if len(self.rows):
             return ""
@@ -220,7 +235,7 @@ class GoalSearch:
         )
 
     def _smallest_breach(self) -> str:
-        """Which path constraint the configuration at the goal breaks that breaks them least, and by how much."""
+        """Return how the configuration at the goal that violates path constraints least violates them, or ""."""
         constraints = self._problem.world.constraints
         if constraints is None or len(self._before_constraints) == 0:
             return ""
@@ -229,7 +244,10 @@ class GoalSearch:
 
 
 def _with_long_ways(problem: Problem, q: Vector) -> Matrix:
-    """The configuration and, for each continuous joint, the same posture reached the other way round."""
+    """Return the configuration and, for each continuous joint, the same posture with that joint a turn away.
+
+    The turn leads to the other side of the start, so the joint moves there the other way round. Shape (k, dof).
+    """
     if not has_continuous(problem.world.robot):
         return q[None]
     rows = [np.array(q)]
@@ -241,17 +259,19 @@ def _with_long_ways(problem: Problem, q: Vector) -> Matrix:
 
 
 def _move_into_regions(problem: Problem, goal: TipGoal, found: Matrix, rng: np.random.Generator) -> Matrix:
-    """Configurations at the goal of a problem that keep its path constraints.
+    """Return configurations at the goal of a problem that keep its path constraints.
+
+    Configurations that keep them are returned as they are. The others, and random ones, are projected onto all regions
+    of the path constraints and one part of the goal at once.
 
     Args:
-        problem: With path constraints.
+        problem: The problem with its path constraints.
         goal: Its goal.
-        found: Configurations at the goal, shape (m, dof). Those that are outside a region are moved into all, along
-            what the goal leaves free.
-        rng: Draws further starts.
+        found: Configurations at the goal, shape (m, dof).
+        rng: Draws the random starts and the parts of the goal.
 
     Returns:
-        Shape (k, dof).
+        Configurations at the goal that keep the constraints, shape (k, dof).
     """
     constraints = problem.world.constraints
     if constraints is None:
@@ -272,23 +292,27 @@ def _move_into_regions(problem: Problem, goal: TipGoal, found: Matrix, rng: np.r
 
 
 def _move_into_regions_and_part(problem: Problem, constraints: HeldRegions, part: GoalPart, starts: Matrix) -> Matrix:
-    """Configurations moved into all regions and to one part of the goal; those that get there."""
+    """Project configurations onto all regions and one part of the goal; return those that get there."""
     try:
         aim = held_region(problem.robot, problem.world.scene, part.region(), "the goal")
-    except InputError:  # ranges of angles that cannot be held; inverse kinematics alone must do
+    except InputError:  # The goal has ranges of angles that cannot be projected onto, so this way is closed.
         return starts[:0]
     return projected_onto(problem.robot, HeldRegions((*constraints.regions, aim)), starts)
 
 
 def _method_fits(method: IkMethod, robot: Robot, drawn: list[Target]) -> bool:
-    """Whether a method can solve for all targets."""
+    """Check whether a method fits all targets."""
     return not any(METHODS[method].misfit(robot, target) for target in drawn)
 
 
 def _numeric_solutions(
     robot: Robot, goal: TipGoal, starts: Matrix, round_number: int, rng: np.random.Generator
 ) -> Matrix:
-    """Configurations at the goal to which numeric inverse kinematics leads; of many parts some take turns."""
+    """Solve for the goal by numeric inverse kinematics from given starts, shape (m, dof).
+
+    A goal of many parts has `MAX_PARTS` of them tried in a round; these share the starts, and the parts take turns from
+    round to round. Returns the configurations at the goal, shape (k, dof).
+    """
     parts = goal.parts
     chosen_parts = [(round_number * MAX_PARTS + k) % len(parts) for k in range(min(len(parts), MAX_PARTS))]
     shares = np.array_split(starts, len(chosen_parts))
@@ -300,7 +324,10 @@ def _numeric_solutions(
 
 
 def _numeric_solutions_of_part(robot: Robot, goal: TipGoal, starts: Matrix, rng: np.random.Generator) -> Matrix:
-    """The same for one part alone. Walks end on the rim of ranges, so that these are projected onto, spread out."""
+    """Solve for a goal of one part by numeric inverse kinematics; return configurations at it, shape (k, dof).
+
+    For a region, half of the starts are projected onto random places in it, since the others end on its rim.
+    """
     if not goal.has_regions:
         return numeric_ik(robot, goal, starts)
     (part,) = goal.parts
@@ -309,16 +336,24 @@ def _numeric_solutions_of_part(robot: Robot, goal: TipGoal, starts: Matrix, rng:
 
 
 def _spread_out(problem: Problem, rows: Matrix, known: Matrix) -> Matrix:
-    """At most `MAX_CONFIGURATIONS` rows unlike each other and the known, turned near the start, nearest first.
+    """Choose at most `MAX_CONFIGURATIONS` rows that differ from each other and from the known ones.
 
-    Half of them are the nearest to the start; the others lie farthest from all that were chosen before, for what is
-    near to the start and to each other may all be blocked by the same thing.
+    The first half are those nearest to the start. Each of the others is the one farthest from all chosen so far, since
+    configurations near to each other may all be blocked by the same obstacle.
+
+    Args:
+        problem: The problem, which gives the start.
+        rows: Configurations to choose from, shape (m, dof).
+        known: Configurations that are known already, shape (k, dof).
+
+    Returns:
+        The chosen rows with continuous joints turned near to the start, nearest to the start first.
     """
     robot = problem.world.robot
     from_start = joint_difference(robot, rows, problem.start)
     turned = np.where(robot.continuous, problem.start + from_start, rows)
     distance = np.linalg.norm(weighted_difference(robot, rows, problem.start), axis=1)
-    separation = np.full(len(rows), np.inf)  # largest joint difference from the nearest of those chosen
+    separation = np.full(len(rows), np.inf)  # largest joint difference from the nearest known or chosen row
     for row in known:
         separation = np.minimum(separation, np.abs(joint_difference(robot, turned, row)).max(axis=1))
 
@@ -333,11 +368,12 @@ def _spread_out(problem: Problem, rows: Matrix, known: Matrix) -> Matrix:
 
 
 def _explain_miss(problem: Problem, goal: TipGoal) -> str:
-    """How near the arm came to a goal within its limits, in a line."""
+    """Return a line that says how near the arm came to a goal within its limits."""
     robot = problem.world.robot
     regions = [part.region() for part in goal.parts]
     starts = np.random.default_rng(0).uniform(*robot.finite_range(), (STARTS, robot.dof))
-    if len(regions) > MAX_PARTS:  # to walk to each of thousands would take minutes
+    # Projecting onto each of thousands of parts would take minutes, so the nearest ones by position are taken.
+    if len(regions) > MAX_PARTS:
         places = np.array([(region.T_world_w * region.T_w_tip).translation for region in regions])
         distances = np.linalg.norm(places[:, None] - poses(robot, starts)[:, :3, 3], axis=2).min(axis=1)
         regions = [regions[k] for k in np.argsort(distances, kind="stable")[:MAX_PARTS]]

@@ -1,4 +1,4 @@
-"""Maps of reach by forward kinematics of random postures: in which cell the tip is, and which way it points.
+"""Maps of reach by forward kinematics of random configurations: where the tip can be, and which way it can point.
 
 A map is a lower bound: more samples fill more of it.
 """
@@ -24,17 +24,17 @@ from rrtik_ompl.model.robot import Robot, jacobians, poses
 from rrtik_ompl.world.world import World, check_world
 
 SAMPLES = 200_000
-BLOCK = 20_000  # postures at a time
-TURNS = 16  # of the first joint for each of them: the whole arm turns as one body, which needs no kinematics
-CELLS = 18  # of the grid across the farthest reach, if no size is given
+BLOCK = 20_000  # number of configurations that are processed at once
+TURNS = 16  # turns of the first joint for each sample; they turn the arm as one body and need no kinematics
+CELLS = 18  # number of cells across the farthest reach, if no size is given
 MAX_CELLS = 4_000_000  # 32 MB of values
-MOST_SAMPLES = 1_000_000_000  # some minutes of a processor
-PROBE = 4096  # postures that determine how large the grid must be
-BELOW = 1e-3  # of a cell: the layer of a planar arm ends so far above the arm, which is seen from above
-PROBE_MARGIN = 1.1  # how much larger than what the probe reached
+MOST_SAMPLES = 1_000_000_000  # takes a processor some minutes
+PROBE = 4096  # number of configurations that determine the size of the grid
+BELOW = 1e-3  # The single layer of a planar arm ends this share of a cell above the arm, which is seen from above.
+PROBE_MARGIN = 1.1  # ratio of the reach of the grid to the reach of the probe
 FORMATS = (".npz", ".csv")
-DIRECTIONS = 64  # one bit each of a 64-bit number
-FINE = 16  # the nearest of them is looked up in a cube of 33 cells a side
+DIRECTIONS = 64  # number of directions; each has one bit of a 64-bit number
+FINE = 16  # The nearest direction is looked up in a cube with 2 * FINE + 1 = 33 cells a side.
 GOLDEN = np.pi * (3.0 - np.sqrt(5.0))  # [rad], the golden angle
 
 Grid = NDArray[np.float64]
@@ -54,15 +54,17 @@ def reach_map(
 
     Args:
         robot: The arm.
-        measure: ``orientations``: share of 64 evenly spread directions (planar arms: of the plane) in which the tip's
-            axis was seen to point; ``manipulability``: the largest product of the Jacobian's singular values
-            seen, sqrt(det(J J^T)) from six joints on [31], metres and radians as they are;
-            ``samples``: how many came.
+        measure: The value of a cell. ``orientations``: the share of 64 evenly spread directions (in the plane for
+            planar arms) in which the tip's axis was seen to point. ``manipulability``: the largest product of the
+            Jacobian's singular values that was seen, sqrt(det(J J^T)) for six or more joints [31], with metres and
+            radians mixed. ``samples``: the number of samples.
         cell: Side of a cell [m]; about an 18th of the reach if None.
-        samples: Postures to draw; where nothing but the arm is considered, each in 16 turns of the first joint.
-        world: If given, only postures that are free count. Its robot must be this one.
-        axis: Of the tip's frame, "x", "y" or "z": what points, for ``orientations``; z if None, of planar arms x.
-        seed: Of the random numbers.
+        samples: Number of configurations to draw. Without a world, and if the first joint turns the whole arm, each is
+            counted in 16 turns of that joint.
+        world: If given, only free configurations count. Its robot must be this one.
+        axis: The axis of the tip's frame that points, for ``orientations``: "x", "y" or "z"; z if None, and x for
+            planar arms.
+        seed: Seed of the random numbers.
 
     Raises:
         UnknownNameError: If there is no such measure.
@@ -100,7 +102,19 @@ def reach_map(
 def _samples(
     robot: Robot, world: World | None, counter: Counter, axis: int, count: int, rng: np.random.Generator
 ) -> Iterator[tuple[Matrix, Matrix, Vector]]:
-    """Where the tip of random postures is, which way it points, shape (m, 3) each, and their quality, shape (m,)."""
+    """Yield samples in blocks: random configurations and, where possible, these turned about the first axis.
+
+    Args:
+        robot: The arm.
+        world: If given, only its free configurations are taken, and they are not turned.
+        counter: Computes the quality of a configuration.
+        axis: Index of the tip's axis that points.
+        count: Number of random configurations.
+        rng: Source of random numbers.
+
+    Yields:
+        Positions of the tip [m], shape (m, 3), directions of its axis, shape (m, 3), and qualities, shape (m,).
+    """
     low, high = robot.finite_range()
     turn = _first_turn(robot) if world is None else None
     for begin in range(0, count, BLOCK):
@@ -116,7 +130,8 @@ def _samples(
 
         if turn is None:
             continue
-        for _ in range(TURNS - 1):  # the same arm turned about its first axis: its quality is the same
+        # Turning the whole arm about its first axis does not change the quality.
+        for _ in range(TURNS - 1):
             angles = rng.uniform(low[0], high[0], len(Q))
             points, pointing = turn(points, pointing, angles - Q[:, 0])
             Q[:, 0] = angles
@@ -124,9 +139,10 @@ def _samples(
 
 
 def _first_turn(robot: Robot) -> Callable[[Matrix, Matrix, Vector], tuple[Matrix, Matrix]] | None:
-    """Turns points and directions, shapes (m, 3), about the first joint's axis by angles, shape (m,).
+    """Return a function that turns points and directions of the tip about the first joint's axis.
 
-    None if the first joint does not carry the whole arm by turning it.
+    The function takes points [m], shape (m, 3), directions, shape (m, 3), and angles [rad], shape (m,), and returns the
+    turned points and directions. None if the first joint does not turn the whole arm as one body.
     """
     chain = robot.chain
     alone = np.count_nonzero(chain.gain[:, 0]) == 1 and chain.gain[0, 0] == 1.0
@@ -151,7 +167,16 @@ def _first_turn(robot: Robot) -> Callable[[Matrix, Matrix, Vector], tuple[Matrix
 
 
 def _grid(robot: Robot, base: Vector, cell: float | None) -> tuple[Vector, float, tuple[int, int, int]]:
-    """Corner, cell size and numbers of cells of a grid that holds all tips; the base is on a cell's corner."""
+    """Lay out a grid around all positions of the tip that a random probe reaches, with the base on a cell's corner.
+
+    Args:
+        robot: The arm.
+        base: Position of the arm's base, shape (3,) [m].
+        cell: Side of a cell [m], or None for a suitable one.
+
+    Returns:
+        Low corner of the first cell, shape (3,) [m], side of a cell [m], and numbers of cells along x, y, z.
+    """
     rng = np.random.default_rng(0)
     tips = poses(robot, rng.uniform(*robot.finite_range(), (PROBE, robot.dof)))[:, :3, 3] - base
     reach = PROBE_MARGIN * float(np.linalg.norm(tips, axis=1).max())
@@ -185,9 +210,9 @@ class ReachMap:
         measure: What the values are: one of ``MEASURES``.
         corner: Low corner of the first cell, shape (3,) [m].
         size: Side of a cell [m].
-        values: Shape (x, y, z), 0 where no sample came.
-        samples: Postures that counted.
-        base: Where the arm's base is, shape (3,) [m].
+        values: Value of each cell, shape (x, y, z); 0 where there was no sample.
+        samples: Number of samples in the grid.
+        base: Position of the arm's base, shape (3,) [m].
 
     Example:
         >>> reach = rrtik.reach_map(rrtik.load_robot("planar3"), samples=2000, seed=1)
@@ -208,41 +233,41 @@ class ReachMap:
 
     @property
     def reached(self) -> NDArray[np.bool_]:
-        """Cells in which a sample came, shape (x, y, z)."""
+        """Whether each cell has a sample, shape (x, y, z)."""
         is_inside: NDArray[np.bool_] = self.values > 0.0
         return is_inside
 
     @property
     def flat(self) -> bool:
-        """Whether there is one layer of cells, as for a planar arm."""
+        """Whether there is a single layer of cells, as for a planar arm."""
         return bool(self.values.shape[2] == 1)
 
     @property
     def volume(self) -> float:
-        """Of these cells [m3]; 0 of a flat map."""
+        """Volume of the reached cells [m3]; 0 for a flat map."""
         return 0.0 if self.flat else float(np.count_nonzero(self.reached)) * self.size**3
 
     @property
     def area(self) -> float:
-        """Of these cells seen from above [m2]."""
+        """Area of the reached cells seen from above [m2]."""
         return float(np.count_nonzero(self.reached.any(axis=2))) * self.size**2
 
     @property
     def best(self) -> Vector:
-        """Middle of the cell with the largest value, shape (3,) [m]."""
+        """Centre of the cell with the largest value, shape (3,) [m]."""
         place = np.unravel_index(int(np.argmax(self.values)), self.values.shape)
         middle: Vector = self.corner + self.size * (np.array(place) + 0.5)
         return middle
 
     def centres(self, axis: int) -> Vector:
-        """Middles of the cells along an axis, shape (n,) [m]."""
+        """Return the centres of the cells along an axis (0, 1 or 2 for x, y or z), shape (n,) [m]."""
         axis = whole_number(axis, "axis of a reachability map")
         at_most(axis, 2, "axis of a reachability map", "0 is x, 1 is y, 2 is z")
         middles: Vector = self.corner[axis] + self.size * (np.arange(self.values.shape[axis]) + 0.5)
         return middles
 
     def value(self, points: Matrix) -> Vector:
-        """The values at points, shape (m, 3) [m]; 0 outside the grid. Shape (m,)."""
+        """Return the values of the cells that hold points, shape (m, 3) [m]; 0 outside the grid. Shape (m,)."""
         places = np.floor((finite_array(points, (None, 3), "points") - self.corner) / self.size).astype(int)
         is_inside = ((places >= 0) & (places < self.values.shape)).all(axis=1)
         found = np.zeros(len(places))
@@ -250,9 +275,9 @@ class ReachMap:
         return found
 
     def slices(self) -> list[Slice]:
-        """Two cuts: upright through the base along x, and level at the height where most cells are reached.
+        """Return two cuts: an upright one through the base along x, and a level one where most cells are reached.
 
-        The second alone if there is one layer of cells.
+        A flat map has only the level one.
         """
         ahead = int(np.clip((self.base[1] - self.corner[1]) / self.size, 0, self.values.shape[1] - 1))
         level = int(np.argmax(self.reached.sum(axis=(0, 1))))
@@ -269,7 +294,7 @@ class ReachMap:
         return cuts[1:] if self.flat else cuts
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write everything as .npz, or one row per reached cell (its middle and value) as .csv, whole or not at all.
+        """Write the map as .npz, or one row per reached cell (centre and value) as .csv, whole or not at all.
 
         Raises:
             InputError: If the ending is another one or the file cannot be written.
@@ -292,14 +317,15 @@ class Slice:
     """A picture of values over a plane.
 
     Attributes:
-        title: What is cut.
+        title: What the picture shows.
         across, up: Labels of the axes.
-        x, y: Middles of the cells [m], shapes (n,) and (m,).
-        values: Shape (m, n).
-        boxes: Rectangles to draw: low x, low y, high x, high y.
-        points: Places to mark, each x, y.
-        base: Where the arm's base is in this plane.
-        meanings: What values mean, for a legend, where they are no amounts; boxes are then a vehicle, points cameras.
+        x, y: Centres of the cells [m], shapes (n,) and (m,).
+        values: Value of each cell, shape (m, n): rows along y, columns along x.
+        boxes: Rectangles to draw: low x, low y, high x, high y [m].
+        points: Places to mark: x, y [m].
+        base: Position of the arm's base in this plane: x, y [m].
+        meanings: Meaning of each value, for a legend, if values are labels and not amounts; boxes are then a vehicle,
+            points cameras.
     """
 
     title: str
@@ -343,30 +369,41 @@ def load_reach_map(path: str | os.PathLike[str]) -> ReachMap:
 
 
 class Counter:
-    """Collects what the samples of each cell say: here, how many there are."""
+    """Collects the samples of each cell; this one counts them, subclasses measure something else.
+
+    Args:
+        cells: Number of cells.
+        planar: Whether the arm is planar.
+    """
 
     def __init__(self, cells: int, planar: bool) -> None:
         self.planar = planar
         self.totals = np.zeros(cells)
 
     def quality(self, robot: Robot, Q: Matrix) -> Vector:
-        """What does not change when the arm turns as a whole, for each posture, shape (m,)."""
+        """Return a value for each configuration, shape (m,), that does not change when the arm turns as a whole."""
         del robot
         return np.ones(len(Q))
 
     def add(self, cells: NDArray[np.int64], pointing: Matrix, quality: Vector) -> None:
-        """Take in samples: their cells, shape (m,), which way the tip points, shape (m, 3), and their quality."""
+        """Add samples.
+
+        Args:
+            cells: Index of the cell of each sample, shape (m,).
+            pointing: Direction of the tip's axis, shape (m, 3).
+            quality: Result of :meth:`quality`, shape (m,).
+        """
         del pointing
         np.add.at(self.totals, cells, quality)
 
     @property
     def values(self) -> Vector:
-        """What the map says, a number for each cell."""
+        """Value of each cell, shape (cells,)."""
         return self.totals
 
 
 class Orientations(Counter):
-    """Which of the directions were seen, a bit for each."""
+    """Measures in which of the directions the tip has pointed; each cell has one bit for each direction."""
 
     def __init__(self, cells: int, planar: bool) -> None:
         super().__init__(cells, planar)
@@ -384,30 +421,30 @@ class Orientations(Counter):
 
     @property
     def values(self) -> Vector:
-        """Share of the directions that were seen."""
+        """Share of the directions that were seen in each cell, shape (cells,)."""
         share: Vector = np.bitwise_count(self.seen) / DIRECTIONS
         return share
 
 
 class Manipulability(Counter):
-    """The largest manipulability that was seen in each cell."""
+    """Measures the largest manipulability that was seen in each cell."""
 
     def quality(self, robot: Robot, Q: Matrix) -> Vector:
-        """Product of the singular values of the Jacobian [31], as many as there are joints, at most six."""
+        """Return the product of the Jacobian's singular values [31], of which there are min(dof, 6)."""
         jacobian = jacobians(robot, Q)
         flipped = jacobian.transpose(0, 2, 1)
-        gram = flipped @ jacobian if robot.dof < 6 else jacobian @ flipped  # the smaller of the two
+        gram = flipped @ jacobian if robot.dof < 6 else jacobian @ flipped  # The smaller one has no extra zeros.
         root: Vector = np.sqrt(np.maximum(np.linalg.det(gram), 0.0))
         return root
 
     def add(self, cells: NDArray[np.int64], pointing: Matrix, quality: Vector) -> None:
-        """Keep the largest of each cell."""
+        """Add samples; each cell keeps its largest quality."""
         del pointing
         np.maximum.at(self.totals, cells, quality)
 
 
 def _directions(planar: bool) -> Matrix:
-    """Evenly spread unit vectors, shape (DIRECTIONS, 3): a circle, or a sunflower on the sphere."""
+    """Return evenly spread unit vectors, shape (DIRECTIONS, 3): a circle, or a Fibonacci spiral on the sphere."""
     if planar:
         angle = TAU * np.arange(DIRECTIONS) / DIRECTIONS
         return np.stack([np.cos(angle), np.sin(angle), np.zeros(DIRECTIONS)], axis=1)

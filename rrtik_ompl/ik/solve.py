@@ -1,4 +1,4 @@
-"""Inverse kinematics by one call: from a goal to configurations that were checked, or the reason why there is none."""
+"""Inverse kinematics by one call: checked configurations at a goal, or the reason why there is none."""
 
 from __future__ import annotations
 
@@ -31,15 +31,15 @@ from rrtik_ompl.model.robot import Robot, inside_limits
 from rrtik_ompl.model.scene import Scene
 from rrtik_ompl.world.world import World, check_world
 
-SECONDS = 1.0  # of a numeric method, unless said otherwise
+SECONDS = 1.0  # default time limit of a numeric method [s]
 METHOD = "inverse kinematics method"  # in messages
 DRAWS = 32  # targets drawn from a goal that leaves freedom; one for each part if it has more parts
-COMPARED = 1_000_000  # rows times parts of a goal at once, some tenths of a second
-DIGITS = 9  # of metres and degrees in a message: less is rounding
+COMPARED = 1_000_000  # rows times parts of a goal that are compared at once, which takes some tenths of a second
+DIGITS = 9  # digits of metres and degrees in a message; further ones are rounding
 
 
 def list_ik_methods() -> tuple[IkMethod, ...]:
-    """Names that `solve_ik` takes as a method, beside "auto"."""
+    """Return the names that `solve_ik` takes as a method, apart from "auto"."""
     return tuple(METHODS)
 
 
@@ -58,20 +58,22 @@ def solve_ik(
 
     Args:
         robot: The arm.
-        goal: A pose, a position, or a region with some freedom (of which targets are drawn); or a pose in any form that
-            `PoseGoal` takes; or a `MultiGoal`, for several tips at once.
-        method: A name from `list_ik_methods`; "auto" is the closed form where it fits, else (and where the targets
-            drawn from a region, or the curve of a singular pose, bring none) numeric, or projection onto task-space
-            regions; the others are there to be compared. Of several tips it is projection.
-        near: Posture near which a solution is wanted, shape (dof,); the middle of the limits if None. A closed form
-            gives the nearest one there is (of a singular pose its nearest representative; where joints have weights, by
-            their weighted way), a numeric method the first that it finds on its way from there.
-        all: Every solution that the method finds, not just one: a closed form gives all branches (of a singular pose
-            representatives), each in the turns nearest to ``near``; a numeric one those it comes across, full turns
-            of a joint counted apart.
+        goal: A pose, a position, or a region with some freedom (from which targets are drawn); or a pose in any form
+            that `PoseGoal` takes; or a `MultiGoal`, for several tips at once.
+        method: A name from `list_ik_methods`, or "auto": the closed form where it fits, otherwise "numeric", or
+            "projection" for task-space regions. "auto" also takes one of these two if the closed form finds nothing
+            for the targets drawn from a region or for a singular pose. For several tips it is projection. The other
+            methods are there for comparison.
+        near: Configuration near which a solution is wanted, shape (dof,); the middle of the limits if None. A closed
+            form gives the nearest solution (for a singular pose the nearest of its representatives), by the weighted
+            distance if joints have weights; a numeric method gives the first that it finds from there.
+        all: Whether to return every solution that the method finds, not just one. A closed form gives all branches (for
+            a singular pose representatives), each in the turns nearest to ``near``; a numeric method gives those that
+            it comes across, and solutions that differ by full turns of a joint count as different.
         world: If given, solutions in collision are left out. Its robot must be this one.
-        seconds: Wall time that a numeric method may take; the clock is read between rounds, of which the first is done.
-        seed: Of the random numbers; the same seed gives the same answer as long as the time does not cut in.
+        seconds: Wall time that a numeric method may take [s]. The clock is read between rounds, and the first round is
+            always done.
+        seed: Seed of the random numbers; the same seed gives the same answer as long as time does not run out.
 
     Raises:
         UnknownNameError: If there is no such method.
@@ -107,19 +109,20 @@ def solve_ik(
 
 
 def free_of_collision(world: World | None, Q: Matrix) -> Mask:
-    """Which configurations, shape (k, dof), are free: by the fast check first, then by the independent one.
+    """Check which configurations, shape (k, dof), are free: by the fast check first, then by the independent one.
 
-    All are if there is no world.
+    Returns:
+        Mask, shape (k,); all True if there is no world.
     """
     if world is None or len(Q) == 0:
-        return ~np.zeros(len(Q), dtype=bool)  # in a third of the time of numpy's own ones
+        return ~np.zeros(len(Q), dtype=bool)  # This takes a third of the time of np.ones().
     free = np.array(world.checks.free(Q))
     free[free] = world.checks.certified(Q[free])
     return free
 
 
 def _tip_goal(goal: TipGoal | ArrayLike | pin.SE3) -> TipGoal:
-    """The goal itself, or that of a pose."""
+    """Return the goal itself, or a `PoseGoal` if it is given as a pose; raise an error for anything else."""
     taken: Any = PoseGoal(goal) if isinstance(goal, (pin.SE3, np.ndarray, list, tuple)) else goal
     if not isinstance(taken, TipGoal):
         require(taken, TIP_GOALS, "goal", "inverse kinematics needs a goal of the tip, such as PoseGoal(T_world_tip)")
@@ -127,7 +130,7 @@ def _tip_goal(goal: TipGoal | ArrayLike | pin.SE3) -> TipGoal:
 
 
 def chosen_method(robot: Robot, drawn: tuple[Target, ...], method: IkMethod) -> IkMethod:
-    """The name of the method for targets: the first that fits if it is "auto".
+    """Return the name of the method for targets: the first that fits if ``method`` is "auto".
 
     Raises:
         UnknownNameError: If there is no such method.
@@ -135,7 +138,7 @@ def chosen_method(robot: Robot, drawn: tuple[Target, ...], method: IkMethod) -> 
     """
 
     def misfit(name: IkMethod) -> str:
-        """Why a method does not fit the targets; "" if it does."""
+        """Return why a method does not fit the targets; "" if it does."""
         for target in drawn:
             fault = METHODS[name].misfit(robot, target)
             if fault:
@@ -154,12 +157,21 @@ def chosen_method(robot: Robot, drawn: tuple[Target, ...], method: IkMethod) -> 
 
 
 def _walking_method(goal: TipGoal) -> IkMethod:
-    """The method for goals with freedom that walks to all of them, not to targets drawn from them."""
+    """Return the method that moves to the goal with all its freedom, not to targets drawn from it."""
     return "projection" if goal.has_regions else "numeric"
 
 
 def _solve_by(request: IkRequest, name: IkMethod, auto: bool) -> IkResult:
-    """The answer of a method; if it has none and was chosen by "auto", of the one that walks to the goal."""
+    """Run a method and return its checked solutions, or the reason why there are none.
+
+    If the method was chosen by "auto", finds nothing, and covered only a part of the goal (drawn targets, or samples of
+    a singular pose's curve), the method that moves to the whole goal is run too.
+
+    Args:
+        request: The problem.
+        name: The method to run.
+        auto: Whether it was chosen by "auto".
+    """
     robot = request.robot
     goal = request.goal
     response = METHODS[name].run(request)
@@ -173,7 +185,8 @@ def _solve_by(request: IkRequest, name: IkMethod, auto: bool) -> IkResult:
     took_part_of_a_curve = name == "closed-form" and response.singular and len(q) == 0
     if auto and not free.any() and (took_draws or took_part_of_a_curve):
         walked = _solve_by(request, _walking_method(goal), False)
-        if walked.found or took_draws:  # else the closed form knows better why there is nothing
+        # For a singular pose the closed form gives the better reason.
+        if walked.found or took_draws:
             return walked
 
     (rows,) = free.nonzero()
@@ -195,12 +208,16 @@ def _solve_by(request: IkRequest, name: IkMethod, auto: bool) -> IkResult:
 
 
 def _nearest(request: IkRequest, q: Matrix) -> tuple[Matrix, Matrix] | None:
-    """Of rows inside the limits the nearest to the posture, shape (1, dof), and its residuals, shape (1, 2).
+    """Check the row of q, shape (k, dof), that is inside the limits and nearest to the wanted posture.
 
-    It is checked first and alone, for mostly it will do: None if it is not at the goal or not accepted.
+    This is the fast path: mostly this row will do, and then the others need no check.
+
+    Returns:
+        The row, shape (1, dof), and its residuals, shape (1, 2) [m, rad]; None if it is not at the goal or not
+        accepted.
     """
     robot = request.robot
-    within_limits = q  # most often all are, and to clamp them takes twice as long as to see that
+    within_limits = q  # Mostly all rows are inside, and this test takes half the time of clamping them.
     if not ((q >= robot.lower) & (q <= robot.upper)).all():
         within_limits = robot.clamp(q[inside_limits(robot, q)])
 
@@ -219,9 +236,10 @@ def _nearest(request: IkRequest, q: Matrix) -> tuple[Matrix, Matrix] | None:
 
 
 def _rows_at_goal(request: IkRequest, q: Matrix) -> tuple[Matrix, Matrix, Mask]:
-    """Rows of q inside the limits and at the goal: the accepted ones or, if there is none, some of the others.
+    """Select the rows of q inside the limits and at the goal: accepted ones or, if there are none, rejected ones.
 
-    Of the accepted ones the nearest are enough unless all are wanted.
+    Rows are compared with the goal in blocks, nearest first. Unless all solutions are wanted, the first block with a
+    row at the goal is enough. Of the rejected rows, which only serve the reason of a failure, one block is compared.
 
     Returns:
         The rows, shape (k, dof); their residuals, shape (k, 2) [m, rad]; and whether they are accepted, shape (k,).
@@ -249,7 +267,10 @@ def _rows_at_goal(request: IkRequest, q: Matrix) -> tuple[Matrix, Matrix, Mask]:
 
 
 def _at_goal(robot: Robot, goal: TipGoal, q: Matrix) -> tuple[Matrix, Matrix]:
-    """The rows of q at the goal, and their residuals, shape (k, 2): of a region from the part a row is nearest to."""
+    """Return the rows of q at the goal, shape (k, dof), and their residuals, shape (k, 2) [m, rad].
+
+    For a goal of several parts, the residuals are those from the part to which a row is nearest.
+    """
     if len(q) == 0:
         return q, np.zeros((0, 2))
     if len(q) == 1 and isinstance(goal, Target):
@@ -264,17 +285,24 @@ def _at_goal(robot: Robot, goal: TipGoal, q: Matrix) -> tuple[Matrix, Matrix]:
 
 
 def _rows_at_a_time(goal: TipGoal) -> int:
-    """How many rows are compared with a goal at once: thousands of rows with thousands of grasps take minutes."""
+    """Return how many rows to compare with a goal at once; thousands of rows and of grasps would take minutes."""
     return max(1, COMPARED // len(goal.parts))
 
 
 def _takes_draws_alone(name: str, goal: TipGoal) -> bool:
-    """Whether the targets that a method takes are not all there is of a goal."""
+    """Check whether a method uses only targets drawn from a goal that leaves more freedom than these."""
     return name not in ("projection", _walking_method(goal)) and any(map(leaves_freedom, goal.parts))
 
 
 def _why(request: IkRequest, answer: IkResponse, name: str, q: Matrix) -> tuple[str, str]:
-    """Reason and detail of a failure, see `IkResult`, of a method that found q, shape (k, dof), all in collision."""
+    """Return reason and detail of a failure, see `IkResult`.
+
+    Args:
+        request: The problem.
+        answer: What the method answered.
+        name: Name of the method.
+        q: Configurations at the goal that were rejected, all in collision, shape (k, dof).
+    """
     robot = request.robot
     goal = request.goal
     if len(q) and request.world is not None:
@@ -299,14 +327,14 @@ def _why(request: IkRequest, answer: IkResponse, name: str, q: Matrix) -> tuple[
 
 
 def _out_of_reach(robot: Robot, target: Target) -> bool:
-    """Whether the lengths of an arm do not allow a target, for certain."""
-    from rrtik_ompl.ik.mb_rrt.search import out_of_reach  # whoever finds a solution needs no tree
+    """Check whether a target is certainly out of reach by the lengths of the arm."""
+    from rrtik_ompl.ik.mb_rrt.search import out_of_reach  # It is loaded here, since only failures need it.
 
     return out_of_reach(robot, target)
 
 
 def _distance_in_words(robot: Robot, goal: TipGoal, q: Vector) -> str:
-    """How far a posture is from a goal, in metres and, unless it is a position, degrees."""
+    """Return how far a configuration is from a goal, in words: metres and, unless it is a position, degrees."""
     ((distance,), (angle,)) = goal.errors(robot, q[None])
     turned = f" and {round(np.degrees(angle), DIGITS):.4g} deg" if goal.oriented else ""
     return f"{round(distance, DIGITS):.4g} m{turned} away"
