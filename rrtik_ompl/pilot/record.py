@@ -1,8 +1,8 @@
-"""Records of sessions: lines of JSON, and the pictures beside them, both written as they happen.
+"""Records of sessions: lines of JSON, and optionally the pictures in a second file, both written as they happen.
 
-The lines are objects seen, commands, and configurations of the arm. Pictures are JPEGs one after the other in a file
-beside the record, which says when each was. Such a stream (Motion JPEG) is read by video players, needs no codec, and
-whatever ends the session, the lines and pictures before it are there.
+The lines contain objects seen, commands, and configurations of the arm. Pictures are stored as JPEGs one after the
+other, and a line of the record gives the position of each. Such a stream (Motion JPEG) can be played by video players
+and needs no codec. However the session ends, all lines and pictures written before remain readable.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ QUALITY = 85
 
 
 class GrowingFile:
-    """A file of a session, which ends with a fault or with the session.
+    """A file of a session, which ends with the session, or earlier if it cannot be written.
 
     Attributes:
-        fault: Why it has ended before the session, as where the disk is full; "" if it has not.
+        fault: Why the file ended before the session, for example because the disk is full; "" if it did not.
     """
 
     fault = ""
@@ -36,13 +36,13 @@ class GrowingFile:
     _told = False
 
     def news(self) -> str:
-        """Why the record has ended, the first time that this is asked; else ""."""
+        """Return why the record has ended, at the first call after that; otherwise ""."""
         said = "" if self._told else self.fault
         self._told = bool(self.fault)
         return said
 
     def close(self) -> None:
-        """End the record."""
+        """Close the file."""
         if self._file is not None:
             with suppress(OSError):
                 self._file.close()
@@ -50,13 +50,13 @@ class GrowingFile:
 
 
 class Record(GrowingFile):
-    """A file that grows line by line; whatever ends the session, the lines before it are there."""
+    """A record that is written line by line."""
 
     def __init__(self, path: str | os.PathLike[str] | None) -> None:
-        """Begin a record; None keeps none.
+        """Open a record; with a path of None nothing is recorded.
 
         Raises:
-            InputError: If the file cannot be written, or holds something: a session cannot be repeated.
+            InputError: If the file cannot be written, or is not empty: a session cannot be repeated.
         """
         self._path = path
         self._end = 0
@@ -70,7 +70,10 @@ class Record(GrowingFile):
                 raise InputError(f"{path}: cannot be written: {error.strerror or error}") from None
 
     def write(self, kind: str, time: float, **values: object) -> None:
-        """Add a line. Where there is no room for it the record ends with the line before: the session goes on."""
+        """Add a line.
+
+        If the disk is full, the incomplete line is removed and the record ends; the session goes on.
+        """
         if self._file is None:
             return
 
@@ -88,10 +91,10 @@ class Record(GrowingFile):
 
 
 def read_record(path: str | os.PathLike[str]) -> Iterator[dict[str, Any]]:
-    """The lines of a record, in their order; a last line that was cut off is left out.
+    """Yield the entries of a record in their order; an incomplete last line is left out.
 
     Raises:
-        InputError: If the file cannot be read, or a line is none of a record.
+        InputError: If the file cannot be read, or a line is not that of a record.
     """
     try:
         lines = Path(path).read_text(encoding="utf-8").splitlines()
@@ -112,22 +115,22 @@ def read_record(path: str | os.PathLike[str]) -> Iterator[dict[str, Any]]:
 
 
 def beside(record: Path) -> Path:
-    """The file of the pictures of a record."""
+    """Return the file of the pictures of a record."""
     return record.with_name(record.name + SUFFIX)
 
 
 class PictureRecord(GrowingFile):
-    """Grows picture by picture."""
+    """A record of pictures, which is written picture by picture."""
 
     def __init__(self, record: Record, path: Path) -> None:
-        """Begin.
+        """Create the file of the pictures.
 
         Args:
-            record: Of the session; it gets a line for each picture.
-            path: Of the record.
+            record: Record of the session, which gets a line for each picture.
+            path: File of that record.
 
         Raises:
-            InputError: If the file beside it cannot be written, or is there already.
+            InputError: If the file beside it cannot be written, or exists already.
         """
         self._record = record
         self._path = beside(path)
@@ -140,7 +143,7 @@ class PictureRecord(GrowingFile):
             raise InputError(f"{self._path}: cannot be written: {error.strerror or error}") from None
 
     def add(self, picture: NDArray[np.uint8], time: float) -> None:
-        """Add a picture of a time [s], unless it is the same as the last one."""
+        """Add a picture taken at a time [s], unless it is the same array as the last one."""
         if self._file is None or picture is self._last:
             return
 
@@ -159,7 +162,7 @@ class PictureRecord(GrowingFile):
 
 
 class RecordedPictures:
-    """Pictures of a record, by place and size."""
+    """The pictures of a record, read by position and size."""
 
     def __init__(self, path: Path) -> None:
         """Open the file.
@@ -174,7 +177,16 @@ class RecordedPictures:
             raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None
 
     def at(self, begin: int, size: int, like: NDArray[np.uint8]) -> NDArray[np.uint8] | None:
-        """A picture of the same shape as another; None where there is none, as where the file was cut off."""
+        """Return a picture.
+
+        Args:
+            begin: Position of its first byte in the file.
+            size: Number of bytes.
+            like: A picture of the expected shape, (height, width, 3).
+
+        Returns:
+            None if there is no such picture, for example because the file was cut off.
+        """
         self._file.seek(begin)
         data = np.frombuffer(self._file.read(size), dtype=np.uint8)
         found = cv2.imdecode(data, cv2.IMREAD_COLOR) if len(data) == size > 0 else None

@@ -1,4 +1,4 @@
-"""A recorded session played again, shown with a simulated camera, for no pictures are recorded."""
+"""Replay a recorded session; the scene is drawn by a simulated camera unless its pictures were recorded, too."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Entry = dict[str, Any]
 
 
 class RecordedArm:
-    """An arm that is where the record says; commands do not move it."""
+    """An arm at the configuration of the record; commands do not move it."""
 
     def __init__(self, robot: Robot, start: Vector) -> None:
         """Begin at a configuration, shape (dof,)."""
@@ -32,24 +32,24 @@ class RecordedArm:
         self.q = robot.configuration(start, "start")
 
     def read(self) -> Vector:
-        """Where the joints are. Shape (dof,), rad or m."""
+        """Return the joint values, shape (dof,) [rad or m]."""
         return self.q.copy()
 
     def move(self, joint: int, target: float) -> None:
-        """Without effect: the record holds the result."""
+        """Do nothing: the record contains the result."""
 
     def follow(self, q: ArrayLike) -> None:
-        """Without effect: the record holds the result."""
+        """Do nothing: the record contains the result."""
 
     def stop(self) -> None:
-        """Without effect: the record holds the result."""
+        """Do nothing: the record contains the result."""
 
     def grip(self, closed: bool) -> None:
-        """Without effect: the record holds the result."""
+        """Do nothing: the record contains the result."""
 
 
 class RecordedPerception:
-    """Gives the entries of a record to a session when their time has come."""
+    """Pass the entries of a record to a session when their time has come."""
 
     def __init__(
         self,
@@ -59,14 +59,14 @@ class RecordedPerception:
         structure: Structure | None = None,
         pictures: RecordedPictures | None = None,
     ) -> None:
-        """Begin at the beginning.
+        """Start at the beginning of a record.
 
         Args:
-            entries: Of a record; see `entries_for`.
-            arm: What the session takes for its arm.
-            world: Makes the pictures; its places follow the record.
-            structure: To what its obstacles are fixed; None if they move with the base.
-            pictures: That were recorded too; else the scene is drawn.
+            entries: Entries of the record; see `entries_for`.
+            arm: The arm of the session.
+            world: Draws the pictures; the places of its objects follow the record.
+            structure: The object to which the obstacles are fixed; None if they move with the base.
+            pictures: The recorded pictures; None if there are none, and the scene is drawn.
         """
         self._structure = structure
         self._entries = entries
@@ -91,12 +91,12 @@ class RecordedPerception:
         self.lost = "the record ends here" if self._next == len(self._entries) else ""
 
     def close(self) -> None:
-        """Close the pictures."""
+        """Close the file of the pictures."""
         if self._pictures is not None:
             self._pictures.close()
 
     def _place(self, seen: list[SeenObject]) -> None:
-        """Put objects, and what is fixed to one of them, where they were seen."""
+        """Move objects to where they were seen, and the obstacles with the structure to which they are fixed."""
         fixed = next((each for each in seen if self._structure and each.object.name == self._structure.name), None)
         if fixed is not None and self._structure is not None:
             self._world.T_start_base = self._structure.T_base_object * fixed.T_base_object.inverse()
@@ -120,7 +120,7 @@ class RecordedPerception:
 
 
 def entries_for(path: str | os.PathLike[str], problem: str, robot: Robot, marker_map: MarkerMap) -> list[Entry]:
-    """The entries of a record, checked.
+    """Return the entries of a record after checking them.
 
     Raises:
         InputError: If the file cannot be read, belongs to another problem, or an entry does not fit.
@@ -143,13 +143,18 @@ def entries_for(path: str | os.PathLike[str], problem: str, robot: Robot, marker
 
 
 def start_of(entries: list[Entry], usual: Vector) -> tuple[Vector, int]:
-    """Where the arm stood when a record began, and the seed of its random numbers."""
+    """Return the configuration of the arm when a record began, shape (dof,), and the seed of its random numbers.
+
+    Args:
+        entries: Entries of the record.
+        usual: The configuration if the record does not contain one, shape (dof,).
+    """
     begin = _begin(entries)
     return np.asarray(begin.get("q", usual)), int(begin.get("seed", 0))
 
 
 def _begin(entries: list[Entry]) -> Entry:
-    """The line that a record begins with; an empty one if it has none."""
+    """Return the first entry of kind "begin"; an empty one if there is none."""
     return next((entry for entry in entries if entry["kind"] == "begin"), {})
 
 

@@ -1,4 +1,4 @@
-"""The loop of a session at its server: commands are executed between any two pictures, and the result is shown."""
+"""The main loop of a session at its server: it executes commands between any two pictures, and shows the result."""
 
 from __future__ import annotations
 
@@ -18,36 +18,37 @@ from rrtik_ompl.pilot.interlock import Sight
 from rrtik_ompl.pilot.machine import VERBS
 from rrtik_ompl.pilot.web.server import MAX_PAGES, PilotServer
 
-PERIOD_SECONDS = 1.0 / 32.0  # a little less than a camera's, so that none of its pictures is left out
+# A little less than the period of a camera, so that none of its pictures is left out.
+PERIOD_SECONDS = 1.0 / 32.0
 CAMERA = "C"  # kinds of pictures, see `web.server`
 OUTSIDE = "O"
 MAX_SEQUENCE = 2**53  # the largest number that a page counts to
 
-Sent: TypeAlias = tuple[int, dict[str, Any]]  # number of a page, and its command
+Sent: TypeAlias = tuple[int, dict[str, Any]]  # number of the page, and the command that it sent
 
 
 def _renews(after: Sent, before: Sent) -> bool:
-    """Whether a command that is held is the one before it once more, which then need not be executed."""
+    """Check whether a held command only repeats the one before it, so that the earlier one need not be executed."""
     names = quoted(after[1].get("name")), quoted(before[1].get("name"))
     same = after[0] == before[0] and names[0] == names[1] and after[1].get("press") == before[1].get("press")
     return same and names[0] in VERBS and VERBS[names[0]].held
 
 
 class Loop:
-    """Runs in the thread that made the engine.
+    """Run a session in the thread that made the engine.
 
     Attributes:
-        reported: When it was last at the begin of a step, by ``time.monotonic()``.
-        fault: Says why the arm was stopped by a watchdog; "" if it was not.
+        reported: Time of the last begin of a step, by ``time.monotonic()``.
+        fault: Returns why the watchdog has stopped the arm; "" if it has not.
     """
 
     def __init__(self, engine: Engine, server: PilotServer) -> None:
-        """Take session and pictures, and the server of the page."""
+        """Store the engine, and the server of the page."""
         self._engine = engine
         self._server = server
         self._answered: dict[int, int] = {}
         self._time = 0.0
-        self._read_at = clock.monotonic()  # when the time was read last
+        self._read_at = clock.monotonic()  # when `time` was evaluated last
         self._audience = 0
         self._outside_too = False
         self.reported = self._read_at
@@ -55,7 +56,7 @@ class Loop:
 
     @property
     def time(self) -> float:
-        """Of the session [s]; stands still in a pause."""
+        """The time of the session [s], which stands still in a pause."""
         now = clock.monotonic()
         if not self._engine.paused:
             self._time += now - self._read_at
@@ -63,8 +64,9 @@ class Loop:
         return self._time
 
     def run(self, until: Stop = no_stop) -> None:
-        """Go on until Ctrl-C, or until ``until`` is true."""
-        cv2.setNumThreads(1)  # more of them only spin: no picture of this size is ready sooner
+        """Run until Ctrl-C, or until ``until`` returns true."""
+        # More threads only cost processor time: pictures of this size are not ready sooner.
+        cv2.setNumThreads(1)
         while not until():
             begin = clock.monotonic()
             self._step()
@@ -91,7 +93,7 @@ class Loop:
 
         self._outside_too = not self._outside_too
         if not self._outside_too and self._audience == audience:
-            return  # every second time is enough for the outside view
+            return  # the outside view is drawn in every second step only
 
         outside = engine.outside_picture(anew=self._audience != audience)
         if outside is not None:
@@ -103,17 +105,17 @@ class Loop:
             self._server.show_state(state, self._answered)
 
     def _execute_all(self) -> None:
-        """Execute what waits now, and no more: a key that is held would leave a slow machine no time for pictures."""
+        """Execute the commands that wait now; later ones must wait, so that a slow machine has time for pictures."""
         self._engine.watch(self.time)
         for _ in range(self._server.commands.qsize()):
             self._execute_one(0.0)
 
     def _execute_one(self, patience: float) -> None:
-        """Execute the next command and show its result at once; wait for one at most ``patience`` [s]."""
+        """Execute the next command and show its result at once; wait at most ``patience`` for it [s]."""
         commands = self._server.commands
         try:
             client, command = commands.get(block=patience > 0.0, timeout=patience or None)
-        except queue.Empty:  # a stop has left out what waited
+        except queue.Empty:  # a stop has removed the commands that waited
             return
 
         with commands.mutex:
@@ -125,19 +127,19 @@ class Loop:
         sight = Sight(self._age(command.pop("seen", None)), self._age(command.pop("picture", None)))
         try:
             self._engine.execute(command, self.time, sight)
-        except Exception as error:  # nothing that a page sends ends the session
+        except Exception as error:  # no input of a page may end the session
             self._engine.session.stand_still()
             what = f"'{quoted(command.get('name'))}' broke: {quoted(error) or type(error).__name__}"
             self._engine.session.say(alarm(f"{what}; the arm was stopped"))
 
         if isinstance(sequence, int) and sequence is not True and 0 <= sequence <= MAX_SEQUENCE:
             self._answered[client] = sequence
-            while len(self._answered) > MAX_PAGES:  # of pages that have left
+            while len(self._answered) > MAX_PAGES:  # forget pages that have left
                 del self._answered[min(self._answered)]
         self._show_state()
 
     def _age(self, stamp: object) -> float:
-        """Age of what a page says that it has shown, by the server's own stamp [s]; inf if that is none."""
+        """Return the age of what a page has shown, by the server's own time stamp [s]; inf if the stamp is invalid."""
         now = self.time
         if isinstance(stamp, bool) or not isinstance(stamp, int | float) or not 0.0 <= stamp <= now:
             return np.inf

@@ -1,10 +1,9 @@
 """The pilot's session without its page: objects and commands go in, the state comes out.
 
-Source: [1, ch. 6] (flow chart). Two modes: assisted manoeuvre moves one joint at a time and refuses moves that are not
-free; assisted teleoperation chooses a grasp, plans a route, and guides the pilot through its moves.
-
-What the session decides stands in `machine`: a function of values. Here it is carried out: a `Session` has the arm, the
-record and the `State` of now.
+Source: [1, ch. 6] (flow chart). There are two ways of working: assisted manoeuvre moves one joint at a time and refuses
+moves that are not free; assisted teleoperation chooses a grasp, plans a route, and guides the pilot through its moves.
+The decisions are made in `machine`, by functions without side effects. A `Session` carries them out: it owns the arm,
+the record and the present `State`.
 """
 
 from __future__ import annotations
@@ -43,11 +42,11 @@ class Session:
     """One pilot, one arm, one scene.
 
     Attributes:
-        means: What the session works with, the same from its begin to its end.
-        state: All that it knows and has decided; each event makes the next one.
+        means: What the session works with, unchanged from its begin to its end.
+        state: The present state; each event replaces it by the next one.
         arm: The arm that is moved.
-        master: An arm whose joints `lead` follows; None without one.
-        supervisor: Compares what the arm does with what it was told.
+        master: A master arm whose joints `lead` follows; None without one.
+        supervisor: Compares the motion of the arm with its set points.
     """
 
     def __init__(
@@ -64,20 +63,21 @@ class Session:
         master: Arm | None = None,
         patience: float | None = None,
     ) -> None:
-        """Begin in manoeuvre.
+        """Begin in the mode manoeuvre.
 
         Args:
-            problem: Robot and surroundings; its goal serves `plan` where no object was chosen.
+            problem: Robot and surroundings; its goal is used by `plan` if no object is chosen.
             arm: The arm that is moved.
-            rates: Of the joints, shape (dof,) [rad/s or m/s]; default ones if None.
-            record: Where the session is recorded.
-            seed: Of the random numbers: the same commands give the same routes.
-            past: Pictures are not of now, and the arm is a simulated one. Else nothing moves without a picture of now.
-            recorded: The arm moves as a record says, whatever it is told: it is not compared with that.
-            structure: To what the problem's obstacles are fixed; None if they move with the arm's base.
-            master: An arm whose joints `lead` follows.
-            patience: For how long routes stand on what is out of view [s]; None for 2 s with a structure, and for ever
-                without one, where the vehicle stands still.
+            rates: Of the joints, shape (dof,) [rad/s or m/s]; None for the default rates.
+            record: The record of the session; None for no record.
+            seed: Seed of the random numbers: the same commands give the same routes.
+            past: Whether the pictures are old ones and the arm is simulated. Otherwise nothing moves without a present
+                picture.
+            recorded: Whether the arm moves as a record says. It is then not compared with its set points.
+            structure: The object to which the problem's obstacles are fixed; None if they move with the arm's base.
+            master: A master arm whose joints `lead` follows.
+            patience: How long routes may depend on objects out of view [s]; None for 2 s with a structure, and for no
+                limit without one, because the vehicle then stands still.
         """
         if patience is None:
             patience = np.inf if structure is None else UNSEEN_SECONDS
@@ -98,26 +98,26 @@ class Session:
 
         self._grasp_servo = GraspServo(problem.robot)
         self._record = record or Record(None)
-        self._read_by_arm = isinstance(arm, LineArm)  # its own thread gives its readings to the supervisor
+        self._read_by_arm = isinstance(arm, LineArm)  # its own thread passes its readings to the supervisor
         if isinstance(arm, LineArm):
             arm.judge = self.supervisor
 
     # --- events ---------------------------------------------------------------------------------------------------
 
     def see(self, objects: Sequence[SeenObject], time: float) -> None:
-        """Update the surroundings by the objects of a picture."""
+        """Update the surroundings by the objects in a picture taken at a time [s]."""
         self._take(events.Seen(objects, time))
 
     def see_arm(self, T_base_tip: pin.SE3, covariance: Matrix, time: float) -> None:
-        """Where a picture shows the tip, with its covariance (6, 6); nothing moves where the joints say otherwise."""
+        """Compare the tip's pose in a picture, with its covariance (6, 6), to the joints; a conflict blocks motion."""
         self._take(events.TipSeen(T_base_tip, covariance, time))
 
     def see_unusable(self, why: str) -> None:
-        """A photograph, or picture of a film, could not be used."""
+        """Register that a photograph, or a picture of a film, could not be used."""
         self._take(events.Unusable(why))
 
     def tick(self, time: float) -> None:
-        """Read the arm and update its progress along the route; stop it where the present is not known any more."""
+        """Read the arm and update its progress along the route; stop it if the present is no longer known."""
         self._take(events.Measured(self.arm.read(), time, self.arm.lost))
 
         standing = None
@@ -138,20 +138,20 @@ class Session:
             self._take(events.Said(answer))
 
     def stand_still(self) -> None:
-        """Stop the arm, and end what is held."""
+        """Stop the arm, and end the held command."""
         self._take(events.Broken())
 
     def command(self, verb: str, time: float, sight: Sight | None = None, /, **arguments: object) -> str:
-        """Execute a command of the pilot; returns a line for a person, which is `message` from then on.
+        """Execute a command of the pilot, and return a line for a person, which is `message` from then on.
 
-        A command that cannot be executed in this mode, or on what is known, says so and moves nothing. Those that are
-        held are repeated as long as the arm shall move. Any other command ends the motion.
+        A command that is not allowed in this mode, or on what is known, is refused and moves nothing. Held commands are
+        repeated as long as the arm shall move. Any other command ends the motion.
 
         Args:
             verb: One of `machine.VERBS`.
-            time: Now [s].
+            time: Current time [s].
             sight: What the page of the pilot had shown; None without a page.
-            **arguments: Of the command.
+            **arguments: Arguments of the command.
         """
         self._take(events.Command(verb, time, self.arm.lost, sight, arguments))
         return self.message
@@ -159,7 +159,7 @@ class Session:
     # --- effects --------------------------------------------------------------------------------------------------
 
     def _take(self, event: events.Event) -> None:
-        """Go on to the next state, and carry out what is to be done; an answer to that is the next event, at once."""
+        """Go on to the next state and carry out its effects; each answer is handled before the next effect."""
         self.state, effects = handle(self.means, self.state, event)
 
         for effect in effects:
@@ -213,7 +213,7 @@ class Session:
         return self.master.read()
 
     def _arms_time(self) -> float:
-        """Now, by the clock of whoever reads the arm [s]."""
+        """Return the current time by the clock of the component that reads the arm [s]."""
         return clock.monotonic() if self._read_by_arm else self.time
 
     # --- what it is like now --------------------------------------------------------------------------------------
@@ -225,12 +225,12 @@ class Session:
 
     @property
     def time(self) -> float:
-        """Of the last event [s]."""
+        """Time of the last event [s]."""
         return self.state.time
 
     @property
     def q(self) -> Vector:
-        """Where the arm is, shape (dof,) [rad or m]."""
+        """Present configuration, shape (dof,) [rad or m]."""
         return self.state.q
 
     @property
@@ -240,12 +240,12 @@ class Session:
 
     @property
     def message(self) -> str:
-        """The line that was said last."""
+        """The last message."""
         return self.state.answer.text
 
     @property
     def level(self) -> Level:
-        """Of the line that was said last."""
+        """Level of the last message."""
         return self.state.answer.level
 
     @property
@@ -255,12 +255,12 @@ class Session:
 
     @property
     def surroundings(self) -> Surroundings:
-        """The objects as they were seen last, and what the gripper holds."""
+        """The objects as they were seen last, and the held object."""
         return self.state.around
 
     @property
     def target(self) -> str | None:
-        """Name of the object that is chosen."""
+        """Name of the chosen object; None if none is chosen."""
         return self.state.target
 
     @property
@@ -270,12 +270,12 @@ class Session:
 
     @property
     def follower(self) -> Follower | Track | None:
-        """Of the route, or of the way back."""
+        """The tracker of the route, or of the way back; None without a route."""
         return self.state.way.follower
 
     @property
     def progress(self) -> Progress | None:
-        """Where the arm is on its route."""
+        """The place of the arm on its route; None before the route is accepted."""
         return self.state.way.progress
 
     @property
@@ -285,25 +285,25 @@ class Session:
 
     @property
     def world(self) -> World:
-        """The world for moves by hand: the gripper may touch what it holds, as long as it does."""
+        """The world for moves by hand, in which the gripper may touch the target while it is in contact with it."""
         return queries.world_by_hand(self.state)
 
     def lamps(self) -> tuple[Lamp, ...]:
-        """Lamps of the chosen object where it is and for where the arm is; none is green if no route can be led."""
+        """Return the lamps of the chosen object from the present configuration; none is green if routes are refused."""
         return queries.lamps(self.means, self.state)
 
     def lamp(self) -> Lamp | None:
-        """The lamp of the grasp that is chosen."""
+        """Return the lamp of the chosen grasp; None if no grasp is chosen."""
         return queries.chosen_lamp(self.means, self.state)
 
     def fault(self) -> str:
-        """What is wrong with the grasp that is chosen: by how much it is out of reach, what touches; "" if nothing."""
+        """Return why the chosen grasp cannot be made: how far out of reach it is, or what touches; "" if it can."""
         return queries.grasp_fault(self.means, self.state)
 
     def joint_range(self) -> JointRange:
-        """The range in which the selected joint can be driven now."""
+        """Return the range within which the selected joint can be driven now."""
         return queries.joint_range(self.means, self.state)
 
     def unseen(self, name: str) -> float:
-        """For how long an object has not been in view, by the pictures taken since [s]."""
+        """Return how long an object has been out of view at the time of the last picture [s]."""
         return queries.unseen_for(self.state, name)

@@ -1,4 +1,4 @@
-"""From the options of a session to an engine: problem, camera, marker map, arm, record."""
+"""Build an engine from the options of a session: problem, camera, marker map, arm, record."""
 
 from __future__ import annotations
 
@@ -35,7 +35,8 @@ from rrtik_ompl.sensing.sight import check_size
 from rrtik_ompl.world.problem import Problem
 
 LAST_PORT = 65535
-DEFAULT_CAMERA_POSE = 2.5, np.radians(125.0), np.radians(30.0)  # [m], [rad]: of a camera whose pose is not known
+# Distance [m], azimuth and elevation [rad] of a camera whose pose is not known.
+DEFAULT_CAMERA_POSE = 2.5, np.radians(125.0), np.radians(30.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +61,14 @@ class SessionOptions:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OpenSession:
-    """A session with all that it holds open, when the threads of arm and camera reported last, and its record."""
+    """An engine with the resources that it holds open.
+
+    Attributes:
+        engine: The engine.
+        closing: Functions that release the resources, in this order.
+        reports: By name, functions that give the time of the last report of the threads of arm and camera.
+        record: The record of the session.
+    """
 
     engine: Engine
     closing: tuple[Callable[[], None], ...]
@@ -75,7 +83,7 @@ class OpenSession:
 
 
 def open_session(options: SessionOptions) -> OpenSession:
-    """Open the session of some options.
+    """Open a session with the given options.
 
     Raises:
         InputError: If a file, the camera or the arm cannot be used.
@@ -121,7 +129,7 @@ def open_session(options: SessionOptions) -> OpenSession:
 
 
 def _picture_record(options: SessionOptions, record: Record) -> PictureRecord | None:
-    """What writes pictures beside the record, if they are asked for."""
+    """Open the record of pictures beside the record, if the options ask for it; None otherwise."""
     if not options.record_pictures:
         return None
     if options.record is None:
@@ -132,7 +140,7 @@ def _picture_record(options: SessionOptions, record: Record) -> PictureRecord | 
 def _further(
     options: SessionOptions, vehicle: SimulatedVehicle | None, problem: Problem, perception: LivePerception
 ) -> dict[str, FurtherCamera]:
-    """Cameras beside the first one, by name."""
+    """Open the cameras in addition to the first one, by name."""
     found: dict[str, FurtherCamera] = {}
     source = perception.source
     second = options.second
@@ -149,21 +157,21 @@ def _further(
 
 
 def _simulated_arm(vehicle: SimulatedVehicle | None, problem: Problem) -> SimulatedArm:
-    """Without errors, or wrong as the file of the simulated vehicle says."""
+    """Return a simulated arm, with the faults of the simulated vehicle if it has any."""
     if vehicle is None or vehicle.faults is None:
         return SimulatedArm(problem.robot, problem.start)
     return WrongArm(problem.robot, problem.start, vehicle.faults)
 
 
 def _structure(vehicle: SimulatedVehicle | None) -> Structure | None:
-    """To what the obstacles of the problem are fixed, and where it is when they are where the problem says."""
+    """Return the object to which the problem's obstacles are fixed, with its nominal pose; None for no such object."""
     if vehicle is None or vehicle.structure is None:
         return None
     return Structure(vehicle.structure, vehicle.places[vehicle.structure])
 
 
 def _patience(vehicle: SimulatedVehicle | None) -> float | None:
-    """For how long routes stand on what is out of view [s]; None for what the session takes."""
+    """Return how long routes may depend on objects out of view [s]; None for the default of the session."""
     return None if vehicle is None else vehicle.patience
 
 
@@ -202,13 +210,13 @@ def _perception(
 
 
 def _together(sources: Sequence[str]) -> Iterator[Picture]:
-    """Pictures of the first source, each with those that the others took at the same time."""
+    """Yield the pictures of the first source, each with those that the others took at the same time."""
     for first, *others in pictures_together(sources):
         yield replace(first, others=tuple(others))
 
 
 def _fitting(pictures: Iterator[Picture], cameras: Sequence[Camera]) -> Iterator[Picture]:
-    """The same pictures; the first that a camera cannot have taken ends them with an error."""
+    """Yield the pictures; raise an error at the first one whose size does not fit its camera."""
     for picture in pictures:
         for each, camera in zip((picture, *picture.others), cameras, strict=True):
             check_size(each.pixels, camera, each.name)
@@ -225,7 +233,7 @@ def _vehicle(options: SessionOptions, problem: Problem) -> SimulatedVehicle:
 
 
 def _recorded(options: SessionOptions, problem: Problem) -> SimulatedVehicle:
-    """What a record is shown with: a simulated vehicle, or the camera and map that it was made with."""
+    """Return the vehicle with which a record is shown: a simulated one, or the camera and map given in the options."""
     if options.camera_file is None or options.map_file is None:
         return _vehicle(options, problem)
 

@@ -1,4 +1,4 @@
-"""All that a session knows and has decided, as one value, and its parts. Only `machine.handle` makes the next one."""
+"""The complete state of a session as one immutable value, and its parts. Only `machine.handle` makes the next one."""
 
 from __future__ import annotations
 
@@ -19,28 +19,30 @@ from rrtik_ompl.pilot.surroundings import Surroundings
 from rrtik_ompl.sensing.scene_from_view import SeenObject
 from rrtik_ompl.world.problem import Problem
 
-STILL_SECONDS = 0.5  # an arm that stands for so long is where its last reading says: pictures and joints are not of now
-TIP_TOLERANCE = 0.005  # [m] of the arm's model and of the marker on it
+# Pictures and readings are delayed differently, so they are compared only if the arm has stood still this long.
+STILL_SECONDS = 0.5
+TIP_TOLERANCE = 0.005  # [m]; error of the arm's model and of the marker on it
 TIP_SIGMAS = 3.0
-MIN_CHANGE = 1e-4  # [rad or m]; less is noise
+MIN_CHANGE = 1e-4  # [rad or m]; smaller changes of a reading are noise
 
-LEASH_SECONDS = 0.1  # how far a set point may be ahead of the arm, at the speed of the moment
-HOLD_SECONDS = 0.25  # without a renewal for as long the drive is over
-FIRST_SECONDS = 0.04  # of motion that the first command of a press asks for: a tap moves the arm by as much
+LEASH_SECONDS = 0.1  # largest lead of a set point over the arm, as time at the present speed
+HOLD_SECONDS = 0.25  # a drive ends if it is not renewed within this time
+# Duration of the motion that the first command of a press asks for: a short tap moves the arm this far.
+FIRST_SECONDS = 0.04
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Means:
-    """What a session works with, the same from its begin to its end.
+    """What a session works with, unchanged from its begin to its end.
 
     Attributes:
-        problem: Robot and surroundings; its goal serves `plan` where no object was chosen.
-        rates: Of the joints, shape (dof,) [rad/s or m/s].
-        seed: Of the random numbers.
-        past: Pictures are not of now, and the arm is a simulated one.
-        recorded: The arm moves as a record says, whatever it is told.
-        patience: For how long routes stand on what is out of view [s].
-        feasibility: What was found out for a state, kept for the next one; nothing else depends on it.
+        problem: Robot and surroundings; its goal is used by `plan` if no object is chosen.
+        rates: Rates of the joints, shape (dof,) [rad/s or m/s].
+        seed: Seed of the random numbers.
+        past: Whether the pictures are old ones and the arm is simulated.
+        recorded: Whether the arm moves as a record says, regardless of its set points.
+        patience: How long routes may depend on objects out of view [s].
+        feasibility: Cache of results for a state; it affects nothing but the speed.
     """
 
     problem: Problem
@@ -62,12 +64,12 @@ class Way:
     """The route that is proposed or followed.
 
     Attributes:
-        route: As it was planned last; None without one.
-        follower: Tracks the arm along it, or along the way back.
-        progress: Where the arm is on it; None before it is accepted.
-        withdrawn: Why it must not be followed any more; "" while it may.
-        list_of_moves: Of single joints: what `together` is made of, and goes back to.
-        aimed: What the route leads to, as it was seen when it was planned.
+        route: The route as it was planned last; None without one.
+        follower: Tracks the arm along the route, or along the way back.
+        progress: Place of the arm on the route; None before the route is accepted.
+        withdrawn: Why the route must not be followed any more; "" while it may.
+        list_of_moves: The route of single-joint moves, from which `together` starts and to which it returns.
+        aimed: The object that the route leads to, as it was seen when the route was planned.
     """
 
     route: Route | None = None
@@ -83,9 +85,9 @@ class Gripper:
     """The gripper.
 
     Attributes:
-        closed: Whether it is.
+        closed: Whether it is closed.
         fixed: Name of an object that it is closed on and that cannot be carried away; "" if there is none.
-        lift: How far what it holds is lifted [m].
+        lift: Height to which the held object is lifted [m].
     """
 
     closed: bool = False
@@ -95,12 +97,12 @@ class Gripper:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pictures:
-    """What the pictures have shown.
+    """The times of the pictures and of what they have shown.
 
     Attributes:
-        time: Of the last one [s].
-        unusable: Why the last one could not be used; "" if it could.
-        seen_at: When each object was seen last, by its name [s].
+        time: Time of the last picture [s].
+        unusable: Why the last picture could not be used; "" if it could.
+        seen_at: Time at which each object was seen last, by its name [s].
     """
 
     time: float = -np.inf
@@ -110,12 +112,12 @@ class Pictures:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ArmCheck:
-    """The camera against the joints: a marker on the gripper shows whether the arm is where its encoders say.
+    """Comparison of camera and joints: a marker on the gripper shows whether the arm is where its encoders say.
 
     Attributes:
-        off: How far they differ, in words, if that is more than may be; "" if not, or if the tip was never seen.
-        q: Where the arm has stood since it moved last, shape (dof,); empty before it was read.
-        since: When that was [s].
+        off: How far they differ, in words, if that exceeds the tolerance; "" if not, or if the tip was never seen.
+        q: Configuration in which the arm stands since it moved last, shape (dof,); empty before the first reading.
+        since: Time of the last motion [s].
     """
 
     off: str = ""
@@ -123,21 +125,21 @@ class ArmCheck:
     since: float = 0.0
 
     def read(self, q: Vector, time: float) -> ArmCheck:
-        """After a reading of the joints at a time [s]."""
+        """Return the check after a reading of the joints at a time [s]."""
         if len(q) == len(self.q) and np.abs(q - self.q).max() <= MIN_CHANGE:
             return self
         return replace(self, q=q, since=time)
 
     def see(self, T_base_tip: pin.SE3, covariance: Matrix, expected: pin.SE3, time: float) -> ArmCheck:
-        """After a picture.
+        """Return the check after a picture of the tip.
 
-        Of an arm that moves nothing is said: the last word holds.
+        While the arm moves, and shortly after, the last result is kept.
 
         Args:
-            T_base_tip: The tip as the picture shows it.
-            covariance: Of that, shape (6, 6).
-            expected: Where joints say that the tip is.
-            time: Of the picture [s].
+            T_base_tip: Pose of the tip in the picture.
+            covariance: Its covariance, shape (6, 6).
+            expected: Pose of the tip according to the joints.
+            time: Time of the picture [s].
         """
         if time - self.since < STILL_SECONDS:
             return self
@@ -153,15 +155,15 @@ class ArmCheck:
 
 @dataclass(frozen=True, slots=True)
 class Press:
-    """A key, button or stick that is held; one at a time.
+    """A key, button or stick that is held; only one at a time.
 
     Attributes:
         verb: The command that it renews.
-        number: Of the press: a key that is pressed anew has another.
-        over: It was ended: whoever still holds it has to press again.
-        due: Joint and end of the move that it makes.
-        nearest: How near to its end the arm has come, and when.
-        near: From the end of a move at which it is made [rad or m].
+        number: Number of the press: a key that is pressed anew has another.
+        over: Whether it was ended: the pilot must release and press again.
+        due: Joint and end [rad or m] of the move that it makes.
+        nearest: Least distance to the end of the move so far [rad or m], and when it was reached [s].
+        near: Distance from the end of a move within which it is completed [rad or m].
     """
 
     verb: str = ""
@@ -172,23 +174,23 @@ class Press:
     near: float = MADE
 
     def is_of(self, verb: str, number: object) -> bool:
-        """Whether a command renews it."""
+        """Check whether a command renews this press."""
         return (verb, number) == (self.verb, self.number)
 
 
 @dataclass(frozen=True, slots=True)
 class Drive:
-    """How the arm is driven: one joint at a time, or all together. Hold to run: only as long as its command is renewed.
+    """How the arm is driven at present: one joint, or all joints together, only as long as the command is renewed.
 
-    Each renewal gives the arm a set point that is a little ahead of it, by no more than `LEASH_SECONDS` of its way.
-    Without a renewal, whatever the reason (the key is released, the page or the line hangs), the arm stops there.
+    Each renewal gives the arm a set point that is ahead of it by at most `LEASH_SECONDS` of motion. Without a renewal,
+    whatever the reason (the key is released, the page or the line hangs), the arm stops there.
 
     Attributes:
         joint: Number of the joint that is driven; None if none is.
-        goal: Where the drive ends [rad or m].
+        goal: Value at which the drive ends [rad or m].
         leading: Whether all joints are led to set points.
-        point: The set point of the joint [rad or m].
-        renewed: When the drive was renewed last [s].
+        point: Set point of the joint [rad or m].
+        renewed: Time of the last renewal [s].
     """
 
     joint: int | None = None
@@ -203,27 +205,30 @@ class Drive:
         return self.leading or self.joint is not None
 
     def expired(self, time: float) -> bool:
-        """Whether it was not renewed in time."""
+        """Check whether the drive was not renewed in time."""
         return self.active and time - self.renewed > HOLD_SECONDS
 
     def goes_on_to(self, joint: int, goal: float) -> bool:
-        """Whether a joint is driven already, and in the direction of a goal [rad or m]."""
+        """Check whether a joint is already driven, and in the direction of a goal [rad or m]."""
         turned = self.active and (goal - self.point) * (self.goal - self.point) < 0.0
         return joint == self.joint and not turned and not self.leading
 
     def begun(self, here: float, time: float) -> Drive:
-        """A new drive of a joint that is at a value [rad or m]."""
+        """Return a new drive of a joint that is at the value ``here`` [rad or m]."""
         return Drive(point=here, renewed=time - FIRST_SECONDS)
 
     def on(self, joint: int, goal: float, rate: float, here: float, time: float) -> Drive:
-        """Driven on towards a goal.
+        """Return the drive after its set point has moved on towards a goal.
+
+        The set point advances at the rate for the time since the last renewal, and never leads the joint by more than
+        `LEASH_SECONDS`.
 
         Args:
             joint: Number of the joint.
-            goal: Where it goes at most [rad or m].
-            rate: Of the joint [rad/s or m/s].
-            here: Where the joint is [rad or m].
-            time: Now [s].
+            goal: Value at which the drive ends [rad or m].
+            rate: Rate of the joint [rad/s or m/s].
+            here: Present value of the joint [rad or m].
+            time: Current time [s].
         """
         seconds = float(np.clip(time - self.renewed, 0.0, LEASH_SECONDS))
         step = np.clip(goal - self.point, -rate * seconds, rate * seconds)
@@ -232,40 +237,40 @@ class Drive:
         return Drive(joint, goal, False, point, max(time, self.renewed))
 
     def led(self, time: float) -> Drive:
-        """All joints are led to set points."""
+        """Return a drive that leads all joints to set points."""
         return Drive(None, self.goal, True, self.point, max(time, self.renewed))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class State:
-    """A session at a moment.
+    """The state of a session at one moment.
 
     Attributes:
-        around: The world with the objects as they were seen last, and with what the gripper holds.
-        q: Where the arm is, shape (dof,) [rad or m].
-        desired: Where it shall be, shape (dof,).
-        time: Now [s].
+        around: The world with the objects as they were seen last, and with the held object.
+        q: Present configuration, shape (dof,) [rad or m].
+        desired: Desired configuration, shape (dof,) [rad or m].
+        time: Current time [s].
         mode: One of `interlock.MODES`.
         selected: Number of the joint that is driven by hand.
-        speed: Share of the joints' rates at which they are driven.
-        target: Name of the object that is chosen.
-        choice: Type and level of the grasp that is chosen.
-        answer: What was said last, and its level.
+        speed: Share of the joints' rates at which the joints are driven.
+        target: Name of the chosen object; None if none is chosen.
+        choice: Type and level of the chosen grasp; None if none is chosen.
+        answer: The last message to the pilot, and its level.
         sight: What the page of the pilot had shown when the last command was given; None without a page.
         pictures: What the pictures have shown.
-        check: Of the camera against the joints.
+        check: Comparison of camera and joints.
         arm_lost: Why the connection to the arm is lost; "" if it is not.
-        fault: What the arm has done that it was not told; "" if nothing, or the pilot has acknowledged it.
-        fault_at: When that was said [s].
-        trouble: Why nothing moves, as it was said last; "" if all is well.
-        unseen: What is out of view, as it was said last; "" if nothing.
+        fault: What the arm did against its set points; "" if nothing, or if the pilot has acknowledged it.
+        fault_at: Time at which the fault was reported [s].
+        trouble: Why nothing moves, as it was reported last; "" if all is well.
+        unseen: What is out of view, as it was reported last; "" if nothing.
         way: The route.
-        press: Of the key that drives, or drove last.
-        drive: Of the arm.
+        press: The press that drives the arm, or did so last.
+        drive: How the arm is driven.
         gripper: The gripper.
-        servoed_at: When the tool was led by the camera last [s].
-        given: The last command, and the number of its press if it has one.
-        due: What is to be done, in this order; `machine.handle` gives it away.
+        servoed_at: Time of the last step of visual servoing [s].
+        given: The last command, and the number of its press; None if the command is not held.
+        due: The effects to carry out, in this order; `machine.handle` returns and clears them.
     """
 
     around: Surroundings
@@ -296,32 +301,32 @@ class State:
 
     @property
     def holds(self) -> str:
-        """Name of what is held and moves with the arm; "" if nothing is."""
+        """Name of the held object, which moves with the arm; "" if nothing is held."""
         held = self.around.held
         return "" if held is None else held.seen.object.name
 
     def do(self, *effects: Effect) -> State:
-        """The same, with more to be done."""
+        """Return the state with further effects to carry out."""
         return replace(self, due=(*self.due, *effects))
 
     def say(self, answer: Answer | None) -> State:
-        """Something is said to the pilot; None leaves the last answer."""
+        """Return the state with a message to the pilot; None keeps the last one."""
         return self if answer is None else replace(self, answer=answer)
 
     def at_rest(self) -> State:
-        """Nothing is driven any more."""
+        """Return the state without a drive; the arm is stopped if it was driven."""
         if not self.drive.active:
             return self
         return replace(self, drive=replace(self.drive, joint=None, leading=False)).do(Stop())
 
     def released(self) -> State:
-        """Nothing is driven any more, and the press that drove has no effect any more."""
+        """Return the state without a drive, in which the present press has no effect any more."""
         return replace(self.at_rest(), press=replace(self.press, over=True))
 
     def stand_still(self) -> State:
-        """The arm stops, whatever moves it, and what is held has no effect any more."""
+        """Return the state in which the arm is stopped in any case, and the present press has no effect any more."""
         return self.released().do(Stop())
 
     def on_its_way(self, **changes: object) -> State:
-        """With changes of the route."""
+        """Return the state with changes of the route's attributes."""
         return replace(self, way=replace(self.way, **changes))  # type: ignore[arg-type]

@@ -1,4 +1,4 @@
-"""The world of a session: the problem's scene with the objects that the camera sees; made anew only when they move."""
+"""The world of a session: the problem's scene with the objects seen by the camera; rebuilt only when they move."""
 
 from __future__ import annotations
 
@@ -28,18 +28,18 @@ from rrtik_ompl.tasks.contact_life import (
 )
 from rrtik_ompl.world.world import World
 
-MAX_SHIFT = 5e-3  # [m]; a target that has moved farther is not where a route ends
-MAX_TURN = np.deg2rad(1.0)  # nor one that has turned by more
+MAX_SHIFT = 5e-3  # [m]; a route is withdrawn if its target has moved farther
+MAX_TURN = np.deg2rad(1.0)  # the same for a rotation of the target
 MIN_SHIFT = 1e-3  # [m]; smaller changes are noise
 MIN_ROTATION = np.deg2rad(0.2)
 
 
 class Structure(NamedTuple):
-    """What the problem's obstacles are fixed to, where the vehicle may move.
+    """The object to which the problem's obstacles are fixed if the vehicle moves.
 
     Attributes:
-        name: Of an object of the marker map.
-        T_base_object: Its pose when the obstacles are where the problem says.
+        name: Name of an object of the marker map.
+        T_base_object: Its pose when the obstacles are at their poses in the problem.
     """
 
     name: str
@@ -47,7 +47,13 @@ class Structure(NamedTuple):
 
 
 class HeldObject(NamedTuple):
-    """What the gripper holds: as it was seen last, its place in the gripper, and what it has not parted from."""
+    """The object in the gripper.
+
+    Attributes:
+        seen: The object as it was seen last.
+        T_tip_object: Its pose in the frame of the tip.
+        rests: Contacts with bodies from which it has not yet been separated.
+    """
 
     seen: SeenObject
     T_tip_object: pin.SE3
@@ -55,11 +61,12 @@ class HeldObject(NamedTuple):
 
 
 class MayTouch(NamedTuple):
-    """What the gripper, with what it holds, may touch of an object.
+    """Permitted contacts of the gripper, and of what it holds, with one object.
 
     Attributes:
-        contacts: How far each part of it and each solid of the object may overlap.
-        buried: Pairs that overlap so deep at a grasp that no depth keeps them from passing through: not compared.
+        contacts: How far each part and each solid of the object may overlap.
+        buried: Pairs that overlap too deeply at a grasp for a penetration limit to prevent passing through. These pairs
+            are not checked.
     """
 
     contacts: tuple[Touching, ...]
@@ -68,13 +75,13 @@ class MayTouch(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Surroundings:
-    """Worlds with the objects as they were seen last, as a value: what changes them gives another one.
+    """The world with the objects as they were seen last. Immutable: every change returns a new value.
 
     Attributes:
         given: The problem's world.
-        structure: To what its obstacles are fixed; None if they move with the arm's base.
-        held: What the gripper holds, as part of the arm; None if nothing.
-        version: Counts how often the world became another one.
+        structure: The object to which its obstacles are fixed; None if they move with the arm's base.
+        held: The object in the gripper, as part of the arm; None if there is none.
+        version: Counts the changes of the world.
     """
 
     given: World
@@ -82,11 +89,12 @@ class Surroundings:
     held: HeldObject | None = None
     version: int = 0
     _seen_objects: Mapping[str, SeenObject] = field(default_factory=dict)
-    # T_object_tip of what was put down: where the tip was in it.
+    # T_object_tip at the moment of release, by name of the object that was put down.
     _tip_at_release: Mapping[str, pin.SE3] = field(default_factory=dict)
-    # Of what was seen and is held; None before there was anything.
+    # The world with seen and held objects; None as long as there are none.
     _world_with_objects: World | None = None
-    # Results by name of the object that may be touched: of these surroundings, and as long as the same thing is held.
+    # Caches by name of the object that may be touched. The first is valid for these surroundings only, the second as
+    # long as the same object is held.
     _worlds_touching: dict[str, World] = field(default_factory=dict)
     _allowed_contacts: dict[str, MayTouch] = field(default_factory=dict)
 
@@ -102,12 +110,12 @@ class Surroundings:
 
     @property
     def basis(self) -> tuple[str, ...]:
-        """Names of the objects by whose places the world is made: the structure, and all that was seen."""
+        """Names of the objects whose poses determine the world: the structure, and all that were seen."""
         fixed = () if self.structure is None else (self.structure.name,)
         return tuple(dict.fromkeys((*fixed, *self._seen_objects)))
 
     def named(self, name: str) -> SeenObject | None:
-        """An object as it was seen last, None if it was never seen."""
+        """Return an object as it was seen last; None if it was never seen."""
         return self._seen_objects.get(name)
 
     def check_grasp(self, name: str | None, type: str, level: int) -> None:
@@ -128,14 +136,14 @@ class Surroundings:
             raise InputError(f"level must be 1 to {count}, got {level + 1}")
 
     def places(self) -> list[dict[str, Any]]:
-        """The objects seen now or earlier as plain values, for a record.
+        """Return the objects seen now or earlier as plain values, for a record.
 
-        Matrices and not quaternions: a replay has to find the same routes, to the last bit.
+        Rotations are stored as matrices, not quaternions: a replay must find the same routes, to the last bit.
         """
         return [_plain(object_seen) for object_seen in self.seen]
 
     def see(self, objects: Sequence[SeenObject]) -> Surroundings:
-        """With the objects that the camera sees; these surroundings themselves if none of them is new or has moved."""
+        """Return the surroundings after a picture; they are the same object if nothing is new or has moved."""
         held_name = "" if self.held is None else self.held.seen.object.name
         candidates = [object_seen for object_seen in objects if object_seen.object.name != held_name]
         changed = [object_seen for object_seen in candidates if self._has_moved(object_seen)]
@@ -146,9 +154,10 @@ class Surroundings:
         return self._renewed(_seen_objects=seen)
 
     def hold(self, seen: SeenObject, T_tip_object: pin.SE3, q: Vector) -> Surroundings:
-        """With an object in the gripper; what it touches at q, shape (dof,), it may until the two have parted.
+        """Return the surroundings with an object in the gripper.
 
-        How far they may overlap says `held`: a millimetre more than now.
+        Contacts of the object at q, shape (dof,), stay permitted until both bodies have separated, with at most a
+        millimetre more overlap than now; see `held`.
         """
         other_objects = {name: other for name, other in self._seen_objects.items() if name != seen.object.name}
         held_object = HeldObject(seen, T_tip_object, ())
@@ -163,7 +172,7 @@ class Surroundings:
         return self._renewed(held=held_object, _seen_objects=other_objects, _allowed_contacts={})
 
     def release(self, T_base_tip: pin.SE3) -> Surroundings:
-        """With what is held where it is for a pose of the tip."""
+        """Return the surroundings with the held object put down where it is at a pose of the tip."""
         held = self.held
         if held is None:
             return self
@@ -178,7 +187,10 @@ class Surroundings:
         )
 
     def settle(self, q: Vector) -> Surroundings:
-        """What is held may not touch again what it has parted from with an arm at q, shape (dof,)."""
+        """Return the surroundings after a reading of the arm at q, shape (dof,).
+
+        Bodies from which the held object has separated may not be touched again.
+        """
         held = self.held
         if held is None or not held.rests:
             return self
@@ -187,7 +199,7 @@ class Surroundings:
         return self if still_touching == held.rests else self._renewed(held=held._replace(rests=still_touching))
 
     def left_inside(self, q: Vector) -> str:
-        """What is held would be left deep inside something by an arm at q, shape (dof,), in words; "" if not."""
+        """Return, in words, inside which obstacle an arm at q, shape (dof,), leaves the held object; "" if none."""
         names = () if self.held is None else self.held.seen.object.solid_names
         obstacle_names = {obstacle.name for obstacle in self.world.scene.obstacles}
 
@@ -197,27 +209,28 @@ class Surroundings:
         return left_inside(deepest) if deepest is not None and deepest.too_deep else ""
 
     def held_solids(self, T_base_tip: pin.SE3) -> tuple[Obstacle, ...]:
-        """The solids of what is held, for a pose of the tip."""
+        """Return the solids of the held object at a pose of the tip."""
         held = self.held
         return () if held is None else replace(held.seen, T_base_object=T_base_tip * held.T_tip_object).solids()
 
     def holding(self, name: str) -> World:
-        """The world in which the gripper may touch an object."""
+        """Return the world in which the gripper may touch an object."""
         if name not in self._worlds_touching:
             grip = self._contacts_allowed(name)
             self._worlds_touching[name] = self.world_with((*grip.contacts, *self.rests), grip.buried)
         return self._worlds_touching[name]
 
     def not_compared(self, name: str) -> str:
-        """Which solids of an object are so deep in the gripper at a grasp that they are not compared; "" if none."""
+        """Return a note on the solids of an object that are not checked against the gripper; "" if all are."""
         solids = sorted({solid for _, solid in self._contacts_allowed(name).buried})
         return f" (the gripper is not compared with {', '.join(solids)})" if solids else ""
 
     def _contacts_allowed(self, name: str) -> MayTouch:
-        """What the gripper may touch of an object, and what it holds: no deeper than at one of the object's grasps.
+        """Return the permitted contacts with an object: no deeper than at one of its grasps, plus a tolerance.
 
-        What it holds may come a millimetre nearer than there. The gripper itself may be as far off as an object may
-        have moved before a route to it is withdrawn.
+        A held object may overlap a millimetre more. The gripper itself may in addition overlap by as much as an object
+        may have moved before a route to it is withdrawn. Pairs that exceed the deepest detectable contact are not
+        checked.
         """
         if name in self._allowed_contacts:
             return self._allowed_contacts[name]
@@ -240,7 +253,14 @@ class Surroundings:
         return self._allowed_contacts[name]
 
     def _nearness_at_grasps(self, name: str) -> dict[tuple[str, str], Nearness]:
-        """How near each part of the gripper, and of what it holds, comes to each solid of an object at its grasps."""
+        """Return the least distance of each part of the gripper to each solid of an object over all its grasps.
+
+        The gripper includes what it holds. The object is placed at the tip once for each grasp, and once at the
+        relative pose at which it was released last.
+
+        Returns:
+            By pair of part and solid; negative distances are penetration depths [m].
+        """
         seen = self._seen_objects[name]
         robot = self.given.robot
         attached = tuple(self._attached())
@@ -269,9 +289,10 @@ class Surroundings:
         return nearest
 
     def world_at(self, q: Vector, target: str | None) -> World:
-        """The world for an arm at q, shape (dof,): its gripper may touch the target if that alone is what it touches.
+        """Return the world for an arm at q, shape (dof,).
 
-        It got there by a route to a grasp, for no other motion may end in contact.
+        If the arm is in contact with the target alone, this is the world in which the gripper may touch it: the arm
+        came there by a route to a grasp, because no other motion may end in contact.
         """
         if target is None or target not in self._seen_objects or self.world.valid(q):
             return self.world
@@ -289,11 +310,11 @@ class Surroundings:
         return shift > MIN_SHIFT or turn > MIN_ROTATION or abs(margin_change) > MIN_SHIFT
 
     def world_with(self, contacts: Sequence[Touching], buried: Sequence[tuple[str, str]] = ()) -> World:
-        """The world of what is given, seen and held.
+        """Return the world of the problem with seen and held objects.
 
         Args:
             contacts: Pairs that may overlap, and how far.
-            buried: Pairs that are not compared.
+            buried: Pairs that are not checked.
         """
         given = self._fixed_scene()
         scene = scene_with(given, [solid for each in self._seen_objects.values() for solid in each.solids()])
@@ -302,17 +323,17 @@ class Surroundings:
         return self.given.with_accuracy("exact").with_scene(with_contacts(changed, contacts))
 
     def _renewed(self, **changes: Any) -> Surroundings:
-        """With changes, the world made of them, and none of those kept."""
+        """Return changed surroundings with a new world, and without results cached for the old one."""
         changed = replace(self, version=self.version + 1, _worlds_touching={}, **changes)
         return replace(changed, _world_with_objects=changed.world_with(changed.rests))
 
     @property
     def rests(self) -> tuple[Touching, ...]:
-        """How far what is held and what it has not parted from may overlap."""
+        """How far the held object may overlap with bodies from which it has not yet been separated."""
         return () if self.held is None else self.held.rests
 
     def _attached(self) -> list[AttachedObject]:
-        """What is held, as part of the arm; how far its place is uncertain adds to its margin."""
+        """Return the held object as a part of the arm; the uncertainty of its pose adds to its margin."""
         held = self.held
         robot = self.given.robot
         if held is None:
@@ -333,7 +354,7 @@ class Surroundings:
         ]
 
     def _fixed_scene(self) -> Scene:
-        """The problem's scene where the structure is seen; how far that is uncertain is the margin of its obstacles."""
+        """Return the problem's scene at the pose of the structure; the uncertainty of this pose adds to the margins."""
         given = self.given.scene
         structure = self.structure
 
@@ -365,7 +386,7 @@ def _margins(seen: SeenObject) -> list[float]:
 
 
 def gripper_links(robot: Robot) -> tuple[str, ...]:
-    """The links that the last joint before the tip carries, with all that hangs on them."""
+    """Return the names of the links carried by the last joint before the tip, including links of joints beyond it."""
     model: Any = robot.model
     last = model.frames[model.getFrameId(robot.tip)].parentJoint
 

@@ -1,7 +1,8 @@
-"""The two pictures of the page: the camera's, with the arm and the chosen grasp drawn in, and the view from outside.
+"""The two pictures of the page: the camera's with the arm and the chosen grasp drawn in, and the view from outside.
 
-Into the camera's picture come aids for the depth that it lacks: what is nearest, how far edges are from each other, the
-axes of insertion. Source: [1, ch. 6 and 4.6.2].
+The camera's picture gets aids for the depth that it lacks: the nearest pair, distances, and the axes of insertion.
+
+Source: [1, ch. 6 and 4.6.2].
 """
 
 from __future__ import annotations
@@ -28,7 +29,8 @@ from rrtik_ompl.sensing.cameras.camera import Camera
 LAMP_COLORS = {GREEN: "#1b9e3a", AMBER: "#e6a100", RED: "#c62828"}
 NEXT_MOVE = "#56b4e9"
 OUTLINE = "#ffffff"
-VIRTUAL_ARM = "#e4ebf5"  # the arm drawn over a picture: not to be taken for the real one
+# The colour of the drawn arm; it must not be mistaken for the real one.
+VIRTUAL_ARM = "#e4ebf5"
 VIRTUAL_OPACITY = 0.6
 SKY = 0.22  # brightness of the outside view's background, which lies beside a dark page
 TRAIL_POINTS = 60  # points of a trail
@@ -36,8 +38,8 @@ OUTSIDE_TRIANGLES = 8_000
 PRESETS = {"side": (90.0, 10.0), "top": (-90.0, 89.0), "behind": (180.0, 25.0), "corner": (125.0, 30.0)}  # degrees
 
 AXIS = 0.25  # length of the axes that are drawn [m]
-SHOWN = 0.15  # nearer pairs are drawn [m]
-NEAREST_SHOWN = 0.05  # from the camera [m]
+SHOWN = 0.15  # pairs nearer than this are drawn [m]
+NEAREST_SHOWN = 0.05  # least distance from the camera [m]
 
 # Colours: blue, green, red.
 WHITE = (255, 255, 255)
@@ -49,10 +51,10 @@ GRASP_AXIS = (80, 200, 60)
 
 
 class CameraView:
-    """The camera's picture with the virtual arm in it.
+    """The camera's picture with the virtual arm drawn in.
 
     Attributes:
-        aids: The distances that are drawn.
+        aids: The distances that are shown.
     """
 
     def __init__(self, camera: Camera, session: Session) -> None:
@@ -65,17 +67,17 @@ class CameraView:
     def draw(
         self, picture: NDArray[np.uint8], T_base_camera: pin.SE3, arm_in_picture: bool = False
     ) -> NDArray[np.uint8]:
-        """The augmented picture.
+        """Return the augmented picture, shape (height, width, 3), blue, green, red.
 
         Args:
-            picture: From the camera.
+            picture: Picture of the camera.
             T_base_camera: Pose of the camera.
-            arm_in_picture: The real arm is in the picture (or simulated there): the virtual one is then not drawn
-                over it, only its planned motion.
+            arm_in_picture: Whether the picture shows the real or simulated arm: then only the planned motion is drawn.
         """
         session = self._session
 
-        real = session.surroundings.world.scene.obstacles  # what is known hides the drawn arm, seen or given
+        # All known obstacles hide the drawn arm, whether they were seen or given.
+        real = session.surroundings.world.scene.obstacles
         drawn = self._arm.draw(
             picture, T_base_camera, None if arm_in_picture else session.q,
             ghosts=ghosts(session), real=real, trail=trail(session),
@@ -86,7 +88,7 @@ class CameraView:
 
 
 class OutsideView:
-    """The arm and its surroundings from a viewpoint that the pilot chooses."""
+    """The arm and its surroundings from a viewpoint chosen by the pilot."""
 
     def __init__(self, session: Session, width: int = 640, height: int = 480) -> None:
         """Begin with the view from a corner."""
@@ -100,21 +102,21 @@ class OutsideView:
         self.share: float | None = None  # of the route that is played, None to show the arm as it is
 
     def turn(self, right: float, up: float) -> None:
-        """Turn the view by angles [rad]."""
+        """Turn the view by two angles [rad]."""
         self.azimuth -= right
         self.elevation = float(np.clip(self.elevation + up, -1.5, 1.5533))
 
     def zoom(self, factor: float) -> None:
-        """Change the distance by a factor, below 1 to come nearer."""
+        """Multiply the distance by a factor; below 1 the view comes nearer."""
         self.distance = float(np.clip(self.distance * factor, 0.2, 50.0))
 
     def preset(self, name: str) -> None:
-        """View from the side, from above, from behind or from a corner; other names have no effect."""
+        """Look from one of the standard viewpoints; other names have no effect."""
         if name in PRESETS:
             self.azimuth, self.elevation = np.radians(PRESETS[name])
 
     def key(self) -> tuple[Hashable, ...]:
-        """Equal if the picture would be."""
+        """Return a key that is equal for equal pictures."""
         session = self._session
         shown = session.q.tobytes() if self.share is None else along(session, self.share).tobytes()
         moves = None if session.follower is None else (session.follower.path, session.follower.current)
@@ -122,7 +124,7 @@ class OutsideView:
         return shown, moves, chosen, self.distance, self.azimuth, self.elevation
 
     def draw(self) -> NDArray[np.uint8]:
-        """The picture. Shape (height, width, 3), blue, green, red."""
+        """Return the picture, shape (height, width, 3), blue, green, red."""
         session = self._session
         T_base_camera = orbit_pose(self.centre, self.distance, self.azimuth, self.elevation)
         configuration = session.q if self.share is None else along(session, self.share)
@@ -139,7 +141,7 @@ class OutsideView:
 
 
 def ghosts(session: Session) -> list[Ghost]:
-    """The chosen grasp in the colour of its lamp, or the next move of a route."""
+    """Return the end of the current move of a route, or the chosen grasp in the colour of its lamp."""
     if session.follower is not None and session.mode in (PROPOSED, FOLLOWING):
         return [Ghost(session.follower.target, NEXT_MOVE, 0.4, outline=OUTLINE)]
 
@@ -153,7 +155,7 @@ def ghosts(session: Session) -> list[Ghost]:
 
 
 def trail(session: Session) -> Matrix | None:
-    """Positions of the tip along the route, shape (k, 3), None without one."""
+    """Return positions of the tip along the route, shape (k, 3) [m]; None without a route."""
     if session.follower is None:
         return None
 
@@ -163,7 +165,7 @@ def trail(session: Session) -> Matrix | None:
 
 
 def along(session: Session, share: float) -> Vector:
-    """The configuration at a share of a route's travel. Shape (dof,)."""
+    """Return the configuration at a share of the route's travel, shape (dof,)."""
     if session.follower is None:
         return session.q
 
@@ -174,7 +176,7 @@ def along(session: Session, share: float) -> Vector:
 
 
 def _chosen(session: Session) -> list[pin.SE3]:
-    """``T_base_tip`` of the grasp that is chosen, in reach or not."""
+    """Return ``T_base_tip`` of the chosen grasp, reachable or not; an empty list if none is chosen."""
     target_seen = None if session.target is None else session.surroundings.named(session.target)
     if target_seen is None or session.state.choice is None:
         return []
@@ -189,11 +191,11 @@ def _objects(session: Session) -> Sequence[pin.SE3]:
 
 
 class Distances(NamedTuple):
-    """Of a posture.
+    """The least distances of a configuration.
 
     Attributes:
-        nearest: The link, or thing held, and the obstacle that are nearest to each other.
-        to_target: The same of the gripper, with what it holds, and the target.
+        nearest: The nearest pair of a link, or held object, and an obstacle; None if there is none.
+        to_target: The nearest pair of the gripper, or held object, and the target; None if there is none.
     """
 
     nearest: Contact | None
@@ -201,7 +203,7 @@ class Distances(NamedTuple):
 
 
 class Aids:
-    """Measures for a session, anew only when something has moved."""
+    """Measure the distances of a session; they are computed again only when something has moved."""
 
     def __init__(self, session: Session) -> None:
         self._session = session
@@ -209,7 +211,7 @@ class Aids:
         self._distances = Distances(None, None)
 
     def distances(self) -> Distances:
-        """Of the arm where it is."""
+        """Return the distances at the present configuration."""
         session = self._session
         surroundings = session.surroundings
         key = (session.q.tobytes(), surroundings.version, session.target)
@@ -242,7 +244,7 @@ class Aids:
         return self._distances
 
     def document(self) -> dict[str, Any]:
-        """The distances as plain values [mm]."""
+        """Return the distances as plain values [mm]."""
         return {name: _plain(contact) for name, contact in self.distances()._asdict().items()}
 
 
@@ -255,7 +257,18 @@ def _plain(contact: Contact | None) -> dict[str, Any] | None:
 def draw_aids(
     drawn: NDArray[np.uint8], camera: Camera, T_base_camera: pin.SE3, session: Session, distances: Distances
 ) -> None:
-    """The axis of the tool and that of the grasp, the line between them with its length, one straight down, the gap."""
+    """Draw the depth aids into a picture in place.
+
+    These are the nearest pair with its distance, the axes of the tool and of the chosen grasp, a vertical line from the
+    tip to the height of the goal, and the line from the tip to the goal with its length.
+
+    Args:
+        drawn: The picture, blue, green, red, shape (height, width, 3).
+        camera: Its camera.
+        T_base_camera: Pose of the camera.
+        session: The session.
+        distances: The least distances.
+    """
     view = _View(drawn, camera, T_base_camera)
     if distances.nearest is not None and 0.0 < distances.nearest.distance < SHOWN:
         nearest = distances.nearest
@@ -280,7 +293,7 @@ def draw_aids(
 
 
 class _View:
-    """A picture that lines are drawn into."""
+    """A picture into which lines in space are drawn."""
 
     def __init__(self, drawn: NDArray[np.uint8], camera: Camera, T_base_camera: pin.SE3) -> None:
         self._drawn = drawn
@@ -288,7 +301,7 @@ class _View:
         self._T = T_base_camera
 
     def line(self, begin: Vector, end: Vector, color: tuple[int, int, int], text: str = "") -> None:
-        """A line with a dark outline, and a text beside its middle; nothing if it comes behind the camera."""
+        """Draw a line in space with a dark outline and a text at its middle, unless it extends behind the camera."""
         points = np.stack([begin, end]) @ self._T.rotation - self._T.rotation.T @ self._T.translation
         if (points[:, 2] < NEAREST_SHOWN).any():
             return
@@ -301,7 +314,7 @@ class _View:
             self._write(text, ((a[0] + b[0]) // 2 - 30, (a[1] + b[1]) // 2 + 26))
 
     def _write(self, text: str, left_foot: tuple[int, int]) -> None:
-        """Light text on a dark plate: legible on any background."""
+        """Write light text on a dark plate, legible on any background."""
         font = (cv2.FONT_HERSHEY_SIMPLEX, 0.5, 1)
         x, y = left_foot
         (width, height), below = cv2.getTextSize(text, *font)

@@ -1,1 +1,1 @@
-"""Routes of single-joint moves to a grasp: how they are searched for, rated and followed."""
+"""Routes of single-joint moves to a grasp: search, rating, and following."""

@@ -1,7 +1,8 @@
-"""Configurations in front of an object from which few joints lead on to the grasp.
+"""Find configurations in front of an object from which moves of few joints lead to the grasp.
 
-The pose before a grasp is reached only roughly: what counts is that the gripper is clear of the object and in front of
-it. That leaves configurations which differ from the grasp in two or three joints, where the exact pose would take all.
+The pose before a grasp has to be reached only roughly: it suffices that the gripper is clear of the object and in front
+of it. This tolerance allows configurations that differ from the grasp in two or three joints, whereas the exact pose
+would require all joints to move.
 """
 
 from __future__ import annotations
@@ -17,30 +18,33 @@ from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.pilot.routes.follower import slack
 from rrtik_ompl.world.world import World
 
-MAX_JOINTS = 3  # that move between such a configuration and the grasp
+MAX_JOINTS = 3  # largest number of joints that move between such a configuration and the grasp
 MAX_OFFSET = 0.02  # [m] from the pose before the object
-MAX_TILT = np.deg2rad(20.0)  # from its orientation
-STANDOFF_FACTORS = (1.0, 1.5, 2.0)  # distances from the object that are tried, over that of the pose before it
-ITERATIONS = 8  # of the search for such configurations
-DAMPING = 1e-4  # of it [m^2]
-ERROR_SAMPLES = 40  # small errors that measure the clearance of a beginning
+MAX_TILT = np.deg2rad(20.0)  # largest angle from the orientation of that pose
+STANDOFF_FACTORS = (1.0, 1.5, 2.0)  # distances from the grasp that are tried, as multiples of that of the approach pose
+ITERATIONS = 8  # of the inverse kinematics for such configurations
+DAMPING = 1e-4  # damping of its least-squares steps [m^2]
+ERROR_SAMPLES = 40  # random errors by which the robustness of such a configuration is measured
 
 
 def approaches(
     world: World, holding: World, grasp: Vector, stages: tuple[pin.SE3, pin.SE3, pin.SE3], max_count: int
 ) -> list[list[Matrix]]:
-    """Last parts of routes, grouped by where they begin; first where small errors do no harm, then of few joints.
+    """Return the last parts of routes, grouped by their first configuration.
+
+    Each part moves the joints in which the first configuration differs from the grasp, one after the other; all orders
+    that are free are returned. The groups are sorted: first those robust to small errors, then those with few joints.
 
     Args:
-        world: In which nothing may be touched: every part begins free in it.
-        holding: In which the gripper may touch the object: every part is free in it.
+        world: World in which nothing may be touched: the first configuration is free in it.
+        holding: World in which the gripper may touch the object: every move is free in it.
         grasp: The configuration that holds the object, shape (dof,).
         stages: ``T_base_tip`` of approach, grasp and lift.
-        max_count: Number of beginnings at most.
+        max_count: Largest number of groups.
 
     Returns:
-        For each beginning the orders of its joints that are free, shape (moves + 1, dof) each; the last row is the
-        grasp.
+        One list for each first configuration, with the free orders of its joints as waypoints, shape (moves + 1, dof)
+        each; the last row is the grasp.
     """
     parts_by_beginning = []
     for begin in _beginnings(world, grasp, stages):
@@ -54,7 +58,7 @@ def approaches(
 
 
 def _in_order(begin: Vector, end: Vector, order: tuple[int, ...]) -> Matrix:
-    """From one configuration to another, joint by joint. Shape (moves + 1, dof)."""
+    """Return the waypoints from one configuration to another, one joint at a time, shape (moves + 1, dof)."""
     rows = np.tile(begin, (len(order) + 1, 1))
     for number, joint in enumerate(order, start=1):
         rows[number:, joint] = end[joint]
@@ -62,7 +66,16 @@ def _in_order(begin: Vector, end: Vector, order: tuple[int, ...]) -> Matrix:
 
 
 def _beginnings(world: World, grasp: Vector, stages: tuple[pin.SE3, pin.SE3, pin.SE3]) -> Matrix:
-    """Free configurations before the object that differ from the grasp in few joints, best first. Shape (k, dof)."""
+    """Return free configurations in front of the object that differ from the grasp in few joints, best first.
+
+    For every choice of at most `MAX_JOINTS` joints and every standoff, inverse kinematics moves those joints until the
+    tip is near the place in front of the object. Results with the right position and orientation that are free are
+    sorted by robustness to small errors, then by the number of joints that differ, then by the deviation of the
+    orientation.
+
+    Returns:
+        Shape (k, dof).
+    """
     joints = range(world.robot.dof)
     joint_choices = [
         np.isin(joints, moving_joints)
@@ -76,7 +89,8 @@ def _beginnings(world: World, grasp: Vector, stages: tuple[pin.SE3, pin.SE3, pin
 
     small_errors = slack(JointPath.of(world.robot, grasp[None]))
     rows = _moved_to_places(world.robot, grasp, np.tile(joint_choices, (len(STANDOFF_FACTORS), 1)), places)
-    rows = np.where(np.abs(rows - grasp) <= small_errors, grasp, rows)  # no move for a difference too small to notice
+    # Differences below the tolerance of following a route need no move.
+    rows = np.where(np.abs(rows - grasp) <= small_errors, grasp, rows)
 
     _, distinct_rows = np.unique(rows, axis=0, return_index=True)
     rows = rows[distinct_rows]
@@ -96,9 +110,16 @@ def _beginnings(world: World, grasp: Vector, stages: tuple[pin.SE3, pin.SE3, pin
 
 
 def _moved_to_places(robot: Robot, grasp: Vector, chosen: Mask, places: Matrix) -> Matrix:
-    """For each choice of joints, shape (m, dof), the grasp with those moved until the tip is near its place, (m, 3).
+    """Move chosen joints until the tip is near given places, by damped least squares on the position.
 
-    By damped least squares. Shape (m, dof).
+    Args:
+        robot: The arm.
+        grasp: The configuration from which all rows start, shape (dof,).
+        chosen: Which joints move in each row, shape (m, dof).
+        places: Desired position of the tip in the base frame for each row, shape (m, 3) [m].
+
+    Returns:
+        Configurations within the limits, shape (m, dof).
     """
     rows = np.tile(grasp, (len(chosen), 1))
     for _ in range(ITERATIONS):
@@ -111,7 +132,7 @@ def _moved_to_places(robot: Robot, grasp: Vector, chosen: Mask, places: Matrix) 
 
 
 def _touching(world: World, rows: Matrix, small_errors: Vector) -> Vector:
-    """Tenths of small errors that make a configuration touch something. Shape (m,)."""
+    """Return the share of small errors that bring each configuration into contact, in tenths, rounded, shape (m,)."""
     errors = np.random.default_rng(0).uniform(-small_errors, small_errors, (ERROR_SAMPLES, len(small_errors)))
     perturbed = world.robot.clamp((rows[:, None] + errors).reshape(-1, len(small_errors)))
     tenths: Vector = np.rint(10.0 * (1.0 - world.valid_batch(perturbed).reshape(len(rows), ERROR_SAMPLES).mean(axis=1)))

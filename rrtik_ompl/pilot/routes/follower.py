@@ -1,7 +1,7 @@
-"""Where the arm is on its route, what remains of it, when to stop, and when the arm is off it.
+"""Determine where the arm is on its route, what remains of it, when to stop, and when the arm has left it.
 
-A `Follower` tracks it along a list of single-joint moves, a `Track` along a path of all joints at once, for an arm
-under position control. Both are asked the same. Source: [1, ch. 6] (flow chart; comparison of the two).
+A `Follower` tracks the arm along a list of single-joint moves. A `Track` does so along a path of all joints at once,
+for an arm under position control. Both have the same interface. Source: [1, ch. 6] (flow chart; comparison of the two).
 """
 
 from __future__ import annotations
@@ -18,24 +18,25 @@ from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.transitions import Move
 from rrtik_ompl.world.world import World
 
-MADE = np.deg2rad(0.005)  # [rad or m]; a move is made this close to its end: the tip of an arm of 2 m is 0.2 mm off
-TOLERANCE = np.deg2rad(1.0)  # [rad]; farther from its value a joint is off the route
+# [rad or m]; a move is completed this close to its end: the tip of an arm of 2 m is then off by 0.2 mm.
+MADE = np.deg2rad(0.005)
+TOLERANCE = np.deg2rad(1.0)  # [rad]; a joint that is farther from its planned value is off the route
 SLIDING_TOLERANCE = 0.002  # [m]
-REACTION_SECONDS = 0.3  # from the advice to stop until the pilot does
-AHEAD_SECONDS = 0.5  # within which an arm that moves all joints is looked for on its path
-PLACES = 51  # at which it is looked for
+REACTION_SECONDS = 0.3  # reaction time of the pilot to the advice to stop
+AHEAD_SECONDS = 0.5  # how far ahead on its path an arm that moves all joints is searched for
+PLACES = 51  # number of points of the path that are compared
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Progress:
-    """Where the arm is on its route.
+    """The place of the arm on its route.
 
     Attributes:
-        move: Number of the current move, from 0; as many as there are moves when all is done.
-        share: Of the current move that is done, 0 to 1.
-        remaining: To the current move's end, with its sign [rad or m].
-        advice: "move", "stop" (now, for the pilot needs time to react), "done" or "lost".
-        fault: If lost: which joint is off its value and by how much.
+        move: Number of the current move, from 0; the number of moves when all is done.
+        share: Share of the current move that is done, from 0 to 1.
+        remaining: Signed distance to the end of the current move [rad or m].
+        advice: "move", "stop" (now, because the pilot needs time to react), "done" or "lost".
+        fault: If lost: which joint deviates from its planned value, and by how much.
     """
 
     move: int
@@ -47,13 +48,13 @@ class Progress:
 
 @dataclass(frozen=True, eq=False)
 class Follower:
-    """Tracks an arm along a path of single-joint moves, as a value: `update` gives the next one.
+    """Track an arm along a path of single-joint moves. The follower is immutable: `update` returns the next one.
 
     Attributes:
-        path: The path, of one joint at a time.
-        rates: Of the joints when they are driven, shape (dof,) [rad/s or m/s].
-        tolerance: Largest error of a joint [rad].
-        current: Number of the move that is due, from 0.
+        path: The path; every motion changes one joint.
+        rates: Rates of the joints when they are driven, shape (dof,) [rad/s or m/s].
+        tolerance: Largest error of a revolute joint [rad].
+        current: Number of the current move, from 0.
     """
 
     path: JointPath
@@ -63,17 +64,17 @@ class Follower:
 
     @cached_property
     def moves(self) -> tuple[Move, ...]:
-        """Of single joints, in their order."""
+        """The moves of single joints, in order."""
         return self.path.moves()
 
     @cached_property
     def slack(self) -> Vector:
-        """How far each joint may be off the route, shape (dof,) [rad or m]."""
+        """How far each joint may deviate from the route, shape (dof,) [rad or m]."""
         return slack(self.path, self.tolerance)
 
     @cached_property
     def _corners(self) -> Matrix:
-        """Configurations before and after each move. Shape (moves + 1, dof)."""
+        """The configurations before and after each move, shape (moves + 1, dof)."""
         rows = [np.array(self.path.start)]
         for move in self.moves:
             row = rows[-1].copy()
@@ -83,20 +84,27 @@ class Follower:
 
     @property
     def done(self) -> bool:
-        """Whether the last move is made."""
+        """Whether the last move is completed."""
         return self.current == len(self.moves)
 
     @property
     def target(self) -> Vector:
-        """Configuration after the current move. Shape (dof,)."""
+        """The configuration after the current move, shape (dof,)."""
         return np.array(self._corners[min(self.current + 1, len(self.moves))])
 
     def joint(self) -> int | None:
-        """Number of the joint that the current move turns; None when all is done."""
+        """Return the number of the joint that the current move changes; None when all is done."""
         return None if self.done else self.path.joint_names.index(self.moves[self.current].joint)
 
     def update(self, q: Vector) -> tuple[Follower, Progress]:
-        """The follower with the move that is due for an arm at q, and the arm's progress."""
+        """Compare an arm at q with the route, and advance over all moves that are completed there.
+
+        The arm is on the route if the joint of the current move is within its range, and all others are at their
+        planned values, each up to the tolerance.
+
+        Returns:
+            The follower with the move that is current now, and the progress of the arm.
+        """
         joint = self.joint()
         if joint is None:
             lost = self._lost(q, self._corners[-1], None)
@@ -109,7 +117,8 @@ class Follower:
             return self, lost
 
         remaining = float(end - q[joint])
-        if abs(remaining) <= min(MADE, 0.5 * abs(end - begin)):  # a short move has to be made, too
+        # A move shorter than the usual tolerance must not count as completed before it begins.
+        if abs(remaining) <= min(MADE, 0.5 * abs(end - begin)):
             return replace(self, current=self.current + 1).update(q)
 
         is_on_move = min(begin, end) - self.slack[joint] <= q[joint] <= max(begin, end) + self.slack[joint]
@@ -121,13 +130,13 @@ class Follower:
         return self, Progress(self.current, share, remaining, "stop" if is_ending else "move")
 
     def pass_on(self, q: Vector) -> tuple[Follower, str, str]:
-        """Take the current move for made although its end is not reached.
+        """Treat the current move as completed although its end is not reached.
 
         Returns:
-            The follower with the next move, the joint of this one, and what is left of it in words.
+            The follower with the next move, the name of the joint of this one, and the remaining distance in words.
 
         Raises:
-            InputError: If more than the tolerance of the route is left, or no move is due.
+            InputError: If more than the tolerance of the route remains, or there is no current move.
         """
         joint = self.joint()
         if joint is None:
@@ -141,12 +150,12 @@ class Follower:
         return replace(self, current=self.current + 1), name, f"{shown:.2g} {unit}"
 
     def rest(self, q: Vector) -> JointPath:
-        """The remaining moves from q as they will be made: each for its joint alone, all others stay as they are."""
+        """Return the remaining moves from q as they will be made: each changes only its joint, all others stay."""
         return self._from(q, [(move.joint, move.end) for move in self.moves[self.current :]])
 
     def back(self, q: Vector) -> JointPath:
-        """The path back to the beginning: the moves that were made, reversed, each for its joint alone."""
-        moves_made = self.moves[: self.current + 1]  # the current one is under way
+        """Return the path back to the start: the moves made so far, reversed, each of one joint."""
+        moves_made = self.moves[: self.current + 1]  # includes the current move, which has begun
         return self._from(q, [(move.joint, move.start) for move in moves_made[::-1]])
 
     def _from(self, q: Vector, ends: list[tuple[str, float]]) -> JointPath:
@@ -177,14 +186,14 @@ class Follower:
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """Tracks an arm along a path, as a value: `update` gives the next one.
+    """Track an arm along a path of all joints. The track is immutable: `update` returns the next one.
 
     Attributes:
         path: The path.
-        rates: Of the joints when they are driven, shape (dof,) [rad/s or m/s].
-        tolerance: Largest error of a joint [rad].
+        rates: Rates of the joints when they are driven, shape (dof,) [rad/s or m/s].
+        tolerance: Largest error of a revolute joint [rad].
         current: 0 until the end is reached, then 1.
-        at: Where on the path the arm is, in seconds from its start.
+        at: Place of the arm on the path, as time from its start [s].
     """
 
     path: JointPath
@@ -195,23 +204,23 @@ class Track:
 
     @property
     def moves(self) -> tuple[Move, ...]:
-        """None: it has no moves of single joints."""
+        """Always empty: there are no moves of single joints."""
         return ()
 
     @cached_property
     def slack(self) -> Vector:
-        """How far each joint may be off the path, shape (dof,) [rad or m]."""
+        """How far each joint may deviate from the path, shape (dof,) [rad or m]."""
         return slack(self.path, self.tolerance)
 
     @cached_property
     def _times(self) -> Vector:
-        """When the arm is at each waypoint if the slowest joint of each piece goes at its rate."""
+        """The time at each waypoint [s], shape (k,), if the slowest joint of each piece moves at its rate."""
         times = (np.abs(np.diff(self.path.waypoints, axis=0)) / self.rates).max(axis=1)
         return np.concatenate([[0.0], np.cumsum(times)])
 
     @property
     def seconds(self) -> float:
-        """That the whole path takes."""
+        """The duration of the whole path [s]."""
         return float(self._times[-1])
 
     @property
@@ -221,15 +230,20 @@ class Track:
 
     @property
     def target(self) -> Vector:
-        """Where it ends. Shape (dof,)."""
+        """The end of the path, shape (dof,)."""
         return self.path.end
 
     def joint(self) -> int | None:
-        """None: no single joint is due."""
+        """Return None: there is no current joint."""
         return None
 
     def update(self, q: Vector) -> tuple[Track, Progress]:
-        """The track with the place that an arm at q has reached, and the arm's progress."""
+        """Find the place of an arm at q on the next `AHEAD_SECONDS` of the path.
+
+        Returns:
+            The track with this place, and the progress of the arm; "lost" if the arm deviates there by more than the
+            tolerance.
+        """
         places = np.linspace(self.at, min(self.at + AHEAD_SECONDS, self.seconds), PLACES)
         errors = np.abs(np.array([self._place(seconds) for seconds in places]) - q) / self.slack
 
@@ -244,11 +258,11 @@ class Track:
         return advanced, Progress(0, advanced.share, advanced.seconds - advanced.at, "move")
 
     def ahead(self, seconds: float) -> Vector:
-        """The place on the path that is so much ahead of the arm. Shape (dof,)."""
+        """Return the configuration on the path that is a given time ahead of the arm, shape (dof,)."""
         return self._place(min(self.at + seconds, self.seconds))
 
     def pass_on(self, q: Vector) -> tuple[Track, str, str]:
-        """There is no move that could be passed over.
+        """Refuse, because there is no move that could be passed over.
 
         Raises:
             InputError: Always.
@@ -256,14 +270,14 @@ class Track:
         raise InputError("no move is due")
 
     def rest(self, q: Vector) -> JointPath:
-        """What remains, from q."""
+        """Return the remaining path from q."""
         waypoints_ahead = self.path.waypoints[np.searchsorted(self._times, self.at, side="right") :]
         return self.path.with_waypoints(
             np.vstack([q, waypoints_ahead if len(waypoints_ahead) else self.path.end[None]])
         )
 
     def back(self, q: Vector) -> JointPath:
-        """The path back to the beginning."""
+        """Return the path from q back to the start."""
         waypoints_behind = self.path.waypoints[: np.searchsorted(self._times, self.at, side="right")]
         return self.path.with_waypoints(np.vstack([q, waypoints_behind[::-1]]))
 
@@ -272,7 +286,7 @@ class Track:
 
     @property
     def share(self) -> float:
-        """Of the path that is behind the arm, 0 to 1."""
+        """The share of the path that is behind the arm, from 0 to 1."""
         return self.at / self.seconds if self.seconds > 0.0 else 1.0
 
     def _fault(self, q: Vector, joint: int) -> str:
@@ -284,11 +298,11 @@ class Track:
 
 
 def slack(path: JointPath, tolerance: float = TOLERANCE) -> Vector:
-    """Largest error of each joint [rad or m]. Shape (dof,)."""
+    """Return the largest permitted error of each joint, shape (dof,) [rad or m]."""
     return np.where(path.prismatic, SLIDING_TOLERANCE, tolerance)
 
 
 def path_fault(world: World, path: JointPath) -> str:
-    """Why a path is not free any more; "" if it is."""
+    """Return why a path is no longer free; "" if it is."""
     faults = path.violations(world)
     return faults[0].reason if faults else ""

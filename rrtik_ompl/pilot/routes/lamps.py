@@ -1,8 +1,8 @@
-"""A lamp for every grasp type and level of an object: can the arm get there, hold it and lift it?
+"""Compute a lamp for every grasp type and level of an object: can the arm reach it, hold it and lift it?
 
-Green: the grasp is in reach, inside the limits and free, the arm gets to it from before the object, and can lift it.
-Amber: the grasp is in reach, but something is in the way of it, of the approach or of the lift. Red: the grasp is out
-of reach: no route leads there. Source: [1, ch. 6]; here the whole sequence of approach, grasp and lift counts.
+Green: the grasp is reachable, within the limits and free, the arm gets to it from in front of the object, and can lift
+it. Amber: the grasp is reachable, but something blocks it, the approach or the lift. Red: the grasp is out of reach, so
+that no route leads there. Source: [1, ch. 6]; here the whole sequence of approach, grasp and lift counts.
 """
 
 from __future__ import annotations
@@ -33,13 +33,13 @@ AMBER: Final = "amber"
 RED: Final = "red"
 LIMITS = "joint limits"
 UNREACHABLE = "out of reach"
-NUMERIC_SECONDS = 0.01  # for a pose, where the arm has no closed form
-DIAGNOSIS_SECONDS = 0.02  # for the reason why one grasp cannot be made
+NUMERIC_SECONDS = 0.01  # time limit for a pose if the arm has no closed-form inverse kinematics
+DIAGNOSIS_SECONDS = 0.02  # time limit for finding the reason why a grasp cannot be made
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Lamp:
-    """What the arm can do with one grasp.
+    """The feasibility of one grasp.
 
     Attributes:
         type: Name of the grasp type.
@@ -47,8 +47,8 @@ class Lamp:
         color: "green", "amber" or "red".
         stage: The stage that fails; None if green.
         reason: Which stage fails and why; "" if green.
-        q: Configurations of approach, grasp and lift, NaN where there is none. Shape (3, dof).
-        grasps: All configurations of the grasp that are found, inside the limits and free. Shape (k, dof).
+        q: Configurations of approach, grasp and lift, shape (3, dof); rows of NaN where there is none.
+        grasps: All configurations found for the grasp that are within the limits and free, shape (k, dof).
     """
 
     type: str
@@ -61,7 +61,10 @@ class Lamp:
 
 
 def stage_poses(T_base_object: pin.SE3, grasp: GraspType, level: int) -> tuple[pin.SE3, pin.SE3, pin.SE3]:
-    """``T_base_tip`` of approach, grasp and lift."""
+    """Return ``T_base_tip`` of approach, grasp and lift.
+
+    The approach is before the grasp along the tool's z axis, the lift is above it along the z axis of the base.
+    """
     grasp_pose = T_base_object * grasp.levels[level]
     approach_pose = grasp_pose.copy()
     lift_pose = grasp_pose.copy()
@@ -80,15 +83,19 @@ def lamps(
     holding: World,
     seconds: float = NUMERIC_SECONDS,
 ) -> tuple[Lamp, ...]:
-    """The lamps of all types and levels of an object where it is now.
+    """Return the lamps of all grasp types and levels of an object at its present pose.
+
+    The configurations of all stages are computed as one batch and checked for collisions, each stage in its own world.
+    A grasp whose exact approach pose is blocked is still green if a few joints lead to it from nearby. If the arm is in
+    contact at present, green lamps become amber.
 
     Args:
-        world: For the approach: everything that must not be touched, the object too.
-        thing: What is to be grasped.
-        T_base_object: Where it is.
-        near: Where the arm is, shape (dof,); the nearest configurations are wanted.
-        holding: For grasp and lift: the same world in which the gripper may touch the object.
-        seconds: For each pose, where the arm has no closed form [s].
+        world: World of the approach: nothing may be touched, including the object.
+        thing: The object.
+        T_base_object: Its pose.
+        near: Present configuration, shape (dof,); configurations near to it are preferred.
+        holding: World of grasp and lift: the same, but the gripper may touch the object.
+        seconds: Time limit for each pose if the arm has no closed form [s].
     """
     grasps_and_levels = [(grasp, level) for grasp in thing.grasps for level in range(len(grasp.levels))]
     if not grasps_and_levels:
@@ -124,22 +131,22 @@ def lamps(
 
 
 def _approached(world: World, holding: World, grasp: Vector, stages: tuple[pin.SE3, pin.SE3, pin.SE3]) -> bool:
-    """Whether a few joints lead to a grasp from about the pose before the object, as a route would."""
+    """Check whether moves of a few joints lead to a grasp from near the approach pose, as on a route."""
     return bool(approaches(world, holding, grasp, stages, max_count=1))
 
 
 def diagnose(
     lamp: Lamp, thing: MarkedObject, T_base_object: pin.SE3, near: Vector, world: World, holding: World
 ) -> str:
-    """Which stage of a grasp fails, and by how much it is out of reach or what would touch; "" for a green lamp.
+    """Return which stage of a grasp fails, and how far it is out of reach or what would touch; "" for a green lamp.
 
     Args:
-        lamp: Of the grasp.
-        thing: What is to be grasped.
-        T_base_object: Where it is.
-        near: Posture near which the arm would be, shape (dof,).
-        world: For the approach.
-        holding: For grasp and lift.
+        lamp: Lamp of the grasp.
+        thing: The object.
+        T_base_object: Its pose.
+        near: Configuration near which a solution is searched, shape (dof,).
+        world: World of the approach.
+        holding: World of grasp and lift.
     """
     if lamp.stage is None:
         return ""
@@ -153,7 +160,12 @@ def diagnose(
 def _postures(
     robot: Robot, poses: NDArray[np.float64], near: Vector, seconds: float
 ) -> tuple[NDArray[np.float64], list[str]]:
-    """For each pose the postures inside the limits, NaN for the others, shape (m, b, dof); and why there is none."""
+    """Solve inverse kinematics for m poses.
+
+    Returns:
+        Configurations within the limits, shape (m, b, dof) for b branches, rows of NaN where there is none, and for
+        each pose the reason if there is none, "" otherwise.
+    """
     if chosen_method(robot, (PoseGoal(poses[0]),), "auto") == "closed-form":
         closed_form = solutions(robot, poses, near=near, check=False)
         postures = np.where(closed_form.valid[..., None], closed_form.branches, np.nan)
@@ -164,7 +176,15 @@ def _postures(
 
 
 def _free(postures: NDArray[np.float64], worlds: tuple[World, ...]) -> NDArray[np.bool_]:
-    """Which postures exist and touch nothing, each stage in its own world. Shape (m, stages, b)."""
+    """Check which postures exist and are free of collisions, each stage in its own world.
+
+    Args:
+        postures: Shape (m, stages, b, dof), rows of NaN where there is none.
+        worlds: The world of each stage.
+
+    Returns:
+        Shape (m, stages, b).
+    """
     free = ~np.isnan(postures[..., 0])
     for world in dict.fromkeys(worlds):
         stages = [k for k, stage_world in enumerate(worlds) if stage_world is world]
@@ -175,7 +195,17 @@ def _free(postures: NDArray[np.float64], worlds: tuple[World, ...]) -> NDArray[n
 
 
 def _nearest(robot: Robot, postures: NDArray[np.float64], free: NDArray[np.bool_], near: Vector) -> NDArray[np.float64]:
-    """Of the free postures of each stage the nearest one, NaN where there is none. Shape (m, stages, dof)."""
+    """Select the free posture of each stage that is nearest to a configuration.
+
+    Args:
+        robot: The arm.
+        postures: Shape (m, stages, b, dof).
+        free: Which of them are free, shape (m, stages, b).
+        near: The configuration, shape (dof,).
+
+    Returns:
+        Shape (m, stages, dof), rows of NaN where no posture is free.
+    """
     distances = np.linalg.norm(joint_difference(robot, postures, near), axis=-1)
 
     best = np.argmin(np.where(free, distances, np.inf), axis=2)
@@ -185,7 +215,15 @@ def _nearest(robot: Robot, postures: NDArray[np.float64], free: NDArray[np.bool_
 
 
 def _color(reasons: list[str], has_free_posture: NDArray[np.bool_]) -> tuple[Color, Stage | None, str]:
-    """Color, the first stage that fails and why; reasons why stages are out of reach, and which stages are free."""
+    """Determine the colour of a lamp.
+
+    Args:
+        reasons: For each stage, why inverse kinematics has no solution; "" if it has one.
+        has_free_posture: Which stages have a free posture, shape (3,).
+
+    Returns:
+        The colour, the first stage that fails (None if green), and why it fails.
+    """
     if reasons[1]:
         return RED, STAGES[1], reasons[1]
 

@@ -1,4 +1,4 @@
-"""Assisted manoeuvre: moves of one joint are checked before they are made, and refused if they are not free.
+"""Assisted manoeuvre: check moves of one joint before they are made, and refuse those that are not free.
 
 Source: [1, ch. 6].
 """
@@ -19,12 +19,14 @@ from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.pilot.routes.follower import slack
 from rrtik_ompl.world.world import World
 
-SINGULARITY_THRESHOLD = 0.05  # sine of an angle, or metres of a lever arm, that vanish in a singular posture
-CLEARANCE_WARNING = 0.02  # [m]; a smaller clearance is warned of
-CLEARANCE_SAMPLES = 20  # along a move
-CLEARANCE_ERROR = 0.002  # [m]; the least distance that is found is at most this much too large
-SINGULARITY_SAMPLES = 60  # along the range of a joint
-ESCAPE_STEPS = (1, 2, 3, 4, 6, 8)  # multiples of a small error, by which a joint is driven to get out of contact
+# Threshold on the quantities that vanish in a singular posture: sines of angles, or lever arms [m].
+SINGULARITY_THRESHOLD = 0.05
+CLEARANCE_WARNING = 0.02  # [m]; smaller clearances cause a warning
+CLEARANCE_SAMPLES = 20  # configurations along a move whose clearance is measured
+CLEARANCE_ERROR = 0.002  # [m]; largest error of the least distance found
+SINGULARITY_SAMPLES = 60  # configurations along the range of a joint
+# Steps, in multiples of the joint's tolerance, that are tried to get out of contact.
+ESCAPE_STEPS = (1, 2, 3, 4, 6, 8)
 
 
 Stretch = tuple[float, float, str]  # from, to [rad or m], name of the singular case
@@ -32,14 +34,14 @@ Stretch = tuple[float, float, str]  # from, to [rad or m], name of the singular 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointRange:
-    """How far one joint can be driven while the others stand still.
+    """The free range of one joint while the others stand still.
 
     Attributes:
-        low: The least value [rad or m].
-        high: The largest value.
+        low: Least value [rad or m].
+        high: Largest value [rad or m].
         below: What ends the range at ``low``: "limit", "full turn" or the pair that touches.
         above: What ends the range at ``high``.
-        singular: Stretches in between on which the arm is near a singular posture; its name is "" if it has none.
+        singular: Intervals within the range in which the arm is near a singular posture, with its name ("" if unnamed).
     """
 
     low: float
@@ -51,13 +53,13 @@ class JointRange:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MoveCheck:
-    """The check of a move.
+    """The result of checking a move.
 
     Attributes:
-        allowed: Whether it may be made.
+        allowed: Whether the move may be made.
         reason: Why not: the limit, or the pair that would touch and where; "" if it may.
-        warnings: Small clearance, singular postures, a move that is only checked in steps.
-        clearance: The least distance to anything along the move, at some samples [m]; -inf if it collides.
+        warnings: Small clearance, singular postures, a move that is not proven free between the steps checked.
+        clearance: Least distance to anything at samples along the move [m]; -inf if it collides, inf if nothing can.
     """
 
     allowed: bool
@@ -69,11 +71,14 @@ class MoveCheck:
 def check_move(world: World, q: Vector, joint: int, target: float) -> MoveCheck:
     """Check a move of one joint.
 
+    The move must respect the limits and be free of collisions. An arm that is in contact may only move out of it. A
+    free move is also checked for small clearance, singular postures, and whether continuous freedom is proven.
+
     Args:
         world: Robot and surroundings.
-        q: Where the arm is, shape (dof,).
+        q: Present configuration, shape (dof,).
         joint: Number of the joint.
-        target: Where it is to go [rad or m].
+        target: Value at its end [rad or m].
     """
     robot = world.robot
     end = q.copy()
@@ -103,9 +108,9 @@ def check_move(world: World, q: Vector, joint: int, target: float) -> MoveCheck:
 
 
 def free_until(world: World, q: Vector, joint: int, target: float) -> float:
-    """How far towards a target a joint can go without touching anything or leaving its limits [rad or m].
+    """Return how far towards a target a joint can move without contact and within its limits [rad or m].
 
-    By bisection; the arm must be free at q.
+    The end is found by bisection; the arm must be free at q.
     """
     robot = world.robot
     end = q.copy()
@@ -126,7 +131,7 @@ def free_until(world: World, q: Vector, joint: int, target: float) -> float:
 
 
 def move_refusal(world: World, q: Vector, joint: int, target: float, check: MoveCheck) -> str:
-    """Why a move is refused, in one line, and how far the joint is free."""
+    """Return why a move is refused, and how far the joint is free, in one line."""
     if not world.valid(q):
         return f"refused: {check.reason}"
 
@@ -135,10 +140,16 @@ def move_refusal(world: World, q: Vector, joint: int, target: float, check: Move
 
 
 def way_out(world: World, q: Vector, joint: int, sign: float) -> float:
-    """Where a joint that is driven one way gets an arm that touches something free [rad or m].
+    """Return the nearest value of a joint, in one direction, at which an arm in contact is free [rad or m].
+
+    Args:
+        world: Robot and surroundings.
+        q: Present configuration, shape (dof,).
+        joint: Number of the joint.
+        sign: Direction, 1 or -1.
 
     Raises:
-        InputError: If it does not.
+        InputError: If none of the `ESCAPE_STEPS` frees the arm.
     """
     small_error = float(slack(JointPath.of(world.robot, q[None]))[joint])
     check = None
@@ -151,7 +162,10 @@ def way_out(world: World, q: Vector, joint: int, sign: float) -> float:
 
 
 def joint_range(world: World, q: Vector, joint: int) -> JointRange:
-    """How far a joint can be driven; nowhere if the arm touches something, a full turn if it is endless and free."""
+    """Return the free range of a joint.
+
+    The range is empty if the arm is in contact, and a full turn if the joint is endless and free.
+    """
     robot = world.robot
     value = float(q[joint])
     if not world.valid(q):
@@ -163,7 +177,18 @@ def joint_range(world: World, q: Vector, joint: int) -> JointRange:
 
 
 def _reach(world: World, q: Vector, joint: int, limit: float, turn: float) -> tuple[float, str]:
-    """How far a joint goes towards its limit, or round once, and what ends it: that, or the pair that touches."""
+    """Return how far a joint can move in one direction, and what ends its range.
+
+    Args:
+        world: Robot and surroundings.
+        q: Present configuration, shape (dof,).
+        joint: Number of the joint.
+        limit: Limit of the joint in this direction; infinite if it has none.
+        turn: Value after a full turn in this direction, used if there is no limit.
+
+    Returns:
+        The last free value [rad or m], and "limit", "full turn" or the pair that touches.
+    """
     end, end_name = (limit, "limit") if np.isfinite(limit) else (turn, "full turn")
     reached = free_until(world, q, joint, end)
     if reached == end:
@@ -178,7 +203,7 @@ def _reach(world: World, q: Vector, joint: int, limit: float, turn: float) -> tu
 
 
 def _singular_stretches(robot: Robot, q: Vector, joint: int, low: float, high: float) -> tuple[Stretch, ...]:
-    """Where along the range of a joint the arm is near a singular posture."""
+    """Return the intervals in the range of a joint in which the arm is near a singular posture."""
     values = np.linspace(low, high, SINGULARITY_SAMPLES)
     rows = np.tile(q, (len(values), 1))
     rows[:, joint] = values
@@ -192,9 +217,12 @@ def _singular_stretches(robot: Robot, q: Vector, joint: int, low: float, high: f
 
 
 def escape_move(world: World, q: Vector) -> tuple[int, float] | None:
-    """The joint, and where to drive it [rad or m], that gets an arm that touches something free again; None if none.
+    """Return a move of one joint that frees an arm which is in contact.
 
-    Of all single joints the one that has to go least far, a few small errors' width at most.
+    Of all joints and directions, the smallest step is returned, in multiples of each joint's tolerance.
+
+    Returns:
+        The number of the joint and its new value [rad or m]; None if no step in `ESCAPE_STEPS` frees the arm.
     """
     small_errors = slack(JointPath.of(world.robot, q[None]))
     for multiple in ESCAPE_STEPS:
@@ -206,7 +234,7 @@ def escape_move(world: World, q: Vector) -> tuple[int, float] | None:
 
 
 def escape_advice(world: World, q: Vector) -> str:
-    """How to get an arm that touches something free; "" if it touches nothing."""
+    """Return how to free an arm that is in contact, in words; "" if it is not in contact."""
     if world.valid(q):
         return ""
     way_free = escape_move(world, q)
@@ -218,7 +246,7 @@ def escape_advice(world: World, q: Vector) -> str:
 
 
 def _out_of_contact(world: World, start: Vector, end: Vector) -> MoveCheck:
-    """An arm that touches something may move so that the overlap decreases and then ends."""
+    """Check a move of an arm that is in contact: the overlap must decrease steadily, then end, and the rest be free."""
     rows = start + np.linspace(0.0, 1.0, CLEARANCE_SAMPLES)[:, None] * (end - start)
     clearances = np.array([world.clearance(row) for row in rows])
     first_free = int(np.argmax(clearances > 0.0))
@@ -233,14 +261,14 @@ def _out_of_contact(world: World, start: Vector, end: Vector) -> MoveCheck:
 
 
 def _first_blocked(world: World, start: Vector, end: Vector) -> Vector:
-    """The first configuration along a motion that is not free; its end if none is found. Shape (dof,)."""
+    """Return the first configuration of a motion that is not free, shape (dof,); its end if none is found."""
     rows = start + np.linspace(0.0, 1.0, world.steps(start, end) + 1)[:, None] * (end - start)
     blocked_rows = np.flatnonzero(~world.valid_batch(rows))
     return np.array(rows[blocked_rows[0]] if len(blocked_rows) else end)
 
 
 def _obstruction(world: World, start: Vector, end: Vector, joint: int) -> str:
-    """Which pair touches first along a move that is not free, and at which value of the joint."""
+    """Return which pair touches first along a move that is not free, and at which value of the joint, in words."""
     first = _first_blocked(world, start, end)
     value, unit = reading(float(first[joint]), joint_unit(world.robot.prismatic[joint]))
     why = world.explain(first) or "too close to tell"
@@ -248,14 +276,19 @@ def _obstruction(world: World, start: Vector, end: Vector, joint: int) -> str:
 
 
 def closest_pair(world: World, rows: Matrix) -> Contact | None:
-    """The pair that is nearest to its margin or to contact at some free configuration; None if nothing can collide.
+    """Return the pair with the least clearance (distance less margin) over several configurations.
 
-    Few rows have to be measured. The next one is that with the lowest bound from the rows before it: two bodies
-    approach each other by no more than twice the bound on the arm's displacement (``World.weights``).
+    Only few rows have to be measured. A measured clearance bounds that of other rows from below, because two bodies
+    approach each other by no more than twice the bound on the arm's displacement (``World.weights``). The next row
+    measured is the one with the lowest bound, until no bound is below the best clearance by more than
+    `CLEARANCE_ERROR`.
 
     Args:
         world: Robot and surroundings.
         rows: Configurations that are free, shape (m, dof), m > 0.
+
+    Returns:
+        None if no pair can collide.
     """
     lower_bounds = np.full(len(rows), -np.inf)
     best = None
@@ -280,7 +313,10 @@ def _singular(world: World, q: Vector) -> list[str]:
 
 
 def _near_singular(robot: Robot, rows: Matrix) -> dict[str, Mask]:
-    """Which configurations are near each singular case, shape (m,); by the Jacobian, "", if the robot names none."""
+    """Return, by name of the singular case, which configurations are near it, shape (m,).
+
+    Robots without named cases are judged by the smallest singular value of the Jacobian, under the name "".
+    """
     if has_closed_form(robot):
         return {case: np.asarray(size < SINGULARITY_THRESHOLD) for case, size in form_of(robot).nearness(rows).items()}
 

@@ -1,8 +1,8 @@
 """Routes to a grasp, one joint at a time: to a configuration in front of the object, then on to the object.
 
-`propose` leads to the grasp that is chosen, or else to the goal of the problem. The postures at the grasp are those of
-its lamp, so that a lamp promises what the search for a route begins with. `all_at_once` makes a
-path of all joints of a list of moves. Source: [1, ch. 6]; the list takes the place of RRT-Connect's path.
+`propose` finds a route to the chosen grasp, or to the goal of the problem if no grasp is chosen. The configurations at
+the grasp are those of its lamp, so that a lamp and the search agree. `all_at_once` converts a list of moves to a path
+of all joints. Source: [1, ch. 6]; the list takes the place of RRT-Connect's path.
 """
 
 from __future__ import annotations
@@ -30,31 +30,32 @@ from rrtik_ompl.planning.shortening import shorten
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
 
-END_OFFSET = 2e-4  # [m] of the tip from its grasp, at the end of a route
+END_OFFSET = 2e-4  # [m]; largest distance of the tip from its grasp at the planned end of a route
 END_TURN = np.deg2rad(0.04)
-MAX_END_OFFSET = 5e-4  # [m]; the same of an arm that has followed it
+MAX_END_OFFSET = 5e-4  # [m]; the same for an arm that has followed the route
 MAX_END_TURN = np.deg2rad(0.1)
 STAGE = "with all joints at once"
-PLANNER_SECONDS = 5.0  # for all joints at once
-MAX_BEGINNINGS = 6  # configurations in front of the object that are tried
+PLANNER_SECONDS = 5.0  # time limit of the planner for all joints at once
+MAX_BEGINNINGS = 6  # largest number of configurations in front of the object that are tried
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Route:
-    """A path of single-joint moves and its figures.
+    """A path of single-joint moves, or of all joints at once, and its figures.
 
     Attributes:
         path: The path.
-        grasp_from: Number of the first move that leads from the pose before the object to the object.
-        travel: Sum of all moves [rad and m].
-        seconds: Sum of all moves' times at the joints' rates.
-        clearance: What it is proven to keep from every obstacle beside its margin, in whole millimetres [m]; 0 if it is
-            not proven, +inf if no obstacle is near. What the gripper or what it holds may touch does not count.
+        grasp_from: Number of the first move from the approach configuration to the object.
+        travel: Sum of the lengths of all moves [rad and m].
+        seconds: Sum of the durations of all moves at the joints' rates [s].
+        clearance: Proven clearance to every obstacle in addition to its margin, in whole millimetres [m]; 0 if nothing
+            is proven, +inf if no obstacle is near. Contacts that are allowed, of the gripper or of what it holds, do
+            not count.
         joints: Names of the joints that move.
-        robustness: Share of executions that touch nothing although every move ends with an error of up to a degree.
-        proven: Whether every move is proven free for its whole length; else some are checked in steps.
+        robustness: Share of executions without contact if every move ends with a random error of up to a degree.
+        proven: Whether every move is proven free over its whole length; otherwise some are only checked in steps.
         together: Whether all joints move at once, for an arm under position control (`all_at_once`).
-        contacts: Of what is held with what it has not parted from.
+        contacts: Contacts of the held object with objects from which it has not yet been separated.
     """
 
     path: JointPath
@@ -69,7 +70,7 @@ class Route:
     contacts: tuple[Touching, ...] = ()
 
     def summary(self) -> str:
-        """The head of the list in one line, with a warning where a small error may touch something."""
+        """Return the figures of the route in one line, with a warning if a small error may cause contact."""
         head = "all joints at once" if self.together else f"{len(self.path.moves())} moves"
 
         line = ", ".join((f"{head}, {self.seconds:.0f} s, {self._clear()}", *map(str, self.contacts)))
@@ -80,7 +81,7 @@ class Route:
         )
 
     def _clear(self) -> str:
-        """How far it stays from obstacles, as far as that is proven."""
+        """Return the clearance in words, as far as it is proven."""
         if not self.proven:
             return "not proven free: checked in steps"
         if np.isinf(self.clearance):
@@ -97,16 +98,21 @@ def propose(
     rates: Vector,
     seed: int,
 ) -> Route | NoRoute:
-    """A route from where the arm is, or why there is none.
+    """Search for a route from the present configuration to the chosen grasp, or to the goal of the problem.
+
+    The configurations of the grasp are tried in the order of their distance from the present one.
 
     Args:
-        problem: Its goal serves where no grasp is chosen.
-        surroundings: What is around.
-        target: Name of the object to grasp.
-        lamp: Of the grasp that is chosen; None if none is.
-        q: Where the arm is, shape (dof,).
-        rates: Of the joints, shape (dof,).
-        seed: Of the random numbers.
+        problem: Its goal is used if no grasp is chosen.
+        surroundings: World with the objects seen.
+        target: Name of the object to grasp; None if none is chosen.
+        lamp: Lamp of the chosen grasp; None if none is chosen.
+        q: Present configuration, shape (dof,).
+        rates: Rates of the joints, shape (dof,) [rad/s or m/s].
+        seed: Seed of the random numbers.
+
+    Returns:
+        The route, or why there is none to the nearest configuration of the grasp.
     """
     world = surroundings.world_at(q, target)
     target_seen = None if target is None else surroundings.named(target)
@@ -131,7 +137,7 @@ def propose(
 
 
 def route_to(world: World, q: Vector, goal: Vector, rates: Vector, seed: int) -> Route | NoRoute:
-    """A route to a configuration."""
+    """Search for a route to a configuration, or return why there is none."""
     return _route(world, world, q, [[_without_tiny_moves(world, goal, q)[None]]], rates, seed)
 
 
@@ -144,16 +150,16 @@ def route_to_grasp(
     rates: Vector,
     seed: int,
 ) -> Route | NoRoute:
-    """A route to a grasp by way of a configuration in front of it.
+    """Search for a route to a grasp by way of a configuration in front of it.
 
     Args:
-        world: In which nothing may be touched, for the first part.
-        holding: In which the gripper may touch the object, for the second.
-        q: Where the arm is, shape (dof,).
+        world: World of the first part, in which nothing may be touched.
+        holding: World of the second part, in which the gripper may touch the object.
+        q: Present configuration, shape (dof,).
         stages: ``T_base_tip`` of approach, grasp and lift.
         grasp: The configuration at which the route ends, free in ``holding``, shape (dof,).
-        rates: Of the joints, shape (dof,).
-        seed: Of the random numbers.
+        rates: Rates of the joints, shape (dof,) [rad/s or m/s].
+        seed: Seed of the random numbers.
     """
     try:
         tails = _tails(world, holding, stages, _without_tiny_moves(holding, grasp, q), seed)
@@ -165,7 +171,11 @@ def route_to_grasp(
 def _tails(
     world: World, holding: World, stages: tuple[pin.SE3, pin.SE3, pin.SE3], grasp: Vector, seed: int
 ) -> Sequence[Tail] | NoRoute:
-    """The last parts of routes to a grasp: few moves from about the pose before it, or else some from exactly there."""
+    """Return the last parts of routes to a grasp.
+
+    Preferred are parts of few moves that begin near the approach pose (`approaches`). If there are none, a planner
+    searches for moves that begin at exactly this pose.
+    """
     few_moves = approaches(world, holding, grasp, stages, MAX_BEGINNINGS)
     if few_moves:
         return few_moves
@@ -179,7 +189,10 @@ def _tails(
 
 
 def _without_tiny_moves(world: World, goal: Vector, q: Vector) -> Vector:
-    """A goal whose joints that are there already need not move, as long as the tip ends where it should."""
+    """Replace joint values of a goal by the present ones as long as the pose of the tip stays within its tolerance.
+
+    The joints are tried in the order of their distance; those whose values are kept need no move.
+    """
     robot = world.robot
     goal_with_fewer_moves = goal
 
@@ -221,13 +234,16 @@ def _route(world: World, holding: World, q: Vector, tails: Sequence[Tail], rates
 
 
 def all_at_once(route: Route, world: World, rates: Vector, seed: int) -> Route | NoRoute:
-    """The same route with all joints at once, up to its last moves to the object, which stay as they are.
+    """Replan a route with all joints at once; its last moves to the object stay moves of single joints.
 
     Args:
         route: Of single-joint moves.
-        world: In which nothing may be touched.
-        rates: Of the joints, shape (dof,).
-        seed: Of the random numbers.
+        world: World in which nothing may be touched.
+        rates: Rates of the joints, shape (dof,) [rad/s or m/s].
+        seed: Seed of the random numbers.
+
+    Returns:
+        The route, or why there is none.
     """
     rows = route.path.waypoints
     before = rows[route.grasp_from]

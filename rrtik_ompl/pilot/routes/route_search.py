@@ -1,7 +1,5 @@
-"""The best route to one of several last parts: robust to small errors of the pilot first, then of few moves.
+"""Search for the best route over several last parts: robust to the pilot's small errors first, then of few moves.
 
-Routes are searched for on small lattices of joint values: the corners between start and goal, then further values of
-one joint after the other. Only where those hold no route a planner is called. They are compared by their executions.
 Source: [1, ch. 6 and 6.3] (lists of single-joint moves).
 """
 
@@ -27,27 +25,29 @@ from rrtik_ompl.planning.shortening.fewest_moves import turning_limits
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
 
-EXECUTIONS = 100  # with errors, that measure the robustness of a route
-MIN_ROBUSTNESS = 0.99  # a smaller one is warned of
-TRIALS = 40  # executions by which all routes are compared
-FINALISTS = 4  # the best of them, which are compared by EXECUTIONS
+EXECUTIONS = 100  # simulated executions with errors, which measure the robustness of a route
+MIN_ROBUSTNESS = 0.99  # smaller robustness causes a warning
+TRIALS = 40  # executions per route in the first comparison of all routes
+FINALISTS = 4  # number of routes that are compared again, with EXECUTIONS
 
-Tail = Sequence[Matrix]  # last parts of routes from one configuration, shape (moves + 1, dof) each, at least one
+# Alternative last parts of routes from one configuration: waypoints, shape (moves + 1, dof) each, at least one.
+Tail = Sequence[Matrix]
 
-FARTHEST = 256  # [mm] of a proven clearance; what is farther away is not near
+FARTHEST = 256  # [mm]; largest clearance that is proven
 PLANNER_SECONDS = 5.0
-MAX_CORNERS = 256  # of a lattice of moves
-FURTHER_VALUES = 24  # of a joint
-DETOUR_STEPS = (-16.0, -8.0, -4.0, 4.0, 8.0, 16.0)  # small errors by which a detour is made larger or smaller
+MAX_CORNERS = 256  # largest number of corners of a lattice
+FURTHER_VALUES = 24  # further values of the joint that makes a detour
+# Steps by which a detour is made larger or smaller, in multiples of the joint's tolerance.
+DETOUR_STEPS = (-16.0, -8.0, -4.0, 4.0, 8.0, 16.0)
 
 
 @dataclass(frozen=True, slots=True)
 class NoRoute:
-    """There is no route.
+    """The result of a search that found no route.
 
     Attributes:
         reason: Why, in words for a person.
-        stage: The part of the route that cannot be made; "" for the whole route.
+        stage: The part of the route that failed; "" for the whole route.
     """
 
     reason: str
@@ -58,20 +58,20 @@ class NoRoute:
 
 
 class GraspRoute(NamedTuple):
-    """Single-joint moves, shape (moves + 1, dof), and the number of the first one that may touch the object."""
+    """Waypoints of single-joint moves, shape (moves + 1, dof), and the number of the first move that may touch."""
 
     rows: Matrix
     grasp_from: int
 
 
 class RouteSearch:
-    """A search for the best route.
+    """Search for the best route from one configuration.
 
     Args:
-        world: In which nothing may be touched.
-        holding: In which the gripper may touch the object; the same where there is none.
-        q: Where the arm is, shape (dof,).
-        seed: Of the random numbers.
+        world: World in which nothing may be touched.
+        holding: World in which the gripper may touch the object; the same world if there is no object.
+        q: Present configuration, shape (dof,).
+        seed: Seed of the random numbers.
     """
 
     def __init__(self, world: World, holding: World, q: Vector, seed: int) -> None:
@@ -84,10 +84,13 @@ class RouteSearch:
         self._slack = slack(self._path)
 
     def find(self, tails: Sequence[Tail]) -> GraspRoute | NoRoute:
-        """The best route; one that is not proven free only where no other is found, or none can be proven.
+        """Return the best route, in three stages: direct routes, detours of one joint, and a planner's route.
+
+        A stage ends the search if its best route is proven free, or if no route can be proven. A route that is not
+        proven is returned only if all stages fail to find one that is.
 
         Args:
-            tails: Last parts, grouped by where they begin; the best beginning first.
+            tails: Alternative last parts, grouped by their first configuration; the best group first.
 
         Raises:
             ProblemError: If the arm is in collision, or the last parts begin in collision.
@@ -109,22 +112,27 @@ class RouteSearch:
         return unproven or best or NoRoute("it comes too close to something to be sure")
 
     def robustness(self, route: GraspRoute, count: int = EXECUTIONS) -> float:
-        """Share of executions that touch nothing but what is grasped although every move ends with a small error."""
+        """Return the share of simulated executions with small random errors that are free of unwanted contact.
+
+        Args:
+            route: The route.
+            count: Number of executions.
+        """
         made = executions(self._path.with_waypoints(route.rows), self._slack, count, np.random.default_rng(self._seed))
         before = made[:, : route.grasp_from + 1]
         after = made[:, route.grasp_from :]
         return float((free_rows(self._world, before) & free_rows(self._forgiving, after)).mean())
 
     def proven(self, route: GraspRoute) -> bool:
-        """Whether all moves of a route are proven free for their whole length."""
+        """Check whether all moves of a route are proven free over their whole length."""
         return all(world.prove(rows).proven for world, rows in self._parts(route) if len(rows) > 1)
 
     def clearance(self, route: GraspRoute) -> float:
-        """What a route is proven to keep from obstacles [m]; see `proven_clearance`."""
+        """Return the proven clearance of a route from obstacles [m]; see `proven_clearance`."""
         return proven_clearance(self._parts(route))
 
     def _provable(self, tail: Tail) -> bool:
-        """Whether there may be a proven route: not without kernels, nor where an end cannot be proven."""
+        """Check whether a proven route can exist: the world must support proofs, and both ends must be provable."""
         end = tail[0][-1]
         return self._world.motion_proven(self._q, self._q) and self._holding.motion_proven(end, end)
 
@@ -132,20 +140,23 @@ class RouteSearch:
         return (route for tail in tails for route in self._direct(tail))
 
     def _direct(self, tail: Tail) -> Iterator[GraspRoute]:
-        """Routes in which every joint moves once before the last part."""
+        """Yield the routes in which every joint moves once before the last part."""
         orders = [self._order(part) for part in tail]
         for first in direct_routes(self._world, self._q, tail[0][0], orders):
             yield from (_joined(first, part) for part in tail)
 
     def _around(self, tail: Tail) -> Iterator[GraspRoute]:
-        """Routes in which one joint makes a detour, narrow or wide."""
+        """Yield the routes in which one joint makes a detour, in several sizes."""
         rng = np.random.default_rng(self._seed)
         for route in detours(self._world, self._q, tail[0][0], self._order(tail[0]), rng):
             for first in (route, *moved_aside(self._world, route, self._slack)):
                 yield min((_joined(first, part) for part in tail), key=lambda joined: len(joined.rows))
 
     def _order(self, last: Matrix) -> list[int]:
-        """All joints, first the one that a last part begins with: so that its move may join the one before."""
+        """Return all joints in random order, except that the joint which moves first in the last part comes first.
+
+        That joint can then move last before the last part, so that both moves join to one.
+        """
         joints = np.random.default_rng(self._seed).permutation(len(self._q)).tolist()
         return joints if len(last) < 2 else sorted(joints, key=lambda joint: last[0, joint] == last[1, joint])
 
@@ -157,25 +168,38 @@ class RouteSearch:
         return proven or next((route for route in ranked if not self._fault(route)), None)
 
     def _rank(self, route: GraspRoute, count: int) -> tuple[float, int, float, float]:
-        """Sorting key, the best first: executions that touch something, in tenths; moves; their exact share; travel."""
+        """Return a sorting key of a route; the smallest is the best.
+
+        Args:
+            route: The route.
+            count: Number of executions that are simulated.
+
+        Returns:
+            The share of executions with contact in tenths, the number of waypoints, that share exactly, and the travel.
+            The rounding lets few moves win over differences in robustness that do not matter.
+        """
         touching = 1.0 - self.robustness(route, count)
         tenths = max(round(10.0 * touching), int(touching > 1.0 - MIN_ROBUSTNESS))
         return tenths, len(route.rows), touching, route_length(route.rows)
 
     def _fault(self, route: GraspRoute) -> str:
-        """Why a second, independent check refuses a route; "" if it does not."""
+        """Return why a second, independent check rejects a route; "" if it does not."""
         faults = (path_fault(world, self._path.with_waypoints(rows)) for world, rows in self._parts(route))
         return next(filter(None, faults), "")
 
     def _parts(self, route: GraspRoute) -> tuple[tuple[World, Matrix], ...]:
-        """What may touch nothing and what may touch the object, each with its world."""
+        """Split a route where it may begin to touch the object; return each part's world and waypoints."""
         before = route.rows[: route.grasp_from + 1]
         after = route.rows[route.grasp_from :]
         return (self._world, before), (self._holding, after)
 
 
 def _joined(first: Matrix, last: Matrix) -> GraspRoute:
-    """A first and a last part; where the same joint moves on they share a move, which may touch the object."""
+    """Join a first and a last part of a route.
+
+    If the same joint moves at the end of one and the beginning of the other, both moves become one, which may touch the
+    object.
+    """
     rows = merge_moves(np.vstack([first, last[1:]]), tolerance=0.0)
     shared = len(rows) < len(first) + len(last) - 1
     return GraspRoute(rows, len(first) - 1 - shared)
@@ -185,20 +209,23 @@ def _joined(first: Matrix, last: Matrix) -> GraspRoute:
 
 
 def direct_routes(world: World, start: Vector, goal: Vector, orders: Sequence[Sequence[int]]) -> list[Matrix]:
-    """Routes in which every joint moves once at most, shape (moves + 1, dof); none if that is not free.
+    """Return the routes on the lattice of start and goal values, in which every joint moves at most once.
 
     Args:
-        world: In which they are to be free.
+        world: World in which the routes must be free.
         start: Shape (dof,).
         goal: Shape (dof,).
-        orders: For each route all joints; of several equally good routes the one whose last moves come first here.
+        orders: For each route an order of all joints; among equally good routes, joints listed first move last.
+
+    Returns:
+        Waypoints, shape (moves + 1, dof) each; empty if no such route is free, or if the lattice is too large.
     """
     values = values_of(np.array([start, goal]))
     return _routes(world, start, goal, values, orders) if lattice_size(values) <= MAX_CORNERS else []
 
 
 def detours(world: World, start: Vector, goal: Vector, order: Sequence[int], rng: np.random.Generator) -> list[Matrix]:
-    """Routes in which one joint takes further values in between, for each joint the best; see `direct_routes`."""
+    """Return the best route for each joint that may take further values in between; see `direct_routes`."""
     ends = np.array([start, goal])
     if lattice_size(values_of(ends)) > MAX_CORNERS:
         return []
@@ -215,7 +242,7 @@ def detours(world: World, start: Vector, goal: Vector, order: Sequence[int], rng
 
 
 def planned(world: World, start: Vector, goal: Vector, seed: int) -> Matrix | NoRoute:
-    """A planner's route, shape (moves + 1, dof), or the reason why there is none.
+    """Return a planner's route of single-joint moves, shape (moves + 1, dof), or why there is none.
 
     Raises:
         ProblemError: If the start or the goal is not free.
@@ -227,12 +254,12 @@ def planned(world: World, start: Vector, goal: Vector, seed: int) -> Matrix | No
 
 
 def moved_aside(world: World, route: Matrix, slack: Vector) -> Iterator[Matrix]:
-    """The same route with another value where a joint makes a detour, as far as it is free. Shape (moves + 1, dof).
+    """Yield variants of a route in which a joint makes its detour at another value, if they are free.
 
     Args:
-        world: In which they are to be free.
-        route: Shape (moves + 1, dof).
-        slack: Small errors of the joints, shape (dof,) [rad or m].
+        world: World in which the variants must be free.
+        route: Waypoints, shape (moves + 1, dof).
+        slack: Tolerances of the joints, which are the unit of the steps, shape (dof,) [rad or m].
     """
     for joint, column in enumerate(route.T):
         for value in np.setdiff1d(column, column[[0, -1]]):
@@ -245,7 +272,7 @@ def moved_aside(world: World, route: Matrix, slack: Vector) -> Iterator[Matrix]:
 
 @cache
 def _planner() -> tuple[str, dict[str, Any]]:
-    """The planner of single-joint moves that can be told to be brief, and the options that tell it.
+    """Return the installed planner of single-joint moves that can be run briefly, and the options for that.
 
     Raises:
         InputError: If no package offers one.
@@ -267,13 +294,14 @@ def _routes(world: World, start: Vector, goal: Vector, values: Values, orders: S
 
 
 def proven_clearance(parts: Iterable[tuple[World, Matrix]]) -> float:
-    """What the motions of a route are proven to keep from every obstacle beside its margin, in whole millimetres [m].
+    """Return the clearance, in addition to the margins, that the motions of a route are proven to keep [m].
 
-    0 also if the motions are not proven free; +inf if everything is more than a quarter of a metre away. Obstacles that
-    may be touched, as what is grasped, do not count.
+    The largest provable clearance is found by bisection in whole millimetres. It is 0 also if the motions are not
+    proven free, and +inf if everything is more than a quarter of a metre away. Obstacles that may be touched do not
+    count.
 
     Args:
-        parts: Waypoints, shape (k, dof), each with the world that they are proven in.
+        parts: Pairs of a world and the waypoints, shape (k, dof), that are proven in it.
     """
     parts = [(world, rows) for world, rows in parts if len(rows) > 1]
 
@@ -292,16 +320,16 @@ def proven_clearance(parts: Iterable[tuple[World, Matrix]]) -> float:
 
 
 def executions(path: JointPath, slack: Vector, count: int, rng: np.random.Generator) -> Matrix:
-    """Corners of a path of single-joint moves as a pilot makes them: every move ends with an error up to ``slack``.
+    """Simulate executions by a pilot: every move ends with a random error up to ``slack``.
 
     Args:
-        path: One joint at a time.
+        path: Path of single-joint moves.
         slack: Largest error of each joint, shape (dof,) [rad or m].
-        count: How many executions.
-        rng: For the errors, which are uniform.
+        count: Number of executions.
+        rng: Source of the errors, which are uniform.
 
     Returns:
-        Shape (count, moves + 1, dof).
+        Waypoints, shape (count, moves + 1, dof).
     """
     names = list(path.joint_names)
     moves = path.moves()
@@ -315,14 +343,14 @@ def executions(path: JointPath, slack: Vector, count: int, rng: np.random.Genera
 
 
 def forgiving(world: World) -> World:
-    """The same world where what is in contact is not compared: only to count what else errors would touch."""
+    """Return the world without checks between bodies in permitted contact, to count only other contacts."""
     scene = world.scene
     pairs = (*scene.allowed_collisions, *(contact.names for contact in scene.contacts))
     return world.with_scene(replace(scene, contacts=(), allowed_collisions=pairs)) if scene.contacts else world
 
 
 def free_rows(world: World, rows: Matrix) -> NDArray[np.bool_]:
-    """Which of some `executions` touch nothing; a joint that stops at its limit is no fault. Shape (count,)."""
+    """Check which `executions` are free of contact, shape (count,); joints are assumed to stop at their limits."""
     if rows.shape[1] < 2:
         return np.ones(len(rows), dtype=bool)
 

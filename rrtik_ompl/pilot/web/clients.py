@@ -1,6 +1,6 @@
-"""Browsers at a session: which of them is the pilot, and what is sent to each. For the server's thread alone.
+"""Browsers at a session: which of them is the pilot, and what is sent to each. Used by the server's thread only.
 
-Nothing is queued: of every kind of message a client that is slow gets the newest one, when it is ready for it.
+There are no queues: a slow client gets only the newest message of each kind, when it is ready for it.
 """
 
 from __future__ import annotations
@@ -8,22 +8,22 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 
-FRAMES = 2  # pictures to a client that it has not acknowledged, at a time
-STATES = 8  # the same of states, which are small, and whose age counts
+FRAMES = 2  # largest number of pictures sent to a client and not yet acknowledged
+STATES = 8  # the same for states, which are small, and whose age matters more
 PILOT = "pilot"
 WATCHING = "watching"
 Message = bytes | str
 
 
 class Lane:
-    """Messages to one client, at most a few unacknowledged; a newer one takes the place of one that waits."""
+    """Messages to one client, with a limit on unacknowledged ones; newer messages replace waiting ones."""
 
     def __init__(self, send: Callable[[Message], None], width: int) -> None:
         """Start empty.
 
         Args:
             send: Sends a message.
-            width: Number of messages that may be unacknowledged.
+            width: Largest number of unacknowledged messages.
         """
         self._send = send
         self._width = width
@@ -32,13 +32,13 @@ class Lane:
         self.dropped = 0
 
     def offer(self, kind: str, message: Message) -> None:
-        """Send a message as soon as the client is ready; one of its kind that still waits is dropped."""
+        """Send a message as soon as the client is ready; a waiting one of the same kind is dropped."""
         self.dropped += kind in self._waiting
         self._waiting[kind] = message
         self._go()
 
     def arrived(self) -> None:
-        """The client has shown one."""
+        """Register that the client has acknowledged a message, and send the next one."""
         self.under_way = max(self.under_way - 1, 0)
         self._go()
 
@@ -55,16 +55,16 @@ class Client:
         """Register a page.
 
         Args:
-            number: Of the connection.
-            name: Chosen by the page; it keeps it when it connects again.
-            send: Sends a message to it.
+            number: Number of the connection.
+            name: Name chosen by the page, which it keeps when it reconnects.
+            send: Sends a message to the page.
         """
         self.number = number
         self.name = name
         self.send = send
         self.frames = Lane(send, FRAMES)
         self.states = Lane(send, STATES)
-        self.heard: float | None = None  # stamp of the last state that it says to have shown
+        self.heard: float | None = None  # time stamp of the last state that the page has acknowledged
 
     def send_json(self, **words: object) -> None:
         """Send a short message at once."""
@@ -72,13 +72,13 @@ class Client:
 
 
 class Clients:
-    """All open pages. The first is the pilot; the others watch until the pilot has left or handed over."""
+    """All open pages. The first is the pilot; the others watch until the pilot leaves or hands over."""
 
     def __init__(self, on_left: Callable[[], None]) -> None:
-        """Begin without pages.
+        """Start without pages.
 
         Args:
-            on_left: Called when the pilot's page is gone.
+            on_left: Called when the pilot has left or handed over.
         """
         self._all: list[Client] = []
         self._on_left = on_left
@@ -90,7 +90,7 @@ class Clients:
         return len(self._all)
 
     def join(self, client: Client) -> None:
-        """Register a page; restore its role as pilot if it had that before and the role is free."""
+        """Register a page, as the pilot if it is the first, or if it was the last pilot and the role is free."""
         self._all.append(client)
 
         returns = client.name == self._last_pilot and not self._handed_over
@@ -109,7 +109,7 @@ class Clients:
         self._send_roles()
 
     def take_over(self, client: Client) -> str:
-        """Make a watching page the pilot; returns why that is refused, "" if it is not."""
+        """Make a watching page the pilot; return why that is refused, "" if it is not."""
         if self.pilot is not None and self.pilot is not client:
             return "another page is the pilot; it has to hand over, or to leave"
         self._make_pilot(client)
@@ -117,7 +117,7 @@ class Clients:
         return ""
 
     def hand_over(self, client: Client) -> None:
-        """The pilot lets another page take over."""
+        """Give up the role of the pilot, so that another page can take over."""
         if client is self.pilot:
             self.pilot = None
             self._handed_over = True
@@ -125,16 +125,16 @@ class Clients:
             self._send_roles()
 
     def heard(self) -> dict[int, float]:
-        """By the number of each page, the stamp of the last state that it says to have shown."""
+        """Return, by the number of each page, the time stamp of the last state that it has acknowledged."""
         return {client.number: client.heard for client in tuple(self._all) if client.heard is not None}
 
     def show_state(self, text: str) -> None:
-        """Send a state to all."""
+        """Send a state to all pages."""
         for client in self._all:
             client.states.offer("state", text)
 
     def show_frame(self, kind: str, frame: bytes) -> None:
-        """Send a picture to all that are ready for one."""
+        """Send a picture to all pages, as soon as they are ready for one."""
         for client in self._all:
             client.frames.offer(kind, frame)
 

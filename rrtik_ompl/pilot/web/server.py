@@ -48,7 +48,7 @@ MAX_QUEUED_COMMANDS = 200
 MAX_STAMP = 1e12  # [s]
 MIN_TOKEN_LENGTH = 16
 GOING_AWAY = 1001  # code of a WebSocket that is closed
-FAREWELL_SECONDS = 0.1  # for it to arrive
+FAREWELL_SECONDS = 0.1  # time for this message to arrive
 PING_SECONDS = 10.0  # so that a page over a line of some seconds sees, although it drives nothing
 PONG_SECONDS = 10.0
 REPORT_SECONDS = 0.25
@@ -57,7 +57,8 @@ REQUEST_SECONDS = 20.0  # for a whole request, and between two on one connection
 PAGE = Path(__file__).parent / "page"
 MAX_NAME_LENGTH = 40
 MAX_PAGES = 100  # open at a time
-MAX_UNSENT = 100  # messages to a page that it does not take from its line; pictures and states are fewer
+# Messages that a page may leave unread; pictures and states are limited to fewer.
+MAX_UNSENT = 100
 NO_TOKEN = "the token is missing or wrong: open the address as rrtik pilot printed it"
 WRONG_ORIGIN = "requested under another name, or from another page: open the address as rrtik pilot printed it"
 TOO_MANY = "too many pages are open: close some"
@@ -69,14 +70,14 @@ SCRIPTS = ("hold.js", "keys.js", "link.js", "pilot.js", "gamepad.js")
 FILES = {"/": ("index.html", "text/html"), "/pilot.css": ("pilot.css", "text/css")}
 FILES |= {f"/{name}": (name, "text/javascript") for name in SCRIPTS}
 
-PASSIVE = socket.AI_PASSIVE  # as who wants to listen asks
+PASSIVE = socket.AI_PASSIVE  # resolve addresses for listening
 
 
 class PilotServer:
-    """Serves the page from a thread of its own until it is left; use it as a context manager.
+    """Serve the page from a separate thread; use it as a context manager.
 
     Attributes:
-        commands: Of the pilot's page, as pairs of the page's number and the command.
+        commands: Commands of the pilot's page, as pairs of the page's number and the command.
         reported: When its thread reported last, by ``time.monotonic()``.
     """
 
@@ -90,15 +91,16 @@ class PilotServer:
         certificate: Path | None = None,
         key: Path | None = None,
     ) -> None:
-        """Take a port.
+        """Open a port.
 
         Args:
-            port: A free one if 0.
+            port: Port number; 0 chooses a free one.
             host: Address of this machine under which pages may reach it.
-            token: Secret that a page has to give; needed for any address but this machine's own.
-            title: Of the page.
-            certificate: Of this machine (PEM, with those that vouch for it); the page is then served by TLS.
-            key: Its private key (PEM); in the file of the certificate if None.
+            token: Secret that a page has to give; required for any address but this machine's own.
+            title: Title of the page.
+            certificate: Certificate of this machine (PEM, with its chain); the page is then served by TLS. None for no
+                TLS.
+            key: Its private key (PEM); None if it is in the file of the certificate.
 
         Raises:
             InputError: If the port, the address or the certificate cannot be used, or the token is missing or short.
@@ -140,28 +142,39 @@ class PilotServer:
         self._thread.join(timeout=10.0)
 
     def heard(self) -> dict[int, float]:
-        """By the number of each page, the stamp of the last state that it says to have shown."""
+        """Return, by the number of each page, the time stamp of the last state that it has acknowledged."""
         return self.clients.heard()
 
     def show_state(self, state: dict[str, Any], executed: dict[int, int]) -> None:
-        """Send a state to all pages, with the number of the last command of each page that was executed before it."""
+        """Send a state to all pages.
+
+        Args:
+            state: The state, as plain values.
+            executed: For each page, by number, the last of its commands that was executed before this state.
+        """
         text = json.dumps({"kind": "state", "answered": executed, **state}, allow_nan=False)
         self._call(lambda: self.clients.show_state(text))
 
     def show_frame(self, kind: str, time: float, jpeg: bytes) -> None:
-        """Send a picture to all pages: kind "C" from the camera, "O" from outside; its time [s]."""
+        """Send a picture to all pages.
+
+        Args:
+            kind: "C" for the camera, "O" for the view from outside.
+            time: Time of the picture [s].
+            jpeg: The picture.
+        """
         frame = kind.encode() + struct.pack("<d", time) + jpeg
         self._call(lambda: self.clients.show_frame(kind, frame))
 
     def may(self, request: HTTPServerRequest) -> bool:
-        """Whether a request names this server, and comes from its own page or from none."""
+        """Check whether a request names this server, and comes from its own page or from none."""
         hosts = {f"{name}:{self.port}" for name in (self._name, *(("localhost",) if self.host == LOOPBACK else ()))}
         host = request.headers.get("Host")
         origin = request.headers.get("Origin")
         return host in hosts and (origin is None or origin == f"{self._scheme}://{host}")
 
     def knows_token(self, word: str) -> bool:
-        """Whether a word is the token; takes the same time however much of it is right."""
+        """Check a word against the token, in a time that does not depend on how much of it is right."""
         return hmac.compare_digest(word.encode(), self.token.encode())
 
     def receive(self, client: Client, text: str) -> None:
@@ -192,7 +205,7 @@ class PilotServer:
             self.commands.put((client.number, said))
 
     def _stop(self, client: Client, said: dict[str, Any]) -> None:
-        """Anybody may stop the arm; what was commanded before and still waits is left out."""
+        """Queue a stop, which any page may give, and discard the commands that still wait."""
         with suppress(queue.Empty):
             while True:
                 self.commands.get_nowait()
@@ -348,7 +361,8 @@ class SocketHandler(Guarded, tornado.websocket.WebSocketHandler):
             self.server.clients.leave(self._client)
 
     def _send(self, message: Message) -> None:
-        if self._unsent >= MAX_UNSENT:  # it takes nothing from its line: what waits for it would fill the memory
+        # The page reads nothing: further messages would fill the memory.
+        if self._unsent >= MAX_UNSENT:
             self.close()
             return
         with suppress(tornado.websocket.WebSocketClosedError):  # `on_close` follows
@@ -359,14 +373,14 @@ class SocketHandler(Guarded, tornado.websocket.WebSocketHandler):
     def _went(self, sent: asyncio.Future[None]) -> None:
         self._unsent -= 1
         if not sent.cancelled():
-            sent.exception()  # a page that was closed abruptly is no news
+            sent.exception()  # an abruptly closed page is no error
 
 
 # --- what it shows to other machines ---------------------------------------------------------------------------------
 
 
 def all_addresses(host: str) -> bool:
-    """Whether a host, however it is spelt (``0``, ``0x0``, ``::``, ``::ffff:0.0.0.0``), means all addresses."""
+    """Check whether a host means all addresses, however it is spelt (``0``, ``0x0``, ``::``, ``::ffff:0.0.0.0``)."""
     try:
         found = [ipaddress.ip_address(entry[4][0]) for entry in socket.getaddrinfo(host or None, 0, flags=PASSIVE)]
     except (OSError, UnicodeError, ValueError):
@@ -375,7 +389,7 @@ def all_addresses(host: str) -> bool:
 
 
 def tls_context(certificate: Path | None, key: Path | None) -> ssl.SSLContext | None:
-    """What TLS needs: a certificate and its private key, both PEM; None without a certificate.
+    """Return the TLS context of a certificate and its private key, both PEM; None without a certificate.
 
     Raises:
         InputError: If they cannot be used, or the key is encrypted.
