@@ -1,4 +1,4 @@
-"""The one package where arrays become OMPL states and back: validity, motions, ownership rules, base of planners."""
+"""The bridge to OMPL: conversion between arrays and states, checks, ownership of states, and the base of planners."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:  # noqa: ANN401 - whatever has that name
-    if name == "objectives":  # loaded late, as no planner needs it
+    if name == "objectives":  # loaded late, because no planner needs it
         return import_module("rrtik_ompl.ompl_bridge.objectives")
     if name == "check_planner":
         return import_module("rrtik_ompl.ompl_bridge.contract").check_planner

@@ -1,6 +1,7 @@
-"""OMPL at work, arrays in and out: one attempt of one planner at one problem, one shortening by its PathSimplifier.
+"""One attempt of one planner at one problem, or one run of OMPL's PathSimplifier, with arrays in and out.
 
-A planner of ours works on arrays. For any other one every OMPL object lives and dies inside the call.
+Array planners (derived from SafePlanner) work on arrays. For any other planner, all OMPL objects are created and
+destroyed inside the call.
 """
 
 from __future__ import annotations
@@ -41,24 +42,29 @@ from rrtik_ompl.ompl_bridge.weighted import WeightedProblem, has_weights
 from rrtik_ompl.world.problem import Problem
 
 NO_PARAMETERS: Mapping[str, Any] = MappingProxyType({})
-ITERATION_LIMIT = "max_iterations"  # the option of our planners
-MOTIONS_PER_ITERATION = 5  # checked motions of OMPL's planners that count as one iteration of ours
+ITERATION_LIMIT = "max_iterations"  # option of array planners
+MOTIONS_PER_ITERATION = 5  # checked motions of an OMPL planner that count as one iteration
 
 INVALID = (ob.PlannerStatus.INVALID_START, ob.PlannerStatus.INVALID_GOAL)
 MAX_SECONDS = 1e9  # [s]
 
 
 def attempt_seeds(seed: int, restarts: int) -> list[int]:
-    """Of the first attempt and of each that begins anew."""
+    """Return the seeds of the first attempt and of each restart."""
     seeds: list[int] = np.random.SeedSequence(seed).generate_state(restarts + 1, np.uint32).tolist()
     return seeds
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Attempt:
-    """What came out: rows of the path, shape (k, n), or None; OMPL's status in words; plain counts; a reason if any.
+    """The result of one attempt.
 
-    ``counting`` is how long it took to count the vertices and edges of an OMPL planner [s], which is no planning.
+    Attributes:
+        rows: Waypoints of the path, shape (k, n), or None.
+        status: OMPL's status in words.
+        statistics: Plain counts.
+        reason: Why there is no path, if the planner says so; else "".
+        counting: Time spent on counting the vertices and edges of an OMPL planner [s], which is not planning time.
     """
 
     rows: Matrix | None
@@ -77,25 +83,25 @@ def attempt(
     parameters: Mapping[str, Any] = NO_PARAMETERS,
     checked: bool = False,
 ) -> Attempt:
-    """Let a planner work from the start of a problem to any of ``goals``, shape (k, n), within a budget.
+    """Let a planner search from the start of a problem to any of ``goals``, within a budget.
 
-    There may be no goals if the planner finds some itself; one that takes one goal gets the first. Where the budget
-    limits iterations (for planners that support it) the attempt ends after so many, or after five times as many checked
-    motions of a planner of OMPL, so that what it finds does not depend on the computer's speed. Where joints have
-    weights, distances are weighted.
+    There may be no goals if the planner finds some itself; a planner with the trait ``one_goal`` gets the first goal
+    alone. If the budget limits iterations (for planners that support it), the attempt ends after that many iterations
+    of an array planner, or after five times as many checked motions of an OMPL planner, so that the result does not
+    depend on the computer's speed. If joints have weights, the planner works with weighted distances.
 
     Args:
-        problem: What to solve.
+        problem: The problem to solve.
         factory: Makes the planner.
         goals: Shape (k, n).
         budget: Time from now on, iterations and the seed.
         parameters: Options of the planner.
-        checked: Whether start and goals are known to be free, so that a planner of ours does not check them again.
+        checked: Whether start and goals are known to be free, so that an array planner does not check them again.
 
     Raises:
         InputError: If the planner does not take a parameter.
         PlannerError: If the planner refused its options for this problem, or broke.
-        KeyboardInterrupt: After a planner of OMPL has stopped in good order; one of ours is left at once.
+        KeyboardInterrupt: After an OMPL planner has stopped properly; an array planner is interrupted at once.
     """
     traits = traits_of(factory)
     goals = goals[:1] if traits.one_goal else goals
@@ -113,13 +119,13 @@ def attempt(
 
 
 def seed_ompl(seed: int) -> None:
-    """Seed OMPL's random numbers, before any object is made that draws from them; OMPL does not take 0."""
+    """Seed OMPL's random numbers, before any object that draws from them is made; OMPL does not accept 0."""
     ou.RNG.setSeed(1 + seed % (2**31 - 2))
 
 
 @contextmanager
 def quiet() -> Iterator[None]:
-    """Silence OMPL's log, which goes to standard output, for the time of one attempt."""
+    """Silence OMPL's log, which goes to standard output, inside a ``with`` block."""
     level = ou.getLogLevel()
     ou.setLogLevel(ou.LogLevel.LOG_NONE)
     try:
@@ -137,7 +143,7 @@ def _on_arrays(
     *,
     checked: bool,
 ) -> Attempt:
-    """An attempt of a planner of ours, which needs of OMPL a space alone."""
+    """Run an attempt of an array planner, which needs only a space of OMPL."""
     name = factory.__name__
     bounds = planning_bounds(problem, goals)
     limit = {} if budget.iterations is None else {ITERATION_LIMIT: budget.iterations}
@@ -157,7 +163,7 @@ def _on_arrays(
 def _in_ompl(
     problem: Problem, factory: PlannerFactory, goals: Matrix, budget: Budget, parameters: Mapping[str, Any]
 ) -> Attempt:
-    """An attempt of a planner of OMPL, or of anybody else's, whose objects all live in here."""
+    """Run an attempt of an OMPL planner or a third-party one; all OMPL objects are local to this function."""
     name = getattr(factory, "__name__", str(factory))
     traits = traits_of(factory)
     seconds = max(budget.left, 0.0)
@@ -183,7 +189,8 @@ def _in_ompl(
 
     _raise_failure(planner, name, status, validity.error)
     rows = exact_path(definition, si)
-    ends_refused_for_lack_of_time = rows is None and validity.late and status in INVALID  # all answers were no by then
+    # After the deadline every check answers no, so the refusal says nothing about start or goals.
+    ends_refused_for_lack_of_time = rows is None and validity.late and status in INVALID
     if ends_refused_for_lack_of_time:
         status = ob.PlannerStatus(ob.PlannerStatus.TIMEOUT)
 
@@ -194,14 +201,15 @@ def _in_ompl(
 
 @contextmanager
 def _named(name: str) -> Iterator[None]:
-    """Whatever leaves the code of a planner, C++'s exceptions or those of a file of anybody, in one line with its name.
+    """Turn any exception that leaves a planner's code into a PlannerError of one line with the planner's name.
 
     Raises:
-        PlannerError: If anything does but an error of ours, a lack of memory and Ctrl-C.
+        PlannerError: For any exception but the library's own errors, MemoryError and KeyboardInterrupt.
     """
     try:
         yield
-    except (RrtikError, MemoryError):  # a campaign has a status of its own for the latter
+    # A campaign reports a lack of memory by a status of its own.
+    except (RrtikError, MemoryError):
         raise
     except (Exception, SystemExit) as error:
         innermost_frame = traceback.extract_tb(error.__traceback__)[-1]
@@ -214,7 +222,10 @@ def _named(name: str) -> Iterator[None]:
 
 
 def _straight_motion(problem: Problem, goals: Matrix) -> Matrix | None:
-    """The straight motion from the start to the nearest goal if it is free, shape (2, n): no path is shorter."""
+    """Return the straight motion from the start to the nearest goal if it is free, shape (2, n), else None.
+
+    No path to any goal is shorter.
+    """
     nearest = goals[np.linalg.norm(goals - problem.start, axis=1).argmin()]
     if not problem.world.motion_valid(problem.start, nearest):
         return None
@@ -223,9 +234,9 @@ def _straight_motion(problem: Problem, goals: Matrix) -> Matrix | None:
 
 @contextmanager
 def interrupt_ends(condition: ob.PlannerTerminationCondition) -> Iterator[None]:
-    """Ctrl-C ends the planner through its termination condition and is raised afterwards.
+    """Let Ctrl-C end the planner through its termination condition, and raise KeyboardInterrupt afterwards.
 
-    Raised inside a callback it would end the process under planners that run a second thread.
+    If it were raised inside a callback, it would end the process with planners that run a second thread.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -248,7 +259,7 @@ def interrupt_ends(condition: ob.PlannerTerminationCondition) -> Iterator[None]:
 
 
 def _status(answer: object) -> ob.PlannerStatus:
-    """What ``solve`` returned; one that is written in Python may return anything."""
+    """Return what ``solve`` returned as a PlannerStatus; a planner written in Python may have returned anything."""
     if isinstance(answer, ob.PlannerStatus):
         return answer
     if isinstance(answer, ob.PlannerStatus.PlannerStatusType):
@@ -257,41 +268,45 @@ def _status(answer: object) -> ob.PlannerStatus:
 
 
 def _raise_failure(planner: ob.Planner, name: str, status: ob.PlannerStatus, error: Exception | None) -> None:
-    """Raise what broke a planner: an error in one of its callbacks, or a failure of its own that it has kept.
+    """Raise the error that broke a planner: one from its callbacks, or one that the planner has kept.
 
     Raises:
-        PlannerError: If there is any.
+        PlannerError: If there is such an error.
     """
     if error is not None:
         raise PlannerError(f"planner {name} broke: {in_short(error)}")
     failure = getattr(planner, "failure", None)
     if failure is not None:
         raise PlannerError(f"planner {name}{'' if failure.refused else ' broke'}: {failure.summary}")
-    if status == ob.PlannerStatus.CRASH and getattr(planner, "error", None):  # a planner of somebody else, in Python
+    # A third-party planner in Python may keep its error as text.
+    if status == ob.PlannerStatus.CRASH and getattr(planner, "error", None):
         raise PlannerError(f"planner {name} broke: {planner.error}")
 
 
 def in_short(error: Exception) -> str:
-    """What an exception says, its type if it says nothing."""
+    """Return the text of an exception, or its type if it has no text."""
     return str(error) or type(error).__name__
 
 
 def _graph(planner: ob.Planner, si: ob.SpaceInformation) -> dict[str, int]:
-    """Size of the trees or the roadmap of a planner of the wheel; one that is written in Python may end the process."""
+    """Count the vertices and edges of an OMPL planner; with planners written in Python this may end the process."""
     graph = ob.PlannerData(si)
     planner.getPlannerData(graph)
     return {"vertices": graph.numVertices(), "edges": graph.numEdges()}
 
 
 def simplified(problem: Problem, route: Matrix, budget: Budget) -> tuple[Matrix, int]:
-    """Let ``ompl.geometric.PathSimplifier`` shorten a route, shape (k, n); also how many motions were checked.
+    """Shorten a route, shape (k, n), by ``ompl.geometric.PathSimplifier``.
 
-    Its last step checks configurations alone of what it has bent, so the result must be checked. When the time is up
-    no motion counts as free, and what was found so far is returned.
+    Its last step only checks configurations of the parts that it has bent, so the result must be checked again. When
+    the time is up no motion counts as free any more, and the best route so far is returned.
+
+    Returns:
+        The new route, shape (m, n), and the number of checked motions.
 
     Raises:
         PlannerError: If a check raised an error.
-        KeyboardInterrupt: After it has stopped in good order.
+        KeyboardInterrupt: After the simplifier has stopped properly.
     """
     with quiet():
         seed_ompl(budget.seed)

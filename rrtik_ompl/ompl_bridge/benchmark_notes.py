@@ -1,4 +1,4 @@
-"""What OMPL's Benchmark cannot ask of a planner written in Python: its options, its graph, how its path got shorter."""
+"""Records that OMPL's Benchmark cannot get from planners written in Python: options, graph sizes, progress."""
 
 from __future__ import annotations
 
@@ -12,22 +12,22 @@ from rrtik_ompl.base.errors import InputError, PlannerError
 from rrtik_ompl.ompl_bridge.safe_planner import SafePlanner
 
 PROGRESS = ("best cost REAL", "time REAL")  # sorted, as OMPL writes the values of a row
-MOMENTS = 101  # even ones of a run
+MOMENTS = 101  # evenly spaced times of a run
 
 
 class BenchmarkNotes:
-    """Listens to the runs of a benchmark, and writes what it has heard into its records.
+    """Listens to the runs of a benchmark, and adds notes on array planners to its records.
 
-    The bindings of OMPL let no planner in Python answer for its parameters, its ``PlannerData`` or its progress. Make
+    OMPL's bindings do not let planners in Python report their parameters, their ``PlannerData`` or their progress. Make
     the notes before ``benchmark()``, and call :meth:`write` between that and ``saveResultsToFile()``: the log then has
-    the options of our planners as common properties, the sizes of their graphs, and rows for Planner Arena's progress
-    page. Planners of OMPL are left as they are.
+    the options of array planners as common properties, the sizes of their graphs, and rows for Planner Arena's progress
+    page. Planners of OMPL are not changed.
 
     Args:
-        benchmark: Its event after a run is taken; the planners are added to it as objects, not by allocators.
+        benchmark: Its post-run event is used; planners must be added to it as objects, not by allocators.
 
     Raises:
-        InputError: If ``benchmark`` is none of OMPL's.
+        InputError: If ``benchmark`` is not an ``ompl.tools.Benchmark``.
 
     Example:
         >>> notes = rrtik.BenchmarkNotes(benchmark)  # doctest: +SKIP
@@ -42,14 +42,15 @@ class BenchmarkNotes:
 
         self._benchmark = benchmark
         self._heard: list[_Run | None] = []
-        heard = self._heard  # an event that held the notes would hold the benchmark, which holds the event
+        # The event only holds the list: if it held the notes, it would hold the benchmark, which holds the event.
+        heard = self._heard
         benchmark.setPostRunEvent(lambda planner, _: heard.append(_heard_of(planner)))
 
     def write(self) -> None:
-        """Write into the records of the benchmark, which has to be over.
+        """Write the notes into the records of the benchmark, which has to be finished.
 
         Raises:
-            PlannerError: If other runs are recorded than were heard of.
+            PlannerError: If the recorded runs are not those that were listened to.
         """
         data = self._benchmark.getRecordedExperimentData()
         if sum(len(each.runs) for each in data.planners) != len(self._heard):
@@ -68,7 +69,7 @@ class _Run:
         self.options = planner.parameters()
         self.progress = planner.progress
         self.sizes = (0, 0)
-        with suppress(PlannerError):  # it found nothing, or was refused
+        with suppress(PlannerError):  # there is no graph if it found nothing or was refused
             graph = planner.graph()
             self.sizes = len(graph.vertices), len(graph.edges)
 
@@ -90,7 +91,17 @@ def _write_planner(planner: ot.PlannerExperiment, runs: list[_Run], seconds: flo
 
 
 def _rows(run: _Run, seconds: float) -> list[dict[str, str]]:
-    """The best cost of a run, when it fell and at even moments: Planner Arena fits curves to many points."""
+    """Return the best cost of a run over time, at each improvement and at evenly spaced times.
+
+    Planner Arena fits curves to many points.
+
+    Args:
+        run: A run with its progress.
+        seconds: Time limit of the benchmark [s].
+
+    Returns:
+        Rows of cost and time as text, keyed by `PROGRESS`.
+    """
     if not run.progress:
         return []
 
@@ -99,5 +110,5 @@ def _rows(run: _Run, seconds: float) -> list[dict[str, str]]:
     moments = moments[moments >= times[0]]
     best = costs[np.searchsorted(times, moments, side="right") - 1]
 
-    rows = {f"{at:.6g}": f"{cost:.9g}" for at, cost in zip(moments, best, strict=True)}  # a time stands once
+    rows = {f"{at:.6g}": f"{cost:.9g}" for at, cost in zip(moments, best, strict=True)}  # each time occurs once
     return [dict(zip(PROGRESS, (cost, at), strict=True)) for at, cost in rows.items()]

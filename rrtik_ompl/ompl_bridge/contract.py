@@ -1,8 +1,8 @@
-"""The contract of our planners, as a function that anybody can run on a planner of their own.
+"""The contract of :class:`SafePlanner`, as a check that anybody can run on their own planner.
 
-Each clause solves a small problem with plain OMPL and a Python validity checker, no World. The last clauses ask a
-planner in many spaces: units, numbers of coordinates, seeds, starts; an exact path has to stand OMPL's own
-``PathGeometric.check()``, which asks every edge of it again.
+Each clause solves a small problem with plain OMPL and a Python validity checker, without a World. The last clauses try
+a planner in many spaces: units, numbers of coordinates, seeds, starts. An exact path has to pass OMPL's own
+``PathGeometric.check()``, which checks every edge again.
 """
 
 from __future__ import annotations
@@ -26,22 +26,22 @@ from rrtik_ompl.ompl_bridge.states import StateIO
 Factory = Callable[..., ob.Planner]  # factory(si) and factory(si, seed=...) make a planner
 Clause = Callable[[Factory], None]
 
-# the small problem, a box of three coordinates
+# The small problem: a box of three coordinates.
 DOF = 3
 START, GOAL = (-1.0, -1.0, -1.0), (1.0, 1.0, 1.0)
 INSIDE_OBSTACLE, OUTSIDE_BOUNDS = (0.0, 0.0, 0.0), (9.0, 0.0, 0.0)
 SECONDS = 10.0  # [s] for problems that take milliseconds
 SHORT = 0.2  # [s] for problems without a solution
 
-# many spaces
+# Many spaces.
 SEEDS = 200
 UNITS = (1e-3, 1.0, 1e3)  # half the extent of a space
 COORDINATES = (1, 2, 7, 60)
-ALWAYS_SOLVED = 2  # coordinates: a single tree without aim, which is a planner too, is lost in many more
+ALWAYS_SOLVED = 2  # largest number of coordinates in which any planner has to succeed, even an undirected single tree
 SPACE_SECONDS = 5.0  # [s] for problems that take milliseconds
-BRIEF = 0.3  # [s] where no path need be found
+BRIEF = 0.3  # [s] for problems for which no path has to be found
 TURNED = (-0.5, 0.0, 0.3), (0.5, 0.0, -0.3)  # two coordinates and an angle, on both sides of a wall
-COARSE = 0.02  # of the extent, between two looks of OMPL at an edge
+COARSE = 0.02  # resolution of OMPL's checks of an edge, as a share of the extent
 
 
 def check_planner(factory: Factory, *, single_joint_moves: bool = False) -> None:
@@ -124,7 +124,7 @@ def refuses_bad_starts_and_goals(factory: Factory) -> None:
 
 
 def takes_several_starts_and_goals(factory: Factory) -> None:
-    """Of several starts and goals, invalid ones are passed over and a path joins two of the others."""
+    """Of several starts and goals, invalid ones are ignored, and a path joins two of the valid ones."""
     starts = (INSIDE_OBSTACLE, START, (-1.5, 0.0, 0.0))
     goals = (INSIDE_OBSTACLE, OUTSIDE_BOUNDS, GOAL, (1.5, 0.0, 0.0))
     setup, status, _ = attempt(factory, starts=starts, goals=goals)
@@ -136,7 +136,7 @@ def takes_several_starts_and_goals(factory: Factory) -> None:
 
 
 def survives_a_broken_checker(factory: Factory) -> None:
-    """An exception in the validity checker gives CRASH with its text in ``error``; the planner is usable again."""
+    """An exception in the validity checker gives CRASH with its text in ``error``; the planner is usable afterwards."""
     calls = [0]
     broken = [True]
 
@@ -183,7 +183,7 @@ def reports_plain_numbers(factory: Factory) -> None:
 
 
 def runs_in_benchmark(factory: Factory) -> None:
-    """OMPL's Benchmark runs it, as an object and through a planner allocator."""
+    """OMPL's Benchmark runs the planner, as an object and through a planner allocator."""
     setup = small_problem()
     benchmark = ot.Benchmark(setup, "contract")
     benchmark.addPlanner(factory(setup.getSpaceInformation()))
@@ -197,9 +197,9 @@ def runs_in_benchmark(factory: Factory) -> None:
 
 
 def asks_for_every_edge(factory: Factory) -> None:
-    """Each edge of an exact path was asked as a whole: among discs that a coarse look can miss, 200 seeds.
+    """Each edge of an exact path has been checked as a whole, among discs that a coarse check can miss, for 200 seeds.
 
-    A planner that is often lost there is asked of fewer.
+    A planner that often fails there is tried with fewer seeds.
     """
     begun = time.monotonic()
     for seed in range(SEEDS):
@@ -247,7 +247,7 @@ def works_in_any_dimension(factory: Factory) -> None:
 
 
 def takes_starts_that_lead_nowhere(factory: Factory) -> None:
-    """A start that is shut in does not keep a planner from one that sees the goal, whichever comes first."""
+    """A start that is enclosed does not keep a planner from finding a path from another one, whichever comes first."""
     for starts in ((START, (1.5, 1.5, 1.5)), ((1.5, 1.5, 1.5), START)):
         setup = small_problem(outside_wall, starts=starts)
         setup.setPlanner(factory(setup.getSpaceInformation(), seed=1))
@@ -256,7 +256,7 @@ def takes_starts_that_lead_nowhere(factory: Factory) -> None:
 
 
 def says_when_there_was_no_time(factory: Factory) -> None:
-    """No time at all gives TIMEOUT, not a word against the goal; a condition may be a function with an interval."""
+    """A solve without time gives TIMEOUT, not INVALID_GOAL; the condition may be a function with an interval."""
     setup = small_problem()
     planner = factory(setup.getSpaceInformation(), seed=1)
     setup.setPlanner(planner)
@@ -358,7 +358,7 @@ def _write_arm(state: ob.State, q: tuple[float, float, float]) -> None:
 
 
 def _past_half_a_turn(state: ob.State) -> bool:
-    """Free but for a wall with one opening, near half a turn."""
+    """Check a state against a wall with one opening, at angles near half a turn."""
     x, angle = (state.getX(), state.getYaw()) if hasattr(state, "getYaw") else (state[1][0], state[0].value)
     return bool(abs(x) > 0.1 or abs(angle) > 2.5)
 
@@ -368,7 +368,7 @@ def small_problem(
     starts: Iterable[ArrayLike] = (START,),
     goals: Iterable[ArrayLike] = (GOAL,),
 ) -> og.SimpleSetup:
-    """A SimpleSetup in three dimensions with an upright bar as the obstacle, and a Python validity checker.
+    """Return a SimpleSetup in three dimensions with an upright bar as obstacle and a Python validity checker.
 
     Args:
         valid: Replaces the validity checker.
@@ -386,7 +386,7 @@ def box_problem(
     *,
     dof: int,
 ) -> og.SimpleSetup:
-    """A SimpleSetup whose coordinates go from minus ``extent`` to ``extent``, with a Python validity checker.
+    """Return a SimpleSetup with coordinates from minus ``extent`` to ``extent`` and a Python validity checker.
 
     Args:
         extent: Above 0 [unit of the space].
@@ -421,17 +421,17 @@ def box_problem(
 
 
 def outside_bar(state: ob.State) -> bool:
-    """The validity checker of :func:`small_problem`: outside a bar with the third axis as its axis."""
+    """Check a state of :func:`small_problem` against a bar whose axis is the third coordinate axis."""
     return bool(abs(state[0]) > 0.5 or abs(state[1]) > 0.5)
 
 
 def outside_wall(state: ob.State) -> bool:
-    """A validity checker for :func:`small_problem` with a wall that no path leads round, between START and GOAL."""
+    """Check a state of :func:`small_problem` against a wall between START and GOAL that no path avoids."""
     return bool(abs(state[0]) > 0.5)
 
 
 def solution_rows(setup: og.SimpleSetup) -> Matrix | None:
-    """The path that a SimpleSetup holds, shape (k, n), or None."""
+    """Return the path of a SimpleSetup, shape (k, n), or None."""
     path = setup.getProblemDefinition().getSolutionPath()
     if path is None:
         return None
@@ -440,7 +440,7 @@ def solution_rows(setup: og.SimpleSetup) -> Matrix | None:
 
 
 def attempt(factory: Factory, *, seed: int = 1, **problem: Any) -> tuple[og.SimpleSetup, ob.PlannerStatus, ob.Planner]:
-    """A solve of the small problem: the setup, the status, the planner."""
+    """Solve the small problem, and return the setup, the status and the planner."""
     setup = small_problem(**problem)
     planner = factory(setup.getSpaceInformation(), seed=seed)
     setup.setPlanner(planner)
@@ -448,7 +448,7 @@ def attempt(factory: Factory, *, seed: int = 1, **problem: Any) -> tuple[og.Simp
 
 
 def solved(factory: Factory, *, seed: int = 1) -> tuple[og.SimpleSetup, Matrix, ob.Planner]:
-    """A solve that must succeed: the setup, the path, the planner."""
+    """Solve the small problem, which must succeed, and return the setup, the path, shape (k, n), and the planner."""
     setup, status, planner = attempt(factory, seed=seed)
     require_status(status, "Exact solution", "the small problem")
 
@@ -465,6 +465,6 @@ def require_status(status: ob.PlannerStatus | str, wanted: str, what: str) -> No
 
 
 def require(condition: bool, what: str, found: object) -> None:
-    """Raise a PlannerError that says what is wrong, and what was found, unless the condition holds."""
+    """Raise a PlannerError with a text and the found value unless the condition holds."""
     if not condition:
         raise PlannerError(f"check_planner: {what}: {found}")

@@ -1,4 +1,4 @@
-"""The goal of a problem as OMPL knows goals: free configurations, and more of them as a planner wants more."""
+"""The goal of a problem as an OMPL goal: free configurations, and more of them when a planner wants more."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ MAX_CONFIGURATIONS = 32
 class GoalSampler(ob.GoalSampleableRegion):  # type: ignore[misc]  # OMPL has no types
     """Free configurations at the goal of a problem, for every OMPL planner that samples its goal.
 
-    Those of the first rounds of inverse kinematics are looked for when the sampler is made; further ones when a
-    planner has been given all of these and wants more (:class:`rrtik_ompl.ik.goal_configurations.GoalSearch`).
-    Configurations that the space information refuses, being out of its bounds or invalid, are left out.
+    The first rounds of inverse kinematics are made with the sampler; further ones follow when a planner has been given
+    all configurations and wants more (:class:`rrtik_ompl.ik.goal_configurations.GoalSearch`). Configurations that the
+    space information refuses, because they are out of its bounds or invalid, are left out.
 
-    Four planners of OMPL need a single goal that is not Python's: :meth:`states` without a number. The ``solve`` of
-    :func:`rrtik_ompl.simple_setup` gives them that by itself. Elsewhere (OMPL's Benchmark, a ProblemDefinition of your
-    own) PRM and PRMstar hang with this goal, and with several of its states: they take up further goals in a second
-    thread, which waits for the interpreter for ever, as checks are Python's and the first thread holds it. BFMT can
-    take a goal out of its queue twice, which ends the process. AORRTC takes a second goal for a path of no length and
-    gives up.
+    Four planners of OMPL need a single goal that is not written in Python: :meth:`states` without a number. The
+    ``solve`` of :func:`rrtik_ompl.simple_setup` gives it to them automatically. Elsewhere (OMPL's Benchmark, a
+    ProblemDefinition of your own) PRM and PRMstar hang with this goal, and with several of its states: they collect
+    further goals in a second thread, which waits for the interpreter forever, because the checks run in Python and the
+    first thread holds the interpreter. BFMT can take a goal out of its queue twice, which ends the process. AORRTC
+    mistakes a second goal for a path of no length and gives up.
 
     Example:
         >>> problem = rrtik.load_problem("titan4_sdu")
@@ -40,11 +40,11 @@ class GoalSampler(ob.GoalSampleableRegion):  # type: ignore[misc]  # OMPL has no
         """Make a goal.
 
         Args:
-            problem: Its goal is what is to be reached; its start is what configurations shall be near to.
-            si: ``ompl.base.SpaceInformation`` over the robot's joints; if None, one that checks by the problem's
-                world, to be had by ``getSpaceInformation()``.
+            problem: Its goal is to be reached; configurations near its start are preferred.
+            si: ``ompl.base.SpaceInformation`` over the robot's joints; None for one with the checks of the problem's
+                world, which ``getSpaceInformation()`` returns.
             seed: The same seed gives the same configurations in the same order.
-            most: Configurations at most.
+            most: Limit of the configurations.
 
         Raises:
             InputError: If the space does not fit the robot, or a number makes no sense.
@@ -66,8 +66,8 @@ class GoalSampler(ob.GoalSampleableRegion):  # type: ignore[misc]  # OMPL has no
         self._problem = problem
         self._io = io
         self._max_configurations = most
-        self._num_given = 0  # to planners
-        self._num_seen = 0  # rows of the search that have been asked for their validity
+        self._num_given = 0  # configurations given to planners
+        self._num_seen = 0  # rows of the search whose validity has been checked
         self._rows: Matrix = frozen(np.zeros((0, robot.dof)))
 
         self._search = GoalSearch(problem, np.random.default_rng(whole_number(seed, "seed")))
@@ -75,7 +75,7 @@ class GoalSampler(ob.GoalSampleableRegion):  # type: ignore[misc]  # OMPL has no
 
     @property
     def rows(self) -> Matrix:
-        """The configurations found so far that the space information takes, shape (k, dof)."""
+        """The configurations found so far that the space information accepts, shape (k, dof)."""
         new = self._search.rows[self._num_seen :]
         self._num_seen += len(new)
         if len(new):
@@ -84,21 +84,21 @@ class GoalSampler(ob.GoalSampleableRegion):  # type: ignore[misc]  # OMPL has no
 
     @property
     def exhausted(self) -> bool:
-        """Whether there are no others than :attr:`rows`."""
+        """Whether no further configurations will be found."""
         return self._search.exhausted or len(self.rows) >= self._max_configurations
 
     @property
     def reason(self) -> str:
-        """Why there is no configuration at all, in a line; "" if there is one."""
+        """One line that says why there is no configuration at all; "" if there is one."""
         if len(self.rows) or len(self._search.rows) == 0:
             return self._search.reason
         return "the configurations found are out of the bounds of the state space, or invalid to its checker"
 
     def more(self) -> bool:
-        """Look for further configurations, for one round.
+        """Search for further configurations, for one round.
 
         Returns:
-            Whether there are any.
+            Whether any were found.
         """
         num_known = len(self.rows)
         if not self.exhausted:
@@ -106,9 +106,9 @@ class GoalSampler(ob.GoalSampleableRegion):  # type: ignore[misc]  # OMPL has no
         return len(self.rows) > num_known
 
     def states(self, most: int = 1) -> ob.GoalStates:
-        """The first configurations as ``ompl.base.GoalStates``, which OMPL samples without the interpreter.
+        """Return the first configurations as ``ompl.base.GoalStates``, which OMPL samples without the interpreter.
 
-        More than one are not for PRM, PRMstar and BFMT outside :func:`rrtik_ompl.simple_setup`; see the class.
+        More than one must not be given to PRM, PRMstar and BFMT outside :func:`rrtik_ompl.simple_setup`; see the class.
         """
         si = self.getSpaceInformation()
         states = ob.GoalStates(si)
@@ -127,22 +127,25 @@ class GoalSampler(ob.GoalSampleableRegion):  # type: ignore[misc]  # OMPL has no
             self._num_given += 1
 
     def maxSampleCount(self) -> int:
-        """How many configurations there may be; called by OMPL."""
+        """Return how many configurations there may be; called by OMPL."""
         return len(self.rows) if self.exhausted or len(self.rows) == 0 else self._max_configurations
 
     def couldSample(self) -> bool:
-        """Whether there is any: nothing is computed beside OMPL, so that it need not wait for one; called by OMPL."""
+        """Check whether there is a configuration; called by OMPL.
+
+        No further one is computed in the background, so there is nothing to wait for.
+        """
         return len(self.rows) > 0
 
     def distanceGoal(self, state: ob.State) -> float:
-        """0 at the goal, else its distance [m; rad or m for a goal in joint values]; called by OMPL."""
+        """Return the distance from the goal [m; rad or m for a goal in joint values], 0 at the goal; called by OMPL."""
         robot = self._problem.world.robot
         goal = self._problem.goal
         q = self._io.read(state)[None]
         return 0.0 if goal.satisfied(robot, q)[0] else float(goal.distance(robot, q)[0])
 
     def _usable(self, rows: Matrix) -> Mask:
-        """Which rows lie inside the bounds and are valid to the checker of the space information, if it has one."""
+        """Check which rows are inside the bounds and valid to the checker of the space information, if it has one."""
         si = self.getSpaceInformation()
         lower, upper = space_bounds(si)
         usable: Mask = np.all(self._io.turning | ((rows >= lower) & (rows <= upper)), axis=1)

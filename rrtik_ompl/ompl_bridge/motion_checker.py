@@ -1,4 +1,4 @@
-"""The motion queries of a planner, counted: of a world, or of an OMPL SpaceInformation."""
+"""Counted motion queries of a planner, answered by a world or by an OMPL SpaceInformation."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from rrtik_ompl.world.motion_queries import MotionQueries
 
 
 class MotionChecker(MotionQueries, Protocol):
-    """The motion queries of a planner, counted.
+    """The motion queries of a planner, with counts.
 
     Attributes:
-        checked_states: Configurations checked.
-        checked_motions: Motions checked (each of them many configurations inside).
+        checked_states: Number of configurations checked.
+        checked_motions: Number of motions checked (each of them as many configurations).
     """
 
     checked_states: int
@@ -36,7 +36,7 @@ class WorldChecker:
         self.checked_motions = 0
 
     def valid(self, q: Vector) -> bool:
-        """Whether q, shape (n,), is free."""
+        """Check whether q, shape (n,), is free."""
         self.checked_states += 1
         return bool(self._world.valid(q))
 
@@ -49,24 +49,24 @@ class WorldChecker:
         return together(Q)
 
     def motion_valid(self, a: Vector, b: Vector) -> bool:
-        """Whether the straight motion from a to b, shapes (n,), is free."""
+        """Check whether the straight motion from a to b, shapes (n,), is free."""
         self.checked_motions += 1
         return bool(self._world.motion_valid(a, b))
 
     def motion_valid_batch(self, A: Matrix, B: Matrix) -> Mask:
-        """Which of the motions from A to B, shapes (m, n), are free, shape (m,)."""
+        """Check which of the motions from A to B, shapes (m, n), are free, shape (m,)."""
         self.checked_motions += len(A)
         return self._world.motion_valid_batch(A, B)
 
 
 class SpaceChecker:
-    """Of a SpaceInformation, so by whatever validity checker its owner has set (see :class:`MotionChecker`).
+    """Motion queries answered by the validity checker of a SpaceInformation (see :class:`MotionChecker`).
 
-    Holds C++ objects: for local variables only.
+    It holds C++ objects, so it must only be kept in local variables.
     """
 
     def __init__(self, si: ob.SpaceInformation) -> None:
-        if not si.isSetup():  # before setup, checkMotion looks at the end point alone
+        if not si.isSetup():  # before setup, checkMotion only checks the end point
             si.setup()
         self._si = si
         self._io = StateIO(si)
@@ -76,28 +76,28 @@ class SpaceChecker:
         self.checked_motions = 0
 
     def valid(self, q: Vector) -> bool:
-        """Whether q, shape (n,), is within the bounds and free."""
+        """Check whether q, shape (n,), is within the bounds and free."""
         self.checked_states += 1
         self._io.write(self._a, q)
         return bool(self._si.satisfiesBounds(self._a) and self._si.isValid(self._a))
 
     def valid_batch(self, Q: Matrix) -> Mask:
-        """Which of the configurations Q, shape (m, n), are within the bounds and free, shape (m,)."""
+        """Check which of the configurations Q, shape (m, n), are within the bounds and free, shape (m,)."""
         return np.array([self.valid(q) for q in Q], dtype=bool)
 
     def motion_valid(self, a: Vector, b: Vector) -> bool:
-        """Whether the straight motion from a to b, shapes (n,), is free; a itself is taken to be."""
+        """Check whether the straight motion from a to b, shapes (n,), is free; a is assumed to be free."""
         self.checked_motions += 1
         if not self._io.turns:
             return self._short_motion_valid(a, b)
         return all(self._short_motion_valid(*ends) for ends in pairwise(pieces(a, b, self._io.turning)))
 
     def _short_motion_valid(self, a: Vector, b: Vector) -> bool:
-        """Whether a motion is free on which no angle of SO(2) goes beyond half a turn."""
+        """Check whether a motion is free on which no angle of SO(2) turns by more than half a turn."""
         self._io.write(self._a, a)
         self._io.write(self._b, b)
         return bool(self._si.checkMotion(self._a, self._b))
 
     def motion_valid_batch(self, A: Matrix, B: Matrix) -> Mask:
-        """Which of the motions from A to B, shapes (m, n), are free, shape (m,)."""
+        """Check which of the motions from A to B, shapes (m, n), are free, shape (m,)."""
         return np.array([self.motion_valid(a, b) for a, b in zip(A, B, strict=True)], dtype=bool)

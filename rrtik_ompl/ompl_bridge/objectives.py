@@ -1,7 +1,7 @@
-"""What a path costs, as objectives of OMPL: for RRT*, BIT* and the other planners that improve a path.
+"""Costs of paths as OMPL objectives, for RRT*, BIT* and the other planners that improve a path.
 
-OMPL's PRM and PRMstar ask an objective in a second thread, which waits for the interpreter for ever: they can take
-:func:`path_length` alone.
+OMPL's PRM and PRMstar call an objective in a second thread, which waits for the interpreter forever: they only work
+with :func:`path_length`.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ STILL = 1e-9  # [unit of the space] a joint that moves less does not move
 
 
 def path_length(si: ob.SpaceInformation) -> ob.OptimizationObjective:
-    """The length of a path in joint space [rad; m]: OMPL's own objective.
+    """Return the length of a path in joint space [rad; m], OMPL's own objective.
 
     Example:
         >>> import rrtik_ompl as rrtik
@@ -32,13 +32,13 @@ def path_length(si: ob.SpaceInformation) -> ob.OptimizationObjective:
 
 
 def clearance(si: ob.SpaceInformation, world: World, *, weight: float = 0.05) -> ob.OptimizationObjective:
-    """The length of a path in joint space, longer where the arm is near to something.
+    """Return the length of a path in joint space, weighted more where the arm is near to a body.
 
     Each piece counts ``1 + weight / clearance`` times its length.
 
     Args:
-        si: Of `space_information()`, or another one over the arm's joints.
-        world: Knows the clearance.
+        si: From `space_information()`, or another one over the arm's joints.
+        world: Computes the clearance.
         weight: The clearance at which a piece counts double [m].
 
     Raises:
@@ -48,19 +48,19 @@ def clearance(si: ob.SpaceInformation, world: World, *, weight: float = 0.05) ->
 
 
 def single_joint_moves(si: ob.SpaceInformation) -> ob.OptimizationObjective:
-    """How many joints move, added up over the motions of a path.
+    """Return how many joints move, added up over the motions of a path.
 
-    It tells paths of single-joint moves from each other. In a tree of straight motions nearly every motion moves every
-    joint, so that planners of such trees make little of it.
+    It ranks paths of single-joint moves. In a tree of straight motions nearly every motion moves every joint, so
+    planners of such trees gain little from it.
     """
     return _Moves(si)
 
 
 def tip_travel(si: ob.SpaceInformation, robot: Robot, *, frame: str | None = None) -> ob.OptimizationObjective:
-    """How far the tip goes [m].
+    """Return the distance that the tip travels [m].
 
     Args:
-        si: Of `space_information()`, or another one over the arm's joints.
+        si: From `space_information()`, or another one over the arm's joints.
         robot: The arm.
         frame: A frame of the arm in place of its tip.
 
@@ -80,20 +80,20 @@ class _Objective(ob.OptimizationObjective):  # type: ignore[misc]  # OMPL has no
             raise InputError(f"objective: the space has {self._states.dof} coordinates, the robot {dof} joints")
 
     def stateCost(self, _: ob.State) -> ob.Cost:
-        """Nothing; called by OMPL."""
+        """Return zero cost; called by OMPL."""
         return ob.Cost(0.0)
 
     def motionCost(self, first: ob.State, second: ob.State) -> ob.Cost:
-        """The cost of the motion between two states; called by OMPL."""
+        """Return the cost of the motion between two states; called by OMPL."""
         return ob.Cost(self.cost(self._states.read(first), self._states.read(second)))
 
     def cost(self, a: Vector, b: Vector) -> float:
-        """Of the straight motion from a to b, shapes (n,)."""
+        """Return the cost of the straight motion from a to b, shapes (n,)."""
         raise NotImplementedError
 
 
 class _Clearance(_Objective):
-    """Length, where pieces near obstacles count more; see the function of the objective."""
+    """Length, weighted more near obstacles; see :func:`clearance`."""
 
     def __init__(self, si: ob.SpaceInformation, world: World, weight: float) -> None:
         super().__init__(si, world.robot.dof)
@@ -114,7 +114,7 @@ class _Moves(_Objective):
 
 
 class _TipTravel(_Objective):
-    """How far a frame of the arm goes [m]."""
+    """The distance that a frame of the arm travels [m]."""
 
     def __init__(self, si: ob.SpaceInformation, robot: Robot, frame: str | None) -> None:
         super().__init__(si, robot.dof)

@@ -1,9 +1,9 @@
-"""States that OMPL owns, kept from being freed by Python as well while a planner written in Python works.
+"""Protection of OMPL's states from being freed by Python too, while a planner written in Python works.
 
-OMPL 2.0.1's bindings return ``ProblemDefinition.getStartState`` and ``getInputStates`` as if Python owned them: the
-state is freed once by Python, once by OMPL, and the process dies, then or later. The bindings make one Python object
-for each state of C++ and return it again as long as it lives, whoever asks. So nothing is freed twice while there are
-objects of these states that own nothing, as other methods return them.
+OMPL 2.0.1's bindings return ``ProblemDefinition.getStartState`` and ``getInputStates`` as if Python owned the states:
+each state is freed once by Python and once by OMPL, and the process dies, at once or later. The bindings make one
+Python object for each C++ state, and return the same object as long as it lives, whoever asks. Nothing is therefore
+freed twice while there are non-owning objects for these states, as other methods return them.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ from ompl import base as ob
 
 from rrtik_ompl.ompl_bridge.safe_planner import SafePlanner
 
-STANDARD_ERROR = 2  # its file; sys.stderr may be none, as in a notebook
+STANDARD_ERROR = 2  # its file descriptor; sys.stderr may have none, as in a notebook
 
-# Why a planner that is_plain() may end the process.
+# The reason why a planner that is_plain() may end the process.
 PLAIN_HINT = (
     "OMPL 2.0.1's bindings free states twice that such a class keeps or frees; "
     "derive it from rrtik_ompl.ompl_bridge.SafePlanner, which searches on arrays"
@@ -34,9 +34,9 @@ def is_plain(planner: object) -> bool:
 
 @contextmanager
 def foreign_code(planner: ob.Planner, definition: ob.ProblemDefinition) -> Iterator[None]:
-    """For the time in which a planner solves a problem: if it is a plain one, no state is freed twice.
+    """Protect states from being freed twice inside a ``with`` block, if the planner is a plain one.
 
-    Should its code end the process all the same, the line of Python that did so is written to standard error.
+    If its code ends the process nevertheless, the Python line that did so is written to standard error.
     """
     if not is_plain(type(planner)):
         yield
@@ -56,7 +56,10 @@ def foreign_code(planner: ob.Planner, definition: ob.ProblemDefinition) -> Itera
 
 
 def borrowed_states(definition: ob.ProblemDefinition) -> list[ob.State]:
-    """Objects of the starts and goals of a problem that own nothing; not to be kept, as states go with the problem."""
+    """Return non-owning objects of the starts and goals of a problem.
+
+    They must not be kept, because the states are freed with the problem.
+    """
     inputs = ob.PlannerInputStates()
     inputs.use(definition)
     states = []

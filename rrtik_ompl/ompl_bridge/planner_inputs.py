@@ -1,4 +1,4 @@
-"""Starts and goals of an OMPL problem definition as arrays, those that its owner takes for valid."""
+"""Starts and goals of an OMPL problem definition as arrays, without those that are invalid."""
 
 from __future__ import annotations
 
@@ -24,7 +24,17 @@ NONE_USABLE = "none is given, or all are in collision or outside the bounds"
 def starts_and_goals(
     inputs: ob.PlannerInputStates, definition: ob.ProblemDefinition, io: StateIO, stop: Stop, *, aimless: bool
 ) -> tuple[Matrix, Matrix]:
-    """All starts of a problem definition and, unless ``aimless``, goals, shapes (s, n) and (g, n); each row once.
+    """Return the starts of a problem definition and, unless ``aimless``, its goals, without repetition.
+
+    Args:
+        inputs: Gives the starts and goals.
+        definition: The problem definition.
+        io: Reads states.
+        stop: Returns True when it is time to stop.
+        aimless: Whether the planner needs no goals.
+
+    Returns:
+        Starts, shape (s, n), and goals, shape (g, n).
 
     Raises:
         IllPosed: If there is no valid start, or the goal cannot be sampled.
@@ -48,7 +58,7 @@ def starts_and_goals(
 
 
 def _refuse_other_spaces(definition: ob.ProblemDefinition, dof: int) -> None:
-    """Refuse a goal or an objective of another space: its states would be read and written beyond their memory."""
+    """Raise an InputError if goal or objective are of another space, whose states would be accessed out of bounds."""
     for what, part in (("goal", definition.getGoal()), ("objective", definition.getOptimizationObjective())):
         count = dof if part is None else part.getSpaceInformation().getStateDimension()
         if count != dof:
@@ -56,7 +66,7 @@ def _refuse_other_spaces(definition: ob.ProblemDefinition, dof: int) -> None:
 
 
 def _starts(inputs: ob.PlannerInputStates, io: StateIO) -> list[Vector]:
-    """All valid starts, each once, shapes (n,)."""
+    """Return all valid starts without repetition, shapes (n,)."""
     rows = []
     while inputs.haveMoreStartStates():
         state = inputs.nextStart()  # borrowed; None if invalid
@@ -67,9 +77,10 @@ def _starts(inputs: ob.PlannerInputStates, io: StateIO) -> list[Vector]:
 
 
 def _goals(inputs: ob.PlannerInputStates, io: StateIO, goal: ob.Goal, stop: Stop) -> list[Vector]:
-    """Goal configurations: all of a finite goal; else a number of samples, or as many as it takes to find one.
+    """Return goal configurations without repetition, shapes (n,).
 
-    Of a :class:`GoalSampler` those that it has.
+    A finite goal gives all of its states, and a :class:`GoalSampler` those that it has. Any other goal is sampled a
+    number of times, and then until one sample is found.
     """
     limit = GOAL_SAMPLES
     if isinstance(goal, GoalSampler):
@@ -100,22 +111,25 @@ def _goals(inputs: ob.PlannerInputStates, io: StateIO, goal: ob.Goal, stop: Stop
 
 
 def _different(rows: list[Vector]) -> list[Vector]:
-    """The rows in their order, each once."""
+    """Return the rows in their order, without repetition."""
     if len(rows) < 2:
         return rows
     return list({row.tobytes(): row for row in rows}.values())
 
 
 def usable(starts: Matrix, goals: Matrix | None, free: Mask) -> tuple[Matrix, Matrix]:
-    """The free ones of starts and goals, shapes (s, n) and (g, n), at least one each; no goals where none are needed.
+    """Return the free starts and goals, at least one of each; no goals if none are needed.
 
     Args:
         starts: Shape (s, n).
         goals: Shape (g, n), or None.
         free: Which of both are free, shape (s + g,) or (s,).
 
+    Returns:
+        Free starts and free goals, shapes (k, n) and (m, n).
+
     Raises:
-        IllPosed: If there is none.
+        IllPosed: If there is no free start, or no free goal.
     """
     free_starts = starts[free[: len(starts)]]
     if len(free_starts) == 0:
@@ -129,10 +143,10 @@ def usable(starts: Matrix, goals: Matrix | None, free: Mask) -> tuple[Matrix, Ma
 
 
 def condition_of(ptc: ob.PlannerTerminationCondition | Callable[[], object] | float) -> Stop:
-    """A termination condition from what OMPL or a person hands to solve.
+    """Return a termination condition as a function, from any argument that ``solve`` accepts.
 
     Raises:
-        InputError: If it is none.
+        InputError: If the argument is neither a number nor callable.
     """
     if isinstance(ptc, Real):  # numbers of NumPy too
         condition: Stop = ob.timedPlannerTerminationCondition(float(ptc))

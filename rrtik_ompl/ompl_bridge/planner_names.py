@@ -1,6 +1,6 @@
-"""Planners by name: ours, those of other packages, OMPL's, and ``file.py:Class`` for those in anybody's Python files.
+"""Planners by name: this library's, those of other packages, OMPL's, and ``file.py:Class`` for classes in files.
 
-A file is run, as ``import`` would.
+A file is executed, as by ``import``.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ from rrtik_ompl.files.digest import sha256
 from rrtik_ompl.ompl_bridge.planner_options import planner_options
 from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory, ompl_planners
 
-AUTO = "auto"  # a portfolio of planners, which `plan()` runs where none is named
+AUTO = "auto"  # a portfolio of planners, which `plan()` runs if none is named
 
-MARK = ".py:"  # of the name of a class in a file
+MARK = ".py:"  # in the name of a class in a file
 
 _OMPL_PREFIX, _MOVEIT_SUFFIX = "geometric::", "kConfigDefault"  # as in ompl_planning.yaml
 
 
 def list_planners() -> tuple[str, ...]:
-    """Names of all planners: "auto", ours and those of other packages in lower case, OMPL's as OMPL writes them.
+    """Return the names of all planners: "auto", those of packages in lower case, and OMPL's as OMPL writes them.
 
     Example:
         >>> rrtik.list_planners()[:3]
@@ -41,7 +41,7 @@ def list_planners() -> tuple[str, ...]:
 
 
 def is_auto(name: str) -> bool:
-    """Whether a name means the portfolio, which is no class.
+    """Check whether a name stands for the portfolio, which has no class.
 
     Raises:
         InputError: If it is no name.
@@ -51,7 +51,7 @@ def is_auto(name: str) -> bool:
 
 
 def refuse_options(given: Iterable[str]) -> None:
-    """Refuse options of the portfolio, which takes none.
+    """Raise an InputError if options are given for the portfolio, which takes none.
 
     Raises:
         InputError: If there are any.
@@ -61,22 +61,22 @@ def refuse_options(given: Iterable[str]) -> None:
 
 
 def options_of(name: str) -> tuple[str, ...]:
-    """Names of the options that a planner takes; the portfolio takes none.
+    """Return the names of the options of a planner; the portfolio has none.
 
     Raises:
-        UnknownNameError: If there is no such planner; carries all names.
+        UnknownNameError: If there is no such planner; the error carries all names.
     """
     return () if is_auto(name) else tuple(planner_options(find_planner(name)))
 
 
 def find_planner(name: str) -> PlannerFactory:
-    """The planner class of a name, in upper or lower case; MoveIt's way of writing OMPL's names is understood too.
+    """Return the planner class of a name, in upper or lower case; MoveIt's spelling of OMPL's names is accepted too.
 
-    ``file.py:Class`` is a class in anybody's file, which is run for that.
+    ``file.py:Class`` is a class in a file, which is executed.
 
     Raises:
-        InputError: If there is no such file, or it cannot be run.
-        UnknownNameError: If there is none, as of "auto"; carries all names.
+        InputError: If there is no such file, or it cannot be executed.
+        UnknownNameError: If there is no class of that name, as for "auto"; the error carries all names.
     """
     if is_planner_file(name):
         return planner_of_file(name)
@@ -91,32 +91,32 @@ def find_planner(name: str) -> PlannerFactory:
 
 @cache
 def _wheel() -> Mapping[str, PlannerFactory]:
-    """OMPL's planners by their names in lower case."""
+    """Return OMPL's planners by their names in lower case."""
     return {name.lower(): planner for name, planner in ompl_planners().items()}
 
 
 def is_planner_file(name: str) -> bool:
-    """Whether a name is that of a class in a Python file."""
+    """Check whether a name is that of a class in a Python file."""
     return MARK in name
 
 
 def label_of(name: str) -> str:
-    """``Class`` of ``file.py:Class``; any other name as it is."""
+    """Return ``Class`` for ``file.py:Class``; any other name as it is."""
     return name.rpartition(":")[2] if is_planner_file(name) else name
 
 
 def planner_in_folder(name: str, folder: Path) -> str:
-    """The name with a path that does not depend on the current folder; a relative one begins at ``folder``."""
+    """Return the name with an absolute path; a relative one is relative to ``folder``."""
     file, _, wanted = name.rpartition(":")
     return f"{(folder / file).resolve()}:{wanted}"
 
 
 def planner_of_file(name: str) -> PlannerFactory:
-    """The planner class in a file, ``file.py:Class``; the file is run once a process.
+    """Return the planner class in a file, ``file.py:Class``; the file is executed once per process.
 
     Raises:
-        InputError: If the file cannot be read or run, or what it calls so is no planner.
-        UnknownNameError: If it has no such class; carries the names of its planners.
+        InputError: If the file cannot be read or executed, or the name is not that of a planner class.
+        UnknownNameError: If it has no such class; the error carries the names of its planners.
     """
     file, _, wanted = name.rpartition(":")
     path = Path(file)

@@ -1,4 +1,4 @@
-"""Options of planners: their names, and a planner made with them, one of ours or one of OMPL's."""
+"""Options of planners: their names, and the construction of planners with them."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from rrtik_ompl.world.problem import Problem
 
 
 def is_safe(factory: PlannerFactory) -> TypeGuard[type[SafePlanner]]:
-    """Whether a planner is a class derived from SafePlanner."""
+    """Check whether a planner is a class derived from SafePlanner."""
     return isinstance(factory, type) and issubclass(factory, SafePlanner)
 
 
 @lru_cache(maxsize=64)
 def planner_options(factory: PlannerFactory) -> tuple[str, ...]:
-    """Names of the options that a planner takes, sorted; those of OMPL's planners in snake case."""
+    """Return the sorted names of the options of a planner; those of OMPL's planners in snake case."""
     if is_safe(factory):
         return tuple(sorted(factory.default_options()))
     setters = {s for s in dir(factory) if s.startswith("set") and not hasattr(ob.Planner, s)}
@@ -33,10 +33,10 @@ def planner_options(factory: PlannerFactory) -> tuple[str, ...]:
 
 
 def check_options(factory: PlannerFactory, name: str, keys: Iterable[str]) -> None:
-    """Refuse options that a planner does not have.
+    """Raise an error if a planner does not have one of the given options.
 
     Raises:
-        UnknownNameError: It names the option.
+        UnknownNameError: It carries the name of the option.
     """
     options = planner_options(factory)
     for key in keys:
@@ -56,10 +56,10 @@ def safe_planner(
     seed: int,
     options: Mapping[str, Any],
 ) -> SafePlanner:
-    """A planner derived from SafePlanner, for a problem.
+    """Make a planner derived from SafePlanner for a problem.
 
     Raises:
-        UnknownNameError: If it has no option of a name.
+        UnknownNameError: If it has no option of that name.
         InputError: If it refuses an option.
     """
     if options:
@@ -77,9 +77,9 @@ def safe_planner(
 
 
 def reseed(planner: SafePlanner, seed: int) -> None:
-    """Give a planner another seed, as one made with it would have; for planners with the trait ``reseeded``."""
+    """Give a planner another seed, so that it acts as one made with it; for planners with the trait ``reseeded``."""
     planner.seed = seed
-    planner.__dict__.pop("rng", None)  # made anew when it is first used
+    planner.__dict__.pop("rng", None)  # it is made again when it is first used
 
 
 def other_planner(
@@ -89,10 +89,10 @@ def other_planner(
     definition: ob.ProblemDefinition,
     options: Mapping[str, Any],
 ) -> ob.Planner:
-    """A planner of OMPL, or any other, whose options are set through setters: ``goal_bias`` through ``setGoalBias``.
+    """Make a planner of OMPL or a third-party one, whose options are set by setters: ``goal_bias`` by ``setGoalBias``.
 
     Raises:
-        UnknownNameError: If it has no option of a name.
+        UnknownNameError: If it has no option of that name.
         InputError: If it cannot be made, or refuses an option.
     """
     try:
@@ -115,7 +115,7 @@ def other_planner(
 
 
 def _why_not_made(factory: PlannerFactory, error: TypeError) -> str:
-    """Why a planner cannot be made from a SpaceInformation, in one line."""
+    """Return why a planner cannot be made from a SpaceInformation, in one line."""
     if ".control" in str(getattr(factory, "__module__", "")):
         return "it plans with controls, which the configurations of an arm have none of; use one of ompl.geometric"
     return f"it cannot be made from an ompl.base.SpaceInformation: {str(error).splitlines()[0]}"

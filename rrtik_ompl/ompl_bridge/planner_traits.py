@@ -1,7 +1,7 @@
-"""What `plan()` has to know of a planner: traits of its class; and the table of the traits of OMPL's own planners.
+"""Traits of planner classes, which `plan()` reads, and the table of the traits of OMPL's own planners.
 
-A class of anybody states its traits as attributes of these names (:class:`~rrtik_ompl.ompl_bridge.SafePlanner` lists
-them with their defaults). Nothing else in the library knows a planner by its name.
+Any class states its traits as attributes of these names (:class:`~rrtik_ompl.ompl_bridge.SafePlanner` lists them with
+their defaults). No other part of the library refers to planners by name.
 """
 
 from __future__ import annotations
@@ -24,27 +24,27 @@ class PlannerTraits:
     """Traits of a planner's class.
 
     Attributes:
-        anytime: It goes on improving its path until the time is up. An optimal path touches what it goes round, so its
-            motions are checked as densely as by the second check.
-        leaves_room: It keeps a clearance itself, where it costs nothing that it values more; its option ``clearance``
-            says how much [m].
+        anytime: The planner improves its path until the time is up. An optimal path touches the obstacles that it goes
+            round, so its motions are checked as densely as by the second check.
+        leaves_room: It keeps a clearance itself, if that does not worsen its objective; its option ``clearance`` gives
+            the amount [m].
         one_goal: It gets the first goal configuration alone.
-        finds_goals: A goal of the tip, given as the option ``goal``, is enough for it: `plan()` computes no goal
-            configurations. ``needs_goals()`` of a SafePlanner says it of one that was made, to ``solve``.
-        straight_first: The straight motion to the nearest goal is tried before it.
+        finds_goals: It only needs a goal of the tip, given as the option ``goal``: `plan()` computes no goal
+            configurations. ``needs_goals()`` of a SafePlanner says the same of a planner object, to ``solve``.
+        straight_first: The straight motion to the nearest goal is tried before the planner.
         has_graph: Its trees can be counted afterwards.
-        supports_iteration_limit: A short attempt, ended by a number of iterations (the option ``max_iterations`` of a
-            SafePlanner) or of checked motions (any other), can be of use.
-        path_statistics: Names of its statistics that describe the path, not the work: they are not added up.
+        supports_iteration_limit: A short attempt can be useful that is ended by a number of iterations (the option
+            ``max_iterations`` of a SafePlanner) or of checked motions (any other planner).
+        path_statistics: Names of its statistics that describe the path, not the work, so that they are not added up.
         kernels: Names of the kernel libraries that it may use.
         one_joint: Its paths move one joint at a time.
-        brief_options: Options with which it stops at the first path that is good, without improving it; none if it has
-            no such options. The pilot's routes are planned by the first ``one_joint`` planner that has some.
-        proof_iterations: Its ``max_iterations`` where it is to prove that a generated problem has a solution; 0 if it
-            is not used for that. So what it finds decides which problems a seed gives.
-        keeps_constraints: It keeps the path constraints of a problem; any other planner is refused there.
-        reseeded: A SafePlanner that searches as one made anew once its seed is another, so that one object serves many
-            queries (:func:`rrtik_ompl.plan_many`): nothing that it keeps depends on the seed but ``rng``.
+        brief_options: Options with which it stops at the first good path, without improving it; empty if it has no such
+            options. The pilot's routes are planned by the first ``one_joint`` planner that has some.
+        proof_iterations: Its ``max_iterations`` when it has to prove that a generated problem has a solution; 0 if it
+            is not used for that. The paths that it finds decide which problems a seed gives.
+        keeps_constraints: It keeps the path constraints of a problem; any other planner is refused for such a problem.
+        reseeded: A SafePlanner that searches like a new one after its seed was changed, so that one object serves many
+            queries (:func:`rrtik_ompl.plan_many`): only ``rng`` depends on the seed.
     """
 
     anytime: bool = False
@@ -65,7 +65,7 @@ class PlannerTraits:
 
 ANYTIME = PlannerTraits(anytime=True, supports_iteration_limit=False)
 
-# What is not listed has the default traits.
+# Planners that are not listed have the default traits.
 # - PRM and PRMstar take up further goals in a second thread. It has motions checked by Python under a lock of the
 #   roadmap, for which the first thread waits while it holds Python's lock: with more than one goal they hang.
 # - AORRTC [15] gives up when it is led from one goal to another: with 16 goals of a UR5 its paths were thrice as long
@@ -99,13 +99,13 @@ _UNBOUND = (
 
 @cache
 def ompl_planners() -> dict[str, type[ob.Planner]]:
-    """OMPL's geometric planners of the installed wheel by their names."""
+    """Return the geometric planners of the installed OMPL wheel by their names."""
     found = {key: value for key, value in vars(og).items() if isinstance(value, type) and issubclass(value, ob.Planner)}
     return {key: value for key, value in found.items() if value is not ob.Planner}
 
 
 def unbound_planners() -> tuple[str, ...]:
-    """Names of OMPL's geometric planners that the installed wheel lacks."""
+    """Return the names of OMPL's geometric planners that the installed wheel lacks."""
     offered = ompl_planners()
     return tuple(name for name in _UNBOUND.split() if name not in offered)
 
@@ -115,7 +115,7 @@ OMPL_TRAITS = {planner: _LISTED.get(name, PlannerTraits()) for name, planner in 
 
 @lru_cache(maxsize=64)
 def traits_of(factory: PlannerFactory) -> PlannerTraits:
-    """The traits of a planner: of OMPL's from the table, else the attributes of the class, as far as it has them."""
+    """Return the traits of a planner: from the table for OMPL's planners, else from the attributes of the class."""
     if isinstance(factory, type) and factory in OMPL_TRAITS:
         return OMPL_TRAITS[factory]
     stated = {each.name: getattr(factory, each.name) for each in fields(PlannerTraits) if hasattr(factory, each.name)}
@@ -123,7 +123,7 @@ def traits_of(factory: PlannerFactory) -> PlannerTraits:
 
 
 def planners_with(condition: Callable[[PlannerTraits], object]) -> dict[str, PlannerTraits]:
-    """The planners that packages offer whose traits meet a condition, by their names, sorted; OMPL's are left out."""
+    """Return the planners of packages whose traits meet a condition, by name, sorted; OMPL's are left out."""
     offered: dict[str, PlannerFactory] = {name: catalog.find_planner(name) for name in catalog.list_planners()}
     stated = {name: traits_of(factory) for name, factory in offered.items()}
     return {name: traits for name, traits in stated.items() if condition(traits)}

@@ -1,4 +1,4 @@
-"""Path constraints for anybody's OMPL code: an ``ompl.base.Constraint``, and a ProjectedStateSpace [18] made of it."""
+"""Path constraints for users' own OMPL code: an ``ompl.base.Constraint``, and a ProjectedStateSpace [18] with it."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from rrtik_ompl.ompl_bridge.setup import bounded_space
 from rrtik_ompl.ompl_bridge.states import StateIO
 from rrtik_ompl.world.problem import Problem
 
-STEP = 0.2  # [rad; m] between two projections; each of them asks Python some ten times
-DETOUR = 2.0  # a motion that gets this much longer by projection is none, as in OMPL
+STEP = 0.2  # [rad; m] distance between two projections, each of which calls Python about ten times
+DETOUR = 2.0  # a motion that projection makes longer by this factor is rejected, as in OMPL
 
 
 class RegionConstraint(ob.Constraint):  # type: ignore[misc]  # OMPL has no types
-    """The path constraints of a problem as ``function`` and ``jacobian`` of OMPL.
+    """The path constraints of a problem as ``function`` and ``jacobian`` for OMPL.
 
     Args:
-        problem: With path constraints.
+        problem: A problem with path constraints.
 
     Raises:
         InputError: If it has none.
@@ -41,18 +41,18 @@ class RegionConstraint(ob.Constraint):  # type: ignore[misc]  # OMPL has no type
         self._constraints = constraints
 
     def function(self, x: Vector, out: Vector) -> None:
-        """Write the values of the equations at x, shape (dof,)."""
+        """Write the residuals of the equations at x, shape (dof,), into ``out``, shape (k,)."""
         out[:] = equations(self._robot, self._constraints, np.array(x))[0]
 
     def jacobian(self, x: Vector, out: Matrix) -> None:
-        """Write their derivatives, shape (k, dof)."""
+        """Write the Jacobian of the equations at x, shape (dof,), into ``out``, shape (k, dof)."""
         out[:] = equations(self._robot, self._constraints, np.array(x))[1]
 
 
 class ProjectedMotions(ob.MotionValidator):  # type: ignore[misc]  # OMPL has no types
-    """Motions along a constraint, in the steps that OMPL's ProjectedStateSpace makes of them, each checked by a world.
+    """Checks motions along a constraint, in the steps that OMPL's ProjectedStateSpace makes, each step by a world.
 
-    OMPL's own validator looks at the ends of the steps alone, and an obstacle may stand between them.
+    OMPL's own validator only checks the ends of the steps, so it may miss an obstacle between them.
     """
 
     def __init__(self, si: ob.SpaceInformation, problem: Problem, constraint: RegionConstraint) -> None:
@@ -63,7 +63,11 @@ class ProjectedMotions(ob.MotionValidator):  # type: ignore[misc]  # OMPL has no
         self._states = StateIO(si)
 
     def checkMotion(self, first: ob.State, second: ob.State, *_: object) -> bool:
-        """Whether the motion between two states keeps to the constraint, is free, and arrives; called by OMPL."""
+        """Check whether the motion between two states keeps the constraint, is free, and arrives; called by OMPL.
+
+        As in OMPL, each step goes straight towards the end and is projected onto the constraint. The motion is rejected
+        if the projection fails, makes too long a detour or comes no nearer to the end.
+        """
         here = self._states.read(first)
         end = self._states.read(second)
         distance = float(np.linalg.norm(end - here))
@@ -89,17 +93,17 @@ class ProjectedMotions(ob.MotionValidator):  # type: ignore[misc]  # OMPL has no
         return self._step_valid(here, end)
 
     def _step_valid(self, a: Vector, b: Vector) -> bool:
-        """Whether a step, shapes (n,), is free, and its end keeps to the constraint too."""
+        """Check whether a step, shapes (n,), is free, and its end keeps the constraint."""
         return bool(self._world.valid(b) and self._world_without_constraints.motion_valid(a, b))
 
 
 def projected_space(problem: Problem, lower: Vector, upper: Vector) -> ob.ConstrainedSpaceInformation:
-    """A SpaceInformation of a ProjectedStateSpace along the path constraints of a problem, with its motions checked.
+    """Return a SpaceInformation of a ProjectedStateSpace along the path constraints of a problem, with checked motions.
 
     Args:
-        problem: With path constraints.
+        problem: A problem with path constraints.
         lower: Lower bounds of the joints, shape (dof,).
-        upper: Upper bounds, shape (dof,).
+        upper: Upper bounds of the joints, shape (dof,).
     """
     constraint = RegionConstraint(problem)
     space = ob.ProjectedStateSpace(bounded_space(lower, upper).getStateSpace(), constraint)

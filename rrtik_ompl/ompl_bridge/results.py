@@ -1,4 +1,4 @@
-"""What a search of a planner brings back: a path, counts, what was grown; and why a ``solve`` could not be done."""
+"""Results of a planner's search: path, counts and graph; and the reason why a ``solve`` was impossible."""
 
 from __future__ import annotations
 
@@ -24,15 +24,16 @@ Tree: TypeAlias = tuple[Matrix, ArrayLike]  # vertices, and the number of each o
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SearchResult:
-    """What a search brings back.
+    """The result of a search.
 
     Attributes:
-        path: Start first, shape (k, n), or None if there is none.
+        path: Waypoints, start first, shape (k, n), or None if there is no path.
         statistics: Plain counts of the search.
         difference: Distance from the end of the path to the goal [unit of the space]; 0 if the path is exact.
         reason: Why there is no exact path, if the search can say it.
-        graph: What was grown, by :meth:`SafePlanner.grown`, if anybody wants to know.
-        progress: Pairs of a time since the search began [s] and the length of the best path then; of one that improves.
+        graph: The grown graph, by :meth:`SafePlanner.grown`, if it is wanted.
+        progress: Pairs of a time since the search began [s] and the length of the best path at that time; for searches
+            that improve their path.
     """
 
     path: Matrix | None
@@ -45,11 +46,11 @@ class SearchResult:
 
 @dataclass(frozen=True, slots=True)
 class Failure:
-    """Why a ``solve`` broke off.
+    """Why a ``solve`` broke.
 
     Attributes:
-        refused: Whether the planner refused its options or what they mean for the problem: an InputError.
-        summary: In one line, without the type of an InputError.
+        refused: Whether the planner refused its options, or their meaning for the problem, by an InputError.
+        summary: One line, without the type if it is an InputError.
     """
 
     refused: bool
@@ -57,7 +58,7 @@ class Failure:
 
 
 class IllPosed(Exception):
-    """The problem definition gives nothing to search between."""
+    """Raised if a problem definition has no starts or goals to search between."""
 
     def __init__(self, status: ob.PlannerStatus, reason: str) -> None:
         super().__init__(reason)
@@ -66,23 +67,24 @@ class IllPosed(Exception):
 
 
 def failure_of(error: BaseException) -> Failure:
-    """What an exception that left a search means."""
+    """Return the failure that an exception from a search stands for."""
     if isinstance(error, InputError):
         return Failure(True, str(error))
     return Failure(False, f"{type(error).__name__}: {error}".removesuffix(": ") + _hint(error))
 
 
 def _hint(error: BaseException) -> str:
-    """What probably caused an exception of the bindings that does not say so."""
+    """Return the probable cause of an exception of the bindings that does not name it; "" for other exceptions."""
     if "bad_cast" not in str(error):
         return ""
     return "; a callback returned a value of the wrong type: a validity checker must return a Python bool"
 
 
 def explained(error: BaseException) -> str:
-    """An exception with its traceback; one of ours, which says what to do, in its line.
+    """Return an exception with its traceback as text; for the library's own errors their line alone.
 
-    Drops the frames, which would keep borrowed states of a callback alive.
+    Removes the traceback from the exception and its causes in place, because its frames would keep borrowed states
+    alive.
     """
     known = isinstance(error, RrtikError)
     text = str(error) if known else "".join(traceback.format_exception(error)).strip() + _hint(error)
@@ -96,7 +98,7 @@ def explained(error: BaseException) -> str:
 
 
 def status_of(found: SearchResult) -> ob.PlannerStatus:
-    """OMPL's word for what a search brought back."""
+    """Return OMPL's status for the result of a search."""
     if found.path is None:
         return ob.PlannerStatus.TIMEOUT
     return ob.PlannerStatus.APPROXIMATE_SOLUTION if found.difference > 0.0 else ob.PlannerStatus.EXACT_SOLUTION
@@ -104,14 +106,14 @@ def status_of(found: SearchResult) -> ob.PlannerStatus:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlannerGraph:
-    """What a planner has grown in its last ``solve``. The arrays are read-only.
+    """The graph that a planner has grown in its last ``solve``. The arrays are read-only.
 
     Attributes:
         vertices: Configurations, shape (v, n) [unit of the space].
-        edges: Pairs of vertices whose motion was found free, shape (e, 2); of a tree the parent first.
+        edges: Index pairs of vertices whose motion was found free, shape (e, 2); in a tree the parent comes first.
         costs: Length of each edge, shape (e,) [unit of the space].
-        starts: Numbers of the vertices that are starts.
-        goals: Likewise of goals.
+        starts: Indices of the vertices that are starts.
+        goals: Indices of the vertices that are goals.
     """
 
     vertices: Matrix
@@ -121,10 +123,10 @@ class PlannerGraph:
     goals: Numbers
 
     def save(self, file: str | os.PathLike[str]) -> None:
-        """Write it as GraphML, which Gephi, NetworkX, igraph and others read.
+        """Write the graph as GraphML, which Gephi, NetworkX, igraph and others read.
 
-        The coordinates of a vertex are in ``coords``, divided by commas, as OMPL writes them; ``weight`` of an edge is
-        its cost.
+        The coordinates of a vertex are in ``coords``, separated by commas, as OMPL writes them; ``weight`` of an edge
+        is its cost.
 
         Raises:
             InputError: If the file cannot be written.
@@ -132,10 +134,10 @@ class PlannerGraph:
         write_text(os.fspath(file), "\n".join([*_graph_ml(self), ""]))
 
     def planner_data(self, si: ob.SpaceInformation) -> ob.PlannerData:
-        """The graph as ``ompl.base.PlannerData``, which has its own copies of the states.
+        """Return the graph as ``ompl.base.PlannerData``, which has its own copies of the states.
 
         Args:
-            si: Of the planner.
+            si: The SpaceInformation of the planner.
         """
         io = StateIO(si)
         data = ob.PlannerData(si)
@@ -162,13 +164,13 @@ class PlannerGraph:
 
 
 def graph_of(vertices: Matrix, edges: ArrayLike, starts: ArrayLike = (), goals: ArrayLike = ()) -> PlannerGraph:
-    """A graph; its costs are the lengths of its edges.
+    """Return a graph whose costs are the lengths of its edges.
 
     Args:
         vertices: Shape (v, n).
-        edges: Pairs of vertices, shape (e, 2).
-        starts: Numbers of vertices.
-        goals: Likewise.
+        edges: Index pairs of vertices, shape (e, 2).
+        starts: Indices of vertices.
+        goals: Indices of vertices.
     """
     pairs = np.asarray(edges, dtype=np.int64).reshape(-1, 2)
     costs = np.linalg.norm(vertices[pairs[:, 1]] - vertices[pairs[:, 0]], axis=1)
@@ -177,7 +179,7 @@ def graph_of(vertices: Matrix, edges: ArrayLike, starts: ArrayLike = (), goals: 
 
 
 def graph_of_trees(starts: Tree, goals: Tree | None = None) -> PlannerGraph:
-    """A graph of a tree that grows from starts and, if there is one, a tree that grows from goals."""
+    """Return the graph of a tree grown from starts and, if there is one, a tree grown from goals."""
     rows = []
     edges = []
     roots = []
@@ -197,17 +199,23 @@ def graph_of_trees(starts: Tree, goals: Tree | None = None) -> PlannerGraph:
 
 
 def graph_of_path(path: Matrix) -> PlannerGraph:
-    """A path, shape (k, n), as a graph: what is left of a planner that keeps no tree."""
+    """Return a path, shape (k, n), as a graph, for planners that keep no tree."""
     steps = np.arange(len(path) - 1)
     return graph_of(path, np.stack([steps, steps + 1], axis=1), [0], [len(path) - 1])
 
 
 def without(rows: Matrix, parents: NDArray[np.integer], is_kept: NDArray[np.bool_]) -> Tree:
-    """A tree without the vertices that are not kept and those below them."""
+    """Return a tree without the vertices that are not kept and their descendants.
+
+    Args:
+        rows: Vertices, shape (v, n).
+        parents: Index of each vertex's parent, below 0 for a root, shape (v,).
+        is_kept: Which vertices are kept, shape (v,).
+    """
     remains = is_kept.copy()
     parent_or_0 = np.where(parents < 0, 0, parents)
 
-    # A round drops the children of those that the one before it dropped.
+    # Each round drops the children of the vertices that the round before dropped.
     while True:
         still_remains = remains & ((parents < 0) | remains[parent_or_0])
         if (still_remains == remains).all():
@@ -219,14 +227,15 @@ def without(rows: Matrix, parents: NDArray[np.integer], is_kept: NDArray[np.bool
 
 
 def nearest_approach(graph: PlannerGraph, goals: Matrix) -> tuple[Matrix, float] | None:
-    """The way from a start, along edges, to the vertex nearest to a goal; and how far from it that is.
+    """Find the vertex that is nearest to a goal, and return the way to it along edges from a start.
 
     Args:
-        graph: Grown by a planner.
+        graph: The graph of a planner.
         goals: Shape (g, n).
 
     Returns:
-        The way, shape (k, n), and the distance [unit of the space]; None if nothing is nearer than a start.
+        The way, shape (k, n), and its distance from the goal [unit of the space]; None if nothing is nearer than a
+        start.
     """
     predecessors = _predecessors(graph)
     if not predecessors:
@@ -246,7 +255,7 @@ def nearest_approach(graph: PlannerGraph, goals: Matrix) -> tuple[Matrix, float]
 
 
 def _predecessors(graph: PlannerGraph) -> dict[int, int]:
-    """The vertices to which edges lead from a start, each with the one before it, -1 for a start."""
+    """Return the vertices that edges reach from a start, each with its predecessor, -1 for a start."""
     leaving: dict[int, list[int]] = {}
     for first, second in graph.edges.tolist():
         leaving.setdefault(first, []).append(second)

@@ -1,8 +1,8 @@
-"""The base of every planner of ours: it handles OMPL's objects so that a planner only sees arrays.
+"""The base class of array planners: it handles OMPL's objects, so that a planner only sees arrays.
 
-OMPL's Python bindings hand out borrowed C++ objects that must not outlive their owner, and an exception that leaves
-``solve`` ends a whole benchmark. Hence the rules kept here: C++ objects live in local variables, states are copied to
-arrays at once, and ``solve`` always returns a status.
+OMPL's Python bindings return borrowed C++ objects that must not outlive their owner, and an exception that leaves
+``solve`` ends a whole benchmark. This class therefore keeps C++ objects in local variables, copies states to arrays at
+once, and always returns a status from ``solve``.
 """
 
 from __future__ import annotations
@@ -46,13 +46,13 @@ from rrtik_ompl.world.motion_queries import MotionQueries, turning_joints
 from rrtik_ompl.world.route_check import route_violations, verification_resolution
 from rrtik_ompl.world.world import World, form_of
 
-SEARCHES = 20  # until a world's second check takes a path
+SEARCHES = 20  # limit of the searches until the second check of a world accepts a path
 FILLED_IN = ("world", "seed", "goal")  # options that `plan()` fills in
 GIVEN = "_given"  # the attribute that keeps the arguments of a planner's constructor
 
 
 class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
-    """Base class: a subclass implements :meth:`search` on arrays and is a complete ``ompl.base.Planner``.
+    """Base class of planners: a subclass implements :meth:`search` on arrays and is a complete ``ompl.base.Planner``.
 
     Every ``solve`` is a new attempt from the starts and goals of the problem definition; nothing is kept from an
     earlier one except the state of the random generator. ``solve`` never raises an Exception: it returns ``CRASH`` and
@@ -60,21 +60,22 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
     does the same without OMPL's states and goals.
 
     A planner refuses options by an InputError, from its constructor or, if it depends on starts and goals, from
-    :meth:`search`. The options are the keyword parameters of the constructor; ``world``, ``seed`` and, for planners
-    that want the goal of the tip, ``goal`` are filled in by `plan()`.
+    :meth:`search`. The options are the keyword parameters of the constructor; `plan()` fills in ``world``, ``seed``
+    and, for planners that have this parameter, ``goal``.
 
-    Traits of the class, for `plan()`, are explained at :class:`~rrtik_ompl.ompl_bridge.planner_traits.PlannerTraits`;
-    one with ``supports_iteration_limit`` has the option ``max_iterations``.
+    The traits of the class, which `plan()` reads, are explained at
+    :class:`~rrtik_ompl.ompl_bridge.planner_traits.PlannerTraits`; a class with ``supports_iteration_limit`` has the
+    option ``max_iterations``.
 
     Attributes:
-        seed: The seed in use; given, or drawn from OMPL's, so that ``ompl.util.RNG.setSeed`` fixes it too.
-        rng: The generator for :meth:`search`.
+        seed: The seed in use; given, or drawn from OMPL's generator, so that ``ompl.util.RNG.setSeed`` fixes it too.
+        rng: The random generator for :meth:`search`.
         statistics: Counts of the last ``solve``, plain ints and floats.
-        error: Why the last ``solve`` could not be done, with the traceback if it broke off, or None.
-        failure: Why the last ``solve`` broke off, or None.
-        reason: Why the last ``solve`` was done in vain, if the search could say it.
-        progress: Pairs of a time since the last ``solve`` began [s] and the length of the best path then.
-        graph_wanted: For :meth:`search`: whether anybody can ask for the graph afterwards.
+        error: Why the last ``solve`` was impossible or broke, with the traceback if it broke; else None.
+        failure: Why the last ``solve`` broke, or None.
+        reason: Why the last ``solve`` found no path, if the search could say it; else "".
+        progress: Pairs of a time since the last ``solve`` began [s] and the length of the best path at that time.
+        graph_wanted: For :meth:`search`: whether the graph can be asked for afterwards.
     """
 
     anytime: ClassVar[bool] = False
@@ -102,8 +103,8 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         Args:
             si: ``ompl.base.SpaceInformation`` of a RealVectorStateSpace, an SO2StateSpace or a compound of them.
             name: Name for OMPL's reports.
-            world: Checks configurations and motions instead of ``si``, if given.
-            seed: At least 0; drawn from OMPL's if None.
+            world: If given, it checks configurations and motions instead of ``si``.
+            seed: At least 0; None draws one from OMPL's generator.
 
         Raises:
             InputError: If the space is of another kind or the seed is no such number.
@@ -126,19 +127,20 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
 
     @cached_property
     def rng(self) -> np.random.Generator:
-        """Random numbers, from the seed; made when they are first used, which takes as long as an easy search."""
+        """The random generator; made when it is first used, because that takes as long as an easy search."""
         return np.random.default_rng(self.seed)
 
     @classmethod
     def default_options(cls) -> dict[str, Any]:
-        """The options that the planner takes, with their defaults."""
+        """Return the options of the planner with their defaults."""
         return {name: default for name, default in keyword_parameters(cls).items() if name not in FILLED_IN}
 
     def set(self, name: str, value: object) -> None:
-        """Change an option, by its name in the constructor; a text such as "0.3" is read as a number.
+        """Change an option by its name in the constructor; a text such as "0.3" is read as a number.
 
         Raises:
-            InputError: If there is no such option, or the planner refuses the value; it is as it was then.
+            InputError: If there is no such option, or the planner refuses the value; the option then keeps its old
+                value.
         """
         change(self, name, value)
 
@@ -147,39 +149,44 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         return options_of(self)
 
     def graph(self) -> PlannerGraph:
-        """What the last ``solve`` by OMPL has grown: vertices, edges that were found free, their costs.
+        """Return the graph of the last ``solve`` by OMPL: vertices, edges that were found free, and their costs.
 
-        Of a planner that keeps no tree, its path; `plan()` keeps none.
+        For a planner that keeps no tree this is its path; `plan()` keeps no graph.
 
         Raises:
-            PlannerError: If there is none: nothing was solved since the planner was made or cleared.
+            PlannerError: If there is no graph, because nothing was solved since the planner was made or cleared.
         """
         if self._graph is None:
             raise PlannerError(f"{self.getName()}: there is no graph; use planner.solve(), or solve of a SimpleSetup")
         return self._graph
 
     def grown(self, starts: Callable[[], Tree], goals: Callable[[], Tree] | None = None) -> PlannerGraph | None:
-        """The graph of trees, for the result of :meth:`search`; None if nobody can ask for it. For subclasses."""
+        """Return the graph of trees for the result of :meth:`search`; None if no graph is wanted. For subclasses.
+
+        Args:
+            starts: Returns the tree from the starts; only called if the graph is wanted.
+            goals: Returns the tree from the goals, if there is one.
+        """
         if not self.graph_wanted:
             return None
         return graph_of_trees(starts(), None if goals is None else goals())
 
     def search(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Stop) -> SearchResult:
-        """Look for a path from any start to any goal until ``ptc()`` is true. For subclasses.
+        """Search for a path from any start to any goal until ``ptc()`` is true. Implemented by subclasses.
 
         Args:
             starts: Free configurations, shape (s, n), s at least 1.
-            goals: Free configurations, shape (g, n), g at least 1, or 0 if :meth:`needs_goals` says so.
+            goals: Free configurations, shape (g, n), g at least 1, or 0 if :meth:`needs_goals` returns False.
             checker: Checks configurations and motions.
-            ptc: Call it: true when it is time to stop.
+            ptc: Returns True when it is time to stop.
         """
         raise NotImplementedError(f"{type(self).__name__} has no search()")
 
     def needs_goals(self) -> bool:
-        """Whether this planner's search needs goal configurations. For subclasses that can do without.
+        """Check whether the search needs goal configurations; overridden by subclasses that do not.
 
-        ``solve`` asks it of a planner that was made, which may depend on its options. The trait ``finds_goals`` is of
-        the class: `plan()` reads it before there is a planner.
+        ``solve`` asks this of a planner object, so the answer may depend on its options. The trait ``finds_goals``
+        belongs to the class: `plan()` reads it before there is a planner.
         """
         return True
 
@@ -189,9 +196,10 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         """Solve the problem of the problem definition; called by OMPL.
 
         Args:
-            ptc: ``PlannerTerminationCondition``, a function that is true when it is time to stop, or a time in seconds.
-            interval: Of OMPL's form with a function, how often a thread of OMPL would call it. Not used: the search
-                itself calls it, for an exception in that thread would end the process.
+            ptc: ``PlannerTerminationCondition``, a function that returns True when it is time to stop, or a time in
+                seconds.
+            interval: How often a thread of OMPL would call the function. Not used: the search itself calls it, because
+                an exception in that thread would end the process.
 
         Returns:
             ``ompl.base.PlannerStatus``.
@@ -207,9 +215,9 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
 
         Args:
             starts: Configurations inside the bounds, shape (s, n).
-            goals: Likewise, shape (g, n); none are needed if :meth:`needs_goals` says so.
-            bounds: Lower and upper ones, shapes (n,), finite; those of the planner's space.
-            stop: Call it: true when it is time to stop.
+            goals: Configurations inside the bounds, shape (g, n); none are needed if :meth:`needs_goals` returns False.
+            bounds: Finite lower and upper bounds of the planner's space, shapes (n,).
+            stop: Returns True when it is time to stop.
             checked: Whether starts and goals are known to be free.
 
         Returns:
@@ -243,9 +251,9 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         return motions_are_free and not _refusal_of_second_check(self._second_check_world, rows)
 
     def bounds(self) -> tuple[Vector, Vector]:
-        """Lower and upper bounds, shapes (n,), read-only, as they were when ``solve`` was last called.
+        """Return lower and upper bounds, shapes (n,), read-only, as they were when ``solve`` was last called.
 
-        Angles of SO(2) are laid out on a line: they go from a turn below the first start to a turn above it.
+        Angles of SO(2) are unrolled onto a line: their bounds are a turn below and a turn above the first start.
         """
         return self._io.bounds() if self._bounds is None else self._bounds
 
@@ -256,16 +264,16 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
 
     @property
     def _io(self) -> StateIO:
-        """Copies states, made when it is first used."""
+        """The converter between states and arrays, made when it is first used."""
         if self._states is None:
             self._states = StateIO(self.getSpaceInformation())  # holds the space, which knows nothing of planners
         return self._states
 
     def _run_search(self, search: Callable[[], SearchResult]) -> tuple[ob.PlannerStatus, SearchResult | None]:
-        """Do a search, and take note of why it could not be done or broke off.
+        """Run a search, and record why it was impossible or broke.
 
         Returns:
-            OMPL's status, and what the search brought back; None if it could not be done or broke off.
+            OMPL's status, and the result of the search; None if it was impossible or broke.
         """
         self._forget()
         try:
@@ -283,7 +291,7 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         return status_of(found), found
 
     def _forget(self) -> None:
-        """Set back all that is said of the last ``solve``."""
+        """Reset all attributes that describe the last ``solve``."""
         self.statistics = {}
         self.error = None
         self.failure = None
@@ -292,15 +300,15 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         self._graph = None
 
     def _in_ompl(self, ptc: Stop) -> SearchResult:
-        """Search between the starts and goals of the problem definition, and hand the path to it."""
+        """Search between the starts and goals of the problem definition, and add the path to it."""
         si = self.getSpaceInformation()
         pdef = self.getProblemDefinition()
         if pdef is None:
             raise PlannerError(f"{self.getName()}: no problem definition; use SimpleSetup or setProblemDefinition()")
 
-        self._bounds = self._io.bounds()  # refuses missing ones in clearer words than OMPL
+        self._bounds = self._io.bounds()  # missing bounds are refused in clearer words than OMPL's
         if self._world is None and not si.isSetup():
-            si.setup()  # before it, checkMotion looks at the end point alone
+            si.setup()  # before setup, checkMotion only checks the end point
 
         inputs = self.getPlannerInputStates()
         aimless = not self.needs_goals()
@@ -314,7 +322,7 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
 
         found = self._search_until_accepted(*ends, ptc, unrolled)
         if found.path is None and isinstance(pdef.getGoal(), GoalSampler):
-            pdef.getGoal().more()  # for the next attempt
+            pdef.getGoal().more()  # the next attempt has more goal configurations
         found = self._remember(found, ends[1], time.perf_counter() - began)
 
         is_approximate = found.difference > 0.0
@@ -329,12 +337,13 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
     def _search_until_accepted(
         self, starts: Matrix, goals: Matrix, stop: Stop, unrolled: Unrolled | None
     ) -> SearchResult:
-        """A search, begun anew as long as the second check of a given world refuses its path.
+        """Search, and search again as long as the second check of a given world refuses the path.
 
-        From the second one on, and for planners that improve, motions are checked as densely as by the second check.
+        From the second search on, and for anytime planners from the first on, motions are checked as densely as by the
+        second check.
         """
         world = self._world
-        if not isinstance(world, World):  # the space information has the last word
+        if not isinstance(world, World):  # without a world there is no second check
             return self._search_between_free_ends(starts, goals, stop)
 
         self._second_check_world = world
@@ -357,10 +366,11 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         return replace(found, path=None, difference=0.0, reason=self.reason)
 
     def _remember(self, found: SearchResult, goals: Matrix, seconds: float) -> SearchResult:
-        """Take note of the graph and the progress of a search.
+        """Record the graph and the progress of a search.
 
         Returns:
-            What was found; without a path, the nearest approach to a goal that the graph has, if any.
+            The result of the search; without a path, the nearest approach to a goal in the graph takes its place, if
+            any.
         """
         if found.path is None:
             self._graph = found.graph
@@ -387,10 +397,11 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         return found
 
     def _free_ends(self, starts: Matrix, goals: Matrix, checker: MotionChecker) -> tuple[Matrix, Matrix]:
-        """The free ones of starts and, if needed, goals, at least one each."""
+        """Return the free starts and, if needed, the free goals, at least one of each."""
         if not self.needs_goals():
             return usable(starts, None, checker.valid_batch(starts))
-        free = self.ends_free(np.concatenate([starts, goals]), checker)  # all at once: a call costs more than a check
+        # All are checked in one call, because a call costs more than a check.
+        free = self.ends_free(np.concatenate([starts, goals]), checker)
         return usable(starts, goals, free)
 
 
@@ -407,12 +418,16 @@ def _refusal_of_second_check(world: object, rows: Matrix | None, unrolled: Unrol
 
 
 def keyword_parameters(planner: Callable[..., Any]) -> Mapping[str, Any]:
-    """The parameters of a planner's class but the first one, which is the space information, and their defaults."""
-    return _parameters(planner)  # apart, as lru_cache asks for Hashable, which classes are not to mypy
+    """Return the parameters of a planner's class with their defaults, without the first one, the space information."""
+    # A separate function, because lru_cache requires Hashable arguments and mypy does not count classes as such.
+    return _parameters(planner)
 
 
 def remembering(constructor: Callable[..., None]) -> Callable[..., None]:
-    """A constructor that keeps the options it is given; of constructors that call each other the outermost does."""
+    """Wrap a constructor so that it stores the options it is given.
+
+    If constructors call each other, the options of the outermost one are stored.
+    """
 
     @wraps(constructor)
     def remember(self: object, *arguments: Any, **options: Any) -> None:
@@ -423,18 +438,18 @@ def remembering(constructor: Callable[..., None]) -> Callable[..., None]:
 
 
 def options_of(planner: ob.Planner) -> dict[str, Any]:
-    """The options of a planner with the values in use."""
+    """Return the options of a planner with the values in use."""
     defaults = {name: value for name, value in keyword_parameters(type(planner)).items() if name not in FILLED_IN}
     given = planner.__dict__.get(GIVEN, {})
     return {name: given.get(name, value) for name, value in defaults.items()}
 
 
 def change(planner: ob.Planner, name: str, value: object) -> None:
-    """Change an option of a planner, as its constructor would take it; a text is read as JSON where it is that.
+    """Change an option of a planner as if it had been given to its constructor; a text is read as JSON if possible.
 
     Raises:
         UnknownNameError: If there is no option of that name.
-        InputError: If the planner refuses the value; it is as it was then.
+        InputError: If the planner refuses the value; the option then keeps its old value.
     """
     options = options_of(planner)
     if name not in options:
@@ -446,7 +461,8 @@ def change(planner: ob.Planner, name: str, value: object) -> None:
     except TypeError as error:
         raise InputError(f"planner {planner.getName()}: {name}: {error}") from None
 
-    # All that depends on options, but neither how far its numbers are drawn nor what hangs on its space.
+    # Take over everything that depends on options, but neither the state of the random generator nor objects of the
+    # space.
     settings = {key: each for key, each in vars(made).items() if key not in ("rng", "_states")}
     planner.__dict__.update(settings)
     planner.__dict__[GIVEN] = given

@@ -1,4 +1,4 @@
-"""A problem as OMPL objects: bounded space, validity and motions checked by the world, start and goal."""
+"""A problem as OMPL objects: a bounded space, checks of states and motions by the world, start and goal."""
 
 from __future__ import annotations
 
@@ -22,10 +22,11 @@ from rrtik_ompl.world.world import World
 
 @dataclass(slots=True, eq=False)
 class ValidityCallback:
-    """Counts the checks of a C++ planner and remembers the first error, which must not be raised inside OMPL.
+    """Checks states and motions for a C++ planner, counts the checks, and keeps the first error.
 
-    After the ``deadline`` [s, of ``time.monotonic``] every answer is no, for some planners call for hundreds of checks
-    between two readings of their clock. After ``most_motions`` too, and the planner is stopped.
+    An error must not be raised inside OMPL. After the ``deadline`` [s, of ``time.monotonic``] every answer is False,
+    because some planners make hundreds of checks between two readings of their clock. After ``most_motions`` checks of
+    motions every answer is False, too, and the planner is stopped.
     """
 
     world: World
@@ -43,12 +44,12 @@ class ValidityCallback:
         return time.monotonic() > self.deadline
 
     def valid(self, q: Vector) -> bool:
-        """Whether q, shape (n,), is free; False from the first error on."""
+        """Check whether q, shape (n,), is free; False from the first error on."""
         self.states += 1
         return self._checked(self.world.valid, q)
 
     def motion_valid(self, a: Vector, b: Vector) -> bool:
-        """Whether the motion a -> b is free; False from the first error on."""
+        """Check whether the motion from a to b, shapes (n,), is free; False from the first error on."""
         self.motions += 1
         if self.motions > self.most_motions:
             if self.stop is not None:
@@ -60,7 +61,7 @@ class ValidityCallback:
         return free
 
     def counts(self) -> dict[str, int]:
-        """Numbers of checks, and of the motions that were found free."""
+        """Return the numbers of checks, and of the motions that were found free."""
         return {"checked_states": self.states, "checked_motions": self.motions, "free_motions": self.free_motions}
 
     def _checked(self, check: Callable[..., bool], *arguments: Vector) -> bool:
@@ -78,7 +79,10 @@ class ValidityCallback:
 
 
 class CheckedMotions(ob.MotionValidator):  # type: ignore[misc]  # OMPL has no types
-    """Motions checked by a world. It must not hold the SpaceInformation, or neither is ever freed."""
+    """Checks motions by a world.
+
+    It must not hold the SpaceInformation, which holds it; otherwise neither is ever freed.
+    """
 
     def __init__(self, si: ob.SpaceInformation, motion_valid: MotionFree) -> None:
         super().__init__(si)
@@ -86,14 +90,14 @@ class CheckedMotions(ob.MotionValidator):  # type: ignore[misc]  # OMPL has no t
         self._states = StateIO(si)
 
     def checkMotion(self, first: ob.State, second: ob.State, *_: object) -> bool:
-        """Whether the motion between two states is free; angles of SO(2) turn the short way."""
+        """Check whether the motion between two states is free; angles of SO(2) turn the short way."""
         a = self._states.read(first)
         b = self._states.read(second)
         return self._motion_valid(a, near_image(b, a, self._states.turning) if self._states.turns else b)
 
 
 def planning_bounds(problem: Problem, goals: Matrix) -> tuple[Vector, Vector]:
-    """Finite bounds to sample in, shapes (n,): the limits; for continuous joints one turn beyond start and goals."""
+    """Return finite bounds to sample in, shapes (n,): the limits, or one turn beyond start and goals."""
     robot = problem.world.robot
     if np.isfinite(robot.lower).all() and np.isfinite(robot.upper).all():
         return robot.lower, robot.upper
@@ -105,7 +109,13 @@ def planning_bounds(problem: Problem, goals: Matrix) -> tuple[Vector, Vector]:
 
 
 def space_information(problem: Problem, goals: Matrix, validity: ValidityCallback) -> ob.SpaceInformation:
-    """A set-up ``ompl.base.SpaceInformation`` of a RealVectorStateSpace whose checks are the world's."""
+    """Return a set-up ``ompl.base.SpaceInformation`` of a RealVectorStateSpace with the checks of a world.
+
+    Args:
+        problem: The problem, which gives the bounds.
+        goals: Goal configurations, shape (k, n).
+        validity: Checks states and motions.
+    """
     si = bounded_space(*planning_bounds(problem, goals))
     states = StateIO(si)
     si.setStateValidityChecker(lambda state: validity.valid(states.read(state)))
@@ -115,7 +125,7 @@ def space_information(problem: Problem, goals: Matrix, validity: ValidityCallbac
 
 
 def problem_definition(problem: Problem, goals: Matrix, si: ob.SpaceInformation) -> ob.ProblemDefinition:
-    """``ompl.base.ProblemDefinition`` with the start of the problem and goal configurations, shape (k, n)."""
+    """Return an ``ompl.base.ProblemDefinition`` with the start of the problem and goal configurations, shape (k, n)."""
     states = StateIO(si)
     state = si.allocState()
     definition = ob.ProblemDefinition(si)
@@ -133,15 +143,15 @@ def problem_definition(problem: Problem, goals: Matrix, si: ob.SpaceInformation)
 
 
 def exact_path(definition: ob.ProblemDefinition, si: ob.SpaceInformation) -> Matrix | None:
-    """The best exact solution of a problem definition as rows, shape (k, n), or None."""
+    """Return the best exact solution of a problem definition as rows, shape (k, n), or None."""
     if not definition.hasExactSolution():
         return None
-    found = definition.getSolutionPath()  # shared ownership: safe to keep while it is copied
+    found = definition.getSolutionPath()  # ownership is shared, so it is safe to copy from
     return StateIO(si).rows(found)
 
 
 def shared_space(lower: Vector, upper: Vector) -> ob.SpaceInformation:
-    """:func:`unchecked_space` for planners to be made with; the same object as long as the bounds are the same."""
+    """Return :func:`unchecked_space`; the same object for the same bounds, shapes (n,)."""
     return _kept_space(lower.tobytes(), upper.tobytes())
 
 
@@ -154,9 +164,9 @@ atexit.register(_kept_space.cache_clear)  # the bindings complain of objects tha
 
 
 def unchecked_space(lower: Vector, upper: Vector) -> ob.SpaceInformation:
-    """As :func:`space_information`, but nothing is checked: for planners that use the world themselves.
+    """Return a SpaceInformation that checks nothing, for planners that use the world themselves.
 
-    OMPL checks each start and goal that it hands out, and a call of Python costs more than some searches.
+    OMPL checks each start and goal that it hands out, and one call of Python takes longer than some searches.
     """
     si = bounded_space(lower, upper)
     si.setStateValidityChecker(ob.AllValidStateValidityChecker(si))
@@ -165,24 +175,24 @@ def unchecked_space(lower: Vector, upper: Vector) -> ob.SpaceInformation:
 
 
 class PythonsStates(ob.SpaceInformation):  # type: ignore[misc]  # OMPL has no types
-    """A SpaceInformation for planners that are written in Python too."""
+    """A SpaceInformation that also works for planners written in Python."""
 
     def freeState(self, state: ob.State) -> None:
-        """Do nothing: the bindings free a state of ``allocState`` themselves, once Python has no more use for it."""
+        """Do nothing: the bindings free a state of ``allocState`` themselves once Python does not use it any more."""
 
 
 def bounded_space(lower: Vector, upper: Vector) -> ob.SpaceInformation:
-    """A SpaceInformation whose space has bounds, shapes (n,)."""
+    """Return a SpaceInformation of a RealVectorStateSpace with bounds, shapes (n,)."""
     return PythonsStates(_real_space(lower, upper))
 
 
 def circular_space(lower: Vector, upper: Vector, turning: Mask) -> ob.SpaceInformation:
-    """A SpaceInformation of a compound: an SO2StateSpace for each coordinate that turns, the others with bounds.
+    """Return a SpaceInformation of a compound: an SO2StateSpace for each coordinate that turns, the others bounded.
 
     Args:
-        lower: Lower bounds, shape (n,); without meaning where a coordinate turns.
-        upper: Upper bounds, shape (n,), likewise.
-        turning: Shape (n,).
+        lower: Lower bounds, shape (n,); ignored where a coordinate turns.
+        upper: Upper bounds, shape (n,); ignored where a coordinate turns.
+        turning: Which coordinates turn, shape (n,).
     """
     space = ob.CompoundStateSpace()
     begin = 0
@@ -200,7 +210,7 @@ def circular_space(lower: Vector, upper: Vector, turning: Mask) -> ob.SpaceInfor
 
 
 def _real_space(lower: Vector, upper: Vector) -> ob.RealVectorStateSpace:
-    """A RealVectorStateSpace with bounds, shapes (n,)."""
+    """Return a RealVectorStateSpace with bounds, shapes (n,)."""
     space = ob.RealVectorStateSpace(len(lower))
     bounds = ob.RealVectorBounds(len(lower))
     for k in range(len(lower)):

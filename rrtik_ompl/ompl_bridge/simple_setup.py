@@ -1,4 +1,4 @@
-"""A world or a problem in anybody's own OMPL code: a SpaceInformation, a SimpleSetup."""
+"""A world or a problem for users' own OMPL code: a SpaceInformation or a SimpleSetup."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.route_check import motion_taken
 from rrtik_ompl.world.world import World
 
-FAR = 1e3  # [m] the clearance that OMPL is told where nothing can collide; its reports cannot hold an infinite one
+FAR = 1e3  # [m] clearance for OMPL where nothing can collide; its reports cannot hold infinity
 
 TIP_PROJECTION = "tip"  # name of a projection of the space
 
 
 class WorldValidity(ob.StateValidityChecker):  # type: ignore[misc]  # OMPL has no types
-    """Validity and clearance of configurations by a world.
+    """Checks validity and clearance of states by a world.
 
-    An exception must not pass through OMPL's second thread (PRM), which ends the process; a configuration that the
-    world refuses to judge is not valid.
+    An exception must not pass through OMPL's second thread (PRM), as it would end the process; a configuration that the
+    world refuses to check counts as invalid.
     """
 
     def __init__(self, si: ob.SpaceInformation, world: World) -> None:
@@ -42,7 +42,7 @@ class WorldValidity(ob.StateValidityChecker):  # type: ignore[misc]  # OMPL has 
         self._states = StateIO(si)
 
     def isValid(self, state: ob.State) -> bool:
-        """Whether a state is inside the limits and free; called by OMPL."""
+        """Check whether a state is inside the limits and free; called by OMPL."""
         q = self._states.read(state)
         return bool(np.isfinite(q).all()) and self._world.valid(q)
 
@@ -53,9 +53,10 @@ class WorldValidity(ob.StateValidityChecker):  # type: ignore[misc]  # OMPL has 
 
 
 class TipProjection(ob.ProjectionEvaluator):  # type: ignore[misc]  # OMPL has no types
-    """A configuration as the position of the tip, for planners that keep a grid (KPIECE1 and its kin).
+    """Projects a configuration to the position of the tip, for planners that keep a grid (such as KPIECE1).
 
-    OMPL chooses the size of the cells from samples. It must not hold the space, which holds it, or neither is freed.
+    OMPL chooses the size of the cells from samples. It must not hold the space, which holds it; otherwise neither is
+    freed.
     """
 
     def __init__(self, space: ob.StateSpace, robot: Robot, coordinates: Coordinates) -> None:
@@ -64,28 +65,28 @@ class TipProjection(ob.ProjectionEvaluator):  # type: ignore[misc]  # OMPL has n
         self._coordinates = coordinates
 
     def getDimension(self) -> int:
-        """Three; called by OMPL."""
+        """Return the dimension of the projection, three; called by OMPL."""
         return 3
 
     def project(self, state: ob.State, projection: Vector) -> None:
-        """Write the position of the tip [m]; called by OMPL."""
+        """Write the position of the tip [m] into ``projection``, shape (3,); called by OMPL."""
         projection[:] = self._robot.fk_batch([self._coordinates.read(state)])[0, :3, 3]
 
 
 class ProblemSetup(og.SimpleSetup):  # type: ignore[misc]  # OMPL has no types
-    """A SimpleSetup that knows what OMPL's planners and its bindings cannot bear."""
+    """A SimpleSetup that works around limitations of OMPL's planners and bindings."""
 
     def solve(self, *limit: Any, **named: Any) -> ob.PlannerStatus:
         """Solve as OMPL's own method does, within seconds or until a termination condition.
 
-        PRM, PRMstar, BFMT and AORRTC get the first goal configuration alone, as in `plan()`: PRM takes up others in a
-        thread of its own, which waits for Python for ever; BFMT can crash; AORRTC gives up. Planners that are written
-        in Python and derived from ``ompl.base.Planner`` cannot have states freed twice.
+        PRM, PRMstar, BFMT and AORRTC get the first goal configuration alone, as in `plan()`: PRM collects further goals
+        in a thread of its own, which waits for Python forever; BFMT can crash; AORRTC gives up. For planners written in
+        Python and derived from ``ompl.base.Planner``, states are protected from being freed twice.
 
         Raises:
             InputError: If PRM is to minimise an objective that is written in Python, for which it would wait as well.
         """
-        self.setup()  # which makes the planner if nobody has
+        self.setup()  # also makes the default planner if none is set
         planner = self.getPlanner()
         definition = self.getProblemDefinition()
         if isinstance(planner, og.PRM):
@@ -107,7 +108,7 @@ def _refuse_python(name: str, objective: ob.OptimizationObjective | None) -> Non
 
 @contextmanager
 def first_goal_alone(definition: ob.ProblemDefinition) -> Iterator[None]:
-    """The goal of a problem is its first configuration, meanwhile; as it is where it cannot be sampled."""
+    """Replace the goal of a problem by its first configuration inside a ``with`` block, if it can be sampled."""
     goal = definition.getGoal()
     si = definition.getSpaceInformation()
     inputs = ob.PlannerInputStates()
@@ -129,19 +130,19 @@ def first_goal_alone(definition: ob.ProblemDefinition) -> Iterator[None]:
 
 
 def space_information(world_or_problem: World | Problem, *, so2: bool = False) -> ob.SpaceInformation:
-    """A set-up ``ompl.base.SpaceInformation`` over the joints of an arm, whose questions a world answers.
+    """Return a set-up ``ompl.base.SpaceInformation`` over the joints of an arm, with the checks of a world.
 
     Its space is a RealVectorStateSpace within the joint limits [rad; m]; a joint without limits gets a turn on both
     sides of the start of a problem, or half a turn on both sides of 0 for a world. States and motions are checked by
-    the world, exactly as in `plan()`: a motion counts as free only if :meth:`JointPath.violations` has nothing against
-    it. The validity checker knows the clearance, so that OMPL's reports of it are right. Beside OMPL's own projection
-    the space has "tip", the position of the tip. For a problem with path constraints it is a
+    the world, exactly as in `plan()`: a motion counts as free only if :meth:`JointPath.violations` accepts it. The
+    validity checker also computes the clearance, so that OMPL's reports of it are right. In addition to OMPL's own
+    projection the space has "tip", the position of the tip. For a problem with path constraints the result is a
     ConstrainedSpaceInformation of a ProjectedStateSpace, for planners of OMPL.
 
     Args:
-        world_or_problem: A `World`, or a `Problem`, whose world it is then.
-        so2: Whether a joint without limits becomes an SO2StateSpace, in which a whole turn more is the same posture.
-            The space is a CompoundStateSpace then, with the joints in their order, and "tip" its default projection.
+        world_or_problem: A `World`, or a `Problem`, whose world is used.
+        so2: Whether a joint without limits becomes an SO2StateSpace, in which whole turns do not change the posture.
+            The space is then a CompoundStateSpace with the joints in their order, and "tip" is its default projection.
 
     Raises:
         InputError: If it is neither, or SO(2) is wanted along path constraints.
@@ -170,14 +171,14 @@ def space_information(world_or_problem: World | Problem, *, so2: bool = False) -
 
 
 def simple_setup(problem: Problem, *, seed: int = 0, so2: bool = False) -> og.SimpleSetup:
-    """A problem as ``ompl.geometric.SimpleSetup``: space, checks, start and goal; only the planner is missing.
+    """Return a problem as ``ompl.geometric.SimpleSetup``: space, checks, start and goal; only the planner is missing.
 
-    A goal in joint values is a GoalState, any other one a :class:`~rrtik_ompl.ompl_bridge.GoalSampler`. Its ``solve``
-    gives planners that cannot bear several goals the first one (:meth:`ProblemSetup.solve`).
+    A goal in joint values becomes a GoalState, any other goal a :class:`~rrtik_ompl.ompl_bridge.GoalSampler`. Its
+    ``solve`` gives planners that cannot handle several goals the first one (:meth:`ProblemSetup.solve`).
 
     Args:
-        problem: What is to be planned.
-        seed: Of the search for configurations at a goal of the tip.
+        problem: The problem to plan.
+        seed: Seed of the search for configurations at a goal of the tip.
         so2: See :func:`space_information`.
 
     Raises:
@@ -213,23 +214,23 @@ def simple_setup(problem: Problem, *, seed: int = 0, so2: bool = False) -> og.Si
 
 
 def _information(world: World, lower: Vector, upper: Vector, so2: bool) -> ob.SpaceInformation:
-    """A SpaceInformation within bounds, shapes (n,), whose states and motions a world judges."""
+    """Return a SpaceInformation within bounds, shapes (n,), whose states and motions a world checks."""
     endless = world.robot.continuous
     si = circular_space(lower, upper, endless) if so2 and endless.any() else bounded_space(lower, upper)
 
     def motion_valid(a: Vector, b: Vector) -> bool:
-        return motion_taken(world.checks, a, b)  # those of the thread that asks
+        return motion_taken(world.checks, a, b)  # the checks of the calling thread
 
     si.setMotionValidator(CheckedMotions(si, motion_valid))
     return _judged(si, world)
 
 
 def _judged(si: ob.SpaceInformation, world: World) -> ob.SpaceInformation:
-    """Set up, with states judged by a world and the projection "tip"."""
+    """Set up a SpaceInformation in place with checks of states by a world and the projection "tip", and return it."""
     si.setStateValidityChecker(WorldValidity(si, world))
     space = si.getStateSpace()
     if isinstance(si, ob.ConstrainedSpaceInformation):
-        si.setup()  # after which alone its space keeps a projection
+        si.setup()  # before setup its space loses projections
 
     tip = TipProjection(space, world.robot, coordinates_of(si, constrained=True))
     space.registerProjection(TIP_PROJECTION, tip)

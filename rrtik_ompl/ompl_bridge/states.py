@@ -1,6 +1,6 @@
-"""Arrays to OMPL states and back, in spaces whose states are rows of numbers.
+"""Conversion between arrays and OMPL states, in spaces whose states are rows of numbers.
 
-These are real coordinates, angles of SO(2), and compounds of both.
+These are spaces of real coordinates, angles of SO(2), and compounds of both.
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ WANTED = "needs a RealVectorStateSpace, an SO2StateSpace or a compound of them (
 
 
 def space_bounds(si: ob.SpaceInformation) -> tuple[Vector, Vector]:
-    """Lower and upper bounds of the coordinates of a space, shapes (n,); of an angle of SO(2) -pi and pi.
+    """Return lower and upper bounds of the coordinates of a space, shapes (n,); for an angle of SO(2) -pi and pi.
 
     Raises:
-        InputError: If a bound is missing: not finite, or the lower one not below the upper one.
+        InputError: If a bound is missing: it is not finite, or the lower one is not below the upper one.
     """
     return _checked_bounds(*coordinates_of(si, constrained=True).bounds(si.getStateSpace()))
 
 
 def _checked_bounds(low: list[float], high: list[float]) -> tuple[Vector, Vector]:
-    """The bounds as arrays, shapes (n,); refuses missing ones."""
+    """Return bounds as arrays, shapes (n,), or raise an InputError if one is missing."""
     lower = frozen(low)
     upper = frozen(high)
     bad = np.flatnonzero(~(np.isfinite(lower) & np.isfinite(upper) & (lower < upper)))
@@ -46,20 +46,21 @@ def _checked_bounds(low: list[float], high: list[float]) -> tuple[Vector, Vector
 
 
 class StateIO:
-    """Copies one configuration at a time between numpy and a state of real coordinates and angles of SO(2).
+    """Copies configurations, one at a time, between numpy and states of real coordinates and angles of SO(2).
 
-    OMPL's ``serialize`` writes through a pointer. Handing it the address of a numpy buffer, in a capsule of the name
-    that the bindings expect, copies a state several times faster than reading its coordinates one by one. The name is
-    an internal of the bindings: it is tried once at construction, and if it fails, the coordinates are read so. An
+    OMPL's ``serialize`` writes through a pointer. Given the address of a numpy buffer, in a capsule with the name that
+    the bindings expect, it copies a state several times faster than reading its coordinates one by one. The name is an
+    internal of the bindings: it is tried once at construction, and if it fails, the coordinates are read one by one. An
     angle is written in [-pi, pi], whatever turn it is in.
+
+    An object is for one thread. It holds the space and no state, so anything that the space does not refer to may keep
+    it.
 
     Attributes:
         dof: Number of coordinates, n.
         turning: Which of them are angles of SO(2), shape (n,).
-        turns: Whether any is.
+        turns: Whether any of them is.
         fast: Whether the capsule works.
-
-    For one thread. It holds the space and no state, so whatever a space does not lead to may keep it.
     """
 
     def __init__(self, si: ob.SpaceInformation) -> None:
@@ -75,14 +76,14 @@ class StateIO:
         self.fast = self._capsule is not None and self._capsule_works(si)
 
     def bounds(self) -> tuple[Vector, Vector]:
-        """:func:`space_bounds` as they are; the same arrays as long as they do not change."""
+        """Return :func:`space_bounds` as they are now; the same arrays as long as the bounds do not change."""
         numbers = self._coordinates.bounds(self._space)
         if self._bounds is None or numbers != self._bounds[0]:
             self._bounds = numbers, _checked_bounds(*numbers)
         return self._bounds[1]
 
     def read(self, state: ob.State) -> Vector:
-        """A private copy of the coordinates of a state, shape (n,)."""
+        """Return a copy of the coordinates of a state, shape (n,)."""
         if not self.fast:
             return np.array(self._coordinates.read(state), dtype=np.float64)
         self._space.serialize(self._capsule, state)
@@ -98,7 +99,7 @@ class StateIO:
         self._space.deserialize(state, self._capsule)
 
     def path(self, si: ob.SpaceInformation, rows: Matrix) -> og.PathGeometric:
-        """Rows, shape (k, n), as an ``ompl.geometric.PathGeometric``."""
+        """Return rows, shape (k, n), as an ``ompl.geometric.PathGeometric``."""
         path = og.PathGeometric(si)
         state = si.allocState()
         append = path.append  # copies
@@ -108,11 +109,11 @@ class StateIO:
         return path
 
     def rows(self, path: og.PathGeometric) -> Matrix:
-        """The states of a PathGeometric as rows, shape (k, n)."""
+        """Return the states of a PathGeometric as rows, shape (k, n)."""
         return np.array([self.read(path.getState(k)) for k in range(path.getStateCount())])
 
     def _capsule_works(self, si: ob.SpaceInformation) -> bool:
-        """Whether states are written and read through the capsule as they are number by number."""
+        """Check whether states are read and written through the capsule as they are coordinate by coordinate."""
         state = si.allocState()
         probe = np.arange(1.0, self.dof + 1.0)
         if self._space.getSerializationLength() != self._buffer.nbytes:
@@ -131,7 +132,7 @@ class StateIO:
 
 
 def _capsule(buffer: Vector) -> object:
-    """A capsule around the address of ``buffer``, or None where the interpreter cannot make one."""
+    """Return a capsule around the address of ``buffer``, or None if the interpreter cannot make one."""
     try:
         new: Callable[..., object] = ctypes.pythonapi.PyCapsule_New
     except AttributeError:
@@ -144,13 +145,13 @@ def _capsule(buffer: Vector) -> object:
 
 @dataclass(frozen=True)
 class Coordinates:
-    """The numbers of a state, in the order in which OMPL serializes them.
+    """The coordinates of a state, in the order in which OMPL serializes them.
 
     Attributes:
-        kind: Of the space: real, SO(2), SE(2), any other compound, or one that is constrained. Those that interpolate
-            otherwise, such as Dubins' curves, are none of these.
-        size: How many numbers.
-        parts: Of a compound those of its subspaces.
+        kind: Class of the space: real, SO(2), SE(2), any other compound, or a constrained space. Spaces that
+            interpolate differently, such as Dubins' curves, are not among them.
+        size: Number of coordinates.
+        parts: For a compound the coordinates of its subspaces.
     """
 
     kind: type[ob.StateSpace]
@@ -159,13 +160,13 @@ class Coordinates:
 
     @cached_property
     def turning(self) -> Mask:
-        """Which numbers are angles of SO(2), shape (size,)."""
+        """Which coordinates are angles of SO(2), shape (size,)."""
         if self.parts:
             return frozen(np.concatenate([part.turning for part in self.parts]), bool)
         return frozen(np.full(self.size, self.kind is ob.SO2StateSpace), bool)
 
     def read(self, state: ob.State) -> list[float]:
-        """The numbers of a state."""
+        """Return the coordinates of a state."""
         if self.kind is ob.RealVectorStateSpace:
             return list(state[0 : self.size])
         if self.kind is ob.SO2StateSpace:
@@ -177,7 +178,7 @@ class Coordinates:
         return [number for k, part in enumerate(self.parts) for number in part.read(state[k])]
 
     def write(self, state: ob.State, numbers: list[float]) -> None:
-        """Set the numbers of a state."""
+        """Set the coordinates of a state."""
         if self.kind is ob.RealVectorStateSpace:
             state[0 : self.size] = numbers
         elif self.kind is ob.SO2StateSpace:
@@ -193,7 +194,7 @@ class Coordinates:
                 numbers = numbers[part.size :]
 
     def bounds(self, space: ob.StateSpace) -> tuple[list[float], list[float]]:
-        """Lower and upper bounds of a space of this kind as they are; of an angle -pi and pi."""
+        """Return lower and upper bounds of a space of this kind, unchecked; for an angle -pi and pi."""
         if self.kind is ob.RealVectorStateSpace:
             bounds = space.getBounds()
             return list(bounds.low), list(bounds.high)
@@ -208,7 +209,7 @@ class Coordinates:
 
 
 def coordinates_of(si: ob.SpaceInformation, *, constrained: bool = False) -> Coordinates:
-    """The coordinates of the space of a SpaceInformation.
+    """Return the coordinates of the space of a SpaceInformation.
 
     Args:
         si: The SpaceInformation.

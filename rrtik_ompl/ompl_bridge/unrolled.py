@@ -1,7 +1,7 @@
-"""Angles of SO(2) laid out on a line, so that searches need know nothing of circles.
+"""Angles of SO(2) unrolled onto a line, so that searches need not handle circles.
 
-A search moves from the first start up to a turn to either side. A goal is there once for each way round, and motions
-are asked, and put into paths, in pieces of less than half a turn, which OMPL interpolates in the same direction.
+A search moves from the first start up to one turn to either side. Each goal has one image for each way round. Motions
+are checked, and put into paths, in pieces of less than half a turn, which OMPL interpolates in the same direction.
 """
 
 from __future__ import annotations
@@ -13,24 +13,28 @@ import numpy as np
 from rrtik_ompl.base.arrays import TAU, Mask, Matrix, Vector
 from rrtik_ompl.base.units import wrapped
 
-LONGEST = 0.75 * np.pi  # [rad] of the turn in a piece of a motion
-MOST_GOALS = 64  # with their other ways round
+LONGEST = 0.75 * np.pi  # [rad] largest turn in a piece of a motion
+MOST_GOALS = 64  # limit of the images of all goals
 
 
 def on_circles(q: Vector, turning: Mask) -> Vector:
-    """q, shape (n,), with its angles in [-pi, pi]; those that are there already to the bit."""
+    """Return q, shape (n,), with its angles in [-pi, pi]; angles that are in this range stay the same bit for bit."""
     beyond = turning & (np.abs(q) > np.pi)
     return np.where(beyond, wrapped(q), q) if beyond.any() else q
 
 
 def near_image(q: Vector, base: Vector, turning: Mask) -> Vector:
-    """q, shape (n,), with each angle moved by full turns until it is as near to ``base`` as can be."""
+    """Return q, shape (n,), with each angle moved by full turns until it is nearest to ``base``."""
     turns = np.round((q - base) / TAU) * TAU
     return np.where(turning & (turns != 0.0), q - turns, q)
 
 
 def pieces(a: Vector, b: Vector, turning: Mask) -> Matrix:
-    """A straight motion as points, the first a and the last b, shape (k, n), between which no angle turns far."""
+    """Divide a straight motion from a to b into pieces in which no angle turns by more than `LONGEST`.
+
+    Returns:
+        Points of the motion, the first a and the last b, shape (k, n).
+    """
     count = int(np.ceil(np.abs(b - a)[turning].max(initial=0.0) / LONGEST))
     if count < 2:
         return np.stack([a, b])
@@ -45,11 +49,11 @@ class Unrolled:
 
     Attributes:
         starts: Shape (s, n), each angle within half a turn of that of the first start.
-        goals: Shape (g, n), the nearest image of each goal first, then the other ways round.
+        goals: Shape (g, n), first the nearest image of each goal, then those for the other ways round.
 
     Args:
         starts: Shape (s, n), s at least 1, angles in [-pi, pi].
-        goals: Likewise, shape (g, n).
+        goals: Shape (g, n), angles in [-pi, pi].
         turning: Which coordinates are angles, shape (n,).
     """
 
@@ -83,20 +87,23 @@ class Unrolled:
         return path
 
     def divided(self, rows: Matrix) -> Matrix:
-        """A path on the line, shape (k, n), in pieces in which no angle turns far."""
+        """Divide a path on the line, shape (k, n), into pieces in which no angle turns by more than `LONGEST`."""
         return np.vstack([rows[:1], *(pieces(a, b, self._turning)[1:] for a, b in pairwise(rows))])
 
     def _remember(self, image: Vector, end: Vector) -> Vector:
-        """Take note of which start or goal an image is of; returns the image."""
+        """Record the start or goal that an image belongs to, and return the image."""
         self._end_of_image[image.tobytes()] = end
         return image
 
     def _near(self, row: Vector) -> Vector:
-        """The image of a row that is nearest to the first start, shape (n,)."""
+        """Return the image of a row that is nearest to the first start, shape (n,)."""
         return near_image(row, self._base, self._turning)
 
     def _images(self, row: Vector) -> list[Vector]:
-        """The images of a row within a turn of the first start, the nearest ones first."""
+        """Return the images of a row within a turn of the first start, the nearest ones first.
+
+        With many angles only the nearest image and those with one angle the other way round are returned.
+        """
         nearest = self._near(row)
         turn_back = np.where(nearest > self._base, -TAU, TAU)
         axes = np.flatnonzero(self._turning)

@@ -1,4 +1,4 @@
-"""A problem of an arm with joint weights, in coordinates in which lengths are weighted, and the way back."""
+"""A problem of an arm with joint weights, in coordinates in which distances are weighted."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ class WeightedProblem:
     """A problem whose configurations are multiplied by the weights of their joints.
 
     Attributes:
-        problem: With a start and motions in these coordinates; its goal is as it was.
+        problem: Its start and motions are in weighted coordinates; its goal is unchanged.
 
     Args:
-        problem: Of a robot with joint weights.
-        motions: What says which motions are free; the problem's world if None.
+        problem: A problem of a robot with joint weights.
+        motions: Checks which motions are free; None for the problem's world.
     """
 
     def __init__(self, problem: Problem, motions: MotionQueries | None = None) -> None:
         self._scale = weights_of(problem.robot)
         self._start = problem.start
 
-        asked: Any = problem.world if motions is None else motions  # which has what it needs of a world
+        asked: Any = problem.world if motions is None else motions  # it has the parts of a world that are needed
         weighted = WeightedMotions(asked, self._scale)
 
         settings = changed(problem.settings, robot=weighted.robot)
@@ -37,7 +37,7 @@ class WeightedProblem:
         self.problem = changed(problem, settings=settings, start=start, world=weighted)
 
     def weighted_rows(self, rows: Matrix) -> Matrix:
-        """Configurations in these coordinates, shape (m, dof)."""
+        """Return configurations in weighted coordinates, shape (m, dof)."""
         return np.asarray(rows * self._scale)
 
     def joint_rows(self, rows: Matrix, known: Matrix) -> Matrix:
@@ -48,10 +48,10 @@ class WeightedProblem:
         return np.asarray(unweighted)
 
     def joint_path(self, rows: Matrix | None, goals: Matrix) -> Matrix | None:
-        """A path to one of some goals as one of the arm, shape (k, dof), or None."""
+        """Return a weighted path to one of some goals as a path of the arm, shape (k, dof), or None."""
         return None if rows is None else self.joint_rows(rows, np.vstack([self._start, goals]))
 
 
 def has_weights(problem: Problem) -> bool:
-    """Whether lengths are weighted: the robot has joint weights."""
+    """Check whether the robot has joint weights, so that lengths are weighted."""
     return bool(problem.robot.joint_weights)

@@ -107,7 +107,7 @@ class Task:
         return self._stopped
 
     def free_batch(self, A: Matrix, B: Matrix) -> Mask:
-        """Which straight motions are free, shapes (m, n) and (m,); none when the time is up."""
+        """Check which straight motions from A to B, shapes (m, n), are free, shape (m,); none once the time is up."""
         if len(A) == 0 or self.expired():
             return np.zeros(len(A), dtype=bool)
         self.asked += len(A)

@@ -239,7 +239,7 @@ def why_stopped(robot: Robot, rail: Rail, followed: Followed) -> str:
 
 
 def why_blocked(world: World, a: Vector, b: Vector, pair: tuple[str, str]) -> str:
-    """Why a motion that is not proven free cannot be taken: the pair in contact, or the pair too near for a proof."""
+    """Return why a motion that is not proven free cannot be made: a contact, or two bodies too near for a proof."""
     for share in np.linspace(0.0, 1.0, LOOKS):
         q = a + share * (b - a)
         if not world.checks.free(q[None])[0]:

@@ -70,7 +70,12 @@ class Tolerance:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Followed:
-    """Configurations along a rail, shape (k, dof), the first one given, and the share of the rail at each, (k,)."""
+    """Configurations along a rail.
+
+    Attributes:
+        rows: Configurations, shape (k, dof), beginning with the given one.
+        shares: Share of the rail at each configuration, shape (k,).
+    """
 
     rows: Matrix
     shares: Vector
@@ -231,7 +236,7 @@ def _correct(robot: Robot, rail: Rail, share: float, q: Vector, tolerance: Toler
 
 
 def _residual(aim: Matrix, tip: Matrix) -> Vector:
-    """From a tip to a pose, in world axes: [m], and the turn's axis times its chord, shape (6,)."""
+    """Return the residual from a tip to a pose in world axes, shape (6,): shift [m], turn's axis times its chord."""
     turn = aim[:3, :3] @ tip[:3, :3].T
     skew = 0.5 * np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
     half = np.sqrt(max(0.25 * (1.0 + np.trace(turn)), 1e-24))

@@ -130,7 +130,9 @@ def arc_rail(T_begin: pin.SE3, T_end: pin.SE3, through: ArrayLike) -> Rail:
 
 
 def screw_rail(T_begin: pin.SE3, T_end: pin.SE3, turns: int = 0) -> Rail:
-    """From one pose to another (SE3) about and along one line of the world at once, with whole turns more or less.
+    """Return the rail from one pose to another (SE3) about and along one line of the world.
+
+    Whole turns are added to the shortest way.
 
     Raises:
         InputError: If turns are no whole number, too many, or wanted where the poses are not turned against each other.
@@ -160,7 +162,7 @@ def _rail(T_begin: pin.SE3, slide: Vector, axis: Vector, angle: float) -> Rail:
 
 
 def _turn_between(T_begin: pin.SE3, T_end: pin.SE3) -> tuple[Vector, float]:
-    """Axis in the world, of length 1, and angle [rad, 0 .. pi] of the turn from one pose to another."""
+    """Return the axis in the world, a unit vector, and the angle [rad, 0 .. pi] of the turn between two poses."""
     vector = np.asarray(pin.log3(T_end.rotation @ T_begin.rotation.T))
     angle = float(np.linalg.norm(vector))
     return (vector / angle, angle) if angle >= NO_TURN else (np.array(Z), 0.0)
