@@ -1,4 +1,4 @@
-"""A certificate: waypoints, what they are proven to keep, and the planes that prove it; written to JSON and read."""
+"""Certificates of paths: the waypoints, the clearance and the separating planes that prove it; stored as JSON."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from rrtik_ompl.files.text import known_ending, read_text, write_text
 
 VERSION = 1
 KIND = "path_certificate"
-IN_PATHS = "certificate"  # key of a path's file
+IN_PATHS = "certificate"  # key of the certificate in the file of a path
 FIELDS = (
     "version",
     "kind",
@@ -31,21 +31,25 @@ FIELDS = (
     "waypoints",
     "motions",
 )
-DEEPEST = 30  # level of an interval that is read
-WHOLE = 6  # whole numbers of an entry: body, part, body, part, level, number; three numbers of a plane may follow
-MEASURED = 4  # whole numbers of an entry of two links that are measured: body, body, level, number
+DEEPEST = 30  # largest level of an interval that is accepted
+# An entry has six integers: body, part, body, part, level, number. The three numbers of a plane's normal may follow.
+WHOLE = 6
+# An entry of two links whose distance coal measures has four integers: body, body, level, number.
+MEASURED = 4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MotionEntries:
-    """By what the pairs of solids are apart in one motion. What has no entry is apart by a ball in all of it.
+    """The entries that show pairs of solids apart in one motion.
+
+    A pair without an entry is shown apart on the whole motion by bounding balls or boxes.
 
     Attributes:
-        solids: Body above the plane, its part, body below, its part, shape (n, 4). Parts -1 and -1: two links as they
-            are, which coal measures in the middle of the interval.
+        solids: Body above the plane, its part, body below, its part, shape (n, 4). Parts -1 and -1 stand for two whole
+            links, whose distance coal measures in the middle of the interval.
         intervals: Level and number of the interval from number / 2**level to (number + 1) / 2**level, shape (n, 2).
-        normals: Unit normal of the plane seen from the frame that carries both bodies, or zeros if a ball and a ball or
-            box settle it, shape (n, 3).
+        normals: Unit normal of the plane in the frame that carries both bodies, shape (n, 3); zeros where balls, or a
+            ball and a box, are sufficient.
     """
 
     solids: NDArray[np.int64]
@@ -58,16 +62,16 @@ class MotionEntries:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Certificate:
-    """What proves that a path is free, for whoever wants to compute it again.
+    """A proof that a path is free, in a form that others can verify by their own computation.
 
     Attributes:
         robot: Name of the robot.
-        robot_digest, scene_digest: Of what it is about, see :mod:`rrtik_ompl.geometry.collision.digests`.
-        clearance: What the path keeps from every obstacle beside its margin [m].
-        self_margin: What links, and what they hold, keep from each other [m].
-        waypoints: Shape (k, dof), read-only.
-        motions: One for each motion; a path of one waypoint has one that stands still.
-        version: Of the format.
+        robot_digest, scene_digest: Digests of the geometry, see :mod:`rrtik_ompl.geometry.collision.digests`.
+        clearance: Distance that the path keeps from every obstacle on top of its margin [m].
+        self_margin: Distance that links and attached objects keep from each other [m].
+        waypoints: The path, shape (k, dof), read-only.
+        motions: The entries of each motion; a path of one waypoint has one motion that stands still.
+        version: Version of the format.
 
     Example:
         >>> problem = rrtik.load_problem("planar3_boxes")
@@ -93,7 +97,7 @@ class Certificate:
 
     @property
     def entries(self) -> int:
-        """How many entries there are in all."""
+        """Number of entries of all motions."""
         return sum(len(motion.solids) for motion in self.motions)
 
     def document(self) -> dict[str, Any]:
@@ -147,7 +151,7 @@ def load_certificate(path: str | os.PathLike[str]) -> Certificate:
 
 
 def _inside(text: str) -> dict[str, Any]:
-    """Return the object of a certificate's file, or of the certificate in a path's."""
+    """Return the JSON object of a certificate from its own file, or from the file of a path that contains one."""
     try:
         return json_object(text, KIND, "motions")
     except InputError as error:
@@ -159,10 +163,10 @@ def _inside(text: str) -> dict[str, Any]:
 
 
 def certificate_beside(path: str | os.PathLike[str]) -> Certificate | None:
-    """Return the certificate that a path's file has beside its waypoints; None if it has none.
+    """Read the certificate that a path's file contains in addition to its waypoints; None if it has none.
 
     Raises:
-        InputError: If it is not sound; the message names the file and the field.
+        InputError: If it is malformed; the message names the file and the field.
     """
     if not str(path).endswith(".json"):
         return None
@@ -174,7 +178,7 @@ def certificate_beside(path: str | os.PathLike[str]) -> Certificate | None:
 
 
 def from_document(document: dict[str, Any]) -> Certificate:
-    """Return the certificate of plain data, see :meth:`Certificate.document`.
+    """Create a certificate from plain data, the inverse of :meth:`Certificate.document`.
 
     Raises:
         InputError: If a field is missing, unknown or of the wrong type or shape; the message names it.
@@ -227,12 +231,12 @@ def _entries(rows: object, where: str) -> MotionEntries:
 
 
 def _six(row: list[Any]) -> list[int]:
-    """Return the whole numbers of an entry, part -1 for links that are measured."""
+    """Return the six integers of an entry; for an entry of four the parts are -1."""
     return [row[0], -1, row[1], -1, *row[2:]] if len(row) == MEASURED else row[:WHOLE]
 
 
 def _entry_fault(row: object) -> str:
-    """What is wrong with an entry; "" if nothing is."""
+    """Return a message about a malformed entry; "" if it is well-formed."""
     if not isinstance(row, list) or len(row) not in (MEASURED, WHOLE, WHOLE + 3):
         return "expected a list of 4 or 6 whole numbers, or of 6 and the 3 numbers of a plane"
     if not all(type(number) is int and 0 <= number < 1 << DEEPEST for number in row[:WHOLE]):

@@ -1,4 +1,4 @@
-"""What a plan has to reach: joint values, an end-effector pose, a position, a region of poses, or any of several."""
+"""Goals of a plan: joint values, an end-effector pose, a position, a region of poses, or any of several."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ from rrtik_ompl.model.robot import Robot, metres_per_radian
 JOINT_TOLERANCE = 1e-6  # [rad] or [m]
 AXES: tuple[FrameAxis, ...] = get_args(FrameAxis)
 NO_BOX = frozen([0.0, 0.0, 0.0])
-MOST_GOALS = 100_000  # of a set
+MOST_GOALS = 100_000  # largest number of goals in a set
 
 
 def joint_difference(robot: Robot, Q: ArrayLike, q: ArrayLike) -> NDArray[np.float64]:
-    """``Q - q`` per joint, continuous joints the short way round (into [-pi, pi]). Shape of Q."""
+    """Compute ``Q - q`` per joint, for continuous joints the short way round (in [-pi, pi]); the shape is that of Q."""
     difference: NDArray[np.float64] = np.asarray(Q, dtype=np.float64) - np.asarray(q, dtype=np.float64)
     if not has_continuous(robot):
         return difference
@@ -42,15 +42,15 @@ def joint_difference(robot: Robot, Q: ArrayLike, q: ArrayLike) -> NDArray[np.flo
 
 @lru_cache(maxsize=64)
 def has_continuous(robot: Robot) -> bool:
-    """Check whether a joint of a robot turns without limits."""
+    """Check whether a robot has a continuous joint."""
     return bool(robot.continuous.any())
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointGoal(Goal):
-    """Reach this configuration. ``q``: shape (dof,), rad or m."""
+    """Reach a configuration ``q``, shape (dof,) [rad or m], within ``tolerance`` of each joint value."""
 
-    q: Vector = field()  # in place of the property of a Goal
+    q: Vector = field()  # replaces the property of Goal
     tolerance: float = JOINT_TOLERANCE
 
     __reduce__ = as_value
@@ -61,11 +61,11 @@ class JointGoal(Goal):
 
     @property
     def title(self) -> str:
-        """What it is."""
+        """Short name of the kind of goal."""
         return "joint values"
 
     def distance(self, robot: Robot, Q: ArrayLike) -> Vector:
-        """Largest joint error of each row of Q, shape (m,) [rad or m]."""
+        """Compute the largest joint error of each row of Q, shape (m,) [rad or m]."""
         require(robot, Robot, "robot of a goal")
         rows = rows_of(Q, len(self.q), "configurations")
         return np.asarray(np.abs(joint_difference(robot, rows, self.q)).max(axis=1))
@@ -77,7 +77,7 @@ class JointGoal(Goal):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PositionGoal(Target):
-    """Bring the tip to a point of the world [m], orientation free. ``tolerance`` [m]."""
+    """Bring the tip to a point of the world [m] in any orientation, within ``tolerance`` [m]."""
 
     oriented = False
 
@@ -92,17 +92,17 @@ class PositionGoal(Target):
 
     @property
     def title(self) -> str:
-        """What it is."""
+        """Short name of the kind of goal."""
         return "tip position"
 
     @property
     def tolerances(self) -> tuple[float, float]:
-        """What the distance may be at most [m], and 0 for the angle."""
+        """Largest distance [m], and 0 for the angle."""
         return self.tolerance, 0.0
 
     @property
     def pose(self) -> pin.SE3:
-        """The tip at the point, turned like the world (``pinocchio.SE3``)."""
+        """The tip at the point, with the orientation of the world (``pinocchio.SE3``)."""
         return pin.SE3(np.eye(3), np.array(self.position))
 
     @property
@@ -111,16 +111,16 @@ class PositionGoal(Target):
         return self.position
 
     def tightened(self, share: float) -> PositionGoal:
-        """Return the same point with that share of the tolerance."""
+        """Return the same point with its tolerance scaled by a share."""
         return PositionGoal(self.position, positive(share, "share of the tolerance") * self.tolerance)
 
     def region(self) -> TaskRegion:
-        """Return the point in any orientation."""
+        """Return the region of the point in any orientation."""
         everywhere = np.outer([0.0, 0.0, 0.0, 1.0, 1.0, 1.0], [-np.pi, np.pi])
         return TaskRegion(self.pose, everywhere, position_tolerance=self.tolerance)
 
     def tip_errors(self, tips: NDArray[np.float64]) -> tuple[Vector, Vector]:
-        """Distance [m] of poses of the tip, shape (m, 4, 4), and an angle of 0, shapes (m,)."""
+        """Compute distances [m] and angles, always 0, of tip poses: (m, 4, 4) -> (m,) each."""
         return np.linalg.norm(tips[:, :3, 3] - self.position, axis=1), np.zeros(len(tips))
 
 
@@ -141,12 +141,12 @@ class PoseGoal(Target):
 
     @property
     def title(self) -> str:
-        """What it is."""
+        """Short name of the kind of goal."""
         return "tip pose"
 
     @property
     def tolerances(self) -> tuple[float, float]:
-        """What the errors may be at most: distance [m] and angle [rad]."""
+        """Largest errors: distance [m] and angle [rad]."""
         return self.position_tolerance, self.orientation_tolerance
 
     @property
@@ -156,21 +156,26 @@ class PoseGoal(Target):
 
     @property
     def point(self) -> Vector:
-        """Where the tip has to be [m], shape (3,)."""
+        """Position of the tip at the goal [m], shape (3,)."""
         point: Vector = self.T_world_tip.translation
         return point
 
     def tightened(self, share: float) -> PoseGoal:
-        """Return the same pose with that share of the tolerances."""
+        """Return the same pose with its tolerances scaled by a share."""
         part = positive(share, "share of the tolerances")
         return PoseGoal(self.T_world_tip, part * self.position_tolerance, part * self.orientation_tolerance)
 
     def region(self) -> TaskRegion:
-        """Return the pose alone."""
+        """Return the region that consists of this pose only."""
         return self.freed(None, NO_BOX)
 
     def freed(self, axis: FrameAxis | None, box: Vector) -> TaskRegion:
-        """The pose with a free turn about an axis of its frame, and a box of positions there, side lengths [m]."""
+        """Return the region of poses that differ by a rotation about an axis and a displacement in a box.
+
+        Args:
+            axis: "x", "y" or "z" of the goal frame, about which the rotation is free; None for no rotation.
+            box: Full side lengths of the box in the goal frame [m], shape (3,).
+        """
         bounds = np.zeros((6, 2))
         bounds[:3] = np.outer(finite_array(box, (3,), "goal box"), [-0.5, 0.5])
         if axis is not None:
@@ -178,7 +183,7 @@ class PoseGoal(Target):
         return TaskRegion(self.T_world_tip, bounds, pin.SE3.Identity(), *self.tolerances)
 
     def tip_errors(self, tips: NDArray[np.float64]) -> tuple[Vector, Vector]:
-        """Position error [m] and rotation angle [rad] of poses of the tip, shape (m, 4, 4), shapes (m,)."""
+        """Compute position errors [m] and rotation angles [rad] of tip poses: (m, 4, 4) -> (m,) each."""
         return pose_errors(tips, self.T_world_tip)
 
 
@@ -187,13 +192,14 @@ AnyPart: TypeAlias = GoalPart | pin.SE3 | NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GoalSet(TipGoal):
-    """Any of several goals: a grasp set. Poses may be given freedom: a turn about an axis, a box of positions.
+    """Any of several goals, such as a set of grasps. Poses may be given a free rotation and a box of positions.
 
     Attributes:
-        members: Goals of which one is enough; a pose (``pinocchio.SE3`` or a matrix) counts as a :class:`PoseGoal`.
-        free_rotation_axis: "x", "y" or "z" of the goal frame about which poses may be turned, or None.
-        box: Full side lengths [m], in the goal frame, within which the position of poses is free, shape (3,).
-        parts: The members, poses that have freedom as task-space regions.
+        members: Goals of which one has to be reached; a pose (``pinocchio.SE3`` or a matrix) becomes a
+            :class:`PoseGoal`.
+        free_rotation_axis: "x", "y" or "z" of the goal frame, about which poses may be turned, or None.
+        box: Full side lengths of the box, in the goal frame, in which the position of poses is free [m], shape (3,).
+        parts: The members, with poses that have freedom converted to task-space regions.
     """
 
     members: tuple[GoalPart, ...]
@@ -229,7 +235,7 @@ class GoalSet(TipGoal):
 
     @property
     def title(self) -> str:
-        """What it is."""
+        """Short name of the kind of goal."""
         return "one of several" if len(self.members) > 1 else "tip region"
 
     @property
@@ -238,7 +244,10 @@ class GoalSet(TipGoal):
         return any(member.freedom is not None for member in self.members)
 
     def alone(self, number: int) -> TipGoal:
-        """Return one of its parts as a goal of its own: of a pose that may be turned, but not shifted, a set of one."""
+        """Return one of the parts as a goal of its own.
+
+        A pose that may be turned but not shifted is returned as a set of one member.
+        """
         place = self._place(number)
         member = self.members[place]
         part = self.parts[place]
@@ -247,16 +256,17 @@ class GoalSet(TipGoal):
         return GoalSet([member], self.free_rotation_axis)
 
     def errors(self, robot: Robot, Q: ArrayLike) -> tuple[Vector, Vector]:
-        """Distance [m] and angle [rad] of the tip from the nearest part, for each row of Q, shapes (m,)."""
+        """Compute the tip's distance [m] and angle [rad] from the nearest part for each row of Q, shape (m,) each."""
         each = self.member_errors(robot, Q)
         best = np.argmin(each[..., 0] + metres_per_radian(robot) * each[..., 1], axis=0)
         position, angle = each[best, np.arange(each.shape[1])].T
         return position, angle
 
     def distance(self, robot: Robot, Q: ArrayLike) -> Vector:
-        """Distance to the nearest part, shape (m,) [m]: the way of the tip, and its turn at half the arm's reach.
+        """Compute the weighted distance of the tip from the nearest part, shape (m,) [m].
 
-        Positions and poses are measured alike; of a position the turn is free. Tolerances do not count.
+        It is the distance plus the angle times half of the arm's reach. Positions and poses are measured alike; for a
+        position the angle is 0. Tolerances are not subtracted.
         """
         each = self.member_errors(robot, Q)
         return np.asarray((each[..., 0] + metres_per_radian(robot) * each[..., 1]).min(axis=0))
@@ -275,22 +285,22 @@ class GoalSet(TipGoal):
         return int(away.argmin()) if any(reached) else None
 
     def member_errors(self, robot: Robot, Q: ArrayLike) -> NDArray[np.float64]:
-        """Distance [m] and angle [rad] (0 for a position) of each row of Q from each member, shape (k, m, 2).
+        """Compute distance [m] and angle [rad] (0 for a position) of each row of Q from each member, shape (k, m, 2).
 
-        Of what lies inside the box, and of what the free rotation can remove, nothing counts.
+        Displacements within the box and rotations about the free axis do not count as errors.
         """
         require(robot, Robot, "robot of a goal")
-        tips = robot.fk_batch(Q)  # once for all of them
+        tips = robot.fk_batch(Q)  # computed once for all members
         return np.array([part.errors_at(tips) for part in self.parts]).transpose(0, 2, 1)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MultiGoal(Goal):
-    """Goals of several tips, all of them at once: an arm with two hands.
+    """Goals of several tips that have to be reached at the same time, as for an arm with two hands.
 
     Attributes:
         frames: Names of the links that are tips.
-        parts: The goal of each, in their order; a pose counts as in a :class:`GoalSet`.
+        parts: The goal of each tip, in the same order; poses are converted as in a :class:`GoalSet`.
 
     Example:
         >>> left, right = (rrtik.PositionGoal([1.2, y, 0.1]) for y in (0.4, -0.4))
@@ -320,11 +330,11 @@ class MultiGoal(Goal):
 
     @property
     def title(self) -> str:
-        """What it is."""
+        """Short name of the kind of goal."""
         return f"{len(self.frames)} tips"
 
     def arms(self, robot: Robot) -> list[Robot]:
-        """Return the robot with each of the tips."""
+        """Return one robot for each tip, which has this tip."""
         return [arm for arm, _ in self.each(robot)]
 
     def distance(self, robot: Robot, Q: ArrayLike) -> Vector:
@@ -332,33 +342,33 @@ class MultiGoal(Goal):
         return np.asarray(np.sum([part.distance(arm, Q) for arm, part in self.each(robot)], axis=0))
 
     def satisfied(self, robot: Robot, Q: ArrayLike) -> Mask:
-        """In which rows of Q all tips are at their goals, shape (m,)."""
+        """Return for which rows of Q all tips are at their goals, shape (m,)."""
         there: Mask = np.all([part.satisfied(arm, Q) for arm, part in self.each(robot)], axis=0)
         return there
 
     def each(self, robot: Robot) -> list[tuple[Robot, GoalPart]]:
-        """Return the goal of each tip, with the robot that has this tip."""
+        """Return the goal of each tip, with the robot that has this tip, as pairs (robot, goal)."""
         require(robot, Robot, "robot of a goal")
         return [(_with_tip(robot, frame), part) for frame, part in zip(self.frames, self.parts, strict=True)]
 
 
 def _with_poses(part: AnyPart) -> GoalPart:
-    matrix = isinstance(part, np.ndarray) and part.ndim > 1  # a row may be a configuration
+    matrix = isinstance(part, np.ndarray) and part.ndim > 1  # a vector could be a configuration
     return PoseGoal(part) if matrix or isinstance(part, pin.SE3) else part  # type: ignore[return-value]
 
 
-PARTS = PoseGoal | PositionGoal | TaskRegion  # the kinds that messages name
+PARTS = PoseGoal | PositionGoal | TaskRegion  # the kinds that error messages name
 TIP_GOALS = PARTS | GoalSet
 
 
 @lru_cache(maxsize=64)
 def _with_tip(robot: Robot, frame: str) -> Robot:
-    """Return the same robot, another of its links being the one that goals refer to."""
+    """Return the same robot with another link as its tip, without its closed-form inverse kinematics."""
     return replace(robot, tip=frame, closed_form=None)
 
 
 def pose_errors(tips: NDArray[np.float64], target: pin.SE3) -> tuple[Vector, Vector]:
-    """Distance [m] and rotation angle [rad] between poses, shape (m, 4, 4), and one target pose."""
+    """Compute distance [m] and rotation angle [rad] of poses from a target pose: (m, 4, 4) -> (m,) each."""
     away = tips[:, :3, 3] - target.translation
     position: Vector = np.hypot.reduce(away, axis=1)
     return position, rotation_angles(target.rotation.T @ tips[:, :3, :3])

@@ -1,4 +1,4 @@
-"""What a world says of a path or a motion, as values; and what may be asked to say it."""
+"""Values that describe the result of checking a path or motion, and the interface of what checks it."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.model.proof import Proof
 from rrtik_ompl.model.robot import Robot
 
-TOUCHING = 1e-6  # [m] of overlap, below which bodies only touch: coal tells no less
-FARTHEST = 2.0  # [m] of clearances that are told apart
+TOUCHING = 1e-6  # [m] overlap below which bodies are said to touch; coal is not more precise
+FARTHEST = 2.0  # [m] largest clearance that is distinguished
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Violation:
-    """Why a path is not valid.
+    """A reason why a path is not valid.
 
     Attributes:
-        edge: Number of the edge, from 0; waypoint ``edge`` is its beginning.
+        edge: Index of the edge, from 0; it begins at waypoint ``edge``.
         q: The offending configuration, shape (n,).
-        reason: A line for a person: the pair in collision, or the joint and its limit.
+        reason: A line that names the pair in collision, or the joint and its limit.
     """
 
     edge: int
@@ -37,13 +37,13 @@ class Violation:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Contact:
-    """Two bodies that touch or are nearer than they may be, or the two that are nearest to that.
+    """Two bodies that touch or are nearer than allowed, or the pair of bodies that is nearest to that.
 
     Attributes:
-        first, second: Names of link, obstacle or attached object.
+        first, second: Names of links, obstacles or attached objects.
         distance: Signed distance [m]: positive is a gap, negative a penetration depth.
         point_first, point_second: Witness points in the world [m], shape (3,).
-        margin: Distance that must be kept between the two [m]; negative is a depth to which they may overlap.
+        margin: Distance that the two must keep [m]; a negative one is the depth to which they may overlap.
     """
 
     first: str
@@ -58,7 +58,7 @@ class Contact:
 
     @property
     def clearance(self) -> float:
-        """The distance less the margin [m]; what is not above 0 is not allowed."""
+        """Distance minus margin [m]; it has to be above 0."""
         return self.distance - self.margin
 
     def __str__(self) -> str:
@@ -78,12 +78,12 @@ class Contact:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PathContact:
-    """A stretch of a path in which the same bodies touch, or are nearer than their margins allow.
+    """A stretch of a path on which the same bodies touch or are nearer than their margins allow.
 
     Attributes:
-        begin, end: Where it begins and ends: number of the motion plus the share of it.
-        deepest: The worst contact of it.
-        names: Of all bodies that touch.
+        begin, end: Where it begins and ends: index of the motion plus position on it from 0 to 1.
+        deepest: The contact with the least clearance on it.
+        names: Names of all bodies that touch.
     """
 
     begin: float
@@ -94,14 +94,14 @@ class PathContact:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ClearanceCurve:
-    """Distances from obstacles beyond their margins, at places along a path; proven, so the true ones are not smaller.
+    """Distances from obstacles minus margins, at places along a path. They are proven lower bounds of the true ones.
 
     Attributes:
-        motions: Number of the motion that each place is on, shape (m,).
-        shares: Where on it, from 0 to 1, shape (m,).
-        distances: Shape (m,) [m]; ``FARTHEST`` if no obstacle is nearer, 0 if not even that is proven.
+        motions: Index of the motion that each place is on, shape (m,).
+        shares: Position of each place on its motion, from 0 to 1, shape (m,).
+        distances: The distances [m], shape (m,); ``FARTHEST`` if no obstacle is nearer, 0 if nothing is proven.
         pairs: Names of the two nearest bodies at each place; ("", "") if none is near.
-        unproven: Numbers of the motions that are not proven free.
+        unproven: Indices of the motions that are not proven free.
     """
 
     motions: NDArray[np.int64]
@@ -114,7 +114,7 @@ class ClearanceCurve:
 
     @property
     def least(self) -> int:
-        """Number of the place where the arm is nearest to an obstacle."""
+        """Index of the place where the arm is nearest to an obstacle."""
         return int(self.distances.argmin())
 
     def __str__(self) -> str:
@@ -130,13 +130,13 @@ class ClearanceCurve:
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """Whether a motion is proven free.
+    """The result whether a motion is proven free, with a text.
 
     Attributes:
-        proven: All of it.
-        text: The same for a person, in one line; with ``doubt`` what follows it.
-        unproven: Numbers of the moves that are drawn on which it is not.
-        doubt: How much is not proven, for a person, where that is told by the moves that are drawn; or "".
+        proven: Whether all of the motion is proven free.
+        text: A line that says so; if there is a ``doubt``, the text that follows it.
+        unproven: Indices of the drawn moves that are not proven free.
+        doubt: A phrase that says how many of the drawn moves are not proven; "" if that is part of ``text``.
     """
 
     proven: bool
@@ -147,12 +147,12 @@ class Verdict:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Judged:
-    """A verdict with its pictures.
+    """A verdict on a motion with its clearance curve and contacts, for pictures.
 
     Attributes:
         verdict: The verdict.
-        curve: How far the motion stays from obstacles; None if none is near, or nothing is known of them.
-        contacts: Where bodies touch.
+        curve: The clearance curve; None if no obstacle is near or known.
+        contacts: The stretches where bodies touch.
     """
 
     verdict: Verdict
@@ -162,12 +162,12 @@ class Judged:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Played:
-    """A motion as a picture plays it: all that a viewer is given of it.
+    """A motion as a picture plays it: all data that a viewer is given.
 
     Attributes:
         waypoints: The configurations that are drawn, shape (k, dof).
-        times: When each is reached [s], shape (k,); None for a path, which has no times.
-        judged: What is said of it, by the moves between these configurations; None where there is no world for it.
+        times: Time of each [s], shape (k,); None for a path, which has no times.
+        judged: The verdict on the moves between these configurations; None without a world.
     """
 
     waypoints: Matrix
@@ -178,15 +178,16 @@ class Played:
 
 
 class Judge(ABC):
-    """What a path asks about itself: a :class:`rrtik_ompl.World`, which is the only one.
+    """Interface by which a path is checked; :class:`rrtik_ompl.World` implements it.
 
-    A value knows no engine, so that the methods of a path that need one hand the question on to what they are given.
+    Values such as paths do not depend on the collision engine, so their methods that need one forward to this
+    interface.
     """
 
     @property
     @abstractmethod
     def robot(self) -> Robot:
-        """Whose paths are judged."""
+        """The robot whose paths are checked."""
 
     @abstractmethod
     def violations(self, waypoints: ArrayLike, *, resolution: float | None = None) -> tuple[Violation, ...]:
@@ -201,22 +202,22 @@ class Judge(ABC):
         slack: float = 0.0,
         seconds: float | None = None,
     ) -> Proof:
-        """What is proven of the motions between waypoints, shape (k, dof)."""
+        """Prove the motions between waypoints, shape (k, dof); see :meth:`rrtik_ompl.World.prove`."""
 
     @abstractmethod
     def has_proven(self, proof: Proof) -> bool:
-        """Check whether a proof covers every motion, keeps what has to be kept here, and was made here."""
+        """Check whether a proof covers every motion, keeps the required clearance, and was made here."""
 
     @abstractmethod
     def judged(self, waypoints: ArrayLike) -> Judged:
-        """What is said of a path, waypoints of shape (k, dof), where it is drawn."""
+        """Return a verdict on a path, waypoints of shape (k, dof), as pictures show it."""
 
 
 def require_judge(world: object, what: str, *others: str) -> None:
-    """Refuse what is no world; ``others`` names what else it may be, for the message.
+    """Refuse an object that is not a world; ``others`` names further accepted types for the message.
 
     Raises:
-        InputError: It says what was given.
+        InputError: The message names the type that was given.
     """
     if not isinstance(world, Judge):
         raise InputError(f"{what} must be of type {' or '.join(['World', *others])}, got {type(world).__name__}")

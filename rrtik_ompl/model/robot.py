@@ -1,7 +1,7 @@
-"""The arm: a Pinocchio [56] model with its geometry, limits, named postures and tip frame. A robot never changes.
+"""The arm: a Pinocchio [56] model with its geometry, limits, named postures and tip frame. It is immutable.
 
-Methods of :class:`Robot` check what they are given. What computes in the library calls the functions of this module and
-the methods of :class:`Chain`, which trust their rows: float64, shape (m, dof).
+Methods of :class:`Robot` validate their arguments. Code inside the library calls the functions of this module and the
+methods of :class:`Chain`, which expect valid rows: float64, shape (m, dof).
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ from rrtik_ompl.base.errors import InputError, UnknownNameError, require
 from rrtik_ompl.base.poses import MOST_MOVING, cross_products, joint_motions
 from rrtik_ompl.base.units import shown_unit
 
-FEW = 16  # configurations up to which Pinocchio's calls cost less than numpy's
-PER_RADIAN = 0.5  # [reach/rad] of distances of tips: two radians count as much as the whole reach
-LIMIT_TOLERANCE = 1e-5  # [rad] or [m]; a value this far outside counts as inside: URDF files write pi in six digits
+FEW = 16  # number of configurations up to which Pinocchio is faster than numpy
+PER_RADIAN = 0.5  # [reach/rad] weight of rotations in tip distances: two radians count as much as the whole reach
+LIMIT_TOLERANCE = 1e-5  # [rad] or [m] tolerance of joint limits, as URDF files often write pi with six digits
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,7 +51,7 @@ class Chain:
     __reduce__ = as_value
 
     def joint_values(self, rows: Matrix) -> Matrix:
-        """Return values of every joint, mimic joints resolved, for configurations, shape (m, dof). Shape (m, n)."""
+        """Compute the values of all joints, including mimic joints, for configurations: (m, dof) -> (m, n)."""
         return np.asarray(rows @ self.gain.T + self.offset)
 
     def joint_frames(self, rows: Matrix) -> NDArray[np.float64]:
@@ -64,29 +64,34 @@ class Chain:
         return frames
 
     def whole_turns(self) -> Mask:
-        """Return which actuated joints, shape (dof,), leave every link where it was if they turn by a whole turn."""
+        """Return which actuated joints leave all links where they are if they turn by a whole turn, shape (dof,)."""
         turning = ~self.prismatic[:, None] & (self.gain == np.rint(self.gain))
         return np.asarray((turning | (self.gain == 0.0)).all(axis=0))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Robot:
-    """A read-only arm. Configurations ``q`` have one number per actuated joint: radians, or metres if prismatic.
+    """An immutable arm. A configuration ``q`` has one number per actuated joint: radians, or metres if prismatic.
 
-    Continuous joints have infinite limits and any real number as a value: q and q + 2 pi are the same posture (all that
-    follows such a joint makes whole turns too), and a straight motion between two values turns by their difference.
+    Continuous joints have infinite limits and any real number as a value. The values q and q + 2 pi are the same
+    posture (mimic joints of such a joint make whole turns too), and a straight motion between two values turns by their
+    difference.
 
     Attributes:
-        name, joint_names: Name used in messages and files; the actuated joints, in the order of q.
-        movable: All joints of the description that are not fixed: actuated ones, those that follow and those held.
-        lower, upper: Position limits, shape (dof,), -inf and +inf for continuous joints.
+        name: Name used in messages and files.
+        joint_names: Names of the actuated joints, in the order of q.
+        movable: Names of all joints of the description that are not fixed: actuated, mimic and locked ones.
+        lower, upper: Position limits [rad or m], shape (dof,), -inf and +inf for continuous joints.
         velocity, acceleration, jerk: Limits [rad/s, rad/s^2, rad/s^3 or m], shape (dof,), inf where unknown.
-        prismatic, continuous: Masks, shape (dof,). tip, postures: Frame that goals refer to; named configurations.
+        prismatic, continuous: Which joints are prismatic, and which revolute without limits, shape (dof,).
+        tip: Name of the frame that goals refer to.
+        postures: Named configurations, shape (dof,) each.
         allowed_collisions: Pairs of link names that are never checked against each other.
-        checked_collisions: Pairs of link names that are checked although a joint joins them.
+        checked_collisions: Pairs of link names that are checked although a joint connects them.
         unchecked_solids: Pairs of names of solids of ``collision`` that are never checked against each other.
-        model, collision: Pinocchio's model and geometry; do not change them. looks: Gives ``visual``.
-        closed_form: The robot's own inverse kinematics, if it brings one.
+        model, collision: Pinocchio's model and geometry; do not change them.
+        looks: Loads ``visual``.
+        closed_form: The robot's own inverse kinematics, if it has one.
         gripper: The joints that open and close its gripper, `rrtik_ompl.description.gripper.GripperJoints`, or None.
         padding, joint_weights: By name; see :func:`rrtik_ompl.padded` and :func:`rrtik_ompl.weighted`.
     """
@@ -130,7 +135,7 @@ class Robot:
 
     @property
     def visual(self) -> pin.GeometryModel:
-        """Pinocchio's geometry of what is drawn; a mesh that cannot be read is an `InputError` here, at the first."""
+        """Pinocchio's visual geometry, loaded on first use; an `InputError` if a mesh cannot be read."""
         return self.looks()
 
     @property
@@ -139,12 +144,14 @@ class Robot:
         return _link_names(self)
 
     def link_of(self, geometry: pin.GeometryObject) -> str:
-        """Name of the link of a geometry object of Pinocchio, such as one of ``collision.geometryObjects``."""
+        """Return the link name of a geometry object of Pinocchio, such as one of ``collision.geometryObjects``."""
         require(geometry, pin.GeometryObject, "geometry of a link", "take it from robot.collision.geometryObjects")
         return str(self.model.frames[geometry.parentFrame].name)
 
     def configuration(self, values: ArrayLike, what: str = "configuration") -> Vector:
-        """Check a configuration given by a user: right length, finite. Shape (dof,).
+        """Validate a configuration given by a user: right length, finite numbers. Shape (dof,).
+
+        ``what`` names it in messages.
 
         Raises:
             InputError: If the number of values is not ``dof`` or one of them is not finite.
@@ -163,7 +170,7 @@ class Robot:
         return np.where(self.prismatic, q, np.radians(q))
 
     def posture(self, name: str) -> Vector:
-        """Named configuration, shape (dof,).
+        """Return a named configuration, shape (dof,).
 
         Raises:
             UnknownNameError: If there is no posture of that name.
@@ -174,17 +181,24 @@ class Robot:
         return self.postures[name]
 
     def within_limits(self, Q: ArrayLike, tolerance: float = LIMIT_TOLERANCE) -> Mask:
-        """Return which of the configurations Q, shape (m, dof), lie inside the limits. Shape (m,)."""
+        """Return which configurations Q, shape (m, dof), lie inside the limits, shape (m,)."""
         return inside_limits(self, self._rows(Q), finite_number(tolerance, "tolerance of limits"))
 
     def finite_range(self) -> tuple[Vector, Vector]:
-        """Bounds to draw configurations in, shapes (dof,): the limits, half a turn (or 3.14 m) where there is none."""
+        """Return finite bounds from which configurations can be drawn, shape (dof,) each.
+
+        They are the limits; where a joint has none, the bounds reach half a turn (3.14 m) from 0 or from its other
+        limit.
+        """
         lower = np.where(np.isfinite(self.lower), self.lower, np.minimum(self.upper, 0.0) - np.pi)
         upper = np.where(np.isfinite(self.upper), self.upper, np.maximum(self.lower, 0.0) + np.pi)
         return lower, upper
 
     def limit_fault(self, q: Vector) -> str:
-        """A line that names the first joint of q outside its limits, in degrees (m if it slides); "" if none is."""
+        """Return a line that names the first joint of q outside its limits; "" if there is none.
+
+        Values in it are in degrees, or metres for prismatic joints.
+        """
         if not (outside := np.flatnonzero(self.onto_limits(q) != self.clamp(q))).size:
             return ""
         if np.shape(q) != (self.dof,):
@@ -200,43 +214,53 @@ class Robot:
         return f"joint '{self.joint_names[joint]}' is at {value:.{digits}g} {unit}, outside its limits {limits} {unit}"
 
     def onto_limits(self, Q: Matrix) -> Matrix:
-        """Values up to ``LIMIT_TOLERANCE`` outside a limit moved onto it, all others as they are. Shape as given."""
+        """Return Q with values up to ``LIMIT_TOLERANCE`` outside a limit moved onto it, and others unchanged.
+
+        The shape is that of Q, (dof,) or (m, dof).
+        """
         clamped = self.clamp(Q)
         lower, upper = _widened_limits(self, LIMIT_TOLERANCE)
         return np.where((lower <= Q) & (upper >= Q), clamped, Q)
 
     def clamp(self, q: Vector) -> Vector:
-        """Move values any distance outside onto the limits. Shape as given. InputError if they are no such numbers."""
+        """Return q with values outside a limit moved onto it, however far they are; the shape is that of q.
+
+        Raises:
+            InputError: If q does not consist of rows of ``dof`` numbers.
+        """
         try:
             return np.asarray(np.minimum(np.maximum(q, self.lower), self.upper))
         except (TypeError, ValueError, OverflowError, MemoryError):
             raise InputError(f"values of robot '{self.name}': expected {self.dof} numbers, or rows of them") from None
 
     def joint_values(self, Q: ArrayLike) -> Matrix:
-        """Values of every joint of the chain, mimic joints resolved. Q: shape (m, dof) or (dof,); (m, joints)."""
+        """Compute the values of all joints of the chain, including mimic joints: (m, dof) or (dof,) -> (m, joints)."""
         return self.chain.joint_values(self._rows(Q))
 
     def pinocchio_configuration(self, Q: ArrayLike) -> Matrix:
-        """Pinocchio's vectors for Q, (m, dof) or (dof,): with mimic joints and (cos, sin) of endless ones; (m, nq)."""
+        """Convert configurations, shape (m, dof) or (dof,), to Pinocchio's vectors, shape (m, nq).
+
+        These contain mimic joints, and (cos, sin) in place of the angle of a continuous joint.
+        """
         return pinocchio_rows(self, self._rows(Q))
 
     def joint_frames(self, Q: ArrayLike) -> NDArray[np.float64]:
-        """Pose in the world of every Pinocchio joint frame, world first. Shape (m, joints + 1, 4, 4)."""
+        """Compute the poses of all Pinocchio joint frames in the world, world first, shape (m, joints + 1, 4, 4)."""
         return self.chain.joint_frames(self._rows(Q))
 
     def fk_batch(self, Q: ArrayLike, frame: str | None = None) -> NDArray[np.float64]:
-        """Forward kinematics of Q, shape (m, dof): T_world_tip, or of another frame or link. Shape (m, 4, 4)."""
+        """Compute T_world_tip, or the pose of another frame or link, for Q: (m, dof) -> (m, 4, 4)."""
         self._require_frame(frame)
         return poses(self, self._rows(Q), frame)
 
     def fk(self, q: ArrayLike, frame: str | None = None) -> pin.SE3:
-        """Forward kinematics: T_world_tip (or another frame) as ``pinocchio.SE3`` for q, shape (dof,)."""
+        """Compute T_world_tip, or the pose of another frame or link, for q, shape (dof,), as ``pinocchio.SE3``."""
         row = self.configuration(q)[None]
         self._require_frame(frame)
         return pin.SE3(poses(self, row, frame)[0])
 
     def jacobian(self, q: ArrayLike, frame: str | None = None) -> Matrix:
-        """Geometric Jacobian at the tip in world axes, rows (linear; angular), shape (6, dof)."""
+        """Compute the geometric Jacobian at the tip in world axes, rows (linear; angular), shape (6, dof)."""
         row = self.configuration(q)[None]
         self._require_frame(frame)
         if self.model.nv > MOST_MOVING:
@@ -246,22 +270,23 @@ class Robot:
         axes = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
         number = _frame_number(self, frame)
         jacobian = pin.computeFrameJacobian(self.model, self.model.createData(), full, number, axes)
-        return np.asarray(np.reshape(jacobian, (6, -1)) @ self.chain.gain)  # for one joint it comes as a vector
+        # For a single joint Pinocchio returns a vector.
+        return np.asarray(np.reshape(jacobian, (6, -1)) @ self.chain.gain)
 
     def jacobian_batch(self, Q: ArrayLike, frame: str | None = None) -> NDArray[np.float64]:
-        """Geometric Jacobians of a batch, as :meth:`jacobian`, for Q of shape (m, dof). Shape (m, 6, dof)."""
+        """Compute the geometric Jacobians of configurations, as :meth:`jacobian`: (m, dof) -> (m, 6, dof)."""
         rows = self._rows(Q)
         self._require_frame(frame)
         return jacobians(self, rows, frame)
 
     def fk_jacobian_batch(self, Q: ArrayLike, frame: str | None = None) -> tuple[Matrix, Matrix]:
-        """:meth:`fk_batch` and :meth:`jacobian_batch` at once, shapes (m, 4, 4) and (m, 6, dof)."""
+        """Compute :meth:`fk_batch` and :meth:`jacobian_batch` at once, shapes (m, 4, 4) and (m, 6, dof)."""
         rows = self._rows(Q)
         self._require_frame(frame)
         return poses_and_jacobians(self, rows, frame)
 
     def _rows(self, Q: ArrayLike) -> Matrix:
-        """Return one configuration or several as rows, shape (m, dof)."""
+        """Validate one configuration or several and return them as rows, shape (m, dof)."""
         rows = number_rows(Q, f"configurations of robot '{self.name}'")
         if rows.ndim != 2 or rows.shape[1] != self.dof:
             raise InputError(f"configurations of robot '{self.name}': expected shape (m, {self.dof}), got {rows.shape}")
@@ -272,13 +297,13 @@ class Robot:
 
 
 def inside_limits(robot: Robot, rows: Matrix, tolerance: float = LIMIT_TOLERANCE) -> Mask:
-    """Which configurations, shape (m, dof), lie inside the limits widened by a tolerance [rad or m]. Shape (m,)."""
+    """Return which configurations, shape (m, dof), lie inside the limits widened by a tolerance, shape (m,)."""
     lower, upper = _widened_limits(robot, tolerance)
     return np.asarray(np.logical_and.reduce((rows >= lower) & (upper >= rows), axis=1))
 
 
 def pinocchio_rows(robot: Robot, rows: Matrix) -> Matrix:
-    """Pinocchio's vectors for configurations, shape (m, dof); see :meth:`Robot.pinocchio_configuration`. (m, nq)."""
+    """Convert configurations to Pinocchio's vectors, (m, dof) -> (m, nq); see :meth:`Robot.pinocchio_configuration`."""
     values = robot.chain.joint_values(rows)
     if robot.model.nq == len(robot.chain.parent):
         return values
@@ -293,17 +318,17 @@ def pinocchio_rows(robot: Robot, rows: Matrix) -> Matrix:
 
 
 def poses(robot: Robot, rows: Matrix, frame: str | None = None) -> NDArray[np.float64]:
-    """T_world_tip, or of another frame, for configurations, shape (m, dof). Shape (m, 4, 4)."""
+    """Compute T_world_tip, or the pose of another frame, for configurations: (m, dof) -> (m, 4, 4)."""
     return in_blocks(partial(_poses, robot, _frame_number(robot, frame)), rows)
 
 
 def jacobians(robot: Robot, rows: Matrix, frame: str | None = None) -> NDArray[np.float64]:
-    """Geometric Jacobians at the tip, or at another frame, for configurations, shape (m, dof). Shape (m, 6, dof)."""
+    """Compute geometric Jacobians at the tip, or at another frame, for configurations: (m, dof) -> (m, 6, dof)."""
     return in_blocks(lambda block: poses_and_jacobians(robot, block, frame)[1], rows)
 
 
 def poses_and_jacobians(robot: Robot, rows: Matrix, frame: str | None = None) -> tuple[Matrix, Matrix]:
-    """:func:`poses` and :func:`jacobians` at once, shapes (m, 4, 4) and (m, 6, dof)."""
+    """Compute :func:`poses` and :func:`jacobians` at once, shapes (m, 4, 4) and (m, 6, dof)."""
     number = _frame_number(robot, frame)
     chain = robot.chain
     frames = chain.joint_frames(rows)
@@ -311,7 +336,7 @@ def poses_and_jacobians(robot: Robot, rows: Matrix, frame: str | None = None) ->
     columns = np.zeros((len(frames), 6, len(chain.parent)))
 
     joint = robot.model.frames[number].parentJoint - 1
-    while joint >= 0:  # only the joints between the base and the frame move it
+    while joint >= 0:  # only joints between the base and the frame move it
         axis = frames[:, joint + 1, :3, :3] @ chain.axis[joint]
         if chain.prismatic[joint]:
             columns[:, :3, joint] = axis
@@ -326,7 +351,10 @@ def poses_and_jacobians(robot: Robot, rows: Matrix, frame: str | None = None) ->
 def _poses(
     robot: Robot, number: int, rows: Matrix, joint_frames: NDArray[np.float64] | None = None
 ) -> NDArray[np.float64]:
-    """Poses of a frame, given by its number, for configurations, shape (m, dof): of few by Pinocchio. (m, 4, 4)."""
+    """Compute the poses of a frame, given by its number, for configurations: (m, dof) -> (m, 4, 4).
+
+    A few configurations are computed by Pinocchio, many by numpy. ``joint_frames`` are those of ``rows`` if known.
+    """
     if robot.model.nv > MOST_MOVING or not 0 < len(rows) <= FEW:
         target = robot.model.frames[number]
         frames = robot.chain.joint_frames(rows) if joint_frames is None else joint_frames
@@ -341,27 +369,27 @@ def _poses(
 
 
 def reach_of(robot: Robot) -> float:
-    """Unit of length of an arm [m]: all offsets between its joints in a row."""
+    """Return the characteristic length of an arm [m]: the sum of all offsets between consecutive joints."""
     return float(np.linalg.norm(robot.chain.placement[:, :3, 3], axis=1).sum()) or 1.0
 
 
 def metres_per_radian(robot: Robot) -> float:
-    """What a turn of the tip counts beside its way [m/rad]."""
+    """Return the weight of the tip's rotation in tip distances [m/rad]."""
     return PER_RADIAN * reach_of(robot)
 
 
 def unnamed_joints(count: int) -> tuple[str, ...]:
-    """What so many joints are called where nobody has named them: ``joint1, joint2, ...``."""
+    """Return default joint names: ``joint1, joint2, ...``."""
     return tuple(f"joint{k + 1}" for k in range(count))
 
 
 def require_joints(robot: Robot, names: Sequence[str], what: str) -> None:
-    """Refuse what moves other joints than a robot, or the same ones in another order.
+    """Refuse a path or motion whose joints are not those of a robot, in the same order.
 
     Args:
         robot: The robot.
-        names: Of the joints that it moves; those of :func:`unnamed_joints` stand for none.
-        what: What it is, such as "path".
+        names: Names of the joints that it moves; the names of :func:`unnamed_joints` fit every robot.
+        what: What is refused, such as "path".
 
     Raises:
         InputError: If the names, or their number, are not those of the robot's actuated joints.
@@ -387,7 +415,7 @@ def _link_names(robot: Robot) -> tuple[str, ...]:
 
 @lru_cache(maxsize=256)
 def _frame_number(robot: Robot, frame: str | None) -> int:
-    """Pinocchio's number of a frame, of the tip if None.
+    """Return Pinocchio's index of a frame, of the tip if None.
 
     Raises:
         UnknownNameError: If there is none of that name.
@@ -400,7 +428,12 @@ def _frame_number(robot: Robot, frame: str | None) -> int:
 
 @lru_cache(maxsize=64)
 def _places_of(robot: Robot) -> tuple[NDArray[np.int64], ...]:
-    """Joints with one number in Pinocchio's vectors and where it is; those with two and where their cosines are."""
+    """Return where the joints stand in Pinocchio's vectors, in which continuous joints have two numbers.
+
+    Returns:
+        Indices of the joints with one number and of these numbers; indices of the joints with two numbers and of the
+        first of these, the cosine.
+    """
     starts = np.array(robot.model.idx_qs.tolist()[1:])
     sizes = np.array(robot.model.nqs.tolist()[1:])
     single = np.flatnonzero(sizes == 1)
@@ -410,5 +443,5 @@ def _places_of(robot: Robot) -> tuple[NDArray[np.int64], ...]:
 
 @lru_cache(maxsize=64)
 def _data_of(robot: Robot, _thread: int) -> pin.Data:
-    """Pinocchio's working memory for a robot, of one thread's own."""
+    """Return Pinocchio's working memory for a robot; each thread has its own."""
     return robot.model.createData()
