@@ -1,1 +1,1 @@
-"""Motions over time, and arms that follow them."""
+"""Compute motions over time, and let arms follow them."""

@@ -1,1 +1,1 @@
-"""What drives an arm: a trajectory that it follows, and a tip that is steered by its velocity."""
+"""Drive an arm: along a trajectory, or by the velocity of its tip."""

@@ -1,4 +1,4 @@
-"""An arm that follows a trajectory: set points at a control rate, pause and resume, a pace, a stop within limits."""
+"""Follow a trajectory with an arm: set points at a control rate, pauses, changes of pace, and stops within limits."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.motion.following.pace import Pace
 from rrtik_ompl.motion.trajectory import RateLimits, Trajectory
 
-RETRY_SECONDS = 0.02  # after which a change of pace is tried again that has kept no limits
-NEAR = 0.05  # [rad] or [m] by which an arm may be elsewhere than it was told, unless said otherwise
-MOST_PERIODS = 3.0  # of a step of run(), however late it is
-SLACK = 1e-6  # of a limit, by which a trajectory may exceed it
-AT_REST = 1e-6  # of a joint's largest velocity
+RETRY_SECONDS = 0.02  # [s] until a change of pace that could not keep the limits is tried again
+NEAR = 0.05  # [rad] or [m] default tolerance of a joint's deviation from its set point
+MOST_PERIODS = 3.0  # largest step of run(), in control periods, however late a tick is
+SLACK = 1e-6  # share of a limit by which a trajectory may exceed it
+AT_REST = 1e-6  # share of a joint's largest velocity below which it counts as at rest
 
 
 @runtime_checkable
@@ -35,17 +35,17 @@ class RobotLink(Protocol):
     """
 
     def positions(self) -> Vector:
-        """Joint values now, shape (n,) [rad or m]."""
+        """Return the joint values now, shape (n,) [rad or m]."""
 
     def command(self, q: Vector, t: float) -> None:
-        """Take a set point, shape (n,) [rad or m], for the time t [s] since the motion began."""
+        """Take a set point, shape (n,) [rad or m], for the time t since the motion began [s]."""
 
 
 class SimulatedLink:
-    """An arm that is always where it is told to be.
+    """A simulated arm that is always exactly at its last set point.
 
     Attributes:
-        sent: Times and set points so far.
+        sent: Times [s] and set points, shape (dof,), that were commanded so far.
 
     Example:
         >>> path = rrtik.JointPath([[0.0, 0.0, 0.0], [0.05, 0.0, 0.0]])
@@ -66,14 +66,14 @@ class SimulatedLink:
         self.sent: list[tuple[float, Vector]] = []
 
     def positions(self) -> Vector:
-        """Joint values now, shape (n,)."""
+        """Return the joint values now, shape (n,)."""
         return self._q.copy()
 
     def command(self, q: Vector, t: float) -> None:
-        """Go to a set point at once.
+        """Move to a set point at once.
 
         Raises:
-            InputError: If it is no row of finite numbers, one for each joint, or the time is none.
+            InputError: If the set point is not one finite number per joint, or the time is not a finite number.
         """
         place = finite_array(q, self._q.shape, "set point").copy()
         time = finite_number(t, "time of a set point")
@@ -83,14 +83,15 @@ class SimulatedLink:
 
 @dataclass(frozen=True, slots=True)
 class Followed:
-    """How following ended.
+    """How following a trajectory ended.
 
     Attributes:
-        arrived: Whether at the end of the trajectory.
-        reason: Why not; "" if it arrived. Where a stop came too late for a rest before the end, it says so.
-        place: How far it came, of the trajectory's own time [s].
-        seconds: How long it took [s].
-        late: By how much the motion was put off for set points that came late, on top of that [s].
+        arrived: Whether the arm is at the end of the trajectory.
+        reason: Why the arm did not arrive; "" if it arrived. If a stop came too late for the arm to rest before the
+            end, the reason says so although the arm arrived.
+        place: How far the motion came, in the trajectory's own time [s].
+        seconds: How long it took, without delays by late ticks [s].
+        late: By how much the motion was delayed because ticks were late, in addition to ``seconds`` [s].
 
     Example:
         >>> path = rrtik.JointPath([[0.0, 0.0, 0.0], [0.05, 0.0, 0.0]])
@@ -108,22 +109,23 @@ class Followed:
 
 
 class Follower:
-    """Follows a trajectory by set points.
+    """Follows a trajectory by sending set points to an arm.
 
-    The arm stays on the path of the trajectory, whatever its pace, so what was proven of it holds. ``pause``,
-    ``resume``, ``stop`` and ``pace`` may be called from other threads; each takes effect within the limits, on the
-    trajectory: where it brakes at its limit already, a little later; at the latest the arm rests where the motion ends.
+    The arm stays on the path of the trajectory at any pace, so what was proven of the path holds. ``pause``,
+    ``resume``, ``stop`` and ``pace`` may be called from other threads. Each takes effect within the limits: where the
+    trajectory brakes at its limit already, this is a little later, and at the latest the arm rests at the end of the
+    motion.
 
     Args:
         trajectory: The motion, from rest to rest.
         link: The arm.
-        limits: That changes of pace keep, and the trajectory itself; None for its peaks.
-        rate: Set points a second.
-        tolerance: By how much the arm may be elsewhere than it was told; then it is stopped [rad or m].
+        limits: Limits that the trajectory and all changes of pace must keep; None for the trajectory's own peaks.
+        rate: Number of set points per second.
+        tolerance: Largest deviation of a joint from its set point [rad or m]; beyond it, the arm is stopped.
 
     Raises:
-        InputError: If the trajectory exceeds the limits or is not at rest at its ends, if the arm is not where it
-            begins or has another number of joints, or if an option is none.
+        InputError: If the trajectory exceeds the limits or is not at rest at its ends, if the arm is not at its start
+            or has another number of joints, or if an option is not valid.
 
     Example:
         >>> import rrtik_ompl as rrtik
@@ -162,11 +164,11 @@ class Follower:
         self._pace = Pace(trajectory.cubics, _limits_to_keep(trajectory, limits))
 
         self._lock = Lock()
-        self._target_pace = 1.0  # unless it is paused or stopping
+        self._target_pace = 1.0  # pace to reach, unless the motion is paused or stopping
         self._paused = False
         self._stopping = False
-        self._reason = ""  # of a stop; "" while there is none
-        self._retry_time = 0.0  # [s] of the motion's clock, before which no other pace is tried
+        self._reason = ""  # reason of a stop; "" if there was none
+        self._retry_time = 0.0  # [s] time on the motion's clock before which no other pace is tried
         self._lateness = 0.0  # [s]
         self._ended = False
 
@@ -174,17 +176,17 @@ class Follower:
 
     @property
     def ended(self) -> bool:
-        """Whether the arm has come to its end, or to its stop."""
+        """Return whether the arm has reached its end or come to a stop."""
         return self._ended
 
     @property
     def place(self) -> float:
-        """Where on the trajectory the arm is told to be, in the trajectory's own time [s]."""
+        """Return the place on the trajectory of the last set point, in the trajectory's own time [s]."""
         return self._pace.place
 
     @property
     def result(self) -> Followed:
-        """How far it is, and how it ended."""
+        """Return how far the motion is and how it ended."""
         pace = self._pace
         reason = self._reason
         arrived = pace.place >= self._motion.duration
@@ -195,21 +197,21 @@ class Follower:
         return Followed(arrived, reason, pace.place, pace.now, self._lateness)
 
     def pause(self) -> None:
-        """Come to rest on the trajectory, until ``resume``."""
+        """Bring the arm to rest on the trajectory, until ``resume``."""
         self._paused = True
 
     def resume(self) -> None:
-        """Go on after ``pause``; a stop is for good."""
+        """Continue after ``pause``; a stop is final."""
         self._paused = False
 
     def stop(self, reason: str = "stopped") -> None:
-        """Come to rest on the trajectory, for good."""
+        """Bring the arm to rest on the trajectory, finally."""
         with self._lock:
             self._stopping = True
             self._reason = self._reason or reason
 
     def pace(self, pace: float) -> None:
-        """Play the motion at a share of its speed, from above 0 to 1.
+        """Play the motion at a share of its timed speed, above 0 and at most 1.
 
         Raises:
             InputError: If the share is another one.
@@ -220,7 +222,7 @@ class Follower:
         self._target_pace = share
 
     def step(self, seconds: float) -> None:
-        """Advance by a time [s] and command the set point then.
+        """Advance by a time [s] and send the set point for the new time.
 
         Raises:
             InputError: If the time is not greater than 0.
@@ -236,14 +238,14 @@ class Follower:
     def run(
         self, *, clock: Callable[[], float] = time.monotonic, sleep: Callable[[float], object] = time.sleep
     ) -> Followed:
-        """Follow to the end, or to a stop; Ctrl-C stops within limits.
+        """Follow the trajectory to its end or to a stop; Ctrl-C stops it within the limits.
 
-        After a tick that came late the motion goes on where it was, a few periods at most further: it falls behind the
-        clock, and the arm is not told to jump. An arm that is not where it was told to be, or whose link cannot say
-        where it is, is stopped within limits; what ``command`` raises ends following at once.
+        After a late tick the motion continues from where it was, by a few periods at most: it falls behind the clock,
+        but the arm is never told to jump. If the arm deviates too much from its set point, or its position cannot be
+        read, it is stopped within the limits. An error raised by ``command`` ends following at once.
 
         Args:
-            clock: Tells the time [s].
+            clock: Returns the time [s].
             sleep: Waits for a time [s].
         """
         last_tick = clock()
@@ -265,7 +267,7 @@ class Follower:
         return self.result
 
     def _advance(self, seconds: float) -> None:
-        """Go on at the pace of the moment; decide on another pace if one is wanted."""
+        """Decide on a change of pace if another pace is wanted, and advance the motion by a time [s]."""
         target = 0.0 if self._paused or self._stopping else self._target_pace
         pace = self._pace
         if target != pace.end and pace.now >= self._retry_time:
@@ -285,9 +287,9 @@ class Follower:
             raise InputError(f"the trajectory begins elsewhere: {deviation} rad or m away; move the arm there first")
 
     def _fault(self, commanded: Vector) -> str:
-        """Why an arm that was told to be at ``commanded``, shape (dof,), has to stop; "" if it need not.
+        """Return why an arm whose set point is ``commanded``, shape (dof,), has to stop; "" if it need not.
 
-        Whatever a link raises here, the arm is brought to rest by the set points that it may still take.
+        All errors of reading the position are caught, so that the remaining set points can bring the arm to rest.
         """
         try:
             positions = finite_array(self._link.positions(), commanded.shape, "positions of the arm")
@@ -297,7 +299,7 @@ class Follower:
         return deviation and f"{deviation} away from where it was told to be"
 
     def _deviation_in_words(self, positions: Vector, commanded: Vector) -> str:
-        """Which joint is farthest from where it was told to be, and how far; "" if all are near enough."""
+        """Return which joint deviates most from its set point and by how much; "" if all are within the tolerance."""
         deviation = np.abs(positions - commanded)
         if (deviation <= self._tolerance).all():
             return ""
@@ -306,7 +308,10 @@ class Follower:
 
 
 def _check_rest(motion: Trajectory) -> None:
-    """Refuse a motion that begins or ends at speed: an arm at rest cannot follow it, and no change of pace ends it."""
+    """Raise an error if a motion does not begin and end at rest.
+
+    An arm at rest could not follow it, and no change of pace would bring the arm to rest at its end.
+    """
     end_speeds = np.abs(motion.velocities[[0, -1]])
     if (end_speeds > AT_REST * motion.peaks().velocity).any():
         end, joint = np.unravel_index(int(end_speeds.argmax()), end_speeds.shape)
@@ -318,13 +323,16 @@ def _check_rest(motion: Trajectory) -> None:
 
 
 def _limits_to_keep(motion: Trajectory, limits: RateLimits | None) -> RateLimits:
-    """What changes of pace keep: the limits, or the peaks of the motion where there are none.
+    """Return the limits that changes of pace must keep: those given, or the peaks of the motion if there are none.
+
+    A limit that the motion exceeds by rounding is raised to the motion's peak.
 
     Raises:
-        InputError: If the motion exceeds them: no change of pace would keep them, and so none would ever be made.
+        InputError: If the motion exceeds the limits: then no change of pace could keep them.
     """
     peaks = motion.peaks()
-    if limits is None:  # joints that stand still have the peaks of the others
+    # A joint that does not move has peaks of 0, so the largest peaks of the other joints are used for it.
+    if limits is None:
         return RateLimits(*(np.maximum(np.where(row > 0.0, row, row.max()), 1e-9) for row in peaks))
 
     bounds = limits.for_joints(len(motion.joint_names))

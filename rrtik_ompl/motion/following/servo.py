@@ -1,8 +1,8 @@
-"""A tip that is steered by its velocity: joint rates for a twist, within limits, away from obstacles, proven free.
+"""Steer the tip by its velocity: joint rates for a twist, within limits, away from obstacles, proven free.
 
-The rates are those of damped least squares [22]; what they leave free serves a secondary task. Near obstacles the rate
-of approach falls with the distance (a velocity damper): the secondary task yields first, then all joints become slower
-together, so that the tip keeps its direction. A step that cannot be proven free is made shorter.
+The rates are those of damped least squares [22]; the remaining freedom serves a secondary task. Near obstacles the rate
+of approach decreases with the distance (a velocity damper): the secondary task yields first, then all joints are slowed
+together, so that the tip keeps its direction. A step that cannot be proven free is shortened.
 """
 
 from __future__ import annotations
@@ -20,20 +20,20 @@ from rrtik_ompl.base.poses import working_memory
 from rrtik_ompl.world.world import World
 
 METHODS = ("scaled", "clipped")
-DAMPED_BELOW = 0.05  # of the Jacobian [m or 1]; below it rates are damped
-STEP = 1e-3  # [rad] or [m] of difference quotients; distances come in single precision
-SLOPE_VALID_WITHIN = 0.03  # [rad] or [m] that joints may move until the slope of the volume is found anew
-SHARES = np.array([0.5, 0.25, 0.1])  # of a step, the first that is proven free is taken
-REACTION_SECONDS = 0.1  # in which a joint comes to rest before its limit
+DAMPED_BELOW = 0.05  # smallest singular value of the Jacobian [m or 1] below which rates are damped
+STEP = 1e-3  # [rad] or [m] step of difference quotients; not smaller, as distances have single precision
+SLOPE_VALID_WITHIN = 0.03  # [rad] or [m] that a joint may move before the gradient of the volume is computed again
+SHARES = np.array([0.5, 0.25, 0.1])  # shares of a step; the first one that is proven free is taken
+REACTION_SECONDS = 0.1  # [s] No joint is so fast that it would reach its limit sooner than this.
 
 
 @dataclass(frozen=True, slots=True)
 class Secondary:
-    """What the rates that do not move the tip are used for, as rates of descent and ascent [1/s].
+    """Gains of the secondary tasks, which use the rates that do not move the tip.
 
     Attributes:
-        centring: Of joints to the middle of their range.
-        manipulability: Of the volume of the Jacobian's ellipsoid.
+        centring: How fast joints move to the middle of their range [1/s].
+        manipulability: How fast the arm increases the volume of the Jacobian's ellipsoid.
     """
 
     centring: float = 0.0
@@ -41,20 +41,20 @@ class Secondary:
 
 
 class Servo:
-    """Joint rates for velocities of the tip.
+    """Computes joint rates for velocities of the tip.
 
     Args:
-        world: Robot and obstacles; of one thread, as it is.
-        method: "scaled" slows all joints together, so that the tip keeps its direction; "clipped" stops each joint at
-            its own limit, so that the tip goes as far as it can.
-        centring: Secondary task: how fast joints go to the middle of their range [1/s].
-        manipulability: Secondary task: how fast the arm moves away from singular postures.
-        near: Distance from which the arm approaches obstacles more slowly [m].
-        kept: Distance that it does not go below [m].
-        slide: Whether the arm, instead of slowing down, gives way along obstacles: the tip leaves its direction then.
+        world: Robot and obstacles; used by one thread only.
+        method: "scaled" slows all joints together, so that the tip keeps its direction; "clipped" limits each joint by
+            itself, so that the tip goes as far as it can.
+        centring: Secondary task: how fast joints move to the middle of their range [1/s].
+        manipulability: Secondary task: how fast the arm moves away from singular configurations.
+        near: Distance below which the arm approaches obstacles more slowly [m].
+        kept: Distance from obstacles that is kept [m].
+        slide: Whether the arm gives way along obstacles instead of slowing down; the tip then leaves its direction.
 
     Raises:
-        InputError: If an option is none, or ``kept`` is not less than ``near``.
+        InputError: If an option is not valid, or ``kept`` is not less than ``near``.
 
     Example:
         >>> import rrtik_ompl as rrtik
@@ -97,19 +97,19 @@ class Servo:
         high = self._robot.upper
         self._mid_range = np.where(np.isfinite(low + high), 0.5 * (low + high), np.nan)
         self._joint_steps = np.eye(self._robot.dof) * STEP  # for difference quotients: one joint moved in each row
-        # Configuration and slope of the volume there, as it was found last; None before that.
+        # Configuration at which the gradient of the volume was computed last, and that gradient.
         self._volume_slope_at: tuple[Vector, Vector] | None = None
 
     def step(self, q: ArrayLike, twist: ArrayLike, dt: float) -> Vector:
-        """Joint rates, shape (dof,) [rad/s or m/s], to be held for a time step.
+        """Return joint rates to be held for a time step, shape (dof,) [rad/s or m/s].
 
         Args:
-            q: The configuration now, shape (dof,); free, or the rates are 0.
-            twist: Of the tip, in the axes of the world: linear [m/s], then angular [rad/s], shape (6,).
+            q: The current configuration, shape (dof,); if it is not free, the rates are 0.
+            twist: Velocity of the tip in the axes of the world, shape (6,): linear [m/s], then angular [rad/s].
             dt: The time step [s].
 
         Raises:
-            InputError: If one of them is not finite, or has another shape.
+            InputError: If an argument is not finite or has another shape.
         """
         configuration = finite_array(q, (self._robot.dof,), "configuration of a servo")
         tip_velocity = finite_array(twist, (6,), "twist of a servo")
@@ -119,19 +119,25 @@ class Servo:
         return self._proven_free(configuration, self._within_limits(configuration, rates, seconds), seconds)
 
     def _rates_for_twist(self, q: Vector, twist: Vector) -> tuple[Vector, Vector]:
-        """Damped least squares: rates that move the tip, and those of the secondary tasks in the Jacobian's null space.
+        """Compute rates that move the tip, by damped least squares, and rates of the secondary tasks in the null space.
 
-        Both of shape (dof,); the second ones leave the tip where it is.
+        Args:
+            q: The configuration, shape (dof,).
+            twist: Velocity of the tip, shape (6,).
+
+        Returns:
+            Both of shape (dof,); the second ones do not move the tip.
         """
         U, singular_values, Vt = np.linalg.svd(self._jacobian(q), full_matrices=False)
         smallest = float(singular_values[-1])
         damping = (1.0 - (smallest / DAMPED_BELOW) ** 2) * DAMPED_BELOW**2 if smallest < DAMPED_BELOW else 0.0
-        # 1e-18, so that nothing is divided by 0 where the Jacobian vanishes
+        # The 1e-18 avoids a division by 0 where the Jacobian vanishes.
         rates = Vt.T @ ((singular_values / (singular_values**2 + damping + 1e-18)) * (U.T @ twist))
 
         secondary = self._secondary_rates(q)
         return rates, secondary - Vt.T @ (Vt @ secondary)
 
+    # Return the Jacobian of the tip in the axes of the world, shape (6, dof).
     def _jacobian(self, q: Vector) -> Matrix:
         robot = self._robot
         pin.computeJointJacobians(robot.model, self._data, robot.pinocchio_configuration(q)[0])
@@ -142,7 +148,7 @@ class Servo:
         return jacobian
 
     def _secondary_rates(self, q: Vector) -> Vector:
-        """Rates of the secondary tasks, shape (dof,)."""
+        """Return the rates of the secondary tasks, shape (dof,), before they are projected into the null space."""
         centring = self._tasks.centring
         manipulability = self._tasks.manipulability
         if centring == 0.0 and manipulability == 0.0:
@@ -154,27 +160,36 @@ class Servo:
         return rates
 
     def _volume_slope(self, q: Vector) -> Vector:
-        """How the volume grows with each joint, shape (dof,); kept while the arm has hardly moved."""
+        """Return the gradient of the volume of the Jacobian's ellipsoid, shape (dof,).
+
+        It is computed by difference quotients, and reused while the arm has hardly moved.
+        """
         if self._volume_slope_at is None or np.abs(q - self._volume_slope_at[0]).max() > SLOPE_VALID_WITHIN:
             slope = (np.array([self._volume(q + step) for step in self._joint_steps]) - self._volume(q)) / STEP
             self._volume_slope_at = (q.copy(), slope)
         return self._volume_slope_at[1]
 
+    # Return the volume of the Jacobian's ellipsoid at a configuration: the product of its singular values.
     def _volume(self, q: Vector) -> float:
         jacobian = self._jacobian(q)
         rows = jacobian @ jacobian.T if len(self._joint_steps) >= 6 else jacobian.T @ jacobian
         return float(np.sqrt(max(np.linalg.det(rows), 0.0)))
 
     def _damped_approach(self, q: Vector, rates: Vector, secondary: Vector, seconds: float) -> Vector:
-        """Velocity damper: rates whose approach to the nearest body falls with the distance, shape (dof,).
+        """Limit rates by a velocity damper: the approach to the nearest body becomes slower as the distance decreases.
+
+        The distance is a lower bound, and its gradient comes from difference quotients. Near obstacles the secondary
+        task is reduced first; if the distance still decreases too fast, all rates are scaled or, with ``slide``, the
+        approaching part is removed.
 
         Args:
             q: The configuration, shape (dof,).
-            rates: Those that move the tip, shape (dof,).
-            secondary: Those of the secondary tasks, shape (dof,).
+            rates: Rates that move the tip, shape (dof,).
+            secondary: Rates of the secondary tasks, shape (dof,).
             seconds: The time step [s].
 
-        The distance is a lower bound. Its rate is negative where the arm approaches something.
+        Returns:
+            The rates, shape (dof,).
         """
         fast = self._world.fast
         combined = rates + secondary
@@ -190,7 +205,7 @@ class Servo:
         gradient = (lower_bounds[1:] - distance) / STEP
         speed_share = max(distance - self._min_distance, 0.0) / (self._slowdown_distance - self._min_distance)
         if gradient @ secondary < 0.0:
-            # The secondary task fades out in the outer half, and leaves the inner one to the tip.
+            # The secondary task fades out in the outer half of the zone; in the inner half only the tip's task remains.
             combined = rates + max(2.0 * speed_share - 1.0, 0.0) * secondary
 
         half_way_a_step = 0.5 * max(distance - self._min_distance, 0.0) / seconds
@@ -209,11 +224,11 @@ class Servo:
         return limited
 
     def _tip_speed(self, rates: Vector) -> float:
-        """A bound of the speed of any point of the arm [m/s]."""
+        """Return a bound on the speed of any point of the arm [m/s]."""
         return float(np.abs(rates) @ self._world.weights)
 
     def _within_limits(self, q: Vector, rates: Vector, seconds: float) -> Vector:
-        """Rates within velocity limits, and such that no joint passes its range."""
+        """Limit rates to the velocity limits, and such that no joint leaves its range."""
         robot = self._robot
         braking_seconds = max(REACTION_SECONDS, seconds)
         upper = np.minimum(self._max_rates, np.maximum(robot.upper - q, 0.0) / braking_seconds)
@@ -227,7 +242,7 @@ class Servo:
         return scaled
 
     def _proven_free(self, q: Vector, rates: Vector, seconds: float) -> Vector:
-        """The rates, or the largest share of them with which the step is proven free; 0 if none is."""
+        """Return the rates, or the largest share of them for which the step is proven free; zeros if there is none."""
         if not rates.any():
             return rates
         if self._world.motion_proven(q, q + seconds * rates):

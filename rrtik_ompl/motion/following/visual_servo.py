@@ -1,8 +1,8 @@
-"""Visual servoing: the last centimetres to a target by what the camera sees of it, until the tip is there.
+"""Lead the tip over the last centimetres to a target by what the camera sees of it, until the tip is there.
 
-"position": the tip goes straight to the pose that the target's markers give. "image": points of the gripper go straight
-to where they are wanted in the picture, by the interaction matrix; errors of calibration that shift both the same way
-cancel. The camera is fixed to the arm's base. The arm stops where the target is not seen any more, or jumps.
+With "position", the tip moves straight to the pose that the target's markers give. With "image", points of the gripper
+move straight to their goals in the picture, by the interaction matrix; calibration errors that shift both in the same
+way cancel. The camera is fixed to the arm's base. The arm stops if the target is no longer seen, or jumps.
 Source: [1, ch. 2.2].
 """
 
@@ -24,20 +24,20 @@ from rrtik_ompl.motion.following.servo import Servo
 
 ServoMethod: TypeAlias = Literal["position", "image"]
 ServoState: TypeAlias = Literal["moving", "done", "lost", "jumped", "blocked"]
-HALF_SIDE = 0.05  # [m]; of the square of points at the tip that "image" leads
-MIN_DEPTH = 0.05  # [m]; nearer to the camera nothing is seen
-STILL = 1e-4  # [rad/s or m/s]; slower than that the arm is taken to stand
+HALF_SIDE = 0.05  # [m] half the side of the square of points at the tip that "image" uses
+MIN_DEPTH = 0.05  # [m] Points nearer to the camera than this are not visible.
+STILL = 1e-4  # [rad/s or m/s] An arm whose joints are all slower than this counts as standing.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ServoStep:
-    """What is to be done in a time step.
+    """The command for one time step.
 
     Attributes:
-        rates: Of the joints, shape (dof,) [rad/s or m/s].
+        rates: Joint rates, shape (dof,) [rad/s or m/s].
         state: "moving", "done", or why the arm stands: "lost", "jumped", "blocked".
-        away: Distance of the tip from where it shall be, by the last sighting [m].
-        turned: The angle to it [rad].
+        away: Distance of the tip from its goal, by the last sighting [m]; inf if there was none.
+        turned: Angle of the rotation to the goal [rad]; inf if there was no sighting.
     """
 
     rates: Vector
@@ -47,14 +47,15 @@ class ServoStep:
 
 
 def interaction_matrix(points: ArrayLike, depths: ArrayLike) -> Matrix:
-    """How points in a picture move with the camera: ``d points = L @ twist``, L of shape (2 n, 6).
+    """Return the matrix L by which points in a picture move with the camera: ``d points = L @ twist``.
 
     Args:
-        points: x / z and y / z in the frame of the camera, shape (n, 2).
-        depths: z of each, above 0, shape (n,) [m].
+        points: Image coordinates x / z and y / z in the frame of the camera, shape (n, 2).
+        depths: Depth z of each point, above 0, shape (n,) [m].
 
     Returns:
-        For a twist of the camera in its own frame: linear [m/s], then angular [rad/s].
+        Matrix of shape (2 n, 6); rows 2 k and 2 k + 1 belong to point k. Its columns are for a twist of the camera in
+        its own frame: linear [m/s], then angular [rad/s].
 
     Raises:
         InputError: If shapes do not fit, or a depth is not above 0.
@@ -75,20 +76,20 @@ def interaction_matrix(points: ArrayLike, depths: ArrayLike) -> Matrix:
 
 
 class VisualServo:
-    """Leads the tip to a target that is seen.
+    """Leads the tip to a target that the camera sees.
 
     Args:
-        servo: Turns velocities of the tip into rates: within limits, away from obstacles, proven free.
+        servo: Converts velocities of the tip to joint rates: within limits, away from obstacles, proven free.
         robot: The arm.
-        method: See the head of this module.
-        T_base_camera: Pose of the camera; for "image".
-        gain: Share of the error that is taken away in a second [1/s].
-        speed: Of the tip at most [m/s].
-        turn: Of the tip at most [rad/s].
-        patience: So long the arm goes on to where the target was seen last [s].
+        method: "position" or "image", see the head of this module.
+        T_base_camera: Pose of the camera; required for "image".
+        gain: Share of the error that is removed per second [1/s].
+        speed: Largest speed of the tip [m/s].
+        turn: Largest angular speed of the tip [rad/s].
+        patience: How long the arm continues to the last seen goal without a sighting [s].
 
     Raises:
-        InputError: If an option is none, or "image" has no camera.
+        InputError: If an option is not valid, or "image" has no camera.
 
     Example:
         >>> import rrtik_ompl as rrtik
@@ -126,28 +127,28 @@ class VisualServo:
         self._turn = positive(turn, "turn")
         self._patience = positive(patience, "patience")
 
-        self.near = 5e-4  # [m] and
-        self.aligned = np.deg2rad(0.1)  # [rad], within which the tip is there
-        self.jump = 0.03  # [m] from one sighting to the next: more is taken for an error
+        self.near = 5e-4  # [m] distance within which the tip has arrived
+        self.aligned = np.deg2rad(0.1)  # [rad] angle within which the tip has arrived
+        self.jump = 0.03  # [m] largest change from one sighting to the next; more is taken for an error
 
-        self._goal: pin.SE3 | None = None  # where the target was seen last
-        self._unseen = 0.0  # [s] since then
+        self._goal: pin.SE3 | None = None  # goal of the tip by the last sighting
+        self._unseen = 0.0  # [s] time since the last sighting
 
     def go_on_with(self, servo: Servo) -> None:
-        """Take another servo for the same target, where the world has changed; what was seen is not forgotten."""
+        """Continue to the same target with another servo, after the world has changed; the last sighting is kept."""
         require(servo, Servo, "servo")
         self._servo = servo
 
     def step(self, q: ArrayLike, seen: ArrayLike | pin.SE3 | None, dt: float) -> ServoStep:
-        """Rates for a time step.
+        """Return the joint rates for a time step.
 
         Args:
-            q: The configuration now, shape (dof,).
-            seen: Where the tip shall be by the picture of now, ``T_base_tip``; None if the target is not in it.
+            q: The current configuration, shape (dof,).
+            seen: Goal pose of the tip by the current picture, ``T_base_tip``; None if the target is not in it.
             dt: The time step [s].
 
         Raises:
-            InputError: If one of them is none.
+            InputError: If one of them is not valid.
         """
         configuration = self._robot.configuration(q, "configuration")
         seconds = positive(dt, "time step")
@@ -168,7 +169,11 @@ class VisualServo:
         return ServoStep(rates, "moving" if np.abs(rates).max() > STILL else "blocked", away, turned)
 
     def _take_sighting(self, seen: pin.SE3 | None, seconds: float) -> ServoState:
-        """Take in a sighting, or that there is none; "moving" while the target is known, or why the arm must stand."""
+        """Record a sighting, or that there was none.
+
+        Returns:
+            "moving" while the goal is known, otherwise why the arm must stand.
+        """
         if seen is None:
             self._unseen += seconds
             return "moving" if self._unseen <= self._patience else "lost"
@@ -181,7 +186,7 @@ class VisualServo:
         return "moving"
 
     def _twist(self, tip: pin.SE3, goal: pin.SE3) -> Vector:
-        """Of the tip, in the axes of the base, shape (6,)."""
+        """Return the velocity of the tip in the axes of the base, shape (6,): linear [m/s], then angular [rad/s]."""
         if self._method == "position" or self._camera is None:
             turning = tip.rotation @ pin.log3(tip.rotation.T @ goal.rotation)
             return self._gain * np.concatenate([goal.translation - tip.translation, turning])
@@ -197,20 +202,21 @@ class VisualServo:
         )
         camera_twist = (
             self._gain * np.linalg.lstsq(0.5 * (matrix_at_tip + matrix_at_goal), error, rcond=None)[0]
-        )  # of the gripper: - L moves it
+            # A twist of the gripper moves its points by -L, so the error is not negated.
+        )
 
         angular = camera_twist[3:]
         velocity = camera_twist[:3] + np.cross(angular, camera.actInv(tip).translation)
         return np.concatenate([camera.rotation @ velocity, camera.rotation @ angular])
 
     def _within_speeds(self, twist: Vector) -> Vector:
-        """The same direction, within the speeds of the tip."""
+        """Scale a twist down, in the same direction, to keep the speed limits of the tip."""
         linear = float(np.linalg.norm(twist[:3])) / self._speed
         angular = float(np.linalg.norm(twist[3:])) / self._turn
         return twist / max(linear, angular, 1.0)
 
 
 def _square(T: pin.SE3) -> Matrix:
-    """Four points at the tip in the frame of the camera, shape (4, 3)."""
+    """Return four points at the tip in the frame of the camera, shape (4, 3) [m]."""
     corners = HALF_SIDE * np.array([[1.0, 1.0, 0.0], [-1.0, 1.0, 0.0], [-1.0, -1.0, 0.0], [1.0, -1.0, 0.0]])
     return np.asarray(corners @ T.rotation.T + T.translation)

@@ -1,4 +1,4 @@
-"""Time parameterisation: a path and limits in, a trajectory out that keeps the limits everywhere."""
+"""Parameterise paths by time: from a path and limits compute a trajectory that keeps the limits everywhere."""
 
 from __future__ import annotations
 
@@ -43,32 +43,33 @@ def time_parameterize(
     torque: ArrayLike | bool | None = None,
     payload: float = 0.0,
 ) -> Trajectory:
-    """Give a path its times: as fast as the limits allow, beginning and ending at rest.
+    """Compute a trajectory along a path: as fast as the limits allow, from rest to rest.
 
     Without ``blend`` the motion stays on the path to 1e-9 and stops at every corner; between two corners it has the
     shortest time under velocity, acceleration and jerk limits [21]. So the single-joint moves of a path are made one
     after the other, and what was checked of the path holds for the motion.
 
     With ``blend`` corners are rounded and passed without a stop, as fast as the limits allow [19]. The motion then
-    leaves the path by at most 0.22 of ``blend``. Its acceleration never jumps, not even without jerk limits; it is
-    proven free where it leaves the path, if the path is proven, or else checked in steps; :meth:`Trajectory.prove`
-    proves the whole motion anew. Waypoints nearer to each other than 0.02 of ``blend`` are merged, so that many of
-    them are one smooth curve, and no piece of such a curve is shorter than 1 ms. A corner that cannot be rounded is a
-    stop; where rounding makes nothing faster none is rounded.
+    leaves the path by at most 0.22 of ``blend``. Its acceleration never jumps, even without jerk limits. Where it
+    leaves the path, it is proven free if the path can be proven, and checked in steps otherwise;
+    :meth:`Trajectory.prove` proves the whole motion anew. Waypoints nearer to each other than 0.02 of ``blend`` are
+    merged, so that many of them become one smooth curve, and no piece of such a curve is shorter than 1 ms. A corner
+    that cannot be rounded is a stop; if rounding does not make the motion faster, no corner is rounded.
 
     Args:
-        path: A valid path. Waypoints that coincide or lie on a line are no corners.
-        limits: Or a robot, whose limits are taken (see :meth:`RateLimits.of` for those that it does not have).
+        path: A valid path. Waypoints that coincide or lie on a line do not count as corners.
+        limits: The limits, or a robot whose limits are taken (see :meth:`RateLimits.of` for limits that it does not
+            have).
         blend: Largest distance of a corner from the beginning of its rounding [rad or m]; 0 keeps to the path.
-        world: For a blend: what the rounded corners must not touch.
-        clearance: What a blended motion keeps from every obstacle on top of its margin [m], if the path keeps it. None:
-            1 mm, or what the ends of the path have.
+        world: The world that a blended motion must not collide with; required for a blend.
+        clearance: Distance that a blended motion keeps from every obstacle in addition to its margin [m], if the path
+            keeps it. None: 1 mm, or what the ends of the path have.
         tip_speed: Largest speed of the tip's origin [m/s]. Limits of the tip and of torques need a robot: pass it as
             ``limits``, or a world.
         tip_acceleration: Largest acceleration of the tip's origin [m/s^2].
-        torque: Largest torques, one number or one per joint [N m; N if it slides], by rigid-body dynamics; True for the
-            efforts of the robot's description.
-        payload: Mass at the tip's origin that the torques carry too [kg].
+        torque: Largest torques, one number or one per joint [N m; N for sliding joints], by rigid-body dynamics; True
+            for the efforts of the robot's description.
+        payload: Mass at the tip's origin that the torques have to carry too [kg].
 
     Returns:
         A motion whose largest velocity, acceleration and jerk are within the limits everywhere (to 1e-9 of them), not
@@ -127,7 +128,7 @@ def time_parameterize(
 
 
 def _corners(path: JointPath) -> Matrix:
-    """The vertices of a path that can be timed, shape (k, n), k at least 2."""
+    """Return the vertices of a path, shape (k, n), k at least 2; raise an error if there is no motion to time."""
     if len(path.waypoints) < 2:
         raise InputError("path to time: it has one waypoint; a motion needs two or more")
     corners = vertices(path.waypoints)

@@ -1,4 +1,4 @@
-"""A path with its corners rounded: near the path, proven free, and no slower than with a stop at each corner."""
+"""Time a path with rounded corners: near the path, proven free, and faster than with a stop at each corner."""
 
 from __future__ import annotations
 
@@ -19,11 +19,12 @@ from rrtik_ompl.motion.trajectory.runs import runs
 from rrtik_ompl.world.clearances import provable_clearances
 from rrtik_ompl.world.world import World
 
-DEVIATION_SHARE = 0.22  # of the blend: how far a motion may be from its path
-MAX_ROUNDS = 12  # attempts with smaller and smaller rounded corners
-LEAST_RADIUS = 1.0 / 32.0  # of the blend; a corner that has to be rounded less is a stop
+DEVIATION_SHARE = 0.22  # largest distance of a motion from its path, as a share of the blend
+MAX_ROUNDS = 12  # most attempts, with smaller and smaller rounded corners
+LEAST_RADIUS = 1.0 / 32.0  # least radius of a rounded corner, as a share of the blend; below it, the corner is a stop
 
-Faults = Callable[[Trajectory, Mask], NDArray[np.int64]]  # pieces that are not known to be free, of those off the path
+# From a motion and the mask of its pieces off the path to the indices of those that are not known to be free.
+Faults = Callable[[Trajectory, Mask], NDArray[np.int64]]
 
 
 def blended(
@@ -35,14 +36,27 @@ def blended(
     faults: Faults,
     more: DynamicLimits | None = None,
 ) -> Trajectory | None:
-    """The motion along a path with these vertices, shape (k, n), that rounds them.
+    """Return the motion along a path that rounds its corners, or None.
 
-    None where no such motion is faster than ``slowest`` [s], or none is free.
+    All corners are rounded as widely as allowed. The radii of the corners near places where the motion deviates too
+    far, or is not known to be free, are halved, until there are no such places.
+
+    Args:
+        path: The path.
+        corners: Its vertices, shape (k, n).
+        limits: Limits of the joints.
+        blend: Largest distance of a corner from the beginning of its rounding [rad or m].
+        slowest: Duration that the motion must be below [s].
+        faults: Function that finds the pieces which are not known to be free.
+        more: Limits of the tip or of torques; None if there are none.
+
+    Returns:
+        The motion; None if no such motion is faster than ``slowest``, or none is free.
     """
     chosen = spaced(corners, MERGED_SHARE * blend)
     merged = len(chosen) < len(corners)
     rows = vertices(corners[chosen]) if merged else corners
-    if len(rows) < 2:  # the whole path is shorter than what is merged
+    if len(rows) < 2:  # The whole path is so short that its waypoints are merged.
         return None
     vertex_places = np.concatenate([np.zeros(1), np.cumsum(np.linalg.norm(np.diff(rows, axis=0), axis=1))])
     radii = first_radii(rows, blend)
@@ -58,7 +72,7 @@ def blended(
         places, deviations, on_path = (np.concatenate(column) for column in columns)
         bad_places = places[deviations > max_deviation]
         if len(bad_places) == 0:
-            off_path = np.ones_like(on_path) if merged else ~on_path  # what was proven is the path with all corners
+            off_path = np.ones_like(on_path) if merged else ~on_path  # Only the path with all corners has been proven.
             bad_places = places[faults(motion, off_path)]
 
         if len(bad_places) == 0:
@@ -68,10 +82,11 @@ def blended(
 
 
 def joined(runs: Sequence[Pieces], path: JointPath) -> Trajectory:
-    """The runs one after the other; the motion ends where ``path`` ends, and takes its names and units."""
+    """Join runs to one motion; it ends where ``path`` ends, and takes the path's joint names and units."""
     durations, positions, velocities, accelerations = (np.concatenate(rows) for rows in zip(*runs, strict=True))
     rest = np.zeros((1, positions.shape[1]))
-    last = -2.0 * velocities[-1:] / durations[-1] - accelerations[-1:]  # of the cubic that comes to rest
+    # Acceleration at the end of the last cubic, which comes to rest.
+    last = -2.0 * velocities[-1:] / durations[-1] - accelerations[-1:]
     return Trajectory(
         np.concatenate([np.zeros(1), np.cumsum(durations)]),
         np.vstack([positions, path.waypoints[-1:]]),
@@ -84,7 +99,7 @@ def joined(runs: Sequence[Pieces], path: JointPath) -> Trajectory:
 
 
 def within(motion: Trajectory, limits: RateLimits, rounds: int = 10) -> Trajectory:
-    """The motion, slowed where rounding errors let it exceed a limit."""
+    """Slow a motion down if rounding errors let it exceed a limit."""
     for _ in range(rounds):
         peaks = motion.peaks()
         factor = limits.slowing(peaks.velocity, peaks.acceleration, peaks.jerk)
@@ -95,7 +110,17 @@ def within(motion: Trajectory, limits: RateLimits, rounds: int = 10) -> Trajecto
 
 
 def _with_narrower_corners(radii: Vector, vertex_places: Vector, bad_places: Vector, min_radius: float) -> Vector:
-    """Half the radius of the corners near bad places; 0 where that is less than ``min_radius``."""
+    """Halve the radii of the corners near bad places.
+
+    Args:
+        radii: Radii of the inner vertices, shape (m,).
+        vertex_places: Places of the inner vertices, shape (m,).
+        bad_places: Places where the motion has faults, shape (k,).
+        min_radius: A radius that becomes smaller than this is set to 0, which makes the corner a stop.
+
+    Returns:
+        The new radii, shape (m,). If no corner's rounding reaches a bad place, the nearest rounded corners are halved.
+    """
     bad_places = np.unique(bad_places)
     is_blamed = (np.abs(vertex_places - bad_places[_nearest(bad_places, vertex_places)]) <= radii) & (radii > 0.0)
     rounded = np.flatnonzero(radii > 0.0)
@@ -108,22 +133,28 @@ def _with_narrower_corners(radii: Vector, vertex_places: Vector, bad_places: Vec
 
 
 def _nearest(rows: Vector, places: Vector) -> NDArray[np.int64]:
-    """Numbers of the rows, ascending, that are nearest to places: of two the first."""
+    """Return the indices of the rows, which ascend, that are nearest to places; the first of two equally near ones."""
     after = np.minimum(np.searchsorted(rows, places), len(rows) - 1)
     before = np.maximum(after - 1, 0)
     return np.where(np.abs(places - rows[before]) <= np.abs(places - rows[after]), before, after)
 
 
 def stopped(path: JointPath, corners: Matrix, limits: RateLimits, more: DynamicLimits | None) -> Trajectory:
-    """The motion along a path with these vertices that stops at each of them."""
+    """Return the motion along a path with these vertices that stops at each of them."""
     parts = runs(corners, np.zeros(len(corners) - 2), limits, more=more)
     return within(joined([run.pieces for run in parts], path), limits)
 
 
 def fault_finder(path: JointPath, world: World, clearance: float | None) -> Faults:
-    """What a motion has to pass: a proof of as much as the path itself is proven to keep, or a check in steps.
+    """Return the function that finds the pieces of a motion that are not known to be free.
 
-    What lies on the path is proven with it.
+    If the path itself can be proven with some clearance, the pieces off the path must be proven with the same
+    clearance; the others are proven with the path. Otherwise the whole motion is checked in steps.
+
+    Args:
+        path: The path.
+        world: The world.
+        clearance: Clearance to keep [m]; None for a default.
     """
     proven_clearance = next(provable_clearances(world, path.waypoints, clearance), None)
     if proven_clearance is None:

@@ -1,6 +1,6 @@
-"""What holds of a timed motion in a world: proofs of its pieces, and the faults of each.
+"""Check timed motions in a world: proofs of their pieces, and the faults of each piece.
 
-In proofs straight motions stand for curved ones, over parts so short that nothing leaves them far.
+In proofs curved motions are replaced by straight ones (chords), over parts so short that nothing moves far from them.
 """
 
 from __future__ import annotations
@@ -18,11 +18,12 @@ from rrtik_ompl.motion.trajectory.cubics import Cubics, even_parts
 from rrtik_ompl.world.route_check import VERIFICATION_DENSITY, not_proven
 from rrtik_ompl.world.world import World
 
-SLACKS = (1e-4, 1e-6, 1e-8)  # [m] by which two bodies together may leave their places on the chords, tried in turn
+# [m] Largest deviation of two bodies together from their places on the chords; tried in turn.
+SLACKS = (1e-4, 1e-6, 1e-8)
 
 
 def faults_of(motion: Cubics, world: World) -> list[tuple[float, str]]:
-    """The first fault of every piece that has one, time [s] and reason; see :meth:`Trajectory.faults`."""
+    """Return time [s] and reason of the first fault of each piece that has one; see :meth:`Trajectory.faults`."""
     clock = bad_moments(motion, world)
     rows = motion.states(clock).positions
     reasons = [world.explain(q) or not_proven(world.settings) for q in rows]
@@ -30,7 +31,10 @@ def faults_of(motion: Cubics, world: World) -> list[tuple[float, str]]:
 
 
 def bad_moments(motion: Cubics, world: World) -> Vector:
-    """Times of the first fault of every piece that has one; see :meth:`Trajectory.faults`."""
+    """Return the times [s] of the first fault of each piece that has one, in order; see :meth:`Trajectory.faults`.
+
+    For a piece that is only unproven, the time is that of its beginning.
+    """
     h = np.diff(motion.times)
     travel = h * (greatest_speeds(motion) @ world.weights)
     counts = np.ceil(travel * VERIFICATION_DENSITY / world.motion_resolution).astype(np.int64) + 1
@@ -49,7 +53,7 @@ def bad_moments(motion: Cubics, world: World) -> Vector:
 
 
 def greatest_speeds(motion: Cubics) -> Matrix:
-    """Bounds of the rates of all joints on each piece, shape (m, n) [rad/s or m/s]."""
+    """Return upper bounds of the joints' speeds on each piece, shape (m, n) [rad/s or m/s]."""
     h = np.diff(motion.times)[:, None]
     peak = np.abs(motion.velocities)
     speeds: Matrix = np.maximum(peak[1:], peak[:-1]) + h * np.abs(motion.jerks * h) / 8.0
@@ -57,13 +61,19 @@ def greatest_speeds(motion: Cubics) -> Matrix:
 
 
 def proof_of_motion(motion: Cubics, world: World, clearance: float | None = None) -> Proof:
-    """A proof of all pieces, of what the world keeps if no clearance [m] is given; see :meth:`Trajectory.prove`."""
+    """Prove all pieces of a motion; see :meth:`Trajectory.prove`.
+
+    Args:
+        motion: The motion.
+        world: The world.
+        clearance: Distance to keep from obstacles [m]; None for what the world requires.
+    """
     kept_clearance = world.settings.required_clearance if clearance is None else clearance
     return proof_of_pieces(motion, world, kept_clearance, 0, len(motion.times) - 1)
 
 
 def proof_of_pieces(motion: Cubics, world: World, clearance: float, first: int, end: int) -> Proof:
-    """A proof of the pieces from ``first`` up to ``end``; see :meth:`Trajectory.prove`."""
+    """Prove the pieces of a motion from number ``first`` to ``end - 1``; see :meth:`Trajectory.prove`."""
     pushes = np.maximum(np.abs(motion.accelerations[:-1]), np.abs(motion.last_accelerations))[first:end]
     times = motion.times[first : end + 1]
     return proof_by_chords(
@@ -72,12 +82,12 @@ def proof_of_pieces(motion: Cubics, world: World, clearance: float, first: int, 
 
 
 class Chords(NamedTuple):
-    """Parts of the pieces of a motion.
+    """The pieces of a motion, cut into equal parts.
 
     Attributes:
-        counts: Into how many parts each piece is cut, shape (m,).
-        pieces: Number of the piece of each part, shape (k,).
-        shares: Where on the piece each part begins, from 0 to 1, shape (k,).
+        counts: Number of parts of each piece, shape (m,).
+        pieces: Index of the piece of each part, shape (k,).
+        shares: Where on its piece each part begins, from 0 to below 1, shape (k,).
     """
 
     counts: NDArray[np.int64]
@@ -85,7 +95,7 @@ class Chords(NamedTuple):
     shares: Vector
 
     def joined(self, proof: Proof) -> Proof:
-        """A proof of the parts as one of the pieces."""
+        """Convert a proof of the parts to a proof of the pieces, with the first gap of each piece."""
         gaps = {int(self.pieces[gap.motion]): gap for gap in reversed(proof.unproven)}
         unproven = (
             replace(gap, motion=k, share=float(self.shares[gap.motion] + gap.share / self.counts[k]))
@@ -95,14 +105,14 @@ class Chords(NamedTuple):
 
 
 def chords_of(durations: Vector, pushes: Vector, slack: float) -> Chords:
-    """Cut pieces of a motion so that two bodies leave their places on the chords by at most ``slack`` [m] together.
+    """Cut pieces of a motion so that two bodies together deviate by at most ``slack`` [m] from the chords.
 
-    Over a part of duration h no coordinate leaves its chord by more than an eighth of h^2 times its acceleration.
+    Over a part of duration h no coordinate deviates from its chord by more than h^2 / 8 times its largest acceleration.
 
     Args:
-        durations: Of the pieces [s], shape (m,).
-        pushes: Largest acceleration of any point of the arm during each of them [m/s^2], shape (m,).
-        slack: See above.
+        durations: Durations of the pieces [s], shape (m,).
+        pushes: Largest acceleration of any point of the arm during each piece [m/s^2], shape (m,).
+        slack: Largest deviation of two bodies together [m].
     """
     counts = np.maximum(np.ceil(durations * np.sqrt(0.25 * pushes / slack)), 1.0).astype(np.int64)
     return Chords(counts, *even_parts(counts))
@@ -116,15 +126,17 @@ def proof_by_chords(
     clearance: float,
     finer: int = 0,
 ) -> Proof:
-    """Prove the pieces of a motion, m of them; those that are not proven by chords are tried again with finer ones.
+    """Prove the m pieces of a motion by chords; pieces that remain unproven are tried again with shorter chords.
+
+    Shorter chords are only tried if the motion itself, at the place of the gap, is far enough from everything.
 
     Args:
-        times: Of their ends [s], shape (m + 1,).
-        pushes: See :func:`chords_of`.
-        places: Configurations at times, shape (k,) to (k, dof).
+        times: Times at the ends of the pieces [s], shape (m + 1,).
+        pushes: Largest acceleration of any point of the arm during each piece [m/s^2], shape (m,).
+        places: Function from times, shape (k,), to configurations, shape (k, dof).
         world: The world.
-        clearance: To be kept from every obstacle [m].
-        finer: How many of ``SLACKS`` have been tried.
+        clearance: Distance to keep from every obstacle [m].
+        finer: Number of ``SLACKS`` that have been tried.
     """
     h = np.diff(times)
     slack = SLACKS[finer]
@@ -136,7 +148,8 @@ def proof_by_chords(
 
     unproven = np.array([gap.motion for gap in proof.unproven])
     q = places(times[unproven] + np.nan_to_num([gap.share for gap in proof.unproven]) * h[unproven])
-    is_hopeful = world.prover.proven(q, q, clearance=clearance)  # where the motion itself is as near, no chord helps
+    # If the motion itself is too near to something, shorter chords cannot help.
+    is_hopeful = world.prover.proven(q, q, clearance=clearance)
     gaps = [gap for gap, hope in zip(proof.unproven, is_hopeful, strict=True) if not hope]
     to_refine = unproven[is_hopeful]
 

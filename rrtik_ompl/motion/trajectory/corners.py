@@ -1,4 +1,4 @@
-"""Where a path bends: the vertices between which it is straight, and how widely each may be rounded."""
+"""Find the vertices between which a path is straight, and how widely each may be rounded."""
 
 from __future__ import annotations
 
@@ -9,15 +9,19 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Matrix, Vector
 
-COINCIDENCE = 1e-10  # [rad] or [m]; waypoints closer to the last one, or to a straight line, are left out
-MIN_CORNER_COSINE = -0.98  # between the directions before and after; a corner with a smaller one is a stop
-MERGED_SHARE = 0.02  # of the blend: waypoints nearer to the last one are merged with it
-ROUNDED_SHARE = 0.14  # of the blend: by which the rounding of a corner alone may leave the path
-SEARCH_CHUNK = 64  # waypoints at once, for the next one that is kept
+COINCIDENCE = 1e-10  # [rad] or [m] Waypoints closer than this to the last one, or to a line, are left out.
+# Smallest cosine between the directions before and after a corner that is rounded; a sharper corner is a stop.
+MIN_CORNER_COSINE = -0.98
+MERGED_SHARE = 0.02  # distance within which waypoints are merged, as a share of the blend
+ROUNDED_SHARE = 0.14  # largest deviation by the rounding of a single corner, as a share of the blend
+SEARCH_CHUNK = 64  # waypoints that are compared at once in the search for the next one to keep
 
 
 def vertices(waypoints: Matrix) -> Matrix:
-    """The waypoints between which a path is straight, to 1e-10: those that coincide or lie on a line are left out."""
+    """Return the waypoints between which a path is straight to 1e-10, shape (k, n).
+
+    Waypoints that coincide with the last one, or lie on a line between others, are left out.
+    """
     rows = waypoints[spaced(waypoints, COINCIDENCE)]
     if len(rows) < 3:
         return rows
@@ -33,9 +37,9 @@ def vertices(waypoints: Matrix) -> Matrix:
 
 
 def spaced(rows: Matrix, min_distance: float) -> NDArray[np.int64]:
-    """Numbers of the rows that are farther than ``min_distance`` from the last one chosen, and of the last row.
+    """Choose rows that are farther than ``min_distance`` from the one chosen before; return their indices, shape (m,).
 
-    Shape (m,).
+    The first row is chosen, and the last one too if there are at least two.
     """
     steps = np.linalg.norm(rows[1:] - rows[:-1], axis=1)
     if (steps > min_distance).all():
@@ -54,14 +58,14 @@ def spaced(rows: Matrix, min_distance: float) -> NDArray[np.int64]:
 
     last = len(rows) - 1
     if len(chosen) > 1 or np.linalg.norm(rows[-1] - rows[0]) > min_distance:
-        if len(chosen) > 1 and chosen[-1] != last:  # too near to the last row, which takes its place
+        if len(chosen) > 1 and chosen[-1] != last:  # This row is too near to the last one, which replaces it.
             chosen.pop()
         chosen.append(last)
     return np.unique(chosen)
 
 
 def _between(a: Matrix, b: Matrix, c: Matrix) -> NDArray[np.bool_]:
-    """Whether each point b lies on the line from a to c, between them; shape (m, n) each."""
+    """Check whether each point b lies on the line from a to c, between them; shape (m, n) each."""
     chord = c - a
     offset = b - a
     length = np.linalg.norm(chord, axis=1)
@@ -75,7 +79,14 @@ def _between(a: Matrix, b: Matrix, c: Matrix) -> NDArray[np.bool_]:
 
 
 def _bends(rows: Matrix) -> NDArray[np.bool_]:
-    """Which inner rows are vertices, shape (k - 2,): halves at the farthest row until all lie on lines."""
+    """Find the inner rows that are vertices: split at the row farthest from the chord until all rows lie on lines.
+
+    Args:
+        rows: Points, shape (k, n).
+
+    Returns:
+        Mask of the vertices among the inner rows, shape (k - 2,).
+    """
     is_vertex = np.zeros(len(rows), dtype=bool)
     unfinished = [(0, len(rows) - 1)]
     while unfinished:
@@ -98,10 +109,14 @@ def _bends(rows: Matrix) -> NDArray[np.bool_]:
 
 
 def first_radii(corners: Matrix, blend: float) -> Vector:
-    """How far from each inner vertex its rounding may begin, shape (k - 2,); 0 where the path must stop.
+    """Return the largest radius of each inner vertex's rounding, shape (k - 2,); 0 where the path must stop.
 
-    At most as far as ``blend`` and the nearest end of the path, and so that the corner by itself leaves the path by at
-    most ``ROUNDED_SHARE`` of the blend: the rounding of radius r leaves it by r / 6 of the change of direction.
+    A radius is at most ``blend``, and such that the rounding of the corner by itself leaves the path by at most
+    ``ROUNDED_SHARE`` of the blend: a rounding of radius r leaves it by r / 6 times the change of direction.
+
+    Args:
+        corners: Vertices, shape (k, n).
+        blend: Largest radius [rad or m].
     """
     edges = corners[1:] - corners[:-1]
     directions = edges / np.linalg.norm(edges, axis=1)[:, None]

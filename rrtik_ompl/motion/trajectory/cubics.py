@@ -1,4 +1,4 @@
-"""Cubics between knots: a motion as numbers, and what follows from them: places, peaks, set points."""
+"""Represent a motion by numbers alone: cubics between knots, with their values, peaks and set points."""
 
 from __future__ import annotations
 
@@ -11,21 +11,23 @@ from numpy.typing import ArrayLike, NDArray
 from rrtik_ompl.base.arrays import Matrix, Vector, finite_array
 from rrtik_ompl.base.errors import InputError
 
-JUMP_SHARE = 1e-6  # of the largest acceleration; a larger difference between two pieces is a jump, its jerk infinite
-LONGEST_PERIOD = 0.02  # [s]; between set points of a drive
-CLOCK_ERROR = 2e-9  # [s]; messages of ROS have nanoseconds
-EXACT = 1e-12  # [rad] or [m]; what rounding leaves between a knot and the end of the cubic that leads to it
-# of a piece in thirds: jerks times h^3, h^2 and h make these changes of position, velocity and acceleration
+# Share of the largest acceleration above which a difference between two pieces counts as a jump, of infinite jerk.
+JUMP_SHARE = 1e-6
+LONGEST_PERIOD = 0.02  # [s] longest control period of a drive
+CLOCK_ERROR = 2e-9  # [s] rounding of times, as messages of ROS have nanoseconds
+EXACT = 1e-12  # [rad] or [m] rounding error between a knot and the end of the cubic that leads to it
+# For a piece of duration h that is cut into thirds of constant jerk: row k times the three jerks, times h^3, h^2 and h,
+# is the change of position, velocity and acceleration over the piece.
 _THIRDS = np.array([[19.0, 7.0, 1.0], [45.0, 27.0, 9.0], [54.0, 54.0, 54.0]]) / 162.0
 
 
 class State(NamedTuple):
-    """Where a motion is, shape (n,) each for one time, (k, n) for k times.
+    """The state of a motion, shape (n,) each for one time, (k, n) each for k times.
 
     Attributes:
-        positions: [rad or m].
-        velocities: [rad/s or m/s].
-        accelerations: [rad/s^2 or m/s^2]; just after a jump.
+        positions: Joint positions [rad or m].
+        velocities: Joint velocities [rad/s or m/s].
+        accelerations: Joint accelerations [rad/s^2 or m/s^2]; at a jump, the value just after it.
     """
 
     positions: NDArray[np.float64]
@@ -34,7 +36,10 @@ class State(NamedTuple):
 
 
 class Peaks(NamedTuple):
-    """Largest absolute velocity, acceleration and jerk of each joint, shape (n,); inf is a jump of acceleration."""
+    """Largest absolute velocity, acceleration and jerk of each joint, shape (n,) each.
+
+    A jerk of inf means that the acceleration jumps.
+    """
 
     velocity: Vector
     acceleration: Vector
@@ -43,13 +48,14 @@ class Peaks(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Cubics:
-    """Knots in time, and a cubic between each two: a motion as numbers alone, that nothing checks.
+    """A motion as knots in time with a cubic between each two; the numbers are not checked.
 
     Attributes:
-        times: Of the knots [s], shape (m,), increasing from 0.
-        positions: Shape (m, n) [rad or m].
-        velocities: Shape (m, n).
-        accelerations: Shape (m, n): at the beginning of each piece, in the last row at the end of the last one.
+        times: Times of the knots [s], shape (m,), increasing from 0.
+        positions: Positions at the knots, shape (m, n) [rad or m].
+        velocities: Velocities at the knots, shape (m, n) [rad/s or m/s].
+        accelerations: Accelerations at the beginning of each piece and, in the last row, at the end of the last piece,
+            shape (m, n) [rad/s^2 or m/s^2].
     """
 
     times: Vector
@@ -59,19 +65,19 @@ class Cubics:
 
     @property
     def duration(self) -> float:
-        """Time from the first to the last knot [s]."""
+        """Return the time from the first to the last knot [s]."""
         return float(self.times[-1])
 
     @property
     def jerks(self) -> Matrix:
-        """Jerk of each piece, with which it comes to the velocity of the next knot [rad/s^3 or m/s^3], (m - 1, n)."""
+        """Return the jerk by which each piece reaches the next knot's velocity, shape (m - 1, n) [rad/s^3 or m/s^3]."""
         h = np.diff(self.times)[:, None]
         jerks: Matrix = 2.0 * (np.diff(self.velocities, axis=0) - h * self.accelerations[:-1]) / h**2
         return jerks
 
     @property
     def ends(self) -> Matrix:
-        """Where the cubic of each piece ends, shape (m - 1, n) [rad or m]."""
+        """Return the positions at which the cubics of all pieces end, shape (m - 1, n) [rad or m]."""
         h = np.diff(self.times)[:, None]
         v = self.velocities[:-1]
         a = self.accelerations[:-1]
@@ -80,13 +86,16 @@ class Cubics:
 
     @property
     def last_accelerations(self) -> Matrix:
-        """Acceleration at the end of each piece, shape (m - 1, n) [rad/s^2 or m/s^2]."""
+        """Return the acceleration at the end of each piece, shape (m - 1, n) [rad/s^2 or m/s^2]."""
         return np.asarray(self.accelerations[:-1] + np.diff(self.times)[:, None] * self.jerks)
 
     def states(self, clock: Vector) -> State:
-        """Positions, velocities and accelerations at times, shape (k,); at rest before the beginning and after the end.
+        """Return positions, velocities and accelerations at times, shape (k, n) each.
 
-        Shape (k, n) each.
+        Before the beginning and after the end the motion is at rest.
+
+        Args:
+            clock: Times [s], shape (k,).
         """
         inside = np.clip(clock, 0.0, self.duration)
         piece = np.clip(np.searchsorted(self.times, inside, side="right") - 1, 0, len(self.times) - 2)
@@ -99,20 +108,25 @@ class Cubics:
         velocities = v + x * (a + x * j / 2.0)
         accelerations = a + x * j
 
-        positions[inside == self.duration] = self.positions[-1]  # to the bit
+        # The end is set exactly, without the rounding of the cubic.
+        positions[inside == self.duration] = self.positions[-1]
         velocities[clock != inside] = 0.0
         accelerations[clock != inside] = 0.0
         return State(positions, velocities, accelerations)
 
     def at_knots(self, numbers: NDArray[np.int64]) -> Cubics:
-        """Some of the knots alone, by their numbers."""
+        """Return the cubics through only the knots with these indices."""
         return Cubics(
             self.times[numbers], self.positions[numbers], self.velocities[numbers], self.accelerations[numbers]
         )
 
     def peaks(self) -> Peaks:
-        """The largest velocity, acceleration and jerk of each joint: exact, for every piece is a cubic."""
-        # joints in rows: numpy looks for the largest number along a row much faster than down a column
+        """Return the largest velocity, acceleration and jerk of each joint: exact, as every piece is a cubic.
+
+        A velocity can peak at a knot or where the acceleration changes sign within a piece; an acceleration peaks at an
+        end of a piece. If the acceleration of a joint jumps anywhere, its jerk is inf.
+        """
+        # Joints are in rows, as numpy finds the largest number along a row much faster than along a column.
         h = np.diff(self.times)
         v, a, j = (np.ascontiguousarray(rows.T) for rows in (self.velocities, self.accelerations, self.jerks))
 
@@ -125,13 +139,14 @@ class Cubics:
 
         ends = a[:, :-1] + h * j
         jump_sizes = np.abs(ends - a[:, 1:])
-        # what rounding of times and velocities does to the acceleration at the end of a piece
+        # Effect of the rounding of times and velocities on the acceleration at the end of a piece.
         rounding = 8.0 * np.finfo(np.float64).eps * (np.abs(v).max() + self.times[-1] * np.abs(a).max()) / h
         smooth = jump_sizes <= rounding
         acceleration = np.maximum(np.abs(a).max(axis=1), np.abs(np.where(smooth, 0.0, ends)).max(axis=1))
 
         jump = JUMP_SHARE * acceleration.max()
-        at_rest = np.abs(a[:, [0, -1]]) <= jump  # before its beginning and after its end the arm does not move
+        # The arm is at rest before the beginning and after the end, so other accelerations there are jumps.
+        at_rest = np.abs(a[:, [0, -1]]) <= jump
         smooth |= jump_sizes <= jump
         is_smooth = smooth.all(axis=1) & at_rest.all(axis=1)
         jerk = np.where(is_smooth, np.abs((a[:, 1:] - a[:, :-1]) / h).max(axis=1), np.inf)
@@ -139,7 +154,7 @@ class Cubics:
         return Peaks(velocity, acceleration, jerk)
 
     def set_point_peaks(self) -> Peaks:
-        """The same where the knots are set points, the jerk as a drive sees it: by differences of acceleration."""
+        """Return the peaks at knots that are set points; as in a drive, jerks are differences of acceleration."""
         velocity = np.abs(self.velocities).max(axis=0)
         acceleration = np.abs(self.accelerations).max(axis=0)
         h = np.maximum(np.diff(self.times), period_of(self.times))[:, None]
@@ -148,7 +163,11 @@ class Cubics:
         return Peaks(velocity, acceleration, np.where(rest, jerk, np.inf))
 
     def are_set_points(self) -> bool:
-        """Whether the knots are those of a smooth motion at a control rate, which jerks change between two of them."""
+        """Check whether the knots are set points of a smooth motion at a control rate.
+
+        This is so if the period is short enough, the cubics do not lead exactly to the next knots (the motion's jerk
+        varies between them), and yet the positions fit a motion with the given velocities and accelerations.
+        """
         if period_of(self.times) > LONGEST_PERIOD + CLOCK_ERROR:
             return False
 
@@ -157,7 +176,7 @@ class Cubics:
         rise = np.diff(self.velocities, axis=0)
         max_acceleration = np.maximum(np.abs(self.accelerations).max(axis=0), np.abs(rise / h).max(axis=0))
 
-        # of any motion whose acceleration is nowhere larger, positions differ by less from these
+        # Difference of positions from the integral of velocities and accelerations, bounded for any such motion.
         position_residual = (
             np.diff(self.positions, axis=0)
             - h * (self.velocities[:-1] + 0.5 * rise)
@@ -170,16 +189,17 @@ class Cubics:
         return bool(largest_misfit > EXACT * max(1.0, np.abs(self.positions).max()) and is_smooth.all())
 
     def in_thirds(self) -> Cubics:
-        """Cubics with three pieces from each knot to the next, that have its position, velocity and acceleration.
+        """Return cubics with three pieces per interval, which reach each knot's position, velocity and acceleration.
 
-        Every third knot, of 3 m - 2, is one of these.
+        The jerks of the three thirds are found from these three conditions. Of the 3 m - 2 new knots every third is a
+        given one.
         """
         h = np.diff(self.times)[:, None]
         p = self.positions[:-1]
         v = self.velocities[:-1]
         a = self.accelerations[:-1]
 
-        # what the jerks of the three thirds have to bring about: of position, velocity and acceleration
+        # Changes of position, velocity and acceleration that the jerks of the three thirds have to bring about.
         gains = (self.positions[1:] - p - h * (v + h * a / 2.0), (self.velocities[1:] - v - h * a) * h)
         changes = np.stack([*gains, (self.accelerations[1:] - a) * h**2])
         first, second, _ = np.einsum("ij,jkl->ikl", np.linalg.inv(_THIRDS), changes) / h**3
@@ -201,13 +221,13 @@ class Cubics:
 
 
 class Pieces(NamedTuple):
-    """Cubics one after the other, from rest to rest.
+    """Successive cubics that form a motion from rest to rest.
 
     Attributes:
-        durations: Of each [s], shape (m,), greater than 0.
-        positions: Where each begins, shape (m, n) [rad or m].
-        velocities: With which each begins, shape (m, n).
-        accelerations: With which each begins, shape (m, n).
+        durations: Duration of each piece [s], shape (m,), greater than 0.
+        positions: Positions at the beginning of each piece, shape (m, n) [rad or m].
+        velocities: Velocities at the beginning of each piece, shape (m, n) [rad/s or m/s].
+        accelerations: Accelerations at the beginning of each piece, shape (m, n) [rad/s^2 or m/s^2].
     """
 
     durations: Vector
@@ -217,7 +237,10 @@ class Pieces(NamedTuple):
 
 
 def hermite_accelerations(times: Vector, positions: Matrix, velocities: Matrix) -> Matrix:
-    """Accelerations at the beginning of the cubics through positions and velocities, and at the end of the last one."""
+    """Return the accelerations of the cubics through positions and velocities, shape (m, n).
+
+    Each row is the acceleration at the beginning of a piece, the last row that at the end of the last piece.
+    """
     h = np.diff(times)[:, None]
     mean = np.diff(positions, axis=0) / h
     first = velocities[:-1]
@@ -228,14 +251,25 @@ def hermite_accelerations(times: Vector, positions: Matrix, velocities: Matrix) 
 
 
 def even_parts(counts: NDArray[np.int64]) -> tuple[NDArray[np.int64], Vector]:
-    """Pieces cut into so many parts each: of each part its piece, and the share of that where it begins, shape (k,)."""
+    """Cut pieces into equal parts.
+
+    Args:
+        counts: Number of parts of each piece.
+
+    Returns:
+        For each part the index of its piece, and the share of the piece at which it begins, from 0 to below 1,
+        shape (k,) both.
+    """
     pieces = np.repeat(np.arange(len(counts)), counts)
     first = np.cumsum(counts) - counts
     return pieces, (np.arange(len(pieces)) - first[pieces]) / counts[pieces]
 
 
 def period_of(times: Vector) -> float:
-    """Of even times, the last of which may be nearer to the one before, or a little later; inf if they are not [s]."""
+    """Return the period of evenly spaced times [s]; inf if they are not evenly spaced.
+
+    The last step may be shorter than the others, or a little longer.
+    """
     if len(times) < 3:
         return np.inf
     period = float(times[-2]) / (len(times) - 2)
@@ -244,10 +278,15 @@ def period_of(times: Vector) -> float:
 
 
 def places(values: ArrayLike, count: int, what: str) -> NDArray[np.int64]:
-    """Numbers of rows given by a user, of ``count`` rows, shape (k,).
+    """Check row numbers given by a user, and return them as integers, shape (k,).
+
+    Args:
+        values: The row numbers.
+        count: Number of rows.
+        what: Name of the numbers in error messages.
 
     Raises:
-        InputError: If they are no whole numbers from 0 to ``count - 1``.
+        InputError: If they are not whole numbers from 0 to ``count - 1``.
     """
     array = finite_array(values, (None,), what)
     if (array != np.floor(array)).any() or array.min(initial=0) < 0 or array.max(initial=0) >= count:

@@ -1,9 +1,9 @@
-"""Curves through rounded corners: their curvature is continuous, and they leave the path no farther than is said.
+"""Round the corners of a path: curves of continuous curvature that stay within a given distance of the path.
 
-A path is the sum of a line and one bend a corner. Each bend is replaced by its mean over a stretch of the path, with
-the weights of a triangle whose half width is the corner's radius: a cubic in three pieces whose second derivative is
-continuous. Roundings may overlap, so that many near corners become one smooth curve; the sum stays what it is. The idea
-of rounding corners is that of [20].
+A path is the sum of a line and one bend per corner. Each bend is replaced by its weighted mean over a stretch of the
+path; the weights form a triangle whose half width is the corner's radius. The result is a cubic in three pieces whose
+second derivative is continuous. Roundings may overlap, so that many near corners become one smooth curve, as the sum
+remains valid. The idea of rounding corners is that of [20].
 """
 
 from __future__ import annotations
@@ -22,47 +22,47 @@ from rrtik_ompl.kernels.tables.memory import PlannedTable, TablePlan, sizes_of
 from rrtik_ompl.kernels.timing.layout import KERNELS, CurveTable
 from rrtik_ompl.motion.trajectory.cubics import even_parts
 
-LEAST_STEPS = 150  # of the grid along a whole curve
-STEPS_PER_RADIUS = 12  # of the grid within a rounded corner
-STEPS_PER_LINE = 8  # of the grid between two of them
-SAME_PLACE = 1e-9  # of the length of a curve; nearer points of a grid are one
+LEAST_STEPS = 150  # fewest steps of the grid along a whole curve
+STEPS_PER_RADIUS = 12  # steps of the grid per radius of a rounded corner
+STEPS_PER_LINE = 8  # steps of the grid along a line between two rounded corners
+SAME_PLACE = 1e-9  # share of a curve's length within which two points of a grid are merged
 
 
 class Samples(NamedTuple):
-    """A curve at m places: position, and first and second derivative by the place.
+    """A curve at m places: position, and first and second derivative with respect to the place.
 
     Attributes:
-        values: Side by side, shape (m, 3 n).
+        values: The three of them side by side, n columns each, shape (m, 3 n).
     """
 
     values: Matrix
 
     @property
     def positions(self) -> Matrix:
-        """Shape (m, n)."""
+        """Return the positions, shape (m, n)."""
         return self.values[:, : self.values.shape[1] // 3]
 
     @property
     def slopes(self) -> Matrix:
-        """First derivative, shape (m, n)."""
+        """Return the first derivatives, shape (m, n)."""
         n = self.values.shape[1] // 3
         return self.values[:, n : 2 * n]
 
     @property
     def bends(self) -> Matrix:
-        """Second derivative, shape (m, n)."""
+        """Return the second derivatives, shape (m, n)."""
         return self.values[:, 2 * (self.values.shape[1] // 3) :]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Curve:
-    """A run through rounded corners, from rest to rest. Places on it are distances along the path.
+    """A run through rounded corners, from rest to rest. A place on it is a distance along the path [rad or m].
 
     Attributes:
-        vertices: Of the path, shape (k, n).
-        along: Place of each, shape (k,), from 0.
-        directions: Of the edges, of length 1, shape (k - 1, n).
-        radii: Of the corners, shape (k,); 0 at both ends.
+        vertices: Vertices of the path, shape (k, n).
+        along: Place of each vertex, shape (k,), from 0.
+        directions: Unit vectors along the edges, shape (k - 1, n).
+        radii: Radii of the corners, shape (k,); 0 at both ends.
     """
 
     vertices: Matrix
@@ -72,7 +72,10 @@ class Curve:
 
     @classmethod
     def of(cls, vertices: Matrix, radii: Vector) -> Curve:
-        """The curve through vertices, shape (k, n), whose inner ones are rounded, shape (k - 2,)."""
+        """Make the curve through vertices, shape (k, n), whose inner ones are rounded with radii, shape (k - 2,).
+
+        No radius exceeds the distance to an end of the path.
+        """
         edges = vertices[1:] - vertices[:-1]
         lengths = np.linalg.norm(edges, axis=1)
         along = np.concatenate([np.zeros(1), np.cumsum(lengths)])
@@ -82,11 +85,11 @@ class Curve:
 
     @property
     def length(self) -> float:
-        """Of the path [rad or m]."""
+        """Return the length of the path [rad or m]."""
         return float(self.along[-1])
 
     def at(self, places: Vector) -> Samples:
-        """Position and derivatives at places that do not decrease, shape (m,)."""
+        """Return the curve's position and derivatives at places, shape (m,), which must not decrease."""
         kernels = library(KERNELS)
         n = self.vertices.shape[1]
         if kernels is None:
@@ -104,20 +107,23 @@ class Curve:
         return Samples(values)
 
     def edges(self, places: Vector) -> NDArray[np.int64]:
-        """Numbers of the edges on which places lie, shape (m,)."""
+        """Return the indices of the edges on which places lie, shape (m,)."""
         return np.clip(np.searchsorted(self.along, places, side="right") - 1, 0, len(self.along) - 2)
 
     def path_at(self, places: Vector) -> Matrix:
-        """The path itself, not rounded, at places, shape (m, n)."""
+        """Return the path itself, without rounding, at places, shape (m, n)."""
         edge = self.edges(places)
         from_vertex: Vector = (places - self.along[edge])[:, None]
         return self.vertices[edge] + from_vertex * self.directions[edge]
 
     def tightest(self, places: Vector) -> Vector:
-        """The smallest radius, a sixth less at most, of the corners within which places lie; inf for none."""
+        """Return for each place the smallest radius of the roundings in which it lies, shape (m,); inf if in none.
+
+        The radius is rounded down, by at most a sixth.
+        """
         corner_places = self.along[1:-1]
         radii = self.radii[1:-1]
-        # in steps of a quarter of an octave, so that there are few radii to search for
+        # Radii are rounded to steps of a quarter of an octave, so that there are few different ones.
         steps = np.floor(4.0 * np.log2(np.maximum(radii, 1e-300)))
         tightest = np.full(len(places), np.inf)
 
@@ -130,9 +136,13 @@ class Curve:
         return tightest
 
     def grid(self) -> tuple[Vector, Vector]:
-        """Places from the beginning to the end, close where the curve bends: wherever its third derivative jumps.
+        """Return places from the beginning to the end of the curve, spaced closely where it bends.
 
-        Also the smallest radius, about, of the corners within which each lies; see :meth:`tightest`.
+        The grid includes all places where the third derivative jumps.
+
+        Returns:
+            Places, shape (m,), and for each the approximate smallest radius of the corners within which it lies,
+            shape (m,); see :meth:`tightest`.
         """
         corner_places = self.along[1:-1]
         radii = self.radii[1:-1]
@@ -156,7 +166,7 @@ class Curve:
 
 @lru_cache(maxsize=64)
 def _plan(vertices: int, n: int, places: int) -> TablePlan:
-    """Where a curve of n coordinates and places on it lie in memory."""
+    """Return the memory layout of a curve with n coordinates and the places on it; cached."""
     return sizes_of(
         CurveTable,
         vertices=vertices * n,

@@ -1,7 +1,7 @@
-"""Limits of the tip and of torques along a motion: rows for the search along a curve, and what a motion has of them.
+"""Limit the tip and the torques along a motion: give the search along a curve its constraints, and measure motions.
 
-Both are linear in path acceleration u and path speed squared x, as [19] has it: torques by rigid-body dynamics
-(Pinocchio [56]), the acceleration of the tip by its components in the plane in which it can lie.
+Both limits are linear in the path acceleration u and the path speed squared x, as in [19]: torques by rigid-body
+dynamics (Pinocchio [56]), the acceleration of the tip by its components in the plane in which it can lie.
 """
 
 from __future__ import annotations
@@ -22,21 +22,22 @@ from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.motion.trajectory.curve import Samples
 from rrtik_ompl.motion.trajectory.fastest import MOST, Bounds
 
-DIRECTIONS = 12  # of the tip's acceleration that are bounded; the polygon loses 0.9 % of the circle
+DIRECTIONS = 12  # directions in which the tip's acceleration is bounded; the polygon loses 0.9 % of the circle
 ANGLES = np.pi * np.arange(DIRECTIONS) / DIRECTIONS
-INSIDE = float(np.cos(0.5 * np.pi / DIRECTIONS))  # where the polygon's sides are, its corners being on the circle
-LEAST_SPEED = 1e-12  # [m] along a unit of the path; a slower tip has no direction
-FASTEST_TIP = 20.0  # [m/s]; a larger limit is a slip of the pen, or in millimetres
-HARDEST_TIP = 200.0  # [m/s^2]; likewise
+# Distance of the polygon's sides from the centre, with its corners on the unit circle.
+INSIDE = float(np.cos(0.5 * np.pi / DIRECTIONS))
+LEAST_SPEED = 1e-12  # [m] per unit of the path; a slower tip has no defined direction
+FASTEST_TIP = 20.0  # [m/s] A larger limit is taken for a mistake, such as one in millimetres.
+HARDEST_TIP = 200.0  # [m/s^2] likewise for the acceleration
 
 
 class Measured(NamedTuple):
-    """What the arm has at k moments.
+    """What is measured of the arm in k states.
 
     Attributes:
-        tip_velocities, tip_accelerations: Of the tip's origin, shape (k, 3) [m/s, m/s^2].
-        torques: Of the actuated joints, shape (k, n) [N m or N], by inverse dynamics.
-        holding: Those that hold the arm still there, shape (k, n).
+        tip_velocities, tip_accelerations: Velocity and acceleration of the tip's origin, shape (k, 3) [m/s, m/s^2].
+        torques: Torques or forces of the actuated joints by inverse dynamics, shape (k, n) [N m or N].
+        holding: Torques or forces that hold the arm still in these configurations, shape (k, n) [N m or N].
     """
 
     tip_velocities: Matrix
@@ -47,13 +48,13 @@ class Measured(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DynamicLimits:
-    """Limits that depend on where the arm is.
+    """Limits that depend on the configuration of the arm.
 
     Attributes:
         robot: The arm.
-        tip_speed, tip_acceleration: Of the tip's origin [m/s, m/s^2]; inf for none.
-        torque: Of the actuated joints, shape (n,) [N m or N]; inf for none.
-        model: Pinocchio's, with the payload.
+        tip_speed, tip_acceleration: Limits of the tip's origin [m/s, m/s^2]; inf for none.
+        torque: Limits of the actuated joints, shape (n,) [N m or N]; inf for none.
+        model: Pinocchio's model, with the payload.
     """
 
     robot: Robot
@@ -72,14 +73,14 @@ class DynamicLimits:
         torque: ArrayLike | bool | None = None,
         payload: float = 0.0,
     ) -> DynamicLimits | None:
-        """Limits of an arm; None if nothing is limited.
+        """Return the limits of an arm; None if nothing is limited.
 
         Args:
             robot: The arm.
-            tip_speed: Of the tip's origin [m/s].
-            tip_acceleration: Of the tip's origin [m/s^2].
+            tip_speed: Largest speed of the tip's origin [m/s].
+            tip_acceleration: Largest acceleration of the tip's origin [m/s^2].
             torque: One number, or one per joint [N m or N]; True for the efforts of the robot's description.
-            payload: Mass at the tip's origin that torques have to carry too [kg].
+            payload: Mass at the tip's origin that the torques have to carry too [kg].
 
         Raises:
             InputError: If a limit is no number greater than 0, the robot has no inertias or no efforts, or a payload
@@ -102,14 +103,17 @@ class DynamicLimits:
 
     @property
     def moves_torques(self) -> bool:
-        """Whether torques are limited."""
+        """Return whether torques are limited."""
         return bool(np.isfinite(self.torque).any())
 
     def bounds(self, samples: Samples) -> Bounds:
-        """The limits at places of a curve.
+        """Return the limits as constraints at places of a curve.
+
+        Args:
+            samples: Positions and derivatives of the curve at m places.
 
         Raises:
-            InputError: If the arm cannot even be held still somewhere.
+            InputError: If the torques do not suffice to hold the arm still somewhere.
         """
         unit = self.measured(samples.positions, samples.slopes, samples.bends)
         speeds = np.linalg.norm(unit.tip_velocities, axis=1)
@@ -122,7 +126,13 @@ class DynamicLimits:
         return limits
 
     def slowing(self, positions: Matrix, velocities: Matrix, accelerations: Matrix) -> float:
-        """Factor by which a motion with these states, shape (k, n) each, has to be slowed; 1 or more."""
+        """Return the factor, 1 or more, by which a motion must be slowed to keep the limits at given states.
+
+        Args:
+            positions: Joint positions, shape (k, n).
+            velocities: Joint velocities, shape (k, n).
+            accelerations: Joint accelerations, shape (k, n).
+        """
         state = self.measured(positions, velocities, accelerations)
         shares = [
             np.linalg.norm(state.tip_velocities, axis=1).max() / self.tip_speed,
@@ -138,10 +148,11 @@ class DynamicLimits:
         return factor * (1.0 + 1e-12) if factor > 1.0 else 1.0
 
     def measured(self, positions: Matrix, velocities: Matrix, accelerations: Matrix) -> Measured:
-        """What the arm has at states, shape (k, n) each; torques only where they are limited."""
+        """Measure the tip and the torques in states of shape (k, n) each; torques are 0 unless they are limited."""
         rows = list(self._states(positions, velocities, accelerations))
         return Measured(*(np.array(column) for column in zip(*rows, strict=True)))
 
+    # Yield for each state the tip's velocity and acceleration, the torques, and the torques that hold the arm still.
     def _states(self, *states: Matrix) -> Iterator[tuple[Vector, Vector, Vector, Vector]]:
         model = self.model
         gain = self.robot.chain.gain
@@ -164,7 +175,15 @@ class DynamicLimits:
             yield speed, push, torques, holding
 
     def _tip_rows(self, unit: Measured) -> Bounds:
-        """The acceleration p' u + p'' x of the tip lies in the plane of p' and p'': its component in each direction."""
+        """Return the limit of the tip's acceleration as constraints.
+
+        The acceleration p' u + p'' x of the tip lies in the plane of p' and p''. Its component in each of
+        ``DIRECTIONS`` directions of that plane is bounded, so that it lies in a polygon inside the circle.
+
+        Args:
+            unit: Measured with joint velocities p' and accelerations p'' of the curve, so that the tip's velocity is
+                its derivative.
+        """
         slopes = unit.tip_velocities
         bends = unit.tip_accelerations
         slope_norms = np.linalg.norm(slopes, axis=1)
@@ -179,6 +198,7 @@ class DynamicLimits:
         cap = self.tip_acceleration / np.maximum(np.where(slope_norms < LEAST_SPEED, across_bend, 0.0), 1e-200)
         return Bounds(Rows(first, second, -limit, limit), np.minimum(cap, MOST))
 
+    # Return the torque limits as constraints; ``along`` has the torques per path acceleration, shape (m, n).
     def _torque_rows(self, unit: Measured, along: Matrix) -> Bounds:
         high = self.torque - unit.holding
         low = -self.torque - unit.holding
@@ -198,7 +218,7 @@ class DynamicLimits:
 
 
 def _of_tip(given: float | None, what: str, unit: str, most: float) -> float:
-    """A limit of the tip; inf if there is none."""
+    """Check a limit of the tip and return it; inf if it is None."""
     if given is None:
         return np.inf
     number = positive(given, what)
@@ -210,6 +230,7 @@ def _of_tip(given: float | None, what: str, unit: str, most: float) -> float:
     return number
 
 
+# Return the torque limits as one number per joint, shape (dof,), checked.
 def _torques(robot: Robot, torque: ArrayLike | bool) -> Vector:
     if sum(inertia.mass for inertia in robot.model.inertias) <= 0.0:
         raise InputError(f"torque limits: robot '{robot.name}' has no inertias; its description must give them")
@@ -232,7 +253,7 @@ def _torques(robot: Robot, torque: ArrayLike | bool) -> Vector:
 
 
 def _loaded(robot: Robot, mass: float) -> pin.Model:
-    """Pinocchio's model with a mass at the tip's origin."""
+    """Return Pinocchio's model with a point mass [kg] added at the tip's origin."""
     if mass == 0.0:
         return robot.model
     model = robot.model.copy()

@@ -1,4 +1,4 @@
-"""The shortest time along a curve under limits of velocity and acceleration, by reachability along the path [19]."""
+"""Compute the fastest timing along a curve under velocity and acceleration limits, by reachability analysis [19]."""
 
 from __future__ import annotations
 
@@ -17,17 +17,18 @@ from rrtik_ompl.kernels.timing.layout import KERNELS, LINE, SearchTable, line_co
 from rrtik_ompl.motion.trajectory.curve import Samples
 from rrtik_ompl.motion.trajectory.limits import RateLimits
 
-CRUISE_PARTS = 12.0  # into which the least time of a cruise is cut
-MOST_PARTS = 2000  # of a motion
-MOST = 1e200  # path speed squared where nothing bounds it
+CRUISE_PARTS = 12.0  # number of parts into which the shortest cruise is divided
+MOST_PARTS = 2000  # largest number of parts of a motion
+MOST = 1e200  # path speed squared where there is no bound
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Bounds:
-    """What else a motion must keep at the points of a grid, in path acceleration u and path speed squared x.
+    """Further constraints at the points of a grid, on path acceleration u and path speed squared x.
 
     Attributes:
-        rows: Shape (m, r) each; low at most 0, high at least 0, so that standing still is allowed.
+        rows: Constraints ``low <= first * u + second * x <= high``, shape (m, r) each; low is at most 0 and high at
+            least 0, so that standing still is allowed.
         cap: Largest x, shape (m,).
     """
 
@@ -36,24 +37,24 @@ class Bounds:
 
     @classmethod
     def capped(cls, cap: Vector) -> Bounds:
-        """Only the speed is bounded."""
+        """Return bounds of the speed only, from the largest x, shape (m,)."""
         none = np.empty((len(cap), 0))
         return cls(Rows(none, none, none, none), np.minimum(cap, MOST))
 
     def and_also(self, other: Bounds) -> Bounds:
-        """These bounds and others at the same grid, both to be kept."""
+        """Return the combination of these bounds and others at the same grid."""
         rows = Rows(*(np.hstack(pair) for pair in zip(self.rows, other.rows, strict=True)))
         return Bounds(rows, np.minimum(self.cap, other.cap))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PathTiming:
-    """When a motion along a curve is where.
+    """The timing of a motion along a curve.
 
     Attributes:
-        grid: Places, shape (m,).
-        squares: Path speed squared there, shape (m,).
-        times: From the beginning [s], shape (m,).
+        grid: Places on the curve, shape (m,).
+        squares: Path speed squared at these places, shape (m,).
+        times: Times at which the motion is there [s], shape (m,), from 0.
     """
 
     grid: Vector
@@ -62,11 +63,11 @@ class PathTiming:
 
     @property
     def duration(self) -> float:
-        """Of the whole motion [s]."""
+        """Return the duration of the whole motion [s]."""
         return float(self.times[-1])
 
     def places(self, clock: Vector) -> Vector:
-        """Where the motion is at times, shape (k,); at its ends before and after."""
+        """Return the places of the motion at times [s], shape (k,); its ends for times outside the motion."""
         t = np.clip(clock, 0.0, self.duration)
         k = np.clip(np.searchsorted(self.times, t, side="right") - 1, 0, len(self.times) - 2)
         elapsed = t - self.times[k]
@@ -76,13 +77,20 @@ class PathTiming:
         return np.maximum.accumulate(np.clip(places, self.grid[0], self.grid[-1]))
 
     def cruising(self, seconds: float) -> Vector:
-        """Path speeds at the grid, shape (m,), cut where they are higher for less than a time, or a third of it all."""
+        """Return path speeds at the grid, shape (m,), without peaks that last for less than a given time.
+
+        The speed is sampled evenly in time. The minimum over a sliding window, followed by the maximum over the same
+        window (a morphological opening), cuts off all peaks that are narrower than the window.
+
+        Args:
+            seconds: Shortest duration of a peak [s]; at most a third of the motion's duration is used.
+        """
         seconds = min(seconds, self.duration / 3.0)
         count = int(np.clip(np.ceil(CRUISE_PARTS * self.duration / seconds), 1, MOST_PARTS))
         places = self.places(np.linspace(0.0, self.duration, count + 1))
         speeds = np.diff(places) * (count / self.duration)
 
-        # the least speed of each window, then the largest of these: peaks narrower than a window are cut off
+        # Take the least speed of each window, then the largest of these: peaks narrower than a window are cut off.
         width = 1 + int(seconds * count / self.duration)
         zeros = np.zeros(width)
         window_minima = sliding_window_view(np.concatenate([zeros, speeds, zeros]), width).min(axis=1)
@@ -92,7 +100,14 @@ class PathTiming:
 
 
 def fastest(grid: Vector, samples: Samples, limits: RateLimits, bounds: Bounds) -> PathTiming:
-    """The motion from rest to rest in the shortest time, along a curve that has these samples at the grid."""
+    """Compute the fastest motion from rest to rest along a curve.
+
+    Args:
+        grid: Places on the curve, shape (m,).
+        samples: The curve at these places.
+        limits: Velocity and acceleration limits of the joints.
+        bounds: Further constraints at these places.
+    """
     kernels = library(KERNELS)
     if kernels is None:
         rows, cap = reference.all_rows(samples.values, limits.velocity, limits.acceleration, bounds.rows, bounds.cap)
@@ -119,7 +134,7 @@ def fastest(grid: Vector, samples: Samples, limits: RateLimits, bounds: Bounds) 
 
 @lru_cache(maxsize=64)
 def _plan(points: int, joints: int, rows: int) -> TablePlan:
-    """Where the search for a grid of so many points lies in memory."""
+    """Return the memory layout of the search on a grid of so many points; cached."""
     return sizes_of(
         SearchTable,
         shape=3 * joints * points,

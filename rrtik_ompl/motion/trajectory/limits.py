@@ -1,4 +1,4 @@
-"""How fast joints may move: velocity, acceleration and jerk limits, from the robot or given."""
+"""Define how fast joints may move: limits of velocity, acceleration and jerk, from the robot or given."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from rrtik_ompl.base.errors import InputError, require
 from rrtik_ompl.model.robot import Robot
 
 DEFAULT_TURN_RATE = 0.5  # [rad/s] of a joint without a velocity limit: slow enough to watch
-DEFAULT_SLIDE_RATE = 0.1  # [m/s] of one that slides
-RAMP_SECONDS = 0.5  # in which a joint without an acceleration limit reaches its full velocity
-ONSET_SECONDS = 0.1  # in which a joint without a jerk limit reaches its full acceleration
+DEFAULT_SLIDE_RATE = 0.1  # [m/s] likewise for a sliding joint
+RAMP_SECONDS = 0.5  # time in which a joint without an acceleration limit reaches its full velocity
+ONSET_SECONDS = 0.1  # time in which a joint without a jerk limit reaches its full acceleration
 
 ROUNDING_MARGIN = 1.0 + 1e-12  # so that a motion slowed to a limit does not exceed it by rounding
 
@@ -26,9 +26,9 @@ class RateLimits:
     """Largest velocity, acceleration and jerk of each joint, shape (n,) each.
 
     Attributes:
-        velocity: [rad/s or m/s], finite.
-        acceleration: [rad/s^2 or m/s^2], finite.
-        jerk: [rad/s^3 or m/s^3]; inf for none.
+        velocity: Velocity limits [rad/s or m/s], finite.
+        acceleration: Acceleration limits [rad/s^2 or m/s^2], finite.
+        jerk: Jerk limits [rad/s^3 or m/s^3]; inf for none.
 
     Example:
         >>> limits = rrtik.RateLimits.of(rrtik.load_robot("panda"), share=0.5)
@@ -44,10 +44,10 @@ class RateLimits:
     __repr__ = in_one_line
 
     def __init__(self, velocity: ArrayLike, acceleration: ArrayLike, jerk: ArrayLike = np.inf) -> None:
-        """Take limits, one number per joint; one number alone is for all joints.
+        """Make limits from one number per joint, or from a single number for all joints.
 
         Raises:
-            InputError: If a limit is no number greater than 0, or their counts differ.
+            InputError: If a limit is not greater than 0, or the numbers of limits differ.
         """
         rows = [_row(v, name) for v, name in ((velocity, "velocity"), (acceleration, "acceleration"), (jerk, "jerk"))]
         count = max(len(row) for row in rows)
@@ -68,20 +68,20 @@ class RateLimits:
         jerk: ArrayLike | None = None,
         share: float = 1.0,
     ) -> RateLimits:
-        """The limits of a robot, or those given instead.
+        """Return the limits of a robot, or those that are given instead.
 
-        Limits that neither the robot nor the caller gives have defaults: 0.5 rad/s or 0.1 m/s; the acceleration that
-        reaches the velocity in 0.5 s; the jerk that reaches the acceleration in 0.1 s.
+        Limits that neither the robot nor the caller gives have defaults: a velocity of 0.5 rad/s or 0.1 m/s, the
+        acceleration that reaches the velocity in 0.5 s, and the jerk that reaches the acceleration in 0.1 s.
 
         Args:
-            robot: Whose limits hold.
-            velocity: Instead of the robot's, one number or one per joint [rad/s or m/s].
-            acceleration: Likewise [rad/s^2 or m/s^2].
-            jerk: Likewise [rad/s^3 or m/s^3]; inf for no limit.
-            share: Of all limits, greater than 0 and at most 1: 0.5 moves at half the speed.
+            robot: The robot.
+            velocity: Limits instead of the robot's, one number or one per joint [rad/s or m/s].
+            acceleration: Likewise for accelerations [rad/s^2 or m/s^2].
+            jerk: Likewise for jerks [rad/s^3 or m/s^3]; inf for no limit.
+            share: Factor of all limits, greater than 0 and at most 1: 0.5 moves at half the speed.
 
         Raises:
-            InputError: If a limit is no number greater than 0, or there is not one per joint.
+            InputError: If a limit is not greater than 0, or their number is not that of the joints.
         """
         require(robot, Robot, "robot of rate limits", "use load_robot(name)")
         part = float(finite_array(share, (), "share of the limits"))
@@ -95,10 +95,16 @@ class RateLimits:
         return cls(part * v, part * a, part * j)
 
     def along(self, directions: Matrix) -> tuple[Vector, Vector, Vector]:
-        """Limits of the speed along straight lines, its acceleration and jerk, for directions of shape (m, n).
+        """Return the limits of speed, acceleration and jerk along straight lines.
+
+        Args:
+            directions: Directions of the lines in configuration space, shape (m, n).
+
+        Returns:
+            Largest speed, acceleration and jerk along each direction, shape (m,) each; inf where nothing limits them.
 
         Raises:
-            InputError: If these are no such rows, or of another number of joints.
+            InputError: If the directions are not finite rows of numbers, or for another number of joints.
         """
         directions = finite_array(directions, (None, None), "directions")
         self._fits(directions.shape[1])
@@ -110,13 +116,13 @@ class RateLimits:
         return v, a, j
 
     def _fits(self, count: int) -> None:
-        """Refuse a number of joints that the limits are not for."""
+        """Raise an error unless the limits are for this number of joints."""
         if len(self.velocity) not in (1, count):
             given = len(self.velocity)
             raise InputError(f"limits: there are {count} joints, but limits for {given}; give one, or one a joint")
 
     def for_joints(self, count: int) -> RateLimits:
-        """The same limits for so many joints: limits of one number each are those of all joints.
+        """Return the same limits for a number of joints; limits of one number each apply to all joints.
 
         Raises:
             InputError: If they are for another number of joints.
@@ -126,10 +132,15 @@ class RateLimits:
         return changed(self, **{name: frozen(np.broadcast_to(row, (count,))) for name, row in rows.items()})
 
     def slowing(self, velocity: Vector, acceleration: Vector, jerk: Vector | None = None) -> float:
-        """Factor by which a motion with these peaks must be slowed to keep the limits; 1 if it keeps them already.
+        """Return the factor, 1 or more, by which a motion with these peaks must be slowed to keep the limits.
+
+        Args:
+            velocity: Largest velocity of each joint, shape (n,).
+            acceleration: Largest acceleration of each joint, shape (n,).
+            jerk: Largest jerk of each joint, shape (n,); None if it is not limited.
 
         Raises:
-            InputError: If these are not one number a joint.
+            InputError: If these are not one number per joint.
         """
         shares = []
         peaks = {"velocity": velocity, "acceleration": acceleration, "jerk": jerk}
@@ -145,7 +156,7 @@ class RateLimits:
 
 
 def default_words(robot: Robot, given: Collection[str] = ()) -> str:
-    """A line that says which limits of a robot are defaults; "" if none is, those ``given`` by name aside."""
+    """Return a line that says which limits of a robot are defaults, except those ``given`` by name; or ""."""
     rules = {
         "velocity": f"{DEFAULT_TURN_RATE:g} rad/s or {DEFAULT_SLIDE_RATE:g} m/s",
         "acceleration": f"full speed after {RAMP_SECONDS:g} s",
@@ -161,7 +172,7 @@ def default_words(robot: Robot, given: Collection[str] = ()) -> str:
 
 
 def _row(values: ArrayLike, name: str) -> Vector:
-    """Positive numbers, infinity allowed, shape (n,) or (1,)."""
+    """Check that limits are positive numbers, infinity allowed, and return them, shape (n,) or (1,)."""
     row: Vector = number_rows(values, f"{name} limits").reshape(-1)
     if dimensions(values) > 1 or row.size == 0 or not (row > 0.0).all():
         shown = str(row[:20].tolist())[:60]
@@ -169,6 +180,7 @@ def _row(values: ArrayLike, name: str) -> Vector:
     return row
 
 
+# Return the given limits or, for None, those of the robot with defaults where it has none, shape (dof,).
 def _of_robot(robot: Robot, given: ArrayLike | None, name: str, own: Vector, default: Vector) -> Vector:
     if given is None:
         return np.where(np.isfinite(own), own, default)

@@ -1,4 +1,4 @@
-"""Timed motions from files: those that `Trajectory.save` wrote, and messages of ROS."""
+"""Read timed motions from files: those that `Trajectory.save` wrote, and messages of ROS."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ from rrtik_ompl.motion.trajectory.text import FORMATS, holds_motion, loads
 def load_trajectory(file: str | os.PathLike[str], robot: Robot | None = None) -> Trajectory:
     """Read a motion written by :meth:`Trajectory.save`, or a JointTrajectory message as JSON or YAML.
 
-    Points at a control rate (even steps of 20 ms or less, what ``Trajectory.save(file, rate=...)`` writes) stay what
-    they are, with their velocities and accelerations, and limits are judged at them, as a drive does: ``set_points`` of
-    the motion. Where accelerations lead elsewhere than to the next point (other programs join their points by other
-    curves), three cubics lead there, so that the acceleration does not jump.
+    Points at a control rate (even steps of 20 ms or less, as ``Trajectory.save(file, rate=...)`` writes them) keep
+    their positions, velocities and accelerations, and limits are judged at these points, as a drive does; they are the
+    ``set_points`` of the motion. If accelerations do not lead to the next point (other programs join their points by
+    other curves), three cubics lead there instead, so that the acceleration does not jump.
 
     Args:
         file: A .json, .yaml or .csv file.
@@ -56,16 +56,19 @@ def load_trajectory(file: str | os.PathLike[str], robot: Robot | None = None) ->
 
 
 def load_motion_or_path(file: str | os.PathLike[str], robot: Robot) -> Trajectory | JointPath:
-    """A timed motion or a path, whichever the file holds.
+    """Read a timed motion or a path, whichever the file holds.
 
     Raises:
-        InputError: If it holds neither, or what does not fit the robot.
+        InputError: If the file holds neither, or does not fit the robot.
     """
     ending = known_ending(file, (*PATH_FORMATS, ".yaml"), "path or trajectory")
     is_motion = ending == ".yaml" or (ending != ".txt" and holds_motion(read_text(file), ending))
     return load_trajectory(file, robot) if is_motion else load_path(file, robot)
 
 
+# Make a trajectory of the columns of a file; see :func:`.text.loads`.
+# Accelerations are used if they lead to the next point; otherwise three cubics per interval are. Points at a control
+# rate become set points of the motion.
 def _from_document(document: dict[str, Any], robot: Robot | None) -> Trajectory:
     units = document["units"]
     sliding = None if units is None else [unit == "m" for unit in units]
@@ -83,12 +86,12 @@ def _from_document(document: dict[str, Any], robot: Robot | None) -> Trajectory:
     if not dense:
         try:
             return Trajectory(points.times, points.positions, points.velocities, bends, **names)
-        except InputError:  # they lead elsewhere than to the next point
+        except InputError:  # The accelerations do not lead to the next point.
             pass
 
     thirds = points.in_thirds()
     try:
         smooth = Trajectory(thirds.times, thirds.positions, thirds.velocities, thirds.accelerations, **names)
-    except InputError:  # numbers do not suffice
+    except InputError:  # The cubics cannot be computed accurately enough.
         return plain
     return smooth.at_set_points(np.arange(0, len(thirds.times), 3)) if dense else smooth

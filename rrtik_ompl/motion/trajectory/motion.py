@@ -1,4 +1,4 @@
-"""A timed motion: knots in time, a cubic between each two, and what follows from that: values, peaks, faults."""
+"""Define the timed motion: knots in time with a cubic between each two, and its values, peaks and faults."""
 
 from __future__ import annotations
 
@@ -30,8 +30,9 @@ from rrtik_ompl.motion.trajectory.played import played_motion
 from rrtik_ompl.motion.trajectory.text import dumps, write_mcap, written_ending
 from rrtik_ompl.world.world import World
 
-END_ERROR = 1e-6  # [s] before the end; a tick there is the end, for no drive takes two points at once
-FIT_TOLERANCE = 1e-8  # [rad] or [m]; between a knot and the end of the cubic that leads to it
+# [s] A tick this close to the end is replaced by the end, as no drive accepts two points at once.
+END_ERROR = 1e-6
+FIT_TOLERANCE = 1e-8  # [rad] or [m] largest distance between a knot and the end of the cubic that leads to it
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,15 +40,16 @@ class Trajectory:
     """Joint positions over time: between two knots every joint follows a cubic.
 
     Attributes:
-        times: Of the knots [s], shape (m,), increasing from 0.
-        positions: Shape (m, n), rad (m for sliding joints).
-        velocities: Shape (m, n).
-        accelerations: Shape (m, n): at the beginning of each piece, in the last row at the end of the last one.
+        times: Times of the knots [s], shape (m,), increasing from 0.
+        positions: Joint positions at the knots, shape (m, n) [rad; m for sliding joints].
+        velocities: Joint velocities at the knots, shape (m, n) [rad/s or m/s].
+        accelerations: Accelerations at the beginning of each piece and, in the last row, at the end of the last piece,
+            shape (m, n) [rad/s^2 or m/s^2].
         joint_names: Names of the n joints.
-        prismatic: Which joints slide, shape (n,).
-        robot_name: Name of the robot it is for, or "".
-        set_points: Numbers of the knots that a file had at a control rate, see :func:`load_trajectory`; None if the
-            motion is known between its knots too.
+        prismatic: Mask of the joints that slide, shape (n,).
+        robot_name: Name of the robot that the motion is for, or "".
+        set_points: Indices of the knots that are set points of a file at a control rate, see :func:`load_trajectory`;
+            None if the motion is known between its knots too.
     """
 
     times: Vector
@@ -73,13 +75,13 @@ class Trajectory:
         prismatic: ArrayLike | None = None,
         robot_name: str = "",
     ) -> None:
-        """Take knots; without accelerations the cubics are those through positions and velocities (Hermite's).
+        """Make a motion from knots; without accelerations its cubics are those through positions and velocities.
 
         Raises:
             InputError: If the shapes differ, a number is not finite, the times do not increase from 0, or the
                 accelerations lead elsewhere than to the next knot.
         """
-        # the names and units of a path obey the same rules, so a path checks them
+        # Names and units obey the same rules as those of a path, so a path checks them.
         path = JointPath(positions, joint_names, prismatic, robot_name)
         rows = path.waypoints
 
@@ -112,18 +114,18 @@ class Trajectory:
 
     @property
     def cubics(self) -> Cubics:
-        """The motion as numbers alone, for what computes with it."""
+        """Return the motion as numbers alone, for computations."""
         return Cubics(self.times, self.positions, self.velocities, self.accelerations)
 
     @property
     def duration(self) -> float:
-        """Time from the first to the last knot [s]."""
+        """Return the time from the first to the last knot [s]."""
         return float(self.times[-1])
 
     def __call__(self, t: ArrayLike) -> State:
-        """Positions, velocities and accelerations at a time [s], or at many: shape (n,), or (k, n) for t of shape (k,).
+        """Return positions, velocities and accelerations at a time [s], shape (n,), or at k times, shape (k, n) each.
 
-        Before its beginning and after its end the arm does not move.
+        Before its beginning and after its end the arm stands still.
 
         Raises:
             InputError: If a time is not finite.
@@ -135,19 +137,19 @@ class Trajectory:
 
     @property
     def jerks(self) -> Matrix:
-        """Jerk of each piece [rad/s^3 or m/s^3], shape (m - 1, n)."""
+        """Return the jerk of each piece [rad/s^3 or m/s^3], shape (m - 1, n)."""
         return self.cubics.jerks
 
     def peaks(self) -> Peaks:
-        """The largest velocity, acceleration and jerk of each joint: exact, not sampled, for every piece is a cubic.
+        """Return the largest velocity, acceleration and jerk of each joint: exact, as every piece is a cubic.
 
-        With ``set_points``: at these, the jerk by their differences.
+        With ``set_points`` only these knots count, and the jerk is computed from differences of acceleration.
         """
         cubics = self.cubics
         return cubics.peaks() if self.set_points is None else cubics.at_knots(self.set_points).set_point_peaks()
 
     def slowed(self, factor: float) -> Trajectory:
-        """The same motion, ``factor`` times as long.
+        """Return the same motion, ``factor`` times as long.
 
         Raises:
             InputError: If the factor is not from 1e-6 to 1e6.
@@ -164,46 +166,50 @@ class Trajectory:
         return slow if self.set_points is None else slow.at_set_points(self.set_points)
 
     def at_set_points(self, knots: NDArray[np.int64]) -> Trajectory:
-        """The same motion, known at these knots alone: limits are judged there."""
+        """Return the same motion, marked as known only at the knots with these indices: limits are judged there."""
         return changed(self, set_points=frozen(places(knots, len(self.times), "set points"), np.int64))
 
     def path(self) -> JointPath:
-        """The knots as waypoints of a path."""
+        """Return the knots as the waypoints of a path."""
         return JointPath(self.positions, self.joint_names, self.prismatic, self.robot_name)
 
     def faults(self, world: World) -> tuple[str, ...]:
         """Check the motion itself, not the path it was made from, densely and independently of planners.
 
         Each piece is checked in steps in which no point of the arm moves more than half of the world's motion
-        resolution, by :meth:`World.certify`; where motions have to be proven (:meth:`World.proving`), it is proven too.
+        resolution, by :meth:`World.certify`; if the world requires proofs of motions (:meth:`World.proving`), it is
+        proven too.
 
         Returns:
-            A line for the first fault of every piece that has one: time, and the pair or limit; empty if it is valid.
+            A line for the first fault of each piece that has one: the time, and the pair or limit. Empty if the motion
+            is valid.
 
         Raises:
-            InputError: If it moves other joints than the world's robot, or these in another order.
+            InputError: If the motion moves other joints than the world's robot, or the same in another order.
         """
         require(world, World, "world of a trajectory's check")
         require_joints(world.robot, self.joint_names, "trajectory")
         return tuple(f"after {moment:.3f} s: {reason}" for moment, reason in faults_of(self.cubics, world))
 
     def prove(self, world: World, *, clearance: float | None = None) -> Proof:
-        """Prove the motion itself free, at every time, not the path it was made from.
+        """Prove that the motion itself is free at every time, not only the path it was made from.
 
-        Each piece is cut into parts so short that no point of the arm leaves the straight motion between the ends of a
-        part by more than 0.1 mm, which an acceleration bounds; the straight motions are proven with that to spare.
-        Where it is nearer to something, parts that leave it by less are tried, down to 0.01 um.
+        Each piece is cut into parts so short that no point of the arm deviates by more than 0.1 mm from the straight
+        motion between the ends of the part, as a bound on the acceleration shows. The straight motions are then proven
+        free with that distance to spare. Where obstacles are too near for this, shorter parts with smaller deviations
+        are tried, down to 0.01 um.
 
         Args:
             world: The world.
-            clearance: To be kept from every obstacle on top of its margin [m]; what the world keeps if None.
+            clearance: Distance to keep from every obstacle in addition to its margin [m]; None for what the world
+                requires.
 
         Returns:
             The proof; its motions are the pieces between two knots.
 
         Raises:
-            InputError: If it moves other joints than the world's robot, or these in another order, or the clearance is
-                negative.
+            InputError: If the motion moves other joints than the world's robot, or the same in another order, or the
+                clearance is negative.
         """
         require(world, World, "world of a trajectory's proof")
         require_joints(world.robot, self.joint_names, "trajectory")
@@ -211,13 +217,13 @@ class Trajectory:
         return proof_of_motion(self.cubics, world, kept_clearance)
 
     def played(self, world: World | None) -> Played:
-        """The motion as a picture plays it, and what is said of it there: by :meth:`prove` and :meth:`faults`.
+        """Return the motion as a picture plays it, with the verdict of :meth:`prove` and :meth:`faults`.
 
         Args:
-            world: In which it is judged; None where there is none.
+            world: The world in which the motion is judged; None if there is none.
 
         Raises:
-            InputError: If it moves other joints than the world's robot, or these in another order.
+            InputError: If the motion moves other joints than the world's robot, or the same in another order.
         """
         require(world, World | None, "world of a trajectory to play")
         if world is not None:
@@ -225,7 +231,10 @@ class Trajectory:
         return played_motion(self.cubics, world)
 
     def jumps(self) -> Matrix:
-        """How much the acceleration jumps at each knot, shape (m, n): from rest at the first, to rest at the last."""
+        """Return the jump of each joint's acceleration at each knot, shape (m, n) [rad/s^2 or m/s^2].
+
+        Before the first knot and after the last one the arm is at rest.
+        """
         a = self.accelerations
         before = np.vstack([np.zeros_like(a[:1]), self.cubics.last_accelerations])
         after = np.vstack([a[:-1], np.zeros_like(a[:1])])
@@ -233,7 +242,13 @@ class Trajectory:
         return jump_sizes
 
     def sampled(self, rate: float) -> tuple[Vector, State]:
-        """Times at a control rate [1/s] from 0 to the end, shape (k,), and the states then; the end is the last one.
+        """Return the times at a control rate, from 0 to the end, and the states at these times.
+
+        Args:
+            rate: The control rate [1/s].
+
+        Returns:
+            Times [s], shape (k,), the last of which is the end of the motion, and states of shape (k, n) each.
 
         Raises:
             InputError: If the rate is no number greater than 0.
@@ -246,18 +261,18 @@ class Trajectory:
     def save(self, file: str | os.PathLike[str], *, rate: float | None = None, accelerations: bool = True) -> None:
         """Write the motion to a file.
 
-        A .json or .csv file (``time,<joint>...``) gives back the same motion by :func:`load_trajectory`. A .yaml or
-        .ros.json file is the message JointTrajectory of ROS 2 and nothing else. A .mcap file has joint states for
-        Foxglove (it needs the package mcap). Each is written whole or not at all.
+        A .json or .csv file (``time,<joint>...``) can be read back as the same motion by :func:`load_trajectory`. A
+        .yaml or .ros.json file holds a JointTrajectory message of ROS 2 and nothing else. A .mcap file holds joint
+        states for Foxglove (it needs the package mcap). Each file is written whole or not at all.
 
         Args:
-            file: See above.
-            rate: Points at a control rate [1/s]; None for one point a knot.
-            accelerations: Whether points have accelerations: controllers of ROS then follow quintics, else cubics.
+            file: Name of the file; its ending decides on the format.
+            rate: Control rate at which points are written [1/s]; None for one point per knot.
+            accelerations: Whether points have accelerations: controllers of ROS then follow quintics, otherwise cubics.
                 Files of .csv and .mcap always have them.
 
         Raises:
-            InputError: If the ending is another one or the file cannot be written.
+            InputError: If the ending is unknown or the file cannot be written.
         """
         require(accelerations, bool, "accelerations of a file")
         ending = written_ending(file)
@@ -268,7 +283,8 @@ class Trajectory:
         else:
             clock, state = self.sampled(rate)
 
-        columns = [(column + 0.0).tolist() for column in (clock, *state)]  # + 0.0: no file has a -0.0
+        # Adding 0.0 turns -0.0 into 0.0.
+        columns = [(column + 0.0).tolist() for column in (clock, *state)]
         if ending == ".mcap":
             write_mcap(file, self.robot_name, self.joint_names, columns)
             return

@@ -1,4 +1,4 @@
-"""A timed motion as a picture plays it, and what the library says of it between all its knots."""
+"""Prepare a timed motion for a picture: the times at which it is drawn, and the verdict between all its knots."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from rrtik_ompl.world.clearance_curve import PLACES, Course
 from rrtik_ompl.world.judgement import Fault, judged_course, with_reason
 from rrtik_ompl.world.world import World
 
-MOST_KNOTS = 900  # of a timed motion, that are all looked at
-FRAME_RATE = 30.0  # [1/s] of a timed motion
-MOST_FRAMES = 900  # beside what is looked at
-TIME_DIGITS = 9  # of a page's times [s]
+MOST_KNOTS = 900  # Up to so many knots of a motion are all examined.
+FRAME_RATE = 30.0  # [1/s] rate at which a timed motion is drawn
+MOST_FRAMES = 900  # most frames, in addition to the places that are examined
+TIME_DIGITS = 9  # decimals of the times on a page [s]
 
 
 def played_motion(motion: Cubics, world: World | None) -> Played:
-    """A timed motion as it is played in a world; see :meth:`Trajectory.played`."""
+    """Return a timed motion as it is played in a world; see :meth:`Trajectory.played`."""
     if world is None:
         clock = _frames_of(motion, np.empty(0))
         judged = None
@@ -33,9 +33,13 @@ def played_motion(motion: Cubics, world: World | None) -> Played:
 
 
 def _judged_motion(motion: Cubics, world: World) -> tuple[Vector, Judged]:
-    """Times at which a timed motion is drawn [s], shape (k,), and the verdict on it, by the moves between these.
+    """Choose the times at which a motion is drawn, and judge the moves between them.
 
-    Everything that is looked at is drawn too: a motion of some tenths of a second is not lost between two pictures.
+    All places that are examined are drawn too, so that an event of some tenths of a second is not lost between two
+    frames.
+
+    Returns:
+        Times [s], shape (k,), and the verdict, which refers to the moves between these times.
     """
     course = _course_of(world, motion)
     judgement, faults = judged_course(world.checks, course, partial(_faults_of_motion, world, motion))
@@ -62,7 +66,7 @@ def _judged_motion(motion: Cubics, world: World) -> tuple[Vector, Judged]:
 
 
 def _course_of(world: World, motion: Cubics) -> Course:
-    """A timed motion as a course: its places are spread over how far the arm moves, and at its knots."""
+    """Return a timed motion as a course to examine: at places spread evenly by the arm's travel, and at knots."""
     h = np.diff(motion.times)
     speed = greatest_speeds(motion)
     travelled = np.append(0.0, np.cumsum(h * np.maximum(speed @ world.weights, 1e-12)))
@@ -78,39 +82,48 @@ def _course_of(world: World, motion: Cubics) -> Course:
 
 
 def _faults_of_motion(world: World, motion: Cubics) -> list[Fault]:
-    """The first fault of each piece of a timed motion."""
+    """Return the first fault of each piece: the index of the piece, the place on it from 0 to 1, and the reason."""
     faults = faults_of(motion, world)
     pieces, shares = _places_at(motion.times, np.array([moment for moment, _ in faults]))
     return [(k, x, reason) for k, x, (_, reason) in zip(pieces.tolist(), shares.tolist(), faults, strict=True)]
 
 
 def _places_at(times: Vector, clock: Vector) -> tuple[NDArray[np.int64], Vector]:
-    """Numbers of the pieces between some times on which others are, and where on these, from 0 to 1."""
+    """Locate times on the pieces between other times.
+
+    Args:
+        times: Increasing times that bound the pieces, shape (m,).
+        clock: The times to locate, shape (k,).
+
+    Returns:
+        Indices of the pieces and places on them from 0 to 1, shape (k,) both.
+    """
     pieces = np.clip(np.searchsorted(times, clock, side="right") - 1, 0, len(times) - 2)
     return pieces, np.clip((clock - times[pieces]) / np.diff(times)[pieces], 0.0, 1.0)
 
 
 def _clock(motion: Cubics, pieces: NDArray[np.int64], shares: Vector) -> Vector:
-    """Times of places on pieces [s]."""
+    """Return the times [s] of places on pieces, from the pieces' indices and shares from 0 to 1, shape (k,)."""
     return np.asarray(motion.times[pieces] + shares * np.diff(motion.times)[pieces])
 
 
 def _times(motion: Cubics, at: Vector) -> Vector:
-    """Times of places that are written as the number of a piece plus the share of it [s]."""
+    """Return the times [s] of places that are given as the index of a piece plus the share of it, shape (k,)."""
     pieces = np.clip(at.astype(np.int64), 0, len(motion.times) - 2)
     return _clock(motion, pieces, at - pieces)
 
 
 def _frames_of(motion: Cubics, more: Vector) -> Vector:
-    """Times at which a motion is drawn [s], shape (k,): at an even rate, at its knots, and at some more."""
+    """Return the times at which a motion is drawn [s], shape (k,): at an even rate, at knots, and at further times."""
     count = int(np.clip(np.ceil(FRAME_RATE * motion.duration), 2, MOST_FRAMES))
     knots = motion.times if len(motion.times) <= MOST_KNOTS else motion.times[[0, -1]]
     clock = np.concatenate([np.linspace(0.0, motion.duration, count + 1), knots, more])
-    return frozen(np.unique(np.round(clock, TIME_DIGITS)))  # the page rounds them, and no two may be the same
+    # The page rounds times, and no two of them may be equal.
+    return frozen(np.unique(np.round(clock, TIME_DIGITS)))
 
 
 def _drawn_moves(motion: Cubics, pieces: tuple[int, ...], clock: Vector) -> tuple[int, ...]:
-    """Numbers of the moves between drawn times that lie on some pieces, at least in part."""
+    """Return the indices of the moves between drawn times that overlap the given pieces."""
     first = np.searchsorted(clock, motion.times[list(pieces)] + 10.0**-TIME_DIGITS, side="right") - 1
     end = np.searchsorted(clock, motion.times[[k + 1 for k in pieces]] - 10.0**-TIME_DIGITS, side="left")
     moves = {k for a, b in zip(first.tolist(), end.tolist(), strict=True) for k in range(a, max(b, a + 1))}
@@ -118,7 +131,7 @@ def _drawn_moves(motion: Cubics, pieces: tuple[int, ...], clock: Vector) -> tupl
 
 
 def _on_frames(motion: Cubics, curve: ClearanceCurve, clock: Vector, unproven: tuple[int, ...]) -> ClearanceCurve:
-    """A curve by pieces as one by the moves between drawn times."""
+    """Convert a clearance curve by pieces to one by the moves between drawn times."""
     moves, shares = _places_at(clock, _clock(motion, curve.motions, curve.shares))
     return replace(curve, motions=moves, shares=frozen(shares), unproven=unproven)
 

@@ -1,4 +1,4 @@
-"""What a drive would say to a motion: peaks against limits, changes of sign of the acceleration, jumps."""
+"""Report what a motion demands of a drive: its peaks relative to limits, sign changes and jumps of its acceleration."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from rrtik_ompl.motion.trajectory.cubics import JUMP_SHARE
 from rrtik_ompl.motion.trajectory.limits import RateLimits
 from rrtik_ompl.motion.trajectory.motion import Trajectory
 
-QUIET_SHARE = 0.02  # of a joint's largest acceleration; what is less is no push
+QUIET_SHARE = 0.02  # share of a joint's largest acceleration below which an acceleration is ignored
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -23,12 +23,13 @@ class MotionReport:
     """How a motion uses the limits of each joint, shape (n,) each.
 
     Attributes:
-        joint_names: Of the n joints.
-        prismatic: Which of them slide.
-        duration: [s].
+        joint_names: Names of the n joints.
+        prismatic: Mask of the joints that slide.
+        duration: Duration of the motion [s].
         velocity, acceleration, jerk: Peaks as shares of the limits; 0 where there is no limit, inf for the jerk of a
             motion whose acceleration jumps.
-        switches: Changes of sign of the acceleration a second, of what is above 2 % of the joint's largest.
+        switches: Sign changes of the acceleration per second; accelerations of less than 2 % of the joint's largest are
+            ignored.
         jump: The largest jump of the acceleration between two pieces, from rest or to rest [rad/s^2 or m/s^2].
     """
 
@@ -45,7 +46,7 @@ class MotionReport:
 
     @property
     def kept(self) -> bool:
-        """Whether all limits are kept, to 1e-9 of them."""
+        """Return whether all limits are kept, to 1e-9 of them."""
         return all(bool((row <= 1.0 + 1e-9).all()) for row in (self.velocity, self.acceleration, self.jerk))
 
     def __str__(self) -> str:
@@ -101,7 +102,7 @@ def motion_report(motion: Trajectory, limits: RateLimits) -> MotionReport:
 
 
 def switches(motion: Trajectory) -> Vector:
-    """How often the acceleration of each joint changes its sign, shape (n,)."""
+    """Return the number of sign changes of each joint's acceleration, shape (n,); small accelerations are ignored."""
     if motion.set_points is not None:
         both = motion.accelerations[motion.set_points]
     else:

@@ -1,4 +1,4 @@
-"""Runs from stop to stop: straight ones, or curves through rounded corners; each becomes a motion of its own."""
+"""Time the runs of a path from stop to stop, straight ones and curves through rounded corners, as separate motions."""
 
 from __future__ import annotations
 
@@ -18,22 +18,26 @@ from rrtik_ompl.motion.trajectory.fastest import Bounds, fastest
 from rrtik_ompl.motion.trajectory.limits import RateLimits
 from rrtik_ompl.motion.trajectory.smoothing import Spline, smoothed, steps_for, widest_window
 
-PERIOD = 1e-3  # [s] the least piece of a curve: the control period of a fast drive
-CRUISE_SLACK = 1e-3  # of a speed, by which it may be more than is said while the acceleration changes its sign
-SHORT_WINDOW = 0.02  # [s]; one so short costs nothing
-MAX_SLOWINGS = 3  # by limits of the tip or of torques; two are enough but for rounding
-SMOOTHED_SHARE = 0.12  # of a corner's radius: by which the smoothing over time alone may leave the rounded corner
+PERIOD = 1e-3  # [s] shortest piece of a curve: the control period of a fast drive
+# Share by which a speed may exceed the cruising speed while the acceleration changes its sign.
+CRUISE_SLACK = 1e-3
+SHORT_WINDOW = 0.02  # [s] A smoothing window as short as this costs hardly any time.
+MAX_SLOWINGS = 3  # most times a spline is slowed for limits of tip or torques; apart from rounding two would do
+# Share of a corner's radius by which smoothing over time may leave the rounded corner.
+SMOOTHED_SHARE = 0.12
 
-MIN_PHASE_SECONDS = 1e-9  # a shorter phase is left out
-PUSHES = np.array([0.0, 1.0, 1.0, 0.0, 0.0, -1.0, -1.0])  # acceleration at the beginning of each phase, of its largest
+MIN_PHASE_SECONDS = 1e-9  # [s] Shorter phases are left out.
+# Acceleration at the beginning of each of the seven phases, as a share of the largest one.
+PUSHES = np.array([0.0, 1.0, 1.0, 0.0, 0.0, -1.0, -1.0])
 
 
 class Attempt(NamedTuple):
-    """How a motion is smoothed.
+    """One way to smooth a motion.
 
     Attributes:
-        window: Largest one, of the widest that the jerk limits can ask for.
-        cruises: Whether the speed holds for as long between growing and falling: a shorter window is enough then.
+        window: Largest smoothing window, as a share of the widest one that the jerk limits may need.
+        cruises: Whether the speed is to stay constant, between rising and falling, for at least as long as the window.
+            Then a shorter window is enough.
     """
 
     window: float
@@ -48,10 +52,10 @@ class Run:
     """A motion from rest to rest.
 
     Attributes:
-        pieces: Its cubics, m of them.
-        places: Where on the path each begins, from the beginning of the path, shape (m,).
-        deviations: How far from there the motion is, shape (m,) [rad or m].
-        on_path: Which of them do not leave the path, shape (m,).
+        pieces: The m cubics of the motion.
+        places: Where on the path each piece begins, as distance from the path's beginning, shape (m,) [rad or m].
+        deviations: Distance of the motion from the path at these places, shape (m,) [rad or m].
+        on_path: Mask of the pieces that do not leave the path, shape (m,).
     """
 
     pieces: Pieces
@@ -61,7 +65,7 @@ class Run:
 
     @property
     def duration(self) -> float:
-        """Of all pieces together [s]."""
+        """Return the duration of all pieces together [s]."""
         return float(self.pieces.durations.sum())
 
 
@@ -73,14 +77,17 @@ def runs(
     max_deviation: float = np.inf,
     more: DynamicLimits | None = None,
 ) -> list[Run]:
-    """The motions from stop to stop, each as fast as the limits allow.
+    """Time the runs of a path from stop to stop, each as fast as the limits allow.
 
     Args:
-        corners: The vertices, shape (k, n).
-        radii: How far from each inner one its rounding begins, shape (k - 2,); 0 for a stop.
-        limits: Of n joints.
-        max_deviation: How far from the path the motion may be, if that can be.
-        more: Limits of the tip or of torques.
+        corners: The vertices of the path, shape (k, n).
+        radii: Distance from each inner vertex at which its rounding begins, shape (k - 2,) [rad or m]; 0 for a stop.
+        limits: Limits of the n joints.
+        max_deviation: Largest distance of the motion from the path [rad or m]; kept if one of the attempts keeps it.
+        more: Limits of the tip or of torques; None if there are none.
+
+    Returns:
+        One run for each section of the path between two stops, in order.
     """
     stops = [0, *(np.flatnonzero(radii == 0.0) + 1).tolist(), len(corners) - 1]
     vertex_places = np.concatenate([np.zeros(1), np.cumsum(np.linalg.norm(np.diff(corners, axis=0), axis=1))])
@@ -111,17 +118,21 @@ def along_curve(
     more: DynamicLimits | None = None,
     begin: float = 0.0,
 ) -> Run:
-    """The motion along a curve; where its jerk is limited it passes bends on their inner side.
+    """Compute the motion along a curve from rest to rest.
+
+    The curve is timed under velocity and acceleration limits and then smoothed over time to keep the jerk limits, so
+    that the motion passes bends on their inner side. Several window widths are tried; of those within ``max_deviation``
+    the fastest motion is taken.
 
     Args:
-        curve: From rest to rest.
-        limits: Of its joints.
-        max_deviation: How far from the path the motion may be; kept where one of the windows does.
-        more: Limits of the tip or of torques.
-        begin: Where on the whole path the curve begins.
+        curve: The curve.
+        limits: Limits of its joints.
+        max_deviation: Largest distance of the motion from the path [rad or m]; kept if one of the windows keeps it.
+        more: Limits of the tip or of torques; None if there are none.
+        begin: Distance of the curve's beginning from that of the whole path [rad or m].
 
     Raises:
-        InputError: If numbers do not suffice.
+        InputError: If the limits are too extreme for floating-point numbers.
     """
     grid, tightest = curve.grid()
     samples = curve.at(grid)
@@ -135,7 +146,7 @@ def along_curve(
 
 
 def _attempts(limits: RateLimits) -> tuple[Attempt, ...]:
-    """What to try: one window where it is so short that it costs nothing."""
+    """Return the ways of smoothing to try; only one if the window is so short that it costs nothing."""
     return ATTEMPTS if widest_window(limits) > SHORT_WINDOW else (Attempt(1.0),)
 
 
@@ -146,10 +157,22 @@ def _smooth(
     limits: RateLimits,
     attempt: Attempt,
 ) -> Spline:
-    """The fastest motion that the windows of an attempt leave near the curve.
+    """Compute the fastest motion along a curve that stays near it after smoothing with the windows of an attempt.
 
-    That is where the path speed squared, times a twenty-fourth of the window squared, is at most ``max_squares``, of
-    shape (m,).
+    Smoothing moves the motion off the curve by about a twenty-fourth of the window squared times the acceleration
+    across the curve, which is the path speed squared times the curvature. Therefore the path speed squared, times a
+    twenty-fourth of the window squared, is bounded by ``max_squares``.
+
+    Args:
+        curve: The curve.
+        grid_samples: Places on the curve, shape (m,), the curve there, and further bounds or None.
+        max_squares: Largest product of the path speed squared and a twenty-fourth of the window squared at each place,
+            shape (m,).
+        limits: Limits of the joints.
+        attempt: The largest window, and whether to cruise.
+
+    Returns:
+        The spline in the joints' coordinates and the place on the path, n + 1 columns.
     """
     window = attempt.window * widest_window(limits)
     grid, samples, extra = grid_samples
@@ -172,7 +195,7 @@ def _smooth(
 
 
 def _slowed(spline: Spline, more: DynamicLimits) -> Spline:
-    """The spline, slowed until it keeps the limits of the tip and of torques at its knots and between them."""
+    """Slow a spline down until it keeps the limits of the tip and of torques at its knots and midway between them."""
     n = more.robot.dof
     for _ in range(MAX_SLOWINGS):
         factor = more.slowing(*(rows[:, :n] for rows in spline.states()))
@@ -183,12 +206,18 @@ def _slowed(spline: Spline, more: DynamicLimits) -> Spline:
 
 
 def _along(curve: Curve, spline: Spline, begin: float) -> Run:
-    """A spline in joints and place as the run that it is."""
+    """Convert a spline in joint values and place on the path, n + 1 columns, to a run.
+
+    Args:
+        curve: The curve that the spline follows.
+        spline: The spline.
+        begin: Distance of the curve's beginning from that of the whole path [rad or m].
+    """
     positions, velocities, accelerations = (rows[:-1] for rows in spline.knots())
     n = curve.vertices.shape[1]
     deviations = _lengths(positions[:, :n] - curve.path_at(positions[:, n]))
 
-    # a piece lies among its four control points: on an edge, if all of them lie on it
+    # A piece lies in the hull of its four control points, so it is on an edge if all of them are.
     controls = spline.controls[:, :n]
     control_places = spline.controls[:, n]
     on_path_controls = _lengths(controls - curve.path_at(control_places)) <= COINCIDENCE
@@ -202,20 +231,27 @@ def _along(curve: Curve, spline: Spline, begin: float) -> Run:
 
 
 def _lengths(rows: Matrix) -> Vector:
-    """Of each row, shape (m,)."""
+    """Return the Euclidean norm of each row, shape (m,)."""
     lengths: Vector = np.sqrt(np.einsum("ij,ij->i", rows, rows))
     return lengths
 
 
 def along_lines(corners: Matrix, limits: RateLimits) -> list[Pieces]:
-    """The fastest motions from rest at each row of corners, shape (k, n), to rest at the next one: k - 1 of them.
+    """Compute the fastest straight motions from rest at each row of corners to rest at the next one.
 
-    At most seven phases of constant jerk, in closed form [21, for rest at both ends]. All joints follow the same
-    profile, so that the motion stays on the line; for one joint it is the joint's fastest motion. Without a jerk limit
-    the profile is the trapezoid of velocity, which is the shortest one on a line.
+    Each motion has at most seven phases of constant jerk, in closed form [21, for rest at both ends]. All joints follow
+    the same profile, so that the motion stays on the line; for a single moving joint it is the joint's fastest motion.
+    Without a jerk limit the profile is the trapezoid of velocity, which is the fastest one on a line.
+
+    Args:
+        corners: The vertices of the path, shape (k, n).
+        limits: Limits of the n joints.
+
+    Returns:
+        The pieces of each of the k - 1 motions; phases without duration are left out.
 
     Raises:
-        InputError: If the limits are so small or so large that numbers do not suffice.
+        InputError: If the limits are too small or too large for floating-point numbers.
     """
     edges = np.diff(corners, axis=0)
     lengths = np.linalg.norm(edges, axis=1)
@@ -248,14 +284,24 @@ def along_lines(corners: Matrix, limits: RateLimits) -> list[Pieces]:
 
 
 def _phases(length: Vector, v: Vector, a: Vector, j: Vector) -> tuple[Matrix, Matrix]:
-    """Durations of the seven phases, and accelerations at their beginnings, shape (m, 7) each."""
+    """Compute the seven phases of the fastest motions over lengths, from rest to rest.
+
+    Args:
+        length: Lengths of m lines [rad or m], shape (m,).
+        v: Velocity limits along the lines, shape (m,).
+        a: Acceleration limits along the lines, shape (m,).
+        j: Jerk limits along the lines, inf for none, shape (m,).
+
+    Returns:
+        Durations of the phases [s] and accelerations at their beginnings, shape (m, 7) each.
+    """
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-        onset = a / j  # in which the acceleration comes to its limit
-        ramp = np.where(v >= a * onset, v / a + onset, 2.0 * np.sqrt(v / j))  # in which the speed comes to its own
+        onset = a / j  # time until the acceleration reaches its limit
+        ramp = np.where(v >= a * onset, v / a + onset, 2.0 * np.sqrt(v / j))  # time until the speed reaches its limit
         cruise = length / v - ramp
         limit = a * onset
-        peak = 0.5 * (np.sqrt(limit**2 + 4.0 * a * length) - limit)  # speed where there is no cruise
-        gentle = np.cbrt(length / (2.0 * j))  # the onset where neither limit is reached
+        peak = 0.5 * (np.sqrt(limit**2 + 4.0 * a * length) - limit)  # speed if there is no cruise
+        gentle = np.cbrt(length / (2.0 * j))  # onset if neither limit is reached
         short = length < 2.0 * limit * onset
         fast = cruise < 0.0
         ramp = np.where(fast, np.where(short, 2.0 * gentle, peak / a + onset), ramp)

@@ -1,4 +1,4 @@
-"""Files of trajectories: JSON in the shape of ROS's JointTrajectory, that message as YAML or JSON, CSV; and MCAP."""
+"""Write and read files of trajectories: JSON like ROS's JointTrajectory, that message itself, CSV, and MCAP."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from rrtik_ompl.files.tables import json_object, table_rows
 from rrtik_ompl.files.text import file_name, known_ending, write_bytes
 
 FORMATS = (".json", ".csv", ".yaml")
-ROS_JSON = ".ros.json"  # the message alone: ROS refuses fields that it does not know
+ROS_JSON = ".ros.json"  # A file with just the message, as ROS rejects fields that it does not know.
 KIND = "joint_trajectory"
 _DURATION = (("sec", "secs"), ("nanosec", "nsecs"))
-FIELDS = ("positions", "velocities", "accelerations")  # of a point; the last one may be left out
+FIELDS = ("positions", "velocities", "accelerations")  # fields of a point; the last one may be missing
 NANOSECONDS = 1_000_000_000
 _SCHEMA = {
     "type": "object",
@@ -32,7 +32,16 @@ _SCHEMA = {
 
 
 def dumps(robot: str, names: Sequence[str], units: Sequence[str], columns: Sequence[list[Any]], ending: str) -> str:
-    """Text of a trajectory; ``columns``: times (m), positions, velocities and, not always, accelerations (m, n)."""
+    """Return the text of a trajectory file.
+
+    Args:
+        robot: Name of the robot, or "".
+        names: Names of the n joints.
+        units: Unit of each joint, "rad" or "m".
+        columns: Lists of m entries each: times [s], positions, velocities and, optionally, accelerations; entries but
+            times have one number per joint.
+        ending: An ending of ``FORMATS`` or ``ROS_JSON``.
+    """
     if ending == ".yaml":
         return to_yaml(joint_trajectory(names, columns))
     if ending == ROS_JSON:
@@ -64,17 +73,25 @@ def _header(names: Iterable[str]) -> list[str]:
 
 
 def written_ending(file: str | os.PathLike[str]) -> str:
-    """What is written to a file of this name: an ending of ``FORMATS``, ``ROS_JSON`` or ".mcap".
+    """Return the format that is written to a file of this name: an ending of ``FORMATS``, ``ROS_JSON`` or ".mcap".
 
     Raises:
-        InputError: If the ending is another one.
+        InputError: If the ending is unknown.
     """
     ending = known_ending(file, (*FORMATS, ".mcap"), "trajectory")
     return ROS_JSON if file_name(file).name.lower().endswith(ROS_JSON) else ending
 
 
 def loads(text: str, ending: str) -> dict[str, Any]:
-    """What :func:`dumps` wrote: ``times`` and ``FIELDS`` (accelerations may be None), ``joint_names``, ``units``.
+    """Read what :func:`dumps` wrote.
+
+    Args:
+        text: The text of the file.
+        ending: An ending of ``FORMATS``.
+
+    Returns:
+        A dictionary with ``times``, the lists ``FIELDS`` of one entry per point (accelerations may be None),
+        ``joint_names`` and ``units`` (may be None), and ``robot``.
 
     Raises:
         InputError: If the text is malformed; the message names the line, the point or the key.
@@ -84,6 +101,7 @@ def loads(text: str, ending: str) -> dict[str, Any]:
     return _from_message(json_object(text, KIND, "points") if ending == ".json" else from_yaml(text))
 
 
+# Read the columns of a CSV file; see :func:`loads`.
 def _from_csv(text: str) -> dict[str, Any]:
     names, rows = table_rows(text, ",")
     count = (len(names or ()) - 1) // 3
@@ -97,6 +115,8 @@ def _from_csv(text: str) -> dict[str, Any]:
     return document
 
 
+# Check the points of a JointTrajectory message and return its columns; see :func:`loads`.
+# Accelerations are only used if all points have them.
 def _from_message(document: dict[str, Any]) -> dict[str, Any]:
     points = document["points"]
     if not isinstance(points, list) or not all(isinstance(point, dict) for point in points):
@@ -120,7 +140,7 @@ def _from_message(document: dict[str, Any]) -> dict[str, Any]:
 
 
 def _seconds(time: object) -> object:
-    """A duration as a number of seconds, or as the messages of ROS 1 and 2 write it."""
+    """Return a duration as a number of seconds; it may also be written as in the messages of ROS 1 and 2."""
     if not isinstance(time, dict):
         return time
     whole, fraction = (next((time[key] for key in keys if key in time), 0) for keys in _DURATION)
@@ -131,18 +151,18 @@ def _seconds(time: object) -> object:
 
 
 def holds_motion(text: str, ending: str) -> bool:
-    """Whether the text of a .json or .csv file is a trajectory, well formed or not, rather than a path."""
+    """Check whether the text of a .json or .csv file is a trajectory, well formed or not, rather than a path."""
     if ending == ".csv":
         return text.startswith("time,") and " velocity" in text.partition("\n")[0]
     return '"points"' in text and '"waypoints"' not in text
 
 
 def joint_trajectory(names: Sequence[str], columns: Sequence[list[Any]]) -> dict[str, Any]:
-    """The message ``trajectory_msgs/JointTrajectory`` with the fields that ROS 2 knows, and no others.
+    """Return the message ``trajectory_msgs/JointTrajectory`` with just the fields that ROS 2 knows.
 
     Args:
-        names: Of the joints.
-        columns: Times, positions and velocities, one entry each per point; accelerations if there are four.
+        names: Names of the joints.
+        columns: Times, positions and velocities, one entry each per point, and accelerations if there are four columns.
     """
     points = []
     for time, *values in zip(*columns, strict=True):
@@ -153,7 +173,7 @@ def joint_trajectory(names: Sequence[str], columns: Sequence[list[Any]]) -> dict
 
 
 def to_yaml(message: dict[str, Any]) -> str:
-    """A message as YAML, as ``ros2 topic pub`` takes it: one line a field of a point."""
+    """Return a message as YAML, as ``ros2 topic pub`` takes it, with one line for each field of a point."""
     text: str = yaml.dump(message, Dumper=_dumper(), sort_keys=False, default_flow_style=None, width=10**6)
     return text
 
@@ -164,10 +184,10 @@ def _dumper() -> type[yaml.SafeDumper]:
 
 
 def from_yaml(text: str) -> dict[str, Any]:
-    """A message from YAML.
+    """Read a message from YAML.
 
     Raises:
-        InputError: If it is none; the message names the line.
+        InputError: If the text is not such a message; the error names the line.
     """
     try:
         document = yaml.load(text, Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader))
@@ -183,7 +203,13 @@ def from_yaml(text: str) -> dict[str, Any]:
 
 
 def write_mcap(file: str | os.PathLike[str], robot: str, names: Sequence[str], columns: Sequence[list[Any]]) -> None:
-    """Write joint states over time, as JSON in the topic ``/joint_states``, for Foxglove and others.
+    """Write joint states over time as JSON messages of the topic ``/joint_states``, for Foxglove and other programs.
+
+    Args:
+        file: The file to write.
+        robot: Name of the robot.
+        names: Names of the joints.
+        columns: Times [s], positions, velocities and accelerations, one entry each per message.
 
     Raises:
         InputError: If the package mcap is not installed, or the file cannot be written.
