@@ -101,7 +101,7 @@ class Certificate:
         return sum(len(motion.solids) for motion in self.motions)
 
     def document(self) -> dict[str, Any]:
-        """Plain data for JSON; an entry is a list of six numbers, of nine with a plane, or of four for coal."""
+        """Return plain data for JSON. Each entry is a list of six numbers, nine with a plane, or four for coal."""
         motions = []
         for motion in self.motions:
             rows = np.column_stack([motion.solids, motion.intervals]).tolist()

@@ -240,7 +240,10 @@ class GoalSet(TipGoal):
 
     @property
     def has_regions(self) -> bool:
-        """Whether a member is a region; poses may be freed as rows of `rrtik_ompl.ik.targets` say it."""
+        """Whether a member is a region.
+
+        Poses made free by axis and box do not count, because `rrtik_ompl.ik.targets` can represent them.
+        """
         return any(member.freedom is not None for member in self.members)
 
     def alone(self, number: int) -> TipGoal:
@@ -277,7 +280,7 @@ class GoalSet(TipGoal):
         return np.asarray((self.member_errors(robot, Q) <= most).all(axis=2).any(axis=0))
 
     def member_at(self, robot: Robot, q: ArrayLike) -> int | None:
-        """Number of the member that a configuration, shape (dof,), reaches, from 0, the nearest of several; or None."""
+        """Return the index of the member that q, shape (dof,), reaches: the nearest of several, None if none."""
         require(robot, Robot, "robot of a goal")
         each = self.member_errors(robot, robot.configuration(q)[None])[:, 0]
         reached = [bool((errors <= part.tolerances).all()) for errors, part in zip(each, self.parts, strict=True)]
@@ -338,7 +341,7 @@ class MultiGoal(Goal):
         return [arm for arm, _ in self.each(robot)]
 
     def distance(self, robot: Robot, Q: ArrayLike) -> Vector:
-        """Distances of all tips together for each row of Q, shape (m,) [m]; see :meth:`GoalSet.distance`."""
+        """Compute the summed distances of all tips for each row of Q, shape (m,) [m]; see :meth:`GoalSet.distance`."""
         return np.asarray(np.sum([part.distance(arm, Q) for arm, part in self.each(robot)], axis=0))
 
     def satisfied(self, robot: Robot, Q: ArrayLike) -> Mask:

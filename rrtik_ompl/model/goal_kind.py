@@ -1,12 +1,12 @@
-"""What every kind of goal answers, so that planning, inverse kinematics and pictures treat all kinds alike.
+"""The interface of all kinds of goals, by which planning, inverse kinematics and pictures treat them alike.
 
-Every goal of the tip has a :class:`TaskRegion`, poses of the tip with ranges for position and for roll, pitch and yaw,
-that targets are drawn from; it is itself a kind of goal. Source: [17]: a frame w in the world, bounds of the
-displacement of a frame s in it, and the tip's place in s. Their distance is that of the displacement; here it is that
-of the tip from the nearest pose of the region, in metres and radians.
+Every goal of the tip has a :class:`TaskRegion`, from which targets are drawn: poses of the tip with ranges for position
+and for roll, pitch and yaw. A region is a kind of goal itself. Source: [17], with a frame w in the world, bounds of the
+displacement of a frame s in w, and the pose of the tip in s. The distance of that source is the norm of the
+displacement; here it is the distance of the tip from the nearest pose of the region, in metres and radians.
 
-A new kind of goal of the tip is a :class:`GoalPart`: ``rrtik_ompl.model.goal`` has the others, and CONTRIBUTING.md an
-example. Files have their own words for each kind, in ``rrtik_ompl.problem_files.goal``.
+A new kind of goal of the tip is a :class:`GoalPart`; see ``rrtik_ompl.model.goal`` for the others, and CONTRIBUTING.md
+for an example. The names of the kinds in files are defined in ``rrtik_ompl.problem_files.goal``.
 """
 
 from __future__ import annotations
@@ -38,14 +38,14 @@ from rrtik_ompl.base.poses import PoseLike, rigid, rotation_angles, rpy_matrices
 from rrtik_ompl.model.robot import Robot, metres_per_radian
 
 COORDINATES = ("x", "y", "z", "roll", "pitch", "yaw")
-SWEEPS = 3  # over roll, pitch and yaw; one is exact where a single one of them is free
+SWEEPS = 3  # sweeps over roll, pitch and yaw; one sweep is exact where only one of them is free
 
 
 class Goal:
-    """What a plan has to reach. Frozen.
+    """A goal of a plan; immutable.
 
-    It has not the metaclass ABCMeta, by which ``isinstance`` would take several times as long: `solve_ik` of one pose
-    takes 20 microseconds, and asks it often. mypy finds all the same what a kind does not answer.
+    The class does not use the metaclass ABCMeta, with which ``isinstance`` takes several times as long: `solve_ik` of
+    one pose takes 20 microseconds and calls it often. mypy reports missing methods all the same.
 
     Attributes:
         oriented: Whether the orientation of the tip counts.
@@ -58,12 +58,12 @@ class Goal:
     @property
     @abstractmethod
     def title(self) -> str:
-        """What it is, in two or three words."""
+        """Short name of the kind of goal, two or three words."""
         raise NotImplementedError
 
     @abstractmethod
     def distance(self, robot: Robot, Q: ArrayLike) -> Vector:
-        """Return how far each row of Q is from the goal, shape (m,) [m, of a configuration rad or m]."""
+        """Compute how far each row of Q is from the goal, shape (m,) [m; rad or m for a configuration]."""
         raise NotImplementedError
 
     @abstractmethod
@@ -73,21 +73,21 @@ class Goal:
 
     @property
     def q(self) -> Vector | None:
-        """The configuration that it is, shape (dof,) [rad or m]; None for a goal of a tip, which many may reach."""
+        """The configuration of a joint goal, shape (dof,) [rad or m]; None for goals that many configurations reach."""
         return None
 
     @property
     def parts(self) -> tuple[GoalPart, ...]:
-        """Its goals of a tip: of one tip any of them is enough, of several tips each has its own."""
+        """Its tip goals: of a single tip, any one of which is sufficient, or one for each of several tips."""
         return ()
 
     @property
     def frames(self) -> tuple[str, ...]:
-        """Names of the links that are tips, one for each part; none unless it is a goal of several tips."""
+        """Names of the links that are tips, one for each part; empty unless it is a goal of several tips."""
         return ()
 
     def arms(self, robot: Robot) -> list[Robot]:
-        """Return the robot with each of the tips that have a goal."""
+        """Return one robot for each tip that has a goal, which has this tip."""
         return [robot]
 
     def member_at(self, robot: Robot, q: ArrayLike) -> int | None:
@@ -97,23 +97,23 @@ class Goal:
 
 
 class TipGoal(Goal):
-    """A goal of the robot's own tip, which is at it where it is at one of the parts."""
+    """A goal of the robot's own tip, reached where any of its parts is reached."""
 
     __slots__ = ()
 
     @abstractmethod
     def errors(self, robot: Robot, Q: ArrayLike) -> tuple[Vector, Vector]:
-        """Distance [m] and angle [rad] of the tip from the nearest part, for each row of Q, shapes (m,)."""
+        """Compute the tip's distance [m] and angle [rad] from the nearest part for each row of Q, shape (m,) each."""
         raise NotImplementedError
 
     @property
     @abstractmethod
     def has_regions(self) -> bool:
-        """Whether it is or has a goal with freedom that no row of `rrtik_ompl.ik.targets` holds."""
+        """Whether it is or contains a goal with a freedom that `rrtik_ompl.ik.targets` cannot represent in a row."""
         raise NotImplementedError
 
     def alone(self, number: int) -> TipGoal:
-        """Return one of its parts as a goal of its own.
+        """Return one of the parts as a goal of its own.
 
         Raises:
             InputError: If there is no part of that number.
@@ -121,7 +121,7 @@ class TipGoal(Goal):
         return self.parts[self._place(number)]
 
     def _place(self, number: int) -> int:
-        """Return the number of one of its parts, checked."""
+        """Validate the index of a part."""
         place = whole_number(number, "number of a part of a goal")
         if place >= len(self.parts):
             raise InputError(f"goal: it has {len(self.parts)} parts, counted from 0, and no part {place}")
@@ -129,34 +129,37 @@ class TipGoal(Goal):
 
 
 class GoalPart(TipGoal):
-    """A goal of the tip that is no set of others: a pose, a position, a region."""
+    """A goal of the tip that is not a set of others: a pose, a position or a region."""
 
     __slots__ = ()
 
     @property
     @abstractmethod
     def tolerances(self) -> tuple[float, float]:
-        """What the errors may be at most: distance [m] and angle [rad] (0 for a position)."""
+        """Largest errors: distance [m] and angle [rad], 0 for a position."""
         raise NotImplementedError
 
     @abstractmethod
     def tip_errors(self, tips: NDArray[np.float64]) -> tuple[Vector, Vector]:
-        """As :meth:`errors_at`, of poses that are known to be such, shape (m, 4, 4)."""
+        """Compute the errors as :meth:`errors_at`, without validation of the poses, shape (m, 4, 4)."""
         raise NotImplementedError
 
     @abstractmethod
     def region(self) -> TaskRegion:
-        """It, or where no region is all of it a part of it: what targets are drawn from, and what pictures show."""
+        """Return the region from which targets are drawn and which pictures show.
+
+        If the goal cannot be expressed as a region exactly, it is a part of the goal.
+        """
         raise NotImplementedError
 
     @property
     def freedom(self) -> TaskRegion | None:
-        """The region that targets are drawn from; None if it is a :class:`Target` itself."""
+        """The region from which targets are drawn; None if the goal is a :class:`Target` itself."""
         return self.region()
 
     @property
     def has_regions(self) -> bool:
-        """Whether it leaves freedom."""
+        """Whether the goal leaves freedom."""
         return self.freedom is not None
 
     def freed(self, axis: FrameAxis | None, box: Vector) -> GoalPart:
@@ -166,22 +169,23 @@ class GoalPart(TipGoal):
 
     @property
     def parts(self) -> tuple[GoalPart, ...]:
-        """It alone."""
+        """The goal itself."""
         return (self,)
 
     def errors_at(self, tips: ArrayLike) -> tuple[Vector, Vector]:
-        """Distance [m] and angle [rad] of poses of the tip, shape (m, 4, 4), from the goal, shapes (m,)."""
+        """Compute distances [m] and angles [rad] of tip poses from the goal: (m, 4, 4) -> (m,) each."""
         return self.tip_errors(finite_array(tips, (None, 4, 4), "poses of the tip"))
 
     def errors(self, robot: Robot, Q: ArrayLike) -> tuple[Vector, Vector]:
-        """Distance [m] and angle [rad] of the tip from the goal, for each row of Q, shapes (m,)."""
+        """Compute the tip's distance [m] and angle [rad] from the goal for each row of Q, shape (m,) each."""
         require(robot, Robot, "robot of a goal")
         return self.tip_errors(robot.fk_batch(Q))
 
     def distance(self, robot: Robot, Q: ArrayLike) -> Vector:
-        """How far the tip is from the goal, shape (m,) [m]: its way, and its turn at the lever of half the arm's reach.
+        """Compute the weighted distance of the tip from the goal for each row of Q, shape (m,) [m].
 
-        Small enough means at the goal only where the tolerances say so: ask :meth:`satisfied`.
+        It is the position error plus the angle times half of the arm's reach. Whether the goal is reached depends on
+        the tolerances of both errors: see :meth:`satisfied`.
         """
         position, angle = self.errors(robot, Q)
         return position + metres_per_radian(robot) * angle
@@ -194,35 +198,35 @@ class GoalPart(TipGoal):
 
 
 class Target(GoalPart):
-    """A goal without freedom, as methods of inverse kinematics take it: a pose, or a point in any orientation."""
+    """A goal without freedom, as inverse kinematics requires: a pose, or a point in any orientation."""
 
     __slots__ = ()
 
     @property
     @abstractmethod
     def pose(self) -> pin.SE3:
-        """T_world_tip (``pinocchio.SE3``), turned like the world if the orientation does not count."""
+        """T_world_tip (``pinocchio.SE3``), with the orientation of the world if the orientation does not count."""
         raise NotImplementedError
 
     @property
     @abstractmethod
     def point(self) -> Vector:
-        """Where the tip has to be [m], shape (3,)."""
+        """Position of the tip at the goal [m], shape (3,)."""
         raise NotImplementedError
 
     @abstractmethod
     def tightened(self, share: float) -> Target:
-        """Return the same goal with that share of its tolerances."""
+        """Return the same goal with its tolerances scaled by a share."""
         raise NotImplementedError
 
     @property
     def freedom(self) -> None:
-        """It leaves none."""
+        """None, as the goal leaves no freedom."""
         return None
 
     @property
     def has_regions(self) -> bool:
-        """It has none."""
+        """Always False."""
         return False
 
 
@@ -231,18 +235,18 @@ class TaskRegion(GoalPart):
     """Bring the tip to any pose ``T_world_w @ D @ T_w_tip`` whose displacement D lies within bounds.
 
     Attributes:
-        T_world_w: Frame of the region.
+        T_world_w: Pose of the region's frame w in the world.
         bounds: Lowest and highest x, y, z [m] and fixed-axis roll, pitch, yaw [rad] of D, shape (6, 2). Angles that
             are a full turn apart are the same; a range of a full turn leaves the angle free.
-        T_w_tip: The tip where D is zero.
-        position_tolerance: [m].
-        orientation_tolerance: [rad].
-        frame: What has to be there in place of the tip, for path constraints: a link or an attached object.
-        position_allowance: How far a path constraint may be left between the waypoints of a path, beyond its tolerance
-            [m]: none unless it is asked for.
-        orientation_allowance: Likewise [rad].
-        from_start: Whether ``T_world_w`` is the frame of the region as seen from the constrained frame at the start of
-            a path; a :class:`rrtik_ompl.Problem` makes a region of the world of it.
+        T_w_tip: Pose of the tip in w if D is the identity.
+        position_tolerance: Largest distance from the region [m].
+        orientation_tolerance: Largest angle from the region [rad].
+        frame: For path constraints, the link or attached object that is constrained; the tip if None.
+        position_allowance: For path constraints, by how much motions between waypoints may exceed the position
+            tolerance [m].
+        orientation_allowance: For path constraints, likewise for the orientation tolerance [rad].
+        from_start: Whether ``T_world_w`` is relative to the constrained frame at the start of a path; a
+            :class:`rrtik_ompl.Problem` replaces such a region by one placed in the world.
 
     Example:
         >>> bounds = np.zeros((6, 2))
@@ -295,19 +299,19 @@ class TaskRegion(GoalPart):
         position_tolerance: float = 1e-3,
         orientation_tolerance: float = 1e-2,
     ) -> TaskRegion:
-        """Return a pose that may be turned about a line of the world and moved along it: a grasp of a bar.
+        """Create the region of a pose that may be rotated about a line and moved along it, such as grasps of a bar.
 
         Args:
             T_world_tip: A pose of the tip at the goal.
-            axis: Direction of the line in the world, of length 1, shape (3,).
-            through: A point of the line [m], shape (3,); the tip's if None.
+            axis: Unit direction of the line in the world, shape (3,).
+            through: A point of the line [m], shape (3,); the position of the tip if None.
             turn: Lowest and highest angle from that pose [rad], shape (2,).
             slide: Lowest and highest displacement along the axis [m], shape (2,).
-            position_tolerance: [m].
-            orientation_tolerance: [rad].
+            position_tolerance: Largest distance from the region [m].
+            orientation_tolerance: Largest angle from the region [rad].
 
         Raises:
-            InputError: If the axis is not of length 1, or a range is upside down.
+            InputError: If the axis is not of length 1, or the lower bound of a range exceeds the upper one.
         """
         tip = rigid(T_world_tip, "goal region: T_world_tip")
         direction = unit_vector(axis, "goal region: axis")
@@ -321,16 +325,16 @@ class TaskRegion(GoalPart):
 
     @property
     def title(self) -> str:
-        """What it is."""
+        """Short name of the kind of goal."""
         return "tip region"
 
     @property
     def tolerances(self) -> tuple[float, float]:
-        """What the errors may be at most: distance [m] and angle [rad]."""
+        """Largest errors: distance [m] and angle [rad]."""
         return self.position_tolerance, self.orientation_tolerance
 
     def region(self) -> TaskRegion:
-        """It is one."""
+        """Return the region itself."""
         return self
 
     @property
@@ -340,7 +344,10 @@ class TaskRegion(GoalPart):
         return ranges
 
     def started_at(self, T_world_frame: PoseLike) -> TaskRegion:
-        """Return the region of the world that a region ``from_start`` is, for a pose of its frame at the start."""
+        """Place a region that is ``from_start`` in the world, given the pose of its frame at the start of the path.
+
+        Other regions are returned unchanged.
+        """
         if not self.from_start:
             return self
         return replace(
@@ -348,21 +355,21 @@ class TaskRegion(GoalPart):
         )
 
     def poses(self, coordinates: Matrix) -> NDArray[np.float64]:
-        """T_world_tip for displacements, shape (m, 6): (m, 4, 4)."""
+        """Compute T_world_tip for displacements, (m, 6) -> (m, 4, 4)."""
         coordinates = _rows(coordinates, (6,), "displacements in a region")
         poses: NDArray[np.float64] = self.T_world_w.homogeneous @ displacements(coordinates) @ self.T_w_tip.homogeneous
         return poses
 
     def drawn(self, count: int, rng: np.random.Generator) -> Matrix:
-        """Displacements drawn evenly from the bounds, shape (count, 6)."""
+        """Draw displacements uniformly from the bounds, shape (count, 6)."""
         require(rng, np.random.Generator, "rng of a region", "use numpy.random.default_rng(seed)")
         whole_number(count, "count of a region")
         return rng.uniform(self.bounds[:, 0], self.bounds[:, 1], (count, 6))
 
     def nearest(self, tips: NDArray[np.float64]) -> Matrix:
-        """Displacements of the poses of the region that are nearest to tips, shape (m, 4, 4): (m, 6).
+        """Compute the displacements of the region's poses that are nearest to tip poses, (m, 4, 4) -> (m, 6).
 
-        First the nearest orientation, then the nearest position.
+        The nearest orientation is found first, then the nearest position for it.
         """
         tips = _rows(tips, (4, 4), "poses of the tip")
         R_w = self.T_world_w.rotation
@@ -380,7 +387,7 @@ class TaskRegion(GoalPart):
 
 
 def displacements(coordinates: Matrix) -> NDArray[np.float64]:
-    """Return the transforms D of rows of x, y, z [m] and roll, pitch, yaw [rad], shape (m, 6): (m, 4, 4)."""
+    """Compute the transforms D for x, y, z [m] and roll, pitch, yaw [rad]: (m, 6) -> (m, 4, 4)."""
     D = np.zeros((len(coordinates), 4, 4))
     D[:, :3, :3] = rpy_matrices(coordinates[:, 3:])
     D[:, :3, 3] = coordinates[:, :3]
@@ -389,7 +396,7 @@ def displacements(coordinates: Matrix) -> NDArray[np.float64]:
 
 
 def _rows(values: ArrayLike, shape: tuple[int, ...], what: str) -> NDArray[np.float64]:
-    """Return numbers of shape (m, *shape); those of a search need not be finite."""
+    """Validate numbers of shape (m, *shape), which need not be finite, as a search may produce others."""
     rows = number_rows(values, what)
     if rows.shape[1:] != shape:
         raise InputError(f"{what}: expected shape (m, {', '.join(map(str, shape))}), got {rows.shape}")
@@ -404,10 +411,11 @@ def _range(values: ArrayLike, what: str) -> Vector:
 
 
 def nearest_angles(rotations: NDArray[np.float64], bounds: Matrix) -> Matrix:
-    """Roll, pitch and yaw within bounds, shape (3, 2), whose rotations are near to given ones: (m, 3, 3) -> (m, 3).
+    """Compute roll, pitch and yaw within bounds whose rotations are near to given ones: (m, 3, 3) -> (m, 3).
 
-    Exact for rotations inside the bounds and where at most one angle has a range. Otherwise the best angle is found
-    in turn with the others held, from both triples that describe the rotation, so that pitch may pass a quarter turn.
+    The result is exact for rotations inside the bounds, and where at most one angle has a range. Otherwise each angle
+    in turn is set to its best value with the others held. This is started from both triples that describe the rotation,
+    so that pitch may exceed a quarter turn, and the better result is taken.
     """
     best: Matrix = np.tile(bounds[:, 0], (len(rotations), 1))
     wide = np.flatnonzero(bounds[:, 0] < bounds[:, 1])
@@ -429,15 +437,15 @@ def nearest_angles(rotations: NDArray[np.float64], bounds: Matrix) -> Matrix:
 
 
 def roll_pitch_yaw(R: NDArray[np.float64]) -> Matrix:
-    """Of R = Rz(yaw) Ry(pitch) Rx(roll), pitch within a quarter turn; shape (m, 3)."""
+    """Compute the angles of R = Rz(yaw) Ry(pitch) Rx(roll) with pitch within a quarter turn: (m, 3, 3) -> (m, 3)."""
     pitch = np.arctan2(-R[:, 2, 0], np.hypot(R[:, 0, 0], R[:, 1, 0]))
     return np.column_stack([np.arctan2(R[:, 2, 1], R[:, 2, 2]), pitch, np.arctan2(R[:, 1, 0], R[:, 0, 0])])
 
 
 def _best_angle(R: NDArray[np.float64], angles: Matrix, k: int) -> Vector:
-    """Return the k-th angle that brings the rotation nearest to R, the other two held, shape (m,).
+    """Compute the k-th angle that brings the rotation nearest to R with the other two held, shape (m,).
 
-    The trace of R^T Rz Ry Rx is a cosine of each angle.
+    The trace of R^T Rz Ry Rx, which is to be maximised, is a cosine of each angle.
     """
     first, second = (rpy_matrices(angles * np.eye(3)[other]) for other in range(3) if other != k)
     C = np.swapaxes(R, 1, 2)
@@ -455,7 +463,7 @@ def _best_angle(R: NDArray[np.float64], angles: Matrix, k: int) -> Vector:
 
 
 def into_range(angles: NDArray[np.float64], low: ArrayLike, high: ArrayLike) -> NDArray[np.float64]:
-    """Return the nearest of equal angles within bounds, or the nearer bound."""
+    """Shift angles by whole turns into bounds, or to the nearer bound where none fits."""
     low = np.asarray(low)
     high = np.asarray(high)
     middle = 0.5 * (low + high)

@@ -1,4 +1,4 @@
-"""A path of configurations that measures itself, asks a world about itself, and is saved and read again."""
+"""Paths of configurations: their length and moves, checks by a world, and files."""
 
 from __future__ import annotations
 
@@ -47,12 +47,12 @@ class JointPath:
     """Waypoints joined by straight lines in configuration space.
 
     Attributes:
-        waypoints: Shape (k, n), read-only, rad (m for prismatic joints), start first.
+        waypoints: Configurations, start first, shape (k, n) [rad, m for prismatic joints], read-only.
         joint_names: Names of the n joints.
-        prismatic: Which joints slide, shape (n,).
-        robot_name: Name of the robot it is for, or "".
-        continuous: Which joints turn without limits, shape (n,).
-        proof: What is proven of it, see :meth:`proved`; None if that was not asked, as in a path with other waypoints.
+        prismatic: Which joints are prismatic, shape (n,).
+        robot_name: Name of the robot, or "".
+        continuous: Which joints are revolute without limits, shape (n,).
+        proof: The proof of its motions, see :meth:`proved`; None if there is none. Changing the waypoints drops it.
     """
 
     waypoints: Matrix
@@ -111,10 +111,10 @@ class JointPath:
         return path_through(_at_zero(robot), usable_waypoints(robot.onto_limits(rows)))
 
     def with_waypoints(self, waypoints: ArrayLike) -> JointPath:
-        """Return the same joints, other waypoints.
+        """Return a path of the same joints with other waypoints, shape (k, n), and without a proof.
 
         Raises:
-            InputError: If they are no such rows, or have not one column for each joint.
+            InputError: If the waypoints are not finite rows with one column for each joint.
         """
         rows = usable_waypoints(finite_array(waypoints, (None, None), "path waypoints"))
         count = rows.shape[1]
@@ -135,17 +135,17 @@ class JointPath:
 
     @property
     def length(self) -> float:
-        """Sum of the Euclidean lengths of the edges [rad, metres counted alike]."""
+        """Sum of the Euclidean lengths of the edges [rad; metres count like radians]."""
         return length_of(self.waypoints)
 
     @property
     def unit(self) -> str:
-        """Unit of the length: rad, m, or "rad, m" for a path of both kinds of joints."""
+        """Unit of the length: "rad", "m", or "rad, m" for a path with both kinds of joints."""
         return ", ".join(name for name, some in (("rad", ~self.prismatic), ("m", self.prismatic)) if some.any())
 
     @property
     def transitions(self) -> int:
-        """Number of moves after joining consecutive moves of the same joint (C-RDT's measure)."""
+        """Number of moves, where consecutive moves of the same joint count as one (the measure of C-RDT)."""
         return transitions(self.waypoints)
 
     @property
@@ -154,7 +154,7 @@ class JointPath:
         return single_joint(merge_moves(self.waypoints), SAME)
 
     def moves(self) -> tuple[Move, ...]:
-        """Return the list of single-joint moves that the path consists of; consecutive moves of the same joint are one.
+        """Return the single-joint moves of the path; consecutive moves of the same joint are merged.
 
         Raises:
             InputError: If an edge moves several joints at once;
@@ -181,7 +181,7 @@ class JointPath:
         )
 
     def resample(self, step: float) -> JointPath:
-        """The same path with further waypoints, none farther than ``step`` [rad] from the next; all old ones stay."""
+        """Return the path with additional waypoints, so that none is farther than ``step`` [rad] from the next."""
         counts = part_counts(self.waypoints, positive(step, "resample step"))
         return path_through(self, subdivided(self.waypoints, counts)[0])
 
@@ -200,7 +200,7 @@ class JointPath:
         return world.violations(self.waypoints, resolution=resolution)
 
     def proved(self, world: Judge, *, clearance: float | None = None, seconds: float | None = None) -> JointPath:
-        """Return the same path with what is proven of its motions: :meth:`rrtik_ompl.World.prove`.
+        """Return the same path with a proof of its motions, made by :meth:`rrtik_ompl.World.prove`.
 
         Raises:
             InputError: If the path is another robot's, there is no world, or the clearance is negative or infinite.
@@ -210,14 +210,14 @@ class JointPath:
         return self.with_proof(world.prove(self.waypoints, clearance=clearance, seconds=seconds))
 
     def with_proof(self, proof: Proof) -> JointPath:
-        """Return the same path with what somebody else has proven of its motions."""
+        """Return the same path with a proof that has been made already."""
         return changed(self, proof=proof)
 
     def played(self, world: Judge | None) -> Played:
-        """Return the path as a picture plays it, and what is said of it there: :meth:`rrtik_ompl.World.judged`.
+        """Return the path as a picture plays it, with a verdict by :meth:`rrtik_ompl.World.judged`.
 
         Args:
-            world: In which it is judged; None where there is none.
+            world: The world that judges it; None for no verdict.
 
         Raises:
             InputError: If the path moves other joints than the world's robot, or these in another order.
@@ -234,7 +234,7 @@ class JointPath:
         return self.proof is not None and self.proof.proven
 
     def proven_in(self, world: Judge) -> bool:
-        """Whether its proof covers every motion, keeps what the world keeps, and was made by a form of the world."""
+        """Check whether the proof of the path holds in a world, see :meth:`rrtik_ompl.World.has_proven`."""
         return self.proof is not None and world.has_proven(self.proof)
 
     def save(self, path: str | os.PathLike[str], *, proof: bool = False) -> None:
@@ -243,8 +243,8 @@ class JointPath:
         The file is written whole or not at all.
 
         Args:
-            path: Of the file.
-            proof: Whether a .json file shall hold what proves the path too, its certificate, for ``rrtik check``.
+            path: Name of the file.
+            proof: Whether a .json file also contains the certificate of the path, for ``rrtik check``.
 
         Raises:
             InputError: If the ending is another one, the file cannot be written, or a proof is asked for and the path
@@ -265,7 +265,7 @@ class JointPath:
         write_text(path, dumps(document, ending))
 
     def document(self) -> dict[str, Any]:
-        """What a .json file of the path holds."""
+        """Return the content of a .json file of the path."""
         return {
             "version": 1,
             "kind": "joint_path",
@@ -275,18 +275,18 @@ class JointPath:
             "continuous": [name for name, endless in zip(self.joint_names, self.continuous, strict=True) if endless],
             "length": self.length,
             "transitions": self.transitions,
-            "waypoints": (self.waypoints + 0.0).tolist(),  # a person reads 0.0, not -0.0
+            "waypoints": (self.waypoints + 0.0).tolist(),  # turns -0.0 into 0.0
         }
 
 
 def path_through(path: JointPath, rows: Matrix) -> JointPath:
-    """As :meth:`JointPath.with_waypoints`, of rows that are known to be finite and of its joints, shape (k, n)."""
+    """Return a path with other waypoints, as :meth:`JointPath.with_waypoints` but without validation."""
     return changed(path, waypoints=frozen(rows), proof=None)
 
 
 @lru_cache(maxsize=64)
 def _at_zero(robot: Robot) -> JointPath:
-    """Return a path of a robot, from which its others are made."""
+    """Return a path of a robot from which its other paths are copied."""
     return JointPath(np.zeros((1, robot.dof)), robot.joint_names, robot.prismatic, robot.name, robot.continuous)
 
 
@@ -295,7 +295,7 @@ def load_path(path: str | os.PathLike[str], robot: Robot | None = None) -> Joint
 
     Args:
         path: A .json, .csv or .txt file.
-        robot: If given, the path must fit it, and takes its joint names.
+        robot: If given, the path must fit it and takes over its joint names.
 
     Raises:
         InputError: If the file is missing, malformed, or does not fit the robot; the message names file and line.
@@ -318,10 +318,10 @@ def load_path(path: str | os.PathLike[str], robot: Robot | None = None) -> Joint
 
 
 def fitted(path: JointPath, robot: Robot) -> JointPath:
-    """Return a path as one of a robot, onto whose limits it is put.
+    """Return the path as one of a robot, with its waypoints moved onto the limits.
 
     Raises:
-        InputError: If it moves other joints, or names them in another order; names that nobody gave do not count.
+        InputError: If it moves other joints, or names them in another order. Default names fit every robot.
     """
     require_joints(robot, path.joint_names, "path")
     return JointPath.of(robot, path.waypoints)

@@ -1,4 +1,4 @@
-"""What is proven of the motions of a path, and where it is not."""
+"""The result of a proof: which motions of a path are proven free, and where the proof of others fails."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ NOWHERE = partial(float, "nan")
 
 @dataclass(frozen=True, slots=True)
 class Gap:
-    """A place on a motion that is not proven free.
+    """A place on a motion where its proof fails.
 
     Attributes:
-        motion: Number of the motion.
-        share: Where on it, from 0 at its start to 1 at its end; nan if the whole motion was not looked at.
-        first, second: Names of the two bodies that are not proven apart. Without a second one, the first says what else
-            is wrong; both are "" if there was no time to look.
+        motion: Index of the motion.
+        share: Position on it, from 0 at its start to 1 at its end; NaN if the motion was not examined.
+        first, second: Names of the two bodies that are not proven apart. If ``second`` is "", ``first`` names another
+            fault; both are "" if the motion was not examined.
     """
 
     motion: int
@@ -41,7 +41,7 @@ class Gap:
 
     @property
     def distance(self) -> float:
-        """How far the two are apart at that place, as coal measures it [m]; nan where there is no place or pair."""
+        """Distance of the two bodies at that place as coal measures it [m]; NaN without a place or a pair."""
         return self._measure()
 
     def __str__(self) -> str:
@@ -53,11 +53,11 @@ class Gap:
 
 
 class Maker(Protocol):
-    """What has made a proof. It is asked again for what takes too long to be said with every proof."""
+    """The prover that made a proof, which answers questions that would take too long for every proof."""
 
     @property
     def digest(self) -> str:
-        """Of the geometry that its proofs are about."""
+        """Digest of the geometry that its proofs refer to."""
 
     def certificate(self, rows: Matrix, clearance: float) -> Certificate | None:
         """By what motions between waypoints, shape (k, dof), keep a clearance [m]; None if one of them does not."""
@@ -65,14 +65,14 @@ class Maker(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Proof:
-    """What is proven of the motions between waypoints.
+    """The result of proving the motions between waypoints free.
 
     Attributes:
-        motions: How many there are.
-        clearance: What each keeps from every obstacle beside its margin [m].
-        unproven: The places that are not proven, at most one of each motion.
-        margin: The least margin of the obstacles [m]; every obstacle's own is kept.
-        maker: What made it; None in another process.
+        motions: Number of motions.
+        clearance: Distance that each keeps from every obstacle on top of its margin [m].
+        unproven: The places where the proof fails, at most one for each motion.
+        margin: The least margin of the obstacles [m]; each obstacle's own margin is kept.
+        maker: The prover that made the proof; None in another process.
     """
 
     motions: int
@@ -87,7 +87,7 @@ class Proof:
 
     @property
     def digest(self) -> str:
-        """Of the robot's and the scene's geometry that the motions are proven for: 32 digits in hexadecimal."""
+        """Digest of the robot's and the scene's geometry for which the motions are proven: 32 hexadecimal digits."""
         return self._digest if self.maker is None else self.maker.digest
 
     @property
@@ -97,10 +97,10 @@ class Proof:
 
 
 def certificate_by(proof: Proof | None, waypoints: Matrix) -> Certificate:
-    """Return the certificate of a path, waypoints of shape (k, dof), for what is proven of it already.
+    """Return the certificate of a path, waypoints of shape (k, dof), that has a proof.
 
     Raises:
-        InputError: If that does not cover the path or was made by another process, or the scene has a cloud.
+        InputError: If the proof does not cover the path or was made in another process, or the scene has a cloud.
     """
     if proof is None:
         raise InputError("path to save with its proof: it has none; use path.proved(world)")

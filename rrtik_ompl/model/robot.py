@@ -55,7 +55,7 @@ class Chain:
         return np.asarray(rows @ self.gain.T + self.offset)
 
     def joint_frames(self, rows: Matrix) -> NDArray[np.float64]:
-        """Pose in the world of every joint frame, world first, for configurations, (m, dof). Shape (m, n + 1, 4, 4)."""
+        """Compute the poses of all joint frames, world first, for configurations: (m, dof) -> (m, n + 1, 4, 4)."""
         motions = joint_motions(self.axis, self.prismatic, self.joint_values(rows))
         frames = allocated((len(rows), len(self.parent) + 1, 4, 4))
         frames[:, 0] = np.eye(4)
@@ -165,7 +165,7 @@ class Robot:
         return finite_array(values, (self.dof,), what).copy()
 
     def configuration_deg(self, values: ArrayLike, what: str = "configuration") -> Vector:
-        """As :meth:`configuration`, of joints that turn in degrees and joints that slide in metres. In rad or m."""
+        """Validate a configuration in degrees (m for prismatic joints), as :meth:`configuration`; in rad or m."""
         q = self.configuration(values, what)
         return np.where(self.prismatic, q, np.radians(q))
 

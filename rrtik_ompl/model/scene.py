@@ -1,4 +1,4 @@
-"""What surrounds the arm: named obstacles with poses, moving ones, attached objects, allowed collisions. Frozen."""
+"""The surroundings of the arm: obstacles at rest or moving, attached objects and allowed collisions. Immutable."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from rrtik_ompl.base.errors import InputError, UnknownNameError, at_most, listed
 from rrtik_ompl.base.poses import rigid
 from rrtik_ompl.model.shapes import SHAPES, Shape
 
-MOST_SOLIDS = 10_000  # of a scene, obstacles and attached objects together
+MOST_SOLIDS = 10_000  # largest number of obstacles and attached objects of a scene
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ConstantVelocity:
-    """A straight motion: position at time t is the obstacle's pose shifted by ``velocity * t`` [m/s, world axes]."""
+    """A straight motion: at time t the obstacle is displaced by ``velocity * t`` [m/s, world axes] from its pose."""
 
     velocity: Vector
 
@@ -33,10 +33,10 @@ class ConstantVelocity:
         object.__setattr__(self, "velocity", frozen(bounded_array(velocity, (3,), "motion velocity")))
 
     def pose_at(self, start: pin.SE3, time: float) -> pin.SE3:
-        """Pose at ``time`` [s] of an obstacle that is at ``start`` at time 0.
+        """Return the pose at ``time`` [s] of an obstacle that is at ``start`` at time 0.
 
         Raises:
-            InputError: If it has left the world by then.
+            InputError: If the obstacle is farther away than numbers are allowed to be.
         """
         require(start, pin.SE3, "pose of an obstacle", "use rrtik_ompl.pose(xyz, quat_xyzw)")
         time = finite_number(time, "time of a motion")
@@ -47,14 +47,17 @@ class ConstantVelocity:
         raise InputError(f"motion: at {time:g} s an obstacle of velocity {self.velocity.tolist()} m/s is far away")
 
     def seen_from(self, time: float) -> ConstantVelocity:
-        """Return the same motion with ``time`` [s] as its time 0."""
+        """Return the motion with ``time`` [s] as its new time 0, which is the same motion."""
         del time
         return self
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TimedPoses:
-    """A motion through poses at given times: straight lines, shortest rotations, at rest before and after."""
+    """A motion through poses in the world at given times [s].
+
+    In between the obstacle moves on straight lines with shortest rotations; before and after it is at rest.
+    """
 
     times: Vector
     poses: tuple[pin.SE3, ...]
@@ -78,7 +81,7 @@ class TimedPoses:
         object.__setattr__(self, "poses", stations)
 
     def pose_at(self, start: pin.SE3, time: float) -> pin.SE3:
-        """Pose at ``time`` [s]; ``start`` does not matter, the waypoints are in the world."""
+        """Return the pose at ``time`` [s]; ``start`` is ignored, as the poses of the motion are in the world."""
         del start
         k = int(np.searchsorted(self.times, time, side="right"))
         if k == 0 or k == len(self.times):
@@ -91,7 +94,7 @@ class TimedPoses:
         return pin.SE3(rotation, (1.0 - share) * a.translation + share * b.translation)
 
     def seen_from(self, time: float) -> TimedPoses:
-        """Return the same motion with ``time`` [s] as its time 0."""
+        """Return the motion with ``time`` [s] as its new time 0."""
         return changed(self, times=frozen(self.times - time))
 
 
@@ -104,10 +107,10 @@ class Obstacle:
 
     Attributes:
         name: Its name.
-        shape: What it is.
+        shape: Its geometry.
         pose: T_world_obstacle.
-        motion: Moves it over time, if given.
-        margin: Distance that the moving parts of the arm must keep to it [m]; what no joint moves must only not touch.
+        motion: Its motion over time; None if it is at rest.
+        margin: Distance that the moving parts of the arm must keep from it [m]; the fixed parts must only not touch it.
     """
 
     name: str
@@ -124,11 +127,17 @@ class Obstacle:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AttachedObject:
-    """A solid held by a link. ``pose`` is T_link_object; ``allow`` names what it may touch beside that link.
+    """A solid held by a link.
 
-    Both lengths are what it keeps from all that it may not touch, on top of the margins of others: ``margin`` [m] is
-    its own, as that of an obstacle is, and becomes it again when it is set down; ``padding`` [m] is that of the grasp,
-    and that of the holding link (:func:`rrtik_ompl.padded`) if None.
+    Attributes:
+        name: Its name.
+        link: The link that holds it.
+        shape: Its geometry.
+        pose: T_link_object.
+        allow: Names of links and obstacles that it may touch, in addition to ``link``.
+        padding: Distance of the grasp [m]: kept from everything that it must not touch, in addition to margins. That of
+            the holding link (:func:`rrtik_ompl.padded`) if None.
+        margin: Its own margin [m], kept likewise; it becomes the margin of the obstacle again when it is detached.
     """
 
     name: str
@@ -155,9 +164,9 @@ class AttachedObject:
 
 
 def _checked_solid(name: object, shape: object, pose: object) -> pin.SE3:
-    """Return the pose of an obstacle or attached object, if all three are what they have to be.
+    """Validate name, shape and pose of an obstacle or attached object, and return the pose.
 
-    A pose that is not finite would compare as farther away than anything, and what is there would not be seen.
+    A pose that is not finite would compare as farther away than anything, so the solid would be ignored.
     """
     name_of(name, "an obstacle or attached object")
     if not isinstance(shape, Shape):
@@ -176,9 +185,9 @@ def _room(value: float, what: str) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Touching:
-    """Two things that are in contact, and how near each other they may come; margins and paddings do not add to that.
+    """A pair that is in contact, with the least distance that it has to keep; margins and paddings do not apply to it.
 
-    A task makes these for what touches when it is taken or set down, and they end when the two have parted.
+    A task creates these for objects that are in contact when grasped or set down; they end when the two have parted.
 
     Attributes:
         first, second: Names; one of them at least is an obstacle or attached object.
@@ -222,13 +231,13 @@ class Touching:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene:
-    """Obstacles, attached objects, and the pairs of names that may touch. ``Scene()`` is the empty one.
+    """Obstacles, attached objects, and pairs of names that may touch. ``Scene()`` is empty.
 
     Attributes:
-        obstacles: What stands or moves by itself.
-        attached: What links hold.
-        allowed_collisions: Pairs of names that are never checked.
-        contacts: Pairs that are in contact, and how far they may overlap.
+        obstacles: Solids in the world, at rest or moving.
+        attached: Solids held by links.
+        allowed_collisions: Pairs of names that are never checked against each other.
+        contacts: Pairs that are in contact, with the depth to which they may overlap.
     """
 
     obstacles: tuple[Obstacle, ...] = ()
@@ -276,7 +285,7 @@ class Scene:
         return (*(o.name for o in self.obstacles), *(o.name for o in self.attached))
 
     def obstacle(self, name: str) -> Obstacle:
-        """Return the obstacle of that name.
+        """Return the obstacle with a given name.
 
         Raises:
             UnknownNameError: If there is none.
@@ -288,15 +297,15 @@ class Scene:
         raise UnknownNameError("obstacle", name, (o.name for o in self.obstacles))
 
     def with_(self, *obstacles: Obstacle) -> Scene:
-        """Return the scene with further obstacles.
+        """Return the scene with additional obstacles.
 
         Raises:
-            InputError: If one is none, or its name is used already.
+            InputError: If one is not an obstacle, or its name is used already.
         """
         return replace(self, obstacles=(*self.obstacles, *obstacles))
 
     def without(self, *names: str) -> Scene:
-        """Return the scene without some of its obstacles and attached objects, and without the pairs that name them.
+        """Return the scene without some obstacles and attached objects, and without the pairs that contain them.
 
         Raises:
             UnknownNameError: If there is none of that name.
@@ -321,21 +330,23 @@ class Scene:
         pose: ArrayLike | pin.SE3 | None = None,
         padding: float | None = None,
     ) -> Scene:
-        """Return the scene in which an obstacle has become an attached object; pairs that may touch still may.
+        """Return the scene in which an obstacle has become an attached object; allowed pairs stay allowed.
 
-        It keeps its margin; a motion that it had ends. What ``allow`` names may touch it until it is set down: a scene
-        knows no posture of the arm, so that it cannot say how deep. :class:`rrtik_ompl.Task` can, and does.
+        The object keeps its margin and loses its motion. It may touch the things named in ``allow`` until it is
+        detached, to any depth, because a scene does not know the posture of the arm. :class:`rrtik_ompl.Task` limits
+        the depth.
 
         Args:
-            name: Of the obstacle.
-            link: That holds it from now on.
-            allow: Links and obstacles that it may touch beside that link.
-            pose: T_link_object, in any form of :func:`rrtik_ompl.base.poses.rigid`; the link's own frame if None.
-            padding: What it keeps from all that it may not touch, beside its margin [m]; that of the link if None.
+            name: Name of the obstacle.
+            link: The link that holds it from now on.
+            allow: Links and obstacles that it may touch, in addition to that link.
+            pose: T_link_object, in any form of :func:`rrtik_ompl.base.poses.rigid`; the identity if None.
+            padding: Distance that it keeps from everything that it must not touch, on top of its margin [m]; that of
+                the link if None.
 
         Raises:
             UnknownNameError: If there is no obstacle of that name.
-            InputError: If it has no end, or the pose is none.
+            InputError: If the obstacle is unbounded, or ``pose`` is not a pose.
         """
         taken = self.obstacle(name)
         rest = self.without(name)
@@ -350,14 +361,13 @@ class Scene:
         return Scene(rest.obstacles, attached, self.allowed_collisions, self.contacts)
 
     def detaching(self, name: str, pose: ArrayLike | pin.SE3) -> Scene:
-        """Return the scene in which an attached object is an obstacle at T_world_object.
+        """Return the scene in which an attached object has become an obstacle at T_world_object.
 
-        Its margin is the obstacle's. What was for the grasp ends with it: padding, what it was allowed to touch, and
-        contacts of what was held.
+        It keeps its margin. The settings of the grasp end: its padding, what it was allowed to touch, and its contacts.
 
         Raises:
             UnknownNameError: If there is no attached object of that name.
-            InputError: If the pose is none.
+            InputError: If ``pose`` is not a pose.
         """
         require(name, str, "name of an attached object")
         held = {a.name: a for a in self.attached}
@@ -370,7 +380,7 @@ class Scene:
         return Scene((*self.obstacles, free), tuple(held.values()), self.allowed_collisions, contacts)
 
     def at(self, time: float) -> Scene:
-        """The scene with ``time`` [s] as its time 0: moving obstacles are where their motion puts them, and go on.
+        """Return the scene with ``time`` [s] as its new time 0: moving obstacles are at their poses then, and go on.
 
         Raises:
             InputError: If the time is not finite, or an obstacle has left the world by then.
@@ -386,7 +396,7 @@ class Scene:
 
 
 def pose_at(obstacle: Obstacle, time: float) -> pin.SE3:
-    """Return where an obstacle is at a time [s]: by the motion that it states, if it states one."""
+    """Return the pose of an obstacle at a time [s], by its motion if it has one."""
     return obstacle.pose if obstacle.motion is None else obstacle.motion.pose_at(obstacle.pose, time)
 
 
@@ -397,7 +407,7 @@ def pairs_that_may_touch(scene: Scene) -> frozenset[tuple[frozenset[str], float 
 
 
 def exchanged(scene: Scene, number: int, obstacle: Obstacle) -> Scene:
-    """The scene with an obstacle in the place of one of the same name and shape; nothing else is checked again."""
+    """Return the scene with an obstacle replaced by one of the same name and shape, without other checks."""
     obstacles = list(scene.obstacles)
     obstacles[number] = obstacle
     return changed(scene, obstacles=tuple(obstacles))

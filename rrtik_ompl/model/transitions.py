@@ -1,4 +1,4 @@
-"""Routes as lists of single-joint moves: what counts as a move, how many a route has, how few it could have.
+"""Paths as lists of single-joint moves: what counts as a move, how many there are, and the least possible number.
 
 Source: the metric and the count of routes of [1, ch. 6.3].
 """
@@ -15,17 +15,17 @@ from numpy.typing import ArrayLike, NDArray
 from rrtik_ompl.base.arrays import MOST_ROWS, Matrix, Vector, finite_array
 from rrtik_ompl.base.errors import InputError, at_most
 
-SAME = radians(1e-6)  # [rad] or [m]; a joint that changes by no more than this has not moved
+SAME = radians(1e-6)  # [rad] or [m] largest change of a joint that does not count as a move
 
 
 class Move(NamedTuple):
-    """One joint moves, all others rest.
+    """A move of one joint, while all others rest.
 
     Attributes:
-        joint: Its name.
+        joint: Name of the joint.
         start, end: Its values before and after.
-        unit: Of the values, "rad" or "m".
-        continuous: Whether the joint has no limits, so that a whole turn more is the same posture.
+        unit: Unit of the values, "rad" or "m".
+        continuous: Whether the joint has no limits, so that values a whole turn apart are the same posture.
     """
 
     joint: str
@@ -41,33 +41,36 @@ class Move(NamedTuple):
 
 
 def moved(a: ArrayLike, b: ArrayLike, tolerance: float = SAME) -> NDArray[np.bool_]:
-    """Sigma of [1, ch. 6.3]: which joints differ between a and b by more than ``tolerance``. Shape of a and b."""
+    """Return which joints differ between a and b by more than ``tolerance``: sigma of [1, ch. 6.3].
+
+    The shape is that of a and b.
+    """
     difference = np.abs(np.asarray(a, dtype=np.float64) - np.asarray(b, dtype=np.float64))
     mask: NDArray[np.bool_] = difference > tolerance
     return mask
 
 
 def lower_bound(start: ArrayLike, goal: ArrayLike, tolerance: float = SAME) -> int:
-    """The number c of [1, ch. 6.3]: the fewest single-joint moves that lead from start to goal, each of shape (n,).
+    """Return the least number of single-joint moves from start to goal, shape (n,) each: c of [1, ch. 6.3].
 
-    It is reached when nothing obstructs. If one joint alone is obstructed, c + 2 is the natural optimum.
+    It is attained if nothing obstructs. If only one joint is obstructed, c + 2 is the natural optimum.
     """
     first = finite_array(start, (None,), "start")
     return int(np.count_nonzero(moved(first, finite_array(goal, (len(first),), "goal"), tolerance)))
 
 
 def merge_moves(waypoints: ArrayLike, tolerance: float = SAME) -> Matrix:
-    """Join consecutive moves of the same joint and delete null moves.
+    """Merge consecutive moves of the same joint and delete null moves.
 
-    The merged move covers no new configuration, so a valid route stays valid. Start and end are kept exactly. With
-    ``tolerance = 0`` every edge of a single-joint route still moves exactly one coordinate.
+    A merged move covers no new configuration, so a valid path stays valid. Start and end are kept exactly. With
+    ``tolerance = 0`` every edge of a single-joint path still moves exactly one coordinate.
 
     Args:
-        waypoints: Shape (k, n), k at least 1.
-        tolerance: Largest change that counts as none, rad or m.
+        waypoints: The path, shape (k, n), k at least 1.
+        tolerance: Largest change that does not count as a move [rad or m].
 
     Returns:
-        Shape (m, n), m <= k; a single row if nothing moves.
+        Waypoints, shape (m, n), m <= k; a single row if nothing moves.
     """
     rows = _rows(waypoints)
     values = rows.tolist()  # lists: most routes are short, and numpy takes longer for a row
@@ -78,14 +81,14 @@ def merge_moves(waypoints: ArrayLike, tolerance: float = SAME) -> Matrix:
             corners.pop()
         if _moved_joints(values[corners[-1]], values[i], tolerance):
             corners.append(i)
-        elif len(corners) > 1:  # a null move: its end takes the place of its beginning, so that the last row is exact
+        elif len(corners) > 1:  # a null move is replaced by its end, so that the last row is exact
             corners[-1] = i
 
     return rows[corners]
 
 
 def without_repeats(route: Matrix) -> Matrix:
-    """Return the route without waypoints that repeat the one before, shape (k, n); both ends stay."""
+    """Return a path, shape (k, n), without waypoints that equal the one before; both ends stay."""
     distinct: Matrix = route[np.append(True, (np.diff(route, axis=0) != 0.0).any(axis=1))]
     return distinct
 
@@ -105,12 +108,12 @@ def single_joint(waypoints: ArrayLike, tolerance: float = 0.0) -> bool:
 
 
 def route_length(waypoints: ArrayLike) -> float:
-    """Sum of the Euclidean lengths of the edges of a route, shape (k, n) [rad, or m for sliding joints]."""
+    """Return the sum of the Euclidean lengths of the edges of a path, shape (k, n) [rad, or m for prismatic joints]."""
     return length_of(_rows(waypoints))
 
 
 def length_of(rows: Matrix) -> float:
-    """As :func:`route_length`, of waypoints that are known to be numbers."""
+    """Return the length of a path as :func:`route_length`, without validation of the waypoints."""
     edges = rows[1:] - rows[:-1]
     return float(np.sqrt((edges * edges).sum(axis=1)).sum())
 
@@ -122,12 +125,12 @@ def _same_joint(a: list[float], b: list[float], c: list[float], tolerance: float
 
 
 def _moved_joints(a: list[float], b: list[float], tolerance: float) -> list[int]:
-    """Return numbers of the joints that differ by more than the tolerance."""
+    """Return the indices of the joints that differ by more than the tolerance."""
     return [joint for joint, (x, y) in enumerate(zip(a, b, strict=True)) if abs(x - y) > tolerance]
 
 
 def _rows(waypoints: ArrayLike) -> Matrix:
-    """Waypoints, which are trusted to be numbers, as an array."""
+    """Convert waypoints to an array; they are not validated further."""
     rows = np.asarray(waypoints, dtype=np.float64)
     if len(rows) == 0:
         raise InputError("waypoints: a route needs at least one configuration")
@@ -135,14 +138,14 @@ def _rows(waypoints: ArrayLike) -> Matrix:
 
 
 def edge_keys(route: Matrix) -> list[tuple[bytes, bytes]]:
-    """Return the edges of a route as keys."""
+    """Return hashable keys of the edges of a path, pairs of bytes."""
     return list(pairwise(row.tobytes() for row in route))
 
 
 def part_counts(rows: Matrix, step: float) -> Vector:
-    """Into how many parts to cut each edge of a polyline, shape (k, n), so that none is longer than ``step``.
+    """Compute the number of parts for each edge of a polyline, shape (k, n), so that none is longer than ``step``.
 
-    A part may be longer by rounding. An edge without length has none (-0.0). Shape (k - 1,).
+    Parts may be longer by rounding errors. Edges of length 0 have no parts (-0.0). The result has shape (k - 1,).
 
     Raises:
         InputError: If there would be more parts than a path may have waypoints.
@@ -153,13 +156,22 @@ def part_counts(rows: Matrix, step: float) -> Vector:
 
 
 def in_parts(counts: Vector, at_once: int) -> list[NDArray[np.int64]]:
-    """Return numbers of the edges with so many checks each, shape (k,), in parts of about ``at_once`` checks."""
+    """Split edges into groups of about ``at_once`` checks, given the number of checks of each edge, shape (k,).
+
+    Returns:
+        The indices of the edges of each group.
+    """
     edges = np.arange(len(counts), dtype=np.int64)
     return np.split(edges, np.flatnonzero(np.diff(counts.cumsum() // at_once)) + 1)
 
 
 def subdivided(rows: Matrix, counts: Vector) -> tuple[Matrix, Vector]:
-    """Cut edge i of a polyline, shape (k, n), into ``counts[i]`` equal parts; also the edge number of every point."""
+    """Divide edge i of a polyline, shape (k, n), into ``counts[i]`` equal parts.
+
+    Returns:
+        All points, shape (m, n), and the index of the edge that each is on, shape (m,). The first point counts to edge
+        0, every other node to the edge that ends there.
+    """
     points = [rows[:1]]
     edges = [np.zeros(1, dtype=np.int64)]
 

@@ -1,4 +1,4 @@
-"""What a world is made from, as one frozen value: every other form of a world is made from its settings."""
+"""The settings of a world as one immutable value, from which every form of a world is made."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from rrtik_ompl.model.scene import Scene
 
 MOTION_RESOLUTION = 0.01  # [m]
 ACCURACIES: tuple[Accuracy, ...] = get_args(Accuracy)
-FINEST_RESOLUTION = 1e-5  # [m]; a motion across an arm's reach is then some hundred thousand checks
+FINEST_RESOLUTION = 1e-5  # [m] least resolution; a motion across an arm's reach then takes some 100,000 checks
 
 
 def _robot(robot: Robot) -> Robot:
@@ -44,40 +44,41 @@ def _optional_clearance(length: float | None) -> float | None:
 
 
 def _setting(check: Callable[[Any], Any], *, key: str = "", least: float = 0.0, unit: str = "") -> dict[str, Any]:
-    """What a field of :class:`WorldSettings` says of a setting beside its name, type and default.
+    """Return the metadata of a field of :class:`WorldSettings`.
 
     Args:
-        check: Makes of what a user gives what a world keeps, or raises.
-        key: What the key of this name in problem files is explained by in their schema; "" if they have no such key.
-        least: The least number that the key may have.
-        unit: In which the setting is printed.
+        check: Validates a value given by a user and returns the value to store, or raises.
+        key: Description of the setting in the schema of problem files; "" if files have no such key.
+        least: Least number that the key may have in files.
+        unit: Unit with which the setting is printed.
     """
     return {"check": check, "key": key, "least": least, "unit": unit}
 
 
 def _length(name: str, key: str = "") -> dict[str, Any]:
-    """As :func:`_setting`, of a length of at least 0 [m]."""
+    """Return the metadata of a length of at least 0 [m], as :func:`_setting`."""
     return _setting(partial(not_negative, what=name), key=key, unit="m")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WorldSettings:
-    """What a :class:`rrtik_ompl.World` is made from; ``dataclasses.replace`` changes some of it, and forgets nothing.
+    """The settings of a :class:`rrtik_ompl.World`; ``dataclasses.replace`` changes some and keeps the others.
 
-    A new setting is a field here, and what obeys it. The arguments of a world, the keys of files, what is printed and
-    what the truth matrix tries follow from the fields.
+    To add a setting, add a field here and the code that obeys it. The arguments of a world, the keys of files, the
+    printed form and the cases of the truth matrix are derived from the fields.
 
     Attributes:
         robot: The arm.
         scene: Its surroundings; moving obstacles are where they are at time 0.
         accuracy: "exact" or "conservative".
         motion_resolution: Largest step of any point of the arm between two checked configurations [m].
-        self_margin: How far links, and what they hold, must stay from each other where they must not touch [m].
-        clearance: What is kept from obstacles on top of their margins [m].
-        proving: Motions must be proven too, with this clearance [m]; None if they need not be.
-        inflation: What checks keep on top of the clearance, for searches that leave room [m]; no other answer does.
-        constraints: Regions that a frame must not leave, placed in the world. Only what keeps them is then free; a
-            :class:`rrtik_ompl.Problem` says where those begin that are ``from_start``.
+        self_margin: Distance that links and attached objects must keep from each other where they must not touch [m].
+        clearance: Distance kept from obstacles on top of their margins [m].
+        proving: Clearance with which motions must be proven to be valid [m]; None if no proof is required.
+        inflation: Distance that collision checks keep on top of the clearance, for searches that leave room [m]. It
+            has no effect on proofs, contacts and distances.
+        constraints: Regions that a frame must not leave, placed in the world; only configurations and motions that
+            keep them are valid. A :class:`rrtik_ompl.Problem` places those that are ``from_start``.
 
     Raises:
         InputError: If one of them is of the wrong type, or a length makes no sense.
@@ -138,16 +139,16 @@ class WorldSettings:
 
     @property
     def required_clearance(self) -> float:
-        """What every motion keeps from obstacles on top of their margins, where nobody asks for more [m]."""
+        """The clearance that every motion keeps from obstacles on top of their margins by default [m]."""
         return max(self.clearance, self.proving or 0.0)
 
     @property
     def summary(self) -> str:
-        """Robot, scene, and what is not as usual, in one line."""
+        """Robot, scene, and all settings that are not the default, in one line."""
         return ", ".join([self.robot.name, str(self.scene), *self.unusual()])
 
     def unusual(self) -> Iterator[str]:
-        """Yield each setting beside robot and scene that is not the default, as ``name=value``."""
+        """Yield a text ``name=value`` for each setting that is not the default, except robot and scene."""
         for each in fields(self):
             value = getattr(self, each.name)
             if each.default is MISSING or value == each.default:
@@ -166,11 +167,11 @@ CHECKS: dict[str, Callable[[Any], Any]] = {each.name: each.metadata["check"] for
 
 
 def checked_settings(given: Mapping[str, Any]) -> dict[str, Any]:
-    """Settings of a world given by a user, by their names, as a world keeps them.
+    """Validate settings of a world given by a user, by their names, and return the values to store.
 
     Raises:
         InputError: If one of them is of the wrong type, or a length makes no sense.
-        UnknownNameError: If there is no setting, or no accuracy, of a name.
+        UnknownNameError: If there is no setting or no accuracy of a given name.
     """
     for name in given:
         if name not in CHECKS:
