@@ -40,7 +40,8 @@ COORDINATES = (1, 2, 7, 60)
 ALWAYS_SOLVED = 2  # largest number of coordinates in which any planner has to succeed, even an undirected single tree
 SPACE_SECONDS = 5.0  # [s] for problems that take milliseconds
 BRIEF = 0.3  # [s] for problems for which no path has to be found
-TURNED = (-0.5, 0.0, 0.3), (0.5, 0.0, -0.3)  # two coordinates and an angle, on both sides of a wall
+# Two configurations of two coordinates and an angle, on different sides of a wall.
+TURNED = (-0.5, 0.0, 0.3), (0.5, 0.0, -0.3)
 COARSE = 0.02  # resolution of OMPL's checks of an edge, as a share of the extent
 
 
@@ -60,7 +61,7 @@ def check_planner(factory: Factory, *, single_joint_moves: bool = False) -> None
 
 
 def solves_and_ends_exactly(factory: Factory) -> None:
-    """A plain SimpleSetup is solved: EXACT_SOLUTION, from the start to the goal to the bit, every edge free."""
+    """A plain SimpleSetup is solved with EXACT_SOLUTION; the path has exactly the given ends, every edge is free."""
     setup, rows, _ = solved(factory)
     require(np.array_equal(rows[0], START) and np.array_equal(rows[-1], GOAL), "the path does not end exactly", rows)
 
@@ -231,7 +232,7 @@ def does_not_depend_on_the_unit(factory: Factory) -> None:
 
 
 def works_in_any_dimension(factory: Factory) -> None:
-    """Spaces of 1, 2, 7 and 60 coordinates: exact where there are two at most, never a crash or a path that is none."""
+    """Spaces of 1, 2, 7 and 60 coordinates never give a crash or an invalid path; up to 2 are solved exactly."""
     for dof in COORDINATES:
         seconds = SPACE_SECONDS if dof <= ALWAYS_SOLVED else BRIEF
         setup = box_problem(1.0, lambda _: True, [np.full(dof, -0.8)], [np.full(dof, 0.8)], dof=dof)
@@ -269,7 +270,7 @@ def says_when_there_was_no_time(factory: Factory) -> None:
 
 
 def turns_either_way(factory: Factory) -> None:
-    """In SE(2) and in a compound with SO(2) a path leads past half a turn where the short way round is shut."""
+    """In SE(2) and in a compound with SO(2), a path turns through half a turn if the shorter way is blocked."""
     for space, write in ((_plane(), _write_plane), (_arm(), _write_arm)):
         setup = og.SimpleSetup(space)
         setup.setStateValidityChecker(_past_half_a_turn)

@@ -28,7 +28,10 @@ class MotionChecker(MotionQueries, Protocol):
 
 
 class WorldChecker:
-    """Of a world or a stand-in, which may leave out ``valid_batch`` (see :class:`MotionChecker`)."""
+    """Motion queries answered by a world or a substitute for one (see :class:`MotionChecker`).
+
+    A substitute may lack ``valid_batch``.
+    """
 
     def __init__(self, world: MotionQueries) -> None:
         self._world = world
@@ -41,7 +44,7 @@ class WorldChecker:
         return bool(self._world.valid(q))
 
     def valid_batch(self, Q: Matrix) -> Mask:
-        """Which of the configurations Q, shape (m, n), are free, shape (m,); at once if the world can do that."""
+        """Check which of the configurations Q, shape (m, n), are free, shape (m,); in one call if possible."""
         together: Callable[[Matrix], Mask] | None = getattr(self._world, "valid_batch", None)
         if together is None:
             return np.array([self.valid(q) for q in Q], dtype=bool)

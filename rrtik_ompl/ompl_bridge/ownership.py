@@ -26,7 +26,7 @@ PLAIN_HINT = (
 
 
 def is_plain(planner: object) -> bool:
-    """Whether a planner's class is written in Python and derived from ``ompl.base.Planner``, not from SafePlanner."""
+    """Check whether a planner's class is written in Python on top of ``ompl.base.Planner`` without SafePlanner."""
     if not isinstance(planner, type) or not issubclass(planner, ob.Planner) or issubclass(planner, SafePlanner):
         return False
     return planner.__module__.partition(".")[0] != "ompl"

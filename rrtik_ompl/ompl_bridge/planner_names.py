@@ -140,7 +140,8 @@ def _is_planner(value: object) -> bool:
 
 @lru_cache(maxsize=32)
 def _module(path: Path) -> ModuleType:
-    name = f"planner_file_{path.stem}_{sha256(str(path).encode()).hexdigest()[:8]}"  # files of one name are several
+    # Several files may have the same name, so the name of the module depends on the whole path.
+    name = f"planner_file_{path.stem}_{sha256(str(path).encode()).hexdigest()[:8]}"
     spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or spec.loader is None:
         raise InputError(f"planner in {path}: not a Python file")

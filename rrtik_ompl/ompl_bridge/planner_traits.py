@@ -16,7 +16,8 @@ from ompl import geometric as og
 
 from rrtik_ompl.description import catalog
 
-PlannerFactory: TypeAlias = Callable[..., ob.Planner]  # a planner's class, or what makes one from a SpaceInformation
+# A planner's class, or a function that makes a planner from a SpaceInformation.
+PlannerFactory: TypeAlias = Callable[..., ob.Planner]
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,7 +19,8 @@ from rrtik_ompl.files.text import write_text
 from rrtik_ompl.ompl_bridge.states import StateIO
 
 Numbers: TypeAlias = NDArray[np.int64]
-Tree: TypeAlias = tuple[Matrix, ArrayLike]  # vertices, and the number of each one's parent, below 0 for a root
+# Vertices, shape (v, n), and the index of each vertex's parent, shape (v,), below 0 for a root.
+Tree: TypeAlias = tuple[Matrix, ArrayLike]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -145,7 +145,10 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         change(self, name, value)
 
     def parameters(self) -> dict[str, Any]:
-        """The options with their values, as :meth:`set` takes them; None is what suits the problem."""
+        """Return the options with their values, as :meth:`set` takes them.
+
+        None stands for a value that suits the problem.
+        """
         return options_of(self)
 
     def graph(self) -> PlannerGraph:
@@ -239,13 +242,16 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         self._forget()
 
     def ends_free(self, rows: Matrix, checker: MotionChecker) -> Mask:
-        """Which starts and goals, shape (m, n), are free, shape (m,). For subclasses that know a faster way to tell."""
+        """Check which starts and goals, shape (m, n), are free, shape (m,).
+
+        Subclasses with a faster check override it.
+        """
         return checker.valid_batch(rows)
 
     def stands(self, rows: Matrix, checker: MotionChecker) -> bool:
-        """Whether a path, shape (k, n), is free, to the second check of a world too. For subclasses that improve one.
+        """Check whether a path, shape (k, n), is free, also by the second check of a world.
 
-        `plan()` makes that check itself, of the last path.
+        For subclasses that improve a path. `plan()` makes the second check itself, for the last path.
         """
         motions_are_free = bool(checker.motion_valid_batch(rows[:-1], rows[1:]).all())
         return motions_are_free and not _refusal_of_second_check(self._second_check_world, rows)
@@ -258,7 +264,10 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         return self._io.bounds() if self._bounds is None else self._bounds
 
     def turning(self) -> Mask | None:
-        """Which coordinates turn, shape (n,): of the world's arm, or angles of SO(2); None where nobody knows."""
+        """Return which coordinates turn, shape (n,): joints of the world's arm, or angles of SO(2).
+
+        None if that is unknown.
+        """
         joints = turning_joints(self._world)
         return self._io.turning if joints is None and self._io.turns else joints
 
@@ -406,7 +415,10 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
 
 
 def _refusal_of_second_check(world: object, rows: Matrix | None, unrolled: Unrolled | None = None) -> str:
-    """Why a world's second check refuses a path, shape (k, n), in a line; "" if it does not, or there is no path."""
+    """Return why a world's second check refuses a path, shape (k, n), in a line; "" if it accepts it.
+
+    A missing path is not refused.
+    """
     if rows is None or not isinstance(world, World):
         return ""
     if unrolled is not None:

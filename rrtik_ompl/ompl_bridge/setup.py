@@ -65,7 +65,7 @@ class ValidityCallback:
         return {"checked_states": self.states, "checked_motions": self.motions, "free_motions": self.free_motions}
 
     def _checked(self, check: Callable[..., bool], *arguments: Vector) -> bool:
-        """The answer of a check; False after an error or the deadline, and where the check itself fails."""
+        """Return the answer of a check; False after an error or the deadline, or if the check raises an error."""
         if self.error is not None or self.late:
             return False
 

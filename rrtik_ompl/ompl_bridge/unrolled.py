@@ -73,14 +73,20 @@ class Unrolled:
         self.goals = np.array(nearest + others).reshape(-1, len(base))
 
     def bounds(self, lower: Vector, upper: Vector) -> tuple[Vector, Vector]:
-        """Bounds of the search, shapes (n,): those given, but of angles a turn to either side of the first start."""
+        """Return the bounds of the search on the line, shapes (n,).
+
+        They are the given ones, but for angles a turn to either side of the first start.
+        """
         return (
             np.where(self._turning, self._base - TAU, lower),
             np.where(self._turning, self._base + TAU, upper),
         )
 
     def path(self, rows: Matrix) -> Matrix:
-        """A path on the line, shape (k, n), as one whose angles turn the short way; its ends are those given."""
+        """Return a path on the line, shape (k, n), as one whose angles turn the short way.
+
+        Its ends are the given start and goal, bit for bit.
+        """
         path = self.divided(rows)
         for end in (0, -1):
             path[end] = self._end_of_image.get(path[end].tobytes(), path[end])

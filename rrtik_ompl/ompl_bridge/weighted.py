@@ -41,7 +41,10 @@ class WeightedProblem:
         return np.asarray(rows * self._scale)
 
     def joint_rows(self, rows: Matrix, known: Matrix) -> Matrix:
-        """Configurations of the arm, shape (m, dof); values of those that are ``known`` come back to the bit."""
+        """Return weighted rows as configurations of the arm, shape (m, dof).
+
+        Values of ``known`` configurations, shape (k, dof), are restored bit for bit.
+        """
         unweighted = rows / self._scale
         for row in known:
             unweighted = np.where(rows == row * self._scale, row, unweighted)

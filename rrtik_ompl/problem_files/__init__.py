@@ -1,1 +1,1 @@
-"""The YAML of problems, scenes, goals and robots; MotionBenchMaker; messages of MoveIt."""
+"""Readers and writers of problems, scenes, goals and robots in YAML, MotionBenchMaker files and MoveIt messages."""

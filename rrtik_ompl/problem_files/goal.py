@@ -1,4 +1,4 @@
-"""The ``start:`` and ``goal:`` sections of a problem file <-> configurations and goals."""
+"""Conversion between the ``start:`` and ``goal:`` sections of a problem file and configurations and goals."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class JointsDeg(Section):
     joints_deg: Numbers = Field(description="revolute and continuous joints [deg], prismatic joints [m]")
 
     def configuration(self, robot: Robot) -> Vector:
-        """Shape (dof,), rad or m."""
+        """Return the configuration, shape (dof,) [rad or m]."""
         return robot.configuration_deg(self.joints_deg, "joints_deg")
 
 
@@ -45,7 +45,7 @@ class Joints(Section):
     joints: Numbers = Field(description="revolute and continuous joints [rad], prismatic joints [m]")
 
     def configuration(self, robot: Robot) -> Vector:
-        """Shape (dof,), rad or m."""
+        """Return the configuration, shape (dof,) [rad or m]."""
         return robot.configuration(self.joints, "joints")
 
 
@@ -55,7 +55,7 @@ class Posture(Section):
     posture: Name
 
     def configuration(self, robot: Robot) -> Vector:
-        """Shape (dof,), rad or m."""
+        """Return the configuration, shape (dof,) [rad or m]."""
         return robot.posture(self.posture)
 
 
@@ -67,7 +67,7 @@ class PoseTarget(Section):
     orientation_tolerance: Positive = Field(1e-2, description="angle of the remaining rotation [rad]")
 
     def build(self) -> PoseGoal:
-        """The goal."""
+        """Return the goal."""
         return PoseGoal(self.pose.build(), self.position_tolerance, self.orientation_tolerance)
 
 
@@ -78,7 +78,7 @@ class PositionTarget(Section):
     tolerance: Positive = Field(1e-3, description="[m]")
 
     def build(self) -> PositionGoal:
-        """The goal."""
+        """Return the goal."""
         return PositionGoal(self.position, self.tolerance)
 
 
@@ -107,7 +107,7 @@ class TaskRegionEntry(Section):
         return self
 
     def build(self) -> TaskRegion:
-        """The goal."""
+        """Return the goal."""
         bounds = [self.x, self.y, self.z]
         for angle in COORDINATES[3:]:
             degrees = getattr(self, f"{angle}_deg") or [0.0, 0.0]
@@ -125,7 +125,7 @@ class TaskRegionTarget(Section):
     task_region: TaskRegionEntry
 
     def build(self) -> TaskRegion:
-        """The goal."""
+        """Return the goal."""
         return self.task_region.build()
 
 
@@ -144,7 +144,7 @@ class AboutAxis(Section):
     about_axis: AboutAxisEntry
 
     def build(self) -> TaskRegion:
-        """The goal."""
+        """Return the goal."""
         entry = self.about_axis
         return TaskRegion.about_axis(
             entry.pose.build(),
@@ -172,7 +172,7 @@ class AnyOf(Section):
     any_of: Annotated[list[Member], Field(min_length=1)]
 
     def build(self) -> GoalSet:
-        """The goal."""
+        """Return the goal."""
         return GoalSet(member.build() for member in self.any_of)
 
 
@@ -182,7 +182,7 @@ class Tips(Section):
     tips: dict[Name, Member] = Field(min_length=1, description="a goal for each tip, by the name of its link")
 
     def build(self) -> MultiGoal:
-        """The goal."""
+        """Return the goal."""
         return MultiGoal({frame: goal.build() for frame, goal in self.tips.items()})
 
 
@@ -201,7 +201,7 @@ class Region(Section):
     region: RegionEntry
 
     def build(self) -> GoalSet:
-        """The goal."""
+        """Return the goal."""
         return GoalSet([self.region.build()], self.region.free_rotation_axis, self.region.box)
 
 
@@ -231,7 +231,7 @@ GoalSection: TypeAlias = Annotated[
 
 
 def build_goal(section: GoalSection, robot: Robot) -> Goal:
-    """The goal that a section describes.
+    """Return the goal that a section describes.
 
     Raises:
         InputError: If it does not fit the robot: number of joints, name of a posture, length of a quaternion.
@@ -243,10 +243,10 @@ def build_goal(section: GoalSection, robot: Robot) -> Goal:
 
 @singledispatch
 def goal_data(goal: Goal) -> dict[str, Any]:
-    """What the ``goal:`` section of a file says about a goal; each kind has its own below.
+    """Return the content of the ``goal:`` section for a goal; each kind of goal is registered below.
 
     Raises:
-        InputError: If the format has no words for it.
+        InputError: If the format cannot express the goal.
     """
     raise InputError(f"goal: a problem file has no words for a {type(goal).__name__}")
 
@@ -281,7 +281,7 @@ def _task_region(goal: TaskRegion) -> dict[str, Any]:
 
 @goal_data.register
 def _any_of(goal: GoalSet) -> dict[str, Any]:
-    """A single pose that was given freedom is a region; of several, each is written as a task_region of its own."""
+    """Return a single pose with free directions as a region; several goals as a list, each with its freedom."""
     if len(goal.members) > 1 or goal.parts[0] is goal.members[0]:
         return {"any_of": [goal_data(part) for part in goal.parts]}
     axis = {} if goal.free_rotation_axis is None else {"free_rotation_axis": goal.free_rotation_axis}

@@ -1,4 +1,4 @@
-"""MotionBenchMaker problems: ``sceneNNNN.yaml`` (a PlanningScene) beside ``requestNNNN.yaml`` (a MotionPlanRequest)."""
+"""MotionBenchMaker problems: ``sceneNNNN.yaml`` (a PlanningScene) and ``requestNNNN.yaml`` (a MotionPlanRequest)."""
 
 from __future__ import annotations
 
@@ -27,40 +27,35 @@ from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
 
 FilePath = str | os.PathLike[str]
-DESCRIBING = ("urdf", "srdf", "joint_limits", "packages", "xacro_args")  # options of a robot's files
-SAME_BASE = 1e-9  # largest difference of two poses that are one [m, and of entries of the rotation]
+DESCRIBING = ("urdf", "srdf", "joint_limits", "packages", "xacro_args")  # options that describe a robot's files
+SAME_BASE = 1e-9  # largest difference of the entries of two poses that count as equal [m; 1]
 
 
 def load_motion_bench_maker(
     scene_path: FilePath, request_path: FilePath | None = None, robot: Robot | FilePath | None = None
 ) -> Problem:
-    """Read a scene and its request.
+    """Read a scene and its request as a problem.
 
-    The joints that the group does not move (the fingers) are held where the start state has them, else where the state
-    of the scene does; what either attaches is held by its link. Without an SRDF beside the URDF the joints of the group
-    are taken to be those of the goal. Paddings and scales of links are those of the robot; a padding counts between
-    links, too. Path constraints of joints narrow the limits of the robot, others are regions of the problem. Frames are
-    the world, links, what they hold, objects, and the fixed frames of the scene; the arm stands where the state of the
-    scene has it for what the scene says, and where the path begins for the request.
+    Joints outside the group (the fingers) are held at their values in the start state, or else in the state of the
+    scene; objects attached by either state are held by their links. If there is no SRDF beside the URDF, the joints of
+    the goal are taken as the group. Paddings and scales of links become those of the robot; a padding also counts
+    between links. Path constraints on joints narrow the limits of the robot, others become regions of the problem.
+    Frames may be the world, links, attached objects, objects, and the fixed frames of the scene. For frames of the
+    scene the arm stands as in the state of the scene, for those of the request as at the start of the path.
 
-    Which links may touch each other is the robot's own business (its SRDF); of the scene's allowed collisions those
-    with an obstacle or an attached object are used, and all of them if the robot says nothing about its links.
+    Which links may touch each other is defined by the robot (its SRDF). Of the scene's allowed collisions, those with
+    an obstacle or an attached object are used; those between links only if the robot defines none.
 
     Args:
-        scene_path: The scene, or the request: the other one stands beside it under the corresponding name.
-        request_path: The request, if it is called otherwise.
-        robot: A robot, its name, or its URDF (an SRDF of the same name beside it is used); the robot that the scene
-            names if None.
+        scene_path: The scene, or the request; the other file is beside it under the corresponding name.
+        request_path: The request, if its name does not correspond.
+        robot: A robot, its name, or its URDF (an SRDF of the same name beside it is used); None for the robot that the
+            scene names.
 
     Raises:
-        InputError: If a file cannot be used, or says something that is not read; one line with file, line, key and
-            remedy.
+        InputError: If a file cannot be used, or contains something that is not supported; one line with file, line, key
+            and remedy.
         ProblemError: If start or goal is in collision or outside the limits.
-
-    Warns:
-        SceneWarning: If something is named that is not there (a link that may be touched, an entry of the allowed
-            collisions, a joint), the robot is another one than the scene's or moves other joints than the group, or
-            links may not touch by the scene but are never compared by the robot's own list.
     """
     scene_file, request_file = _pair(Path(scene_path), None if request_path is None else Path(request_path))
     scene_document = read_yaml(scene_file)
@@ -128,7 +123,7 @@ def _arm(
     robot: Robot | FilePath | None,
     states: Mapping[str, float],
 ) -> Robot:
-    """The robot of the caller, or of the scene, with its base and its fingers where the start has them."""
+    """Return the given robot or that of the scene, with base and fingers as at the start."""
     moved = bool(request.start_state.multi_dof_joint_state.transforms)
     document, key = (request_document, "start_state") if moved else (scene_document, "robot_state")
     with document.at((key, "multi_dof_joint_state")):
@@ -149,7 +144,7 @@ def _arm(
 
 
 def _base_pose(state: RobotState) -> pin.SE3:
-    """``T_world_base`` of a state.
+    """Return ``T_world_base`` of a state.
 
     Raises:
         InputError: If it is given in another frame than the world.
@@ -166,7 +161,7 @@ def _base_pose(state: RobotState) -> pin.SE3:
 def _said_where(
     scene_document: YamlDocument, request_document: YamlDocument, scene: SceneMessage, request: RequestMessage
 ) -> Iterator[None]:
-    """Put in front of an error about a name that the robot does not have the place that asks for it."""
+    """Add file, line and key to an error about a name that the robot does not have, inside a ``with`` block."""
     try:
         yield
     except UnknownNameError as error:
@@ -192,12 +187,12 @@ def _robot(
     states: Mapping[str, float],
     base: pin.SE3,
 ) -> Robot:
-    """The robot by name or file, base and unmoved joints where the start has them.
+    """Load the robot by name or file, with base and held joints as at the start.
 
-    Without an SRDF the group is taken to be the joints of the goal, or those that move its link.
+    If there is no SRDF, the group is taken to be the joints of the goal, or those that move its link.
 
     Raises:
-        InputError: If a goal of joints, without an SRDF, leaves out one between two that it names.
+        InputError: If, without an SRDF, a goal of joints leaves out a joint between two that it names.
     """
     options: dict[str, Any] = {}
     joints = [c.joint_name for c in request.goal_constraints[0].joint_constraints]
@@ -222,16 +217,16 @@ def _robot(
     if guessed:
         _tell_held_joints(free, document, request.group_name)
 
-    held = free.movable.difference(free.joint_names)  # the start state may name joints that this robot has fixed
+    held = free.movable.difference(free.joint_names)  # the start state may name fixed joints, too
     locked = {joint: value for joint, value in states.items() if joint in held}
     return load_robot(name, locked=locked, **options)
 
 
 def _tell_held_joints(robot: Robot, document: YamlDocument, group: str) -> None:
-    """Tell of joints above those of a goal that are held, as the goal does not name them.
+    """Warn of joints above those of a goal that are held because the goal does not name them.
 
     Raises:
-        InputError: If one is between two that the goal names: the arm would be another one.
+        InputError: If one is between two that the goal names, because the arm would be a different one.
     """
     frames = robot.model.frames
     above: list[str] = []
@@ -262,7 +257,7 @@ def _tell_held_joints(robot: Robot, document: YamlDocument, group: str) -> None:
 
 
 def _refuse_another_base(robot: Robot, base: pin.SE3) -> None:
-    """Refuse a robot of the caller that stands elsewhere than the state says."""
+    """Raise an InputError if the given robot has another base pose than the state."""
     wanted = base.homogeneous
     if np.array_equal(wanted, np.eye(4)):
         return
@@ -272,7 +267,10 @@ def _refuse_another_base(robot: Robot, base: pin.SE3) -> None:
 
 
 def _another_group(robot: Robot, group: str) -> str:
-    """A line about a robot of the caller whose joints are not those of a group of its SRDF; "" if that is not known."""
+    """Return a warning if the joints of the given robot are not those of the group of its SRDF; "" if they are.
+
+    It is also "" if the group is not known.
+    """
     source = dict(robot.source)
     kind = next((key for key in ("moveit", "urdf") if key in source), "")
     if not kind or source.get("group") == group or not {"moveit", "srdf"} & source.keys():
@@ -281,7 +279,8 @@ def _another_group(robot: Robot, group: str) -> str:
     of_files = {key: source[key] for key in DESCRIBING if key in source and key != kind}
     try:
         moving = load_robot(source[kind], group=group, **of_files).joint_names
-    except InputError as error:  # its group; all else can be loaded otherwise, or the robot would not be there
+    # Only a missing group is reported: everything else could be loaded before, or there would be no robot.
+    except InputError as error:
         return str(error) if getattr(error, "name", "") == group else ""
 
     if set(moving) == set(robot.joint_names):
@@ -290,18 +289,19 @@ def _another_group(robot: Robot, group: str) -> str:
 
 
 def _held_elsewhere(robot: Robot, states: Mapping[str, float]) -> str:
-    """A line about a joint that a robot of the caller was not told to hold where the start has it; "" for none."""
+    """Return a warning if the given robot holds a joint at another value than the start; "" if it does not."""
     own = robot.source.get("locked", {})
     for joint in sorted(robot.movable.difference(robot.joint_names).intersection(states)):
         value = states[joint]
-        known = own.get(joint, value if own else 0.0)  # what follows a joint that is held there is not told by itself
+        # A joint that mimics a held one has no entry of its own.
+        known = own.get(joint, value if own else 0.0)
         if abs(value - known) > LIMIT_TOLERANCE:
             return f"joint '{joint}' is at {value:g}, and the robot that was given was not loaded with that in locked="
     return ""
 
 
 def _names_of(robot: Robot) -> set[str]:
-    """What a scene may call a robot: by its own name, or that of its file."""
+    """Return the names that a scene may use for a robot: its own name, or that of its file."""
     files = {Path(str(robot.source[kind])).stem for kind in ("urdf", "mjcf", "dh") if kind in robot.source}
     return {robot.name, str(robot.source.get("name", robot.name)), *files}
 
@@ -327,7 +327,7 @@ def _as_the_scene_says(
 
 
 def _ranges(wanted: Iterable[JointConstraint]) -> dict[str, list[float]]:
-    """What joints keep to, by name; of several constraints of one joint what all of them allow."""
+    """Return the range of each joint that satisfies all of its constraints, [lowest, highest], by name."""
     ranges: dict[str, list[float]] = {}
     for each in wanted:
         low = each.position - each.tolerance_below
@@ -338,7 +338,7 @@ def _ranges(wanted: Iterable[JointConstraint]) -> dict[str, list[float]]:
 
 
 def _tell_misspelt_joints(document: YamlDocument, request: RequestMessage, robot: Robot) -> None:
-    """Tell of names of the start state that are like those of joints which it does not name."""
+    """Warn of unknown joint names in the start state that resemble a joint without a value."""
     names = request.start_state.joint_state.name
     unnamed = robot.movable.difference(names)
     for k, name in enumerate(names):
@@ -378,7 +378,7 @@ def _goal(robot: Robot, request: RequestMessage, states: Mapping[str, float], fr
 
 
 def _refuse_unmoved(robot: Robot, wanted: JointConstraint, value: float | None, group: str) -> None:
-    """Refuse a goal of a joint that the arm does not move, unless the joint is there already."""
+    """Raise an error if a goal names a joint that the arm does not move and that is not at that value already."""
     name = wanted.joint_name
     if name not in robot.movable:
         raise UnknownNameError(f"joint of robot '{robot.name}'", name, robot.movable)

@@ -1,8 +1,8 @@
 """MoveIt's messages as MotionBenchMaker files hold them: PlanningScene, MotionPlanRequest and their parts.
 
-Every key of a message is in one of three classes: it is read; it says nothing of the problem of a path (who planned,
-for how long, colours), and is listed in ``says_nothing``; or it is refused where it holds anything. What is empty in
-ROS (nothing, no text, 0, false, and lists and groups of these) says nothing wherever it stands.
+Every key of a message belongs to one of three classes. It is read; or it has no effect on the path problem (who
+planned, for how long, colours) and is listed in ``says_nothing``; or it is refused if its value is not empty. A value
+is empty if ROS fills it in by default: nothing, no text, 0, false, and lists and groups of these.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from rrtik_ompl.files.sections import Length, Name, NotNegative, Number, Positiv
 from rrtik_ompl.model.shapes import SHAPES, Shape
 
 KNOWN = {key: kind for key, kind in sorted(SHAPES.items()) if kind.moveit}
-SHAPE_NUMBERS = {1: "box", 2: "sphere", 3: "cylinder", 4: "cone", 5: "prism"}  # of shape_msgs/SolidPrimitive
-OPERATION_NUMBERS = {0: "add", 1: "remove", 2: "append", 3: "move"}  # of moveit_msgs/CollisionObject
+SHAPE_NUMBERS = {1: "box", 2: "sphere", 3: "cylinder", 4: "cone", 5: "prism"}  # constants of shape_msgs/SolidPrimitive
+OPERATION_NUMBERS = {0: "add", 1: "remove", 2: "append", 3: "move"}  # constants of moveit_msgs/CollisionObject
 if TYPE_CHECKING:
     PrimitiveName = str
 else:
@@ -30,7 +30,7 @@ else:
 
 
 def _by_number(names: dict[int, str]) -> BeforeValidator:
-    """Take the constants of a message for the words that they stand for."""
+    """Return a validator that replaces the numeric constants of a message by their names."""
 
     def named(value: object) -> object:
         if isinstance(value, bool) or not isinstance(value, int):
@@ -41,7 +41,7 @@ def _by_number(names: dict[int, str]) -> BeforeValidator:
 
 
 def _listed(keys: str) -> BeforeValidator:
-    """Take ``{x: .., y: .., z: ..}``, as ROS prints a vector, for a list of numbers."""
+    """Return a validator that turns ``{x: .., y: .., z: ..}``, as ROS prints a vector, into a list of numbers."""
 
     def listed(value: object) -> object:
         if not isinstance(value, dict):
@@ -55,7 +55,7 @@ def _listed(keys: str) -> BeforeValidator:
 
 
 def _row(value: object) -> object:
-    """Take ``{enabled: [..]}``, as ROS writes a row of a table, for the row."""
+    """Turn ``{enabled: [..]}``, as ROS writes a row of a table, into the row."""
     return value["enabled"] if isinstance(value, dict) and set(value) == {"enabled"} else value
 
 
@@ -64,10 +64,10 @@ Quaternion = Annotated[Vector4, _listed("xyzw")]
 
 
 class Message(BaseModel):
-    """A message; a key that it does not read must be empty, or be known to say nothing of a path.
+    """A message that refuses unknown keys unless their values are empty.
 
     Attributes:
-        says_nothing: Keys that do not bear on the problem.
+        says_nothing: Keys that are ignored, because they do not affect the problem.
     """
 
     says_nothing: ClassVar[tuple[str, ...]] = ()
@@ -91,7 +91,7 @@ class Message(BaseModel):
 
 
 def is_empty(value: object) -> bool:
-    """Whether a value of a message says nothing: what ROS fills in where nobody did."""
+    """Check whether a value of a message is empty: what ROS fills in by default."""
     if isinstance(value, dict):
         return all(map(is_empty, value.values()))
     if isinstance(value, list):
@@ -107,11 +107,11 @@ class PoseMessage(Message):
 
     @property
     def given(self) -> bool:
-        """Whether anybody filled it in: a quaternion of zeros is none."""
+        """Whether the pose was filled in: a quaternion of zeros stands for none."""
         return bool(self.model_fields_set) and any(self.orientation)
 
     def build(self) -> pin.SE3:
-        """The pose as ``pinocchio.SE3``; the identity if nobody filled it in."""
+        """Return the pose as ``pinocchio.SE3``; the identity if it was not filled in."""
         return pose(self.position, self.orientation if any(self.orientation) else IDENTITY_QUATERNION)
 
 
@@ -130,7 +130,7 @@ class Primitive(Message):
     dimensions: Annotated[list[Length], Field(min_length=1, max_length=3)]
 
     def check(self) -> None:
-        """Refuse another number of dimensions.
+        """Raise an error if the number of dimensions is wrong.
 
         Raises:
             InputError: It says how many there must be.
@@ -140,10 +140,10 @@ class Primitive(Message):
             raise InputError(f"a {self.type} has {count} dimensions, found {len(self.dimensions)}")
 
     def build(self, factor: float = 1.0) -> Shape:
-        """The shape, so many times as large.
+        """Return the shape, scaled by a factor.
 
         Raises:
-            InputError: If it has another number of dimensions.
+            InputError: If the number of dimensions is wrong.
         """
         self.check()
         kind = KNOWN[self.type]
@@ -155,17 +155,17 @@ class Primitive(Message):
         return kind(**values)
 
     def _counts(self) -> dict[str, int]:
-        """How many numbers each measure has."""
+        """Return how many numbers each measure has."""
         return {m.name: 3 if m.kind == "three lengths" else 1 for m in KNOWN[self.type].measures}
 
 
 class CollisionObject(Message):
-    """One or several primitives under one name, and what is done with them."""
+    """One or several primitives under one name, and the operation on them."""
 
     says_nothing = ("type",)
 
     id: str = ""
-    header: Header = Field(default_factory=Header)  # made anew in a fifth of the time of a copy
+    header: Header = Field(default_factory=Header)  # a factory takes a fifth of the time of a copy
     pose: PoseMessage = Field(default_factory=PoseMessage)
     primitives: list[Primitive] = Field(default_factory=list)
     primitive_poses: list[PoseMessage] = Field(default_factory=list)
@@ -178,10 +178,10 @@ class CollisionObject(Message):
     operation: Annotated[Literal["add", "remove", "append", "move"], _by_number(OPERATION_NUMBERS)] = "add"
 
     def check(self) -> None:
-        """Refuse geometry that is not read, and lists of different lengths.
+        """Raise an error if geometry is not supported, or lists have different lengths.
 
         Raises:
-            InputError: If there are meshes or planes, or a shape or a subframe has no pose, or a shape has another
+            InputError: If there are meshes or planes, if a shape or a subframe has no pose, or if a shape has a wrong
                 number of dimensions.
         """
         for solid in self.primitives:
@@ -197,7 +197,7 @@ class CollisionObject(Message):
             raise InputError(f"'{self.id}' has {count}; give one pose for each")
 
     def places(self) -> list[pin.SE3]:
-        """The pose of each primitive in the frame of the object."""
+        """Return the pose of each primitive in the frame of the object."""
         return [each.build() for each in self.primitive_poses] or [pin.SE3.Identity()] * len(self.primitives)
 
 
@@ -210,10 +210,10 @@ class AllowedMatrix(Message):
     default_entry_values: list[bool] = Field(default_factory=list)
 
     def stated(self) -> dict[tuple[str, str], bool]:
-        """What the table says of pairs of names that differ, each pair once.
+        """Return the entries of the table for pairs of different names, each pair once.
 
         Raises:
-            InputError: If it is not square.
+            InputError: If the table is not square.
         """
         rows = self.entry_values
         count = len(self.entry_names)
@@ -227,10 +227,10 @@ class AllowedMatrix(Message):
         return found
 
     def defaults(self) -> dict[str, bool]:
-        """What is said of a name and all those with which the table has no entry for it.
+        """Return for each name with a default whether it may touch the names for which the table has no entry with it.
 
         Raises:
-            InputError: If there is not a value for each name.
+            InputError: If the numbers of names and values differ.
         """
         names = self.default_entry_names
         values = self.default_entry_values
@@ -275,13 +275,13 @@ class JointState(Message):
 
 
 class Transform(Message):
-    """A pose, in the words of another message."""
+    """A pose in the format of geometry_msgs/Transform."""
 
     translation: Vector = Field(default=[0.0, 0.0, 0.0])
     rotation: Quaternion = Field(default=list(IDENTITY_QUATERNION))
 
     def build(self) -> pin.SE3:
-        """The pose as ``pinocchio.SE3``; the identity if nobody filled it in."""
+        """Return the pose as ``pinocchio.SE3``; the identity if it was not filled in."""
         return pose(self.translation, self.rotation if any(self.rotation) else IDENTITY_QUATERNION)
 
 
@@ -295,7 +295,7 @@ class BaseState(Message):
 
 
 class AttachedMessage(Message):
-    """What a link holds."""
+    """An object that is attached to a link."""
 
     says_nothing = ("detach_posture", "weight")
 
@@ -305,19 +305,19 @@ class AttachedMessage(Message):
 
 
 class RobotState(Message):
-    """Joint values, the pose of the base, and what is held."""
+    """Joint values, the pose of the base, and attached objects."""
 
-    says_nothing = ("is_diff",)  # joints that are not named are where the scene has them
+    says_nothing = ("is_diff",)  # joints without a value keep that of the scene
 
     joint_state: JointState = JointState()
     multi_dof_joint_state: BaseState = BaseState()
     attached_collision_objects: list[AttachedMessage] = Field(default_factory=list)
 
     def values(self) -> dict[str, float]:
-        """Value of each joint.
+        """Return the value of each joint.
 
         Raises:
-            InputError: If there is not a position for each name.
+            InputError: If the numbers of names and positions differ.
         """
         names = self.joint_state.name
         positions = self.joint_state.position
@@ -335,14 +335,14 @@ class FixedFrame(Message):
 
 
 class LinkPadding(Message):
-    """How much thicker a link is."""
+    """The padding of a link [m]."""
 
     link_name: Name
     padding: NotNegative = 0.0
 
 
 class LinkScale(Message):
-    """How many times as large a link is."""
+    """The scale factor of a link."""
 
     link_name: Name
     scale: Positive = 1.0
@@ -363,7 +363,7 @@ class SceneMessage(Message):
 
 
 class JointConstraint(Message):
-    """The value that a joint has to have, and how far it may be from it [rad or m]."""
+    """The wanted value of a joint, and the allowed deviations from it [rad or m]."""
 
     says_nothing = ("weight",)
 
@@ -392,11 +392,11 @@ class PositionConstraint(Message):
 
     @property
     def offset(self) -> list[float]:
-        """The point, in the frame of the link [m]."""
+        """The point of the link in its frame [m], [x, y, z]."""
         return self.target_point_offset or [0.0, 0.0, 0.0]
 
     def volume(self) -> tuple[Primitive, pin.SE3]:
-        """The only primitive of the region, and where it is.
+        """Return the only primitive of the region, and its pose.
 
         Raises:
             InputError: If there is not exactly one, or it is neither a sphere nor a box.
@@ -420,21 +420,21 @@ class OrientationConstraint(Message):
     absolute_x_axis_tolerance: Positive = 1e-2
     absolute_y_axis_tolerance: Positive = 1e-2
     absolute_z_axis_tolerance: Positive = 1e-2
-    parameterization: Literal[0, 1] = 0  # angles about x, y and z in turn, or the axis times the angle
+    parameterization: Literal[0, 1] = 0  # Euler angles about x, y and z, or a rotation vector
 
     def build_rotation(self) -> Matrix:
-        """The orientation as a matrix, shape (3, 3)."""
+        """Return the orientation as a matrix, shape (3, 3)."""
         rotation: Matrix = pose([0.0, 0.0, 0.0], self.orientation).rotation
         return rotation
 
     @property
     def tolerances(self) -> tuple[float, float, float]:
-        """About the axes of the orientation [rad]."""
+        """Tolerances about the x, y and z axes of the orientation [rad]."""
         return self.absolute_x_axis_tolerance, self.absolute_y_axis_tolerance, self.absolute_z_axis_tolerance
 
 
 class Constraints(Message):
-    """What the end of the motion, or all of it, has to satisfy."""
+    """Conditions on the end of the motion, or on all of it."""
 
     says_nothing = ("name",)
 
@@ -444,7 +444,7 @@ class Constraints(Message):
 
     @property
     def links(self) -> tuple[str, ...]:
-        """Links that positions and orientations refer to."""
+        """Links that position and orientation constraints refer to."""
         places = [c.link_name for c in self.position_constraints]
         return (*places, *(c.link_name for c in self.orientation_constraints))
 
@@ -459,7 +459,7 @@ class RequestMessage(Message):
         "num_planning_attempts",
         "pipeline_id",
         "planner_id",
-        "workspace_parameters",  # of a base that drives
+        "workspace_parameters",  # only for a mobile base
     )
 
     start_state: RobotState

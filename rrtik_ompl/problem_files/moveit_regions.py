@@ -13,16 +13,18 @@ from rrtik_ompl.model.goal_kind import TaskRegion
 from rrtik_ompl.problem_files.moveit_messages import Constraints, OrientationConstraint, PositionConstraint
 from rrtik_ompl.problem_files.moveit_scene import Frames
 
-FREE = np.pi - 2e-3  # [rad] a tolerance of 3.14 leaves an axis free
-LARGEST = np.radians(80.0)  # [rad] of an angle that is bounded
-RIM = 1e-3  # [m] that a box is smaller than its message says, and its region's tolerance; at most half the least side
+FREE = np.pi - 2e-3  # [rad] from this tolerance on an axis is free, so that 3.14 is enough
+LARGEST = np.radians(80.0)  # [rad] greatest tolerance of an axis that is not free
+# [m] A box becomes smaller by this rim, which is the tolerance of its region. The rim is at most half the least half
+# side.
+RIM = 1e-3
 
 
 def tip_goal(wanted: Constraints, frames: Frames) -> Goal:
-    """The goal of one link: a position, and an orientation if there is one.
+    """Return the goal of one link: a position, and an orientation if there is one.
 
     Raises:
-        InputError: If there is no position or more than one, a frame is unknown, or what is asked for is no region.
+        InputError: If there is not exactly one position, a frame is unknown, or the constraints are not supported.
     """
     if len(wanted.position_constraints) != 1 or len(wanted.orientation_constraints) > 1 or wanted.joint_constraints:
         raise InputError("goal: give joint_constraints, or one position and at most one orientation constraint")
@@ -47,10 +49,10 @@ def tip_goal(wanted: Constraints, frames: Frames) -> Goal:
 
 
 def held_regions_of(wanted: Constraints, frames: Frames) -> list[TaskRegion]:
-    """The regions of a path, one for each position and each orientation.
+    """Return the regions of path constraints, one for each position and each orientation constraint.
 
     Raises:
-        InputError: If a frame is unknown or moves with the arm, or what is asked for is no region.
+        InputError: If a frame is unknown or moves with the arm, or the constraints are not supported.
     """
     headers = [each.header for each in wanted.position_constraints]
     for header in [*headers, *(each.header for each in wanted.orientation_constraints)]:
@@ -79,7 +81,7 @@ def held_regions_of(wanted: Constraints, frames: Frames) -> list[TaskRegion]:
 
 
 def _goal_region(place: PositionConstraint, turn: OrientationConstraint | None, frames: Frames) -> TaskRegion:
-    """A goal that needs a region: a box, a point beside the link's origin, or an axis that is free."""
+    """Return a goal that needs a region: a box, a point off the link's origin, or a free axis."""
     box = _placed(place, frames)
     bounds, tolerance = _sides(place)
     offset = -np.array(place.offset)
@@ -92,7 +94,7 @@ def _goal_region(place: PositionConstraint, turn: OrientationConstraint | None, 
         raise InputError("goal: a target_point_offset together with an orientation is not read; give the link's origin")
     R = _oriented(turn, frames)
 
-    if not bounds.any():  # a ball has no axes: those of the orientation will do
+    if not bounds.any():  # a sphere has no axes, so those of the orientation are used
         T_world_w = pin.SE3(R, box.translation)
         return TaskRegion(T_world_w, _bounds(bounds, ranges), pin.SE3.Identity(), tolerance, angle)
 
@@ -104,18 +106,18 @@ def _goal_region(place: PositionConstraint, turn: OrientationConstraint | None, 
 
 
 def _placed(place: PositionConstraint, frames: Frames) -> pin.SE3:
-    """The frame of the volume of a position, in the world."""
+    """Return the pose of the volume of a position constraint in the world."""
     return frames.pose(place.header.frame_id) * place.volume()[1]
 
 
 def _oriented(turn: OrientationConstraint, frames: Frames) -> Matrix:
-    """The orientation that is wanted, in the world, shape (3, 3)."""
+    """Return the wanted orientation in the world, shape (3, 3)."""
     rotation: Matrix = frames.pose(turn.header.frame_id).rotation @ turn.build_rotation()
     return rotation
 
 
 def _sides(place: PositionConstraint) -> tuple[Matrix, float]:
-    """Bounds of a position in the frame of its volume, shape (3, 2) [m], and its tolerance [m]."""
+    """Return bounds of a position in the frame of its volume, shape (3, 2) [m], and its tolerance [m]."""
     solid, _ = place.volume()
     if solid.type == "sphere":
         return np.zeros((3, 2)), solid.dimensions[0]
@@ -125,16 +127,20 @@ def _sides(place: PositionConstraint) -> tuple[Matrix, float]:
 
 
 def _bounds(place: Matrix, angles: Matrix | None) -> Matrix:
-    """Bounds of a region, shape (6, 2); all angles are free if there are none."""
+    """Return bounds of a region, shape (6, 2), from those of position and angles; all angles are free if None."""
     free = np.outer([np.pi] * 3, [-1.0, 1.0])
     return np.vstack([place, free if angles is None else angles])
 
 
 def _angles(turn: OrientationConstraint, *, ranged: bool = False) -> tuple[Matrix | None, float]:
-    """Ranges of roll, pitch and yaw, shape (3, 2), and the angle [rad] within which the frame is near to one of them.
+    """Return ranges of roll, pitch and yaw, and the tolerance of the orientation.
 
-    One axis whose tolerance is pi or more is free: the frame may turn about it. Where the tolerance of x or z is larger
-    than both others, and if ``ranged``, the frame may turn about that axis by what is left of it. None: all are free.
+    One axis whose tolerance is pi or more is free: the frame may turn about it. With ``ranged``, if the tolerance of x
+    or z is larger than both others, the frame may turn about that axis by the difference.
+
+    Returns:
+        Ranges, shape (3, 2) [rad], or None if all angles are free; and the angle within which the frame must be near
+        one of the orientations in the ranges [rad].
     """
     tolerances = np.array(turn.tolerances)
     free = tolerances >= FREE
@@ -147,7 +153,7 @@ def _angles(turn: OrientationConstraint, *, ranged: bool = False) -> tuple[Matri
     widest = int(np.argmax(tolerances))
     others = float(np.delete(tolerances, widest).min())
 
-    # an angle about an axis, as a vector, is longer than the tilt of the frame by up to pi / 2
+    # The length of a rotation vector can exceed the tilt of the frame by a factor of up to pi / 2.
     least = others if turn.parameterization == 0 else others / (0.5 * np.pi)
     least = min(least, LARGEST)
 
@@ -156,6 +162,7 @@ def _angles(turn: OrientationConstraint, *, ranged: bool = False) -> tuple[Matri
     elif ranged and widest != 1 and turn.parameterization == 0 and tolerances[widest] > 2.0 * least:
         ranges[widest] = (tolerances[widest] - least) * np.array([-1.0, 1.0])
     else:
-        least = min(others, LARGEST)  # the angle itself bounds all three, in either form
+        # The angle of the rotation bounds its components in both parameterizations.
+        least = min(others, LARGEST)
 
     return ranges, least

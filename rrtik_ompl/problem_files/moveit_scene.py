@@ -1,6 +1,6 @@
-"""The scene of MoveIt's messages: objects added, changed and taken away in turn, what links hold, what may touch.
+"""The scene of MoveIt's messages: objects that are added, changed and removed in order, attached objects, contacts.
 
-Objects, links and fixed frames are frames that other messages name (:class:`Frames`).
+Objects, links and fixed frames are frames that other messages may refer to (:class:`Frames`).
 """
 
 from __future__ import annotations
@@ -34,14 +34,14 @@ from rrtik_ompl.problem_files.moveit_messages import (
     SceneMessage,
 )
 
-OCTOMAP = "<octomap>"  # MoveIt's name for it
-SHOWN = 3  # pairs in a warning
-WORLD = "world"  # the frame of this name, or of none
+OCTOMAP = "<octomap>"  # MoveIt's name for the map
+SHOWN = 3  # names or pairs shown in a warning
+WORLD = "world"  # name of the world frame; an empty name stands for it, too
 
 
 @dataclass
 class _Object:
-    """An object: where it is in the world, its shapes and where they are in it, and frames in it."""
+    """An object: its pose in the world, its shapes with their poses in it, and the poses of its subframes in it."""
 
     pose: pin.SE3
     shapes: list[tuple[Primitive, pin.SE3]] = field(default_factory=list)
@@ -49,11 +49,11 @@ class _Object:
 
 
 class SceneReader:
-    """What the messages of one problem say of its scene.
+    """Builds the scene from the messages of one problem.
 
     Args:
         robot: The arm, padded as the scene says.
-        frames: Learns the frames of the objects.
+        frames: The known frames; frames of objects are added to it.
         message: The scene.
     """
 
@@ -84,7 +84,7 @@ class SceneReader:
         return self._frames
 
     def hold(self, document: YamlDocument, location: Location, state: RobotState) -> None:
-        """Read what a state attaches to links; one of the name of an earlier one takes its place.
+        """Read the objects that a state attaches to links; one with the name of an earlier one replaces it.
 
         Raises:
             InputError: If one of them cannot be read; with file, line and key.
@@ -100,10 +100,10 @@ class SceneReader:
                     tell(document, (*place, "touch_links", j), line)
 
     def scene(self, document: YamlDocument) -> Scene:
-        """The scene.
+        """Return the scene.
 
         Raises:
-            InputError: If names are used twice, or the table of allowed collisions is none.
+            InputError: If a name is used twice, or the table of allowed collisions is malformed.
         """
         names: dict[str, list[str]] = {}
 
@@ -141,7 +141,7 @@ class SceneReader:
             return Scene(scene.obstacles, scene.attached, allowed)
 
     def _do(self, item: CollisionObject) -> None:
-        """Do with an object what its message says."""
+        """Carry out the operation of an object's message."""
         if item.operation == "remove":
             for name in [item.id] if item.id else list(self._objects):
                 self._objects.pop(name, None)
@@ -170,7 +170,7 @@ class SceneReader:
         self._frames.add(item.id, _frame_of(item, placed), placed.parts)
 
     def _move(self, item: CollisionObject, known: _Object) -> None:
-        """Bring an object, or each of its shapes, to another place."""
+        """Move an object, or each of its shapes, to another pose, in place."""
         header = self._frames.pose(item.header.frame_id)
         if item.pose.given:
             known.pose = header * item.pose.build()
@@ -182,13 +182,13 @@ class SceneReader:
             raise InputError(f"'{item.id}': to move it, give its pose, or a pose for each of its primitives")
 
     def _built(self, item: CollisionObject) -> _Object:
-        """An object as its message says."""
+        """Return the object that a message describes."""
         pose = self._frames.pose(item.header.frame_id) * item.pose.build()
         parts = dict(zip(item.subframe_names, [each.build() for each in item.subframe_poses], strict=True))
         return _Object(pose, list(zip(item.primitives, item.places(), strict=True)), parts)
 
     def _attach(self, item: AttachedMessage) -> None:
-        """Give an object to a link: one of the message, or one of the world that it names."""
+        """Attach an object to a link: the one in the message, or the one in the world that it names."""
         _named(item.object)
         item.object.check()
         if item.object.operation != "add":
@@ -221,12 +221,12 @@ class SceneReader:
 
 
 def tell(document: YamlDocument, location: Location, line: str) -> None:
-    """Warn of something that stands at a location of a message and is not in the problem."""
+    """Warn of something at a location of a message that does not become part of the problem."""
     warnings.warn(SceneWarning(f"{document.place(location)}: {line}"), stacklevel=3)
 
 
 def passed_over(matrix: AllowedMatrix, robot: Robot) -> str:
-    """A line about links that may not touch by a scene and that the robot never compares; "" for none."""
+    """Return a warning about links that the scene does not allow to touch but the robot never compares; "" for none."""
     never = robot.allowed_collisions
     pairs = [pair for pair, free in matrix.stated().items() if not free and frozenset(pair) in never]
     if not pairs:
@@ -244,21 +244,24 @@ def _named(item: CollisionObject) -> None:
 
 
 def _numbered(name: str, count: int) -> list[str]:
-    """Names of the parts of an object: ``id``, then ``id_2``, ``id_3``..."""
+    """Return the names of the parts of an object: ``id``, then ``id_2``, ``id_3``..."""
     return [name if k == 0 else f"{name}_{k + 1}" for k in range(count)]
 
 
 def _frame_of(item: CollisionObject, placed: _Object) -> pin.SE3:
-    """The frame by which others refer to an object: that of its only shape where it has no pose of its own."""
+    """Return the frame by which others refer to an object, in the world.
+
+    An object without a pose of its own and with a single shape has the frame of this shape.
+    """
     alone = len(placed.shapes) == 1 and not item.pose.given
     return placed.pose * placed.shapes[0][1] if alone else placed.pose
 
 
 def _mapped(placed: PlacedOctomap, frames: Frames) -> Obstacle | None:
-    """The occupied cells of a map; None if there is none.
+    """Return the occupied cells of a map as an obstacle; None if there is no map.
 
     Raises:
-        InputError: If it is not a binary one, or its data are none.
+        InputError: If the map is not binary, or its data are malformed.
     """
     if not placed.octomap.data:
         return None
@@ -275,7 +278,7 @@ def _mapped(placed: PlacedOctomap, frames: Frames) -> Obstacle | None:
 
 
 def _allowed(matrix: AllowedMatrix, robot: Robot, names: dict[str, list[str]]) -> tuple[tuple[str, str], ...]:
-    """Pairs of links and solids that may touch: by the table, or else by what is said of one name and all others."""
+    """Return the pairs of links and solids that may touch, by the table or else by the defaults of names."""
     links = robot.link_names
     stated = matrix.stated()
     allowed = [pair for pair, free in stated.items() if free and {*pair} <= {*links, *names}]
@@ -290,7 +293,10 @@ def _allowed(matrix: AllowedMatrix, robot: Robot, names: dict[str, list[str]]) -
 
 
 def _by_default(matrix: AllowedMatrix, every: list[str]) -> list[tuple[str, str]]:
-    """Pairs that may touch by what is said of one of them, or of both, and of which the table says nothing."""
+    """Return the pairs without an entry in the table that may touch by the defaults of their names.
+
+    If both names have a default, both must allow it.
+    """
     defaults = matrix.defaults()
     stated = {frozenset(pair) for pair in matrix.stated()}
     found = []
@@ -302,15 +308,15 @@ def _by_default(matrix: AllowedMatrix, every: list[str]) -> list[tuple[str, str]
 
 
 def _unknown_entries(matrix: AllowedMatrix, known: Collection[str]) -> Iterator[tuple[str, Location]]:
-    """Names of a matrix that nothing has, and that would decide something, and where they stand.
+    """Yield the names of a table that nothing has although their entries would have an effect, and their locations.
 
-    Tables are often of a robot with more links, and of things that are gone. A name is therefore taken for no slip of
-    the pen if the one that is most like it stands in the same list.
+    Tables often belong to a robot with more links, or name objects that are gone. A name is therefore not reported as a
+    misspelling if the known name most similar to it is in the same list.
     """
     stated = matrix.stated()
     defaults = matrix.defaults()
     free = {name for pair, allowed in stated.items() if allowed for name in pair}
-    overrides = any(defaults.values())  # so that pairs that may not touch count, too
+    overrides = any(defaults.values())  # then entries that forbid a contact have an effect, too
     lists: dict[str, tuple[Sequence[str], Collection[str]]] = {
         "entry_names": (matrix.entry_names, matrix.entry_names if overrides else free),
         "default_entry_names": (matrix.default_entry_names, [name for name, allowed in defaults.items() if allowed]),
@@ -325,7 +331,7 @@ def _unknown_entries(matrix: AllowedMatrix, known: Collection[str]) -> Iterator[
 
 
 class _Carried(NamedTuple):
-    """A frame: the link that carries it, "" for none, and T_link_frame."""
+    """A frame: the link that carries it ("" for none), and T_link_frame."""
 
     link: str
     pose: pin.SE3
@@ -335,17 +341,17 @@ _STANDING = _Carried("", pin.SE3.Identity())
 
 
 class Frames:
-    """Poses of named frames in the world, while the arm stands somewhere.
+    """Poses of named frames in the world, at one configuration of the arm.
 
-    A frame is carried by a link, or stands still. An empty name is the world.
+    A frame is carried by a link or fixed in the world. An empty name stands for the world.
 
     Args:
         robot: The arm.
         q: Its configuration, shape (dof,).
-        fixed: Frames of the scene that stand still in others, in any order.
+        fixed: Frames of the scene that are fixed in other frames, in any order.
 
     Raises:
-        InputError: If fixed frames stand in each other.
+        InputError: If fixed frames refer to each other in a circle.
     """
 
     def __init__(self, robot: Robot, q: Vector, fixed: Iterable[FixedFrame]) -> None:
@@ -355,21 +361,23 @@ class Frames:
 
         for each in self._parents_first(fixed):
             parent = _bare(each.header.frame_id)
-            if not self._has(parent):  # the frame in which all others are given is the world by another name
+            # An unknown parent frame is taken as another name of the world.
+            if not self._has(parent):
                 self._known[parent] = _STANDING
             self.add(_bare(each.child_frame_id), self.pose(parent) * each.transform.build(), link=self.link(parent))
 
-        if not self._has(robot.name):  # some files give coordinates in a frame of the robot's name
+        # Some files give coordinates in a frame with the name of the robot.
+        if not self._has(robot.name):
             self._known[robot.name] = _STANDING
 
     def moved_to(self, q: Vector) -> Frames:
-        """The same frames while the arm stands at another configuration, shape (dof,)."""
+        """Return the same frames at another configuration of the arm, shape (dof,)."""
         moved = Frames(self._robot, q, ())
         moved._known = dict(self._known)
         return moved
 
     def pose(self, name: str) -> pin.SE3:
-        """``T_world_frame`` of a frame.
+        """Return ``T_world_frame`` of a frame.
 
         Raises:
             UnknownNameError: If there is no such frame.
@@ -384,24 +392,24 @@ class Frames:
         return self._link_pose(name)
 
     def link(self, name: str) -> str:
-        """The link that carries a frame; "" for one that stands still."""
+        """Return the link that carries a frame; "" for a frame that is fixed in the world."""
         name = _bare(name)
         return self._known[name].link if name in self._known else name
 
     def moves(self, name: str) -> bool:
-        """Whether a frame moves with the arm."""
+        """Check whether a frame moves with the arm."""
         link = self.link(name)
         model = self._robot.model
         return bool(link and model.existFrame(link) and model.frames[model.getFrameId(link)].parentJoint > 0)
 
     def add(self, name: str, pose: pin.SE3, parts: Mapping[str, pin.SE3] | None = None, *, link: str = "") -> None:
-        """Know a frame from now on, and frames in it, by their poses in it (``name/part``).
+        """Add a frame, and frames in it under the names ``name/part``.
 
         Args:
-            name: Of the frame.
+            name: Name of the frame.
             pose: T_world_frame.
             parts: T_frame_part, by name.
-            link: That carries it; "" if it stands still.
+            link: The link that carries it; "" if it is fixed in the world.
         """
         T_link_frame = self._link_pose(link).actInv(pose)
         placed = {name: T_link_frame} | {
@@ -410,7 +418,7 @@ class Frames:
         self._known |= {each: _Carried(link, place) for each, place in placed.items()}
 
     def forget(self, name: str) -> None:
-        """Know a frame and those in it no longer."""
+        """Remove a frame and the frames in it."""
         for each in [each for each in self._known if each == name or each.startswith(f"{name}/")]:
             del self._known[each]
 
@@ -421,7 +429,7 @@ class Frames:
         return self._robot.fk(self._q, link) if link else pin.SE3.Identity()
 
     def _parents_first(self, fixed: Iterable[FixedFrame]) -> Iterator[FixedFrame]:
-        """Fixed frames, each after the one in which it stands."""
+        """Yield fixed frames, each after the frame that it is fixed in."""
         left = list(fixed)
         while left:
             children = {_bare(each.child_frame_id) for each in left}

@@ -1,4 +1,4 @@
-"""The ``path_constraints:`` section of a problem file <-> task-space regions that are held along a path."""
+"""Conversion between the ``path_constraints:`` section of a problem file and task-space regions along a path."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Upright(Constraint):
     upright: UprightEntry
 
     def build(self, robot: Robot) -> TaskRegion:
-        """The constraint."""
+        """Return the constraint."""
         entry = self.upright
         return upright(
             robot,
@@ -66,7 +66,7 @@ class OnPlane(Constraint):
     on_plane: OnPlaneEntry
 
     def build(self, robot: Robot) -> TaskRegion:
-        """The constraint."""
+        """Return the constraint."""
         del robot
         entry = self.on_plane
         amounts = {"tolerance": entry.tolerance, "allowance": entry.allowance}
@@ -88,7 +88,7 @@ class OnLine(Constraint):
     on_line: OnLineEntry
 
     def build(self, robot: Robot) -> TaskRegion:
-        """The constraint."""
+        """Return the constraint."""
         del robot
         entry = self.on_line
         amounts = {"tolerance": entry.tolerance, "allowance": entry.allowance}
@@ -112,7 +112,7 @@ class OrientationOf(Constraint):
     orientation_of: OrientationEntry
 
     def build(self, robot: Robot) -> TaskRegion:
-        """The constraint."""
+        """Return the constraint."""
         del robot
         entry = self.orientation_of
         if entry.tolerance_deg is not None and entry.tolerances_deg is not None:
@@ -136,7 +136,7 @@ class Inside(Constraint):
     inside: InsideEntry
 
     def build(self, robot: Robot) -> TaskRegion:
-        """The constraint."""
+        """Return the constraint."""
         del robot
         entry = self.inside
         amounts = {"tolerance": entry.tolerance, "allowance": entry.allowance}
@@ -156,7 +156,7 @@ class InTaskRegion(Constraint):
     task_region: HeldRegionEntry
 
     def build(self, robot: Robot) -> TaskRegion:
-        """The constraint."""
+        """Return the constraint."""
         del robot
         entry = self.task_region
         return replace(
@@ -183,10 +183,10 @@ ConstraintSection: TypeAlias = Annotated[
 def build_constraints(
     document: YamlDocument, sections: Iterable[ConstraintSection], robot: Robot
 ) -> tuple[TaskRegion, ...]:
-    """The constraints that a file describes.
+    """Return the constraints that a file describes.
 
     Raises:
-        InputError: If one makes no sense; with file, line and key.
+        InputError: If one of them is invalid; with file, line and key.
     """
     built = []
     for number, section in enumerate(sections):
@@ -196,10 +196,11 @@ def build_constraints(
 
 
 def constraint_data(region: TaskRegion) -> dict[str, Any]:
-    """What the ``path_constraints:`` section of a file says about one of them.
+    """Return the content of an entry of the ``path_constraints:`` section.
 
     Raises:
-        InputError: If it is ``from_start`` and none that :func:`upright` makes: the format has no words for it.
+        InputError: If the region is ``from_start`` but not one of :func:`upright`, because the format cannot express
+            it.
     """
     data = _upright_data(region) if region.from_start else _region_data(region)
     return data if region.frame is None else {**data, "frame": region.frame}

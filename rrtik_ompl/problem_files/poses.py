@@ -1,4 +1,4 @@
-"""Rows of poses or points of the tip in a file: CSV with named columns, or JSON (YAML) with ``poses`` or ``points``."""
+"""Files with poses or points of the tip: CSV with named columns, or JSON (YAML) with ``poses`` or ``points``."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class PosesFile(Section):
 
 
 def load_poses(path: str | os.PathLike[str]) -> NDArray[np.float64]:
-    """Poses T_world_tip, shape (m, 4, 4), or points, shape (m, 3), as the file has it; m is at least 1.
+    """Read a file of poses T_world_tip, shape (m, 4, 4), or of points [m], shape (m, 3); m is at least 1.
 
     Raises:
         InputError: If the file cannot be used; one line with file, line, what was found and the remedy.

@@ -1,6 +1,6 @@
-"""Problem files (YAML, ``version: 1``) <-> `Problem`: what a file says, once a world has been asked about it.
+"""Conversion between problem files (YAML, ``version: 1``) and `Problem`, with start and goal checked by a world.
 
-A MotionBenchMaker file (scene or request) is recognised by its keys and read as well.
+A MotionBenchMaker file (scene or request) is recognised by its keys and can be read, too.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ def load_problem(
 
     Args:
         name_or_file: A name without ending and folder, or a path.
-        robot: Plan for this robot (or its name, or its URDF) in place of the one that the file names.
+        robot: A robot (or its name, or its URDF) to be used in place of the one that the file names.
         trust_xacro: Whether the macros of a robot's file are trusted, see `load_robot`.
 
     Raises:
@@ -83,17 +83,18 @@ def _problem(name_or_file: FilePath, robot: Robot | FilePath | None) -> Problem:
 
 
 def _is_motion_bench_maker(data: Mapping[str, Any]) -> bool:
-    """Whether the top level of a YAML file has the keys of a PlanningScene or of a MotionPlanRequest."""
+    """Check whether the top level of a YAML file has the keys of a PlanningScene or a MotionPlanRequest."""
     return "version" not in data and any(key in data for key in ("robot_model_name", "goal_constraints"))
 
 
 def save_problem(problem: Problem, path: FilePath) -> None:
-    """Write a problem as YAML, whole or not at all; numbers read back bit for bit, rotations to the last digit or two.
+    """Write a problem as YAML; if writing fails, no incomplete file is left.
 
-    Angles are written in radians. Files (meshes, URDF) are named relative to the new file's folder.
+    Numbers are read back bit for bit, rotations to the last digit or two. Angles are written in radians. Files (meshes,
+    URDF) are named relative to the new file's folder.
 
     Raises:
-        InputError: If the file cannot be written, or the format has no words for something in the problem.
+        InputError: If the file cannot be written, or the format cannot express a part of the problem.
 
     Example:
         >>> rrtik.save_problem(rrtik.load_problem("planar3_boxes"), "boxes.yaml")
@@ -105,10 +106,10 @@ def save_problem(problem: Problem, path: FilePath) -> None:
 
 
 def problem_data(problem: Problem, folder: Path) -> dict[str, Any]:
-    """What the file of a problem in a folder holds.
+    """Return the content of a problem file in a folder.
 
     Raises:
-        InputError: If the format has no words for something in the problem.
+        InputError: If the format cannot express a part of the problem.
     """
     settings = problem.settings
     data: dict[str, Any] = {"version": 1, "robot": robot_data(settings.robot.source, folder)}

@@ -1,4 +1,4 @@
-"""What a problem file says, as values: settings of a world, start, goal; nothing is asked of a world."""
+"""Values of a problem file, read without a world: settings of the world, start and goal."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ from rrtik_ompl.problem_files.run import RunSection
 from rrtik_ompl.problem_files.scene import SceneEntry
 
 FilePath = str | os.PathLike[str]
-ONLY_PATHS = (".csv", ".txt")  # endings; a .json may be either
+ONLY_PATHS = (".csv", ".txt")  # endings of path files; a .json may be a path or a problem
 NO_GOAL = "it has stages and no goal"
 OF_TASKS = {"task": NO_GOAL, "goals": "it has several goals, to be reached in order"}  # by keys
-OF_PATHS = ("waypoints", "points")  # keys of files of paths and of trajectories
-ELSEWHERE = ("robot", "scene", "constraints")  # settings that have sections of their own
-TYPES = {  # of keys, by the types of settings
+OF_PATHS = ("waypoints", "points")  # keys of path and trajectory files
+ELSEWHERE = ("robot", "scene", "constraints")  # settings that have sections of their own in a file
+TYPES = {  # types of keys, by the types of settings
     "float": NotNegative,
     "float | None": NotNegative | None,
     "bool": StrictBool,
@@ -42,7 +42,7 @@ TYPES = {  # of keys, by the types of settings
 
 
 def _key(setting: Setting[Any]) -> tuple[Any, Any]:
-    """Type and default of the key of a setting, for pydantic."""
+    """Return type and default of the key of a setting, for pydantic."""
     least = setting.metadata["least"]
     if least > 0.0:
         return Positive, Field(setting.default, ge=least, description=setting.metadata["key"])
@@ -53,10 +53,10 @@ class _WorldKeys(Section):
     """How a world checks. Lengths in metres."""
 
     def settings(self, robot: Robot, scene: Scene) -> WorldSettings:
-        """Of the world of a robot in a scene.
+        """Return the settings of the world of a robot in a scene.
 
         Raises:
-            InputError: If the robot is none that a world can be made of.
+            InputError: If no world can be made of the robot.
         """
         return WorldSettings(robot, scene, **{each.name: getattr(self, each.name) for each in SETTINGS_IN_FILES})
 
@@ -83,10 +83,13 @@ class ProblemFile(WorldKeys):
 
 
 def load_unchecked(name_or_file: FilePath) -> tuple[WorldSettings, Vector, Goal]:
-    """What a problem file says, as values: settings of the world, start and goal. No world is asked about them.
+    """Read a problem file as values, without making a world that checks them.
+
+    Returns:
+        Settings of the world, the start, shape (dof,), and the goal.
 
     Raises:
-        InputError: As for :func:`load_problem`, but for what only a world can say.
+        InputError: As for :func:`load_problem`, except for faults that only a world can find.
     """
     document = problem_document(problem_path(name_or_file))
     entry = parse(document, ProblemFile)
@@ -95,7 +98,7 @@ def load_unchecked(name_or_file: FilePath) -> tuple[WorldSettings, Vector, Goal]
 
 
 def problem_document(path: Path) -> YamlDocument:
-    """The content of a problem file; whoever names a path alone is told what is missing."""
+    """Read the content of a problem file; for files of paths or tasks, raise an error that names the right command."""
     document = None if path.suffix.lower() in ONLY_PATHS and os.path.isfile(path) else read_yaml(path)
     if document is None or (isinstance(document.data, dict) and not document.data.keys().isdisjoint(OF_PATHS)):
         name = path.name
@@ -109,7 +112,7 @@ def problem_document(path: Path) -> YamlDocument:
 
 
 def problem_path(name_or_file: FilePath) -> Path:
-    """The file of a problem: a bare word is the name of a shipped one, or a file if there is no such name.
+    """Return the file of a problem: a bare word is the name of a shipped problem, or else of a file.
 
     Raises:
         UnknownNameError: If it is a bare word, and neither.
@@ -129,7 +132,7 @@ def problem_path(name_or_file: FilePath) -> Path:
 
 
 def ends_of(document: YamlDocument, entry: ProblemFile, robot: Robot) -> tuple[Vector, Goal]:
-    """Start, shape (dof,), and goal."""
+    """Return the start, shape (dof,), and the goal."""
     with document.at(("start",)):
         start = entry.start.configuration(robot)
     with document.at(("goal",)):
@@ -137,7 +140,7 @@ def ends_of(document: YamlDocument, entry: ProblemFile, robot: Robot) -> tuple[V
 
 
 def settings_of(document: YamlDocument, entry: ProblemFile, robot: Robot | FilePath | None) -> WorldSettings:
-    """The settings of its world: of the robot that it names, or of another one."""
+    """Return the settings of the world, with the robot that the file names or the given one."""
     if robot is None:
         with document.at(("robot",)):
             robot = robot_from_entry(document.data["robot"], document.path.parent)
@@ -149,7 +152,7 @@ def settings_of(document: YamlDocument, entry: ProblemFile, robot: Robot | FileP
 
 
 def planner_of(document: YamlDocument, name: str | None) -> str | None:
-    """The name of a planner, if there is such a planner."""
+    """Return the name of a planner, or None, after a check that there is such a planner."""
     if name is not None and name.lower() not in list_planners():
         from rrtik_ompl.ompl_bridge.planner_names import (
             is_planner_file,  # loads OMPL, which few files need
@@ -164,16 +167,16 @@ def planner_of(document: YamlDocument, name: str | None) -> str | None:
 
 
 def problem_schema() -> dict[str, Any]:
-    """JSON schema of the problem file, made from the same models that check it."""
+    """Return the JSON schema of the problem file, made from the models that check it."""
     schema = without_null(ProblemFile.model_json_schema())
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
 
 
 def world_data(settings: WorldSettings) -> dict[str, Any]:
-    """What the keys of a file say about settings: those that are not the default, and the motion resolution.
+    """Return the keys of a file for settings: those that are not the default, and the motion resolution.
 
     Raises:
-        InputError: If the format has no word for one of them.
+        InputError: If the format cannot express one of them.
     """
     data: dict[str, Any] = {"motion_resolution": settings.motion_resolution}
     for each in fields(settings):

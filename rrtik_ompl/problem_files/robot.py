@@ -1,4 +1,4 @@
-"""The ``robot:`` entry of a problem file: what it may say. `catalog.robot_from_entry` turns it into a robot."""
+"""The ``robot:`` entry of a problem file and its keys. `catalog.robot_from_entry` turns it into a robot."""
 
 from __future__ import annotations
 
@@ -146,7 +146,7 @@ RobotEntry: TypeAlias = Annotated[
 
 
 def robot_data(source: Mapping[str, Any], folder: Path) -> dict[str, Any] | str:
-    """What the ``robot:`` entry of a file in ``folder`` says about a robot with this source; paths made relative."""
+    """Return the ``robot:`` entry for a robot with this source, in a file in ``folder``; paths become relative."""
     data: dict[str, Any] = {}
     for key, value in source.items():
         if isinstance(value, pin.SE3):

@@ -30,7 +30,7 @@ class GoalWaypoint(Section):
         return self
 
     def configuration(self, robot: Robot) -> Vector:
-        """Shape (dof,), rad or m.
+        """Return the configuration, shape (dof,) [rad or m].
 
         Raises:
             InputError: If it has the wrong number of joints or is outside the limits.
@@ -72,10 +72,10 @@ class RunSection(Section):
         return data
 
     def goal_motion(self, robot: Robot) -> GoalMotion | None:
-        """The motion of the goal, or None if it does not move.
+        """Return the motion of the goal, or None if it does not move.
 
         Raises:
-            InputError: If times go backwards, or a row has the wrong number of joints or is outside the limits.
+            InputError: If times do not increase, or a row has the wrong number of joints or is outside the limits.
         """
         if self.goal is None:
             return None
@@ -84,7 +84,14 @@ class RunSection(Section):
 
 
 class GoalMotion:
-    """A goal that moves in straight lines between configurations; at rest before and after."""
+    """A goal that moves in straight lines between configurations, and rests before and after.
+
+    Calling it returns the goal configuration at a time.
+
+    Args:
+        times: Increasing times of the configurations [s], shape (k,).
+        rows: Configurations, shape (k, n).
+    """
 
     def __init__(self, times: Vector, rows: Matrix) -> None:
         if (np.diff(times) <= 0.0).any():
@@ -93,5 +100,5 @@ class GoalMotion:
         self._rows = frozen(rows)
 
     def __call__(self, time: float) -> Vector:
-        """The configuration at ``time`` [s], shape (n,)."""
+        """Return the configuration at ``time`` [s], shape (n,)."""
         return np.array([np.interp(time, self._times, column) for column in self._rows.T])

@@ -1,4 +1,4 @@
-"""The ``scene:`` section of our YAML files <-> `Scene`: obstacles, attached objects, allowed collisions."""
+"""Conversion between the ``scene:`` section of YAML files and `Scene`: obstacles, attached objects, contacts."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class PoseEntry(Section):
         return self
 
     def build(self) -> pin.SE3:
-        """The pose as ``pinocchio.SE3``."""
+        """Return the pose as ``pinocchio.SE3``."""
         if self.rpy_deg is not None:
             return pose_from_rpy(self.xyz, np.radians(self.rpy_deg))
         return pose(self.xyz) if self.quat_xyzw is None else pose(self.xyz, self.quat_xyzw)
@@ -70,7 +70,7 @@ class MotionEntry(Section):
         return self
 
     def build(self) -> Motion:
-        """The motion."""
+        """Return the motion."""
         if self.velocity is not None:
             return ConstantVelocity(self.velocity)
         stations = self.waypoints or []
@@ -83,7 +83,7 @@ class SolidEntry(ShapeEntry):
     pose: PoseEntry | None = None
 
     def build_pose(self) -> pin.SE3:
-        """The pose; identity if none is given."""
+        """Return the pose; the identity if none is given."""
         return pin.SE3.Identity() if self.pose is None else self.pose.build()
 
 
@@ -94,11 +94,13 @@ class ObstacleEntry(SolidEntry, json_schema_extra=ONE_SHAPE):
     margin: NotNegative | None = Field(None, description="[m] that the arm keeps from it; that of the scene if absent")
 
     def build(self, folder: Path, margin: float = 0.0) -> Obstacle:
-        """The obstacle. One that moves through waypoints and has no pose of its own stands where it is at time 0.
+        """Return the obstacle.
+
+        An obstacle that moves through waypoints and has no pose of its own gets its pose at time 0.
 
         Args:
-            folder: Where meshes are looked for.
-            margin: That of an obstacle that states none [m].
+            folder: Folder in which meshes are looked for.
+            margin: Margin of an obstacle that states none [m].
         """
         motion = None if self.motion is None else self.motion.build()
         place = self.build_pose()
@@ -136,7 +138,7 @@ class ContactEntry(Section):
     )
 
     def build(self) -> Touching:
-        """The contact."""
+        """Return the contact."""
         first, second = self.pair
         return Touching(first, second, self.distance)
 
@@ -155,10 +157,10 @@ class SceneEntry(Section):
     )
 
     def build(self, document: YamlDocument, location: Location = ("scene",)) -> Scene:
-        """The scene; errors name the line of the obstacle.
+        """Return the scene; errors name the line of the obstacle.
 
         Raises:
-            InputError: If a shape or pose makes no sense, a mesh cannot be read, or a name stands twice.
+            InputError: If a shape or pose is invalid, a mesh cannot be read, or a name is used twice.
         """
         folder = document.path.parent
 
@@ -208,7 +210,9 @@ def load_scene(path: str | os.PathLike[str]) -> Scene:
 
 
 def save_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
-    """Write a scene as YAML, whole or not at all. Mesh files are named relative to the new file's folder.
+    """Write a scene as YAML; if writing fails, no incomplete file is left.
+
+    Mesh files are named relative to the new file's folder.
 
     Raises:
         InputError: If the file cannot be written, or a mesh does not come from a file.
@@ -223,7 +227,7 @@ def save_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
 
 
 def scene_data(scene: Scene, folder: Path) -> dict[str, Any]:
-    """What the ``scene:`` section of a file in ``folder`` says about a scene."""
+    """Return the content of the ``scene:`` section of a file in ``folder``."""
     data: dict[str, Any] = {}
     if scene.obstacles:
         data["obstacles"] = [_obstacle_data(o, folder) for o in scene.obstacles]
@@ -237,7 +241,7 @@ def scene_data(scene: Scene, folder: Path) -> dict[str, Any]:
 
 
 def pose_data(placement: pin.SE3) -> dict[str, Any]:
-    """What a file says about a pose; the orientation is left out if there is none."""
+    """Return the entry of a pose; the orientation is left out if it is the identity."""
     data: dict[str, Any] = {"xyz": placement.translation.tolist()}
     if not np.array_equal(placement.rotation, np.eye(3)):
         data["quat_xyzw"] = quaternion_xyzw(placement).tolist()

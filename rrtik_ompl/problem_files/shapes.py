@@ -1,4 +1,4 @@
-"""The keys that give a shape in our YAML files, made from what the registered shapes say of their measures."""
+"""The keys of shapes in YAML files, generated from the measures of the registered shapes."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ from rrtik_ompl.model.shapes.shape import MeasureKind
 
 ONE_SHAPE = {"oneOf": [{"required": [key]} for key in SHAPES]}
 
-TypeForm: TypeAlias = Any  # a type or what ``Annotated`` makes of one, for which typing has no name yet
+TypeForm: TypeAlias = Any  # a type or an ``Annotated`` form, for which typing has no name
 
 _TYPES: dict[MeasureKind, TypeForm] = {
     "length": Length,
@@ -85,14 +85,15 @@ class OctreeEntry(Section):
 
 @dataclass(frozen=True, slots=True)
 class _FileRow:
-    """How a kind of shape is given whose numbers come from a file of its own.
+    """How a kind of shape is given whose data come from a file of its own.
 
     Attributes:
-        noun: What messages call it.
-        remedy: How one that was made in memory gets a file.
-        read: Reads the file, with what the entry says of it.
-        details: What an entry says of a shape beside the name of the file and its scale.
-        entry: Its keys; None if the name of the file is the value of its own key, and the scale stands beside it.
+        noun: Name of the kind in messages.
+        remedy: How a shape made in memory gets a file, for messages.
+        read: Reads the file, with the values of the entry.
+        details: Returns the values of an entry other than the name of the file and its scale.
+        entry: Class of the entry; None if the name of the file is the value of the shape's own key, with the scale
+            beside it.
     """
 
     noun: str
@@ -142,7 +143,7 @@ _FILES: dict[type[Shape], _FileRow] = {
 
 
 def _keys(kind: type[Shape]) -> dict[str, Any]:
-    """The keys of one kind of shape, all of them optional, with their types and descriptions."""
+    """Return the keys of one kind of shape, all of them optional, with their types and descriptions."""
     row = _FILES.get(kind)
     if row is not None and row.entry is not None:
         return {kind.key: _optional(row.entry, None)}
@@ -195,7 +196,7 @@ class ShapeEntry(_ShapeKeys):
         return self
 
     def build_shape(self, folder: Path) -> Shape:
-        """The shape; meshes and clouds are looked for relative to ``folder``."""
+        """Return the shape; files of meshes and clouds are relative to ``folder``."""
         kind = next(kind for key, kind in SHAPES.items() if getattr(self, key) is not None)
         value: Any = getattr(self, kind.key)
         row = _FILES.get(kind)
@@ -216,10 +217,10 @@ class ShapeEntry(_ShapeKeys):
 
 
 def shape_data(name: str, shape: Shape, folder: Path) -> dict[str, Any]:
-    """What a file in ``folder`` says about the shape of the solid of that name.
+    """Return the keys for the shape of the solid of that name, in a file in ``folder``.
 
     Raises:
-        InputError: If it is a mesh or a cloud that does not come from a file.
+        InputError: If the shape needs a file and does not come from one.
     """
     if type(shape) in _FILES:
         return _file_data(name, shape, folder)
@@ -231,7 +232,7 @@ def shape_data(name: str, shape: Shape, folder: Path) -> dict[str, Any]:
 
 def _file_data(name: str, shape: Shape, folder: Path) -> dict[str, Any]:
     row = _FILES[type(shape)]
-    of_file: Any = shape  # all kinds of the table have a source and a scale
+    of_file: Any = shape  # all kinds in the table have a source and a scale
     if not of_file.source:
         raise InputError(f"'{name}': a {row.noun} made in memory cannot be written; {row.remedy}")
     file = relative_name(of_file.source, folder)
@@ -242,5 +243,5 @@ def _file_data(name: str, shape: Shape, folder: Path) -> dict[str, Any]:
 
 
 def relative_name(path: str, folder: Path) -> str:
-    """A file as another one in ``folder`` names it; links on the way to either are followed."""
+    """Return the name of a file relative to ``folder``; symbolic links in both are resolved."""
     return Path(os.path.relpath(os.path.realpath(path), os.path.realpath(folder))).as_posix()

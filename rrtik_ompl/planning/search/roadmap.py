@@ -343,7 +343,7 @@ def _restored(
 
 
 def _box(robot: Robot) -> tuple[Vector, Vector]:
-    """Where vertices lie: inside the limits; joints without limits within a turn of 0 either way."""
+    """Return the bounds of the vertices, shapes (dof,): the limits, or a turn either way of 0 if there are none."""
     return np.where(robot.continuous, -TAU, robot.lower), np.where(robot.continuous, TAU, robot.upper)
 
 
