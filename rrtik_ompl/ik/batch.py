@@ -1,4 +1,4 @@
-"""Inverse kinematics of an array of poses: closed forms and the numeric method all at once, the others one by one."""
+"""Inverse kinematics of an array of poses: closed form and numeric method take all at once, others one by one."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from rrtik_ompl.model.goal import PoseGoal, joint_difference
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.world.world import World, check_world
 
-LEAST_SHARE = 256  # poses of a thread: fewer take less time than it does to begin one
+LEAST_SHARE = 256  # least number of poses of a thread: fewer take less time than to start the thread
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -34,12 +34,13 @@ class IkBatch:
     """One answer per pose.
 
     Attributes:
-        q: The solution nearest to the given posture (of a closed form), or the first found from it, shape
-            (m, dof); NaN where there is none.
-        found: Where there is one, shape (m,).
-        residuals: Distance [m] and angle [rad] by forward kinematics, shape (m, 2); NaN where there is none.
-        reasons: Why there is none, "" where there is one: see `IkResult`.
-        details: The same in lines: by how much, which joint, what touches.
+        q: Solutions, shape (m, dof): by a closed form the nearest to the given configuration, by another method the
+            first that it found from there; NaN where there is none.
+        found: Whether there is a solution, shape (m,).
+        residuals: Distance [m] and angle [rad] from the pose by forward kinematics, shape (m, 2); NaN where there is no
+            solution.
+        reasons: Why there is no solution, see `IkResult`; "" where there is one.
+        details: Each reason as a line: by how much, which joint, what touches.
 
     Example:
         >>> robot = rrtik.load_robot("ur5")
@@ -69,21 +70,21 @@ def solve_ik_batch(
     seed: int = 0,
     threads: int | None = None,
 ) -> IkBatch:
-    """For each pose a solution inside the limits and, if a world is given, free of collision.
+    """Find for each pose a solution inside the limits and, if a world is given, free of collision.
 
     Args:
         robot: The arm.
         poses: T_world_tip, shape (m, 4, 4).
         method: As for `solve_ik`; "closed-form" and "numeric" take all poses at once.
-        near: Posture near which solutions are wanted, shape (dof,); the middle of the limits if None.
+        near: Configuration near which solutions are wanted, shape (dof,); the middle of the limits if None.
         world: If given, solutions in collision are left out. Its robot must be this one.
-        seconds: For each pose that has no closed-form solution.
-        seed: Of the random numbers.
-        threads: That share the poses; as many as there are cores if None. The solutions do not depend on it.
+        seconds: Wall time for each pose that has no closed-form solution [s].
+        seed: Seed of the random numbers.
+        threads: Number of threads that share the poses; the number of cores if None. Solutions do not depend on it.
 
     Raises:
         UnknownNameError: If there is no such method.
-        InputError: If a pose is none, the method does not fit the robot, or an argument makes no sense.
+        InputError: If a matrix is no pose, the method does not fit the robot, or an argument is out of range.
 
     Example:
         >>> robot = rrtik.load_robot("panda")
@@ -120,7 +121,21 @@ def _solved(
     seed: int,
     part: slice,
 ) -> tuple[Matrix, Matrix, list[str], list[str]]:
-    """The answers for a part of the poses: q, residuals, reasons and details of an :class:`IkBatch`."""
+    """Solve for a part of the poses, in one thread.
+
+    Args:
+        robot: The arm.
+        poses: All poses, shape (m, 4, 4).
+        asked: The method that was asked for.
+        near: Configuration near which solutions are wanted, shape (dof,).
+        world: The world that checks for collision, or None.
+        seconds: Wall time for each pose [s].
+        seed: Seed for the first of all poses.
+        part: The poses to solve for.
+
+    Returns:
+        q, residuals, reasons and details as in :class:`IkBatch`, for the poses of the part.
+    """
     method = asked
     targets = poses[part]
     budget = Budget(seconds=seconds * len(targets))
@@ -136,7 +151,7 @@ def _solved(
     elif method == "numeric":
         _by_search(robot, targets, near, world, budget, q, residuals)
 
-    # what is left one by one, each with the seed of its place: however many threads there are, answers are the same
+    # Remaining poses are solved one by one. Each has a seed by its index, so answers do not depend on the threads.
     for k in np.flatnonzero(np.isnan(q[:, 0])).tolist():
         goal = PoseGoal(targets[k])
         own_seed = seed + part.start + k
@@ -153,7 +168,10 @@ def _solved(
 def _by_closed_form(
     robot: Robot, targets: NDArray[np.float64], near: Vector, world: World | None, q: Matrix, residuals: Matrix
 ) -> None:
-    """Write the nearest valid branch of each target into q, shape (m, dof), and residuals, shape (m, 2)."""
+    """Write the nearest valid branch of each target into q, shape (m, dof), and residuals, shape (m, 2), in place.
+
+    Rows of targets without a valid branch stay as they are.
+    """
     found = branches_of(robot, targets, np.broadcast_to(near, (len(targets), robot.dof)))
     valid = np.array(found.valid)
     valid[valid] = free_of_collision(world, found.branches[valid])
@@ -175,7 +193,10 @@ def _by_search(
     q: Matrix,
     residuals: Matrix,
 ) -> None:
-    """Write solutions into q, shape (m, dof), and residuals, shape (m, 2): targets in collision are tried again."""
+    """Write numeric solutions into q, shape (m, dof), and residuals, shape (m, 2), in place.
+
+    Targets whose solution is in collision are tried again, until a solution is free, the starts or the time run out.
+    """
     search = Search(robot, pose_rows(targets), near)
     going = np.arange(len(targets))
 
@@ -191,7 +212,10 @@ def _by_search(
 
 
 def _checked(robot: Robot, targets: NDArray[np.float64], q: Matrix) -> Matrix:
-    """Residuals by forward kinematics, shape (m, 2); rows of q that are not at their targets become NaN, in place."""
+    """Return residuals by forward kinematics, shape (m, 2) [m, rad]; NaN where q is not at its target.
+
+    Such rows of q, shape (m, dof), become NaN in place.
+    """
     residuals = tip_residuals(robot, q.T[:, None], targets)[:, 0].T
     residuals[~(residuals <= POSE.tolerances).all(axis=1)] = np.nan
     q[np.isnan(residuals[:, 0])] = np.nan

@@ -1,4 +1,4 @@
-"""Path constraints as tables for kernels, and configurations moved onto them."""
+"""Path constraints as tables for kernels, and the projection of configurations onto path constraints."""
 
 from __future__ import annotations
 
@@ -20,18 +20,23 @@ from rrtik_ompl.kernels.simd.library import library
 from rrtik_ompl.kernels.tables.memory import aligned, packed, record
 from rrtik_ompl.model.robot import PER_RADIAN, Robot, reach_of
 
-SHORTEST_STEP = 0.01  # [unit of the configurations] of a search, unless tolerances need shorter ones
+SHORTEST_STEP = 0.01  # shortest step of a search [unit of the configurations], unless tolerances need shorter ones
 
 
 class HeldTables:
     """The tables of path constraints for a robot.
 
     Attributes:
-        regions: What is held.
+        regions: The regions of the path constraints.
         held: The table of all regions.
-        address: Where it is; valid as long as this object lives.
-        shortest: Step that searches along the regions take at least [unit of the configurations]: shorter ones where
+        address: Address of the table in memory; valid as long as this object lives.
+        shortest: Shortest step of searches along the regions [unit of the configurations]; it is shorter where
             tolerances are small.
+
+    Args:
+        robot: The arm.
+        constraints: The regions.
+        limbs: For each region the table of the joints that move its frame.
     """
 
     def __init__(self, robot: Robot, constraints: HeldRegions, limbs: list[LimbTable]) -> None:
@@ -65,7 +70,15 @@ class HeldTables:
         self.shortest = min((_shortest_step(region) for region in constraints.regions), default=SHORTEST_STEP)
 
     def project(self, rows: Matrix, steps: int = STEPS) -> tuple[Matrix, Mask]:
-        """Move configurations, shape (m, dof), into all regions; where they are then, and which are there, (m,)."""
+        """Project configurations onto all regions.
+
+        Args:
+            rows: Configurations, shape (m, dof).
+            steps: Largest number of steps for each.
+
+        Returns:
+            The moved configurations, shape (m, dof), and which of them are in all regions, shape (m,).
+        """
         kernels = library(layout.KERNELS)
         moved = aligned(np.asarray(rows))
         reached = aligned(np.zeros(len(rows), dtype=np.int32))
@@ -74,12 +87,17 @@ class HeldTables:
         return moved.reshape(rows.shape).copy(), reached != 0
 
     def intact(self) -> bool:
-        """Whether no kernel has written beyond an array."""
+        """Check that no kernel has written beyond an array."""
         return all(part.intact() for part in (self.held, *self._parts, *self._limbs))
 
 
 def _region_tables(region: HeldRegion, limb: LimbTable) -> tuple[RegionTable, CallTable]:
-    """The table of a region, and the memory of its frames."""
+    """Return the table of a region, and that of the memory for its frames, which must live as long.
+
+    Args:
+        region: The region.
+        limb: The table of the joints that move its frame.
+    """
     fixed = limb.fixed.reshape(-1, ik_layout.POSE_NUMBERS)[0]
     first = np.eye(4)
     first[:3, :3] = fixed[:9].reshape(3, 3)
@@ -96,7 +114,7 @@ def _region_tables(region: HeldRegion, limb: LimbTable) -> tuple[RegionTable, Ca
 
 
 def _record(region: HeldRegion) -> Matrix:
-    """The numbers of a region."""
+    """Return the numbers of a region in the layout that kernels read."""
     bounds = region.region.bounds
     levers = region.levers[region.rows]
     return record(
@@ -117,27 +135,34 @@ def _record(region: HeldRegion) -> Matrix:
 
 
 def _shortest_step(region: HeldRegion) -> float:
-    """Half the step of all joints that has room to bend inside a region, `SHORTEST_STEP` at most."""
+    """Return a step so short that a straight motion between two points of a region stays inside its tolerances.
+
+    It is half the step whose largest deviation fills the space between the accepted and the allowed error, and at most
+    `SHORTEST_STEP`.
+    """
     dof = region.robot.dof
     step = np.full((1, dof), SHORTEST_STEP / np.sqrt(dof))
     space_left = region.limits(between=True) - region.accepted
     bent = region.deviations(np.zeros((1, dof)), step)[0]
-    # a chord leaves its curve by the square of its length
+    # The deviation of a chord from its curve grows with the square of its length, hence the square root.
     share = float(np.sqrt((space_left[bent > 0.0] / bent[bent > 0.0]).min(initial=4.0)))
     return SHORTEST_STEP * min(0.5 * share, 1.0)
 
 
 def projected_onto(robot: Robot, constraints: HeldRegions, rows: Matrix) -> Matrix:
-    """Configurations, shape (m, dof), moved into all regions and limits; those that got there, shape (k, dof)."""
+    """Project configurations, shape (m, dof), onto all regions inside the limits; return those that get there.
+
+    Configurations that are there already are not moved. Shape (k, dof).
+    """
     tables = held_tables(robot, constraints)
-    rows = robot.clamp(rows)  # one that is there already is not moved
+    rows = robot.clamp(rows)
     moved, reached = projected_rows(robot, constraints, rows) if tables is None else tables.project(rows)
     in_all_regions: Matrix = moved[reached & constraints.held(moved)]
     return in_all_regions
 
 
 def held_tables(robot: Robot, constraints: HeldRegions) -> HeldTables | None:
-    """The tables of path constraints; None where there are no kernels, or a joint hangs on several numbers of q."""
+    """Return the tables of path constraints; None without kernels, or if a joint depends on several entries of q."""
     if library(layout.KERNELS) is None:
         return None
     limbs = [_limb_of(robot, each.joint, each.T_joint_d.tobytes()) for each in constraints.regions]
@@ -147,5 +172,11 @@ def held_tables(robot: Robot, constraints: HeldRegions) -> HeldTables | None:
 
 @lru_cache(maxsize=64)
 def _limb_of(robot: Robot, joint: int, placement: bytes) -> LimbTable | None:
-    """The joints that move a frame, given by its pose in that of a joint."""
+    """Return the table of the joints that move a frame, see `limb_table`.
+
+    Args:
+        robot: The arm.
+        joint: Number of the joint that carries the frame.
+        placement: Pose of the frame in that of the joint, the bytes of a matrix of shape (4, 4).
+    """
     return limb_table(robot, frame_columns(robot, joint, np.frombuffer(placement).reshape(4, 4)))

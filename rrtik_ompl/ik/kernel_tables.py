@@ -1,4 +1,4 @@
-"""What the kernels of inverse kinematics work on: an arm from base to tip, configurations to start from, and calls."""
+"""Tables that the kernels of inverse kinematics read: an arm from base to tip, configurations to start from, calls."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from rrtik_ompl.kernels.reference.descent import DAMPING, DAMPING_SHARE, LARGEST
 from rrtik_ompl.kernels.tables.memory import PlannedTable, TablePlan, aligned, packed, sizes_of
 from rrtik_ompl.model.robot import Robot, reach_of
 
-SEEDS = 512  # configurations that walks may start from
+SEEDS = 512  # number of configurations that descents may start from
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,19 +29,19 @@ class Seeds:
 
 @lru_cache(maxsize=64)
 def seeds_of(robot: Robot) -> Seeds:
-    """Random configurations of a robot, always the same."""
+    """Return random configurations of a robot, the same at every call."""
     q = np.random.default_rng(0).uniform(*robot.finite_range(), (SEEDS, robot.dof))
     return Seeds(frozen(q), frozen(robot.fk_batch(q)))
 
 
 @lru_cache(maxsize=64)
 def limb_of(robot: Robot) -> LimbTable | None:
-    """The table of a robot's limb without seeds; None if a joint hangs on several numbers of q."""
+    """Return the table of a robot's limb without seeds; None if a joint depends on several entries of q."""
     return limb_table(robot, tip_columns(robot))
 
 
 def limb_table(robot: Robot, tip: TipColumns) -> LimbTable | None:
-    """The table of the joints that move a frame, without seeds; None if one of them hangs on several numbers of q."""
+    """Return the table of the joints that move a frame, without seeds; None if one depends on several entries of q."""
     if (np.count_nonzero(tip.gain, axis=1) > 1).any():
         return None
     columns = np.argmax(np.abs(tip.gain), axis=1)
@@ -68,7 +68,7 @@ def limb_table(robot: Robot, tip: TipColumns) -> LimbTable | None:
 
 @lru_cache(maxsize=64)
 def seeded_limb_of(robot: Robot) -> LimbTable | None:
-    """As `limb_of`, with the configurations of `seeds_of` to start from."""
+    """Return the table of a robot's limb, as `limb_of`, with the configurations of `seeds_of` to start from."""
     limb = limb_table(robot, tip_columns(robot))
     seeds = seeds_of(robot)
     if limb is not None:
@@ -77,27 +77,29 @@ def seeded_limb_of(robot: Robot) -> LimbTable | None:
 
 
 def pose_numbers(poses: NDArray[np.float64]) -> Matrix:
-    """Poses, shape (k, 4, 4), as 12 numbers each: the rotation row by row, then the origin."""
+    """Return poses, shape (k, 4, 4), as 12 numbers each: the rotation row by row, then the origin; shape (k, 12)."""
     return np.concatenate([poses[:, :3, :3].reshape(-1, 9), poses[:, :3, 3]], axis=1)
 
 
 class KernelCall:
-    """What one call of a kernel works on.
+    """The arguments, working memory and results of one call of a kernel.
 
     Args:
-        limb: See `rrtik_ompl.ik.kernel_tables`.
-        aims: Goals, one for each row or one for all, see `rrtik_ompl.ik.targets`; like all arrays it is copied.
-        q: Where rows begin, shape (m, dof).
-        steps: Of a start, at most.
-        patience: See `rrtik_ompl.kernels.ik.ik_layout`.
-        near: Postures to start from, shape (m, dof).
+        limb: The table of the arm, see :func:`limb_table`.
+        aims: Goals, one for each row or one for all, shape (m, 18) or (1, 18), see `rrtik_ompl.ik.targets`; like all
+            arrays it is copied.
+        q: First configuration of each row, shape (m, dof).
+        steps: Largest number of steps of one start.
+        patience: Number of steps after which a start that has come no nearer is given up, see
+            `rrtik_ompl.kernels.ik.ik_layout`.
+        near: Configurations to start from before the seeds, shape (m, dof).
         following: Number of the next start of each row, shape (m,).
 
     Attributes:
-        address: Where its fields are.
-        aims: Its goals; they may be changed between calls.
-        q: Where the rows have come to.
-        next: Number of the next start of each row now.
+        address: Address of the table in memory.
+        aims: The goals, which may be changed between calls.
+        q: Configuration of each row after the call, shape (m, dof).
+        next: Number of the next start of each row after the call, shape (m,).
     """
 
     def __init__(
@@ -125,33 +127,33 @@ class KernelCall:
             self.next[:] = following
 
     def begin(self, aim: Matrix, near: Vector) -> None:
-        """Start anew, in a call for a single row: from a posture, shape (dof,), to a goal, shape (1, 18)."""
+        """Prepare a single-row call to run again: from a configuration, shape (dof,), to a goal, shape (1, 18)."""
         self.aims[:] = aim
         self._table.near[:] = near
         self.next[:] = 0
 
     def intact(self) -> bool:
-        """Whether no kernel has written beyond an array."""
+        """Check that no kernel has written beyond an array."""
         return self._table.intact()
 
     @property
     def reached(self) -> Mask:
-        """Which rows are at their goals, shape (m,)."""
+        """Whether each row is at its goal, shape (m,)."""
         rows: Mask = self._table.reached.view(np.int32)[: len(self.q)] != 0
         return rows
 
     @property
     def steps(self) -> int:
-        """How many have been taken."""
+        """Number of steps that the call has taken."""
         return self._table.done
 
 
 @lru_cache(maxsize=64)
 def spare_calls(limb: LimbTable) -> list[KernelCall]:
-    """Calls for a single row with all fields, that outlive a use: to make one takes longer than most of them run.
+    """Return the list of calls for a single row that are not in use; making one takes longer than most of them run.
 
-    Whoever uses one takes it out, so that threads do not meet, and puts it back; one that an exception has left is
-    not put back.
+    A user takes a call out of the list, so that two threads never share one, and puts it back after use. After an
+    exception it is not put back.
     """
     del limb
     return []
@@ -159,7 +161,7 @@ def spare_calls(limb: LimbTable) -> list[KernelCall]:
 
 @lru_cache(maxsize=64)
 def _plan_of(limb: LimbTable, aims: int, rows: int, near: bool, begun: bool, steps: int, patience: int) -> TablePlan:
-    """Where a call for so many goals and rows lies in memory."""
+    """Return the memory layout of a call for so many goals and rows, with or without ``near`` and ``following``."""
     return sizes_of(
         CallTable,
         aims=ik_layout.AIM_FLOATS * aims,
@@ -184,7 +186,7 @@ def _plan_of(limb: LimbTable, aims: int, rows: int, near: bool, begun: bool, ste
 
 
 def call_table(limb: LimbTable, steps: int, patience: int) -> CallTable:
-    """What a call for a single row works on; see :class:`KernelCall`."""
+    """Return the table of a call for a single row, all numbers 0; see :class:`KernelCall`."""
     table = CallTable(PlannedTable(_plan_of(limb, 1, 1, True, True, steps, patience)))
     for array in table.memory.arrays.values():
         array[:] = 0.0

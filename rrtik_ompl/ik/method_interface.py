@@ -1,4 +1,4 @@
-"""The interface of inverse kinematics: request and response of a method, the method itself, and what is found."""
+"""The interface of inverse kinematics methods: request, response, the method itself, and the result for users."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from rrtik_ompl.model.goal import Target, TipGoal, has_continuous, joint_differe
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.world.world import World
 
-SAME_POSTURE = 1e-3  # [rad] or [m]; solutions of a numeric method this near are one
+SAME_POSTURE = 1e-3  # [rad] or [m]: solutions of a numeric method this near to each other count as one
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -28,13 +28,14 @@ class IkRequest:
     Attributes:
         robot: The arm.
         goal: The goal.
-        targets: Goals without freedom drawn from it, for methods that need such; one of them is enough.
-        near: Posture near which a solution is preferred, shape (dof,).
-        accept: Which of some configurations, shape (k, dof), inside the limits and at the goal, will do.
+        targets: Targets without freedom drawn from the goal, for methods that need these; reaching one is enough.
+        near: Configuration near which a solution is preferred, shape (dof,).
+        accept: Checks which configurations, shape (k, dof), inside the limits and at the goal, are acceptable; returns
+            shape (k,).
         all: Whether to return every solution that the method can find, not just one.
-        budget: How long a method may take; it looks between its rounds. The random numbers are those of ``random``.
-        random: Random numbers.
-        world: What ``accept`` checks collisions with, for methods that place the arm link by link.
+        budget: Time limit, which a method reads between its rounds.
+        random: Source of random numbers.
+        world: The world that ``accept`` checks collisions with, for methods that place the arm link by link.
     """
 
     robot: Robot
@@ -49,7 +50,7 @@ class IkRequest:
 
     @property
     def rng(self) -> np.random.Generator:
-        """Where random numbers come from."""
+        """Source of random numbers."""
         return self.random.rng
 
 
@@ -59,10 +60,10 @@ class IkResponse:
 
     Attributes:
         q: Configurations at one of the targets, inside the limits, in collision or not, shape (k, dof).
-        nearest: If there is none: the posture that came nearest to the goal with no regard to limits, shape (dof,).
-        iterations: Steps, 0 for a closed form.
-        timed_out: Whether the time was up before the method was through.
-        singular: Whether a target is in reach of a whole curve of solutions, of which ``q`` can only hold members.
+        nearest: If there are none, the configuration that came nearest to the goal, regardless of limits, shape (dof,).
+        iterations: Number of steps; 0 for a closed form.
+        timed_out: Whether the time was up before the method had finished.
+        singular: Whether a target has a whole curve of solutions, of which ``q`` can only hold samples.
     """
 
     q: Matrix
@@ -74,14 +75,19 @@ class IkResponse:
 
 @dataclass(frozen=True, slots=True)
 class Method:
-    """A method: ``misfit`` says why it does not fit a robot and a target ("" if it does); ``run`` solves."""
+    """A method of inverse kinematics.
+
+    Attributes:
+        misfit: Returns why the method does not fit a robot and a target; "" if it does.
+        run: Solves a request.
+    """
 
     misfit: Callable[[Robot, Target], str]
     run: Callable[[IkRequest], IkResponse]
 
 
 def fits_all(robot: Robot, target: Target) -> str:
-    """The misfit of a method that fits every robot and target."""
+    """Return "", the misfit of a method that fits every robot and target."""
     del robot, target
     return ""
 
@@ -93,14 +99,14 @@ class IkResult:
     Attributes:
         solutions: Configurations at the goal, inside the limits, free if a world was given, nearest first; shape
             (k, dof). At most one unless all were asked for.
-        residuals: Distance [m] and angle [rad] of each from the goal by forward kinematics, shape (k, 2); of several
+        residuals: Distance [m] and angle [rad] of each from the goal by forward kinematics, shape (k, 2); for several
             tips those of the tip that is farthest away.
-        reason: "" or why there is none: ``unreachable``, ``limits``, ``collision``, ``time`` (or the method gave up,
-            or tried a part of a region alone).
-        detail: The same in a line: by how much, which joint, what touches.
-        iterations: Steps of a numeric method.
+        reason: Why there is no solution: ``unreachable``, ``limits``, ``collision`` or ``time`` (which also means that
+            the method gave up, or tried only a part of a region); "" if there is one.
+        detail: The reason as a line: by how much, which joint, what touches.
+        iterations: Number of steps of a numeric method.
         method: The method that answered.
-        seconds: Time taken.
+        seconds: Time taken [s].
     """
 
     solutions: Matrix
@@ -120,19 +126,19 @@ class IkResult:
         return len(self.solutions) > 0
 
     def nearest(self) -> IkResult:
-        """The same with the nearest solution alone."""
+        """Return the result with only its nearest solution."""
         return replace(self, solutions=self.solutions[:1], residuals=self.residuals[:1])
 
 
 def nearest_first(robot: Robot, rows: Matrix, near: Vector) -> NDArray[np.intp]:
-    """Numbers of rows, shape (k, dof), those nearest to a posture first; joints count as their weights say."""
+    """Return the indices that sort rows, shape (k, dof), by their weighted joint distance from a configuration."""
     difference = weighted_difference(robot, rows, near)
     order: NDArray[np.intp] = np.vecdot(difference, difference).argsort(kind="stable")
     return order
 
 
 def different_rows(rows: Matrix, order: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Numbers of the rows, taken in that order, without those that repeat an earlier one to `SAME_POSTURE`."""
+    """Return indices of different rows in the given order; rows within `SAME_POSTURE` of one before are dropped."""
     chosen: list[int] = []
     for k in order.tolist():
         if not chosen or np.abs(rows[k] - rows[chosen]).max(axis=1).min() > SAME_POSTURE:
@@ -141,12 +147,12 @@ def different_rows(rows: Matrix, order: NDArray[np.intp]) -> NDArray[np.intp]:
 
 
 def unwind(robot: Robot, rows: Matrix, start: Vector | None) -> None:
-    """Turn continuous joints to where they were in the row before, in place; rows of NaN are passed over.
+    """Change continuous joints by full turns, in place, so that each row is as near as possible to the row before.
 
     Args:
         robot: The arm.
-        rows: Shape (k, dof).
-        start: Before the first row, shape (dof,); None for nowhere.
+        rows: Configurations, shape (k, dof), changed in place; rows of NaN are skipped.
+        start: Configuration before the first row, shape (dof,), or None.
     """
     if not has_continuous(robot):
         return
@@ -160,18 +166,18 @@ def unwind(robot: Robot, rows: Matrix, start: Vector | None) -> None:
 
 @lru_cache(maxsize=64)
 def mid_range_configuration(robot: Robot) -> Vector:
-    """Where a search begins if nobody says: the middle of the limits, shape (dof,)."""
+    """Return the middle of the limits, shape (dof,), where a search begins by default."""
     return frozen(0.5 * np.sum(robot.finite_range(), axis=0))
 
 
 class RandomStream:
-    """The same seed gives the same numbers.
+    """A source of random numbers that is made when it is first used; the same seed gives the same numbers.
 
     Args:
         seed: A whole number of at least 0.
 
     Raises:
-        InputError: If it is none.
+        InputError: If the seed is no such number.
     """
 
     def __init__(self, seed: int) -> None:
@@ -179,5 +185,5 @@ class RandomStream:
 
     @cached_property
     def rng(self) -> np.random.Generator:
-        """Where the numbers come from."""
+        """The random generator."""
         return np.random.default_rng(self._seed)

@@ -1,4 +1,4 @@
-"""The methods of inverse kinematics behind one face, the preferred ones first, and which goals each fits."""
+"""The methods of inverse kinematics behind one interface, the preferred ones first, and the goals that each fits."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ from rrtik_ompl.model.robot import Robot, inside_limits
 
 
 def load_kernels(robot: Robot) -> None:
-    """Load what the methods may call before the clock starts: to compile it the first time is no part of a search."""
+    """Load the kernels that the methods may call, so that compiling them is not counted as time of a search."""
     library(ik_layout.KERNELS)
     if has_closed_form(robot) and form_of(robot).kernel:
         library(branch_layout.KERNELS)
 
 
 def _closed_form_misfit(robot: Robot, target: Target) -> str:
-    """Why the closed form does not fit a robot and a target; "" if it does."""
+    """Return why the closed form does not fit a robot and a target; "" if it does."""
     if not has_closed_form(robot):
         return "the robot brings no closed form"
     if form_of(robot).kind == "pose" and not target.oriented:
@@ -38,7 +38,13 @@ def _closed_form_misfit(robot: Robot, target: Target) -> str:
 
 
 def _closed_form(request: IkRequest) -> IkResponse:
-    """All branches of all targets; if none will do, the curves of those that are singular within their tolerances."""
+    """Solve a request by the closed form.
+
+    First all branches inside the limits are taken, and if one is accepted, they are the answer. Otherwise forward
+    kinematics finds the branches that are at a goal only within its tolerances, and targets that are singular within
+    their tolerances bring samples of their whole curve of solutions. If there is nothing at all, the branch that misses
+    least, by limits or else by distance, is the nearest configuration.
+    """
     robot = request.robot
     targets = request.targets
     q = None
@@ -47,10 +53,11 @@ def _closed_form(request: IkRequest) -> IkResponse:
     if q is None:
         found = branches_of(robot, *_poses_and_hints(request), check=False)
         q = found.branches[found.valid]
-    if len(q) and request.accept(q).any():  # the usual case; forward kinematics checks what is returned
+    # The usual case; solve_ik() checks the returned rows by forward kinematics.
+    if len(q) and request.accept(q).any():
         return IkResponse(q, request.near)
 
-    # none will do: see by forward kinematics which ones are at a goal, and which came nearest
+    # Otherwise forward kinematics shows which branches are at a goal, and which came nearest.
     found = branches_of(robot, *_poses_and_hints(request))
     rows = found.branches.reshape(-1, robot.dof)
     target_of_row = np.repeat(np.arange(len(targets)), found.real.shape[1])
@@ -69,29 +76,29 @@ def _closed_form(request: IkRequest) -> IkResponse:
 
 
 def _poses_and_hints(request: IkRequest) -> tuple[NDArray[np.float64], Matrix]:
-    """Of all targets, shapes (m, 4, 4) and (m, dof)."""
+    """Return the poses of all targets, shape (m, 4, 4), and the wanted configuration for each, shape (m, dof)."""
     return np.array([_matrix(target) for target in request.targets]), np.array([request.near] * len(request.targets))
 
 
 def leaves_a_curve(robot: Robot, targets: Sequence[Target]) -> bool:
-    """Whether any target of a closed form is singular within its tolerances, and so has a curve of solutions."""
+    """Check whether any target of a closed form is singular within its tolerances, so that it has a solution curve."""
     poses = np.array([_matrix(target) for target in targets])
     found = branches_of(robot, poses, slack=min(map(_slack, targets)), check=False)
     return bool(((found.singular > 0) & found.real.any(axis=1)).any())
 
 
 def _slack(target: Target) -> float:
-    """How far from singular a target may be to be treated as singular: a part of its tolerances, 0 of a position."""
+    """Return how far from singular a target may be to be treated as singular: 0.4 times its smaller tolerance."""
     return 0.4 * min(target.tolerances)
 
 
 def _matrix(target: Target) -> Matrix:
-    """The pose of a target, shape (4, 4)."""
+    """Return the pose of a target, shape (4, 4)."""
     return np.asarray(target.pose.homogeneous, dtype=np.float64)
 
 
 def _genetic(request: IkRequest) -> IkResponse:
-    from rrtik_ompl.ik.genetic.search import genetic  # what `plan()` does not need is loaded when it is asked for
+    from rrtik_ompl.ik.genetic.search import genetic  # Loaded late, since `plan()` does not need it.
 
     return genetic(request)
 
@@ -110,7 +117,7 @@ def _mb_rrt(request: IkRequest) -> IkResponse:
 
 
 def _baseline(name: IkMethod) -> Method:
-    """One of the methods that others use."""
+    """Return a baseline method, whose module is loaded when it is first used."""
 
     def misfit(robot: Robot, target: Target) -> str:
         from rrtik_ompl.ik.baselines import BASELINES

@@ -1,4 +1,4 @@
-"""Goals of several tips: configurations with all of them in place, found tip by tip and put together."""
+"""Goals of several tips: configurations with all tips at their goals, found tip by tip and then combined."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from rrtik_ompl.model.robot import Robot, metres_per_radian
 from rrtik_ompl.model.scene import Scene
 
 PROJECTION: IkMethod = "projection"
-STARTS = 96  # random ones, for each tip
+STARTS = 96  # number of starts for each tip
 
 
 def at_all_tips(
@@ -32,17 +32,18 @@ def at_all_tips(
     scene: Scene,
     path_regions: Iterable[HeldRegion],
 ) -> Matrix:
-    """Configurations with all tips at their goals that keep path constraints, shape (k, dof).
+    """Return configurations with all tips at their goals that keep path constraints, shape (k, dof).
 
-    First each tip alone is moved to its goal from many starts, then the joints of one tip's are put together with those
-    of another's. Where tips share joints, or there are path constraints, that is but a start for all at once.
+    First each tip alone is moved to its goal from many starts. Then configurations are combined: each joint is taken
+    from a solution of the tip that it moves. Finally these are projected onto all goals and path constraints at once,
+    since tips may share joints.
 
     Args:
-        robot: With all the tips.
-        goal: Of each: a goal of several tips.
-        near: One of the starts, shape (dof,).
-        rng: Of the others.
-        scene: Whose attached objects may have goals too.
+        robot: The robot with all the tips.
+        goal: A goal of several tips.
+        near: The first of the starts, shape (dof,).
+        rng: Draws the other starts and the combinations.
+        scene: Its attached objects may have goals too.
         path_regions: Regions of path constraints.
     """
     regions = goal_regions(robot, scene, goal)
@@ -55,7 +56,7 @@ def at_all_tips(
         if len(of_this_tip) == 0:
             return of_this_tip
         of_this_tip = of_this_tip[np.argsort(np.linalg.norm(weighted_difference(robot, of_this_tip, near), axis=1))]
-        rows = np.append(0, rng.integers(len(of_this_tip), size=STARTS - 1))  # the nearest ones of all tips first
+        rows = np.append(0, rng.integers(len(of_this_tip), size=STARTS - 1))  # Row 0 combines the nearest solutions.
         moved = _moving(robot, region)
         joined[:, moved] = of_this_tip[rows][:, moved]
 
@@ -65,7 +66,7 @@ def at_all_tips(
 
 
 def _moving(robot: Robot, region: HeldRegion) -> NDArray[np.intp]:
-    """Numbers of the joints of q that move the frame of a region."""
+    """Return the indices of the entries of q that move the frame of a region."""
     return np.flatnonzero((robot.chain.gain[region.rows] != 0.0).any(axis=0))
 
 
@@ -79,16 +80,16 @@ def solve_all_tips(
     *,
     scene: Scene,
 ) -> IkResult:
-    """Inverse kinematics of several tips: all solutions of the first round that has any, nearest first.
+    """Solve inverse kinematics of several tips: all solutions of the first round that finds any, nearest first.
 
     Args:
-        robot: See :func:`at_all_tips`.
-        goal: Likewise.
-        near: Likewise.
-        accept: Which configurations, shape (m, dof), are free, shape (m,).
-        budget: How long it may take; there is a first round in any case.
-        rng: See :func:`at_all_tips`.
-        scene: Likewise.
+        robot: The robot with all the tips.
+        goal: A goal of several tips.
+        near: Configuration near which solutions are wanted, shape (dof,).
+        accept: Checks which configurations, shape (m, dof), are free; returns shape (m,).
+        budget: Time limit, read between rounds; the first round is always done.
+        rng: Source of random numbers.
+        scene: Its attached objects may have goals too.
     """
     rounds = 0
     reason = "time"
@@ -113,7 +114,7 @@ def solve_all_tips(
 
 
 def _residuals(robot: Robot, goal: MultiGoal, rows: Matrix) -> Matrix:
-    """Distance [m] and angle [rad] of each row from the goals, of the tip that is farthest away, shape (m, 2)."""
+    """Return the residuals of the tip that is farthest from its goal, for each row, shape (m, 2) [m, rad]."""
     each = np.array([part.errors(arm, rows) for arm, part in goal.each(robot)]).transpose(0, 2, 1)
     worst = np.argmax(each[..., 0] + metres_per_radian(robot) * each[..., 1], axis=0)
     farthest: Matrix = each[worst, np.arange(len(rows))]

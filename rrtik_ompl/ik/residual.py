@@ -1,4 +1,4 @@
-"""How far tips are from a goal, for methods that walk towards it."""
+"""Residuals of the tip from a goal, for methods that move towards it step by step."""
 
 from __future__ import annotations
 
@@ -17,21 +17,22 @@ from rrtik_ompl.base.poses import working_memory
 from rrtik_ompl.model.goal import Target
 from rrtik_ompl.model.robot import Robot, pinocchio_rows
 
-SHARE = 0.01  # of the tolerance: a solution on the rim would not survive rounding
-NEAR_HALF_TURN = 1e-4  # [rad] from pi, where the skew part of a rotation no longer determines its axis
+SHARE = 0.01  # Share of the tolerance at which a search ends; at the full tolerance rounding could fail a later check.
+NEAR_HALF_TURN = 1e-4  # [rad]: this near to pi the skew part of a rotation no longer determines its axis
 
 
 def well_inside(robot: Robot, goal: Target, Q: Matrix) -> Mask:
-    """Which rows of Q, shape (m, dof), are at most a hundredth of the tolerance away."""
+    """Check which rows of Q, shape (m, dof), are within a hundredth of the goal's tolerances; shape (m,)."""
     position, angle = goal.errors(robot, Q)
     max_distance, max_angle = goal.tolerances
     return (position <= SHARE * max_distance) & (angle <= SHARE * max_angle)
 
 
 def error_of_one(robot: Robot, goal: Target, q: Vector) -> tuple[float, float]:
-    """Distance [m] and angle [rad] (0 for a position) of the tip from a goal, for one q, shape (dof,).
+    """Return distance [m] and angle [rad] (0 for a position) of the tip from a goal, for one q, shape (dof,).
 
-    By Pinocchio and in numbers of Python's own: as `tip_errors`, up to rounding, in a quarter of its time.
+    Pinocchio's forward kinematics and plain Python numbers give the same as `tip_errors`, up to rounding, in a quarter
+    of its time.
     """
     model, data, frame, q_is_pinocchios = _tip_of(robot, get_ident())
     pin.forwardKinematics(model, data, q if q_is_pinocchios else pinocchio_rows(robot, q[None])[0])
@@ -40,7 +41,7 @@ def error_of_one(robot: Robot, goal: Target, q: Vector) -> tuple[float, float]:
     if not goal.oriented:
         return distance, 0.0
 
-    # sine from the skew part, cosine from the trace: exact for small angles and for large ones
+    # The sine from the skew part and the cosine from the trace are together accurate for small and large angles.
     a, b, c = goal.pose.actInv(tip).rotation.tolist()
     sine = 0.5 * math.hypot(c[1] - b[2], a[2] - c[0], b[0] - a[1])
     return distance, math.atan2(sine, 0.5 * (a[0] + b[1] + c[2] - 1.0))
@@ -48,7 +49,11 @@ def error_of_one(robot: Robot, goal: Target, q: Vector) -> tuple[float, float]:
 
 @lru_cache(maxsize=64)
 def _tip_of(robot: Robot, thread: int) -> tuple[Any, Any, int, bool]:
-    """Pinocchio's model, working memory of one thread's own, the tip's number; whether q is as Pinocchio wants it."""
+    """Return what `error_of_one` needs of Pinocchio; one entry for each thread, which shares no working memory.
+
+    Returns:
+        Model, working memory, number of the tip's frame, and whether q needs no conversion for Pinocchio.
+    """
     del thread
     chain = robot.chain
     model = robot.model
@@ -63,14 +68,14 @@ def walked(
 
     Args:
         robot: The arm.
-        goal: Where to.
-        starts: Shape (m, dof).
-        step: From rows that have not arrived, shape (k, dof), to the next ones.
-        max_steps: Steps at most.
-        enough: So many starts are enough; all of them if None.
+        goal: The goal.
+        starts: Configurations to start from, shape (m, dof).
+        step: Function from the rows that have not arrived, shape (k, dof), to their next configurations.
+        max_steps: Largest number of steps.
+        enough: Number of starts that have to arrive; all of them if None.
 
     Returns:
-        Where each start has led to, shape (m, dof), and the steps taken.
+        The last configuration of each start, shape (m, dof), and the number of steps taken.
     """
     Q = np.clip(starts, robot.lower, robot.upper)
     for number in range(max_steps):
@@ -82,27 +87,36 @@ def walked(
 
 
 def twist(goal: Target, tips: NDArray[np.float64]) -> Matrix:
-    """Twist from the tips, shape (m, 4, 4), to the goal in world axes: (linear [m]; rotation vector [rad]), (m, 6)."""
+    """Return the twists from tips, shape (m, 4, 4), to a goal: linear [m] and rotation vector [rad] in world axes.
+
+    Shape (m, 6); the rotation vector is 0 for a position.
+    """
     if not goal.oriented:
         return np.hstack([goal.point - tips[:, :3, 3], np.zeros((len(tips), 3))])
     return twist_between(tips, goal.pose.rotation, goal.point)
 
 
 def twist_between(tips: NDArray[np.float64], rotations: NDArray[np.float64], positions: NDArray[np.float64]) -> Matrix:
-    """The same to rotations, shape (m, 3, 3), and positions, shape (m, 3), one for each tip or one for all: (m, 6)."""
+    """Return the twists from tips to poses: linear [m] and rotation vector [rad] in world axes, shape (m, 6).
+
+    Args:
+        tips: Poses of the tip, shape (m, 4, 4).
+        rotations: Wanted rotations, shape (m, 3, 3), or one for all, shape (3, 3).
+        positions: Wanted positions [m], shape (m, 3), or one for all, shape (3,).
+    """
     turns = rotations @ tips[:, :3, :3].transpose(0, 2, 1)
     return np.hstack([positions - tips[:, :3, 3], _rotation_vectors(turns)])
 
 
 def shortened(steps: Matrix, largest: float) -> Matrix:
-    """Steps of joints, shape (m, dof), scaled so that no joint moves further than allowed [rad or m]."""
+    """Return steps, shape (m, dof), each scaled so that no joint moves by more than ``largest`` [rad or m]."""
     largest_of_step = np.abs(steps).max(axis=1, keepdims=True)
     bounded: Matrix = steps * np.minimum(1.0, largest / np.maximum(largest_of_step, 1e-12))
     return bounded
 
 
 def _rotation_vectors(R: NDArray[np.float64]) -> Matrix:
-    """Logarithms of rotations, shape (m, 3, 3): (m, 3)."""
+    """Return the rotation vectors (logarithms) [rad] of rotations, shape (m, 3, 3); shape (m, 3)."""
     skew = 0.5 * np.stack([R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]], axis=1)
     sine = np.linalg.norm(skew, axis=1)
     angle = np.arctan2(sine, 0.5 * (np.trace(R, axis1=1, axis2=2) - 1.0))

@@ -1,6 +1,6 @@
-"""What an arm can do in and near singular postures: a report on one, and joint rates that stay bounded there.
+"""Singular configurations: a report on what the arm can do there, and joint rates that stay bounded near them.
 
-Sources: Nakamura and Hanafusa [25]; the damping of the smallest singular value alone, Maciejewski and Klein [26].
+Sources: Nakamura and Hanafusa [25]; damping of only the small singular values, Maciejewski and Klein [26].
 """
 
 from __future__ import annotations
@@ -17,24 +17,26 @@ from rrtik_ompl.base.copies import as_value
 from rrtik_ompl.ik.analytic.closed_form import form_of, has_closed_form
 from rrtik_ompl.model.robot import LIMIT_TOLERANCE, Robot
 
-RANK_TOLERANCE = 1e-9  # singular values below this share of 1 (metres and radians as they are) count as 0
-DAMPED_BELOW = 0.05  # singular values below this are damped; metres count in units of the arm's reach
-LOST = 1e-12  # singular values below this are 0
-DAMPING = 0.05  # at a singular value of 0
+RANK_TOLERANCE = 1e-9  # Singular values below this (metres and radians mixed) count as 0.
+DAMPED_BELOW = 0.05  # Singular values below this are damped; metres count in units of the arm's reach.
+LOST = 1e-12  # Singular values below this are 0.
+DAMPING = 0.05  # damping at a singular value of 0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SingularityReport:
-    """What a posture can and cannot do.
+    """What a configuration can and cannot do.
 
     Attributes:
-        singular_values: Of the Jacobian at the tip, largest first, shape (min(6, dof),); metres and radians mixed.
-        rank: How many of them are not 0: never the count of vanishing factors, which overstates the loss.
-        manipulability: Their product, sqrt(det(J J^T)) [31].
-        nearness: The singular cases that the robot names, 0 at the singularity: sines, or metres.
-        active: The cases at which it is.
-        at_limits: Joints that are at a limit.
-        rank_inside_limits: Rank without the joints at their limits: what is left of the motion when they are stopped.
+        singular_values: Singular values of the Jacobian at the tip, largest first, shape (min(6, dof),); metres and
+            radians mixed.
+        rank: Number of singular values that are not 0. (Counting vanishing factors of the determinant instead would
+            overstate the loss.)
+        manipulability: Product of the singular values, sqrt(det(J J^T)) [31].
+        nearness: For each singular case that the robot names, a sine or a length [m] that is 0 at the singularity.
+        active: Names of the cases in which the configuration is singular.
+        at_limits: Names of the joints at a limit.
+        rank_inside_limits: Rank without the joints at a limit: the motion that is left when these are stopped.
     """
 
     singular_values: Vector
@@ -49,12 +51,12 @@ class SingularityReport:
 
 
 def singularity_report(robot: Robot, q: ArrayLike, *, tolerance: float = RANK_TOLERANCE) -> SingularityReport:
-    """Report on one posture.
+    """Report how singular a configuration is.
 
     Args:
-        robot: Any arm; the named cases are empty if it brings no closed form.
+        robot: Any arm; there are no named cases if it brings no closed form.
         q: Configuration, shape (dof,).
-        tolerance: Below this a singular value, or the nearness of a case, counts as 0.
+        tolerance: Singular values and nearness values up to this count as 0.
 
     Raises:
         InputError: If q does not fit the robot.
@@ -78,13 +80,13 @@ def singularity_report(robot: Robot, q: ArrayLike, *, tolerance: float = RANK_TO
 
 
 def manipulability(robot: Robot, Q: ArrayLike) -> Vector:
-    """Product of the singular values of the Jacobian for each row of Q, shape (m, dof). Shape (m,)."""
+    """Return the product of the Jacobian's singular values for each row of Q, shape (m, dof); shape (m,)."""
     product: Vector = np.prod(np.linalg.svd(robot.jacobian_batch(Q), compute_uv=False), axis=1)
     return product
 
 
 def limit_active(robot: Robot, q: ArrayLike, tolerance: float = LIMIT_TOLERANCE) -> Mask:
-    """Which joints of a configuration are at a limit, within ``tolerance`` [rad or m]. Shape (dof,)."""
+    """Check which joints of a configuration are at a limit, within ``tolerance`` [rad or m]; shape (dof,)."""
     values = robot.configuration(q)
     stopped: Mask = (values <= robot.lower + tolerance) | (values >= robot.upper - tolerance)
     return stopped
@@ -96,14 +98,14 @@ def _rank(values: Vector, tolerance: float) -> int:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rate:
-    """An answer of rate control.
+    """Joint rates for a wanted twist of the tip.
 
     Attributes:
         qdot: Joint rates [rad/s or m/s], shape (dof,).
-        twist: What the tip does at these rates, (linear; angular), shape (6,) [m/s, rad/s].
-        smallest: Smallest singular value of the scaled Jacobian: how near the posture is to a singular one.
-        scale: Share of the wanted speed that the joints' velocity limits leave.
-        stopped: Joints at a limit that the motion would push further, and that were held for that.
+        twist: Twist of the tip at these rates, (linear; angular), shape (6,) [m/s, rad/s].
+        smallest: Smallest singular value of the scaled Jacobian; it is 0 in a singular configuration.
+        scale: Share of the wanted speed that the joints' velocity limits allow.
+        stopped: Names of joints at a limit that were stopped because the motion would push them further.
     """
 
     qdot: Vector
@@ -122,16 +124,19 @@ def rate(
     damping: float = DAMPING,
     near: float = DAMPED_BELOW,
 ) -> Rate:
-    """Joint rates that move the tip with a twist as well as the posture allows.
+    """Return joint rates that move the tip with a twist, as well as the configuration allows.
+
+    The rates are a damped pseudo-inverse of the twist. Joints at a limit that would be pushed further are stopped, and
+    the rates are computed again without them. Finally all rates are scaled to the joints' velocity limits.
 
     Args:
         robot: Any arm.
         q: Configuration, shape (dof,).
         twist: Velocity of the tip in world axes, (linear [m/s]; angular [rad/s]), shape (6,).
-        bias: Rates wanted where they do not disturb the tip (null space), shape (dof,); zeros if None. In a singular
-            posture the null space is what carries the arm out of it.
+        bias: Wanted joint rates in the null space, where they do not disturb the tip, shape (dof,); zeros if None. In a
+            singular configuration the null space leads the arm out of it.
         damping: Largest damping, in the same unit as ``near``.
-        near: Singular value below which damping sets in, growing smoothly from 0.
+        near: Singular value below which damping sets in; it grows smoothly from 0.
 
     Raises:
         InputError: If an array does not fit the robot.
@@ -147,7 +152,8 @@ def rate(
     low = values <= robot.lower + LIMIT_TOLERANCE
     high = values >= robot.upper - LIMIT_TOLERANCE
     free = np.ones(robot.dof, dtype=bool)
-    while True:  # each round holds at least one joint more; held joints do not move, so it ends
+    # Each round stops at least one more joint, and stopped joints do not move, so the loop ends.
+    while True:
         qdot, smallest = _damped(jacobian * units[:, None] * free, wanted * units, extra * free, damping, near)
         blocked = free & ((low & (qdot < 0.0)) | (high & (qdot > 0.0)))
         if not blocked.any():
@@ -160,13 +166,27 @@ def rate(
 
 
 def _damped(J: Matrix, twist: Vector, bias: Vector, damping: float, near: float) -> tuple[Vector, float]:
-    """Singular directions are followed by s / (s^2 + l^2); what that leaves of the joint space follows the bias."""
+    """Solve J qdot = twist by damped least squares, with a bias in the rest of the joint space.
+
+    Along each singular direction the inverse of the singular value s is s / (s^2 + l^2), where the damping l is 0 from
+    ``near`` on. The share of a direction that the twist does not take follows the bias.
+
+    Args:
+        J: Jacobian, shape (6, dof).
+        twist: Wanted twist in the same units, shape (6,).
+        bias: Wanted joint rates, shape (dof,).
+        damping: Damping at a singular value of 0.
+        near: Singular value below which there is damping.
+
+    Returns:
+        Joint rates, shape (dof,), and the smallest singular value.
+    """
     U, s, Vt = np.linalg.svd(J)
     square = np.where(s < near, (1.0 - (s / near) ** 2) * damping**2, 0.0)
     inverse = np.divide(s, s * s + square, out=np.zeros_like(s), where=s > LOST)
 
     share_taken = np.zeros(len(Vt))
-    share_taken[: len(s)] = s * inverse  # share of each direction that the twist has taken
+    share_taken[: len(s)] = s * inverse  # share of each singular direction that the twist takes
     V = Vt.T
     qdot: Vector = V[:, : len(s)] @ (inverse * (U.T @ twist)[: len(s)]) + V @ ((1.0 - share_taken) * (Vt @ bias))
     return qdot, float(s[-1])

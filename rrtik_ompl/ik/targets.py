@@ -1,4 +1,4 @@
-"""A goal of the tip as methods take it: targets without freedom drawn from it, or rows of numbers to walk to."""
+"""A goal of the tip as methods take it: targets without freedom drawn from it, or rows of numbers for kernels."""
 
 from __future__ import annotations
 
@@ -21,28 +21,39 @@ from rrtik_ompl.model.goal import GoalPart, GoalSet, PoseGoal, PositionGoal, Tar
 from rrtik_ompl.model.goal_kind import TaskRegion, displacements
 
 POSE = PoseGoal(np.eye(4))  # for its tolerances
-UPRIGHT = np.eye(3).ravel()  # where the orientation does not count
+UPRIGHT = np.eye(3).ravel()  # a rotation for rows whose orientation does not count
 
 
 def targets(goal: TipGoal, max_count: int, rng: np.random.Generator) -> list[Target]:
-    """Goals without freedom: the goal itself, or at most ``max_count``, drawn of its parts where they leave freedom."""
+    """Return targets without freedom: the parts of a goal, or displacements drawn from them where they are regions.
+
+    Args:
+        goal: The goal.
+        max_count: Largest number of targets; of more parts a random choice is taken. A goal that leaves freedom gets
+            exactly so many.
+        rng: Source of random numbers.
+    """
     parts, coordinates = _drawn(goal, max_count, rng)
     places = iter(displacements(coordinates))
     return [part if isinstance(part, Target) else _target(part.region(), next(places)) for part in parts]
 
 
 def skip_targets(goal: TipGoal, max_count: int, rng: np.random.Generator) -> None:
-    """Draw the random numbers of :func:`targets`, and make nothing of them."""
+    """Draw the random numbers of :func:`targets` without making targets, so that later numbers stay the same."""
     _drawn(goal, max_count, rng)
 
 
 def leaves_freedom(part: GoalPart) -> bool:
-    """Whether there are further targets to be drawn from it."""
+    """Check whether different targets can be drawn from a part of a goal."""
     return part.freedom is not None and bool(part.freedom.free.any())
 
 
 def _drawn(goal: TipGoal, max_count: int, rng: np.random.Generator) -> tuple[list[GoalPart], Matrix]:
-    """The parts of which targets are made, and for each region among them a displacement, shape (regions, 6)."""
+    """Return the part of the goal for each target, and random coordinates for each of them that is a region.
+
+    Returns:
+        Parts, and the coordinates x, y, z, roll, pitch, yaw in their regions, shape (regions, 6) [m, rad].
+    """
     parts = goal.parts
     if len(parts) > max_count:
         parts = tuple(parts[k] for k in rng.permutation(len(parts))[:max_count])
@@ -54,7 +65,7 @@ def _drawn(goal: TipGoal, max_count: int, rng: np.random.Generator) -> tuple[lis
 
 
 def _target(part: TaskRegion, displacement: Matrix) -> Target:
-    """The goal without freedom that a displacement of a region is, shape (4, 4)."""
+    """Return the target without freedom at a displacement, shape (4, 4), in a region."""
     pose = part.T_world_w.homogeneous @ displacement @ part.T_w_tip.homogeneous
     any_turn = (part.bounds[3:, 1] - part.bounds[3:, 0] >= TAU).all()
     if any_turn and not part.T_w_tip.translation.any():
@@ -63,9 +74,10 @@ def _target(part: TaskRegion, displacement: Matrix) -> Target:
 
 
 def goal_rows(goal: TipGoal) -> Matrix:
-    """A goal as rows that `rrtik_ompl.kernels.ik.ik_layout` describes, one for each member of a region, shape (k, 18).
+    """Return a goal as rows of numbers for kernels, one for each member of a region, shape (k, 18).
 
-    Tolerances are a hundredth of the goal's: a solution on their rim would not survive rounding.
+    `rrtik_ompl.kernels.ik.ik_layout` describes a row. Tolerances are a hundredth of the goal's, since a solution right
+    at the tolerance would fail a later check by rounding.
 
     Raises:
         InputError: If the goal is a task-space region or has one, whose freedom no row can hold.
@@ -73,7 +85,7 @@ def goal_rows(goal: TipGoal) -> Matrix:
     if not isinstance(goal, GoalSet):
         return _row(goal)[None]
     rows = np.array([_row(member) for member in goal.members])
-    # points and single turns have neither a box nor an axis to choose
+    # Only members with a full orientation have a box and an axis of free rotation.
     posed = rows[:, FREE_TURN] == NO_TURN
     rows[posed, BOX : BOX + 3] = 0.5 * goal.box
     if goal.free_rotation_axis is not None:
@@ -82,7 +94,7 @@ def goal_rows(goal: TipGoal) -> Matrix:
 
 
 def pose_rows(poses: NDArray[np.float64]) -> Matrix:
-    """Poses with the tolerances of a `PoseGoal`, shape (k, 4, 4), as rows, shape (k, 18); see `goal_rows`."""
+    """Return poses, shape (k, 4, 4), with the tolerances of a `PoseGoal` as rows, shape (k, 18); see `goal_rows`."""
     rows = np.tile(_row(POSE), (len(poses), 1))
     rows[:, :9] = poses[:, :3, :3].reshape(-1, 9)
     rows[:, 9:12] = poses[:, :3, 3]

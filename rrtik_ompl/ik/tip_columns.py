@@ -1,6 +1,7 @@
-"""Forward kinematics of many configurations number by number, several times faster than by 4 x 4 products.
+"""Forward kinematics of many configurations entry by entry, several times faster than by products of 4 x 4 matrices.
 
-A chain of joints is folded beforehand into fixed transforms between turns about z, whose zeros cost nothing.
+The chain is rewritten once so that every joint turns about (or slides along) the z axis, with fixed transforms between
+the joints. Entries of these that are 0, 1 or -1 need no multiplication.
 """
 
 from __future__ import annotations
@@ -15,19 +16,20 @@ from numpy.typing import NDArray
 from rrtik_ompl.model.robot import Robot
 
 Numbers = NDArray[np.float64]
-Entry: TypeAlias = Numbers | float  # of matrices for many configurations at once: a number where all have the same
-ROUNDING = 1e-15  # entries of rotations this near to -1, 0, 1 are meant to be that
+Entry: TypeAlias = Numbers | float  # an entry of many matrices: an array, or a number if it is the same in all
+ROUNDING = 1e-15  # Entries of rotations this near to -1, 0 or 1 are rounded to it.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TipColumns:
-    """The joints that move a frame, base first.
+    """The k joints that move a frame, base first.
 
     Attributes:
-        gain: Joint values = gain @ q + offset, shape (k, dof).
-        offset: See ``gain``, shape (k,).
-        fixed: Transform before each turn about z (or slide along it), the last one after all, shape (k + 1, 4, 4).
-        prismatic: Shape (k,).
+        gain: Factors of the joint values, which are gain @ q + offset; shape (k, dof).
+        offset: Offsets of the joint values, shape (k,).
+        fixed: Fixed transform before each joint, which turns about z or slides along it, and one after the last joint;
+            shape (k + 1, 4, 4).
+        prismatic: Whether each joint slides, shape (k,).
     """
 
     gain: Numbers
@@ -36,7 +38,14 @@ class TipColumns:
     prismatic: NDArray[np.bool_]
 
     def poses(self, q: Numbers) -> Numbers:
-        """Rotation columns x, y, z and position of the frame in the world for q of shape (dof, ...): (4, 3, ...)."""
+        """Compute the pose of the frame in the world for many configurations.
+
+        Args:
+            q: Configurations, joints in the first axis, shape (dof, ...).
+
+        Returns:
+            The columns x, y, z of the rotation and the position [m], shape (4, 3, ...).
+        """
         values = self._values(q)
         pose = [list(self.fixed[0][:3, column]) for column in range(4)]
 
@@ -54,7 +63,7 @@ class TipColumns:
         return np.stack([np.stack([np.broadcast_to(entry, q.shape[1:]) for entry in column]) for column in pose])
 
     def _values(self, q: Numbers) -> list[Numbers]:
-        """The values of the chain's joints for q, shape (dof, ...), each shape (...)."""
+        """Return the value of each joint of the chain for q, shape (dof, ...); each has shape (...)."""
         if np.array_equal(self.gain, np.eye(len(q))) and not self.offset.any():
             return list(q)
         return list(np.tensordot(self.gain, q, 1) + self.offset.reshape(-1, *(1,) * (q.ndim - 1)))
@@ -62,13 +71,19 @@ class TipColumns:
 
 @lru_cache(maxsize=64)
 def tip_columns(robot: Robot) -> TipColumns:
-    """The chain from the base to the robot's tip."""
+    """Return the chain from the base to the robot's tip."""
     target = robot.model.frames[robot.model.getFrameId(robot.tip)]
     return frame_columns(robot, int(target.parentJoint), target.placement.homogeneous)
 
 
 def frame_columns(robot: Robot, joint: int, placement: Numbers) -> TipColumns:
-    """The chain from the base to a frame, given by its joint's number (0: the world) and its pose in the joint's."""
+    """Return the chain from the base to a frame.
+
+    Args:
+        robot: The arm.
+        joint: Number of the joint that carries the frame; 0 is the world.
+        placement: Pose of the frame in that of the joint, shape (4, 4).
+    """
     chain = robot.chain
     rows = list[int]()
     row = joint - 1
@@ -88,7 +103,7 @@ def frame_columns(robot: Robot, joint: int, placement: Numbers) -> TipColumns:
 
 
 def _moved(pose: list[list[Entry]], fixed: Numbers) -> list[list[Entry]]:
-    """The pose followed by a fixed transform; terms with a factor 0 are left out."""
+    """Return a pose (columns x, y, z and position) times a fixed transform; terms with a factor 0 are left out."""
     return [
         [_sum([(pose[i][axis], fixed[i, j]) for i in range(3)] + [(pose[3][axis], fixed[3, j])]) for axis in range(3)]
         for j in range(4)
@@ -96,7 +111,7 @@ def _moved(pose: list[list[Entry]], fixed: Numbers) -> list[list[Entry]]:
 
 
 def _sum(terms: list[tuple[Entry, float]]) -> Entry:
-    """The sum of values times factors; factors of 0 and 1 or -1 take no multiplication."""
+    """Return the sum of values times factors; factors of 0, 1 and -1 take no multiplication."""
     total: Entry = 0.0
     for value, factor in terms:
         if factor == 0.0:
@@ -114,7 +129,7 @@ def _sum(terms: list[tuple[Entry, float]]) -> Entry:
 
 
 def _z_along(axis: Numbers) -> Numbers:
-    """A rotation, as a 4 x 4 matrix, that takes z to a unit axis; a signed permutation for the usual axes."""
+    """Return a rotation, as a 4 x 4 matrix, that takes z to a unit axis; a signed permutation for x, y and z."""
     x = np.cross(np.eye(3)[int(np.argmin(np.abs(axis)))], axis)
     x /= np.linalg.norm(x)
     matrix = np.eye(4)
@@ -123,6 +138,6 @@ def _z_along(axis: Numbers) -> Numbers:
 
 
 def _exact(matrix: Numbers) -> Numbers:
-    """The matrix with entries that are whole numbers but for rounding made so."""
+    """Return the matrix with entries rounded that are whole numbers up to rounding."""
     rounded = np.round(matrix)
     return np.where(np.abs(matrix - rounded) < ROUNDING, rounded, matrix)

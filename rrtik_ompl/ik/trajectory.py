@@ -1,4 +1,4 @@
-"""Inverse kinematics of a whole trajectory by one call: configurations that follow a row of poses or points."""
+"""Inverse kinematics of a whole trajectory by one call: configurations that follow a sequence of poses or points."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from rrtik_ompl.model.robot import Robot, inside_limits
 from rrtik_ompl.world.world import World, check_world
 
 SECONDS = 60.0
-SECONDS_A_POINT = 5.0  # to say why a point has no configuration
+SECONDS_A_POINT = 5.0  # longest time to find out why one point has no configuration [s]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -37,15 +37,19 @@ class IkTrajectory:
     """Configurations along a trajectory of k points.
 
     Attributes:
-        q: Shape (k, dof), inside the limits, free if a world was given; NaN where there is none.
-        residuals: Distance [m] and angle [rad] of each from its target by forward kinematics, shape (k, 2); NaN there.
-        reasons: Why a point has none, "" where there is one: ``unreachable``, ``limits``, ``collision``, ``time``.
-        detail: The first of these in a line; "" if there is none.
-        jumps: Points at which a joint moves farther than a jump, or that follow a point without a configuration.
-        blocked: Points to which the straight motion from the point before collides; empty if no world was given.
+        q: Configurations, shape (k, dof), inside the limits, and free if a world was given; rows of NaN for points
+            without a configuration.
+        residuals: Distance [m] and angle [rad] of each from its target by forward kinematics, shape (k, 2), or NaN.
+        reasons: For each point why it has no configuration, ``unreachable``, ``limits``, ``collision`` or ``time``; ""
+            if it has one.
+        detail: The first of these reasons in a line; "" if there is none.
+        jumps: Indices of points at which a joint moves farther than a jump, or that follow a point without a
+            configuration.
+        blocked: Indices of points to which the straight motion from the previous point collides; empty if no world was
+            given.
         method: The method that answered.
-        iterations: Generations of a genetic algorithm, steps of a numeric method, 0 of a closed form.
-        seconds: Time taken.
+        iterations: Generations of a genetic algorithm, steps of a numeric method, or 0 for a closed form.
+        seconds: Time taken [s].
     """
 
     q: Matrix
@@ -69,12 +73,12 @@ class IkTrajectory:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Task:
-    """One trajectory as the methods that follow it get it; see `solve_ik_trajectory`."""
+    """The checked arguments of `solve_ik_trajectory`, as the methods that follow a trajectory get them."""
 
     robot: Robot
     poses: Matrix
     targets: tuple[Target, ...]
-    goals: tuple[TipGoal, ...]  # the targets, with the freedom that is left to them
+    goals: tuple[TipGoal, ...]  # the targets, with a free rotation axis if one was given
     near: Vector | None
     world: World | None
     jump: float
@@ -83,12 +87,12 @@ class Task:
     budget: Budget
 
     def accept(self, Q: Matrix) -> Mask:
-        """Which configurations, shape (k, dof), are free of collision."""
+        """Check which configurations, shape (k, dof), are free of collision; shape (k,)."""
         return free_of_collision(self.world, Q)
 
 
 def list_ik_trajectory_methods() -> tuple[str, ...]:
-    """Names that `solve_ik_trajectory` takes as a method, beside "auto"."""
+    """Return the names that `solve_ik_trajectory` takes as a method, apart from "auto"."""
     return tuple(FOLLOWERS)
 
 
@@ -112,23 +116,23 @@ def solve_ik_trajectory(
     Args:
         robot: The arm.
         poses: T_world_tip, shape (k, 4, 4), or points [m] with any orientation, shape (k, 3).
-        method: "closed-form" (the shortest way through the branches), "genetic" (GA-REB), a numeric method that
-            follows several solutions side by side, or "auto": the closed form where it fits, else "numeric".
-        near: Posture before the first point, shape (dof,); any if None.
+        method: "closed-form" (the shortest path through the branches), "genetic" (GA-REB), "numeric" (follows several
+            solutions side by side), or "auto": the closed form where it fits, else "numeric".
+        near: Configuration before the first point, shape (dof,); any if None.
         world: If given, all configurations are free of collision. Its robot must be this one.
-        position_tolerance: Of every point [m].
-        orientation_tolerance: Of every pose [rad].
-        free_rotation_axis: "x", "y" or "z" of the tip about which every pose may be turned, as for a drill or a torch;
-            only "numeric" knows what to do with that.
-        jump: Motion of one joint between two points [rad or m] from which on it counts as a jump; the genetic
-            algorithm makes none.
-        options: Of the genetic algorithm, or the name of a preset: "standard", "historical", "refined".
-        seconds: Time that a method may take, the closed form aside.
-        seed: Of the random numbers.
+        position_tolerance: Largest distance from each point [m].
+        orientation_tolerance: Largest angle from each pose [rad].
+        free_rotation_axis: Axis of the tip, "x", "y" or "z", about which every pose may be turned, as for a drill or a
+            torch; only "numeric" supports it.
+        jump: Motion of one joint between two points [rad or m] above which it counts as a jump; the genetic algorithm
+            makes none.
+        options: Options of the genetic algorithm, or the name of a preset: "standard", "historical", "refined".
+        seconds: Time that a method may take [s]; the closed form is not limited.
+        seed: Seed of the random numbers.
 
     Raises:
         UnknownNameError: If there is no such method or preset.
-        InputError: If the method does not fit the robot, a pose is none, or an argument makes no sense.
+        InputError: If the method does not fit the robot, a matrix is no pose, or an argument is out of range.
     """
     check_world(world, robot)
     load_kernels(robot)
@@ -169,7 +173,7 @@ def solve_ik_trajectory(
 
 
 def _checked_poses(poses: ArrayLike) -> Matrix:
-    """The poses as an array, shape (k, 4, 4), or the points, shape (k, 3)."""
+    """Check poses or points and return them as an array, shape (k, 4, 4) or (k, 3)."""
     rows = finite_array(poses, (None, 4, 4) if dimensions(poses) == 3 else (None, 3), "poses")
     if len(rows) == 0:
         raise InputError("poses: a trajectory needs at least one point")
@@ -179,14 +183,14 @@ def _checked_poses(poses: ArrayLike) -> Matrix:
 
 
 def _target(row: Matrix, position_tolerance: float, orientation_tolerance: float) -> Target:
-    """The goal of one pose, shape (4, 4), or point, shape (3,)."""
+    """Return the goal for one pose, shape (4, 4), or point, shape (3,)."""
     if row.ndim == 1:
         return PositionGoal(row, position_tolerance)
     return PoseGoal(row, position_tolerance, orientation_tolerance)
 
 
 def _with_free_axis(targets: tuple[Target, ...], axis: FrameAxis | None) -> tuple[TipGoal, ...]:
-    """The targets, or goals that leave the turn about an axis of the tip free."""
+    """Return the targets, or goals that leave the rotation about an axis of the tip free."""
     if axis is None:
         return targets
     if not targets[0].oriented:
@@ -195,14 +199,14 @@ def _with_free_axis(targets: tuple[Target, ...], axis: FrameAxis | None) -> tupl
 
 
 def _options(options: GeneticOptions | GeneticPreset) -> GeneticOptions:
-    """The options themselves, or those of a preset."""
+    """Return the options themselves, or those of a preset."""
     if isinstance(options, GeneticOptions):
         return options
     return PRESETS[one_of(PRESETS, options, "preset of the genetic algorithm")]
 
 
 def _chosen_method(task: Task, method: TrajectoryIkMethod) -> TrajectoryIkMethod:
-    """The name of the method for a trajectory: the first that fits if it is "auto".
+    """Return the name of the method for a trajectory: the first that fits if ``method`` is "auto".
 
     Raises:
         UnknownNameError: If there is no such method.
@@ -226,7 +230,11 @@ def _chosen_method(task: Task, method: TrajectoryIkMethod) -> TrajectoryIkMethod
 
 
 def _closed_form(task: Task) -> tuple[Matrix, int]:
-    """The branches that lead on, and where no branch is exactly there, a posture within the tolerances."""
+    """Follow the branches of the closed form; where none reaches a point exactly, look for one within the tolerances.
+
+    Returns:
+        Configurations, shape (k, dof), NaN where there is none, and 0 iterations.
+    """
     q = np.array(follow(task.robot, task.poses, task.near, jump=task.jump, accept=task.accept).q)
     for k in np.flatnonzero(np.isnan(q[:, 0])):
         before = task.near if k == 0 or np.isnan(q[k - 1, 0]) else q[k - 1]
@@ -237,8 +245,12 @@ def _closed_form(task: Task) -> tuple[Matrix, int]:
 
 
 def _genetic(task: Task) -> tuple[Matrix, int]:
-    """Configurations of the points, shape (k, dof), NaN from where the run stopped, and its generations."""
-    quick = None if task.world is None else task.world.valid_batch  # the second opinion comes at the end
+    """Follow the points by the genetic algorithm.
+
+    Returns:
+        Configurations, shape (k, dof), NaN from the point where the run stopped, and the number of generations.
+    """
+    quick = None if task.world is None else task.world.valid_batch  # The independent check follows at the end.
     options = replace(task.options, largest_step=task.options.largest_step or task.jump)
     run = follow_targets(task.robot, task.targets, options, task.rng, accept=quick, near=task.near, budget=task.budget)
     q = np.full((len(task.targets), task.robot.dof), np.nan)
@@ -256,7 +268,16 @@ FOLLOWERS: Mapping[TrajectoryIkMethod, Callable[[Task], tuple[Matrix, int]]] = M
 
 
 def _keep_only_checked(task: Task, q: Matrix) -> Matrix:
-    """Residuals, shape (k, 2). Rows that are not at their target, inside the limits and free become NaN, in place."""
+    """Check all configurations by forward kinematics, limits and collision, and return their residuals.
+
+    Args:
+        task: The trajectory.
+        q: Configurations, shape (k, dof), changed in place: rows that fail a check become NaN, the others are clamped
+            to the limits.
+
+    Returns:
+        Distance [m] and angle [rad] from the targets, shape (k, 2), NaN where q is.
+    """
     residuals = np.full((len(q), 2), np.nan)
     for k in np.flatnonzero(~np.isnan(q[:, 0])):
         residuals[k] = np.ravel(task.goals[k].errors(task.robot, q[k : k + 1]))
@@ -270,10 +291,13 @@ def _keep_only_checked(task: Task, q: Matrix) -> Matrix:
 
 
 def _why(task: Task, name: TrajectoryIkMethod, q: Matrix) -> tuple[tuple[str, ...], str]:
-    """Reasons of all points, and the first of them in a line.
+    """Find out why points have no configuration, by solving for each of them alone while time is left.
 
-    A genetic algorithm knows nothing of the points after the one where it stopped; there and where the time is up the
-    reason is ``time``.
+    The genetic algorithm tries no point after the one where it stopped; for these, and once the time is up, the reason
+    is ``time``.
+
+    Returns:
+        A reason for each point, "" if it has a configuration, and the first reason in a line.
     """
     reasons = [""] * len(q)
     detail = ""
@@ -294,7 +318,7 @@ def _why(task: Task, name: TrajectoryIkMethod, q: Matrix) -> tuple[tuple[str, ..
 
 
 def _jumps(robot: Robot, q: Matrix, jump: float) -> tuple[int, ...]:
-    """Points after a jump, and points that follow a gap."""
+    """Return the indices of points after a jump or after a gap; points before the first configuration do not count."""
     is_solved = ~np.isnan(q[1:, 0])
     was_solved = ~np.isnan(q[:-1, 0])
     has_jumped = np.abs(joint_difference(robot, q[1:], q[:-1])).max(axis=1) > jump
@@ -303,7 +327,7 @@ def _jumps(robot: Robot, q: Matrix, jump: float) -> tuple[int, ...]:
 
 
 def _blocked(world: World | None, q: Matrix) -> tuple[int, ...]:
-    """Points to which the straight motion from the point before collides."""
+    """Return the indices of points to which the straight motion from the previous point collides."""
     solved_pairs = np.flatnonzero(~np.isnan(q[1:, 0]) & ~np.isnan(q[:-1, 0]))
     if world is None or len(solved_pairs) == 0:
         return ()

@@ -14,25 +14,26 @@ from rrtik_ompl.kernels.simd.library import Library, library
 from rrtik_ompl.model.goal import TipGoal
 from rrtik_ompl.model.robot import Robot
 
-STEPS = 60  # of one start
-AT_A_TIME = 4096  # goals in one call of a kernel, which nothing can interrupt
-PATIENCE = 5  # steps after which a start that has not come nearer is given up
+STEPS = 60  # largest number of steps of one start
+AT_A_TIME = 4096  # goals in one call of a kernel, which cannot be interrupted
+PATIENCE = 5  # number of steps after which a start that has come no nearer is given up
 
 
 def walk(
     robot: Robot, aims: Matrix, starts: Matrix, *, steps: int = STEPS, patience: int | None = None
 ) -> tuple[Matrix, Mask, int]:
-    """Walk from each start towards its goal inside the joint limits.
+    """Descend from each start towards its goal inside the joint limits.
 
     Args:
         robot: The arm.
-        aims: Goals, see `rrtik_ompl.ik.targets`, one for each start or one for all, shape (m, 18) or (1, 18).
-        starts: Shape (m, dof).
-        steps: At most.
-        patience: Steps after which a start that has not come nearer is given up; never if None.
+        aims: Goals, one for each start or one for all, shape (m, 18) or (1, 18), see `rrtik_ompl.ik.targets`.
+        starts: Configurations to start from, shape (m, dof).
+        steps: Largest number of steps.
+        patience: Number of steps after which a start that has come no nearer is given up; never if None.
 
     Returns:
-        Where the starts have led to, shape (m, dof), whether that is at the goal, shape (m,), and the most steps taken.
+        The last configuration of each start, shape (m, dof), whether it is at its goal, shape (m,), and the largest
+        number of steps that a start has taken.
     """
     patience = steps + 1 if patience is None else patience
     kernels = library(KERNELS)
@@ -46,9 +47,10 @@ def walk(
 
 
 def descend(robot: Robot, goal: TipGoal, starts: Matrix, *, iterations: int = STEPS) -> tuple[Matrix, int]:
-    """Where every start leads to in at most so many steps, at the goal or not: shape (m, dof), and the steps taken.
+    """Descend from each start towards a goal that has one member, such as a pose with a free rotation axis.
 
-    The goal has one member, such as a pose whose turn about an axis is free.
+    Returns:
+        The last configuration of each start, at the goal or not, shape (m, dof), and the number of steps taken.
     """
     Q, _, taken = walk(robot, goal_rows(goal), starts, steps=iterations)
     return Q, taken
@@ -58,13 +60,13 @@ class SearchOfOne:
     """`Search` for a single goal, by kernels, in memory that is kept between searches.
 
     Args:
-        kernels: The library.
-        limb: With seeds, see `rrtik_ompl.ik.kernel_tables`.
+        kernels: The library of kernels.
+        limb: The table of the arm with seeds, see `rrtik_ompl.ik.kernel_tables`.
         aim: The goal, shape (1, 18).
-        near: Posture inside the limits to start from, shape (dof,).
+        near: Configuration inside the limits to start from, shape (dof,).
 
     Attributes:
-        steps: Taken by all starts together.
+        steps: Number of steps taken by all starts together.
     """
 
     def __init__(self, kernels: Library, limb: LimbTable, aim: Matrix, near: Vector) -> None:
@@ -73,35 +75,36 @@ class SearchOfOne:
         self.steps = 0
         try:
             self._call = spare_calls(limb).pop()
-        except IndexError:  # none was made yet, or all are in use
+        except IndexError:  # There is no spare call: none was made yet, or all are in use.
             self._call = KernelCall(limb, aim, near[None], STEPS, PATIENCE, near[None], np.zeros(1, dtype=np.int64))
         else:
             self._call.begin(aim, near)
 
     def advance(self) -> Matrix:
-        """The next solution, shape (1, dof); of shape (0, dof) at the end of the starts."""
+        """Return the next solution, shape (1, dof), or shape (0, dof) if no starts are left."""
         solved = self._kernels.solve(self._limb.address, self._call.address)
         self.steps += self._call.steps
         return self._call.q[:solved].copy()
 
     def close(self) -> None:
-        """Leave the memory to the next search; this one has ended."""
+        """End this search and leave its memory to the next one."""
         spare_calls(self._limb).append(self._call)
 
 
 class Search:
-    """Solutions of many goals, one after the other for each: first from a posture, then from the seeds nearest to it.
+    """A search for solutions of many goals side by side, one solution after the other for each goal.
 
-    The same arguments give the same solutions, whatever else is solved in between.
+    Each goal is tried from the given configuration first, then from the seeds whose tips are nearest to the goal. The
+    solutions depend only on the arguments, not on the order in which goals are solved.
 
     Args:
         robot: The arm.
-        aims: Goals, see `rrtik_ompl.ik.targets`, shape (m, 18).
-        near: Posture to start from, shape (dof,) or (m, dof).
+        aims: Goals, shape (m, 18), see `rrtik_ompl.ik.targets`.
+        near: Configuration to start from, shape (dof,), or one for each goal, shape (m, dof).
 
     Attributes:
         q: The last solution of each goal, shape (m, dof).
-        steps: Taken by all starts together.
+        steps: Number of steps taken by all starts together.
     """
 
     def __init__(self, robot: Robot, aims: Matrix, near: ArrayLike) -> None:
@@ -109,25 +112,25 @@ class Search:
         self._aims = aims
         self._near = np.empty((len(aims), robot.dof))
         self._near[:] = robot.clamp(np.asarray(near))
-        self._num_starts = np.zeros(len(aims), dtype=np.int64)  # that each goal has tried
+        self._num_starts = np.zeros(len(aims), dtype=np.int64)  # number of starts that each goal has tried
         self.q: Matrix = self._near.copy()
         self.steps = 0
 
     def advance(self, rows: NDArray[np.int64]) -> Mask:
-        """Find the next solution of some goals.
+        """Find the next solution of some goals and write it to ``q``.
 
         Args:
-            rows: Numbers of the goals, shape (k,).
+            rows: Indices of the goals, shape (k,).
 
         Returns:
-            Which of them have one, shape (k,). A goal without one has come to the end of its starts, 513 of them.
+            Whether each of them has another solution, shape (k,). A goal without one has tried all of its 513 starts.
         """
         if len(rows) <= AT_A_TIME:
             return self._advance(rows)
         return np.concatenate([self._advance(rows[k : k + AT_A_TIME]) for k in range(0, len(rows), AT_A_TIME)])
 
     def _advance(self, rows: NDArray[np.int64]) -> Mask:
-        """As :meth:`advance`, in one call of the kernels."""
+        """Find the next solution of some goals as :meth:`advance` does, in one call of the kernel."""
         kernels = library(KERNELS)
         limb = seeded_limb_of(self._robot)
         if kernels is None or limb is None:
@@ -143,7 +146,7 @@ class Search:
         return call.reached
 
     def _advance_plainly(self, rows: NDArray[np.int64]) -> Mask:
-        """The same in numpy, all goals side by side."""
+        """Find the next solution of some goals as :meth:`advance` does, in numpy."""
         seeds = seeds_of(self._robot)
         reached = np.zeros(len(rows), dtype=bool)
         order = np.argsort(farness(self._robot, self._aims[rows], seeds.tips), axis=1, kind="stable")

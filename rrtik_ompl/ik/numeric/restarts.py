@@ -1,4 +1,4 @@
-"""Methods of `solve_ik` that walk from many starts: Levenberg-Marquardt, and any other walk, round after round."""
+"""Methods of `solve_ik` that descend from many starts: Levenberg-Marquardt, and any other descent, round by round."""
 
 from __future__ import annotations
 
@@ -19,17 +19,21 @@ from rrtik_ompl.kernels.simd.library import library
 from rrtik_ompl.model.goal import Target, TipGoal
 from rrtik_ompl.model.robot import Robot, inside_limits
 
-AT_ONCE = 32  # members of a goal, between two readings of the clock, when others have their turn
-STARTS = 32  # in one round
-MAX_ROUNDS = 16  # after which it gives up
-MEMBERS = 4  # of a region, that are searched once more to say why there is no solution
+AT_ONCE = 32  # members of a goal that are advanced between two readings of the clock
+STARTS = 32  # starts in one round
+MAX_ROUNDS = 16  # number of rounds after which a method gives up
+MEMBERS = 4  # members of a region that are searched once more to explain why there is no solution
 
-# From (robot, goal, starts of shape (m, dof)) to where each start has led to, shape (m, dof), and the steps taken.
+# A function of (robot, goal, starts of shape (m, dof)) that returns the last configuration of each start, shape
+# (m, dof), and the number of steps taken.
 Walk: TypeAlias = Callable[[Robot, Target, Matrix], tuple[Matrix, int]]
 
 
 def numeric(request: IkRequest) -> IkResponse:
-    """The method of `solve_ik`: solutions of many members of the goal side by side until one will do."""
+    """Solve a request by Levenberg-Marquardt: members of the goal are solved in groups until a solution is accepted.
+
+    Members whose solution was rejected go to the end of the queue and are continued from their next start.
+    """
     if request.all:
         return _many(request)
     aims = aims_of(request)
@@ -37,7 +41,7 @@ def numeric(request: IkRequest) -> IkResponse:
     limb = seeded_limb_of(request.robot)
     if len(aims) == 1 and kernels is not None and limb is not None:
         near = request.near
-        if near is not mid_range_configuration(request.robot):  # the default, which needs no clamping
+        if near is not mid_range_configuration(request.robot):  # The default is inside the limits.
             near = request.robot.clamp(near)
         return _alone(request, SearchOfOne(kernels, limb, aims, near))
 
@@ -59,7 +63,7 @@ def numeric(request: IkRequest) -> IkResponse:
 
 
 def _alone(request: IkRequest, search: SearchOfOne) -> IkResponse:
-    """The same for a goal of one member."""
+    """Solve for a goal of one member: one solution after the other until one is accepted."""
     found = [search.advance()]
     timed_out = request.budget.over()
     while not timed_out and len(found[-1]) and not request.accept(found[-1])[0]:
@@ -70,7 +74,7 @@ def _alone(request: IkRequest, search: SearchOfOne) -> IkResponse:
 
 
 def _many(request: IkRequest) -> IkResponse:
-    """Solutions from many random starts, as different as they come."""
+    """Collect solutions from `MAX_ROUNDS` rounds of random starts; the members of the goal take turns."""
     robot = request.robot
     steps = 0
     timed_out = False
@@ -92,7 +96,7 @@ def _many(request: IkRequest) -> IkResponse:
 
 
 def _answered(request: IkRequest, found: Matrix, steps: int, timed_out: bool) -> IkResponse:
-    """The response with what was found, shape (k, dof), or else with the posture that comes nearest."""
+    """Return the response with the configurations found, shape (k, dof), or else with the nearest configuration."""
     if len(found):
         return IkResponse(found, request.near, steps, timed_out)
     searched = not request.all and not timed_out
@@ -100,13 +104,15 @@ def _answered(request: IkRequest, found: Matrix, steps: int, timed_out: bool) ->
 
 
 def restarted(method: Walk, request: IkRequest, *, starts: int = STARTS, rounds: int = MAX_ROUNDS) -> IkResponse:
-    """Walk from the posture and from random ones, round after round until a solution will do.
+    """Solve a request by a method that descends from given starts, round by round until a solution is accepted.
+
+    The first start is the wanted configuration, the others are random; the targets take turns.
 
     Args:
-        method: What walks; what it leads to outside the joint limits is left out.
+        method: The method; results outside the joint limits are left out.
         request: The problem.
-        starts: In one round.
-        rounds: At most, but one for each target; these take turns.
+        starts: Number of starts in one round.
+        rounds: Largest number of rounds, but at least one for each target.
     """
     robot = request.robot
     found = np.zeros((0, robot.dof))
@@ -130,13 +136,13 @@ def restarted(method: Walk, request: IkRequest, *, starts: int = STARTS, rounds:
 
 
 def nearest_posture(request: IkRequest, *, searched: bool = False) -> Vector:
-    """The posture that comes nearest to the goal, for the reason of a failure, shape (dof,).
+    """Return the configuration that comes nearest to the goal, to explain a failure, shape (dof,).
 
-    It is one inside the limits if such a one reaches the goal; otherwise the joints may turn without limits.
+    It is one inside the limits if one of these reaches the goal; otherwise joints may turn beyond their limits.
 
     Args:
         request: The problem.
-        searched: Whether `Search` is known to find nothing inside the limits.
+        searched: Whether it is known that `Search` finds nothing inside the limits.
     """
     robot = request.robot
     aims = aims_of(request)
@@ -155,7 +161,7 @@ def nearest_posture(request: IkRequest, *, searched: bool = False) -> Vector:
 
 @lru_cache(maxsize=64)
 def _turning_freely(robot: Robot) -> Robot:
-    """The robot with a full turn to either side in place of its limits."""
+    """Return the robot with limits of a full turn to either side for all joints that turn."""
     turning = ~robot.prismatic
     return replace(
         robot,
@@ -165,7 +171,7 @@ def _turning_freely(robot: Robot) -> Robot:
 
 
 def aims_of(request: IkRequest) -> Matrix:
-    """Rows of the goal, see `rrtik_ompl.ik.targets`; of targets drawn from it if it has task-space regions."""
+    """Return the goal as rows, shape (k, 18), see `goal_rows`; for task-space regions those of the drawn targets."""
     if request.goal.has_regions:
         return np.vstack([goal_rows(target) for target in request.targets])
     return goal_rows(request.goal)
@@ -176,15 +182,15 @@ def numeric_ik(robot: Robot, goal: TipGoal, starts: Matrix, *, iterations: int =
 
     Args:
         robot: The arm.
-        goal: A pose, a position with any orientation, or a region of these; its members take turns.
-        starts: Shape (m, dof).
-        iterations: Steps at most.
+        goal: A pose, a position with any orientation, or a set of these, whose members take turns.
+        starts: Configurations to start from, shape (m, dof).
+        iterations: Largest number of steps.
 
     Returns:
         The rows that satisfy the goal, in the order of their starts, shape (k, dof), k <= m.
 
     Raises:
-        InputError: If the goal is a task-space region or has one: `rrtik_ompl.ik.numeric.projection` is for these.
+        InputError: If the goal is a task-space region or has one, for which `rrtik_ompl.ik.numeric.projection` is.
     """
     aims = goal_rows(goal)
     if len(aims) > 1:

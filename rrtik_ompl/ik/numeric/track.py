@@ -1,4 +1,4 @@
-"""A trajectory followed by numeric steps, from several solutions of its first point at once."""
+"""Numeric tracking of a trajectory, from several solutions of its first point side by side."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ from rrtik_ompl.ik.numeric.restarts import STARTS
 from rrtik_ompl.model.goal import TipGoal, joint_difference
 from rrtik_ompl.model.robot import Robot
 
-ROUNDS_PER_POINT = 4  # of random starts at a point that no motion leads to
-CARRIED = 8  # solutions that are followed side by side, those nearest to the posture before
+ROUNDS_PER_POINT = 4  # rounds of random starts at a point to which no motion leads
+CARRIED = 8  # number of solutions that are followed side by side, those nearest to the previous configuration
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tracker:
-    """One trajectory as numeric trackers get it.
+    """Follows one trajectory numerically.
 
     Attributes:
         robot: The arm.
-        targets: Of the points: poses, positions, or poses whose turn about an axis is free.
-        accept: Which of some configurations, shape (k, dof), will do.
-        jump: Motion of one joint between two points [rad or m] from which on it counts as a jump.
-        rng: Random numbers.
-        budget: How long it may take.
+        targets: Goals of the points: poses, positions, or poses with a free rotation axis.
+        accept: Checks which configurations, shape (k, dof), are acceptable; returns shape (k,).
+        jump: Motion of one joint between two points [rad or m] above which it counts as a jump.
+        rng: Source of random numbers.
+        budget: Time limit.
     """
 
     robot: Robot
@@ -41,10 +41,16 @@ class Tracker:
     budget: Budget
 
     def follow(self, near: Vector | None) -> tuple[Matrix, int]:
-        """Configurations of all points, shape (k, dof), NaN where none was found, and the steps taken.
+        """Follow the trajectory.
 
-        Solutions of the first point are carried on side by side; the one that comes farthest, with the least motion,
-        is taken. Where none can go on, the next point is solved afresh.
+        Solutions of the first point are continued side by side. Of those that come farthest, the one with the least
+        motion is taken. Where none can go on, the next point is solved from random starts again.
+
+        Args:
+            near: Configuration before the first point, shape (dof,), or None.
+
+        Returns:
+            Configurations of all points, shape (k, dof), NaN where none was found, and the number of steps taken.
         """
         q = np.full((len(self.targets), self.robot.dof), np.nan)
         point = 0
@@ -70,7 +76,15 @@ class Tracker:
         return q, steps
 
     def fresh(self, target: TipGoal, last: Vector | None) -> tuple[Matrix, int]:
-        """Different solutions of one point, at most `CARRIED`, nearest to the posture before first, and the steps."""
+        """Solve one point from random starts.
+
+        Args:
+            target: Goal of the point.
+            last: Configuration before it, shape (dof,), or None.
+
+        Returns:
+            At most `CARRIED` different solutions, nearest to ``last`` first, shape (k, dof), and the number of steps.
+        """
         steps = 0
         for number in range(ROUNDS_PER_POINT):
             starts = self.rng.uniform(*self.robot.finite_range(), (STARTS, self.robot.dof))
@@ -87,7 +101,17 @@ class Tracker:
         return Q[different], steps
 
     def carry(self, begun: Matrix, point: int) -> tuple[NDArray[np.float64], int]:
-        """Follow the trajectory from solutions of a point until none can go on; shape (points, survivors, dof)."""
+        """Follow the trajectory from solutions of a point until none can go on without a jump.
+
+        Each descent starts from the linear extrapolation of the last two configurations.
+
+        Args:
+            begun: Solutions of the point, shape (k, dof).
+            point: Index of the point.
+
+        Returns:
+            The tracks that came farthest, shape (points, tracks, dof), and the number of steps.
+        """
         tracks = begun[None]
         steps = 0
         for target in self.targets[point + 1 :]:
@@ -107,7 +131,7 @@ class Tracker:
         return tracks, steps
 
     def usable_rows(self, target: TipGoal, Q: Matrix) -> Matrix:
-        """The rows that are at the target and will do."""
+        """Return the rows of Q, shape (m, dof), that are at the target and accepted."""
         Q = Q[target.satisfied(self.robot, Q)]
         usable: Matrix = Q[self.accept(Q)]
         return usable
