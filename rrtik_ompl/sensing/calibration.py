@@ -1,4 +1,4 @@
-"""Intrinsics of a camera from photographs of a board, with the uncertainty of every number; its tone."""
+"""Calibrate the intrinsics and the tone of a camera from photographs of a board, with standard deviations."""
 
 from __future__ import annotations
 
@@ -21,21 +21,22 @@ from rrtik_ompl.sensing.sight import as_gray
 Board = cv2.aruco.CharucoBoard | Chessboard
 
 MIN_CORNERS, MIN_VIEWS = 8, 5
-TONE_VIEWS, TONE_LOOKS = 3, 12  # photographs in which the tone is looked at; markers, or pieces, that are enough
-MIN_TONE_SIDE = 20.0  # [pixels] of a marker, of a piece of a chessboard
+# Number of photographs used to estimate the tone, and the least number of markers or pieces in them.
+TONE_VIEWS, TONE_LOOKS = 3, 12
+MIN_TONE_SIDE = 20.0  # [pixels]; least side of a marker or a piece of a chessboard for this estimate
 MAX_VIEW_ERROR = 1.0  # [pixels]; a view with a larger error is blurred, bent or mismatched
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Calibration:
-    """A calibrated camera and how good it is.
+    """A calibrated camera, and the quality of the calibration.
 
     Attributes:
         camera: The camera.
-        sigmas: Standard deviations of fx, fy, cx, cy [pixels]; the camera has them, too. Shape (4,).
+        sigmas: Standard deviations of fx, fy, cx, cy [pixels], shape (4,); they are also part of the camera.
         error: Root mean square reprojection error over all views [pixels].
-        view_errors: Of each photograph; NaN where it was not used. Shape (m,).
-        unused: For each photograph, why it was not used; empty if it was.
+        view_errors: The same for each photograph, shape (m,); NaN where it was not used.
+        unused: For each photograph, why it was not used; "" if it was.
     """
 
     camera: Camera
@@ -46,15 +47,16 @@ class Calibration:
 
 
 def board_corners(gray: NDArray[np.uint8], board: Board) -> tuple[Matrix, Matrix]:
-    """Corners of a board in a grey picture: on the board [m], shape (k, 3), and their pixels, shape (k, 2)."""
+    """Return the corners of a board in a grey picture: positions on the board [m], (k, 3), and pixels, (k, 2)."""
     return board.corners(gray) if isinstance(board, Chessboard) else charuco_corners(gray, board)
 
 
 def calibrate(pictures: Sequence[NDArray[np.uint8]], board: Board) -> Calibration:
-    """Calibrate from photographs of one board (`detection.charuco_board`, `Chessboard`) under different angles.
+    """Calibrate a camera from photographs of one board, taken from different angles.
 
-    The third radial coefficient stays 0: with it the second one is not stable. The camera's tone is the median of
-    those with which the board's markers, or pieces of a chessboard, are most like the photographs.
+    The board is made by `detection.charuco_board` or `Chessboard`. The third radial coefficient stays 0, because the
+    second one is not stable together with it. The tone of the camera is the median over the tones with which the
+    board's markers, or the pieces of a chessboard, correlate best with the photographs.
 
     Raises:
         InputError: If the photographs differ in size, or fewer than five show the board well enough.
@@ -66,7 +68,10 @@ def calibrate(pictures: Sequence[NDArray[np.uint8]], board: Board) -> Calibratio
 def seen_boards(
     pictures: Sequence[NDArray[np.uint8]], board: Board
 ) -> tuple[list[NDArray[np.uint8]], list[tuple[Matrix, Matrix]]]:
-    """Photographs as grey values, and the corners of the board in each.
+    """Convert photographs to grey values, and find the corners of the board in each.
+
+    Returns:
+        The grey pictures, and for each the result of `board_corners`.
 
     Raises:
         InputError: If the photographs differ in size.
@@ -80,11 +85,11 @@ def seen_boards(
 def calibrate_by_corners(
     grays: Sequence[NDArray[np.uint8]], found: Sequence[tuple[Matrix, Matrix]], board: Board
 ) -> Calibration:
-    """As :func:`calibrate`, from what :func:`seen_boards` gives."""
+    """Calibrate as :func:`calibrate` does, from the results of :func:`seen_boards`."""
     unused = ["" if len(points) >= MIN_CORNERS else _too_few(len(points)) for points, _ in found]
     used = [k for k, reason in enumerate(unused) if not reason]
 
-    # The worst view is left out until all are good, one at a time: it spoils the errors of the others.
+    # Views are removed one at a time, the worst first, because a bad view also increases the errors of the others.
     result = None
     while len(used) >= MIN_VIEWS:
         result = _solve([found[k] for k in used], grays[0].shape)
@@ -117,7 +122,7 @@ def calibrate_by_corners(
 def _solve(views: Sequence[tuple[Matrix, Matrix]], shape: tuple[int, ...]) -> tuple[Any, ...]:
     points = [np.ascontiguousarray(p, dtype=np.float32) for p, _ in views]
     pixels = [np.ascontiguousarray(q, dtype=np.float32) for _, q in views]
-    solve: Any = cv2.calibrateCameraExtended  # its type requires first guesses where None is allowed
+    solve: Any = cv2.calibrateCameraExtended  # the stub of OpenCV does not allow None for the initial guesses
     solved: tuple[Any, ...] = solve(points, pixels, shape[::-1], None, None, flags=cv2.CALIB_FIX_K3)
     return solved
 
@@ -127,10 +132,10 @@ def _too_few(count: int) -> str:
 
 
 def _tone(views: Sequence[tuple[NDArray[np.uint8], Matrix]], board: Board) -> float | None:
-    """Median tone of a board's markers or pieces; None where too few are large and clear enough.
+    """Return the median tone of a board's markers or pieces; None if too few of them are large and clear.
 
     Args:
-        views: Photographs, and where the board's corners are in them.
+        views: Photographs, and the pixels of the board's corners in them, shape (k, 2).
         board: The board.
     """
     if isinstance(board, Chessboard):

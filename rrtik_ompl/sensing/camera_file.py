@@ -1,4 +1,4 @@
-"""A calibrated camera <-> its YAML file; files of OpenCV and ROS are read too."""
+"""Read and write calibrated cameras as YAML files; files of OpenCV and ROS can be read, too."""
 
 from __future__ import annotations
 
@@ -19,8 +19,9 @@ from rrtik_ompl.sensing.calibration import Calibration
 from rrtik_ompl.sensing.cameras.camera import Camera
 
 Pixels = Annotated[int, Field(strict=True, gt=0, le=100_000)]
-_STARTS, _TAG = ("%YAML:1", "<?xml"), "!!opencv-matrix"  # of what OpenCV writes; it writes %YAML 1.2 by now
-_MATRICES = ("camera_matrix", "Camera_Matrix", "cameraMatrix", "K", "M1")  # of its own samples
+# Beginnings of OpenCV's files, and a tag for newer ones, which begin with %YAML 1.2.
+_STARTS, _TAG = ("%YAML:1", "<?xml"), "!!opencv-matrix"
+_MATRICES = ("camera_matrix", "Camera_Matrix", "cameraMatrix", "K", "M1")  # keys in the files of OpenCV's samples
 _LENSES = ("distortion_coefficients", "Distortion_Coefficients", "distCoeffs", "dist_coeffs", "D", "D1")
 _WIDTHS, _HEIGHTS = ("image_width", "image_Width", "width"), ("image_height", "image_Height", "height")
 
@@ -47,7 +48,7 @@ class CameraEntry(Section):
     view_errors_px: Numbers | None = Field(None, description="of each photograph that was used")
 
     def build(self) -> Camera:
-        """The camera."""
+        """Return the camera."""
         matrix = [[self.fx, 0.0, self.cx], [0.0, self.fy, self.cy], [0.0, 0.0, 1.0]]
         doubts = (*(self.sigmas_px or (0.0,) * 4), *(*(self.distortion_sigmas or (0.0,) * 5), 0.0)[:5])
         lens = (*self.distortion, 0.0)[:5]
@@ -62,7 +63,7 @@ class CameraFile(Section):
 
 
 def load_camera(path: str | os.PathLike[str]) -> Camera:
-    """Read a camera file: one of ours, what OpenCV's tools write, or a camera_info file of ROS.
+    """Read a camera file: our own format, the files of OpenCV's tools, or a camera_info file of ROS.
 
     Raises:
         InputError: If the file cannot be used; one line with file, line, key, what was found and the remedy.
@@ -81,7 +82,7 @@ def load_camera(path: str | os.PathLike[str]) -> Camera:
 
 
 def save_camera(camera: Camera | Calibration, path: str | os.PathLike[str]) -> None:
-    """Write a camera, with the errors of its calibration if that is given.
+    """Write a camera; for a `Calibration`, its errors are written, too.
 
     Raises:
         InputError: If the file cannot be written.
@@ -108,7 +109,7 @@ def save_camera(camera: Camera | Calibration, path: str | os.PathLike[str]) -> N
 
 
 class MatrixEntry(Section):
-    """A matrix of ROS: its size, and its numbers row by row."""
+    """A matrix in ROS's format: its size, and its numbers row by row."""
 
     rows: int
     cols: int
@@ -116,7 +117,7 @@ class MatrixEntry(Section):
 
 
 class CameraInfo(Section):
-    """What ROS's camera_calibration writes."""
+    """A camera file written by ROS's camera_calibration."""
 
     image_width: Pixels
     image_height: Pixels
@@ -128,24 +129,24 @@ class CameraInfo(Section):
     projection_matrix: MatrixEntry | None = None
 
     def build(self) -> Camera:
-        """The camera; rectification and projection do not concern pictures as they are taken."""
+        """Return the camera; rectification and projection do not apply to raw pictures."""
         return _camera(self.camera_matrix.data, self.distortion_coefficients.data, self.image_width, self.image_height)
 
 
 def is_of_opencv(text: str) -> bool:
-    """Whether a file is one of OpenCV's storage."""
+    """Check whether the text of a file is in OpenCV's storage format."""
     return text.lstrip().startswith(_STARTS) or _TAG in text
 
 
 def camera_from_opencv(text: str, name: str) -> Camera:
-    """The camera of a file that OpenCV wrote.
+    """Return the camera of a file written by OpenCV.
 
     Args:
-        text: Of the file.
-        name: Of the file, for errors.
+        text: Text of the file.
+        name: Name of the file, for error messages.
 
     Raises:
-        InputError: If there is no camera with its picture's size in it, or one with another model of the lens.
+        InputError: If the file contains no camera with its picture size, or one with another lens model.
     """
     try:
         storage = cv2.FileStorage(text, cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY)
@@ -166,7 +167,7 @@ def camera_from_opencv(text: str, name: str) -> Camera:
 
 
 def camera_from_ros(document: YamlDocument) -> Camera:
-    """The camera of a camera_info file.
+    """Return the camera of a camera_info file.
 
     Raises:
         InputError: If it cannot be used; one line with file, line and key.
@@ -177,7 +178,7 @@ def camera_from_ros(document: YamlDocument) -> Camera:
 
 
 def is_of_ros(document: YamlDocument) -> bool:
-    """Whether a YAML file is a camera_info of ROS."""
+    """Check whether a YAML file is a camera_info file of ROS."""
     return isinstance(document.data, dict) and "camera_matrix" in document.data and "image_width" in document.data
 
 

@@ -1,4 +1,4 @@
-"""Depth pictures -> clouds of points."""
+"""Convert depth pictures to point clouds."""
 
 from __future__ import annotations
 
@@ -25,18 +25,18 @@ def cloud_from_depth(
     farthest: float = 10.0,
     every: int = 1,
 ) -> PointCloud:
-    """A cloud from a depth picture: a point for each pixel that has a depth.
+    """Return a point cloud with one point for each pixel that has a valid depth.
 
     Args:
-        depth: Shape (height, width), along the camera's axis; what is not finite, or not between ``nearest`` and
-            ``farthest``, was not seen.
-        camera: Its intrinsics, as :func:`rrtik_ompl.sensing.camera_file.load_camera` reads them.
-        pose: T_world_camera (x right, y down, z away from it); the camera's own frame if None.
-        radius: Of the ball that each point is [m].
+        depth: Depth along the camera's axis, shape (height, width). Values that are not finite, or not between
+            ``nearest`` and ``farthest``, are left out.
+        camera: Intrinsics of the camera, as :func:`rrtik_ompl.sensing.camera_file.load_camera` reads them.
+        pose: T_world_camera (x right, y down, z away from it); None for points in the camera frame.
+        radius: Radius of the ball that represents each point [m].
         scale: Metres per unit of the picture; 0.001 for millimetres.
-        nearest: See above [m].
-        farthest: See above [m].
-        every: Take every so many-th pixel along both axes.
+        nearest: Least valid depth [m].
+        farthest: Largest valid depth [m].
+        every: Use every n-th pixel along both axes.
 
     Raises:
         InputError: If the picture has another size than the camera's, a number makes no sense, or no pixel is left.

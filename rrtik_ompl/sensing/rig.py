@@ -1,8 +1,8 @@
-"""Two or more cameras that take pictures at the same time: what each sees of an object is joined to one pose.
+"""Two or more cameras that take pictures at the same time; their poses of an object are fused to one.
 
-Each camera's pose of an object comes with a covariance that is small across its view and large along it. Joined by the
-inverses of these, cameras that stand apart make up for what the others cannot tell: distance, and which of two poses of
-a single square is the right one. Cameras that contradict each other by more than what is stated are not joined.
+Each camera's pose has a covariance that is small across its line of sight and large along it. When the poses are
+weighted by the inverse covariances, cameras that are apart supply what the others cannot measure: distance, and which
+of two poses of a single square is correct. Poses that contradict each other by more than their covariances are refused.
 """
 
 from __future__ import annotations
@@ -24,9 +24,10 @@ from rrtik_ompl.sensing.markers.detection import SeenMarker
 from rrtik_ompl.sensing.markers.marker_map import MarkerMap
 from rrtik_ompl.sensing.sight import Sighting, as_gray, check_size, detect_objects
 
-MAX_CONTRADICTION = 5.0  # squared deviations for each number that the cameras both give; 1 is usual
-NEAREST = 0.01  # [m] before a camera that it can see
-ROUNDS = 4  # of Gauss-Newton: rotations are nearly vectors after one
+# Sum of squared normalised deviations per degree of freedom; 1 is usual.
+MAX_CONTRADICTION = 5.0
+NEAREST = 0.01  # [m]; least distance in front of a camera that can be seen
+ROUNDS = 4  # iterations of Gauss-Newton; after the first, rotations are small and nearly linear
 CONTRADICTION = (
     "the cameras contradict each other by {:.0f} times what is stated: check their focal lengths, the marker's side, "
     "and how they stand to each other"
@@ -35,16 +36,16 @@ CONTRADICTION = (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rig:
-    """Cameras that are fixed to each other.
+    """Cameras that are rigidly mounted to each other.
 
     Attributes:
         cameras: At least two.
-        poses: ``T_first_camera`` of each; the first one's is the identity.
-        position_sigma: Standard deviation of where the others are [m].
-        rotation_sigma: Of how they are turned [rad].
+        poses: ``T_first_camera`` of each; the first one is the identity.
+        position_sigma: Standard deviation of the positions of the others [m].
+        rotation_sigma: Standard deviation of their rotations [rad].
 
     Raises:
-        InputError: If there are fewer than two cameras, as many poses as cameras are not given, or one is none.
+        InputError: If there are fewer than two cameras, the numbers of cameras and poses differ, or one is invalid.
     """
 
     cameras: tuple[Camera, ...]
@@ -70,7 +71,7 @@ class Rig:
 
 
 def detect_in_rig(pictures: Sequence[NDArray[np.uint8]], rig: Rig, marker_map: MarkerMap) -> tuple[Sighting, ...]:
-    """The objects of a map that the cameras of a rig see, in the frame of the first one, in the order of the map.
+    """Detect the objects of a map with all cameras of a rig; poses are in the frame of the first camera.
 
     Args:
         pictures: One of each camera, taken at the same time.
@@ -78,8 +79,8 @@ def detect_in_rig(pictures: Sequence[NDArray[np.uint8]], rig: Rig, marker_map: M
         marker_map: The map of all objects.
 
     Returns:
-        An object that only one camera sees has the pose that this one gives. Markers are those that were seen, each
-        once; corners of what the first camera does not see are where it would see them.
+        The objects in the order of the map. An object seen by only one camera has the pose of this camera. Each marker
+        is listed once; corners not seen by the first camera are those that it would see.
 
     Raises:
         InputError: If there are not as many pictures as cameras, or one does not have its camera's size.
@@ -100,12 +101,16 @@ def detect_in_rig(pictures: Sequence[NDArray[np.uint8]], rig: Rig, marker_map: M
 
 
 def joined(sightings: Sequence[Sighting]) -> Sighting:
-    """One sighting of several of the same object, all in the same frame; what is refused counts only if all are."""
+    """Fuse several sightings of one object, in the same frame, to one.
+
+    Refused sightings are ignored unless all are refused. Where a camera has two possible poses, the combination with
+    the least contradiction is taken; the second best remains as the other pose if it is consistent, too.
+    """
     usable = [sighting for sighting in sightings if not sighting.refused]
     if len(usable) < 2:
         return (usable or list(sightings))[0]
 
-    # Each camera may leave two poses open: the combination that contradicts itself least is taken.
+    # Each camera may have two possible poses: take the combination with the least contradiction.
     fused = [_fuse(usable, poses) for poses in product(*(_branches(sighting) for sighting in usable))]
     pose = min(fused, key=lambda candidate: candidate.surprise)
 
@@ -127,9 +132,9 @@ def _branches(sight: Sighting) -> list[pin.SE3]:
 
 
 def _fuse(sightings: Sequence[Sighting], poses: Sequence[pin.SE3]) -> CornerPose:
-    """The pose that is nearest to some poses by their covariances, found by Gauss-Newton's steps.
+    """Return the weighted mean of poses, with their inverse covariances as weights, by Gauss-Newton iterations.
 
-    Its ``surprise`` says by how much they contradict each other.
+    Its ``surprise`` is the normalised sum of squared deviations; above 1, it scales the covariance up.
     """
     weights = [np.linalg.inv(sighting.pose.covariance) for sighting in sightings]
     covariance = np.linalg.inv(sum(weights))
@@ -148,13 +153,13 @@ def _fuse(sightings: Sequence[Sighting], poses: Sequence[pin.SE3]) -> CornerPose
 
 
 def _pose_difference(begin: pin.SE3, end: pin.SE3) -> Vector:
-    """From one pose to another: position, and a small rotation about the axes of the camera. Shape (6,)."""
+    """Return the change from one pose to another: translation, and rotation vector in the camera's axes, shape (6,)."""
     rotation: Matrix = end.rotation @ begin.rotation.T
     return np.concatenate([end.translation - begin.translation, pin.log3(rotation)])
 
 
 def _in_first(sight: Sighting, rig: Rig, number: int) -> Sighting:
-    """A sighting of one of the cameras in the frame of the first one."""
+    """Transform a sighting of one of the cameras to the frame of the first one; the rig's uncertainty is added."""
     if number == 0:
         return sight
 
@@ -178,7 +183,7 @@ def _in_first(sight: Sighting, rig: Rig, number: int) -> Sighting:
 
 
 def _marker_in_first(marker: SeenMarker, pose: CornerPose, sight: Sighting, rig: Rig) -> SeenMarker:
-    """A marker with its corners where the first camera of the rig would see them; in its corner what is behind it."""
+    """Return a marker with the corners that the first camera would see; zeros if any is not in front of it."""
     mounted_marker = next(candidate for candidate in sight.object.markers if candidate.number == marker.number)
     T = pose.T_camera_object
     corners = mounted_marker.corners @ T.rotation.T + T.translation

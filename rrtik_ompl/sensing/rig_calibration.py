@@ -1,4 +1,4 @@
-"""How cameras stand to each other, from pictures of one board that they took at the same times."""
+"""Calibrate the relative poses of cameras from pictures of one board that they took at the same times."""
 
 from __future__ import annotations
 
@@ -18,12 +18,19 @@ from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.markers.chessboard import Chessboard
 from rrtik_ompl.sensing.rig import Rig
 
-MIN_MOMENTS = 4  # in which both cameras see the board
-MAX_ERROR = 1.0  # [pixels] of the corners of all moments; a larger one means other times, or cameras that moved
+MIN_MOMENTS = 4  # least number of moments in which both cameras see the board
+# [pixels]; a larger error of the corners means that times differ, or that the cameras moved.
+MAX_ERROR = 1.0
 
 
 class Common(NamedTuple):
-    """Corners that two cameras saw at one time: on the board [m], shape (k, 3), and their pixels, (k, 2) each."""
+    """Corners seen by two cameras at one time.
+
+    Attributes:
+        points: On the board [m], shape (k, 3).
+        first: Their pixels in the first camera, shape (k, 2).
+        other: Their pixels in the other camera, shape (k, 2).
+    """
 
     points: NDArray[np.float32]
     first: NDArray[np.float32]
@@ -32,13 +39,13 @@ class Common(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RigCalibration:
-    """A calibrated rig and how good it is.
+    """A calibrated rig, and the quality of the calibration.
 
     Attributes:
-        rig: The rig, with what is not certain of its poses.
-        cameras: How each of its cameras was calibrated.
-        moments: In how many moments each but the first saw the board together with the first.
-        errors: Of each but the first: root mean square distance of corners from their pixels [pixels].
+        rig: The rig, with the standard deviations of its poses.
+        cameras: Calibration of each camera.
+        moments: For each camera but the first, the number of moments in which it saw the board together with the first.
+        errors: For each camera but the first, the root mean square reprojection error [pixels].
     """
 
     rig: Rig
@@ -48,19 +55,20 @@ class RigCalibration:
 
 
 def calibrate_rig(pictures: Sequence[Sequence[NDArray[np.uint8]]], board: Board) -> RigCalibration:
-    """Calibrate cameras and how they stand to each other, from pictures of a board.
+    """Calibrate cameras and their relative poses from pictures of a board.
 
-    Each camera is calibrated by all of its own pictures. Then its pose is that with which the corners that it and the
-    first camera saw at the same times lie best; how sure that is, is what moments contradict each other by: each is
-    left out once (the jackknife, [68]).
+    Each camera is calibrated from all of its own pictures. Its pose then minimises the reprojection error of the
+    corners that it and the first camera saw at the same times. The uncertainty of the pose follows from leaving out
+    each moment once (the jackknife, [68]).
 
     Args:
-        pictures: Of each camera, as many, in the order of the moments at which they were taken.
-        board: The board; a chessboard has an even number of squares along one side and an odd one along the other.
+        pictures: For each camera the same number of pictures, in the order of time.
+        board: The board; a chessboard must have an even number of squares along one side and an odd one along the
+            other.
 
     Raises:
-        InputError: If there are fewer than two cameras, other numbers of pictures, too few of them show the board, or
-            the cameras did not stand still to each other.
+        InputError: If there are fewer than two cameras, the numbers of pictures differ, too few of them show the board,
+            or the cameras moved relative to each other.
     """
     if len(pictures) < 2 or len({len(camera_pictures) for camera_pictures in pictures}) > 1:
         counts = ", ".join(str(len(camera_pictures)) for camera_pictures in pictures)
@@ -95,9 +103,11 @@ def calibrate_rig(pictures: Sequence[Sequence[NDArray[np.uint8]]], board: Board)
 def _relative_to_first(
     cameras: Sequence[Calibration], corners: Sequence[Sequence[tuple[Matrix, Matrix]]], number: int
 ) -> tuple[pin.SE3, int, float, Vector]:
-    """How a camera stands to the first one: its pose, in how many moments both saw the board, error and deviations.
+    """Calibrate the pose of a camera relative to the first one.
 
-    The last two are those of `_relative_pose`.
+    Returns:
+        The pose, the number of moments in which both saw the board, and error and standard deviations as of
+        `_relative_pose`.
     """
     common = [moment for pair in zip(corners[0], corners[number], strict=True) if (moment := _common_corners(*pair))]
     if len(common) < MIN_MOMENTS:
@@ -116,7 +126,7 @@ def _relative_to_first(
 
 
 def _common_corners(first: tuple[Matrix, Matrix], other: tuple[Matrix, Matrix]) -> Common | None:
-    """The corners that both saw; None if these are too few."""
+    """Return the corners that both cameras saw; None if there are too few."""
     index_of_point = {tuple(np.round(point, 6)): k for k, point in enumerate(other[0])}
     index_pairs = []
     for k, point in enumerate(first[0]):
@@ -133,7 +143,12 @@ def _common_corners(first: tuple[Matrix, Matrix], other: tuple[Matrix, Matrix]) 
 
 
 def _relative_pose(first: Camera, other: Camera, common: Sequence[Common]) -> tuple[pin.SE3, float, Vector]:
-    """``T_first_other``, the error [pixels], and standard deviations of its position [m] and rotation [rad]."""
+    """Calibrate the relative pose of two cameras.
+
+    Returns:
+        ``T_first_other``, the root mean square error [pixels], and the standard deviations of position [m] and rotation
+        [rad], shape (2,).
+    """
     pose, error = _stereo_calibrated(first, other, common)
     shifts = []
     for left_out in range(len(common)):
@@ -147,7 +162,7 @@ def _relative_pose(first: Camera, other: Camera, common: Sequence[Common]) -> tu
 
 
 def _stereo_calibrated(first: Camera, other: Camera, common: Sequence[Common]) -> tuple[pin.SE3, float]:
-    solve: Any = cv2.stereoCalibrate  # its type requires more where None is allowed
+    solve: Any = cv2.stereoCalibrate  # the stub of OpenCV requires arguments that may be None
     error, *_, rotation, translation, _, _ = solve(
         [moment.points for moment in common],
         [moment.first for moment in common],

@@ -1,4 +1,4 @@
-"""A rig of cameras <-> its YAML file, and the pictures that its cameras took at the same time."""
+"""Read and write rigs of cameras as YAML files, and read pictures that their cameras took at the same time."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from rrtik_ompl.sensing.camera_file import load_camera, save_camera
 from rrtik_ompl.sensing.cameras.pictures import Picture, pictures_from
 from rrtik_ompl.sensing.rig import Rig
 
-MAX_APART = 0.02  # [s] between pictures of one moment; a thing at 0.1 m/s goes 2 mm in that time
+MAX_APART = 0.02  # [s]; largest time difference within one moment; an object at 0.1 m/s moves 2 mm in this time
 
 
 class RigCameraEntry(Section):
@@ -31,7 +31,7 @@ class RigCameraEntry(Section):
     pose: PoseEntry | None = Field(None, description="in the frame of the first camera; left out for that one")
 
     def build(self) -> pin.SE3:
-        """Its pose."""
+        """Return its pose."""
         return pin.SE3.Identity() if self.pose is None else self.pose.build()
 
 
@@ -69,7 +69,7 @@ def load_rig(path: str | os.PathLike[str]) -> Rig:
 
 
 def save_rig(rig: Rig, path: str | os.PathLike[str]) -> list[Path]:
-    """Write a rig, and its cameras into files beside it: of ``rig.yaml`` they are ``rig_1.yaml`` and so on.
+    """Write a rig, and its cameras to files beside it: for ``rig.yaml`` these are ``rig_1.yaml`` and so on.
 
     Returns:
         The files of the cameras.
@@ -94,9 +94,9 @@ def save_rig(rig: Rig, path: str | os.PathLike[str]) -> list[Path]:
 
 
 def pictures_together(sources: Sequence[str]) -> Iterator[tuple[Picture, ...]]:
-    """One picture of each source at a time, as `pictures_from` gives them: folders by order, films by their times.
+    """Yield one picture of each source at a time; folders are matched by order, films by time.
 
-    Camera devices are read one after the other; only cameras that are triggered together see the same moment.
+    Camera devices are read one after the other; only cameras with a common trigger see the same moment.
 
     Raises:
         InputError: If a source ends before the others, or its pictures are of other times.

@@ -1,4 +1,4 @@
-"""Pictures of a camera as a feed of `replan`: a scene for each picture, all with the same obstacles."""
+"""Convert pictures of a camera to a feed for `replan`: one scene for each picture, all with the same obstacles."""
 
 from __future__ import annotations
 
@@ -16,17 +16,18 @@ REMEDY = "show every object of the marker map, or give the scene that holds it"
 
 
 def scene_feed(pictures: Iterable[Picture], sensor: Sensor, scene: Scene | None = None) -> Iterator[Snapshot]:
-    """Pairs of a time and a scene, as :func:`rrtik_ompl.replan` takes them; a live camera sets the pace of the run.
+    """Yield a snapshot of time and scene for each picture, as :func:`rrtik_ompl.replan` takes them.
 
-    Pictures are passed over until every object of the marker map has been seen once, for nobody knows where the others
-    are. From then on an object that is out of view, or cannot be placed, stays where it was seen last, and the snapshot
-    says for how long it has been unseen. Obstacles that no camera looks for are at rest.
+    Pictures are skipped until every object of the marker map has been seen once, because the places of the others are
+    unknown until then. From then on, an object that is out of view, or cannot be located, stays at its last pose, and
+    the snapshot says for how long it has been unseen. Obstacles that are not tracked by the camera are at rest. A live
+    camera sets the pace of the run.
 
     Args:
-        pictures: In the order of time, such as ``pictures_from(source)``. The first that is used has the time 0.
+        pictures: In the order of time, such as ``pictures_from(source)``. The first one that is used has the time 0.
         sensor: Detects the objects.
-        scene: Further obstacles, none if None. An obstacle with the name of an object of the map has the pose that is
-            given here until that object is seen.
+        scene: Further obstacles; None for none. An obstacle with the name of an object of the map defines the object's
+            pose until the object is seen.
 
     Raises:
         InputError: If the pictures end before everything was seen; it names what was not. If a picture cannot be used.
@@ -44,7 +45,7 @@ def scene_feed(pictures: Iterable[Picture], sensor: Sensor, scene: Scene | None 
 
     begin = None
     why = ""
-    last = dict[str, float]()  # when each was seen
+    last = dict[str, float]()  # time at which each was seen last
 
     for picture in pictures:
         view = sensor.view(picture)
@@ -66,6 +67,6 @@ def scene_feed(pictures: Iterable[Picture], sensor: Sensor, scene: Scene | None 
 
 
 def _at_rest(obstacle: Obstacle, seen: list[str]) -> Obstacle:
-    """An obstacle that states to be at rest if no camera looks for it and it states no motion."""
+    """Return an obstacle with zero velocity, unless it is tracked by the camera or already has a motion."""
     known = obstacle.name in seen or obstacle.motion is not None
     return obstacle if known else replace(obstacle, motion=ConstantVelocity([0.0, 0.0, 0.0]))

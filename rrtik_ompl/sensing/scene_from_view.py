@@ -1,7 +1,8 @@
-"""Detected objects in the frame of the arm's base: their solids as a scene, the approach to a grasp as the goal.
+"""Transform detected objects to the base frame, and make scenes of their solids and goals of their grasps.
 
-Source: [1, ch. 4]: ``T_camera_tip = T_camera_mount T_mount_base T_base_tip(q)``. Where the base is known from its mount
-(the camera moves with the arm), only the pose of the target is noisy; with a marker on the base, that of the arm too.
+Source: [1, ch. 4]: ``T_camera_tip = T_camera_mount T_mount_base T_base_tip(q)``. If the pose of the camera is known
+from its mount (it moves with the arm), only the pose of the object is noisy; with a marker on the base, that of the arm
+is noisy, too.
 """
 
 from __future__ import annotations
@@ -26,19 +27,19 @@ from rrtik_ompl.sensing.markers.marker_map import MarkedObject, MarkerMap
 from rrtik_ompl.sensing.sight import Sighting, detect_objects
 from rrtik_ompl.world.problem import Problem
 
-SIGMAS = 3.0  # standard deviations of an obstacle's position that its margin covers
+SIGMAS = 3.0  # number of standard deviations of an obstacle's position that its margin covers
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SeenObject:
-    """An object in the frame of the arm's base.
+    """A detected object in the base frame of the arm.
 
     Attributes:
-        object: Which one.
+        object: The object of the marker map.
         T_base_object: Its pose.
-        covariance: Of (position [m], small rotation about the axes of the base [rad]). Shape (6, 6).
-        sighting: Its detection; None if the pose is that of a record.
-        sigmas: How many standard deviations of its place the margins of its solids cover; 0 for no margins.
+        covariance: Covariance of (position [m], small rotation about the axes of the base [rad]), shape (6, 6).
+        sighting: Its detection; None if the pose comes from a record.
+        sigmas: Number of standard deviations of its pose that the margins of its solids cover; 0 for no margins.
     """
 
     object: MarkedObject
@@ -66,24 +67,24 @@ class SeenObject:
         return _largest_sigma(self.covariance[3:, 3:])
 
     def margin(self, solid: Obstacle) -> float:
-        """How far a point of one of its solids may be from where it seems to be [m].
+        """Return how far a point of one of its solids may be from its estimated place [m].
 
-        ``sigmas`` times the deviation of the position and that of the rotation at the lever arm of the solid's farthest
-        point, which is no less than that of any point along any direction, however the two are correlated. Only small
-        errors are covered: not the second pose of a single marker, nor a map that is wrong. Of a half-space the point
-        that is nearest to the object counts, for it has no farthest one.
+        This is ``sigmas`` times the standard deviation of the position, plus that of the rotation multiplied by the
+        lever arm of the solid's farthest point. The sum bounds the deviation of any point in any direction, however the
+        two are correlated. Only small errors are covered: not the second pose of a single marker, nor a wrong map. A
+        half-space has no farthest point, so its distance from the object's origin is used.
         """
         return self.sigmas * (self.position_sigma + _lever(solid) * self.rotation_sigma)
 
     def solids(self) -> tuple[Obstacle, ...]:
-        """Its solids as obstacles in the frame of the base, named after it, with what is uncertain as their margins."""
+        """Return its solids as obstacles in the base frame, named after it, with its uncertainty in their margins."""
         return tuple(
             Obstacle(name, each.shape, self.T_base_object * each.pose, margin=each.margin + self.margin(each))
             for name, each in zip(self.object.solid_names, self.object.solids, strict=True)
         )
 
     def grasp_pose(self, kind: str, level: int) -> pin.SE3:
-        """``T_base_tip`` of a grasp.
+        """Return ``T_base_tip`` of a grasp; levels count from 0.
 
         Raises:
             UnknownNameError: If the object has no such grasp type.
@@ -95,7 +96,7 @@ class SeenObject:
 def objects_in_base(
     sightings: tuple[Sighting, ...], marker_map: MarkerMap, *, sigmas: float = SIGMAS
 ) -> tuple[SeenObject, ...]:
-    """All objects with a pose that can be used, in the frame of the arm's base; the base itself is left out.
+    """Return all objects with a usable pose in the base frame; the base itself and the arm are left out.
 
     Args:
         sightings: Detected objects.
@@ -117,13 +118,13 @@ def objects_in_base(
 def scene_from_image(
     picture: NDArray[np.uint8], camera: Camera, marker_map: MarkerMap, *, sigmas: float = SIGMAS
 ) -> Scene:
-    """The scene that a picture shows: the solids of every target and obstacle in view, in the frame of the base.
+    """Return the scene in a picture: the solids of every target and obstacle in view, in the base frame.
 
     Args:
         picture: Shape (height, width) or (height, width, 3), 8 bits.
-        camera: Of the picture.
+        camera: Camera of the picture.
         marker_map: The map of all objects.
-        sigmas: How many standard deviations of where they are the margins cover.
+        sigmas: Number of standard deviations of their poses that the margins cover.
 
     Raises:
         NoBaseError: If the pose of the base is not known.
@@ -134,7 +135,7 @@ def scene_from_image(
 
 
 def scene_with(scene: Scene, solids: Iterable[Obstacle]) -> Scene:
-    """A scene with more solids, which take the place of those of the same names."""
+    """Return a scene with further solids, which replace those of the same names."""
     more = tuple(solids)
     names = {solid.name for solid in more}
     other_obstacles = tuple(obstacle for obstacle in scene.obstacles if obstacle.name not in names)
@@ -142,21 +143,21 @@ def scene_with(scene: Scene, solids: Iterable[Obstacle]) -> Scene:
 
 
 def grasp_problem(problem: Problem, seen: Iterable[SeenObject], name: str, kind: str, level: int) -> Problem:
-    """From the start of a problem to where the approach to a grasp of a seen object begins.
+    """Return the problem of moving from a given start to the approach pose of a grasp of a detected object.
 
-    From there the tip goes straight along its own z axis, by the ``approach`` of the grasp type; that is not part of
-    the problem, so nothing may touch the object along the path. Solids of detected objects have their margins.
+    From there the tip moves straight along its own z axis, by the ``approach`` of the grasp type. This motion is not
+    part of the problem, so nothing may touch the object along the path. Solids of detected objects have their margins.
 
     Args:
         problem: Its robot, start and scene are kept.
-        seen: Objects in the frame of the base.
-        name: Of the object to be grasped.
+        seen: Objects in the base frame.
+        name: Name of the object to be grasped.
         kind: Grasp type.
-        level: From 1.
+        level: Number of the level, from 1.
 
     Raises:
         InputError: If the object was not seen, or has no such grasp.
-        ProblemError: If the start touches something.
+        ProblemError: If the start is in collision.
     """
     objects = tuple(seen)
     target = next((object_seen for object_seen in objects if object_seen.object.name == name), None)
@@ -177,11 +178,11 @@ def grasp_problem(problem: Problem, seen: Iterable[SeenObject], name: str, kind:
 
 
 class NoBaseError(InputError):
-    """The base of the arm is not in view, so that nothing can be said in its frame."""
+    """The base of the arm is not in view, so that no poses can be given in its frame."""
 
 
 def base_from_camera(marker_map: MarkerMap, sightings: tuple[Sighting, ...]) -> tuple[pin.SE3, Matrix]:
-    """``T_base_camera`` and the covariance of the base's pose in the frame of the camera.
+    """Return ``T_base_camera``, and the covariance of the base's pose in the camera frame, shape (6, 6).
 
     Raises:
         NoBaseError: If the base has markers and none of them is in view, or its pose is refused.
@@ -199,7 +200,7 @@ def base_from_camera(marker_map: MarkerMap, sightings: tuple[Sighting, ...]) -> 
 
 
 def tip_seen(marker_map: MarkerMap, sightings: tuple[Sighting, ...]) -> tuple[pin.SE3, Matrix] | None:
-    """``T_base_tip`` and its covariance by a marker on the arm; None without one in view, or without the base."""
+    """Return ``T_base_tip`` and its covariance, (6, 6), from a marker on the arm; None without one or the base."""
     try:
         T_base_camera, spread = base_from_camera(marker_map, sightings)
     except NoBaseError:
@@ -209,9 +210,9 @@ def tip_seen(marker_map: MarkerMap, sightings: tuple[Sighting, ...]) -> tuple[pi
 
 
 def place_in_base(T_base_camera: pin.SE3, base_covariance: Matrix, sight: Sighting) -> tuple[pin.SE3, Matrix]:
-    """``T_base_object`` and its covariance: position [m] and small rotation [rad] in the axes of the base, (6, 6).
+    """Return ``T_base_object``, and the covariance of position [m] and rotation [rad] in the axes of the base, (6, 6).
 
-    The error of the base's rotation counts with the distance between base and object as its lever arm.
+    The rotation error of the base contributes with the distance between base and object as its lever arm.
     """
     pose = T_base_camera * sight.pose.T_camera_object
     turn = T_base_camera.rotation
@@ -227,7 +228,7 @@ def place_in_base(T_base_camera: pin.SE3, base_covariance: Matrix, sight: Sighti
 
 
 def checked_sigmas(value: float) -> float:
-    """A number of standard deviations.
+    """Check a number of standard deviations, and return it as ``float``.
 
     Raises:
         InputError: If it is not finite, or negative.
@@ -239,7 +240,7 @@ def checked_sigmas(value: float) -> float:
 
 
 def _lever(solid: Obstacle) -> float:
-    """How far from the origin of the object the point of a solid is that moves most when it turns [m]."""
+    """Return the distance from the object's origin to the point of a solid that moves most under rotation [m]."""
     if isinstance(solid.shape, HalfSpace):
         normal = solid.pose.rotation @ solid.shape.normal
         return abs(float(solid.shape.offset + normal @ solid.pose.translation))

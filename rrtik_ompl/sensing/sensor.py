@@ -1,4 +1,4 @@
-"""A camera over time: pictures in, tracked objects in the frame of the arm's base out."""
+"""A camera over time: it takes pictures, and returns tracked objects in the base frame of the arm."""
 
 from __future__ import annotations
 
@@ -25,7 +25,9 @@ from rrtik_ompl.sensing.scene_from_view import SIGMAS, NoBaseError, SeenObject, 
 from rrtik_ompl.sensing.sight import Sighting, as_gray, check_size, detect_objects
 from rrtik_ompl.sensing.tracker import PoseTracker
 
-WHOLE_EVERY = 4  # pictures: in between, markers are searched for where they were, unless one of them has gone
+# Every n-th picture is searched as a whole. In between, markers are searched near their last places, unless one of
+# them has disappeared.
+WHOLE_EVERY = 4
 GOOD, DOUBTFUL, REFUSED = (80, 200, 60), (0, 170, 255), (60, 60, 230)  # blue, green, red
 AXES = ((0, 0, 255), (0, 200, 0), (255, 80, 0))  # x red, y green, z blue
 
@@ -36,10 +38,10 @@ class View:
 
     Attributes:
         picture: The picture.
-        camera: Of the picture.
-        seen: Every object of which a marker is in view, its pose smoothed over the pictures before.
-        placed: Those with a usable pose, in the frame of the base.
-        why_not_placed: Why there are none, if there is no base.
+        camera: Camera of the picture.
+        seen: Every object with a marker in view; its pose is smoothed over the previous pictures.
+        placed: Those with a usable pose, in the base frame.
+        why_not_placed: Why there are none, if the base is unknown; "" otherwise.
     """
 
     picture: Picture
@@ -49,7 +51,7 @@ class View:
     why_not_placed: str = ""
 
     def scene(self) -> Scene:
-        """The solids of all placed objects.
+        """Return the solids of all located objects.
 
         Raises:
             NoBaseError: If the pose of the base is not known.
@@ -57,7 +59,7 @@ class View:
         return Scene(tuple(solid for each in self.usable() for solid in each.solids()))
 
     def usable(self) -> tuple[SeenObject, ...]:
-        """All placed objects.
+        """Return all located objects.
 
         Raises:
             NoBaseError: If the pose of the base is not known.
@@ -75,13 +77,13 @@ class View:
         write_picture(annotated(self.picture.pixels, self.camera, self.seen), path)
 
     def lines(self) -> list[str]:
-        """One line an object, for a person."""
+        """Return one line for each object, for a person."""
         if not self.seen:
             return [f"{self.picture.name}: no marker of the map in view"]
         return [f"{self.picture.name}: {_line(each, self._place(each))}" for each in self.seen]
 
     def document(self) -> dict[str, Any]:
-        """Everything as plain values; metres, radians, quaternions x, y, z, w."""
+        """Return the objects as plain values; metres, radians, quaternions x, y, z, w."""
         objects = [_data(each, self._place(each)) for each in self.seen]
         return {"picture": self.picture.name, "time": self.picture.time, "objects": objects}
 
@@ -90,18 +92,19 @@ class View:
 
 
 class Sensor:
-    """Detects and tracks objects in one picture after the other."""
+    """Detect and track objects in a sequence of pictures."""
 
     def __init__(
         self, camera: Camera | Rig, marker_map: MarkerMap, *, smooth: bool = True, sigmas: float = SIGMAS
     ) -> None:
-        """Begin without objects.
+        """Start without objects.
 
         Args:
-            camera: Of the pictures; or several that take theirs at the same time, with poses in the frame of the first.
+            camera: Camera of the pictures; or a rig of several that take pictures at the same time, whose poses are in
+                the frame of the first.
             marker_map: The map of all objects.
-            smooth: Smooth poses over time and leave out outliers.
-            sigmas: How many standard deviations of their places the margins of obstacles cover; 0 for no margins.
+            smooth: Whether to smooth poses over time and reject outliers.
+            sigmas: Number of standard deviations of their poses that the margins of obstacles cover; 0 for no margins.
 
         Raises:
             InputError: If ``sigmas`` is not 0 or more.
@@ -114,19 +117,19 @@ class Sensor:
         self._sigmas = checked_sigmas(sigmas)
         self._trackers = {each.name: PoseTracker() for each in marker_map.objects} if smooth else {}
         self._before: tuple[Sighting, ...] = ()
-        self._count = 0  # of pictures
-        self._blank: NDArray[np.uint8] | None = None  # the last picture in which nothing was found
+        self._count = 0  # number of pictures so far
+        self._blank: NDArray[np.uint8] | None = None  # last picture without any marker of the map
 
     def view(self, picture: Picture, *others: Picture) -> View:
-        """The objects in a picture, which is later than the one before.
+        """Return the objects in a picture, which must be later than the previous one.
 
         Args:
-            picture: Of the camera, or of the first one.
-            others: Of the other cameras, taken at the same time.
+            picture: Picture of the camera, or of the first one.
+            others: Pictures of the other cameras, taken at the same time.
 
         Raises:
-            InputError: If there are not as many pictures as cameras, one does not have its camera's size, or times go
-                backwards.
+            InputError: If the numbers of pictures and cameras differ, a picture does not have its camera's size, or
+                times go backwards.
         """
         detected = self._detected(picture, others)
         self._before = detected if self._trackers else ()
@@ -156,9 +159,9 @@ class Sensor:
         return detect_objects(picture.pixels, self.camera, self.marker_map, before=self._before, near=near)
 
     def why_nothing(self, source: str) -> str:
-        """One line on why no object was seen in the last picture without one, with a remedy.
+        """Return one line on why no object was found in the last picture without one, with a remedy.
 
-        Searches for markers of all dictionaries, which takes as long as dozens of pictures.
+        Markers of all dictionaries are searched, which takes as long as dozens of pictures.
         """
         if self._blank is None:
             return f"{source}: markers of the map are in view, but none that says where the arm's base is"
@@ -186,7 +189,7 @@ class Sensor:
         first = (pose.T_camera_object, pose.error)
         second = (pose.other, pose.other_error)
         chosen, other = (second, first) if tracked.other_branch else (first, second)
-        if tracked.sure:  # by this picture or those before it
+        if tracked.sure:  # the ambiguity is resolved by this picture or earlier ones
             other = (None, np.inf)
 
         pose = CornerPose(tracked.T_camera_object, other[0], chosen[1], other[1], tracked.covariance)
@@ -235,13 +238,13 @@ def _pose_and_frame(sight: Sighting, place: SeenObject | None) -> tuple[pin.SE3,
 def annotated(
     picture: NDArray[np.uint8], camera: Camera, sightings: Sequence[Sighting], axis_length: float = 0.06
 ) -> NDArray[np.uint8]:
-    """A copy of a picture with every detected object. Shape (height, width, 3).
+    """Return a copy of a picture with every detected object drawn in, shape (height, width, 3).
 
     Args:
         picture: Shape (height, width) or (height, width, 3).
-        camera: Of the picture.
+        camera: Camera of the picture.
         sightings: From `detect_objects`.
-        axis_length: Of the drawn frames [m].
+        axis_length: Length of the drawn axes [m].
     """
     drawn: Any = np.array(picture if picture.ndim == 3 else cv2.cvtColor(picture, cv2.COLOR_GRAY2BGR))
     for each in sightings:
@@ -275,7 +278,7 @@ def _draw_axes(drawn: NDArray[np.uint8], camera: Camera, sight: Sighting, length
 
 
 def _write(drawn: NDArray[np.uint8], text: str, corners: NDArray[np.float64], colour: tuple[int, int, int]) -> None:
-    """A caption below the markers, inside the picture, on a dark ground."""
+    """Write a caption below the markers, within the picture, on a dark background."""
     height, width = drawn.shape[:2]
     (wide, high), below = cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, 0.5, 1)
     x = int(np.clip(corners[:, 0].min(), 2, max(width - wide - 4, 2)))

@@ -1,4 +1,4 @@
-"""From a picture to the poses of objects, each with its quality; an unreliable pose is refused with a reason."""
+"""Compute the poses of objects in a picture, each with its quality; unreliable poses are refused with a reason."""
 
 from __future__ import annotations
 
@@ -25,12 +25,15 @@ from rrtik_ompl.sensing.markers.corner_pose import (
 from rrtik_ompl.sensing.markers.detection import SeenMarker, find_markers
 from rrtik_ompl.sensing.markers.marker_map import MarkedObject, MarkerMap, MountedMarker
 
-MIN_SIDE_PIXELS = 12.0  # two a cell of the coarsest dictionaries
-MAX_REPROJECTION_ERROR = 2.0  # [pixels] of a corner; a larger one means a wrong map or a wrong number
-MAX_BENT = 0.04  # the same as a share of a single marker's side: sheets that are bent deviate by as much, and say so
+MIN_SIDE_PIXELS = 12.0  # two pixels for each cell of the coarsest dictionaries
+MAX_REPROJECTION_ERROR = 2.0  # [pixels]; a larger error of the corners means a wrong map or a wrong number
+# The same as a share of a single marker's side: bent sheets deviate by this much, and their covariance shows it.
+MAX_BENT = 0.04
 
-MAX_CONTRADICTION = 5.0  # `surprise` of markers together; wrong sides by 0.5 % make 6 to 40, right ones 0.2 to 1
-MAX_STRAIN = 9.0  # three standard deviations of the focal length, or of the lens, against what the file says
+# Largest `surprise` of several markers; sides that are wrong by 0.5 % give 6 to 40, correct ones 0.2 to 1.
+MAX_CONTRADICTION = 5.0
+# Largest `strain`: three standard deviations between the focal length or the distortion and the camera's file.
+MAX_STRAIN = 9.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,10 +41,10 @@ class Sighting:
     """An object in a picture.
 
     Attributes:
-        object: Which one.
-        pose: Its pose in the frame of the camera, the second one, errors and covariance.
-        markers: Those of its markers that were seen.
-        refused: Why the pose is not to be used; empty if it is.
+        object: The object of the marker map.
+        pose: Its pose in the camera frame, the second pose, errors and covariance.
+        markers: Its markers that were seen.
+        refused: Why the pose must not be used; "" if it may.
     """
 
     object: MarkedObject
@@ -51,7 +54,7 @@ class Sighting:
 
     @property
     def quality(self) -> float:
-        """From 0 (no use) to 1: likeness of the best marker, halved where the pose is ambiguous, 0 if refused."""
+        """Quality from 0 (useless) to 1: likeness of the best marker, halved if the pose is ambiguous, 0 if refused."""
         if self.refused:
             return 0.0
         likeness = max((m.likeness for m in self.markers if m.likeness > 0.5), default=0.5)
@@ -59,10 +62,10 @@ class Sighting:
 
 
 def as_gray(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """A picture of shape (height, width) or (height, width, 3 or 4; blue, green, red) as grey values.
+    """Convert a picture, (height, width) or (height, width, 3 or 4; blue, green, red), to grey values.
 
     Raises:
-        InputError: If it is no such picture.
+        InputError: If the array is not such a picture.
     """
     array = np.asarray(picture)
     if array.dtype != np.uint8 or array.ndim not in (2, 3) or (array.ndim == 3 and array.shape[2] not in (3, 4)):
@@ -85,18 +88,18 @@ def detect_objects(
     before: Sequence[Sighting] = (),
     near: bool = False,
 ) -> tuple[Sighting, ...]:
-    """The objects of a map that a picture shows, in the order of the map.
+    """Detect the objects of a map in a picture; they are returned in the order of the map.
 
     Args:
         picture: Shape (height, width) or (height, width, 3), 8 bits.
-        camera: Of the picture, with the same size.
+        camera: Camera of the picture, with the same size.
         marker_map: The map of all objects.
-        align: Sharpen corners (`alignment`).
-        before: What the picture before showed, of a film: its markers are aligned faster.
-        near: Search for markers only where those were, unless one of them is not there any more.
+        align: Refine the corners (`alignment`).
+        before: Sightings in the previous picture of a film, which make alignment faster.
+        near: Search for markers only near their previous places, unless one of them has disappeared.
 
     Raises:
-        InputError: If the picture does not have the camera's size, or is none.
+        InputError: If the picture does not have the camera's size, or is invalid.
     """
     require(camera, Camera, "camera", "use load_camera(file)")
     require(marker_map, MarkerMap, "marker map", "use load_marker_map(file)")
@@ -113,7 +116,7 @@ def detect_objects(
 
 
 def check_size(picture: NDArray[np.uint8], camera: Camera, name: str = "the picture") -> None:
-    """Check that a picture, of which ``name`` is said, has the size of a camera's.
+    """Check that a picture has the size of its camera's pictures; ``name`` is used in the message.
 
     Raises:
         InputError: If the picture does not have the camera's size.
@@ -127,7 +130,11 @@ def check_size(picture: NDArray[np.uint8], camera: Camera, name: str = "the pict
 
 
 def sighting(camera: Camera, thing: MarkedObject, seen: Sequence[SeenMarker]) -> Sighting | None:
-    """The sighting of one object by the markers in view; None if none of them is on it."""
+    """Compute the sighting of one object from the markers in view; None if none of them is on it.
+
+    Only sharp and sufficiently large markers are used, as long as there are any. A single marker may have two poses;
+    several markers give one.
+    """
     mounted = {marker.number: marker for marker in thing.markers}
     seen_on_object = tuple(marker for marker in seen if marker.number in mounted)
     if not seen_on_object:
@@ -158,7 +165,7 @@ def sighting(camera: Camera, thing: MarkedObject, seen: Sequence[SeenMarker]) ->
 
 
 def _straightened(camera: Camera, marker: SeenMarker, side: float) -> SeenMarker:
-    """A marker without what the lens bends within it; half of that is doubted."""
+    """Correct the corners of a marker for the lens distortion within it; half of the correction counts as uncertain."""
     bend = lens_bend(camera, marker.corners, side)
     if marker.spread is None or not bend.any():
         return marker
@@ -167,14 +174,14 @@ def _straightened(camera: Camera, marker: SeenMarker, side: float) -> SeenMarker
 
 
 def _of_one(camera: Camera, marker: SeenMarker, mounted: MountedMarker, sigma: float) -> CornerPose:
-    """The pose of the object from that of its only visible marker."""
+    """Compute the pose of an object from its only visible marker."""
     marker_pose = pose_of_square(camera, marker.corners, mounted.side, sigma, marker.spread, mounted.side_sigma)
     T_marker_object = mounted.T_object_marker.inverse()
 
     object_pose = marker_pose.T_camera_object * T_marker_object
     other_object_pose = None if marker_pose.other is None else marker_pose.other * T_marker_object
 
-    # A rotation at the marker moves the object's origin.
+    # A rotation error of the marker displaces the object's origin.
     origin_from_marker = object_pose.translation - marker_pose.T_camera_object.translation
     rotation_lever = np.eye(6)
     rotation_lever[:3, 3:] = -pin.skew(origin_from_marker)
@@ -189,7 +196,7 @@ def _of_one(camera: Camera, marker: SeenMarker, mounted: MountedMarker, sigma: f
 
 
 def _side_shifts(markers: Sequence[MountedMarker]) -> list[Matrix]:
-    """Of all their corners, by the standard deviation of each marker's side. Each of shape (4 markers, 3)."""
+    """Return the displacements of all corners by one sigma of each marker's side, shape (4 markers, 3) each [m]."""
     shifts = []
     for k, marker in enumerate(markers):
         if marker.side_sigma > 0.0:

@@ -1,7 +1,7 @@
-"""Poses over time: the right one of two is chosen, outliers are left out, noise is smoothed.
+"""Track poses over time: choose the correct one of two, reject outliers, and smooth noise.
 
-The covariance of a smoothed pose is that of its own picture, and how far smoothing has moved it from there: errors of a
-picture repeat themselves in the next ones, so that smoothing steadies poses and does not make them more certain.
+The covariance of a smoothed pose is that of its own picture, plus the distance by which smoothing has moved it. Errors
+repeat from picture to picture, so smoothing makes poses steadier, but not more certain.
 """
 
 from __future__ import annotations
@@ -17,18 +17,22 @@ from rrtik_ompl.sensing.markers.corner_pose import ALIGNED_SIGMA, CornerPose, tu
 from rrtik_ompl.sensing.sight import Sighting
 
 OUTLIER_LIMIT = 5.0  # standard deviations
-MAX_SPEED = 1.0  # [m/s]: a motion below it between two pictures is no outlier
+MAX_SPEED = 1.0  # [m/s]; slower motion between two pictures is no outlier
 MAX_TURN_RATE = 2.0  # [rad/s]
-BRANCH_TURN_RATE = 0.5  # [rad/s]: poses of one branch in two pictures differ by that, and by twice their uncertainty
-MAX_OUTLIERS = 3  # in a row; after as many the new pose is taken
-BELIEF_MEMORY = 0.75  # share of the logarithm of the belief that is kept from picture to picture
-MAX_ODDS = 3.0  # that a single doubtful picture gives to one of two poses
-SWITCH_BELIEF = 0.8  # that the other pose needs to be taken; more than one picture gives, starting from even odds
-CERTAIN_BELIEF = 0.99  # more than any number of doubtful pictures gives: errors of lens and blur repeat themselves
-STILL, MOVING = (1e-4, 1e-3), (0.25, 0.7)  # change of velocity within a second [m/s], [rad/s]
-FIRST_SPEED = 0.3, 0.6  # standard deviation of what is not known yet [m/s], [rad/s]
-STAY = 1.0  # how long a thing usually stays still, or in motion [s]
-LEAST_LIKELY = 1e-4  # no model is ever given up
+# [rad/s]; poses of the same branch in two pictures differ by this, and by twice their uncertainty.
+BRANCH_TURN_RATE = 0.5
+MAX_OUTLIERS = 3  # after this many outliers in a row the new pose is accepted
+BELIEF_MEMORY = 0.75  # share of the log belief that is kept from picture to picture
+MAX_ODDS = 3.0  # largest odds that a single ambiguous picture gives to one of two poses
+# Belief in the other pose at which tracking switches to it; one picture, from even odds, does not reach it.
+SWITCH_BELIEF = 0.8
+# More than any number of ambiguous pictures can give, because errors of lens and blur repeat.
+CERTAIN_BELIEF = 0.99
+# Change of velocity within a second [m/s] and [rad/s] of both motion models.
+STILL, MOVING = (1e-4, 1e-3), (0.25, 0.7)
+FIRST_SPEED = 0.3, 0.6  # standard deviation of the initial, unknown velocities [m/s], [rad/s]
+STAY = 1.0  # mean time for which an object stays at rest, or in motion [s]
+LEAST_LIKELY = 1e-4  # least probability of a model, so that none is ever excluded
 _MEASURED, _RATES = slice(0, 6), slice(6, 12)
 
 
@@ -37,11 +41,11 @@ class Tracked:
     """A tracked pose.
 
     Attributes:
-        T_camera_object: The smoothed pose; the expected one if the sighting was an outlier.
-        covariance: As of a `CornerPose`, for the smoothed pose. Shape (6, 6).
-        outlier: The sighting was left out.
-        other_branch: Of the two poses of the sighting the second one was taken, which explains its picture less well.
-        sure: This picture, or those before it, leave no doubt which of two poses is the right one.
+        T_camera_object: The smoothed pose; the predicted one if the sighting was an outlier.
+        covariance: Of the smoothed pose, as in `CornerPose`, shape (6, 6).
+        outlier: Whether the sighting was rejected.
+        other_branch: Whether the second pose of the sighting was used, which explains its picture less well.
+        sure: Whether this picture, or earlier ones, leave no doubt which of two poses is correct.
     """
 
     T_camera_object: pin.SE3
@@ -52,24 +56,27 @@ class Tracked:
 
 
 class PoseTracker:
-    """Tracks one object through pictures with times.
+    """Track one object through a sequence of pictures.
 
-    Where a picture fits two poses, both are followed. Each has a share of belief, which passes from the poses of one
-    picture to the nearest ones of the next and grows for the pose that has less error, as in a hidden Markov model
-    with two states; what was believed long ago is forgotten. A pose is given up for the other one only if the
-    other has most of the belief, which no single doubtful picture can give it.
+    While pictures are ambiguous, both poses are followed. Each has a share of belief, which passes from the poses of
+    one picture to the nearest ones of the next, and grows for the pose with less error, as in a hidden Markov model
+    with two states; old evidence decays. The tracker switches to the other pose only if that one has most of the
+    belief, which no single ambiguous picture can give it.
     """
 
     def __init__(self) -> None:
         self._filter = MotionFilter()
         self._time = -np.inf
-        self._branches: list[pin.SE3] = []  # poses of the last sighting, one or two, not smoothed
-        self._belief: Vector = np.ones(0)  # in each of them
-        self._followed_pose: pin.SE3 | None = None  # the one of them that is followed
+        self._branches: list[pin.SE3] = []  # one or two poses of the last sighting, not smoothed
+        self._belief: Vector = np.ones(0)  # belief in each of these branches
+        self._followed_pose: pin.SE3 | None = None  # the branch that is followed
         self._outliers_in_row = 0
 
     def update(self, sight: Sighting, time: float) -> Tracked:
-        """Update by a sighting at a time [s].
+        """Update the track with a sighting at a time [s], and return the tracked pose.
+
+        An outlier is rejected unless it repeats, or the sighting has just resolved an ambiguity. When the branch
+        switches, or an outlier is accepted, the filter restarts.
 
         Raises:
             InputError: If times do not increase.
@@ -86,7 +93,7 @@ class PoseTracker:
         )
         chosen, switched = self._chosen_branch(branches, belief)
 
-        # A wrong pose may have been tracked until now.
+        # The pose that was tracked so far may have been the wrong one.
         became_certain = not self._is_certain(self._belief) and self._is_certain(belief)
         outlier = not switched and self._is_outlier(branches[chosen], sight, seconds)
         self._outliers_in_row = self._outliers_in_row + 1 if outlier else 0
@@ -106,7 +113,7 @@ class PoseTracker:
         return Tracked(*smoothed, False, chosen == 1, self._is_certain(belief))
 
     def _smoothed(self, seen: pin.SE3, covariance: Matrix, seconds: float | None) -> tuple[pin.SE3, Matrix]:
-        """A pose and its covariance, ``seconds`` after the one before it that it goes on from."""
+        """Return the smoothed pose and its covariance; ``seconds`` is the time since the last pose, None to restart."""
         if seconds is None:
             self._filter.restart(seen, covariance)
             return seen, covariance
@@ -118,12 +125,16 @@ class PoseTracker:
         return filtered, frozen(covariance + np.outer(smoothing_shift, smoothing_shift))
 
     def _updated_belief(self, branches: list[pin.SE3], errors: Vector, pose: CornerPose, seconds: float) -> Vector:
-        """Belief that each pose of a new sighting is the true one; sums to 1."""
+        """Return the belief in each pose of a new sighting, which sums to 1.
+
+        The belief in the last poses is flattened, passed on to the new poses by their angular distances, and weighted
+        by the likelihood of the errors.
+        """
         prior = np.ones(len(branches))
         if self._branches:
             reach = np.hypot(2.0 * pose.rotation_sigma, BRANCH_TURN_RATE * seconds)
             turns = np.array([[turn_between(last, new) for new in branches] for last in self._branches])
-            transition = 1.0 / (1.0 + (turns / reach) ** 2)  # a much larger change is rare, not impossible
+            transition = 1.0 / (1.0 + (turns / reach) ** 2)  # heavy-tailed: a much larger change is rare, but possible
             remembered = self._belief**BELIEF_MEMORY
             prior = remembered / remembered.sum() @ (transition / transition.sum(axis=1, keepdims=True))
 
@@ -132,7 +143,7 @@ class PoseTracker:
         return np.asarray(belief / belief.sum())
 
     def _chosen_branch(self, branches: list[pin.SE3], belief: Vector) -> tuple[int, bool]:
-        """Which pose is followed, and whether it does not go on from the one that was followed until now."""
+        """Return the index of the pose to follow, and whether it is not the continuation of the last one."""
         best = int(belief.argmax())
         if self._followed_pose is None:
             return best, False
@@ -158,11 +169,11 @@ class PoseTracker:
 
 
 class MotionFilter:
-    """Where a thing is that stands still or moves: a Kalman filter for each, and how likely each of them is.
+    """Filter of a pose that is at rest or moves: two Kalman filters, and the probability of each.
 
-    The interacting multiple model filter of Blom and Bar-Shalom, 1988 [53], with two models of nearly constant velocity
-    that differ in how much velocities change: hardly at all, or as a vehicle's in a swell. States are position, small
-    rotation from a reference, and their rates. Begin with `restart`.
+    This is the interacting multiple model filter of Blom and Bar-Shalom, 1988 [53], with two models of nearly constant
+    velocity that differ in how much velocities change: hardly at all, or as those of a vehicle in a swell. The state
+    holds position, small rotation from a reference, and their rates, shape (12,). Call `restart` first.
     """
 
     def __init__(self) -> None:
@@ -172,7 +183,7 @@ class MotionFilter:
         self._shares = np.full(2, 0.5)
 
     def restart(self, pose: pin.SE3, covariance: Matrix) -> None:
-        """Forget everything but a pose and its covariance, shape (6, 6)."""
+        """Reset the filter to a pose and its covariance, shape (6, 6)."""
         self._reference = pose.rotation.copy()
         state = np.zeros(12)
         spread = np.zeros((12, 12))
@@ -185,7 +196,11 @@ class MotionFilter:
         self._shares = np.full(2, 0.5)
 
     def update(self, pose: pin.SE3, covariance: Matrix, seconds: float) -> pin.SE3:
-        """The pose after a measurement, ``seconds`` after the one before."""
+        """Return the filtered pose after a measurement, ``seconds`` after the last one.
+
+        The steps of the filter are: mix the states of both models, predict and correct each of them, update the
+        probabilities of the models, and combine their states.
+        """
         stay_probability = np.exp(-seconds / STAY)
         transition = np.array([[stay_probability, 1.0 - stay_probability], [1.0 - stay_probability, stay_probability]])
         predicted_shares, mixed_states = self._mixed(transition)
@@ -202,13 +217,13 @@ class MotionFilter:
         return self._settle()
 
     def ahead(self, seconds: float) -> pin.SE3:
-        """The pose to be expected after a time, if nothing is measured."""
+        """Return the predicted pose after a time [s] without a measurement."""
         state = self._shares @ self._states
         state = state[_MEASURED] + seconds * state[_RATES]
         return pin.SE3(pin.exp3(state[3:]) @ self._reference, state[:3])
 
     def _mixed(self, transition: Matrix) -> tuple[Vector, list[tuple[Vector, Matrix]]]:
-        """What each model is likely to be before a measurement, and what it begins with."""
+        """Return the prior probabilities of both models, shape (2,), and the mixed state and covariance of each."""
         joint = transition * self._shares[:, None]
         predicted_shares = joint.sum(axis=0)
 
@@ -223,7 +238,7 @@ class MotionFilter:
         return predicted_shares, mixed_states
 
     def _step(self, k: int, state: Vector, spread: Matrix, measurement: Vector, noise: Matrix, seconds: float) -> float:
-        """Predict and correct one model; the logarithm of how well the measurement fits it."""
+        """Predict and correct one model in place, and return the log-likelihood of the measurement."""
         forward = np.eye(12)
         forward[_MEASURED, _RATES] = seconds * np.eye(6)
         change = np.diag(np.repeat(np.square((STILL, MOVING)[k]), 3))
@@ -238,7 +253,7 @@ class MotionFilter:
         self._states[k] = state + gain @ innovation
 
         spread = spread - gain @ spread[_MEASURED]
-        self._spreads[k] = 0.5 * (spread + spread.T)  # rounding must not make it lopsided
+        self._spreads[k] = 0.5 * (spread + spread.T)  # keeps the matrix symmetric despite rounding
 
         return -0.5 * float(
             innovation @ np.linalg.solve(innovation_covariance, innovation)
@@ -246,7 +261,7 @@ class MotionFilter:
         )
 
     def _settle(self) -> pin.SE3:
-        """The pose by both models; rotations are counted from it from now on."""
+        """Return the combined pose, and make its rotation the new reference."""
         state = self._shares @ self._states
         self._reference = pin.exp3(state[3:6]) @ self._reference
         self._states[:, 3:6] -= state[3:6]

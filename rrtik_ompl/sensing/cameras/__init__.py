@@ -1,1 +1,1 @@
-"""Cameras: the pinhole model, a head that pans and tilts, and where pictures come from."""
+"""Cameras: the pinhole model, a pan-tilt-zoom head, and sources of pictures."""

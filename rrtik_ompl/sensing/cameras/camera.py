@@ -1,4 +1,4 @@
-"""A pinhole camera with lens distortion: points to pixels and back. Frozen."""
+"""A pinhole camera with lens distortion, which converts points to pixels and back. Immutable."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from rrtik_ompl.base.copies import as_value
 from rrtik_ompl.base.errors import InputError
 
 ORIGIN = np.zeros(3)
-UNDISTORT: Any = getattr(cv2, "undistortPointsIter", cv2.undistortPoints)  # OpenCV 5 made one function of two
+UNDISTORT: Any = getattr(cv2, "undistortPointsIter", cv2.undistortPoints)  # OpenCV 5 has merged the two functions
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Camera:
-    """Intrinsics of a camera, in OpenCV's conventions: a whole number is the centre of a pixel.
+    """Intrinsics of a camera in OpenCV's conventions: integer coordinates are at the centre of a pixel.
 
     Attributes:
-        matrix: Shape (3, 3): fx, fy, cx, cy in pixels; skew is not modelled and must be 0.
-        distortion: Brown's k1, k2, p1, p2, k3 [59]. Shape (5,).
-        width: Of the picture, in pixels.
-        height: Of the picture, in pixels.
-        sigmas: Standard deviations of fx, fy, cx, cy [pixels] and of the five numbers of the lens: what the
-            calibration is not sure of, 0 where it says nothing. Shape (9,).
-        tone: How it codes light as grey values (`markers.lighting`); None: estimated for each marker.
+        matrix: Camera matrix with fx, fy, cx, cy in pixels, shape (3, 3); skew is not modelled and must be 0.
+        distortion: Brown's k1, k2, p1, p2, k3 [59], shape (5,).
+        width: Width of the picture in pixels.
+        height: Height of the picture in pixels.
+        sigmas: Standard deviations of fx, fy, cx, cy [pixels] and of the five distortion coefficients, shape (9,);
+            0 where the calibration gives none.
+        tone: How the camera codes light as grey values (`markers.lighting`); None to estimate it for each marker.
     """
 
     matrix: Matrix
@@ -76,13 +76,13 @@ class Camera:
         object.__setattr__(self, "height", int(height))
 
     def project(self, points: ArrayLike) -> Matrix:
-        """Pixels of points in the frame of the camera [m]. Shape (m, 3) to (m, 2)."""
+        """Project points in the camera frame, shape (m, 3) [m], to pixels, shape (m, 2)."""
         rows = finite_array(points, (None, 3), "points to project")
         pixels, _ = cv2.projectPoints(rows[:, None], ORIGIN, ORIGIN, self.matrix, self.distortion)
         return np.asarray(pixels, dtype=np.float64)[:, 0]
 
     def rays(self, pixels: ArrayLike) -> Matrix:
-        """Where the rays of pixels meet the plane z = 1. Shape (m, 2) to (m, 2)."""
+        """Return where the rays of pixels, shape (m, 2), meet the plane z = 1 of the camera frame, shape (m, 2)."""
         rows = finite_array(pixels, (None, 2), "pixels")
         if not self.distortion.any():
             return (rows - self.matrix[:2, 2]) / np.diag(self.matrix)[:2]
@@ -92,11 +92,11 @@ class Camera:
         return np.asarray(found, dtype=np.float64)[:, 0]
 
     def jacobian(self, points: ArrayLike, translation: ArrayLike) -> Matrix:
-        """How pixels change with a pose. Shape (2 m, 6).
+        """Return the Jacobian of the pixels of an object's points with respect to its pose, shape (2 m, 6).
 
         Args:
-            points: In the axes of the camera, from the origin of the object (``R @ p_object``). Shape (m, 3) [m].
-            translation: Origin of the object in the frame of the camera. Shape (3,) [m].
+            points: Relative to the object's origin, in the axes of the camera (``R @ p_object``), shape (m, 3) [m].
+            translation: Origin of the object in the camera frame, shape (3,) [m].
 
         Returns:
             d pixel / d (translation [m], small rotation about the axes of the camera [rad]).
@@ -107,10 +107,10 @@ class Camera:
         return np.hstack([slopes[:, 3:6], slopes[:, :3]])
 
     def own_slopes(self, points: ArrayLike) -> Matrix:
-        """How pixels of points in the frame of the camera change with its own numbers. Shape (2 m, 9).
+        """Return the Jacobian of the pixels of points with respect to the intrinsics, shape (2 m, 9).
 
         Args:
-            points: Shape (m, 3) [m].
+            points: In the camera frame, shape (m, 3) [m].
 
         Returns:
             d pixel / d (fx, fy, cx, cy [pixels], k1, k2, p1, p2, k3).
@@ -120,6 +120,6 @@ class Camera:
         return np.asarray(slopes[:, 6:15], dtype=np.float64)
 
     def doubt(self, points: ArrayLike) -> Matrix:
-        """Covariance of the pixels of points in the frame of the camera, by `sigmas`. Shape (2 m, 2 m) [pixels^2]."""
+        """Return the covariance of the pixels of points that results from `sigmas`, shape (2 m, 2 m) [pixels^2]."""
         each = self.own_slopes(points) * self.sigmas
         return np.asarray(each @ each.T, dtype=np.float64)

@@ -1,4 +1,4 @@
-"""A camera on a head that pans and tilts, with a lens that zooms: where it is and how it shows, by its encoders.
+"""A camera with a zoom lens on a pan-tilt head; its pose and intrinsics follow from the readings of encoders.
 
 Source: [1, ch. 4.6.2] (two rotations before the camera, intrinsics that depend on the zoom).
 """
@@ -19,32 +19,32 @@ from rrtik_ompl.sensing.cameras.camera import Camera
 
 
 class Encoder(NamedTuple):
-    """From the counts of an encoder to an angle.
+    """Conversion of the counts of an encoder to an angle.
 
     Attributes:
-        zero: Its count at the angle 0.
-        per_count: Angle of a count [rad]; negative where it counts the other way.
+        zero: Count at the angle 0.
+        per_count: Angle of a count [rad]; negative if the encoder counts in the opposite direction.
     """
 
     zero: float = 0.0
     per_count: float = 1.0
 
     def angle(self, count: float) -> float:
-        """The angle of a count [rad]."""
+        """Return the angle of a count [rad]."""
         return (finite_number(count, "count of an encoder") - self.zero) * self.per_count
 
 
 class PanTiltZoom:
-    """A head and its lens.
+    """A pan-tilt head with a zoom lens.
 
     Args:
-        cameras: The lens at some zooms, each calibrated there, all of one size.
-        zooms: Counts of the zoom's encoder of each, increasing, shape (k,). One camera: a lens that does not zoom.
-        T_base_head: The head in the frame of the arm's base at pan 0: it pans about its z axis, and tilts about the y
-            axis that has been panned.
-        T_head_camera: The camera in the frame that is panned and tilted.
-        pan: Of the encoder of the pan; by itself it gives radians.
-        tilt: Of the encoder of the tilt.
+        cameras: The lens, calibrated at one or more zooms, with the same picture size.
+        zooms: Increasing counts of the zoom's encoder, one for each camera, shape (k,); one for a lens without zoom.
+        T_base_head: Pose of the head in the base frame of the arm at pan 0. It pans about its z axis, then tilts about
+            the panned y axis.
+        T_head_camera: Pose of the camera in the panned and tilted frame.
+        pan: Encoder of the pan; by default its counts are radians.
+        tilt: Encoder of the tilt; by default its counts are radians.
 
     Raises:
         InputError: If there is no camera, sizes differ, or zooms do not increase.
@@ -81,18 +81,18 @@ class PanTiltZoom:
         self._tilt = tilt
 
     def pose(self, pan: float, tilt: float) -> pin.SE3:
-        """``T_base_camera`` for counts of pan and tilt."""
+        """Return ``T_base_camera`` for counts of pan and tilt."""
         turned = pin.utils.rotate("z", self._pan.angle(pan)) @ pin.utils.rotate("y", self._tilt.angle(tilt))
         return self.T_base_head * pin.SE3(turned, np.zeros(3)) * self.T_head_camera
 
     def camera(self, zoom: float) -> Camera:
-        """The lens at a count of the zoom, between those that were calibrated.
+        """Return the intrinsics at a count of the zoom, interpolated between the calibrated ones.
 
-        Focal lengths change by equal factors with equal counts, all else by equal amounts; what is not sure of the two
-        neighbours is not sure of what lies between them.
+        Focal lengths are interpolated geometrically, all other numbers linearly. Each standard deviation is the larger
+        one of the two neighbours.
 
         Raises:
-            InputError: If it lies outside of them.
+            InputError: If the count is outside the calibrated range.
         """
         at = finite_number(zoom, "zoom")
         if not self.zooms[0] <= at <= self.zooms[-1]:

@@ -1,4 +1,4 @@
-"""Where pictures come from: an image file, a folder of them, a video file, a camera device."""
+"""Sources of pictures: an image file, a folder of images, a video file, or a camera device."""
 
 from __future__ import annotations
 
@@ -20,16 +20,21 @@ from rrtik_ompl.files.text import file_name, write_bytes
 
 IMAGE_ENDINGS = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp")
 VIDEO_ENDINGS = (".mp4", ".avi", ".webm", ".mkv", ".mov", ".m4v")
-MOST_CAMERAS = 1_000_000  # their numbers, which OpenCV also adds hundreds to
+MOST_CAMERAS = 1_000_000  # limit of a device number; OpenCV adds hundreds to it
 MAX_FILE_BYTES = 512 * 1024 * 1024
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Picture:
-    """One picture: blue, green, red, shape (height, width, 3), where it comes from, and its time [s].
+    """One picture.
 
-    ``others`` are those that the other cameras of a rig took at the same time. ``noisy`` is False for one that was
-    computed: two of a scene that stands still are equal then, and only their times tell them apart.
+    Attributes:
+        pixels: Blue, green, red, shape (height, width, 3).
+        name: Where it comes from.
+        time: When it was taken [s].
+        others: Pictures that the other cameras of a rig took at the same time.
+        noisy: Whether it has sensor noise. Computed pictures of a scene at rest are identical, and only their times
+            differ.
     """
 
     pixels: NDArray[np.uint8]
@@ -39,14 +44,14 @@ class Picture:
     noisy: bool = True
 
     def repeats(self, before: Picture) -> bool:
-        """Whether a camera that lives cannot have taken it after another one: noise makes any two pictures differ."""
+        """Check whether a picture repeats an earlier one; pictures of a live camera always differ by their noise."""
         if not self.noisy and self.time != before.time:
             return False
         return np.array_equal(self.pixels, before.pixels)
 
 
 def read_picture(path: str | os.PathLike[str]) -> NDArray[np.uint8]:
-    """An image file as blue, green, red. Shape (height, width, 3).
+    """Read an image file as blue, green, red, shape (height, width, 3).
 
     Raises:
         InputError: If the file is missing or not an image.
@@ -57,13 +62,13 @@ def read_picture(path: str | os.PathLike[str]) -> NDArray[np.uint8]:
         if not os.path.isfile(file) or size > MAX_FILE_BYTES:
             raise InputError(f"{path}: is not an image file of at most 512 MiB")
         data = np.frombuffer(file.read_bytes(), dtype=np.uint8)
-    except (OSError, ValueError) as error:  # a name that the system cannot have is a ValueError
+    except (OSError, ValueError) as error:  # an invalid file name is a ValueError
         why = getattr(error, "strerror", None) or str(error)
         raise InputError(f"{path}: {why.lower()}; check the name") from None
 
     picture = None
     if size:
-        with suppress(cv2.error):  # a header with a size larger than memory
+        with suppress(cv2.error):  # a header may claim a size larger than memory
             picture = cv2.imdecode(data, cv2.IMREAD_COLOR)
     if picture is None:
         raise InputError(f"{path}: is not an image that can be read; use {', '.join(IMAGE_ENDINGS)}")
@@ -71,7 +76,7 @@ def read_picture(path: str | os.PathLike[str]) -> NDArray[np.uint8]:
 
 
 def write_picture(picture: NDArray[np.uint8], path: Path) -> None:
-    """Write an image file; its ending says which kind.
+    """Write an image file in the format of its file name extension.
 
     Raises:
         InputError: If it cannot be written.
@@ -82,13 +87,13 @@ def write_picture(picture: NDArray[np.uint8], path: Path) -> None:
 
 
 def pictures_from(source: str | os.PathLike[str] | int) -> Iterator[Picture]:
-    """Pictures of an image file, of all images in a folder (by name), of a video file, or of a camera.
+    """Yield the pictures of an image file, of all images in a folder (by name), of a video file, or of a camera.
 
     Args:
         source: A path, or the number of a camera device (also as text: "0").
 
     Raises:
-        InputError: If there is nothing that can be read. A camera that is lost ends with `CameraLostError`.
+        InputError: If nothing can be read. A lost camera raises `CameraLostError`.
     """
     if isinstance(source, int) or str(source).isdecimal():
         number = source if isinstance(source, int) else int(str(source))
@@ -108,7 +113,7 @@ def pictures_from(source: str | os.PathLike[str] | int) -> Iterator[Picture]:
 
 
 class CameraLostError(InputError):
-    """A camera that gave pictures gives none any more."""
+    """A camera that delivered pictures before no longer does."""
 
 
 def _video(path: Path) -> Iterator[Picture]:
@@ -143,7 +148,7 @@ def _device(number: int) -> Iterator[Picture]:
 
 @contextmanager
 def quiet() -> Iterator[None]:
-    """Suppress OpenCV's warnings: our own error says in one line why something cannot be opened."""
+    """Suppress OpenCV's warnings, because our own error says in one line why something cannot be opened."""
     log: Any = cv2.utils.logging
     before = log.setLogLevel(log.LOG_LEVEL_ERROR)
     try:

@@ -1,1 +1,1 @@
-"""Square markers: detection, corners below a pixel, poses, marker maps, sheets to print."""
+"""Square markers: detection, corners with sub-pixel accuracy, poses, marker maps, and sheets to print."""

@@ -1,10 +1,11 @@
-"""Corners of a marker to a hundredth of a pixel: the whole ideal marker is aligned with the picture.
+"""Refine the corners of a marker to a hundredth of a pixel by aligning the whole ideal marker with the picture.
 
-The criterion is the enhanced correlation coefficient of Evangelidis and Psarakis, 2008 [52], which does not change
-with brightness and contrast; the motion is a homography. Four corners alone are pulled inwards by blur, by as much
-as 0.2 pixels; all edges of all cells together are not, if the ideal marker is blurred as the picture is: as much, and
-evenly in the picture, so unevenly on a marker that is tilted. Blur is blur of light: the ideal marker is blurred first,
-and then shown by the tone curve, and cut off where white is, with which it is most like the picture (`lighting`).
+The criterion is the enhanced correlation coefficient of Evangelidis and Psarakis, 2008 [52], which is invariant to
+brightness and contrast; the motion model is a homography. Blur pulls single corners inwards by up to 0.2 pixels. The
+edges of all cells together do not have this error, provided that the ideal marker is blurred like the picture: by the
+same amount, and isotropically in the picture, thus anisotropically on a tilted marker. A lens blurs light, not grey
+values. So the ideal marker is blurred first, then converted by the tone curve and clipped at white; the tone is the
+one with the best correlation (`lighting`).
 """
 
 from __future__ import annotations
@@ -22,29 +23,35 @@ from rrtik_ompl.sensing.markers.lighting import LINEAR, SRGB, TONES, likenesses,
 Pixels = NDArray[np.float32]
 
 MIN_LIKENESS = 0.9  # below it the marker is partly covered or the picture is not sharp
-_MAX_CORNER_SHIFT = 0.25  # of a side; inner edges are sometimes found in place of outer ones
-_CELL_PIXELS = (3, 26)  # of a cell in the ideal picture; near its size in the camera's: coarser samples lie off
-_SQUARE_PIXELS = (3, 80)  # the same of a chessboard, whose few edges are all that tells its tone
-_RIM_CELLS = 0.5  # width of the white rim that is used; farther out blur mixes in the background
-_DEFAULT_SPOT = 0.8  # standard deviation of a sharp picture's blur: lens, photosite, interpolation [pixels]
-_SPOTS = _DEFAULT_SPOT * 1.5 ** np.arange(-2, 5)  # that are tried
-_NEAR_SPOTS = 1.5 ** np.arange(-1.0, 2.0)  # that are tried where one is known, as factors of that
+_MAX_CORNER_SHIFT = 0.25  # share of a side; the detector sometimes returns inner edges instead of outer ones
+# Range of pixels per cell in the ideal picture. It should be near the cell's size in the camera's picture, because
+# coarser sampling shifts the corners.
+_CELL_PIXELS = (3, 26)
+# The same for a piece of a chessboard, whose few edges must suffice to estimate the tone.
+_SQUARE_PIXELS = (3, 80)
+_RIM_CELLS = 0.5  # width of the white rim that is used; farther out the background blurs into it
+# [pixels]; standard deviation of the blur of a sharp picture, by lens, photosite and interpolation.
+_DEFAULT_SPOT = 0.8
+_SPOTS = _DEFAULT_SPOT * 1.5 ** np.arange(-2, 5)  # the blurs that are tried
+_NEAR_SPOTS = 1.5 ** np.arange(-1.0, 2.0)  # the factors that are tried if a blur is known
 _SPOT_TOLERANCE = 0.1  # relative difference below which no second alignment is made
 _TONE_TOLERANCE = 0.05
-_UNLIKENESS_RATIO = 1.2  # times as much unlike as the last estimate of blur and tone left: it holds still
-_ROUNDS = 3  # of alignment, each with what was learned of the picture in the one before
-_LINEAR_BELOW = 0.35  # a smaller tone is taken for that of a linear camera, which coarse sampling makes look larger
-_FEW = 48  # samples along a side are enough where the way that light is shown is searched for
+_UNLIKENESS_RATIO = 1.2  # factor of 1 - likeness up to which the last estimate of blur and tone remains valid
+_ROUNDS = 3  # rounds of alignment, each with the blur and tone estimated in the round before
+# Smaller estimates of the tone count as linear: coarse sampling makes the tone of a linear camera appear larger.
+_LINEAR_BELOW = 0.35
+# Number of samples along a side that suffices for the search of blur and tone.
+_FEW = 48
 _STOP = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 30, 1e-6)
 
 
 class Look(NamedTuple):
-    """How a picture shows a marker.
+    """How a picture renders a marker.
 
     Attributes:
         spot: Standard deviation of its blur [pixels].
-        tone: Of the picture (`markers.lighting`).
-        likeness: Of the marker when both were estimated.
+        tone: Tone of the picture (`markers.lighting`).
+        likeness: Correlation of the marker with the picture when both were estimated.
     """
 
     spot: float
@@ -53,13 +60,13 @@ class Look(NamedTuple):
 
 
 class Aligned(NamedTuple):
-    """A marker that was aligned with a picture.
+    """The result of aligning a marker with a picture.
 
     Attributes:
         corners: Shape (4, 2) [pixels].
         likeness: Correlation of the ideal marker with the picture, from 0 to 1.
-        spread: Covariance of the corners' eight numbers, shape (8, 8) [pixels^2]; None where they were not aligned.
-        look: None where they were not aligned.
+        spread: Covariance of the corners' eight coordinates, shape (8, 8) [pixels^2]; None if they were not aligned.
+        look: Blur and tone; None if the corners were not aligned.
     """
 
     corners: Matrix
@@ -75,17 +82,17 @@ def aligned_corners(
     tone: float | None = None,
     before: Look | None = None,
 ) -> Aligned:
-    """Sharper corners of a marker that was found, how sure they are, and how well the ideal marker fits the picture.
+    """Refine the corners of a detected marker, and estimate their covariance.
 
     Args:
-        gray: The picture. Shape (height, width).
-        corners: As found, within a few pixels. Shape (4, 2).
-        cells: The ideal marker, its border included. Shape (n, n).
-        tone: Of the picture; None: the one with which the marker fits best.
-        before: How the picture before it showed the marker; the search begins there, which is three times as fast.
+        gray: The picture, shape (height, width).
+        corners: Detected corners, correct to a few pixels, shape (4, 2).
+        cells: The ideal marker including its border, shape (n, n).
+        tone: Tone of the picture; None to use the one with which the marker fits best.
+        before: Look of the marker in the previous picture; a search that starts there is three times as fast.
 
     Returns:
-        Below `MIN_LIKENESS` the corners are returned unchanged.
+        The aligned marker; with a likeness below `MIN_LIKENESS` it has the corners that were given.
     """
     framed = np.pad(cells, 1, constant_values=255)
     low, square, fit = _lay_over(gray, corners, framed, _CELL_PIXELS, tone, before)
@@ -104,24 +111,32 @@ def aligned_corners(
 
 
 def look_of(gray: NDArray[np.uint8], corners: Matrix, framed: NDArray[np.uint8]) -> Look | None:
-    """How a picture shows a pattern of squares, such as a piece of a chessboard; None if it is not there.
+    """Return how a picture renders a pattern of squares, such as a piece of a chessboard; None if it does not fit.
 
     Args:
-        gray: The picture. Shape (height, width).
-        corners: Of the pattern without what is around it, to a pixel. Shape (4, 2).
-        framed: The pattern, with one cell more on each side: what is around it. Shape (n + 2, n + 2).
+        gray: The picture, shape (height, width).
+        corners: Corners of the pattern without its surroundings, correct to a pixel, shape (4, 2).
+        framed: The pattern with one more cell on each side for its surroundings, shape (n + 2, n + 2).
     """
     fit = _lay_over(gray, corners, framed, _SQUARE_PIXELS)[2]
     return None if fit is None or fit.likeness < MIN_LIKENESS else fit.look
 
 
 def mean_side(corners: Matrix) -> float:
-    """Mean length of the edges of a marker, from its corners, shape (4, 2), in their unit."""
+    """Return the mean length of the edges of a marker, from its corners, shape (4, 2), in their unit."""
     return float(np.linalg.norm(np.roll(corners, -1, 0) - corners, axis=1).mean())
 
 
 class _Fit(NamedTuple):
-    """The ideal marker as the picture would show it, the picture in its frame, and what leads from one to the other."""
+    """The alignment of an ideal marker with a picture.
+
+    Attributes:
+        likeness: Their correlation.
+        homography: From the ideal marker to the piece of the picture, shape (3, 3).
+        model: The ideal marker as the picture would render it, shape (h, w).
+        seen: The picture in the frame of the ideal marker, shape (h, w).
+        look: Blur and tone that were assumed.
+    """
 
     likeness: float
     homography: Pixels
@@ -138,11 +153,11 @@ def _lay_over(
     tone: float | None = None,
     last_look: Look | None = None,
 ) -> tuple[Matrix, Matrix, _Fit | None]:
-    """A pattern with a frame of one cell, laid over a picture.
+    """Align a pattern, which has a frame of one cell, with a picture.
 
     Returns:
-        Where the piece of the picture begins that was looked at, corners of the pattern in the ideal picture, and the
-        fit; None if it does not converge.
+        The origin of the piece of the picture that was used, shape (2,), the corners of the pattern in the ideal
+        picture, shape (4, 2), and the fit; None if the alignment does not converge.
     """
     count = len(framed) - 2
     side = mean_side(corners)
@@ -156,7 +171,7 @@ def _lay_over(
     ideal = _ideal(framed, cell, rim)
     try:
         fit = _align_with_look(ideal, piece, homography.astype(np.float32), tone, last_look)
-        if last_look is not None and fit.likeness < MIN_LIKENESS:  # the picture before it misled
+        if last_look is not None and fit.likeness < MIN_LIKENESS:  # the look of the previous picture was misleading
             fit = _align_with_look(ideal, piece, homography.astype(np.float32), tone, None)
     except cv2.error:  # the alignment did not converge
         return origin, square, None
@@ -179,7 +194,11 @@ def _ideal(framed: NDArray[np.uint8], cell: int, rim: int) -> Pixels:
 def _align_with_look(
     ideal: Pixels, piece: Pixels, homography: Pixels, tone: float | None, last_look: Look | None
 ) -> _Fit:
-    """The homography from the ideal marker to a picture, whose blur, tone and light are estimated too."""
+    """Find the homography from the ideal marker to a picture together with blur and tone.
+
+    Alignment and estimation of blur and tone alternate, for at most `_ROUNDS`. With a look from the previous picture,
+    which still explains this one, a single alignment is enough.
+    """
     tones = TONES if tone is None else (tone,)
     starts = [Look(_DEFAULT_SPOT, start_tone) for start_tone in ((LINEAR, SRGB) if tone is None else tones)]
     if last_look is not None:
@@ -204,7 +223,7 @@ def _align_with_look(
 
 
 def _fit(ideal: Pixels, piece: Pixels, homography: Pixels, look: Look) -> _Fit:
-    """The homography for a blur and a tone."""
+    """Find the homography for a given blur and tone."""
     blurred = _blurred(ideal, look.spot**2 * _spread(homography, ideal.shape))
     model = shown(blurred, _warped(piece, homography, ideal.shape), look.tone)
     likeness, refined = _find_homography(model, piece, homography)
@@ -212,7 +231,7 @@ def _fit(ideal: Pixels, piece: Pixels, homography: Pixels, look: Look) -> _Fit:
 
 
 def _find_homography(model: Pixels, piece: Pixels, homography: Pixels) -> tuple[float, Pixels]:
-    align: Any = cv2.findTransformECC  # its type requires a mask where None is allowed
+    align: Any = cv2.findTransformECC  # the stub of OpenCV does not allow None for the mask
     likeness, refined = align(model, piece, homography, cv2.MOTION_HOMOGRAPHY, _STOP, None, 1)
     return float(likeness), refined
 
@@ -225,15 +244,15 @@ def _warped(piece: Pixels, homography: Pixels, shape: tuple[int, ...]) -> Pixels
 def _spot_and_tone(
     ideal: Pixels, seen: Pixels, spread: Matrix, look: Look, tones: tuple[float, ...], spots: Vector
 ) -> Look:
-    """Blur [pixels] and tone with which the ideal marker is most like the picture: first the one, then the other.
+    """Return the blur [pixels] and then the tone that maximise the correlation of the ideal marker with the picture.
 
     Args:
         ideal: The marker.
-        seen: The picture in its frame.
-        spread: Of a spot of a pixel, in that frame.
-        look: What was assumed until now.
-        tones: That are tried.
-        spots: That are tried, each larger than the one before by the same factor.
+        seen: The picture in the frame of the marker.
+        spread: Covariance of a spot of one pixel in that frame, shape (2, 2).
+        look: Present estimate.
+        tones: Tones that are tried; equally spaced.
+        spots: Blurs that are tried; each is larger than the one before by the same factor.
     """
     step = max(len(seen) // _FEW, 1)
     samples = np.ascontiguousarray(seen[::step, ::step])
@@ -252,7 +271,7 @@ def _spot_and_tone(
 
 
 def _peak(values: Vector) -> float:
-    """Where between the places of some values the parabola through the largest and its neighbours is largest."""
+    """Return the maximum of the parabola through the largest value and its neighbours, as a fractional index."""
     best = int(np.clip(np.argmax(values), 1, len(values) - 2))
     low, middle, high = values[best - 1 : best + 2]
     curvature = low - 2.0 * middle + high
@@ -265,7 +284,7 @@ def _like_last_look(look: Look, last_look: Look) -> bool:
 
 
 def _spread(homography: Pixels, shape: tuple[int, ...]) -> Matrix:
-    """Covariance, in the middle of the ideal marker, of what a round spot in the picture covers. Shape (2, 2)."""
+    """Return the covariance, at the centre of the ideal marker, of a round spot of one pixel in the picture."""
     middle = np.array([0.5 * (shape[1] - 1), 0.5 * (shape[0] - 1), 1.0])
     x, y = homography[:2] @ middle
     bottom = homography[2] @ middle

@@ -1,4 +1,4 @@
-"""Plain chessboards for calibration: their inner corners in a picture, and pieces that a lens bends little."""
+"""Plain chessboards for calibration: their inner corners in a picture, and pieces with little lens distortion."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from numpy.typing import NDArray
 from rrtik_ompl.base.arrays import LARGEST, Matrix, frozen
 from rrtik_ompl.base.errors import InputError
 
-SMALLEST_SIDE = 1e-6  # [m] of a square or a marker
+SMALLEST_SIDE = 1e-6  # [m]; smallest side of a square or a marker
 PIECE = 2  # squares along a side
 
 
 @dataclass(frozen=True, slots=True)
 class Chessboard:
-    """A chessboard without markers: squares across and down, and the side of a square [m].
+    """A chessboard without markers: numbers of squares across and down, and the side of a square [m].
 
-    It must be in view as a whole. Sides of which one is odd and one even make it clear which end is which: the square
-    after the first corner is then a black one. The calibration of a single camera does not need to know that.
+    The whole board must be in view. If one of the two numbers is odd and the other even, the orientation of the board
+    is unique: the square after the first corner is a black one. The calibration of a single camera does not need this.
 
     Raises:
         InputError: If it has fewer than 4 x 4 squares, or the side is not positive.
@@ -44,16 +44,16 @@ class Chessboard:
 
     @property
     def points(self) -> Matrix:
-        """Corners between squares on the board [m], row by row. Shape ((columns - 1) (rows - 1), 3)."""
+        """Corners between squares on the board [m], row by row, shape ((columns - 1) (rows - 1), 3)."""
         down, across = np.mgrid[1 : self.rows, 1 : self.columns]
         return frozen(np.c_[across.ravel(), down.ravel(), np.zeros(down.size)] * self.square)
 
     def corners(self, gray: NDArray[np.uint8]) -> tuple[Matrix, Matrix]:
-        """Points on the board [m], shape (k, 3), and their pixels, shape (k, 2); none if the board is not found."""
+        """Return points on the board [m], shape (k, 3), and their pixels, shape (k, 2); empty if it is not found."""
         pattern = (self.columns - 1, self.rows - 1)
         try:
             is_found, pixels = cv2.findChessboardCornersSB(gray, pattern, flags=cv2.CALIB_CB_ACCURACY)
-        except cv2.error:  # its copies take more memory than there is
+        except cv2.error:  # OpenCV's copies of the picture may exceed the memory
             size = " x ".join(map(str, gray.shape[::-1]))
             raise InputError(f"a picture of {size} pixels is too large to find a chessboard in; scale it") from None
 
@@ -66,21 +66,22 @@ class Chessboard:
         return self.points, corner_pixels
 
     def _first_is_white(self, gray: NDArray[np.uint8], pixels: Matrix) -> bool:
-        """Whether the square after the first corner is white: lighter than its neighbour."""
+        """Check whether the square after the first corner is white, that is, lighter than its neighbour."""
         grid = pixels.reshape(self.rows - 1, self.columns - 1, 2)
         middles = [np.rint(grid[:2, k : k + 2].reshape(4, 2).mean(axis=0)).astype(int) for k in (0, 1)]
         first, neighbour = (int(gray[down, across]) for across, down in middles)
         return first > neighbour
 
     def pieces(self, gray: NDArray[np.uint8], pixels: Matrix) -> Iterator[tuple[Matrix, NDArray[np.uint8]]]:
-        """Pieces of the board, each of `PIECE` squares or fewer a side, without gaps and none over another.
+        """Divide the board into pieces of at most `PIECE` squares a side, without gaps or overlap.
 
         Args:
             gray: The picture.
-            pixels: From `corners`.
+            pixels: Pixels from `corners`.
 
         Yields:
-            Corners in the picture, shape (4, 2), and the piece with the squares around it, 0 black and 255 white.
+            Corners in the picture, shape (4, 2), and the piece with the squares around it, 0 for black and 255 for
+            white.
         """
         grid = pixels.reshape(self.rows - 1, self.columns - 1, 2)
         side = min(PIECE, self.columns - 2, self.rows - 2)
@@ -92,7 +93,7 @@ class Chessboard:
                     grid[row + a : row + a + side, column + b : column + b + side] for a in (0, 1) for b in (0, 1)
                 )
 
-                # Which colour comes first is told by the picture.
+                # The grey values in the picture decide which colour comes first.
                 across, down = np.rint(middles).astype(np.intp).reshape(-1, 2).T
                 grey_values = gray[down, across]
                 inner = is_odd[1:-1, 1:-1].ravel()

@@ -1,11 +1,12 @@
-"""The pose of an object from pixels of points that are known on it, and how far it can be trusted.
+"""Compute the pose of an object from the pixels of known points on it, with its covariance.
 
-A single square seen almost from the front has two poses that explain its picture nearly as well (Collins and Bartoli,
-2014 [51]): both are kept. Where perspective is strong, or by chance, only one of the two is a minimum of the
-error: then the second one is that of the closed form, for a long valley may lead from there to the minimum, with the
-true pose somewhere in it. Covariance: first-order propagation of the error of a corner.
+A single square seen almost from the front has two poses that explain its picture nearly equally well (Collins and
+Bartoli, 2014 [51]): both are returned. With strong perspective, or by chance, only one of them is a minimum of the
+error. Then the second one is the closed-form solution, because the true pose may lie in the long valley between it and
+the minimum. The covariance follows from first-order propagation of the errors of the corners.
 
-A homography keeps straight lines straight, a lens does not: corners that were aligned by one are mended by `lens_bend`.
+A homography keeps straight lines straight, a distorting lens does not: corners that were aligned by a homography are
+corrected by `lens_bend`.
 """
 
 from __future__ import annotations
@@ -20,33 +21,36 @@ import pinocchio as pin
 from rrtik_ompl.base.arrays import Matrix, frozen
 from rrtik_ompl.sensing.cameras.camera import Camera
 
-MIN_ERROR_RATIO = 6.0  # of the two errors of a square; below it are 27 % of near-frontal views and all wrong choices
-CHANCE_ERROR = 0.015  # [pixels]: four corners that agree better do so by chance
-ALIGNED_SIGMA = 0.02  # error of a corner [pixels]: a quarter is noise of 1 %, the rest lens and blur
-ROUGH_SIGMA = 0.2  # blur pulls corners that were not aligned inwards by as much
-MAX_SURPRISE = 6.0  # squared deviations that chance makes of a square; what exceeds them enlarges the covariance
+# A smaller ratio of the two errors is ambiguous: this covers 27 % of near-frontal views, and all wrong choices.
+MIN_ERROR_RATIO = 6.0
+CHANCE_ERROR = 0.015  # [pixels]; smaller errors of four corners occur by chance
+ALIGNED_SIGMA = 0.02  # [pixels]; error of an aligned corner: a quarter is noise of 1 %, the rest lens and blur
+ROUGH_SIGMA = 0.2  # [pixels]; error of a corner that was not aligned, which blur pulls inwards
+# Sum of squared deviations of a square that is explained by chance; a larger sum scales the covariance up.
+MAX_SURPRISE = 6.0
 MAX_DISTANCE = 1e4  # [m]
-MIN_BRANCH_ANGLE = 1e-3  # [rad]: minima that are nearer to each other are one; distinct ones are 0.03 apart and more
+# [rad]; minima closer than this are the same. Distinct ones differ by at least 0.03.
+MIN_BRANCH_ANGLE = 1e-3
 _MAX_STEPS = 40
-_PLACES = 9  # in a row, on the marker and its rim, at which the lens is looked at
-_OF_HOMOGRAPHIES = 8  # of the motions that are fitted; the others are the bends that alignment fits, too
-_RIM = 1.1  # of the marker's side, with its rim
+_PLACES = 9  # sample points along each side of the marker with its rim for the effect of the lens
+_OF_HOMOGRAPHIES = 8  # number of columns of `_motions` that are homographies; the others are bends
+_RIM = 1.1  # size of the marker with its rim, as a multiple of the side
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CornerPose:
-    """A pose that explains the pixels of some points.
+    """A pose that explains the pixels of known points.
 
     Attributes:
-        T_camera_object: The pose that explains them best.
-        other: The second pose of a single square, None if there is none.
-        error: Root mean square distance of a point from its pixel, in pixels.
+        T_camera_object: The pose with the least error.
+        other: The second pose of a single square; None if there is none.
+        error: Root mean square distance of the points from their pixels [pixels].
         other_error: That of the second pose; infinite if there is none.
-        covariance: Of (position [m], small rotation about the axes of the camera [rad]). Shape (6, 6).
-        surprise: Squared deviations of the points from their pixels, by what is known of both, for each number that
-            they have more than a pose: 1 is usual; far more is a contradiction.
-        strain: Of these squared deviations, how many another focal length alone would explain, or another bend of the
-            lens, whichever is more: as large as the square of a normal number by chance. 0 for a single square.
+        covariance: Covariance of (position [m], small rotation about the axes of the camera [rad]), shape (6, 6).
+        surprise: Sum of squared normalised residuals divided by the degrees of freedom: about 1 is usual; a much larger
+            value is a contradiction.
+        strain: How much of this sum another focal length, or another distortion, would explain, whichever is more; for
+            correct intrinsics the square of a standard normal number. 0 for a single square.
     """
 
     T_camera_object: pin.SE3
@@ -59,7 +63,7 @@ class CornerPose:
 
     @property
     def ambiguous(self) -> bool:
-        """The second pose explains the picture almost as well, so that the first may be the wrong one."""
+        """Whether the second pose explains the picture almost as well, so that the first may be wrong."""
         return self.other_error < MIN_ERROR_RATIO * max(self.error, CHANCE_ERROR)
 
     @property
@@ -74,12 +78,12 @@ class CornerPose:
 
 
 def turn_between(first: pin.SE3, second: pin.SE3) -> float:
-    """Angle between the rotations of two poses [rad]."""
+    """Return the angle between the rotations of two poses [rad]."""
     return float(np.linalg.norm(pin.log3(first.rotation.T @ second.rotation)))
 
 
 def square_corners(side: float) -> Matrix:
-    """Corners of a marker in its own frame: x right, y up, z out of it; in the order they are found. Shape (4, 3)."""
+    """Return the corners of a marker in its own frame (x right, y up, z out of it) as detected, shape (4, 3)."""
     half = 0.5 * side
     return np.array([[-half, half, 0.0], [half, half, 0.0], [half, -half, 0.0], [-half, -half, 0.0]])
 
@@ -92,20 +96,23 @@ def pose_of_square(
     spread: Matrix | None = None,
     side_sigma: float = 0.0,
 ) -> CornerPose:
-    """Pose of one marker from its four corners.
+    """Compute the pose of one marker from its four corners.
+
+    The closed form gives up to two poses, which Levenberg-Marquardt refines. If both converge to the same minimum, the
+    unrefined closed-form solution that is farther away becomes the second pose.
 
     Args:
-        camera: Of the picture.
-        pixels: Of the corners, shape (4, 2).
-        side: Of the marker [m].
-        sigma: Error of a corner [pixels].
-        spread: Covariance of the corners in place of it, shape (8, 8) [pixels^2].
+        camera: Camera of the picture.
+        pixels: Pixels of the corners, shape (4, 2).
+        side: Side of the marker [m].
+        sigma: Standard deviation of a corner [pixels].
+        spread: Covariance of the corners, used instead of ``sigma``, shape (8, 8) [pixels^2].
         side_sigma: Standard deviation of the side [m].
     """
     points = square_corners(side)
     shifts = [points * side_sigma / side] if side_sigma else []
 
-    # Exactly in front of the camera the closed form fails: not a number, or a marker that faces away.
+    # For an exactly frontal marker the closed form may give NaN or a marker that faces away. Then SQPnP is used.
     guesses = _guesses(camera, points, pixels, cv2.SOLVEPNP_IPPE_SQUARE) or _guesses(camera, points, pixels)
 
     refined = [_levenberg(camera, points, pixels, guess) for guess in guesses]
@@ -139,10 +146,16 @@ def pose_of_points(
     spread: Matrix | None = None,
     shifts: Sequence[Matrix] = (),
 ) -> CornerPose:
-    """Pose of an object from points on it that are known in its frame. Shapes (m, 2) and (m, 3), m at least 4.
+    """Compute the pose of an object from at least four known points on it.
 
-    ``sigma`` or ``spread``, shape (2 m, 2 m), as in `pose_of_square`; ``shifts``: by how much the points may be
-    elsewhere on the object, one standard deviation of each independent reason, shape (m, 3) [m].
+    Args:
+        camera: Camera of the picture.
+        pixels: Pixels of the points, shape (m, 2).
+        points: In the frame of the object, shape (m, 3) [m].
+        sigma: Standard deviation of a pixel coordinate [pixels].
+        spread: Covariance of the pixels, used instead of ``sigma``, shape (2 m, 2 m) [pixels^2].
+        shifts: Possible displacements of the points on the object, one standard deviation for each independent cause,
+            shape (m, 3) each [m].
     """
     best = _levenberg(camera, points, pixels, _guesses(camera, points, pixels)[0])
     error = _error(camera, points, pixels, best)
@@ -154,14 +167,15 @@ def pose_of_points(
 
 
 def lens_bend(camera: Camera, corners: Matrix, side: float) -> Matrix:
-    """How far the corners of an aligned marker lie off, because the lens is not a homography [pixels]. Shape (4, 2).
+    """Return the error of the corners of an aligned marker caused by lens distortion [pixels], shape (4, 2).
 
-    Alignment fits bends along with the homography (`corner_spread`), so that of the lens the homography's part is left.
+    The distortion within the marker is not a homography. It is expressed as a sum of the small motions that alignment
+    fits (`corner_spread`): only the part of homographies moves the corners, while the bends are fitted separately.
 
     Args:
-        camera: Of the picture.
-        corners: Of the marker, shape (4, 2) [pixels].
-        side: Of the marker [m].
+        camera: Camera of the picture.
+        corners: Corners of the marker, shape (4, 2) [pixels].
+        side: Side of the marker [m].
     """
     if not camera.distortion.any():
         return np.zeros((4, 2))
@@ -177,11 +191,11 @@ def lens_bend(camera: Camera, corners: Matrix, side: float) -> Matrix:
     homography, _ = cv2.findHomography(flat, pixels, 0)
     back = cv2.perspectiveTransform(np.ascontiguousarray(pixels)[:, None], np.linalg.inv(homography))[:, 0]
 
-    # What the lens adds to a homography, as small motions on the marker.
+    # Express the deviation of the lens from a homography as small motions on the marker.
     scale = 0.5 * side
     shift, *_ = np.linalg.lstsq(np.vstack(_motions(flat / scale)), (back - flat).T.ravel(), rcond=None)
 
-    # Alignment takes the bends among them for bends, and only the others move its corners.
+    # Alignment fits the bends separately, so only the motions of homographies displace its corners.
     on_marker = square[:, :2] / scale
     moved = square[:, :2] + np.stack([part[:, :_OF_HOMOGRAPHIES] @ shift[:_OF_HOMOGRAPHIES]
                                       for part in _motions(on_marker)], axis=1)  # fmt: skip
@@ -191,7 +205,14 @@ def lens_bend(camera: Camera, corners: Matrix, side: float) -> Matrix:
 
 
 def _motions(places: Matrix) -> tuple[Matrix, Matrix]:
-    """Small motions of a plane, x and y by themselves: those of homographies, then four bends. Shapes (m, 12)."""
+    """Return a basis of small motions of a plane: eight of homographies, then four bends.
+
+    Args:
+        places: Points of the plane, shape (m, 2).
+
+    Returns:
+        The x and the y components of each motion at each point, shape (m, 12) each.
+    """
     u, v = places.T
     none = np.zeros(len(u))
     one = np.ones(len(u))
@@ -203,7 +224,7 @@ def _motions(places: Matrix) -> tuple[Matrix, Matrix]:
 
 
 def _guesses(camera: Camera, points: Matrix, pixels: Matrix, method: int = cv2.SOLVEPNP_SQPNP) -> list[pin.SE3]:
-    """Poses in closed form that explain the pixels, best first."""
+    """Return closed-form poses that explain the pixels, best first; implausible ones are left out."""
     object_points = np.ascontiguousarray(points)
     image_points = np.ascontiguousarray(pixels)
     _, turns, shifts, _ = cv2.solvePnPGeneric(
@@ -214,14 +235,17 @@ def _guesses(camera: Camera, points: Matrix, pixels: Matrix, method: int = cv2.S
 
 
 def _plausible(pose: pin.SE3, facing: bool) -> bool:
-    """Finite, before the camera, and with its z axis towards it if it has to face it."""
+    """Check that a pose is finite, in front of the camera, and, if required, with its z axis towards the camera."""
     if not (np.isfinite(pose.homogeneous).all() and 0.0 < pose.translation[2] < MAX_DISTANCE):
         return False
     return not facing or float(pose.rotation[:, 2] @ pose.translation) < 0.0
 
 
 def _levenberg(camera: Camera, points: Matrix, pixels: Matrix, pose: pin.SE3) -> pin.SE3:
-    """The nearby pose of least error: Levenberg's steps about the axes of the camera, kept where they help."""
+    """Refine a pose to the nearby minimum of the reprojection error by Levenberg-Marquardt.
+
+    Rotations are updated about the axes of the camera; steps that increase the error are rejected.
+    """
     damping = 1e-6
     error = _error(camera, points, pixels, pose)
 
@@ -254,12 +278,12 @@ def _error(camera: Camera, points: Matrix, pixels: Matrix, pose: pin.SE3) -> flo
 
 
 def _pixel_covariance(count: int, sigma: float, spread: Matrix | None) -> Matrix:
-    """Covariance of the pixels as they were found. Shape (2 m, 2 m)."""
+    """Return the covariance of the detected pixels, shape (2 m, 2 m) [pixels^2]."""
     return sigma**2 * np.eye(2 * count) if spread is None else spread
 
 
 def _point_covariance(camera: Camera, points: Matrix, pose: pin.SE3, shifts: Sequence[Matrix]) -> Matrix:
-    """Covariance of the pixels of what is not known of lens and object. Shape (2 m, 2 m)."""
+    """Return the covariance of the pixels due to uncertain intrinsics and points, shape (2 m, 2 m) [pixels^2]."""
     in_camera_axes = points @ pose.rotation.T
     covariance = camera.doubt(in_camera_axes + pose.translation)
     jacobian = camera.jacobian(in_camera_axes, pose.translation)[:, :3].reshape(-1, 2, 3)
@@ -274,7 +298,20 @@ def _point_covariance(camera: Camera, points: Matrix, pose: pin.SE3, shifts: Seq
 def _covariance(
     camera: Camera, points: Matrix, pixels: Matrix, pose: pin.SE3, covariances: tuple[Matrix, Matrix]
 ) -> tuple[Matrix, float]:
-    """Of (position, rotation), larger where the points deviate from their pixels by more than they should; how much."""
+    """Return the covariance of a pose, and its normalised sum of squared residuals.
+
+    The part due to the pixels is scaled up if the residuals are larger than they should be (`MAX_SURPRISE`).
+
+    Args:
+        camera: Camera of the picture.
+        points: In the frame of the object, shape (m, 3) [m].
+        pixels: Shape (m, 2).
+        pose: ``T_camera_object``.
+        covariances: Of the pixels and of the points, as covariances of pixels, shape (2 m, 2 m) each.
+
+    Returns:
+        Covariance of (position [m], rotation [rad]), shape (6, 6), and the ``surprise`` of `CornerPose`.
+    """
     in_camera_axes = points @ pose.rotation.T
     of_pixels, of_points = covariances
     jacobian = camera.jacobian(in_camera_axes, pose.translation)
@@ -297,7 +334,7 @@ def _covariance(
 
 
 def _strain(camera: Camera, points: Matrix, pixels: Matrix, pose: pin.SE3, covariances: tuple[Matrix, Matrix]) -> float:
-    """Squared deviations that another focal length or another k1 would explain: their score tests [69]."""
+    """Return the score statistic [69] of another focal length or another k1, whichever is larger."""
     in_camera_axes = points @ pose.rotation.T
     in_camera = in_camera_axes + pose.translation
     residuals = (camera.project(in_camera) - pixels).ravel()

@@ -1,9 +1,10 @@
-"""How far the corners of an aligned marker can be trusted: from what the alignment could not explain of the picture.
+"""Estimate the covariance of the corners of an aligned marker from the residuals of the alignment.
 
-What is left is no noise but structure: sheets are bent, ink has spread, something moved, and neighbours err alike. So
-the marker is cut into blocks, and each is left out once: how far the corners then move is what blocks contradict each
-other by (the jackknife, [68]). The white noise of the samples is added. Ink that has spread, blur that differs from way
-to way, and a sheet that is bent are fitted along with the corners; bends are part of what the corners are doubted by.
+The residuals are not noise but structure: sheets are bent, ink has spread, something moved, and neighbouring samples
+have similar errors. So the marker is divided into blocks, each block is left out once, and the resulting movements of
+the corners show how far the blocks contradict each other (the jackknife, [68]). The white noise of the samples is
+added. Spread ink, anisotropic blur, and a bent sheet are fitted together with the corners; the size of the bends adds
+to the uncertainty of the corners.
 """
 
 from __future__ import annotations
@@ -20,31 +21,36 @@ from rrtik_ompl.sensing.markers.lighting import CUT_OFF
 
 Pixels = NDArray[np.float32]
 
-FLOOR = 0.02  # [pixels]; of a picture without any noise: sampling, rounding, shape of the blur
-CUT_SHIFT = 0.12  # [pixels] by which a marker as a whole may lie off, times the share of it that is cut off at white
-_FEW = 48  # samples along a side that are enough
-_TINY = 1e-6  # of the squares: what a marker cannot tell, such as a bend along its view, stays 0
+FLOOR = 0.02  # [pixels]; error in a picture without noise, by sampling, rounding, and the shape of the blur
+# [pixels]; possible displacement of the whole marker, multiplied by the share of samples that are clipped at white.
+CUT_SHIFT = 0.12
+_FEW = 48  # sufficient number of samples along a side
+_TINY = 1e-6  # relative regularisation: parameters that the marker cannot determine stay 0
 _BLOCKS = 4  # along a side
-_ALIKE = np.kron(np.ones((4, 4)), np.eye(2))  # of the corners' eight numbers, moved together
-_BENDS = slice(14, 18)  # of the columns
-_STEP = 0.05  # of a corner, by which slopes are measured [pixels]
+_ALIKE = np.kron(np.ones((4, 4)), np.eye(2))  # covariance pattern of a common displacement of all four corners
+_BENDS = slice(14, 18)  # columns of the bends
+_STEP = 0.05  # step of a corner for finite differences [pixels]
 
 
 def corner_spread(model: Pixels, seen: Pixels, square: Matrix, corners: Matrix) -> tuple[Matrix, Matrix]:
-    """Better corners, shape (4, 2), and the covariance of their eight numbers [pixels^2], shape (8, 8).
+    """Refine the corners of an aligned marker by a linear fit, and return their covariance.
 
     Args:
-        model: The ideal marker, blurred and lit as the picture shows it.
+        model: The ideal marker, blurred and lit as in the picture.
         seen: The picture in the frame of the model, of the same shape.
         square: Corners of the marker in the model, shape (4, 2).
-        corners: In the picture, shape (4, 2).
+        corners: Corners in the picture, shape (4, 2).
+
+    Returns:
+        The corners, shape (4, 2) [pixels], and the covariance of their eight coordinates, shape (8, 8) [pixels^2].
     """
     step = max(len(model) // _FEW, 1)
     columns = _columns(model, square, corners, step)
     values = seen[::step, ::step].ravel().astype(np.float64)
     shape = columns.shape[:2]
     columns = columns.reshape(len(values), -1)
-    samples_per_pixel = max(_area(square) / _area(corners) / step**2, 1.0)  # samples of one pixel err alike
+    # Samples within one pixel have the same error.
+    samples_per_pixel = max(_area(square) / _area(corners) / step**2, 1.0)
 
     normal = columns.T @ columns
     right_side = columns.T @ values
@@ -68,9 +74,10 @@ def corner_spread(model: Pixels, seen: Pixels, square: Matrix, corners: Matrix) 
 
 
 def _columns(model: Pixels, square: Matrix, corners: Matrix, step: int) -> Matrix:
-    """How the picture of the marker changes with what is fitted, eight numbers of corners first. Shape (h, w, k).
+    """Return the Jacobian of the grey values of the marker with respect to all fitted numbers, shape (h, w, k).
 
-    Of one sample among ``step`` along each side.
+    The columns are eight coordinates of corners, then brightness, contrast, spread of ink, three of blur, and four
+    bends. Only one sample in ``step`` along each side is used.
     """
     across = _slope(model, 1, 0)
     down = _slope(model, 0, 1)
@@ -87,7 +94,7 @@ def _columns(model: Pixels, square: Matrix, corners: Matrix, step: int) -> Matri
     u = (2.0 * x - low[0] - high[0]) / (high[0] - low[0])
     v = (2.0 * y - low[1] - high[1]) / (high[1] - low[1])
 
-    # Motions of second order that no homography has: those of homographies are (u u, u v) and (u v, v v).
+    # Motions of second order that are no homographies, whose own ones are (u u, u v) and (u v, v v).
     bends = [across * v * v, down * u * u, across * u * u - down * u * v, across * u * v - down * v * v]
     light_and_bends = [np.ones(model.shape), model, np.hypot(across, down), *blurs, *bends]
     return np.dstack([_slopes(across, down, (x, y), square, corners), *light_and_bends])
@@ -99,13 +106,13 @@ def _slope(picture: NDArray[np.floating[Any]], across: int, down: int) -> Matrix
 
 @lru_cache(maxsize=64)
 def _sample_places(height: int, width: int, step: int) -> tuple[Matrix, Matrix]:
-    """Where the samples are, across and down. Each of shape (height, width)."""
+    """Return the x and y coordinates of the samples, shape (height, width) each."""
     y, x = np.mgrid[0.0:height, 0.0:width] * step
     return x, y
 
 
 def _slopes(across: Matrix, down: Matrix, places: tuple[Matrix, Matrix], square: Matrix, corners: Matrix) -> Matrix:
-    """How the model's grey values change with each number of the corners [1 / pixel]. Shape (h, w, 8)."""
+    """Return the Jacobian of the model's grey values with respect to the corners [1 / pixel], shape (h, w, 8)."""
     x, y = (coordinate.ravel() for coordinate in places)
     moved_corners = corners.reshape(8) + _STEP * np.eye(8)
 
@@ -121,13 +128,13 @@ def _slopes(across: Matrix, down: Matrix, places: tuple[Matrix, Matrix], square:
 
 
 def _perspectives(before: Matrix, after: Matrix) -> Matrix:
-    """The homographies that lead four points to four others, in float64. Each of shape (k, 4, 2); (k, 3, 3)."""
+    """Return the homographies that map four points to four others, shape (k, 3, 3), from arrays of shape (k, 4, 2)."""
     count = len(before)
     x, y = np.moveaxis(before, 2, 0)
     u, v = np.moveaxis(after, 2, 0)
     ones = np.ones((count, 4))
     zeros = np.zeros((count, 4))
-    # Two equations a point, for the eight numbers beside the last one, which is 1.
+    # Each point gives two equations for the eight unknown entries; the ninth entry is 1.
     rows = np.concatenate([
         np.stack([x, y, ones, zeros, zeros, zeros, -u * x, -u * y], axis=2),
         np.stack([zeros, zeros, zeros, x, y, ones, -v * x, -v * y], axis=2),
@@ -144,7 +151,7 @@ def _area(corners: Matrix) -> float:
 
 
 def _jackknife_covariance(shape: tuple[int, ...], slopes: Matrix, residuals: Vector, normal: Matrix) -> Matrix:
-    """Covariance of the corners by how they move when one block after the other is left out. Shape (8, 8)."""
+    """Return the covariance of the corners from their movement when each block is left out once, shape (8, 8)."""
     order, ends = _blocks(*shape[:2])
     slopes_and_residuals = np.column_stack([slopes, residuals])[order]
     block_normals = np.stack([part.T @ part for part in np.split(slopes_and_residuals, ends)])
@@ -155,7 +162,7 @@ def _jackknife_covariance(shape: tuple[int, ...], slopes: Matrix, residuals: Vec
 
 @lru_cache(maxsize=64)
 def _blocks(height: int, width: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """An order of the samples in which each block stands together, and where blocks end in it."""
+    """Return an order of the samples in which each block is contiguous, and the ends of the blocks in it."""
     rows, columns = (np.arange(size) * _BLOCKS // size for size in (height, width))
     block = (rows[:, None] * _BLOCKS + columns).ravel()
     order = np.argsort(block, kind="stable")

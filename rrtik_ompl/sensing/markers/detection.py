@@ -25,31 +25,38 @@ DICTIONARIES = {
     "aruco_original": "DICT_ARUCO_ORIGINAL",
     "aruco_mip_36h12": "DICT_ARUCO_MIP_36h12",
 }
-_ENLARGED = 2.0  # for further tries
-_CALM = 1.0, 1.4  # standard deviation of the blur against noise there, in the second and the third [enlarged pixels]
-_SHARPENED, _EDGE = 8.0, 3.0  # in the third: times what is finer than a spot of this size is added [enlarged pixels]
-_WIDEST = 53  # window of light in a second look [pixels], in which all that a code corrects is corrected; 23 is usual
-_FAR_APART = 3  # bits that a dictionary corrects; others would see markers in any clutter
-_AROUND = 81  # side of the window in which light and contrast are made even there
-_FAINT = 1.5  # grey values: less contrast is noise
-_CONTRAST = 60.0  # grey values for a standard deviation of the window
-_NEAR_SIDES, _NEAR_PIXELS = 1.0, 16  # how far a marker may have moved since the picture before
-_NEAR_OUTLINE_SHARE = 0.5  # of the longer side of what is searched then; smaller outlines are noise
-MIN_OUTLINE_SHARE = 0.01  # of a marker's outline, of the picture's longer side; OpenCV's own 0.03 drops distant ones
+_ENLARGED = 2.0  # scale of the picture in further attempts
+# [enlarged pixels]; standard deviation of the blur against noise in the first and second further attempt.
+_CALM = 1.0, 1.4
+# Sharpening of the second further attempt: factor of the detail that is added, and its size [enlarged pixels].
+_SHARPENED, _EDGE = 8.0, 3.0
+# [pixels]; largest threshold window of the thorough detector, which also corrects as many bits as the code allows.
+# OpenCV's default is 23.
+_WIDEST = 53
+# Bits that a dictionary must be able to correct for this; others would find markers in any clutter.
+_FAR_APART = 3
+_AROUND = 81  # [enlarged pixels]; side of the window in which brightness and contrast are equalised
+_FAINT = 1.5  # grey values; smaller contrast is noise
+_CONTRAST = 60.0  # grey values to which the standard deviation in a window is scaled
+# How far a marker may have moved since the previous picture, in sides and in pixels.
+_NEAR_SIDES, _NEAR_PIXELS = 1.0, 16
+_NEAR_OUTLINE_SHARE = 0.5  # share of the longer side of that window; smaller outlines are noise
+# Least perimeter of a marker as a share of the picture's longer side; OpenCV's 0.03 would miss distant markers.
+MIN_OUTLINE_SHARE = 0.01
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SeenMarker:
-    """A marker in a picture.
+    """A detected marker.
 
     Attributes:
         dictionary: Its dictionary.
-        number: Its number in there.
-        corners: Top left, top right, bottom right, bottom left as printed. Shape (4, 2), pixels.
-        likeness: Correlation of the ideal marker with the picture, 1 at best; below `MIN_LIKENESS` the corners
-            are as they were detected; NaN without alignment.
-        spread: Covariance of the corners, shape (8, 8) [pixels^2]; None where they are as they were detected.
-        look: Blur and tone of the picture, by this marker; None where they are not known.
+        number: Its number in the dictionary.
+        corners: Top left, top right, bottom right, bottom left as printed, shape (4, 2) [pixels].
+        likeness: Correlation of the ideal marker with the picture, at most 1. Below `MIN_LIKENESS` the corners are not
+            aligned; NaN if alignment was not requested.
+        spread: Covariance of the corners, shape (8, 8) [pixels^2]; None if they are not aligned.
+        look: Blur and tone of the picture at this marker; None if they are not known.
     """
 
     dictionary: str
@@ -66,7 +73,7 @@ class SeenMarker:
 
 
 def marker_cells(dictionary: str, number: int) -> NDArray[np.uint8]:
-    """The ideal marker, upright: one number a cell, 0 black, 255 white, its black border included. Shape (n, n).
+    """Return the ideal marker, upright, with its black border: one number a cell, 0 black, 255 white, shape (n, n).
 
     Raises:
         InputError: If there is no such marker.
@@ -89,16 +96,16 @@ def find_markers(
     before: Sequence[SeenMarker] = (),
     near: bool = False,
 ) -> tuple[SeenMarker, ...]:
-    """All markers of a dictionary in a grey picture, in the order of their numbers.
+    """Detect all markers of a dictionary in a grey picture, sorted by their numbers.
 
     Args:
         gray: Shape (height, width).
         dictionary: One of `DICTIONARIES`.
-        align: Align the ideal marker with the picture (`aligned_corners`); else corners are those of the detector.
-        tone: Of the picture (`markers.lighting`); None: for each marker the one with which it fits best.
-        before: Those of the picture before, of a film: they are aligned faster.
-        near: Search only where those were, unless one of them is not there any more; and where nothing is found,
-            not for what is blurred most, which costs as much again.
+        align: Refine the corners (`aligned_corners`); otherwise they are those of the detector.
+        tone: Tone of the picture (`markers.lighting`); None to use, for each marker, the one with which it fits best.
+        before: Markers of the previous picture of a film, which makes their alignment faster.
+        near: Search only near those markers, unless one of them has disappeared. If nothing is found, the costly search
+            for strongly blurred markers is skipped.
     """
     last_looks = {marker.number: marker.look for marker in before}
     corners, numbers = _detected(gray, dictionary, before, near)
@@ -122,7 +129,11 @@ def find_markers(
 
 
 def _detected(gray: NDArray[np.uint8], dictionary: str, before: Sequence[SeenMarker], near: bool) -> tuple[Any, Any]:
-    """Corners and numbers by the cheapest try that finds any, OpenCV's way: numbers are None where none does."""
+    """Run increasingly expensive detections until one finds a marker.
+
+    Returns:
+        Corners and numbers in OpenCV's format; the numbers are None if nothing was found.
+    """
     corners, numbers = _near_last_places(gray, before) if near and before else ([], None)
     if numbers is None:
         corners, numbers, _ = _detector(dictionary).detectMarkers(gray)
@@ -134,7 +145,11 @@ def _detected(gray: NDArray[np.uint8], dictionary: str, before: Sequence[SeenMar
 
 
 def _near_last_places(gray: NDArray[np.uint8], before: Sequence[SeenMarker]) -> tuple[Any, Any]:
-    """Corners and numbers of what the picture before showed, searched for around its place; None where one is not."""
+    """Search for the markers of the previous picture near their places.
+
+    Returns:
+        Corners and numbers in OpenCV's format; the numbers are None if any of the markers is missing.
+    """
     corners = []
     numbers = []
 
@@ -156,9 +171,12 @@ def _near_last_places(gray: NDArray[np.uint8], before: Sequence[SeenMarker]) -> 
 
 
 def _further_tries(gray: NDArray[np.uint8], dictionary: str, tries: int) -> tuple[Any, Any]:
-    """Corners and numbers of what is too faint, too blurred or too small at first: in an enlarged, evened picture.
+    """Search for faint, blurred or small markers in an enlarged picture with equalised contrast.
 
-    The second of these tries sharpens the picture, in which faint markers drown in noise and blurred ones appear.
+    The second attempt also sharpens the picture: blurred markers appear, while faint ones drown in noise.
+
+    Returns:
+        Corners and numbers in OpenCV's format; the numbers are None if nothing was found.
     """
     large = cv2.resize(gray, None, fx=_ENLARGED, fy=_ENLARGED, interpolation=cv2.INTER_CUBIC).astype(np.float32)
     corners: Any = []
@@ -175,7 +193,7 @@ def _further_tries(gray: NDArray[np.uint8], dictionary: str, tries: int) -> tupl
 
 
 def _evened(picture: NDArray[np.floating[Any]]) -> NDArray[np.uint8]:
-    """The same light and contrast everywhere."""
+    """Equalise brightness and contrast locally."""
     local_mean = cv2.boxFilter(picture, -1, (_AROUND, _AROUND))
     local_deviation = np.sqrt(
         np.maximum(cv2.boxFilter(picture * picture, -1, (_AROUND, _AROUND)) - local_mean * local_mean, _FAINT**2)
@@ -184,12 +202,12 @@ def _evened(picture: NDArray[np.floating[Any]]) -> NDArray[np.uint8]:
 
 
 def dictionaries_seen(gray: NDArray[np.uint8]) -> tuple[str, ...]:
-    """Which dictionaries have markers in a picture; for the error where the expected one has none."""
+    """Return the dictionaries that have markers in a picture, for the error message if the expected one has none."""
     return tuple(name for name in DICTIONARIES if _detector(name).detectMarkers(gray)[1] is not None)
 
 
 def charuco_board(columns: int, rows: int, square: float, marker: float, dictionary: str) -> cv2.aruco.CharucoBoard:
-    """A chessboard with markers in its white squares; sides of squares and markers in metres.
+    """Return a chessboard with markers in its white squares; sides of squares and markers in metres.
 
     Raises:
         InputError: If a side is not positive, a marker does not fit its square, or the dictionary is too small.
@@ -202,18 +220,18 @@ def charuco_board(columns: int, rows: int, square: float, marker: float, diction
 
 
 def dictionary_of(board: cv2.aruco.CharucoBoard) -> str | None:
-    """Name of the dictionary of a board's markers, None if it is none of `DICTIONARIES`."""
+    """Return the name of the dictionary of a board's markers; None if it is none of `DICTIONARIES`."""
     cells = board.getDictionary().bytesList
     return next((name for name in DICTIONARIES if np.array_equal(_table(name).bytesList, cells)), None)
 
 
 def charuco_corners(gray: NDArray[np.uint8], board: cv2.aruco.CharucoBoard) -> tuple[Matrix, Matrix]:
-    """Corners of a board in a picture: points on the board [m], shape (k, 3), and their pixels, shape (k, 2)."""
+    """Return the corners of a board in a picture: points on the board [m], shape (k, 3), and pixels, shape (k, 2)."""
     pixels, numbers, _, _ = cv2.aruco.CharucoDetector(board).detectBoard(gray)
     if numbers is None or len(numbers) == 0:
         return np.zeros((0, 3)), np.zeros((0, 2))
 
-    match: Any = board.matchImagePoints  # its type requires a sequence where an array is allowed
+    match: Any = board.matchImagePoints  # the stub of OpenCV requires a sequence, but arrays work
     points, matched_pixels = match(np.asarray(pixels).reshape(-1, 1, 2), np.ravel(numbers))
     return np.reshape(points, (-1, 3)).astype(np.float64), np.reshape(matched_pixels, (-1, 2)).astype(np.float64)
 
@@ -242,5 +260,6 @@ def _detector(
         far_apart = _table(dictionary).maxCorrectionBits >= _FAR_APART
         parameters.errorCorrectionRate = 1.0 if far_apart else parameters.errorCorrectionRate
 
-    parameters.minDistanceToBorder = 0  # else markers that fill half of the picture are lost, though wholly in view
+    # Otherwise markers that fill half of the picture are lost, although they are fully in view.
+    parameters.minDistanceToBorder = 0
     return cv2.aruco.ArucoDetector(_table(dictionary), parameters)

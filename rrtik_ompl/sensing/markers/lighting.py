@@ -1,8 +1,8 @@
-"""How a picture shows ideal markers: light that changes over them, a tone curve, white that is cut off.
+"""Model how a picture renders ideal markers: uneven light, a tone curve, and white that is clipped.
 
-Most cameras and files code light by the curve of sRGB (IEC 61966-2-1) or one like it, some do not. Lenses blur light,
-not grey values: edges lie elsewhere in a coded picture, by a tenth of a pixel. The family of curves here has one
-number, the tone: 0 for light itself, 1 for sRGB, in between and beyond by powers.
+Most cameras and files code light by the curve of sRGB (IEC 61966-2-1) or a similar one, some do not. Lenses blur light,
+not grey values: this moves edges in the coded picture by a tenth of a pixel. The family of curves used here has one
+parameter, the tone: 0 for linear light, 1 for sRGB, and powers of the curve in between and beyond.
 """
 
 from __future__ import annotations
@@ -16,34 +16,34 @@ from rrtik_ompl.base.arrays import Vector
 
 Pixels = NDArray[np.float32]
 
-CUT_OFF = 250.0  # a larger grey value may be of any light
+CUT_OFF = 250.0  # larger grey values may be clipped
 LINEAR, SRGB = 0.0, 1.0
-TONES = (-0.25, 0.0, 0.25, 0.5, 0.75, 1.0, 1.25)  # that are tried where none is known
-_SHADES = 4096  # that are told apart
-_TOE, _SLOPE, _LINK = 0.04045, 12.92, 0.055  # of sRGB's curve, a straight line below the toe
+TONES = (-0.25, 0.0, 0.25, 0.5, 0.75, 1.0, 1.25)  # tones that are tried if none is known
+_SHADES = 4096  # resolution of the table of grey values
+_TOE, _SLOPE, _LINK = 0.04045, 12.92, 0.055  # parameters of sRGB's curve, which is linear below the toe
 
 
 def shown(ideal: Pixels, seen: Pixels, tone: float) -> Pixels:
-    """An ideal marker, blurred, as a picture shows it. Of the same shape.
+    """Render a blurred ideal marker as in a picture; the result has the same shape.
 
-    Black and white each have a light that changes evenly over the marker; both are fitted to the picture, where it is
-    not cut off.
+    The light on black and on white cells each varies linearly over the marker. Both are fitted to those pixels of the
+    picture that are not clipped.
 
     Args:
-        ideal: From 0 to 255.
-        seen: The picture in its frame, of the same shape.
-        tone: Of the picture.
+        ideal: The marker, values from 0 to 255.
+        seen: The picture in the frame of the marker, of the same shape.
+        tone: Tone of the picture.
     """
     return np.asarray(_shown_rows([ideal], seen, [tone])[0].reshape(ideal.shape), dtype=np.float32)
 
 
 def likenesses(ideals: list[Pixels], seen: Pixels, tones: list[float]) -> Vector:
-    """How like a picture is to some ideal markers that are shown by some tones: correlations. Shape (k,).
+    """Return the correlations of a picture with several renderings of ideal markers, shape (k,).
 
     Args:
-        ideals: k of them, or one for all tones.
+        ideals: k markers, or one for all tones.
         seen: The picture, as for `shown`.
-        tones: k of them, or one for all ideals.
+        tones: k tones, or one for all markers.
     """
     models = _shown_rows(ideals, seen, tones)
     models -= models.mean(axis=1, keepdims=True)
@@ -53,7 +53,7 @@ def likenesses(ideals: list[Pixels], seen: Pixels, tones: list[float]) -> Vector
 
 
 def _shown_rows(ideals: list[Pixels], seen: Pixels, tones: list[float]) -> Pixels:
-    """Of each ideal and its tone, as a row: all by one product of matrices, for markers are small. Shape (k, n)."""
+    """Render ideal markers as rows of an array, shape (k, n), with one matrix product for all, as markers are small."""
     basis, basis_products = _even_light(*seen.shape)
     grey = seen.ravel()
     not_cut_off = (grey < CUT_OFF).astype(np.float32)
@@ -61,7 +61,7 @@ def _shown_rows(ideals: list[Pixels], seen: Pixels, tones: list[float]) -> Pixel
     grey_indices = np.clip(np.rint(grey), 0, 255).astype(np.intp)
     lights = np.stack([light_of(tone)[grey_indices] for tone in tones])
 
-    # Normal equations of three numbers for black and three for white, of what is not cut off.
+    # Set up the normal equations of three coefficients for black and three for white, from pixels that are not clipped.
     known_products = (basis_products * not_cut_off).T
     products = [
         np.ones((1, len(grey)), dtype=np.float32) @ known_products,
@@ -87,7 +87,11 @@ def _shown_rows(ideals: list[Pixels], seen: Pixels, tones: list[float]) -> Pixel
 
 @lru_cache(maxsize=64)
 def _even_light(height: int, width: int) -> tuple[Pixels, Pixels]:
-    """One, and what changes evenly across and down, shape (3, height * width); the products of each two, (9, ...)."""
+    """Return the basis 1, x, y of light that varies linearly, and the products of each two of its elements.
+
+    Returns:
+        Shapes (3, height * width) and (9, height * width).
+    """
     down, across = np.mgrid[-1.0 : 1.0 : height * 1j, -1.0 : 1.0 : width * 1j].astype(np.float32)
     basis = np.stack([np.ones(height * width, dtype=np.float32), across.ravel(), down.ravel()])
     products = (basis[:, None] * basis).reshape(9, -1)
@@ -99,27 +103,27 @@ def _even_light(height: int, width: int) -> tuple[Pixels, Pixels]:
 
 
 def coded(light: NDArray[np.float32], tone: float) -> NDArray[np.float32]:
-    """Grey values of light, both from 0 to 1 (more is cut off at 1). Of the same shape.
+    """Convert light to grey values by the tone curve, both from 0 to 1; brighter light is clipped.
 
     Args:
-        light: From 0 for none to 1 for the brightest that is not cut off.
-        tone: 0 linear, 1 sRGB.
+        light: From 0 for none to 1 for the brightest that is not clipped.
+        tone: 0 for linear, 1 for sRGB.
     """
-    # The inverse of `_decoded`, between 4097 of its values.
+    # `_decoded` is inverted by interpolation between 4097 of its values.
     value = np.linspace(0.0, 1.0, 4097)
     return np.interp(light, _decoded(value, tone), value).astype(np.float32)
 
 
 @lru_cache(maxsize=256)
 def light_of(tone: float) -> NDArray[np.float32]:
-    """The light, from 0 to 255, of each of the 256 grey values of a picture. Shape (256,)."""
+    """Return the light, from 0 to 255, of each of the 256 grey values, shape (256,)."""
     table = (255.0 * _decoded(np.arange(256) / 255.0, tone)).astype(np.float32)
     table.flags.writeable = False
     return table
 
 
 def coded_values(light: NDArray[np.float32], tone: float) -> NDArray[np.float32]:
-    """Grey values of light, both from 0 to 255, by a table: for whole pictures. Of the same shape."""
+    """Convert light to grey values, both from 0 to 255, by a table, which is fast for whole pictures."""
     places = np.clip(light * np.float32((_SHADES - 1) / 255.0), 0.0, _SHADES - 1)
     return np.asarray(_grey_of(round(tone, 2))[np.rint(places).astype(np.intp)], dtype=np.float32)
 

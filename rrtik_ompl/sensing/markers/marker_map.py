@@ -1,4 +1,4 @@
-"""Which marker is where on which object, what the object is, and how it can be grasped. Frozen."""
+"""Objects with their markers, solids and grasps, and the map of all of them. Immutable."""
 
 from __future__ import annotations
 
@@ -19,10 +19,15 @@ ROLES = ("base", "arm", "target", "obstacle")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MountedMarker:
-    """A marker on an object: its number, the side of its black square [m], and ``T_object_marker``.
+    """A marker on an object.
 
-    The marker's frame has x to its right, y to its top and z out of the paper, the origin in its middle. What
-    is not known of its side is stated by ``side_sigma``, a standard deviation [m].
+    The marker's frame has x to its right, y to its top and z out of the paper, with the origin in its centre.
+
+    Attributes:
+        number: Number in the dictionary.
+        side: Side of its black square [m].
+        T_object_marker: Its pose.
+        side_sigma: Standard deviation of the side [m].
     """
 
     number: int
@@ -43,19 +48,19 @@ class MountedMarker:
 
     @property
     def corners(self) -> Matrix:
-        """Its corners in the frame of the object [m], in the order in which they are found. Shape (4, 3)."""
+        """Its corners in the object frame [m], in the order of detection, shape (4, 3)."""
         return frozen(square_corners(self.side) @ self.T_object_marker.rotation.T + self.T_object_marker.translation)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GraspType:
-    """A family of grasps: one orientation, and the places along the object (levels) where it is tried.
+    """A family of grasps with one orientation, at several places along the object (levels).
 
     Attributes:
-        name: For the pilot.
+        name: Name shown to the pilot.
         levels: ``T_object_tip`` of each level.
-        approach: How far before the grasp the tip stops first, against its own z axis [m].
-        lift: How far the object is taken up after it, along the world's z axis [m].
+        approach: Distance at which the tip first stops before the grasp, against its own z axis [m].
+        lift: Height by which the object is lifted afterwards, along the world's z axis [m].
     """
 
     name: str
@@ -79,14 +84,14 @@ class GraspType:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MarkedObject:
-    """A rigid thing with markers on it.
+    """A rigid object with markers on it.
 
     Attributes:
         name: Its name.
         role: "base" (of the arm: its frame is the world of the scene), "arm" (on its last link: its frame is that of
             the tip), "target" or "obstacle".
-        markers: Where they sit; several are used together.
-        solids: What it is made of, with poses ``T_object_solid``.
+        markers: Its markers; those in view are used together.
+        solids: Its solids, with poses ``T_object_solid``.
         grasps: Its grasp types.
         loose: Whether a gripper can carry it away.
     """
@@ -110,12 +115,12 @@ class MarkedObject:
 
     @property
     def solid_names(self) -> tuple[str, ...]:
-        """Names of its solids in a scene: its own, with that of the solid if there are several."""
+        """Names of its solids in a scene: the object's name, followed by the solid's if there are several."""
         several = len(self.solids) > 1
         return tuple(f"{self.name}.{each.name}" if several else self.name for each in self.solids)
 
     def grasp(self, name: str) -> GraspType:
-        """The grasp type of a name.
+        """Return the grasp type of a name.
 
         Raises:
             UnknownNameError: If there is none.
@@ -128,13 +133,13 @@ class MarkedObject:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MarkerMap:
-    """All objects that a camera may see, and how the camera is held.
+    """All objects that a camera may see, and how the camera is mounted.
 
     Attributes:
-        dictionary: Of the markers.
-        objects: What they sit on.
-        T_base_camera: Where the camera is mounted, if arm and camera are held by one body (as on a vehicle); None if
-            the base has markers of its own and the camera may be anywhere.
+        dictionary: Dictionary of the markers.
+        objects: The objects.
+        T_base_camera: Pose of the camera, if one body carries arm and camera (as on a vehicle); None if the base has
+            markers of its own and the camera may be anywhere.
     """
 
     dictionary: str
@@ -164,11 +169,11 @@ class MarkerMap:
 
     @property
     def base(self) -> MarkedObject | None:
-        """The object that is the base of the arm, if it has markers."""
+        """The object that is the base of the arm; None if the base has no markers."""
         return next((o for o in self.objects if o.role == "base"), None)
 
     def named(self, name: str) -> MarkedObject:
-        """The object of a name.
+        """Return the object of a name.
 
         Raises:
             UnknownNameError: If there is none.

@@ -1,4 +1,4 @@
-"""A marker map <-> its YAML file: which marker sits on which object, its solids, its grasps."""
+"""Read marker maps from YAML files: markers on objects, solids, and grasps."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class MarkerEntry(Section):
     pose: PoseEntry | None = Field(None, description="in the frame of the object; its origin if absent")
 
     def build(self) -> MountedMarker:
-        """The marker."""
+        """Return the marker."""
         place = pin.SE3.Identity() if self.pose is None else self.pose.build()
         return MountedMarker(self.id, self.side, place, self.side_sigma)
 
@@ -41,12 +41,12 @@ class GraspEntry(Section):
     lift: NotNegative = Field(0.1, description="how far the object is taken up, along the world's z axis [m]")
 
     def build(self) -> GraspType:
-        """The grasp type."""
+        """Return the grasp type."""
         return GraspType(self.type, [level.build() for level in self.levels], self.approach, self.lift)
 
 
 class ObjectEntry(Section):
-    """A thing with markers."""
+    """An object with markers."""
 
     name: Name
     role: Literal["base", "arm", "target", "obstacle"]
@@ -56,7 +56,7 @@ class ObjectEntry(Section):
     loose: bool = Field(False, strict=True, description="whether a gripper can carry it away")
 
     def build(self, folder: Path) -> MarkedObject:
-        """The object; files of meshes are relative to ``folder``."""
+        """Return the object; files of meshes are relative to ``folder``."""
         solids = [Obstacle(each.name, each.build_shape(folder), each.build_pose()) for each in self.solids]
         grasps = [each.build() for each in self.grasps]
         markers = tuple(each.build() for each in self.markers)
@@ -72,7 +72,7 @@ class MarkerMapFile(Section):
     objects: Annotated[list[ObjectEntry], Field(min_length=1)]
 
     def build(self, document: YamlDocument) -> MarkerMap:
-        """The map; errors name the line of the object."""
+        """Return the map; error messages name the line of the object."""
         from rrtik_ompl.sensing.markers.detection import marker_cells
 
         objects = []
@@ -80,7 +80,7 @@ class MarkerMapFile(Section):
             with document.at(("objects", k)):
                 objects.append(entry.build(document.path.parent))
                 for marker in entry.markers:
-                    marker_cells(self.dictionary, marker.id)  # raises where there is no such marker
+                    marker_cells(self.dictionary, marker.id)  # raises if the dictionary has no such marker
 
         with document.at(()):
             return MarkerMap(

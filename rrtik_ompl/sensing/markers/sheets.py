@@ -1,4 +1,4 @@
-"""Sheets to print: markers and boards at their true size, as PDF (vector) or PNG, with a rule to check the printer."""
+"""Print markers and boards in true size, as PDF (vector) or PNG, with a scale to check the printer."""
 
 from __future__ import annotations
 
@@ -27,7 +27,16 @@ SHEET_FORMATS = (".pdf", ".png")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Tile:
-    """A picture of cells on the paper: lower left corner, size of a cell, height of the caption's place [m]."""
+    """An array of cells on the paper.
+
+    Attributes:
+        cells: Grey values, shape (rows, columns).
+        x: Left edge [m].
+        y: Lower edge [m].
+        cell: Side of a cell [m].
+        caption: Text below it.
+        caption_y: Height of the text [m].
+    """
 
     cells: NDArray[np.uint8]
     x: float
@@ -46,10 +55,10 @@ def print_markers(
     paper: str = "a4",
     dots_per_inch: int = 600,
 ) -> int:
-    """Write sheets with markers of a side [m] (that of the black square), as many as fit on each.
+    """Write sheets with markers of a given side [m] (that of the black square), as many as fit on each.
 
     Returns:
-        Number of sheets. Several as PNG are numbered: ``name-1.png``, ``name-2.png``.
+        The number of sheets. Several PNG files are numbered: ``name-1.png``, ``name-2.png``.
 
     Raises:
         InputError: If a marker does not exist or does not fit the paper, or the file cannot be written.
@@ -102,7 +111,7 @@ def print_board(
     if columns * square > width - 2 * EDGE or rows * square > height - 2 * EDGE - 2 * CAPTION:
         raise InputError(f"a board of {columns * square:.3f} x {rows * square:.3f} m does not fit on {paper}")
 
-    fine = 100  # cells a square: the side of a marker becomes a whole number of them to 1 %
+    fine = 100  # cells a square, so that the side of a marker is a whole number of cells to 1 %
     picture = np.asarray(board.generateImage((columns * fine, rows * fine), marginSize=0, borderBits=1), dtype=np.uint8)
 
     caption = f"ChArUco {columns} x {rows}, {dictionary}, squares {1e3 * square:g} mm, markers {1e3 * marker:g} mm"
