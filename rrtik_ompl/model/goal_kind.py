@@ -91,7 +91,7 @@ class Goal:
         return [robot]
 
     def member_at(self, robot: Robot, q: ArrayLike) -> int | None:
-        """Return which of several goals a configuration, shape (dof,), reaches, from 0; None if it has no members."""
+        """Return the index of the member that q, shape (dof,), reaches; None for none, or if there are no members."""
         del robot, q
         return None
 
@@ -163,7 +163,7 @@ class GoalPart(TipGoal):
         return self.freedom is not None
 
     def freed(self, axis: FrameAxis | None, box: Vector) -> GoalPart:
-        """It with a free turn about an axis of its frame and a box of positions, if it is a pose."""
+        """Return the goal with a free rotation about an axis and a box of positions; only a pose is changed by it."""
         del axis, box
         return self
 
@@ -380,7 +380,7 @@ class TaskRegion(GoalPart):
         return np.hstack([np.clip(place, self.bounds[:3, 0], self.bounds[:3, 1]), angles])
 
     def tip_errors(self, tips: NDArray[np.float64]) -> tuple[Vector, Vector]:
-        """Distance [m] and angle [rad] of poses of the tip, shape (m, 4, 4), from the nearest pose, shapes (m,)."""
+        """Compute distances [m] and angles [rad] of tip poses from the nearest region poses: (m, 4, 4) -> (m,) each."""
         poses = self.poses(self.nearest(tips))
         position: Vector = np.linalg.norm(tips[:, :3, 3] - poses[:, :3, 3], axis=1)
         return position, rotation_angles(np.swapaxes(poses[:, :3, :3], 1, 2) @ tips[:, :3, :3])

@@ -101,7 +101,9 @@ class JointPath:
 
     @staticmethod
     def of(robot: Robot, waypoints: ArrayLike) -> JointPath:
-        """A path of this robot through ``waypoints``, shape (k, dof); :meth:`rrtik_ompl.Robot.onto_limits` applies.
+        """Create a path of a robot through ``waypoints``, shape (k, dof).
+
+        Values slightly outside a limit are moved onto it (:meth:`rrtik_ompl.Robot.onto_limits`).
 
         Raises:
             InputError: If the rows do not have one value per joint of the robot.

@@ -60,7 +60,7 @@ class Maker(Protocol):
         """Digest of the geometry that its proofs refer to."""
 
     def certificate(self, rows: Matrix, clearance: float) -> Certificate | None:
-        """By what motions between waypoints, shape (k, dof), keep a clearance [m]; None if one of them does not."""
+        """Return a certificate that motions between waypoints, (k, dof), keep a clearance [m]; None if one does not."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -401,7 +401,7 @@ def pose_at(obstacle: Obstacle, time: float) -> pin.SE3:
 
 
 def pairs_that_may_touch(scene: Scene) -> frozenset[tuple[frozenset[str], float | None]]:
-    """Return the pairs of names that a scene allows to touch, and how near those in contact may come [m]."""
+    """Return the pairs of names that may touch, each with the least distance of a contact [m] or None."""
     allowed = ((frozenset(pair), None) for pair in scene.allowed_collisions)
     return frozenset([*allowed, *((each.pair, each.distance) for each in scene.contacts)])
 

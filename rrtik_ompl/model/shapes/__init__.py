@@ -1,8 +1,8 @@
-"""What obstacles and attached bodies are: frozen solids in their own frame, in metres (not how they collide).
+"""Shapes of obstacles and attached bodies: immutable solids in their own frame, in metres, without collision checks.
 
-Here are those that a few numbers describe, and ``SHAPES``, which has every kind by its key in files.
-Whoever adds a kind to it and to ``rrtik_ompl.geometry.collision.shape_table``, before files are read, uses it like the
-others.
+This module defines the shapes that a few numbers describe, and ``SHAPES``, which holds every kind by its key in files.
+A kind that is added to it and to ``rrtik_ompl.geometry.collision.shape_table`` before files are read can be used like
+the others.
 """
 
 from __future__ import annotations
@@ -50,9 +50,9 @@ __all__ = [
     "same_shape",
 ]
 
-SIDES = 32  # of a drawn cylinder
-SEGMENTS = 24  # of a drawn ball or capsule
-MOST_SEGMENTS = 2_000  # half a million vertices
+SIDES = 32  # number of sides of a drawn cylinder
+SEGMENTS = 24  # number of segments of a drawn ball or capsule
+MOST_SEGMENTS = 2_000  # largest number of segments, which gives half a million vertices
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,16 +82,16 @@ class Box(Shape):
 
     @property
     def bounding_radius(self) -> float:
-        """Half its diagonal [m]."""
+        """Half of its diagonal [m]."""
         return float(np.linalg.norm(0.5 * self.size))
 
     def surface(self) -> Triangles:
-        """Its six sides."""
+        """Return its six sides as triangles."""
         x, y, z = self.size
         return extruded(0.5 * np.array([[-x, -y], [x, -y], [x, y], [-x, y]]), z)
 
     def grown(self, margin: float) -> Triangles:
-        """Return the box with rounded edges that is larger by the margin [m] on all sides."""
+        """Return the surface of all points within a margin [m] of the box, which has rounded edges."""
         turn = np.concatenate([np.linspace(0.0, 0.5 * np.pi, 7) + 0.5 * np.pi * k for k in range(4)])
         corners = np.repeat(0.5 * self.size[:2] * [[1, 1], [-1, 1], [-1, -1], [1, -1]], 7, axis=0)
         return rounded(corners, turn, float(self.size[2]), not_negative(margin, "margin"))
@@ -124,11 +124,11 @@ class Sphere(Shape):
         return self.radius
 
     def surface(self, segments: int = SEGMENTS) -> Triangles:
-        """Rings of so many segments from pole to pole."""
+        """Return its surface as triangles, in rings of ``segments`` each from pole to pole."""
         return round_ended(self.radius, 0.0, _segments(segments))
 
     def grown(self, margin: float) -> Sphere:
-        """Return the ball of a larger radius."""
+        """Return the ball with its radius enlarged by a margin [m]."""
         return Sphere(self.radius + not_negative(margin, "margin"))
 
 
@@ -159,16 +159,16 @@ class Cylinder(Shape):
         return float(np.hypot(self.radius, 0.5 * self.length))
 
     def surface(self) -> Triangles:
-        """Return the prism over a polygon inscribed in its base."""
+        """Return the surface of the prism over a regular polygon inscribed in its base."""
         return extruded(self.radius * _circle(SIDES)[1], self.length)
 
     def grown(self, margin: float) -> Triangles:
-        """Return the cylinder with rounded edges that is larger by the margin [m] on all sides."""
+        """Return the surface of all points within a margin [m] of the cylinder, which has rounded edges."""
         turn, circle = _circle(48)
         return rounded(self.radius * circle, turn, self.length, not_negative(margin, "margin"))
 
     def capped(self) -> Capsule:
-        """Return the cylinder with half a ball on either end."""
+        """Return the capsule of the cylinder with a half ball at either end."""
         return Capsule(self.radius, self.length)
 
 
@@ -199,11 +199,11 @@ class Capsule(Shape):
         return self.radius + 0.5 * self.length
 
     def surface(self, segments: int = SEGMENTS) -> Triangles:
-        """Rings of so many segments from pole to pole."""
+        """Return its surface as triangles, in rings of ``segments`` each from pole to pole."""
         return round_ended(self.radius, self.length, _segments(segments))
 
     def grown(self, margin: float) -> Capsule:
-        """Return the capsule of a larger radius."""
+        """Return the capsule with its radius enlarged by a margin [m]."""
         return Capsule(self.radius + not_negative(margin, "margin"), self.length)
 
 
@@ -244,7 +244,7 @@ class HalfSpace(Shape):
         return float("inf")
 
     def surface(self) -> Triangles:
-        """None: see :func:`rrtik_ompl.viewer.drawing.meshes.half_space_plate`.
+        """Refuse to draw; a viewer uses :func:`rrtik_ompl.viewer.drawing.meshes.half_space_plate`.
 
         Raises:
             InputError: Always.
@@ -292,19 +292,19 @@ class Prism(Shape):
         return float(np.hypot(np.linalg.norm(self.polygon, axis=1).max(), 0.5 * self.height))
 
     def surface(self) -> Triangles:
-        """Its walls, floor and roof."""
+        """Return its side walls and both polygons as triangles."""
         return extruded(self.polygon, self.height)
 
 
 def _segments(given: int) -> int:
-    """Return the number of segments of a drawn ball, if a quarter of it is a ring or more."""
+    """Validate the number of segments of a drawn ball, at least 4."""
     segments = whole_number(given, "segments", least=4)
     at_most(segments, MOST_SEGMENTS, "segments")
     return segments
 
 
 def _circle(sides: int) -> tuple[Vector, Matrix]:
-    """Angles [rad] evenly round a circle of radius 1, shape (sides,), and the points there, shape (sides, 2)."""
+    """Return evenly spaced angles [rad], shape (sides,), and their points on the unit circle, shape (sides, 2)."""
     turn = np.linspace(0.0, TAU, sides, endpoint=False)
     return turn, np.stack([np.cos(turn), np.sin(turn)], 1)
 

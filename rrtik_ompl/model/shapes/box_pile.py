@@ -1,4 +1,4 @@
-"""Shapes that are many boxes along the axes of one frame: each box is checked, and proven apart, as a box is."""
+"""Shapes that are unions of many boxes along the axes of one frame, each of which is checked and proven like a box."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from rrtik_ompl.model.shapes.shape import Shape
 from rrtik_ompl.model.shapes.surfaces import Triangles, extruded
 
 MOST_BOXES = 20_000
-ONE = extruded(np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]]), 1.0)  # a box of size 1
+ONE = extruded(np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]]), 1.0)  # a cube of side 1
 
 
 class BoxPile(Shape):
-    """The union of boxes."""
+    """A union of boxes."""
 
     __slots__ = ()
     movable = False
@@ -25,7 +25,7 @@ class BoxPile(Shape):
     @property
     @abstractmethod
     def boxes(self) -> tuple[Matrix, Matrix]:
-        """Their centres and full side lengths [m], shape (n, 3) each."""
+        """Centres and full side lengths of the boxes [m], shape (n, 3) each."""
 
     @property
     def bounding_radius(self) -> float:
@@ -34,7 +34,7 @@ class BoxPile(Shape):
         return float(np.linalg.norm(np.abs(centres) + 0.5 * sizes, axis=1).max())
 
     def surface(self) -> Triangles:
-        """Return the sides of all boxes."""
+        """Return the sides of all boxes as triangles."""
         centres, sizes = self.boxes
         corners = centres[:, None] + ONE.vertices * sizes[:, None]
         faces = ONE.faces + len(ONE.vertices) * np.arange(len(centres))[:, None, None]
@@ -45,20 +45,23 @@ def few_enough(count: int, what: str, remedy: str) -> None:
     """Refuse more boxes than a scene can hold.
 
     Raises:
-        InputError: It says the remedy.
+        InputError: The message ends with the remedy.
     """
     at_most(count, MOST_BOXES, f"{what}: boxes", remedy)
 
 
 def merged(heights: Matrix) -> NDArray[np.int64]:
-    """Rectangles of equal numbers in a grid, NaN in none of them: rows from, to, columns from, to, shape (n, 4).
+    """Divide a grid into rectangles of equal numbers; NaN is in none of them.
 
-    Runs along the rows first, then equal runs of rows that follow each other.
+    Runs of equal numbers within rows are found first, then equal runs in consecutive rows are merged.
+
+    Returns:
+        First row, end row, first column and end column of each rectangle, shape (n, 4); the ends are exclusive.
     """
     done: list[tuple[int, int, int, int]] = []
     open_: dict[tuple[int, int, float], int] = {}
     for row, numbers in enumerate([*heights, np.full(heights.shape[1], np.nan)]):
-        ends = np.flatnonzero(np.diff(numbers) != 0.0) + 1  # NaN differs from all, itself too
+        ends = np.flatnonzero(np.diff(numbers) != 0.0) + 1  # NaN differs from every number, also from itself
         starts = np.concatenate([[0], ends]).tolist()
         known = zip(starts, [*ends.tolist(), len(numbers)], numbers[starts].tolist(), strict=True)
         now = {(a, b, height): open_.get((a, b, height), row) for a, b, height in known if height == height}

@@ -1,4 +1,4 @@
-"""Ground as a grid of heights: a seabed from sonar, terrain from a picture."""
+"""Ground as a grid of heights, such as a seabed from sonar or terrain from a picture."""
 
 from __future__ import annotations
 
@@ -14,41 +14,41 @@ from rrtik_ompl.base.errors import CloudWarning, InputError, require
 from rrtik_ompl.model.shapes.box_pile import BoxPile, few_enough, merged
 from rrtik_ompl.model.shapes.point_cloud import Invalid, known_choice
 
-FEW = 0.05  # share of the heights that are few
-FAR = 20.0  # how many times the extent of the rest, and of the grid, is far
+FEW = 0.05  # largest share of the heights that count as outliers
+FAR = 20.0  # heights are outliers if they are this many times the extent of the rest, and of the grid, away
 COARSER = "take .coarser(2), or a part of it"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HeightField(BoxPile):
-    """A grid of columns, each as high as its number, all of them from one floor: exactly that solid.
+    """A grid of columns from a common floor up to their heights; the solid is exactly the union of these.
 
-    Columns of one height that lie beside each other are one box. The middle of the grid is the origin; columns of the
-    array go along x, rows along y.
+    Adjacent columns of equal height form one box. The origin is the middle of the grid; columns of the array go along
+    x, rows along y.
 
     Attributes:
-        heights: Where the columns end along z [m], shape (rows, columns); NaN where there is none.
+        heights: Upper end of each column along z [m], shape (rows, columns); NaN where there is no column.
         cell: Side of a column [m].
-        floor: Where they begin along z [m].
-        source: Path of the file it was read from, or "" if it is not as that file has it.
-        scale: Metres per unit of that file, kept for writing the scene back.
-        nodata: The number that stands for no data in that file, likewise; None if nobody stated one.
+        floor: Lower end of all columns along z [m].
+        source: Path of the file it was read from, or "" if it was changed since.
+        scale: Metres per unit of that file; it is written back with the scene.
+        nodata: The number that stands for missing data in that file; it is written back as well. None if unknown.
 
     Args:
         heights: See above.
         cell: See above.
         floor: See above; one cell below the lowest height if None.
-        invalid: Whether heights that are not finite are refused, or dropped: no column is there.
+        invalid: Whether heights that are not finite are refused, or dropped, which leaves out their columns.
         source: See above.
         scale: See above.
         nodata: See above.
 
     Raises:
-        InputError: If there is no height, heights are not numbers or not finite, one is not above the floor, or they
-            are more boxes than a scene can hold.
+        InputError: If there are no heights, heights are not numbers or not finite, one is not above the floor, or
+            there are more boxes than a scene can hold.
 
     Warns:
-        CloudWarning: If a few heights lie far beyond the rest: they are rather marks of missing data.
+        CloudWarning: If a few heights lie far beyond the rest, as they probably mark missing data.
 
     Example:
         >>> seabed = rrtik.HeightField([[0.1, 0.1, 0.3], [0.1, 0.1, 0.2]], cell=0.5)
@@ -135,10 +135,12 @@ class HeightField(BoxPile):
         return centres, sizes
 
     def coarser(self, factor: int) -> HeightField:
-        """Cells that are so many times as wide, the whole grid at most, each as high as the highest of those in it.
+        """Return a grid with cells ``factor`` times as wide, each as high as the highest cell in it.
+
+        At most, the whole grid becomes one cell.
 
         Raises:
-            InputError: If the factor is no whole number of at least 1.
+            InputError: If the factor is not a whole number of at least 1.
 
         Example:
             >>> rrtik.HeightField([[0.0, 0.2], [0.1, 0.3]], cell=0.5).coarser(2).heights
@@ -151,17 +153,17 @@ class HeightField(BoxPile):
         return HeightField(highest, self.cell * step, self.floor, invalid="drop")
 
     def rounded(self, step: float) -> HeightField:
-        """Return each height rounded up to a multiple of a step [m], so that more columns are of one height.
+        """Return the grid with heights rounded up to multiples of a step [m], so that more columns form one box.
 
         Raises:
-            InputError: If the step is no length.
+            InputError: If the step is not positive.
         """
         size = length(step, "step of heights")
         return HeightField(np.ceil(self.heights / size - 1e-9) * size, self.cell, self.floor, invalid="drop")
 
 
 def _far_beyond(rows: Matrix, cell: float) -> str:
-    """What lies far above or below all but a few heights, in words; "" for nothing."""
+    """Describe a few heights that lie far above or below all others; "" if there are none."""
     heights = np.sort(rows[np.isfinite(rows)])
     few = max(int(FEW * len(heights)), 1)
     width = cell * max(rows.shape)

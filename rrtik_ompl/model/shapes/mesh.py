@@ -24,7 +24,7 @@ from rrtik_ompl.model.shapes.shape import Shape
 from rrtik_ompl.model.shapes.surfaces import Triangles
 
 MOST_TRIANGLES = 5_000_000
-SAME_DIGITS = 12  # of metres; vertices that differ less differ by rounding
+SAME_DIGITS = 12  # decimals of metres in which vertices differ if they are not equal up to rounding errors
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,9 +33,9 @@ class Mesh(Shape):
 
     Attributes:
         vertices: Shape (n, 3), metres.
-        triangles: Vertex numbers, shape (m, 3).
+        triangles: Vertex indices, shape (m, 3).
         source: Path of the file it was read from, or "".
-        scale: The factor that was applied to the file's numbers, kept for writing the scene back.
+        scale: Factor that was applied to the file's numbers; it is written back with the scene.
 
     Example:
         >>> corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
@@ -84,7 +84,7 @@ class Mesh(Shape):
 
     @property
     def closed(self) -> bool:
-        """Whether every edge is shared by exactly two triangles of opposite sense, so that inside and outside exist."""
+        """Whether every edge is shared by exactly two triangles of opposite orientation, so that it has an inside."""
         return self.open_edges == 0
 
     @property
@@ -93,20 +93,21 @@ class Mesh(Shape):
         return float(np.linalg.norm(self.vertices[distinct(self.triangles)], axis=1).max())
 
     def surface(self) -> Triangles:
-        """Its triangles."""
+        """Return its triangles."""
         return Triangles(self.vertices, self.triangles)
 
 
 def _welded(points: Matrix, faces: NDArray[np.int64]) -> tuple[Matrix, NDArray[np.int64]]:
-    """Merge equal vertices (STL repeats them per triangle) and drop triangles that collapse to a line or a point.
+    """Merge equal vertices (STL repeats them for each triangle) and drop triangles of zero area.
 
-    Where vertices differ by rounding alone, those are merged too: coal takes a ball for one that touches the sliver
-    between them, wherever it is, and a solid whose seam is open by that would count as a surface.
+    If vertices differ only by rounding errors, these are merged as well. Coal reports contacts of balls with the
+    slivers between such vertices, wherever the ball is, and a solid with such a seam would count as an open surface.
     """
     unique, merged = _merged(points, points, faces)
     sides = unique[merged] - unique[np.roll(merged, 1, axis=1)]
     if (np.abs(sides).max(axis=2) < 10.0**-SAME_DIGITS).any() or _open_edges(merged) > 0:
-        for shift in (0.0, 0.37 * 10.0**-SAME_DIGITS):  # what one rounding parts, the other one joins
+        # Neighbours that fall on different sides of a rounding boundary are merged with the shifted one.
+        for shift in (0.0, 0.37 * 10.0**-SAME_DIGITS):
             unique, merged = _merged(np.round(unique + shift, SAME_DIGITS) + 0.0, unique, merged)
 
     a, b, c = (unique[merged[:, k]] for k in range(3))
@@ -114,7 +115,11 @@ def _welded(points: Matrix, faces: NDArray[np.int64]) -> tuple[Matrix, NDArray[n
 
 
 def _merged(keys: Matrix, points: Matrix, faces: NDArray[np.int64]) -> tuple[Matrix, NDArray[np.int64]]:
-    """Return one point for all of the same key, and the faces of those."""
+    """Keep one of the points with equal keys, and renumber the faces accordingly.
+
+    Returns:
+        The points, shape (n, 3), and the faces, shape (m, 3).
+    """
     _, first, index = np.unique(keys, axis=0, return_index=True, return_inverse=True)
     return points[first], np.asarray(index).reshape(-1)[faces]
 
@@ -124,5 +129,5 @@ def _open_edges(faces: NDArray[np.int64]) -> int:
     edges: NDArray[Any] = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
     size = int(faces.max()) + 1
     forward, count = np.unique(edges[:, 0] * size + edges[:, 1], return_counts=True)
-    backward = distinct(edges[:, 1] * size + edges[:, 0])  # numpy hashes such numbers, in ten times the time
+    backward = distinct(edges[:, 1] * size + edges[:, 0])  # ten times faster than numpy.unique here
     return int((count > 1).sum() + np.setxor1d(forward, backward, assume_unique=True).size)

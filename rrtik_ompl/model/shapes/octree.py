@@ -1,4 +1,4 @@
-"""The occupied cells of an octree: space that a mapping program holds for full."""
+"""The occupied cells of an octree, as mapping programs produce it."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from rrtik_ompl.model.shapes.box_pile import BoxPile, few_enough
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Octree(BoxPile):
-    """Cubes along the axes of their frame.
+    """A union of cubes along the axes of their frame.
 
     Attributes:
-        centres: Of the cubes, shape (n, 3) [m].
+        centres: Centres of the cubes, shape (n, 3) [m].
         sides: Their full side lengths, shape (n,) [m].
         source: Path of the file it was read from, or "".
-        scale: Metres per unit of that file, kept for writing the scene back.
+        scale: Metres per unit of that file; it is written back with the scene.
 
     Raises:
-        InputError: If there is no cube, a number is not finite, a side is no length, or they are more than a scene can
-            hold.
+        InputError: If there are no cubes, or more than a scene can hold, a number is not finite, or a side is not
+            positive.
 
     Example:
         >>> rrtik.Octree([[0.0, 0.0, 0.1], [0.4, 0.0, 0.3]], [0.2, 0.6])

@@ -1,4 +1,4 @@
-"""Clouds of points, as depth cameras, laser scanners and sonars see their surroundings."""
+"""Point clouds as measured by depth cameras, laser scanners and sonars."""
 
 from __future__ import annotations
 
@@ -29,38 +29,37 @@ from rrtik_ompl.model.shapes.shape import Shape
 from rrtik_ompl.model.shapes.surfaces import Triangles
 
 MOST_POINTS = 20_000_000
-WIDEST = 200.0  # [m] a cloud of a larger extent is rather one in millimetres
-MOST_DRAWN = 20_000  # points of a surface
-RADIUS = 0.01  # [m] of a point whose radius nobody states
+WIDEST = 200.0  # [m] extent above which a cloud is suspected to be in millimetres
+MOST_DRAWN = 20_000  # largest number of points in a drawn surface
+RADIUS = 0.01  # [m] default radius of a point
 
 Invalid: TypeAlias = Literal["refuse", "drop"]
 Points: TypeAlias = NDArray[np.float32]
 
 
 class _Kept:
-    """What is made of a cloud once, when somebody asks for it first."""
+    """Data derived from a cloud, which is computed on first use and kept."""
 
     __slots__ = ("_tree", "solid", "table")
 
     _tree: PointTree
-    solid: Callable[[], Any]  # a weak reference to what collision checks take it for
-    table: object  # what the kernels make of its tree
+    solid: Callable[[], Any]  # a weak reference to its collision geometry
+    table: object  # the kernels' table of its tree
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PointCloud(_Kept, Shape):
-    """A cloud of points: every point is a ball of this radius, exactly.
+    """A cloud of points, each of which is exactly a ball of the given radius.
 
-    Points are kept in single precision, as sensors and files give them, which moves them by at most 6e-8 of their
-    coordinates.
+    Points are stored in single precision, as sensors and files provide them, with a relative error of at most 6e-8.
 
     Attributes:
-        points: Shape (n, 3), metres, float32.
-        radius: Of the ball that each of them is [m]; choose it so that balls of neighbouring points overlap, and add
-            what the sensor's noise may move a point by.
-        source: Path of the file it was read from, or "" if it is not as that file has it.
-        scale: The factor that was applied to the file's numbers, kept for writing the scene back.
-        dropped: How many points were left out because they were not finite.
+        points: The centres of the balls, shape (n, 3) [m], float32.
+        radius: Radius of each ball [m]. Choose it so that balls of neighbouring points overlap, and add the error of
+            the sensor.
+        source: Path of the file it was read from, or "" if it was changed since.
+        scale: Factor that was applied to the file's numbers; it is written back with the scene.
+        dropped: Number of points that were left out because they were not finite.
 
     Args:
         points: Shape (n, 3) [m].
@@ -70,10 +69,10 @@ class PointCloud(_Kept, Shape):
         scale: See above.
 
     Raises:
-        InputError: If there is no point, points are not numbers or not finite, or the radius is no length.
+        InputError: If there are no points, points are not numbers or not finite, or the radius is not positive.
 
     Warns:
-        CloudWarning: If the cloud is wider than 200 m: it is rather in millimetres.
+        CloudWarning: If the cloud is wider than 200 m, as it is probably in millimetres.
 
     Example:
         >>> import numpy as np
@@ -125,25 +124,25 @@ class PointCloud(_Kept, Shape):
 
     @property
     def bounding_radius(self) -> float:
-        """Distance of its farthest point from its origin, and the radius of a point [m]."""
+        """Distance of its farthest point from its origin plus the radius of a point [m]."""
         squares = np.einsum("ni,ni->n", self.points, self.points, dtype=np.float64)
         return float(np.sqrt(squares.max())) + self.radius
 
     @property
     def bounds(self) -> tuple[Vector, Vector]:
-        """Lowest and highest coordinates of its balls [m], shape (3,) each."""
+        """Lowest and highest coordinates of the balls [m], shape (3,) each."""
         low, high = (end.astype(np.float64) for end in self.tree.bounds)
         return low - self.radius, high + self.radius
 
     @property
     def tree(self) -> PointTree:
-        """Its points in a tree; made when it is first asked for: 10 ms for 100,000 points."""
+        """Its points in a tree, built on first use (10 ms for 100,000 points)."""
         if not hasattr(self, "_tree"):
             object.__setattr__(self, "_tree", point_tree(self.points))
         return self._tree
 
     def surface(self) -> Triangles:
-        """Return an octahedron around each point, or around each of some of them where there are many."""
+        """Return an octahedron around each point, or around every n-th point if there are many."""
         some = self.points[:: -(-len(self.points) // MOST_DRAWN)].astype(np.float64)
         tips = self.radius * np.concatenate([np.eye(3), -np.eye(3)])
         faces = np.array([[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2], [1, 0, 5], [3, 1, 5], [4, 3, 5], [0, 4, 5]])
@@ -151,17 +150,19 @@ class PointCloud(_Kept, Shape):
         return Triangles((some[:, None] + tips).reshape(-1, 3), numbers.reshape(-1, 3))
 
     def grown(self, margin: float) -> PointCloud:
-        """Return the cloud of the same points with a larger radius [m]."""
+        """Return the cloud with the radius of its points enlarged by a margin [m]."""
         return PointCloud(self.points, self.radius + not_negative(margin, "margin"))
 
     def voxel(self, size: float) -> PointCloud:
-        """One point for all those in each cube of a grid; its radius is so large that it covers all of their balls.
+        """Return a thinned cloud with one point for each occupied cube of a grid, at the mean of its points.
+
+        The radius is enlarged so that the new balls cover all old ones.
 
         Args:
             size: Side of a cube [m].
 
         Raises:
-            InputError: If the size is no length, or so small that the grid has no numbers for its cubes.
+            InputError: If the size is not positive, or so small that the grid has too many cubes.
         """
         size = length(size, "voxel size")
         low, high = (end.astype(np.float64) for end in extremes(self.points))
@@ -181,7 +182,9 @@ class PointCloud(_Kept, Shape):
         return PointCloud(middles, self.radius + moved)
 
     def cropped(self, low: ArrayLike, high: ArrayLike) -> PointCloud:
-        """The points in a box about whose lowest and highest coordinates, shape (3,) each [m], in the cloud's frame.
+        """Return the points within a box.
+
+        ``low`` and ``high`` are its lowest and highest coordinates in the cloud's frame, shape (3,) each [m].
 
         Raises:
             InputError: If no point is left.
@@ -191,7 +194,7 @@ class PointCloud(_Kept, Shape):
         return self.only(inside, "cropped")
 
     def only(self, chosen: Mask, what: str = "cloud") -> PointCloud:
-        """Some of its points, by a mask, shape (n,).
+        """Return a cloud of some of its points, selected by a mask, shape (n,).
 
         Raises:
             InputError: If none is left.
@@ -205,13 +208,13 @@ class PointCloud(_Kept, Shape):
 
 
 def known_choice(invalid: Invalid, what: str) -> None:
-    """Refuse what does not say whether numbers that are not finite are refused or dropped."""
+    """Refuse a value of ``invalid`` other than "refuse" or "drop"."""
     if not isinstance(invalid, str) or invalid not in ("refuse", "drop"):
         raise InputError(f"{what}: invalid must be 'refuse' or 'drop', got {invalid!r}")
 
 
 def _usable(points: ArrayLike, invalid: Invalid, what: str) -> tuple[Points, int]:
-    """Return points as read-only float32, and how many were dropped."""
+    """Validate points, shape (n, 3), and return them as read-only float32, with the number of dropped points."""
     given = points if isinstance(points, np.ndarray) and points.dtype == np.float32 else number_rows(points, what)
     if given.ndim != 2 or given.shape[1] != 3:
         raise InputError(f"{what}: expected points of shape (any, 3), got shape {given.shape}")

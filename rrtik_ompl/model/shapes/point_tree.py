@@ -1,8 +1,8 @@
-"""Points in a tree that kernels walk with vector lanes: sorted along a Morton curve [67], in blocks of ``LEAF`` points.
+"""A tree of points for kernels with vector lanes: sorted along a Morton curve [67], in blocks of ``LEAF`` points.
 
-A block has a box around it; ``LEAF`` boxes that follow each other are a group, and a group has a box too, in a group of
-the next level, until one group has all. Where things stand follows from their numbers alone: child c of group g of a
-level is group ``LEAF * g + c`` of the level below, or that block of points below the lowest level.
+Each block has a bounding box. ``LEAF`` consecutive boxes form a group, which has a bounding box in a group of the next
+level, and so on until one group contains all. No pointers are stored: child c of group g of a level is group ``LEAF * g
++ c`` of the level below, or the block of points with this index below the lowest level.
 """
 
 from __future__ import annotations
@@ -13,19 +13,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-LEAF = 16  # points of a block, boxes of a group
-FAR = 1e18  # [m] where the sides of boxes lie that stand for nothing; its square is a float32 still
-CURVE_BITS = 10  # of each coordinate along the curve
+LEAF = 16  # number of points in a block, and of boxes in a group
+FAR = 1e18  # [m] position of the sides of empty boxes; its square is still a float32
+CURVE_BITS = 10  # number of bits of each coordinate along the curve
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PointTree:
-    """The tree.
+    """The arrays of a tree.
 
     Attributes:
-        blocks: Points x, y and z, shape (blocks, 3, LEAF), float32; the last point fills up its block.
-        boxes: Sides low x, high x, low y, ... of boxes, shape (groups, 6, LEAF), float32, level after level.
-        firsts: Number of the first group of each level, those around blocks of points first, int32.
+        blocks: Points x, y and z, shape (blocks, 3, LEAF), float32; an incomplete block is filled with its last point.
+        boxes: Sides low x, high x, low y, ... of the boxes, shape (groups, 6, LEAF), float32, level after level.
+        firsts: Index of the first group of each level, int32; the level of boxes around points is first.
     """
 
     blocks: NDArray[np.float32]
@@ -39,7 +39,7 @@ class PointTree:
         return whole[::2].min(axis=1), whole[1::2].max(axis=1)
 
     def within(self, low: NDArray[Any], high: NDArray[Any]) -> NDArray[np.float32]:
-        """Return points of the blocks whose boxes meet a box, shape (k, 3)."""
+        """Return the points of all blocks whose boxes intersect a box, shape (k, 3)."""
         groups = np.zeros(1, dtype=np.int64)
         for first in self.firsts[::-1].tolist():
             boxes = self.boxes[first + groups]
@@ -50,17 +50,20 @@ class PointTree:
 
 
 def extremes(points: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Lowest and highest coordinates of points, shape (n, 3): column by column, which numpy does ten times faster."""
+    """Return the lowest and highest coordinates of points, shape (n, 3), as arrays of shape (3,).
+
+    It works column by column, which is ten times faster in numpy.
+    """
     columns = [points[:, k] for k in range(points.shape[1])]
     return np.array([column.min() for column in columns]), np.array([column.max() for column in columns])
 
 
 def point_tree(points: NDArray[np.float32]) -> PointTree:
-    """Return the tree of points, shape (n, 3), at least one."""
+    """Build the tree of one or more points, shape (n, 3)."""
     count = -(-len(points) // LEAF)
     order = np.argsort(_places(points))
     order = np.append(order, np.full(count * LEAF - len(points), order[-1]))
-    blocks = points[order.reshape(count, LEAF).T]  # the first points of all blocks, the second ones, ...
+    blocks = points[order.reshape(count, LEAF).T]  # shape (LEAF, blocks, 3)
 
     low = blocks.min(axis=0)
     high = blocks.max(axis=0)
@@ -88,7 +91,7 @@ def point_tree(points: NDArray[np.float32]) -> PointTree:
 
 
 def _places(points: NDArray[np.float32]) -> NDArray[np.uint32]:
-    """Return where points lie along the curve: the bits of their coordinates in turn, shape (n,)."""
+    """Compute the positions of points along the Morton curve, which interleaves the bits of coordinates, shape (n,)."""
     low, high = extremes(points)
     extent = float((high - low).max())
     scale = np.float32(((1 << CURVE_BITS) - 0.5) / extent if extent > 0.0 else 0.0)
@@ -97,7 +100,7 @@ def _places(points: NDArray[np.float32]) -> NDArray[np.uint32]:
 
 
 def _apart(cells: NDArray[np.uint32]) -> NDArray[np.uint32]:
-    """Return numbers of ``CURVE_BITS`` bits with two zeros between each two of them."""
+    """Spread numbers of ``CURVE_BITS`` bits so that two zeros stand between any two bits."""
     for shift, mask in ((16, 0x030000FF), (8, 0x0300F00F), (4, 0x030C30C3), (2, 0x09249249)):
         cells = (cells | (cells << np.uint32(shift))) & np.uint32(mask)
     return cells

@@ -1,4 +1,4 @@
-"""Simple polygons in the plane: whether they are any, and cut into convex ones. Vertices have shape (k, 2) [m]."""
+"""Simple polygons in the plane: validation and division into convex parts. Vertices have shape (k, 2) [m]."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from rrtik_ompl.base.errors import InputError
 
 
 def without_repeats(polygon: Matrix) -> Matrix:
-    """The polygon without vertices that the next one repeats, as the first one of a closed ring repeats the last."""
+    """Return the polygon without vertices that equal their successor, such as the repeated one of a closed ring."""
     vertices: Matrix = polygon[(polygon != np.roll(polygon, -1, axis=0)).any(axis=1)]
     return vertices
 
 
 def check_simple(polygon: Matrix) -> None:
-    """Refuse what is no simple polygon.
+    """Refuse a polygon that is not simple.
 
     Raises:
         InputError: If two sides of the polygon cross or touch, or if it has no area.
@@ -45,12 +45,12 @@ def _meet(p: Vector, q: Vector, r: Vector, s: Vector) -> bool:
 
 
 def _turn(p: Vector, q: Vector, r: Vector) -> float:
-    """Twice the signed area of a triangle: positive for a left turn, where r lies left of the line p q."""
+    """Return twice the signed area of a triangle, which is positive if r lies left of the line p q."""
     return float((q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]))
 
 
 def convex_parts(polygon: Matrix) -> tuple[Matrix, ...]:
-    """Cut a simple polygon, shape (k, 2), into convex polygons: ear clipping, then greedy merging of neighbours."""
+    """Divide a simple polygon, shape (k, 2), into convex ones by ear clipping and greedy merging of neighbours."""
     area = np.sum(polygon[:, 0] * np.roll(polygon[:, 1], -1) - np.roll(polygon[:, 0], -1) * polygon[:, 1])
     ring = list(range(len(polygon))) if area > 0 else list(range(len(polygon)))[::-1]
     parts = [ring] if _is_convex(polygon, ring) else _merged(polygon, _ears(polygon, ring))
@@ -64,7 +64,15 @@ def _is_convex(polygon: Matrix, ring: list[int]) -> bool:
 
 
 def _ears(polygon: Matrix, ring: list[int]) -> list[list[int]]:
-    """Triangulate by cutting ears [39]; ``ring`` runs counter-clockwise."""
+    """Triangulate by cutting ears [39].
+
+    Args:
+        polygon: All vertices, shape (k, 2).
+        ring: Indices of vertices in counter-clockwise order.
+
+    Returns:
+        The triangles as lists of three indices.
+    """
     rest = list(ring)
     triangles = []
     while len(rest) > 3:
@@ -80,7 +88,7 @@ def _ears(polygon: Matrix, ring: list[int]) -> list[list[int]]:
                 triangles.append([before, tip, after])
                 del rest[k]
                 break
-        else:  # only straight corners are left: drop one, it adds no area
+        else:  # Only straight corners are left, of which one is dropped, as it adds no area.
             flat = min(
                 range(len(rest)), key=lambda k: abs(_turn(*(polygon[rest[(k + d) % len(rest)]] for d in (-1, 0, 1))))
             )
@@ -94,7 +102,7 @@ def _in_triangle(point: Vector, p: Vector, q: Vector, r: Vector) -> bool:
 
 
 def _merged(polygon: Matrix, parts: list[list[int]]) -> list[list[int]]:
-    """Join neighbouring parts while the union stays convex [40]."""
+    """Merge neighbouring parts, lists of vertex indices, as long as their union is convex [40]."""
     parts = [list(part) for part in parts]
     while (found := _neighbours(polygon, parts)) is not None:
         i, j, union = found
@@ -104,7 +112,7 @@ def _merged(polygon: Matrix, parts: list[list[int]]) -> list[list[int]]:
 
 
 def _neighbours(polygon: Matrix, parts: list[list[int]]) -> tuple[int, int, list[int]] | None:
-    """Return the first two parts whose union is convex, by their numbers, and the union; None if there are none."""
+    """Return the indices of the first two parts whose union is convex, and the union; None if there are none."""
     for i, j in combinations(range(len(parts)), 2):
         union = _joined(parts[i], parts[j])
         if union is not None and _is_convex(polygon, union):
@@ -113,12 +121,12 @@ def _neighbours(polygon: Matrix, parts: list[list[int]]) -> tuple[int, int, list
 
 
 def _joined(first: list[int], second: list[int]) -> list[int] | None:
-    """Union of two counter-clockwise rings that share one edge, or None."""
+    """Return the union of two counter-clockwise rings that share an edge, or None."""
     for k in range(len(first)):
         a = first[k]
         b = first[(k + 1) % len(first)]
         for m in range(len(second)):
             if second[m] == b and second[(m + 1) % len(second)] == a:
-                around = [second[(m + 1 + s) % len(second)] for s in range(len(second))]  # from a all round to b
+                around = [second[(m + 1 + s) % len(second)] for s in range(len(second))]  # the second ring from a to b
                 return first[: k + 1] + around[1:-1] + first[k + 1 :]
     return None

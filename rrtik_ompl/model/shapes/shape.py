@@ -1,4 +1,4 @@
-"""What a shape says of itself, so that files, pictures and the rest of the library treat all shapes alike."""
+"""The interface of shapes, by which files, pictures and the rest of the library treat all shapes alike."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ MeasureKind: TypeAlias = Literal["length", "three lengths", "number", "vector", 
 
 @dataclass(frozen=True, slots=True)
 class Measure:
-    """One of the numbers, or lists of numbers, that give a shape.
+    """A number, or list of numbers, that describes a shape.
 
     Attributes:
         name: Attribute of the shape, argument of its class, key in YAML, attribute in URDF.
-        kind: What may be given.
-        text: Its description in the schema of YAML files, None if its name says all.
-        default: What stands for it in a file that does not give it; None if a file must.
+        kind: Which values are accepted.
+        text: Its description in the schema of YAML files; None if the name is sufficient.
+        default: Value used if a file does not give it; None if a file must.
     """
 
     name: str
@@ -32,21 +32,21 @@ class Measure:
 
 
 class Shape(ABC):
-    """A solid in its own frame, in metres. Frozen.
+    """A solid in its own frame, in metres; immutable.
 
     Attributes:
-        key: Its key in YAML files, and its tag or type in URDF and MoveIt's messages, if those know it.
-        measures: What a file gives of it; none if no file gives it in numbers.
-        grouped: Whether YAML has the measures as keys below ``key``; else the first one is the value of ``key``, and
-            the others stand beside it.
-        in_urdf: Whether URDF knows it.
-        moveit: Names of its measures in the order of MoveIt's ``dimensions``; none if MoveIt does not know it.
-        bounded: Whether it has an end in all directions.
-        movable: Whether a link can hold it.
+        key: Its key in YAML files, and its tag or type in URDF and MoveIt's messages if these support it.
+        measures: The numbers that a file gives; empty if files do not describe it by numbers.
+        grouped: Whether the measures are keys below ``key`` in YAML. Otherwise the first one is the value of ``key``,
+            and the others are keys beside it.
+        in_urdf: Whether URDF supports it.
+        moveit: Names of its measures in the order of MoveIt's ``dimensions``; empty if MoveIt does not support it.
+        bounded: Whether it is bounded in all directions.
+        movable: Whether it can be attached to a link.
         smooth: Whether its surface has no edges.
         fine: Whether its surface may have more triangles than a picture needs.
-        sensed: Whether a sensor measured it: the next scene may have other points of it, and the arm's own may be
-            among them.
+        sensed: Whether a sensor measured it. Then it may have other points in the next scene, and points of the arm may
+            be among them.
     """
 
     __slots__ = ()
@@ -69,24 +69,24 @@ class Shape(ABC):
 
     @abstractmethod
     def surface(self) -> Triangles:
-        """Its surface as triangles, of a smooth one close to it.
+        """Return its surface as triangles; smooth surfaces are approximated.
 
         Raises:
-            InputError: If the shape has no end.
+            InputError: If the shape is unbounded.
         """
 
     def grown(self, margin: float) -> Shape | Triangles | None:
-        """Return all that is within a margin [m] of it, as a shape or as a surface; None if neither is at hand.
+        """Return all points within a margin [m] of it as a shape or a surface; None if that is not implemented.
 
         Raises:
-            InputError: If the margin is negative, or no finite number.
+            InputError: If the margin is negative or not a finite number.
         """
         del margin
         return None
 
 
 def same_shape(first: Shape, second: Shape) -> bool:
-    """Check whether two shapes are of one kind and one size."""
+    """Check whether two shapes are of the same kind and have equal fields."""
     return first is second or (
         type(first) is type(second)
         and all(np.array_equal(getattr(first, f.name), getattr(second, f.name)) for f in fields(first))  # type: ignore[arg-type]

@@ -1,4 +1,4 @@
-"""Surfaces of solids as triangles, counter-clockwise seen from outside."""
+"""Surfaces of solids as triangles, which are counter-clockwise seen from outside."""
 
 from __future__ import annotations
 
@@ -10,18 +10,23 @@ from numpy.typing import NDArray
 from rrtik_ompl.base.arrays import TAU, Matrix, Vector
 from rrtik_ompl.model.shapes.polygons import convex_parts
 
-Faces: TypeAlias = NDArray[np.int64]  # vertex numbers, shape (m, 3)
+Faces: TypeAlias = NDArray[np.int64]  # vertex indices, shape (m, 3)
 
 
 class Triangles(NamedTuple):
-    """Vertices, shape (n, 3) [m], and vertex numbers of each triangle, shape (m, 3)."""
+    """A triangle mesh.
+
+    Attributes:
+        vertices: Shape (n, 3) [m].
+        faces: Vertex indices of each triangle, shape (m, 3).
+    """
 
     vertices: Matrix
     faces: Faces
 
 
 def extruded(polygon: Matrix, height: float) -> Triangles:
-    """Closed prism over a simple polygon, shape (k, 2), from z = -height/2 to +height/2."""
+    """Return the closed prism over a simple polygon, shape (k, 2), from z = -height/2 to +height/2."""
     ring = polygon if _signed_area(polygon) > 0.0 else polygon[::-1]
     walls = [_quad(a, b, height) for a, b in zip(ring, np.roll(ring, -1, axis=0), strict=True)]
 
@@ -37,7 +42,13 @@ def extruded(polygon: Matrix, height: float) -> Triangles:
 
 
 def revolved(radii: Vector, heights: Vector, segments: int) -> Triangles:
-    """Circles about z with these radii and heights, shape (k,) each, from below, and the surface between them."""
+    """Return the surface that connects circles about z, from bottom to top.
+
+    Args:
+        radii: Radius of each circle, shape (k,) [m].
+        heights: Height of each circle, shape (k,) [m].
+        segments: Number of vertices on each circle.
+    """
     turn = np.linspace(0.0, TAU, segments, endpoint=False)
     x = np.outer(radii, np.cos(turn))
     y = np.outer(radii, np.sin(turn))
@@ -46,7 +57,7 @@ def revolved(radii: Vector, heights: Vector, segments: int) -> Triangles:
 
 
 def round_ended(radius: float, length: float, segments: int) -> Triangles:
-    """Return a ball, cut in two and drawn apart by a length along z."""
+    """Return a capsule along z whose cap centres are ``length`` apart; a ball if that is 0."""
     rings = segments // 4
     angles = np.linspace(0.0, 0.5 * np.pi, rings + 1)
     lift = np.concatenate([np.full(rings + 1, -0.5 * length), np.full(rings + 1, 0.5 * length)])
@@ -55,14 +66,14 @@ def round_ended(radius: float, length: float, segments: int) -> Triangles:
 
 
 def rounded(outline: Matrix, turn: Vector, length: float, radius: float, rings: int = 6) -> Triangles:
-    """What lies within a radius of an upright convex solid: its surface.
+    """Return the surface of all points within a radius of an upright convex solid.
 
     Args:
-        outline: Points on the solid's outline, anticlockwise, shape (k, 2).
-        turn: Angles of the outward normal at each of them, shape (k,) [rad]; a corner is repeated, once for each.
-        length: Full extent of the solid along z.
-        radius: Of the edges.
-        rings: Steps from an upright side to a face.
+        outline: Points on the solid's outline, counter-clockwise, shape (k, 2) [m].
+        turn: Angle of the outward normal at each point, shape (k,) [rad]; a corner is repeated for each of its normals.
+        length: Full extent of the solid along z [m].
+        radius: Radius of the rounding [m].
+        rings: Number of steps from a vertical side to a horizontal face.
     """
     quarter = np.linspace(0.0, 0.5 * np.pi, rings + 1)
     out = np.stack([np.cos(turn), np.sin(turn)], 1)
@@ -76,7 +87,7 @@ def rounded(outline: Matrix, turn: Vector, length: float, radius: float, rings: 
 
 
 def wrap(rings: int, sides: int) -> Faces:
-    """Faces between consecutive rings of vertices, first and last ring left open."""
+    """Return the faces between consecutive rings of vertices; the first and the last ring are left open."""
     ring, side = (a.reshape(-1) for a in np.meshgrid(np.arange(rings - 1), np.arange(sides), indexing="ij"))
     a = ring * sides + side
     b = ring * sides + (side + 1) % sides
