@@ -1,4 +1,4 @@
-"""`Task`: several stages of work in a row, planned as a whole: pick and place, drawing a tool out of its holder."""
+"""Plan tasks: several stages of work in a row, such as pick and place, whose motions are planned together."""
 
 from __future__ import annotations
 
@@ -38,8 +38,8 @@ from rrtik_ompl.world.world import World
 if TYPE_CHECKING:
     from rrtik_ompl.tasks.played import PlayedTask
 
-SECONDS = 10.0  # [s] that a task may be planned
-FAR = 0.05  # [m] between an object and what holds it, from which on that is said
+SECONDS = 10.0  # [s] default time limit for planning a task
+FAR = 0.05  # [m] distance between an object and the link that holds it above which a note says so
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -47,17 +47,17 @@ class TaskPlan:
     """The outcome of planning a task.
 
     Attributes:
-        found: Whether all of it can be done.
+        found: Whether the whole task can be done.
         paths: The motions, each from where the one before ends.
-        worlds: The world of each motion: what the arm holds and how far its gripper is open.
+        worlds: The world of each motion, with the objects that the arm holds and the opening of its gripper.
         stages: The stage that each motion does.
-        chosen: Numbers of the alternatives that were taken, from 0, in their order.
-        reason: "" if found, else which stages failed, how often and why.
-        end: The world after the last stage, whatever that is; None if it is not found.
-        notes: What the author of the task may not have meant, and what it stands on, a line each: an object attached
-            from far away, contacts, fingers whose way is not proven.
-        contacts: Those that each motion stood on: which things touched, how deep they may overlap, and up to which
-            waypoint; from there on the motion is checked without.
+        chosen: Indices of the alternatives that were taken, in their order.
+        reason: "" if found, otherwise which stages failed, how often and why.
+        end: The world after the last stage; None if no plan was found.
+        notes: One line for each fact that the author of the task may not have intended, or on which the plan depends:
+            an object attached from far away, contacts, fingers whose motion is not proven.
+        contacts: For each motion the contacts on which it depends: which things touch, how deep they may overlap, and
+            up to which waypoint; from there on the motion is checked without the contact.
 
     Example:
         >>> loaded = rrtik.load_task("titan4_drawer")
@@ -80,10 +80,10 @@ class TaskPlan:
 
     @property
     def proven(self) -> bool:
-        """Whether every motion is proven in its own world, on the contacts that it is said to stand on.
+        """Return whether every motion is proven free in its own world, with the contacts that the plan states.
 
-        A motion that nobody has tried to prove, as those of a file, is proved when this is asked, each time anew. False
-        too if a contact or the place of a thing is not true, see :meth:`violations`.
+        A motion without a proof, such as one from a file, is proved on each access. The answer is False too if a stated
+        contact or the place of a thing is not true, see :meth:`violations`.
         """
         if not self.found or any(self._standing_faults()):
             return False
@@ -94,11 +94,11 @@ class TaskPlan:
         return True
 
     def violations(self) -> tuple[Violation, ...]:
-        """Check all motions again, each in its world, and without each contact once that has ended.
+        """Check all motions again, each in its world, and without each contact once it has ended.
 
-        Nor is the plan's word taken for what it stands on. A contact may allow a millimetre more than the two overlap
-        where it begins, of which 5 mm count at most if no grasp has named the pair; and all things are where the motion
-        before has left them.
+        The contacts that the plan states are checked too. A contact may allow at most a millimetre more than the two
+        things overlap where it begins, of which at most 5 mm count if no grasp has named the pair; and all things must
+        be where the motion before has left them.
 
         Returns:
             The first violation of every edge that has one, motion after motion; empty for a valid plan.
@@ -106,7 +106,7 @@ class TaskPlan:
         return tuple(each for motion in self.faults() for each in motion)
 
     def faults(self) -> tuple[tuple[Violation, ...], ...]:
-        """The violations of each motion, see :meth:`violations`.
+        """Return the violations of each motion, see :meth:`violations`.
 
         Example:
             >>> loaded = rrtik.load_task("titan4_drawer")
@@ -120,14 +120,15 @@ class TaskPlan:
         for path, world, stage, stood_on, standing in motions:
             faults = [*standing, *path.violations(world_of_motion(path, world, stage))]
             parting_waypoints = sorted({each.until for each in stood_on if each.until is not None})
-            for until in () if standing else parting_waypoints:  # what is not true is no ground for a check
+            # If stated contacts are not true, checks that depend on them would mean nothing.
+            for until in () if standing else parting_waypoints:
                 rest = path.with_waypoints(path.waypoints[until:])
                 faults += rest.violations(world_from(world, stood_on, until))
             faults_of_motions.append(tuple(faults))
         return tuple(faults_of_motions)
 
     def played(self) -> PlayedTask:
-        """The plan as a picture plays it: timed by :func:`time_task`, and what is said of it, see :meth:`faults`.
+        """Return the plan as a picture plays it: timed by :func:`time_task`, with the verdict of :meth:`faults`.
 
         Raises:
             InputError: If there is no motion.
@@ -151,7 +152,7 @@ class Task:
         stages: `MoveTo`, `Straight`, `Attach`, `Detach`, `Gripper`, `Alternatives`.
 
     Raises:
-        InputError: If there is none, or something else among them.
+        InputError: If there are no stages, or something else is among them.
 
     Example:
         >>> import rrtik_ompl as rrtik
@@ -172,18 +173,19 @@ class Task:
     def plan(self, world: World, start: ArrayLike | str, *, seconds: float = SECONDS, seed: int = 0) -> TaskPlan:
         """Choose alternatives and configurations such that the whole task works, and plan its motions.
 
-        Every motion is collision-free in its own world: straight lines are proven, the others as :func:`plan` has them.
+        Every motion is collision-free in its own world: straight lines are proven, the others are as :func:`plan` makes
+        them.
 
         Args:
             world: Robot and scene at the beginning.
             start: Configuration, shape (dof,), or the name of a posture.
             seconds: Limit of wall time [s].
-            seed: The same seed gives the same plan, as long as the time limit does not cut in.
+            seed: The same seed gives the same plan, unless the time limit ends the search.
 
         Raises:
-            InputError: If the stages make no sense in this world: something is attached twice, or detached where it is
-                not held; the stage is named.
-            UnknownNameError: If there is no object, link or posture of a name.
+            InputError: If the stages are inconsistent in this world, as when something is attached twice, or detached
+                while it is not held; the message names the stage.
+            UnknownNameError: If an object, link or posture does not exist.
             ProblemError: If the start is in collision or outside the limits.
         """
         require(world, World, "world of a task", "use World(robot, scene)")
@@ -215,7 +217,7 @@ class Task:
 
 
 def _notes_of(done: Done) -> tuple[str, ...]:
-    """What is odd about a way: objects attached from far away; and the contacts that its motions stood on."""
+    """Return the notes of a plan: uncertain finger motions, contacts, and objects attached from far away."""
     notes = []
     stood_on = {id(branch): contacts for (branch, _), contacts in zip(done.motions, done.contacts, strict=True)}
 
@@ -232,7 +234,7 @@ def _notes_of(done: Done) -> tuple[str, ...]:
 
 
 def _gap(world: World, q: Vector, name: str, link: str) -> float:
-    """Distance of an obstacle from a link and what is rigidly joined with it at q [m]; 0 where these have no solid."""
+    """Return an obstacle's distance from a link and the links rigidly joined to it at q [m]; 0 without solids."""
     robot = world.robot
     bodies = world.bodies
     joint = robot.model.frames[robot.model.getFrameId(link)].parentJoint

@@ -1,4 +1,4 @@
-"""Where a task may go on from one place: the stages of a branch of the search, without the motions between postures."""
+"""Expand the branches of a task's search by one stage, without planning the motions between configurations."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
 
 TOLERANCE = Tolerance(DEVIATION, TURN_DEVIATION)
-THOROUGH = 1  # round of the search from which straight lines are tried in all ways that a redundant arm has
-WHOLE = 1.0
+THOROUGH = 1  # first round of the search in which straight lines are tried in all ways that a redundant arm has
+WHOLE = 1.0  # share of a line that is followed completely
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,20 +38,20 @@ class Branch:
     """A task done up to some place.
 
     Attributes:
-        setting: What surrounds the arm there, of a motion with the contacts that it stands on.
-        q: Where the arm is, shape (dof,).
-        rest: What is left to do.
-        before: The branch that it goes on from; None at the start.
-        step: What has been done since; None at the start.
-        path: Of a straight line; None elsewhere.
-        contacts: That a straight line stands on.
-        setting_left: What a motion leaves behind: its setting without the contacts that have ended; None if none has.
-        arriving: Contacts of what is taken or set down where a motion ends.
-        note: What is not certain of fingers that have moved.
-        done: How many stages.
-        cost: Way of the joints so far, weighted [rad, metres counted alike].
-        chosen: Numbers of the alternatives taken, from 0.
-        effort: Round of the search that made it.
+        setting: Robot and scene there; for a motion, those during the motion, with the contacts on which it depends.
+        q: Configuration of the arm, shape (dof,).
+        rest: The steps that are left to do.
+        before: The branch that this one continues; None at the start.
+        step: The step that was done in between; None at the start.
+        path: The path of a straight line; None for other steps.
+        contacts: The contacts on which a straight line depends.
+        setting_left: The setting after a motion, without the contacts that have ended; None if none has.
+        arriving: Contacts of things that are taken or set down at the end of a motion.
+        note: What is uncertain about the fingers' motion; "" if nothing is.
+        done: Number of stages done.
+        cost: Weighted length of all motions so far [rad; metres count the same].
+        chosen: Indices of the alternatives taken.
+        effort: Round of the search that made the branch.
     """
 
     setting: Setting
@@ -70,7 +70,7 @@ class Branch:
     effort: int = 0
 
     def chain(self) -> list[Branch]:
-        """All branches from the start to this one, the start left out."""
+        """Return all branches from the start to this one, without the start."""
         links: list[Branch] = []
         here: Branch | None = self
         while here is not None and here.before is not None:
@@ -80,25 +80,25 @@ class Branch:
 
     @property
     def after(self) -> Setting:
-        """What surrounds the arm from here on."""
+        """Return the setting from the end of this branch on."""
         return self.setting if self.setting_left is None else self.setting_left
 
     @property
     def moves(self) -> bool:
-        """Whether it is a motion whose way has to be planned."""
+        """Return whether the branch is a motion whose path has yet to be planned."""
         return self.step is not None and isinstance(self.step.stage, MoveTo)
 
 
 @dataclass(slots=True, eq=False)
 class Choices:
-    """The configurations of a goal at one place of the search: those found, and more of them.
+    """The configurations of a goal at one place of the search: those found so far, and the search for more.
 
     Attributes:
-        branch: That place.
-        search: Of configurations.
-        arrives: Whether what is taken or set down there may touch at them.
-        more: Whether there may be more of them.
-        used: How many of them have become branches.
+        branch: The branch that continues to the goal.
+        search: The search for configurations.
+        arrives: Whether things that are taken or set down there may touch at these configurations.
+        more: Whether there may be further configurations.
+        used: Number of configurations that have become branches.
     """
 
     branch: Branch
@@ -110,12 +110,13 @@ class Choices:
 
 @dataclass(slots=True, eq=False)
 class Expander:
-    """Makes the branches that follow a branch.
+    """Makes the branches that continue a branch.
 
     Attributes:
-        rng: Random numbers of inverse kinematics.
-        failures: Why steps failed, in the order in which they did.
-        choices: Goals of the tip, of which more configurations may be looked for.
+        rng: Random number generator for inverse kinematics.
+        seed: Seed of the search along straight lines.
+        failures: Failed steps, in order: the branch, the step and the reason.
+        choices: Goals of the tip for which more configurations may be found.
     """
 
     rng: np.random.Generator
@@ -124,7 +125,7 @@ class Expander:
     choices: list[Choices] = field(default_factory=list)
 
     def after(self, branch: Branch) -> Iterator[Branch]:
-        """The branches that go one step on; none if the step fails, which is noted."""
+        """Yield the branches that are one step further; if the step fails, there are none, and the reason is noted."""
         step = branch.rest[0]
         rest = branch.rest[1:]
         stage = step.stage
@@ -145,14 +146,17 @@ class Expander:
             self.failures.append((branch, step, str(error)))
 
     def more(self) -> Iterator[Branch]:
-        """Branches with further configurations of goals that were met before."""
+        """Yield branches to further configurations of goals that occurred before."""
         for choices in self.choices:
             if not choices.search.exhausted:
                 choices.search.more()
                 yield from self._branches_of_choices(choices)
 
     def ends(self, branch: Branch) -> bool:
-        """Whether a branch with nothing left to do may end; the reason why not is noted."""
+        """Check whether a branch with nothing left to do may end; if not, the reason is noted.
+
+        After a last stage that changes the setting, the arm must not touch anything.
+        """
         if branch.before is None or branch.step is None or branch.after is branch.before.after:
             return True
         touching = branch.after.world.explain(branch.q)
@@ -162,7 +166,7 @@ class Expander:
         return not touching
 
     def _after_gripper(self, branch: Branch, step: Step, stage: Gripper) -> Iterator[Branch]:
-        """The branch after fingers have moved; none, and the fault noted, if something is in their way."""
+        """Yield the branch after the fingers have moved, or note the fault if something is in their way."""
         setting = branch.after.after(stage, branch.q)
         things_taken = [thing.name for thing in handled(branch.rest[1:], setting.robot) if thing.by is not None]
         motion = finger_motion(branch.after, setting, branch.q, things_taken)
@@ -172,7 +176,11 @@ class Expander:
         yield replace(_following_branch(branch, step, setting, branch.q), note=motion.note)
 
     def _after_move(self, branch: Branch, step: Step, stage: MoveTo) -> Iterator[Branch]:
-        """A branch for each configuration of a goal, in contact there only if nothing else is possible."""
+        """Yield a branch for each configuration of a goal.
+
+        Contacts at the goal, of things that are taken or set down there, are only allowed if no configuration is free
+        without them.
+        """
         try:
             choices = self._choices(branch, branch.after, stage)
             reason = choices.search.reason
@@ -193,14 +201,16 @@ class Expander:
                 self.choices.append(choices)
             yield from self._branches_of_choices(choices)
 
+    # Start the search for configurations of a stage's goal in a setting.
     def _choices(self, branch: Branch, setting: Setting, stage: MoveTo) -> Choices:
         problem = Problem(setting.world, branch.q, stage.goal, constraints=stage.constraints)
-        search = GoalSearch(problem, self.rng, all_turns=False)  # the plan to it may go either way round
+        # A plan may reach the goal in either direction of a continuous joint, so whole turns need not be tried.
+        search = GoalSearch(problem, self.rng, all_turns=False)
         search.first()
         return Choices(branch, search, setting is not branch.after, problem.goal.q is None)
 
     def _branches_of_choices(self, choices: Choices) -> Iterator[Branch]:
-        """A branch for each configuration of a goal that has not become one yet."""
+        """Yield a branch for each configuration of a goal that has not become one yet."""
         branch = choices.branch
         rows = choices.search.rows
         for q in rows[choices.used :]:
@@ -212,11 +222,11 @@ class Expander:
         choices.used = len(rows)
 
     def _arriving(self, branch: Branch, q: Vector) -> tuple[Touching, ...]:
-        """The contacts of what is taken or set down at a configuration, shape (dof,), to which a motion leads."""
+        """Return the contacts of things that are taken or set down at the end of a motion to q, shape (dof,)."""
         return contacts_on_arrival(branch.after.world, branch.rest[1:], q)
 
     def _after_line(self, branch: Branch, step: Step, stage: Straight) -> Iterator[Branch]:
-        """The branch at the end of a straight line of the tip; none, and the reason noted, if it is not reached."""
+        """Yield the branch at the end of a straight line of the tip; if it is not reached, the reason is noted."""
         world = branch.after.world
         if touching := world.explain(branch.q):
             self.failures.append((branch, step, f"it cannot begin: {touching}; move it or allow the pair"))
@@ -247,10 +257,13 @@ class Expander:
         )
 
     def _follow_line(self, branch: Branch, line: Way) -> tuple[Setting, tuple[Touching, ...], Attempt, str]:
-        """Follow a line, in contact at its end only if nothing else is possible.
+        """Follow a straight line, with contacts at its end only if it cannot be followed without them.
+
+        To find these contacts, the line is first followed without collision checks.
 
         Returns:
-            The setting on the way, the contacts of what is taken or set down at its end, how far it came, and why.
+            The setting during the motion, the contacts of things that are taken or set down at the end, the attempt,
+            and why it did not come farther.
         """
         setting = branch.after
         steps = branch.rest[1:]
@@ -275,6 +288,7 @@ class Expander:
             attempted = self._attempt(branch, line, setting.world)
         return setting, arriving, attempted, attempted.reason
 
+    # Follow a line in a world: thoroughly, in all ways of a redundant arm, in later rounds of the search.
     def _attempt(self, branch: Branch, line: Way, world: World) -> Attempt:
         if branch.effort >= THOROUGH:
             return farthest(world, line, branch.q[None])
@@ -282,16 +296,19 @@ class Expander:
 
 
 def weighted_length(robot: Robot, a: Vector, b: Vector) -> float:
-    """Of the joints from one configuration to another, weighted [rad, metres counted alike]."""
+    """Return the weighted length of a straight motion between two configurations [rad; metres count the same]."""
     return float(np.linalg.norm(weighted_difference(robot, b, a)))
 
 
 def _line_of(branch: Branch, stage: Straight, seed: int) -> Way:
-    """Of the tip on a straight line that begins where a branch has come to."""
+    """Return the straight line of the tip for a stage that begins at the end of a branch."""
     tip = branch.after.robot.fk(branch.q)
     return Way((straight_rail(tip, stage.goal(tip)),), TOLERANCE, None, seed)
 
 
+# Return the branch that continues another one by a step.
+# It takes over the rest of the steps, the choices and the effort, and adds the length of the path (or of the straight
+# motion to ``q``) to the cost.
 def _following_branch(
     branch: Branch,
     step: Step,

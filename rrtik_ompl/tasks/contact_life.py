@@ -1,10 +1,11 @@
-"""The life of a contact: it begins where something is taken or set down, and ends where the two have parted.
+"""Follow contacts from where they begin, as something is taken or set down, to where the two things have parted.
 
-What touches when it is attached may go on touching, a millimetre deeper than then at most, until the two are apart;
-from there on the pair is checked as any other. Before something is taken or set down it may touch, a millimetre deep at
-most, on the motion that leads there. Never may thin things be so deep in each other that they could pass through
-(:mod:`rrtik_ompl.geometry.collision.thickness`). All of it is a distance that a pair of things must keep, negative for
-a depth (:class:`rrtik_ompl.Touching`), so that proofs and certificates hold as they do for margins.
+Things that touch when one is attached may continue to touch, at most a millimetre deeper than then, until they have
+parted; from there on the pair is checked like any other. A thing that is about to be taken or set down may touch, at
+most a millimetre deep, on the motion that leads there. Thin things may never overlap so deeply that they could pass
+through each other (:mod:`rrtik_ompl.geometry.collision.thickness`). Each contact is expressed as a distance that a pair
+of things must keep, negative for a penetration depth (:class:`rrtik_ompl.Touching`), so that proofs and certificates
+work as they do for margins.
 """
 
 from __future__ import annotations
@@ -31,23 +32,24 @@ from rrtik_ompl.world.proof import Prover
 from rrtik_ompl.world.route_check import violations_of
 from rrtik_ompl.world.world import World, form_of
 
-CONTACT_GAP = 1e-4  # [m] of a gap up to which two touch: straight lines deviate by as much
-EXTRA_DEPTH = 1e-3  # [m] that two in contact may come nearer than they were
-SMALL_OVERLAP = 5e-3  # [m] of overlap that needs no word
-MAX_MEASURED_DEPTH = 1.0  # [m] that is looked for
-BISECTIONS = 24  # of a depth
-PARTING_STEP = 2.5e-4  # [m] that two come nearer at most between places of a motion at which parting is looked for
-PLACES_AT_ONCE = 256  # places
+CONTACT_GAP = 1e-4  # [m] largest gap at which two things count as touching; straight lines deviate by as much
+EXTRA_DEPTH = 1e-3  # [m] how much nearer two things in contact may come than they were
+SMALL_OVERLAP = 5e-3  # [m] largest overlap that is accepted although no grasp names the pair
+MAX_MEASURED_DEPTH = 1.0  # [m] largest penetration depth that is measured
+BISECTIONS = 24  # bisections of a penetration depth
+# [m] Largest approach of two things between successive places of a motion at which their parting is checked.
+PARTING_STEP = 2.5e-4
+PLACES_AT_ONCE = 256  # places whose joint frames are computed in one call
 
 
 @dataclass(frozen=True, slots=True)
 class MotionContact:
-    """A contact that a motion stood on.
+    """A contact on which a motion depends.
 
     Attributes:
-        touching: The two, and how near they may come.
-        until: Number of the waypoint at which they have parted; None if the contact lasts to the end of the motion.
-        then: How near they may come from there on [m]; None if they are checked as others are.
+        touching: The two things, and how near they may come.
+        until: Index of the waypoint at which they have parted; None if the contact lasts to the end of the motion.
+        then: Distance that they must keep from there on [m]; None if the pair is then checked like any other.
         allowed: Whether a grasp has named the pair, see :class:`rrtik_ompl.Attach`.
 
     Example:
@@ -69,7 +71,7 @@ class MotionContact:
 
     @property
     def following(self) -> tuple[Touching, ...]:
-        """The contact of the two once they have parted, if they may touch again."""
+        """Return the contact of the pair after it has parted, if it may touch again."""
         return () if self.then is None else (replace(self.touching, distance=self.then),)
 
 
@@ -84,30 +86,30 @@ class Nearness:
 
     @property
     def pair(self) -> frozenset[str]:
-        """Both names, in no order."""
+        """Return both names, without order."""
         return frozenset((self.first, self.second))
 
     @property
     def too_deep(self) -> bool:
-        """Whether one is deeper inside the other than it may be left."""
+        """Return whether the overlap is deeper than a thing may be left at."""
         return self.distance < -EXTRA_DEPTH - DISTANCE_TOLERANCE
 
     def going_on(self) -> Touching:
-        """The contact of two that touch now, until they part."""
+        """Return the contact for two things that touch now, to hold until they part."""
         return Touching(self.first, self.second, max(min(self.distance, 0.0) - EXTRA_DEPTH, -self.deepest))
 
     def arriving(self) -> Touching:
-        """The contact of two of which one is about to be taken or set down here."""
+        """Return the contact for two things of which one is about to be taken or set down here."""
         return Touching(self.first, self.second, -min(EXTRA_DEPTH, self.deepest))
 
 
 def allowed(bodies: Iterable[Body], first: str, second: str) -> Touching:
-    """The contact of two things that may touch, whether or not they do."""
+    """Return the contact for two things that may touch, whether or not they do."""
     return Touching(first, second, -min(EXTRA_DEPTH, deepest_contact(bodies, first, second)))
 
 
 def left_inside(near: Nearness) -> str:
-    """Says that a thing would be set down inside another, and how deep."""
+    """Return a message that a thing would be set down inside another, and how deep."""
     depth = f"{-1e3 * near.distance:.3g}"
     if near.distance < -MAX_MEASURED_DEPTH:
         depth = f"more than {1e3 * MAX_MEASURED_DEPTH:g}"
@@ -115,14 +117,25 @@ def left_inside(near: Nearness) -> str:
 
 
 def with_contacts(scene: Scene, contacts: Iterable[Touching]) -> Scene:
-    """A scene with further contacts; of a pair that has one already the new one counts, of two new ones the last."""
+    """Return a scene with further contacts; of several contacts of one pair the last new one counts."""
     contact_of_pair = {contact.pair: contact for contact in contacts}
     unchanged = tuple(old for old in scene.contacts if old.pair not in contact_of_pair)
     return replace(scene, contacts=(*unchanged, *contact_of_pair.values()))
 
 
 def touching_at(world: World, q: Vector, name: str) -> list[Nearness]:
-    """What touches or overlaps a thing at q, shape (dof,), the deepest first, of the pairs that are checked."""
+    """Return the things that touch or overlap a given one at a configuration, the deepest first.
+
+    Only pairs that the world checks are considered.
+
+    Args:
+        world: The world.
+        q: The configuration, shape (dof,).
+        name: Name of the thing.
+
+    Returns:
+        One entry for each other thing, with the given one as ``first``.
+    """
     bodies = world.bodies
     frames = world.robot.joint_frames(q[None])[0]
     nearest_of_pair: dict[tuple[str, str], Nearness] = {}
@@ -141,7 +154,16 @@ def touching_at(world: World, q: Vector, name: str) -> list[Nearness]:
 
 
 def signed_distance(robot: Robot, pair: tuple[Body, Body], q: Vector, frames: Matrix) -> float:
-    """The signed distance of two bodies at q [m], of meshes that of their convex pieces; +inf if they do not touch."""
+    """Return the signed distance of two bodies at q [m]; inf if they do not touch.
+
+    For meshes the penetration depth is that of their convex pieces.
+
+    Args:
+        robot: The robot.
+        pair: The bodies.
+        q: The configuration, shape (dof,).
+        frames: Poses of all joint frames at q, shape (joints + 1, 4, 4).
+    """
     poses = _transforms(pair, frames)
     if distance(pair[0].geometry, poses[0], pair[1].geometry, poses[1], CONTACT_GAP) is not None:
         return np.inf
@@ -155,7 +177,10 @@ def signed_distance(robot: Robot, pair: tuple[Body, Body], q: Vector, frames: Ma
 
 
 def _depth_of_pieces(robot: Robot, pair: tuple[Body, Body], q: Vector) -> float:
-    """How deep convex pieces of two bodies overlap at q [m], as proofs see it; endless if it is more than a metre."""
+    """Return the penetration depth of two bodies' convex pieces at q [m], as proofs see it; inf if it exceeds a metre.
+
+    It is found by bisection, as the smallest allowed overlap with which the prover can prove the pair.
+    """
     others = zip(pair, pair[::-1], strict=True)
     bodies = [replace(one, margin=0.0, padding=0.0, contacts=((other.name, 0.0),)) for one, other in others]
     prover = Prover(robot, bodies, ((0, 1),))
@@ -176,14 +201,15 @@ def _depth_of_pieces(robot: Robot, pair: tuple[Body, Body], q: Vector) -> float:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FollowedContacts:
-    """A motion and its contacts, once it is known where they end.
+    """A motion and its contacts, after it was determined where they end.
 
     Attributes:
-        path: The motion, with a waypoint at each place where two have parted.
-        contacts: What it stood on.
-        lasting: The contacts that are left at its end.
-        fault: "" if all that has parted stays apart, else what does not; the path then ends where the two have parted.
-        world: Where the path ends, if there is a fault: the world without the contact that has ended there.
+        path: The motion, with a waypoint at each place where two things have parted.
+        contacts: The contacts on which it depends.
+        lasting: The contacts that remain at its end.
+        fault: "" if all things that parted stay apart, otherwise what touches again; the path then ends where the two
+            have parted.
+        world: If there is a fault, the world at the end of the path, without the contact that has ended there.
     """
 
     path: JointPath
@@ -199,13 +225,16 @@ def follow_contacts(
     grasp_pairs: frozenset[frozenset[str]],
     contacts_at_end: Iterable[Touching] = (),
 ) -> FollowedContacts:
-    """Find where the contacts of a motion end, and check that what has parted stays apart.
+    """Find where the contacts of a motion end, and check that things stay apart after they have parted.
+
+    Each contact ends at the first place where its two things have parted; a waypoint is inserted there. From that
+    waypoint on, the path is checked in a world without the contact. A motion with new waypoints is proved again.
 
     Args:
         path: The motion.
-        world: Its world, with all contacts.
-        grasp_pairs: Pairs that somebody allowed for a grasp: when they have parted, they may touch again.
-        contacts_at_end: Contacts of what is taken or set down at its end.
+        world: The world of the motion, with all contacts.
+        grasp_pairs: Pairs that a grasp allows: after they have parted, they may touch again.
+        contacts_at_end: Contacts of things that are taken or set down at the end of the motion.
     """
     end_contact_of_pair = {contact.pair: contact for contact in contacts_at_end}
     parting_of_contact = {
@@ -247,7 +276,7 @@ def follow_contacts(
 
 
 def contacts_from(contacts: Iterable[MotionContact], number: int) -> tuple[Touching, ...]:
-    """The contacts of a motion that are left from a waypoint on, by its number."""
+    """Return the contacts of a motion that hold from the waypoint with this index on."""
     contacts_left: list[Touching] = []
     for each in contacts:
         contacts_left += [each.touching] if each.until is None or each.until > number else each.following
@@ -255,7 +284,7 @@ def contacts_from(contacts: Iterable[MotionContact], number: int) -> tuple[Touch
 
 
 def world_from(world: World, contacts: Iterable[MotionContact], number: int) -> World:
-    """The world of a motion from a waypoint on, by its number: without the contacts that have ended there."""
+    """Return the world of a motion from the waypoint with this index on, without the contacts that have ended there."""
     stood_on = tuple(contacts)
     known_pairs = {each.touching.pair for each in stood_on}
     others = tuple(contact for contact in world.scene.contacts if contact.pair not in known_pairs)
@@ -263,27 +292,27 @@ def world_from(world: World, contacts: Iterable[MotionContact], number: int) -> 
 
 
 def touching_again(contact: Touching) -> Touching:
-    """The contact of a pair that was allowed for a grasp, once the two have parted: it may touch again, no deeper."""
+    """Return the contact of a pair of a grasp after it has parted: the two may touch again, but no deeper than 1 mm."""
     return replace(contact, distance=max(contact.distance, -EXTRA_DEPTH))
 
 
 def parted(world: World, q: Vector, contact: Touching) -> bool:
-    """Whether two that are in contact in a world have parted at q, shape (dof,)."""
+    """Check whether two things that are in contact in a world have parted at q, shape (dof,)."""
     return place_of_parting(q[None], world, contact) is not None
 
 
 def place_of_parting(rows: Matrix, world: World, contact: Touching) -> tuple[int, float] | None:
-    """Look for the first place on a route at which two that are in contact have parted.
+    """Find the first place on a route at which two things in contact have parted.
 
-    Places are looked at between which the two come nearer by a quarter of a millimetre at most.
+    Places are checked between which the two can approach each other by at most a quarter of a millimetre.
 
     Args:
-        rows: Waypoints, shape (k, dof).
-        world: In which the two are in contact.
-        contact: Of the two.
+        rows: Waypoints of the route, shape (k, dof).
+        world: The world, in which the two are in contact.
+        contact: Their contact.
 
     Returns:
-        Number of the motion between waypoints and the share of it; None if they have not parted at any place.
+        Index of the motion between two waypoints, and the share of it, from 0 to 1; None if they part nowhere.
     """
     bodies = world.bodies
     pairs = [pair for pair in world.pairs if {bodies[k].name for k in pair} == contact.pair]
@@ -298,7 +327,17 @@ def place_of_parting(rows: Matrix, world: World, contact: Touching) -> tuple[int
 
 
 def _places_along(rows: Matrix, robot: Robot, weights: Vector) -> Iterator[tuple[int, float, Matrix]]:
-    """Places of a route between which bodies come nearer by a step at most, and the frames of all joints there."""
+    """Yield places of a route between which bodies approach each other by at most ``PARTING_STEP``.
+
+    Args:
+        rows: Waypoints of the route, shape (k, dof).
+        robot: The robot.
+        weights: Bound of the approach per change of each joint, shape (dof,) [m per rad or m].
+
+    Yields:
+        Index of the motion between two waypoints, the share of it, and the joint frames there,
+        shape (joints + 1, 4, 4).
+    """
     ends = [(rows[0], rows[0])] if len(rows) == 1 else pairwise(rows)
     for number, (a, b) in enumerate(ends):
         steps = max(1, int(np.ceil(float(weights @ np.abs(b - a)) / PARTING_STEP)))
@@ -310,14 +349,14 @@ def _places_along(rows: Matrix, robot: Robot, weights: Vector) -> Iterator[tuple
 
 
 def _keep_apart(pair: tuple[Body, Body], frames: Matrix) -> bool:
-    """Whether two bodies keep what they must where they are not in contact, and do not touch."""
+    """Check whether two bodies do not touch and keep the distance that is required without a contact."""
     poses = _transforms(pair, frames)
     limit = usually_apart(*pair) + CONTACT_GAP
     return distance(pair[0].geometry, poses[0], pair[1].geometry, poses[1], limit) is not None
 
 
 def _transforms(pair: tuple[Body, Body], frames: Matrix) -> list[coal.Transform3s]:
-    """Coal's poses of two bodies."""
+    """Return the poses of two bodies as coal's transforms."""
     poses = (pin.SE3(frames[body.joint]) * body.placement for body in pair)
     return [coal.Transform3s(pose.rotation, pose.translation) for pose in poses]
 
@@ -329,10 +368,10 @@ def _with_waypoints_at(
 
     Args:
         rows: Waypoints, shape (k, dof).
-        places: Number of a motion between waypoints and the share of it, in their order.
+        places: Index of a motion between two waypoints and the share of it, in ascending order.
 
     Returns:
-        All waypoints, shape (m, dof), and the number of the waypoint at each place.
+        All waypoints, shape (m, dof), and for each place the index of its waypoint.
     """
     waypoints = list(rows)
     waypoint_of_place = {}
@@ -351,7 +390,7 @@ def _with_waypoints_at(
 
 
 def joined_with(robot: Robot, link: str) -> frozenset[str]:
-    """The links that are rigidly joined with a link, itself among them."""
+    """Return the links that are rigidly joined to a link, including that link."""
     model = robot.model
     joint_of_link = {name: model.frames[model.getFrameId(name)].parentJoint for name in robot.link_names}
     return frozenset(name for name, its_joint in joint_of_link.items() if its_joint == joint_of_link[link])

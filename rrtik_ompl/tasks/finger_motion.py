@@ -1,8 +1,8 @@
-"""The way of a gripper's fingers, while the arm stands still: a motion like any other.
+"""Check the motion of a gripper's fingers while the arm stands still.
 
-Where fingers are held is part of a robot, so that no joint of it moves them. Between two robots a finger on one joint
-goes along a screw. As in [16], bodies whose distance in the middle of an interval is larger than what they come nearer
-on half of it are apart in all of it.
+The positions of the fingers belong to the robot, so no joint of the robot moves them; opening the gripper gives another
+robot. Between these two robots a finger on one joint moves along a screw. As in [16], two bodies are apart on a whole
+interval if their distance at its middle exceeds what they can approach each other on half of it.
 """
 
 from __future__ import annotations
@@ -25,27 +25,32 @@ from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.tasks.contact_life import CONTACT_GAP, EXTRA_DEPTH, signed_distance
 from rrtik_ompl.tasks.setting import Setting
 
-MAX_LEVEL = 12  # level of an interval: 1/4096 of the way
-SAME = 1e-7  # [m] or [rad] to which a finger's place in the middle of its way is on the screw
+MAX_LEVEL = 12  # deepest level of the bisection, with intervals of 1/4096 of the motion
+SAME = 1e-7  # [m] or [rad] tolerance for a finger's pose at the middle of its motion to be on the screw
 REMEDY = "attach the object, move the gripper less, or allow the pair"
 
 
 @dataclass(frozen=True, slots=True)
 class FingerMotion:
-    """What is known of a motion of fingers. ``fault``: what is in their way; ``note``: what is doubtful."""
+    """The result of checking a motion of fingers.
+
+    Attributes:
+        fault: What is in their way; "" if nothing is.
+        note: What is doubtful; "" if nothing is.
+    """
 
     fault: str = ""
     note: str = ""
 
 
 def finger_motion(before: Setting, after: Setting, q: Vector, things_taken: Sequence[str]) -> FingerMotion:
-    """Check fingers on their way against the scene, and what they carry.
+    """Check the motion of fingers against the scene and against what they carry.
 
     Args:
-        before: With the fingers as they are held.
-        after: With the fingers as they are held then.
-        q: Where the arm is, shape (dof,).
-        things_taken: Things that are attached before the arm moves on: fingers may press on these.
+        before: The setting with the fingers where they are.
+        after: The setting with the fingers where they are to be.
+        q: Configuration of the arm, shape (dof,).
+        things_taken: Names of things that are attached before the arm moves on: fingers may press on these.
     """
     bodies_before = before.world.bodies
     bodies_after = after.world.bodies
@@ -72,7 +77,17 @@ def finger_motion(before: Setting, after: Setting, q: Vector, things_taken: Sequ
 
 
 def _pressed_in(before: Setting, after: Setting, q: Vector, moving: set[int], things_taken: Sequence[str]) -> str:
-    """A note of the finger that closes deepest into what is held or taken next, q of shape (dof,); "" if none does."""
+    """Return a note on the finger that closes deepest into a thing that is held or taken next, or "".
+
+    Fingers that open or rest are ignored.
+
+    Args:
+        before: The setting with the fingers where they are.
+        after: The setting with the fingers where they are to be.
+        q: Configuration of the arm, shape (dof,).
+        moving: Numbers of the bodies that move.
+        things_taken: Names of things that are attached next.
+    """
     bodies_before = before.world.bodies
     bodies_after = after.world.bodies
     names_held = {item.name for item in after.scene.attached} | set(things_taken)
@@ -87,7 +102,8 @@ def _pressed_in(before: Setting, after: Setting, q: Vector, moving: set[int], th
             if depth <= deepest:
                 continue
             depth_before = -signed_distance(before.robot, (bodies_before[finger], bodies_before[thing]), q, frames)
-            if depth_before >= depth:  # the finger opens, or rests
+            # The finger opens or rests.
+            if depth_before >= depth:
                 continue
             deepest = depth
             note = f"'{bodies_after[finger].name}' closes {1e3 * depth:.3g} mm deep into '{bodies_after[thing].name}'"
@@ -96,12 +112,12 @@ def _pressed_in(before: Setting, after: Setting, q: Vector, moving: set[int], th
 
 
 class PairMotion:
-    """Two bodies of which one moves at least, from their first places to their last ones.
+    """A motion of two bodies, at least one of which moves, each along a screw.
 
     Args:
-        first: Both at the beginning.
-        last: At the end, on the same joints.
-        frames: Of all joints, shape (joints + 1, 4, 4).
+        first: Both bodies at the beginning.
+        last: Both bodies at the end, on the same joints.
+        frames: Poses of all joint frames, shape (joints + 1, 4, 4).
     """
 
     def __init__(self, first: tuple[Body, Body], last: tuple[Body, Body], frames: Vector) -> None:
@@ -110,17 +126,18 @@ class PairMotion:
         self._twists = [pin.log6(a.placement.actInv(b.placement)).vector for a, b in zip(first, last, strict=True)]
         self._speed = sum(_speed(body, twist) for body, twist in zip(first, self._twists, strict=True))
         self._required_distance = kept_apart(*first)
-        if self._distance(0.0, hulls=False) <= CONTACT_GAP:  # what fingers let go may go on touching them, no deeper
+        # A thing that the fingers release may continue to touch them, but hardly deeper.
+        if self._distance(0.0, hulls=False) <= CONTACT_GAP:
             overlap_now = min(self._distance(0.0, hulls=True), 0.0)
             self._required_distance = min(self._required_distance, overlap_now - EXTRA_DEPTH)
 
     def apart(self) -> bool:
-        """Whether the two keep what they must on the whole way."""
+        """Check whether the two bodies keep the required distance during the whole motion."""
         places = Containment(self._bodies_at(0.0), ((0, 1),))
         return not places.holds((0, 1), self._frames) and self._apart_on_intervals()
 
     def _apart_on_intervals(self) -> bool:
-        """Whether the two keep their distance on the whole way, by bisection and a bound on how fast they move [16]."""
+        """Check whether the two bodies keep their distance, by bisection with a bound on how fast they move [16]."""
         undecided = [(0, 0)]  # level and number of intervals
         while undecided:
             level, number = undecided.pop()
@@ -135,7 +152,7 @@ class PairMotion:
         return True
 
     def _bodies_at(self, share: float) -> tuple[Body, Body]:
-        """Both bodies at a share of the way."""
+        """Return both bodies at a share of the motion, from 0 to 1."""
         first, second = (
             replace(body, placement=body.placement * pin.exp6(share * twist))
             for body, twist in zip(self._first, self._twists, strict=True)
@@ -143,7 +160,10 @@ class PairMotion:
         return first, second
 
     def _distance(self, share: float, *, hulls: bool) -> float:
-        """Signed, at a share of the way [m]; that of their hulls where they may overlap, for coal knows no other."""
+        """Return the signed distance of the bodies at a share of the motion [m].
+
+        With ``hulls`` it is that of their convex hulls, for which coal has a penetration depth.
+        """
         bodies = self._bodies_at(share)
         if hulls:
             first, second = (replace(body, geometry=around(body.geometry)) for body in bodies)
@@ -152,7 +172,7 @@ class PairMotion:
 
 
 def _speed(body: Body, twist: Vector) -> float:
-    """How far a point of a body moves at most along a screw from beginning to end [m]."""
+    """Return an upper bound on how far any point of a body moves along a screw from beginning to end [m]."""
     reach = float(np.linalg.norm(body.geometry.aabb_center)) + float(body.geometry.aabb_radius)
     return float(np.linalg.norm(twist[:3]) + np.linalg.norm(twist[3:]) * reach)
 
@@ -162,7 +182,7 @@ def _same_pose(first: pin.SE3, second: pin.SE3) -> bool:
 
 
 def _on_screws(before: Robot, after: Robot) -> bool:
-    """Whether every finger is in the middle of the way where a single screw takes it."""
+    """Check whether every finger is, at the middle of its motion, where a single screw would take it."""
     middle = _robot_of_entry(_entry_of_middle(before, after))
     placements = [
         {(str(item.name), int(item.parentJoint)): item.placement for item in robot.collision.geometryObjects}
@@ -178,12 +198,12 @@ def _on_screws(before: Robot, after: Robot) -> bool:
 
 
 def _middle_of_screw(first: pin.SE3, last: pin.SE3) -> pin.SE3:
-    """The pose half-way from one to another on the screw that takes the one to the other."""
+    """Return the pose half-way along the screw from one pose to another."""
     return first * pin.exp6(0.5 * pin.log6(first.actInv(last)).vector)
 
 
 def _entry_of_middle(before: Robot, after: Robot) -> str:
-    """The entry of the robot with its fingers in the middle, as JSON."""
+    """Return the entry, as JSON, of the robot with its fingers at the middle of their motion."""
     values_before = before.source.get("locked", {})
     values_after = after.source.get("locked", {})
     middle_values = {name: 0.5 * (values_before.get(name, 0.0) + value) for name, value in values_after.items()}

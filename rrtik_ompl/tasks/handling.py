@@ -1,4 +1,4 @@
-"""What is taken and set down, read from the stages: where a motion ends, and too deep whatever is chosen."""
+"""Determine from the stages what is taken and set down: at the end of a motion, and too deep whatever is chosen."""
 
 from __future__ import annotations
 
@@ -30,14 +30,19 @@ from rrtik_ompl.world.world import World
 
 @dataclass(frozen=True, slots=True)
 class Handled:
-    """A thing that is taken or set down. ``by``: the links that may touch it then; None if all that it may meet may."""
+    """A thing that is taken or set down.
+
+    Attributes:
+        name: Name of the thing.
+        by: Links that may touch it then; None if everything may.
+    """
 
     name: str
     by: frozenset[str] | None
 
 
 def handled(steps: Sequence[Step], robot: Robot) -> list[Handled]:
-    """What may be taken and set down before the arm moves on, whatever is chosen."""
+    """Return the things that may be taken or set down before the arm moves on, for any choice of alternatives."""
     things: list[Handled] = []
     for place, step in enumerate(steps):
         stage = step.stage
@@ -55,7 +60,7 @@ def handled(steps: Sequence[Step], robot: Robot) -> list[Handled]:
 
 
 def may_touch(world: World, steps: Sequence[Step]) -> list[Touching]:
-    """Contacts that would let what is taken or set down next touch all that it may touch there."""
+    """Return contacts that let the things that are taken or set down next touch all that they may touch."""
     contact_of_pair: dict[frozenset[str], Touching] = {}
     for thing in handled(steps, world.robot):
         for pair in {frozenset(world.bodies[k].name for k in numbers) for numbers in world.pairs}:
@@ -66,7 +71,7 @@ def may_touch(world: World, steps: Sequence[Step]) -> list[Touching]:
 
 
 def fault_of_setting_down(world: World, steps: Sequence[Step], q: Vector) -> str:
-    """Why something cannot be set down at q, shape (dof,), because of its depth; "" if it can."""
+    """Return why something would be set down too deep inside another at q, shape (dof,); "" if nothing would."""
     obstacle_names = frozenset(world.scene.names)
     for thing in handled(steps, world.robot):
         for near in touching_at(world, q, thing.name) if thing.by is None else ():
@@ -76,7 +81,7 @@ def fault_of_setting_down(world: World, steps: Sequence[Step], q: Vector) -> str
 
 
 def contacts_on_arrival(world: World, steps: Sequence[Step], q: Vector) -> tuple[Touching, ...]:
-    """The contacts of what is taken or set down at q, shape (dof,); none where it would be deeper than it may be."""
+    """Return the contacts of things that are taken or set down at q, shape (dof,), without those too deep."""
     contact_of_pair: dict[frozenset[str], Touching] = {}
     for thing in handled(steps, world.robot):
         near = (each for each in touching_at(world, q, thing.name) if thing.by is None or each.second in thing.by)
@@ -86,7 +91,7 @@ def contacts_on_arrival(world: World, steps: Sequence[Step], q: Vector) -> tuple
 
 @dataclass(frozen=True, slots=True)
 class Tip:
-    """Where the tip is, and how far it may be from there [m] and turned [rad]."""
+    """A pose of the tip, and how far from it the tip may be [m] and how far it may be turned [rad]."""
 
     pose: pin.SE3
     away: float = 0.0
@@ -94,14 +99,14 @@ class Tip:
 
 
 def never_set_down(steps: Sequence[Step], world: World, q: Vector) -> str:
-    """Why a stage can never set down what it holds: the place is too deep inside an obstacle; "" if nothing says so.
+    """Return why a stage can never set down what it holds, as the place is too deep inside an obstacle; "" if it may.
 
-    Only what is sure is said: poses of the tip that are not known, and alternatives, end the look ahead.
+    Only certain faults are reported: the prediction ends where the pose of the tip is unknown, and at alternatives.
 
     Args:
-        steps: Of the task.
-        world: At its beginning.
-        q: Where the arm begins, shape (dof,).
+        steps: Steps of the task.
+        world: The world at its beginning.
+        q: Configuration at its beginning, shape (dof,).
     """
     tip: Tip | None = Tip(world.robot.fk(q))
     grasps: dict[str, Tip] = {}
@@ -130,7 +135,7 @@ def never_set_down(steps: Sequence[Step], world: World, q: Vector) -> str:
 
 
 def _reached(stage: MoveTo, world: World) -> Tip | None:
-    """Where the tip is after a motion; None if several places are possible."""
+    """Return the pose of the tip after a motion; None if several poses are possible."""
     goal = stage.goal
     if isinstance(goal, Target) and goal.oriented:
         return Tip(goal.pose, *goal.tolerances)
@@ -140,7 +145,18 @@ def _reached(stage: MoveTo, world: World) -> Tip | None:
 
 
 def _too_deep(world: World, q: Vector, name: str, tip: Tip, grasp: Tip, moved_before: set[str]) -> str:
-    """Says how deep a thing would be left inside an obstacle that nothing has moved, if that is sure."""
+    """Return a message if a thing would certainly be left too deep inside an unmoved obstacle; "" otherwise.
+
+    The thing's place is uncertain by the tolerances of the tip when it was grasped and when it is set down.
+
+    Args:
+        world: The world at the beginning of the task.
+        q: Configuration at its beginning, shape (dof,).
+        name: Name of the thing.
+        tip: Pose of the tip when the thing is set down.
+        grasp: Pose of the thing in the frame of the tip, with the tolerances of the tip at the grasp.
+        moved_before: Names of all things that may have moved.
+    """
     frames = world.robot.joint_frames(q[None])[0]
     pose = tip.pose * grasp.pose
     allowed_pairs = {frozenset(pair) for pair in world.scene.allowed_collisions}
@@ -161,6 +177,6 @@ def _too_deep(world: World, q: Vector, name: str, tip: Tip, grasp: Tip, moved_be
 
 
 def _centre(world: World, body: Body, name: str) -> Vector:
-    """Of the box around a body, as seen from the frame of the obstacle that it is part of [m], shape (3,)."""
+    """Return the centre of a body's bounding box in the frame of the obstacle that it is part of [m], shape (3,)."""
     placement = world.scene.obstacle(name).pose.actInv(body.placement)
     return np.array(placement.act(np.array(body.geometry.aabb_center)))

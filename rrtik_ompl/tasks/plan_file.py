@@ -1,4 +1,4 @@
-"""The plan of a task in one file (JSON): every motion with its stage, its waypoints, its robot and its scene."""
+"""Save the plan of a task in one JSON file: every motion with its stage, its waypoints, its robot and its scene."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class StoodOnEntry(ContactEntry):
     allowed: bool = Field(False, description="whether the grasp has named the pair: it may be deeper than 5 mm")
 
     def stood_on(self) -> MotionContact:
-        """The contact."""
+        """Return the contact."""
         return MotionContact(self.build(), self.until, self.then, self.allowed)
 
 
@@ -76,7 +76,7 @@ def save_task_plan(plan: TaskPlan, file: str | os.PathLike[str]) -> None:
     """Write the plan of a task to a .json file, whole or not at all.
 
     Raises:
-        InputError: If it has no motion, the ending is another one, or the file cannot be written.
+        InputError: If the plan has no motion, the ending is not .json, or the file cannot be written.
 
     Example:
         >>> loaded = rrtik.load_task("titan4_drawer")
@@ -120,7 +120,7 @@ def save_task_plan(plan: TaskPlan, file: str | os.PathLike[str]) -> None:
 
 
 def is_task_plan(file: str | os.PathLike[str]) -> bool:
-    """Whether a file that is there says of itself that it holds the plan of a task."""
+    """Check whether a file exists and states that it holds the plan of a task."""
     path = Path(file)
     if path.suffix.lower() != ".json" or not path.is_file():
         return False
@@ -132,10 +132,12 @@ def is_task_plan(file: str | os.PathLike[str]) -> bool:
 
 
 def load_task_plan(file: str | os.PathLike[str], *, trust_xacro: bool = False) -> TaskPlan:
-    """Read a plan that :func:`save_task_plan` has written; its motions have no proofs, `TaskPlan.proven` makes them.
+    """Read a plan that :func:`save_task_plan` has written.
+
+    Its motions have no proofs; `TaskPlan.proven` makes them.
 
     Args:
-        file: The path.
+        file: The path of the file.
         trust_xacro: Whether the macros of a robot's file are trusted, see `load_robot`.
 
     Raises:
@@ -152,6 +154,7 @@ def load_task_plan(file: str | os.PathLike[str], *, trust_xacro: bool = False) -
         return _task_plan(file)
 
 
+# Read a plan; see :func:`load_task_plan`. Each motion must begin where the one before ends.
 def _task_plan(file: str | os.PathLike[str]) -> TaskPlan:
     document = read_yaml(file_name(file))
     entry = parse(document, TaskPlanFile)
@@ -173,7 +176,7 @@ def _task_plan(file: str | os.PathLike[str]) -> TaskPlan:
 
 
 def _contact_data(contacts: tuple[MotionContact, ...]) -> dict[str, Any]:
-    """What a file says of the contacts that a motion stood on."""
+    """Return the entries of a file for the contacts on which a motion depends."""
     entries = []
     for each in contacts:
         entry: dict[str, Any] = {"pair": list(each.touching.names), "distance": each.touching.distance}
@@ -183,6 +186,7 @@ def _contact_data(contacts: tuple[MotionContact, ...]) -> dict[str, Any]:
     return {"contacts": entries} if entries else {}
 
 
+# Build the world and the path of the motion with this index.
 def _motion(document: YamlDocument, entry: TaskPlanFile, number: int) -> tuple[World, JointPath]:
     motion = entry.motions[number]
     place = ("motions", number)
@@ -197,6 +201,7 @@ def _motion(document: YamlDocument, entry: TaskPlanFile, number: int) -> tuple[W
         return world, JointPath.of(world.robot, rows)
 
 
+# Build the world of an entry; ``place`` is where the entry is in the document, for error messages.
 def _world(document: YamlDocument, entry: TaskPlanFile, part: WorldEntry, place: tuple[str | int, ...]) -> World:
     data: Any = document.data
     for key in (*place, "robot"):

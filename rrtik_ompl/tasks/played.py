@@ -1,4 +1,4 @@
-"""The plan of a task as a picture plays it: timed, tick by tick, and what is proven of it."""
+"""Prepare the plan of a task for a picture: timed, tick by tick, with the verdict on it."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ class PlayedTask:
     """A plan over time, as :func:`time_task` times it: at the robot's own limits, with rests between motions.
 
     Attributes:
-        plan: The plan, of which each motion has a tick at least.
-        rate: Ticks a second.
-        motions: Number of the motion of each tick, shape (ticks,).
-        waypoints: The configurations, shape (ticks, dof).
-        rests: How much is over in each tick of a rest before the next motion, 0 outside of rests, shape (ticks,).
-        judged: What is said of it, by the ticks.
-        held: The regions of path constraints, and where the motion that keeps each begins, shape (dof,).
+        plan: The plan; each of its motions has at least one tick.
+        rate: Ticks per second.
+        motions: Index of the motion of each tick, shape (ticks,).
+        waypoints: Configuration at each tick, shape (ticks, dof).
+        rests: Share of a rest before the next motion that is over at each tick, 0 outside of rests, shape (ticks,).
+        judged: The verdict, by the ticks.
+        held: The regions of path constraints, each with the configuration at which its motion begins, shape (dof,).
     """
 
     plan: TaskPlan
@@ -47,7 +47,7 @@ class PlayedTask:
 
 
 def played_task(plan: TaskPlan) -> PlayedTask:
-    """A plan as it is played; see :meth:`TaskPlan.played`."""
+    """Return a plan as it is played; see :meth:`TaskPlan.played`."""
     if not plan.paths:
         raise InputError("task plan to show: it has no motion" + (f": {plan.reason}" if plan.reason else ""))
     motions, rows, rests = _ticks(plan)
@@ -55,9 +55,13 @@ def played_task(plan: TaskPlan) -> PlayedTask:
 
 
 def _ticks(plan: TaskPlan) -> tuple[NDArray[np.int64], Matrix, Vector]:
-    """For each tick its motion, its configuration, and how much is over of a rest before the next motion.
+    """Return the ticks of a plan.
 
-    A motion that leads nowhere takes no time, and has a tick too.
+    A motion that leads nowhere takes no time, but has a tick too.
+
+    Returns:
+        For each tick the index of its motion, shape (ticks,); its configuration, shape (ticks, dof); and the share of a
+        rest that is over, shape (ticks,).
     """
     numbers = np.arange(len(plan.paths))
     starts = np.array([path.start for path in plan.paths])
@@ -78,13 +82,13 @@ def _ticks(plan: TaskPlan) -> tuple[NDArray[np.int64], Matrix, Vector]:
 
 
 def _share_of_rest(pauses: Matrix, time: float) -> float:
-    """How much is over of the rest, of some rests (begin, end), in which a time lies; 0 between them."""
+    """Return the share that is over of the rest in which a time lies; 0 outside of the rests, shape (p, 2)."""
     resting = pauses[(pauses[:, 0] < time) & (time < pauses[:, 1])]
     return float((time - resting[0, 0]) / (resting[0, 1] - resting[0, 0])) if len(resting) else 0.0
 
 
 def _judged(plan: TaskPlan, motions: NDArray[np.int64], rows: Matrix) -> Judged:
-    """The verdict on a plan, by its ticks."""
+    """Return the verdict on a plan, by its ticks."""
     faults = plan.faults()
     parts = zip(plan.paths, plan.worlds, plan.stages, strict=True)
     worlds = [world_of_motion(path, world, stage) for path, world, stage in parts]
@@ -109,7 +113,7 @@ def _judged(plan: TaskPlan, motions: NDArray[np.int64], rows: Matrix) -> Judged:
 
 
 def _contacts(world: World, ticks: NDArray[np.int64], rows: Matrix, faults: list[Vector]) -> Iterator[PathContact]:
-    """What touches in the ticks of a motion, and at the library's faults of it, each in the tick that is nearest."""
+    """Yield what touches in the ticks of a motion, and at its faults, each fault at the nearest tick."""
     yield from contacts_at(world.checks, ticks.astype(np.float64), rows)
     for q in faults:
         tick = float(ticks[np.abs(rows - q).sum(axis=1).argmin()])
@@ -118,7 +122,7 @@ def _contacts(world: World, ticks: NDArray[np.int64], rows: Matrix, faults: list
 
 
 def _held(plan: TaskPlan) -> tuple[tuple[HeldRegion, Vector], ...]:
-    """The regions of the path constraints of all motions, and where each motion begins, shape (dof,)."""
+    """Return the regions of all motions' path constraints, each with the configuration at which its motion begins."""
     regions_of_motions: list[tuple[HeldRegion, Vector]] = []
     for path, world, stage in zip(plan.paths, plan.worlds, plan.stages, strict=True):
         if isinstance(stage, MoveTo):

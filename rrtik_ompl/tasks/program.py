@@ -1,4 +1,4 @@
-"""A task as a program: its stages with the numbers that messages call them by, checked before anything is searched."""
+"""Number the stages of a task, as messages name them, and check them before anything is searched."""
 
 from __future__ import annotations
 
@@ -25,28 +25,35 @@ class Step:
 
 
 def steps_of(stages: Iterable[Stage], prefix: str = "") -> tuple[Step, ...]:
-    """Stages with their numbers."""
+    """Return stages with their numbers, each of which begins with the prefix."""
     return tuple(Step(f"{prefix}{k + 1}", stage) for k, stage in enumerate(stages))
 
 
 def options_of(step: Step) -> tuple[tuple[Step, ...], ...]:
-    """The rows of a step that has alternatives."""
+    """Return the rows of a step that has alternatives, as steps."""
     assert isinstance(step.stage, Alternatives), "only these have options"
     return tuple(steps_of(row, f"{step.number}.{k + 1}.") for k, row in enumerate(step.stage.options))
 
 
 def check_program(steps: tuple[Step, ...], world: World) -> None:
-    """Refuse what can never be done, whatever is chosen.
+    """Raise an error if a task can never be done, whatever is chosen.
 
     Raises:
-        InputError: If something is attached twice or detached where it is not, or the robot has no gripper joints.
-        UnknownNameError: If there is no object, link or posture of a name.
+        InputError: If something is attached twice, or detached while it is not held, or the robot has no gripper
+            joints.
+        UnknownNameError: If an object, link or posture does not exist.
     """
     _holds_after(steps, {frozenset(item.name for item in world.scene.attached)}, world)
 
 
 def _holds_after(steps: tuple[Step, ...], possible_holds: set[Held], world: World) -> set[Held]:
-    """What may be held after some steps; ``possible_holds``: what may be held before, a set for each choice so far."""
+    """Return which sets of objects may be held after some steps, and check the steps.
+
+    Args:
+        steps: The steps.
+        possible_holds: The sets of names that may be held before them, one for each choice so far.
+        world: The world at the beginning of the task.
+    """
     for step in steps:
         stage = step.stage
         try:
@@ -69,7 +76,7 @@ def _holds_after(steps: tuple[Step, ...], possible_holds: set[Held], world: Worl
 
 
 def _holds_after_attach(stage: Attach, names_held: Held, world: World) -> Held:
-    """What is held once something is attached; refuses what is held already, and unknown names."""
+    """Return the names of what is held after an object is attached; raise an error if it is held already or unknown."""
     if stage.object in names_held:
         raise InputError(f"'{stage.object}' is held already; detach it first")
     if stage.object not in world.scene.names:
@@ -85,7 +92,7 @@ def _holds_after_attach(stage: Attach, names_held: Held, world: World) -> Held:
 
 
 def _holds_after_detach(stage: Detach, names_held: Held, world: World) -> Held:
-    """What is held once something is detached; refuses what is not held."""
+    """Return the names of what is held after an object is detached; raise an error if it is not held."""
     if stage.object not in names_held:
         if stage.object not in world.scene.names:
             raise UnknownNameError("attached object", stage.object, world.scene.names)
@@ -93,6 +100,7 @@ def _holds_after_detach(stage: Detach, names_held: Held, world: World) -> Held:
     return names_held - {stage.object}
 
 
+# Raise an error unless each constraint's frame is a frame of the robot or an object that is held for every choice.
 def _check_frames(stage: MoveTo, possible_holds: set[Held], world: World) -> None:
     model = world.robot.model
     for region in stage.constraints:

@@ -1,6 +1,7 @@
-"""Search for choices with which a whole task works: the farthest branch first, of these the shortest; backtracking.
+"""Search for choices with which a whole task works, by best-first search with backtracking.
 
-Straight lines are followed at once, for they decide most; motions between postures are planned when all else fits.
+The branch with most stages done is expanded first, among these the shortest. Straight lines are followed at once, as
+they exclude most choices; motions between configurations are planned when everything else fits.
 """
 
 from __future__ import annotations
@@ -26,17 +27,18 @@ from rrtik_ompl.world.clearances import CLEARANCE, proved, proved_as_clear
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
 
-FIRST_ITERATIONS = 4_000  # of each planner for a motion between postures; four times as much in each further round
+# Iterations of each planner for a motion between configurations; GROWTH times as many in each further round.
+FIRST_ITERATIONS = 4_000
 GROWTH = 4
-LEAST_SECONDS = 1e-3  # for one of them
+LEAST_SECONDS = 1e-3  # [s] least time for such a motion
 ROUNDS = 8
-NAMED = 6  # stages whose failures a reason names
-MOST_WORDS = 300  # letters of one failure
+NAMED = 6  # most stages whose failures a reason names
+MOST_WORDS = 300  # most letters of one failure
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Done:
-    """The branch that has done the whole task, and the motions on its way, with their paths and contacts."""
+    """The last branch of a completed task, and for each motion on the way its branch, its path and its contacts."""
 
     last: Branch
     motions: tuple[tuple[Branch, JointPath], ...]
@@ -44,10 +46,10 @@ class Done:
 
 
 class TaskSearch:
-    """One search.
+    """The search for one task.
 
     Args:
-        budget: Time, and the seed of everything random.
+        budget: The time limit, and the seed of all random numbers.
     """
 
     def __init__(self, budget: Budget) -> None:
@@ -55,20 +57,24 @@ class TaskSearch:
         self._out_of_time = False
         self._expander = Expander(np.random.default_rng(budget.seed), budget.seed)
 
-        # A heap of branches to go on from, the smallest first: most stages done, then shortest, then oldest.
+        # A heap of branches to expand: those with most stages done first, then the shortest, then the oldest.
         self._queue: list[tuple[int, float, int, Branch]] = []
         self._numbers = count()
 
-        # Of motions between postures, by the identity of their branches: path, and contacts that it stands on.
+        # Path and contacts of planned motions between configurations, by the id of their branch.
         self._paths: dict[int, JointPath] = {}
         self._contacts: dict[int, tuple[MotionContact, ...]] = {}
 
-        # Motions that were not found in this round, by the same, and the branches that cannot go on without them.
+        # Ids of branches whose motion was not found in this round, and the branches that depend on such motions.
         self._motions_not_found: set[int] = set()
         self._waiting: list[Branch] = []
 
     def run(self, start: Branch) -> Done | None:
-        """What does the whole task; None if no choices work."""
+        """Search for choices with which the whole task works; None if there are none.
+
+        Each round allows more effort than the one before: it retries the branches whose motions were not found, and
+        continues with further configurations of the goals.
+        """
         self._push(start)
         for effort in range(ROUNDS):
             done = self._run_round(effort)
@@ -88,7 +94,7 @@ class TaskSearch:
         return None
 
     def reason(self) -> str:
-        """Why nothing was found: what failed, the farthest stage first, and how often."""
+        """Return why nothing was found: which steps failed, the latest stage first, how often, and for example why."""
         failures = self._expander.failures
         failures_of_step: dict[str, tuple[Step, Counter[str]]] = {}
         for _, step, text in failures:
@@ -133,7 +139,12 @@ class TaskSearch:
         heapq.heappush(self._queue, (-branch.done, branch.cost, next(self._numbers), branch))
 
     def _plan_motions(self, branch: Branch, effort: int) -> list[tuple[Branch, JointPath]] | None:
-        """The motions of a branch that has done everything, those between postures planned; None if one fails."""
+        """Plan the motions between configurations of a branch that has done all steps.
+
+        Returns:
+            All motions of the branch with their paths; None if one was not found, in which case the branch waits for
+            the next round.
+        """
         motions: list[tuple[Branch, JointPath]] = []
         for link in branch.chain():
             if link.moves and id(link) not in self._paths and not self._plan_motion(link, effort):
@@ -146,7 +157,10 @@ class TaskSearch:
         return motions
 
     def _plan_motion(self, link: Branch, effort: int) -> bool:
-        """Plan a motion between postures and store its path and contacts; whether one was found."""
+        """Plan a motion between configurations, store its path and contacts, and return whether one was found.
+
+        The straight motion is tried first.
+        """
         before = link.before
         world = link.setting.world
         assert before is not None, "it comes after another"
@@ -168,7 +182,7 @@ class TaskSearch:
         return path is not None and self._accept_path(link, path, effort)
 
     def _path_of(self, problem: Problem, link: Branch, effort: int) -> JointPath | None:
-        """Plan a path of a problem that a motion poses; None, and the reason noted, if there is none."""
+        """Plan a path for a motion's problem; if there is none, note the reason and return None."""
         seconds = max(self._budget.left, LEAST_SECONDS)
         result = plan_counted(problem, Budget(self._budget.seed, seconds, FIRST_ITERATIONS * GROWTH**effort))
         if result.path is None:
@@ -176,7 +190,7 @@ class TaskSearch:
         return result.path
 
     def _path_from_parting(self, link: Branch, world: World, q: Vector, goal: Vector, effort: int) -> JointPath | None:
-        """A way on from where two have parted to the goal of a motion, both of shape (dof,)."""
+        """Plan a path from the place where two things have parted to the goal of a motion, both of shape (dof,)."""
         try:
             return self._path_of(Problem(world, q, goal), link, effort)
         except ProblemError as error:
@@ -184,17 +198,17 @@ class TaskSearch:
             return None
 
     def _note_failure(self, link: Branch, reason: str) -> None:
-        """Note why the way of a motion between postures was not found."""
+        """Note why the path of a motion between configurations was not found."""
         assert link.before is not None, "it comes after another"
         assert link.step is not None, "it has done one"
         self._expander.failures.append((link.before, link.step, reason))
 
     def _accept_path(self, link: Branch, path: JointPath, effort: int) -> bool:
-        """Store the path of a motion and its contacts; if what has parted on it touches again, replan from there.
+        """Store the path of a motion and its contacts; if things touch again, replan from where they had parted.
 
         Args:
             link: The branch of the motion.
-            path: From the branch before it to its configuration.
+            path: The path from the branch before to this one's configuration.
             effort: Round of the search, for a path that is planned anew.
 
         Returns:
@@ -206,7 +220,8 @@ class TaskSearch:
         if setting.scene.contacts:
             world = world_of_motion(path, setting.world, link.step.stage)
             followed = follow_contacts(path, world, setting.grasp_pairs, link.arriving)
-            if followed.world is not None:  # the path ends where two have parted that it would make touch again
+            # The path now ends where two things have parted that would touch again later.
+            if followed.world is not None:
                 detour = self._path_from_parting(link, followed.world, followed.path.end, path.end, effort)
                 if detour is None:
                     return False
@@ -223,9 +238,9 @@ class TaskSearch:
 
 
 def _moved_to_start(q: Vector, path: JointPath, link: Branch) -> JointPath:
-    """The path of a branch from q, shape (dof,), where the one before ended: perhaps whole turns of joints away.
+    """Shift a path by whole turns of joints so that it begins at q, shape (dof,), where the motion before ended.
 
-    A plan may reach its goal the other way round of a continuous joint.
+    This is needed because a plan may reach its goal in the other direction of a continuous joint.
     """
     difference = q - path.start
     if not difference.any():

@@ -1,4 +1,4 @@
-"""What surrounds the arm and what it holds, at one place of a task; how stages change it."""
+"""Model the robot and the scene at one place of a task, and how stages change them."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ from rrtik_ompl.world.world import World, form_of
 
 
 class Setting:
-    """A robot in a scene; its world is made when it is first needed, for several stages may change it in a row.
+    """A robot in a scene. Its world is made when it is first needed, as several stages in a row may change the setting.
 
     Attributes:
-        robot: With its fingers as they are held.
-        scene: Obstacles, what is held, and contacts.
+        robot: The robot, with its fingers as they are held.
+        scene: Obstacles, attached objects, and contacts.
         grasp_pairs: Pairs of names that an :class:`Attach` allows as long as it holds something.
     """
 
@@ -40,14 +40,14 @@ class Setting:
 
     @classmethod
     def of(cls, world: World) -> Setting:
-        """The setting of a world that there is."""
+        """Return the setting of an existing world."""
         setting = cls(world, world.robot, world.scene)
         setting.world = world
         return setting
 
     @classmethod
     def beginning(cls, world: World, q: Vector) -> Setting:
-        """The setting of a world at q, shape (dof,): what is held there may go on touching what it touches."""
+        """Return the setting of a world at q, shape (dof,): held objects may continue to touch what they touch."""
         touching = [near for item in world.scene.attached for near in touching_at(world, q, item.name)]
         known_pairs = {contact.pair for contact in world.scene.contacts}
         contacts = [
@@ -57,39 +57,44 @@ class Setting:
 
     @cached_property
     def world(self) -> World:
-        """The robot in the scene, with the other settings of the first world of the task."""
+        """Return the world of the robot in the scene, with the other settings of the first world of the task."""
         return form_of(self._first_world, robot=self.robot, scene=self.scene)
 
     def with_contacts(self, contacts: Iterable[Touching]) -> Setting:
-        """The same setting with further contacts; of a pair that has one already the new one counts."""
+        """Return the same setting with further contacts; a new contact replaces an old one of the same pair."""
         new = tuple(contacts)
         return self.with_scene(with_contacts(self.scene, new)) if new else self
 
     def arriving(self, contacts: Iterable[Touching]) -> Setting:
-        """The same setting with contacts of what is about to be taken or set down; deeper ones that there are stay."""
+        """Return the same setting with contacts of things that are taken or set down next; deeper old ones remain."""
         distance_of_pair = {contact.pair: contact.distance for contact in self.scene.contacts}
         return self.with_contacts(each for each in contacts if each.distance < distance_of_pair.get(each.pair, np.inf))
 
     def with_scene(self, scene: Scene) -> Setting:
-        """The same robot in another scene."""
+        """Return the same robot in another scene."""
         return Setting(self._first_world, self.robot, scene, self.grasp_pairs)
 
     def with_contacts_only(self, contacts: tuple[Touching, ...]) -> Setting:
-        """The same setting with these contacts and no others."""
+        """Return the same setting with exactly these contacts."""
         return self if contacts == self.scene.contacts else self.with_scene(replace(self.scene, contacts=contacts))
 
     def after(self, stage: Attach | Detach | Gripper, q: Vector) -> Setting:
-        """The setting after a stage that the arm does at a configuration, shape (dof,).
+        """Return the setting after a stage that the arm does at a configuration.
+
+        Args:
+            stage: The stage.
+            q: The configuration, shape (dof,).
 
         Raises:
-            InputError: If the robot has no gripper joints, does not open so far, or would leave what it lets go deep
-                inside something.
-            UnknownNameError: If there is no object or link of a name.
+            InputError: If the robot has no gripper joints or does not open so far, or if the thing that it releases
+                would be left deep inside something.
+            UnknownNameError: If an object or a link does not exist.
         """
         if isinstance(stage, Gripper):
             return Setting(self._first_world, with_gripper(self.robot, stage), self.scene, self.grasp_pairs)
         return self._attached(stage, q) if isinstance(stage, Attach) else self._detached(stage, q)
 
+    # Return the setting after an obstacle is attached, with contacts for what it touches and for what it may touch.
     def _attached(self, stage: Attach, q: Vector) -> Setting:
         pose = self.robot.fk(q, stage.link).actInv(self.scene.obstacle(stage.object).pose)
         links = tuple(name for name in stage.allow if name in self.robot.link_names)
@@ -109,6 +114,7 @@ class Setting:
         }
         return setting.with_contacts(contacts.values())
 
+    # Return the setting after an object is detached, with contacts for what it touches.
     def _detached(self, stage: Detach, q: Vector) -> Setting:
         obstacle_names = frozenset(self.scene.names)
         for near in touching_at(self.world, q, stage.object):
@@ -124,17 +130,17 @@ class Setting:
 
 
 def world_of_motion(path: JointPath, world: World, stage: Stage) -> World:
-    """The world of a motion, with the path constraints of its stage if it has any."""
+    """Return the world of a motion, with the path constraints of its stage if there are any."""
     if not isinstance(stage, MoveTo) or not stage.constraints:
         return world
     return Problem(world, path.start, path.end, constraints=stage.constraints).world
 
 
 def with_gripper(robot: Robot, stage: Gripper) -> Robot:
-    """The same arm with its fingers held elsewhere.
+    """Return the same robot with its fingers held elsewhere.
 
     Raises:
-        InputError: If it has no gripper joints, or does not open so far.
+        InputError: If the robot has no gripper joints, or does not open so far.
     """
     joints = robot.gripper
     if joints is None:

@@ -1,4 +1,4 @@
-"""The stages of a task: what the arm does, one after the other."""
+"""Define the stages of a task: what the arm does, one after the other."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from rrtik_ompl.model.goal_kind import TaskRegion
 
 LineFrame: TypeAlias = Literal["world", "tip"]
 GripperState: TypeAlias = Literal["open", "close"]
-NO_LENGTH = 1e-9  # [m]
+NO_LENGTH = 1e-9  # [m] A shorter shift counts as none.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MoveTo:
-    """Move to a goal by any way that is free.
+    """Move to a goal along any free path.
 
     Attributes:
         goal: A goal, the name of a posture, a configuration, shape (dof,), or a pose of the tip as ``SE3`` or matrix.
-        constraints: Regions that a frame must not leave on the way, those ``from_start`` as seen from where this stage
+        constraints: Regions that a frame must not leave on the way; those ``from_start`` refer to where this stage
             begins; see :class:`rrtik_ompl.Problem`.
 
     Example:
@@ -63,9 +63,9 @@ class Straight:
     """Move the tip in a straight line: by a shift, or to a pose.
 
     Attributes:
-        by: Shift of the tip [m], shape (3,), its orientation kept.
+        by: Shift of the tip [m], shape (3,), with constant orientation.
         to: Pose of the tip at the end, as :func:`rrtik_ompl.straight` takes it.
-        frame: Whose axes the shift is in: "world", or "tip" as it is at the beginning.
+        frame: Axes of the shift: "world", or "tip" as it is at the beginning.
 
     Example:
         >>> rrtik.Straight(by=[0.0, 0.0, -0.1], frame="tip").by.tolist()
@@ -96,7 +96,7 @@ class Straight:
         return "Straight"
 
     def goal(self, tip: pin.SE3) -> pin.SE3:
-        """The pose at the end for a pose of the tip at the beginning (SE3)."""
+        """Return the pose of the tip at the end (SE3), from its pose at the beginning."""
         require(tip, pin.SE3, "pose of the tip", "use robot.fk(q)")
         if self.by is not None:
             shift = tip.rotation @ self.by if self.frame == "tip" else self.by
@@ -106,14 +106,14 @@ class Straight:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Attach:
-    """An obstacle moves with a link from now on.
+    """Attach an obstacle to a link, with which it moves from now on.
 
     Attributes:
         object: Name of the obstacle.
-        link: That holds it.
-        allow: Links and obstacles that it may touch while it is held, beside that link.
-        padding: What it keeps while it is held from all that it may not touch, beside its margin [m]; what the link
-            keeps (:func:`rrtik_ompl.padded`) if None.
+        link: Name of the link that holds it.
+        allow: Names of further links and obstacles that it may touch while it is held.
+        padding: Distance that it keeps while it is held from everything that it may not touch, in addition to its
+            margin [m]; None for that of the link (:func:`rrtik_ompl.padded`).
 
     Example:
         >>> rrtik.Attach("box", "panda_hand", allow=["table"], padding=0.005).allow
@@ -138,7 +138,10 @@ class Attach:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Detach:
-    """What is held stays where it is from now on. ``object``: its name.
+    """Detach an object, which stays where it is from now on.
+
+    Attributes:
+        object: Name of the object.
 
     Example:
         >>> print(rrtik.Detach("box"))
@@ -156,13 +159,14 @@ class Detach:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Gripper:
-    """Open or close the gripper. The fingers' way is checked as a motion is, against the scene and what is held.
+    """Open or close the gripper.
 
-    They may press on what is attached before the arm moves on.
+    The motion of the fingers is checked against the scene and what is held, like any other motion. Fingers may press on
+    objects that are attached before the arm moves on.
 
     Attributes:
         state: "open" or "close".
-        width: How far apart the fingers are afterwards [m]; wide open or shut if None.
+        width: Distance between the fingers afterwards [m]; None for wide open or shut.
 
     Example:
         >>> rrtik.Gripper("close", width=0.04).width
@@ -184,7 +188,10 @@ class Gripper:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Alternatives:
-    """Any of several rows of stages.
+    """Do any one of several rows of stages.
+
+    Attributes:
+        options: The rows of stages.
 
     Example:
         >>> grasps = [[rrtik.MoveTo("up")], [rrtik.MoveTo("home"), rrtik.Attach("box", "tool0")]]
@@ -208,10 +215,10 @@ Stage: TypeAlias = MoveTo | Straight | Attach | Detach | Gripper | Alternatives
 
 
 def checked_stages(stages: object, what: str) -> tuple[Stage, ...]:
-    """A row of stages.
+    """Check a row of stages and return it.
 
     Raises:
-        InputError: If it is empty, or something else is in it.
+        InputError: If it is empty, or contains something else.
     """
     row = _row(stages)
     if not row:

@@ -1,8 +1,8 @@
-"""Whether what the motions of a plan stand on is true: contacts that are there, and things that stay where they were.
+"""Check the assumptions of a plan's motions: contacts that exist, and things that stay where they were.
 
-A plan may come from a file that somebody has changed, so that nothing here takes its word for it: a contact may be no
-deeper than the two are where it begins, and a thing is at the beginning of a motion what it was, and where it was, at
-the end of the one before.
+A plan may come from a file that was changed, so nothing it states is trusted: a contact may be no deeper than the
+overlap of the two things where it begins, and at the beginning of a motion each thing must be the same, and in the same
+place, as at the end of the motion before.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from rrtik_ompl.model.shapes.shape import same_shape
 from rrtik_ompl.tasks.contact_life import EXTRA_DEPTH, SMALL_OVERLAP, MotionContact, contacts_from, touching_at
 from rrtik_ompl.world.world import World
 
-MOVED = 1e-6  # [m, rad] between two motions that is rounding
+MOVED = 1e-6  # [m, rad] change of a thing's pose between two motions that counts as rounding
 
 
 def standing_faults(
@@ -32,13 +32,13 @@ def standing_faults(
     contacts: Sequence[Sequence[MotionContact]],
     end: World | None,
 ) -> list[list[Violation]]:
-    """What is not true of each motion: contacts deeper than they were, names that are not there, things that change.
+    """Return the false statements about each motion: contacts that are too deep, unknown names, changed things.
 
     Args:
         paths: The motions.
-        worlds: Of each.
-        contacts: That each stood on.
-        end: The world after the last one; what changes there is a fault of the last motion.
+        worlds: The world of each motion.
+        contacts: The contacts on which each motion depends.
+        end: The world after the last motion; changes there are faults of the last motion.
     """
     faults_of_motions: list[list[Violation]] = []
     before: tuple[Touching, ...] = ()
@@ -64,7 +64,7 @@ def standing_faults(
 
 
 def _false_names(world: World, stood_on: Sequence[MotionContact]) -> list[str]:
-    """The contacts that a motion is said to stand on, and that its scene does not have."""
+    """Return the faults of contacts that a motion is said to depend on but that its scene does not have."""
     names = {*world.scene.names, *world.robot.link_names}
     faults = []
     for each in stood_on:
@@ -78,7 +78,14 @@ def _false_names(world: World, stood_on: Sequence[MotionContact]) -> list[str]:
 
 
 def _too_deep(world: World, q: Vector, stood_on: Sequence[MotionContact], before: Sequence[Touching]) -> list[str]:
-    """Contacts that allow more than is true where they begin, at q, shape (dof,); ``before``: those that go on."""
+    """Return the faults of contacts that allow more overlap than there is where they begin.
+
+    Args:
+        world: The world of the motion.
+        q: Configuration at which the motion begins, shape (dof,).
+        stood_on: Contacts on which the motion depends.
+        before: Contacts at the end of the motion before, which may continue.
+    """
     distance_of_pair = {contact.pair: contact.distance for contact in before}
     named = {each.touching for each in stood_on if each.allowed}
     faults = []
@@ -98,27 +105,28 @@ def _too_deep(world: World, q: Vector, stood_on: Sequence[MotionContact], before
 
 
 def _deeper(names: tuple[str, str], distance: float, deepest_allowed: float, depth: float) -> str:
-    """Says that a contact allows too much."""
+    """Return a message that a contact allows too much."""
     first, second = names
     fault = f"may overlap by {1e3 * deepest_allowed:.3g} mm at most, not by {-1e3 * distance:.4g} mm"
     return f"contact of '{first}' and '{second}': they {fault}; where it begins they overlap by {1e3 * depth:.3g} mm"
 
 
 def _depth(world: World, q: Vector, contact: Touching) -> float:
-    """How deep two things overlap where their contact begins, at q, shape (dof,) [m]."""
+    """Return the penetration depth of two things at q, shape (dof,), where their contact begins [m]."""
     if not set(contact.names) & set(world.scene.names):
         return 0.0
     name, other = contact.names if contact.first in world.scene.names else contact.names[::-1]
     distances = [each.distance for each in touching_at(world, q, name) if each.second == other]
     may_have_let_go = world.robot.gripper is not None and other in world.robot.link_names
-    least_depth = EXTRA_DEPTH if may_have_let_go else 0.0  # fingers may have moved away since they let it go
+    # The fingers may have moved away since they released it.
+    least_depth = EXTRA_DEPTH if may_have_let_go else 0.0
     return max([least_depth, *(-distance for distance in distances)])
 
 
 def _changes(before: World, after: World, q: Vector) -> list[str]:
-    """What is another in a world than in the one before it, at q, shape (dof,), between two motions.
+    """Return what differs between a world and the one before it, at q, shape (dof,), between two motions.
 
-    Fingers move there, and things are taken and set down; nothing else happens.
+    Between motions fingers move and things are taken and set down; everything else must stay as it is.
     """
     faults = []
     if _lasting(before.robot) != _lasting(after.robot):
@@ -141,14 +149,14 @@ def _changes(before: World, after: World, q: Vector) -> list[str]:
 
 
 def _lasting(robot: Robot) -> dict[str, Any]:
-    """The description of a robot but for what its fingers are held at."""
+    """Return the description of a robot without the positions of its fingers."""
     fingers = () if robot.gripper is None else robot.gripper.joints
     locked = {name: value for name, value in robot.source.get("locked", {}).items() if name not in fingers}
     return {**robot.source, "locked": locked}
 
 
 def _altered(old: Obstacle | AttachedObject, new: Obstacle | AttachedObject) -> list[str]:
-    """What a thing keeps from one motion to the next, and has not kept."""
+    """Return the names of the properties that a thing must keep from one motion to the next but has not kept."""
     altered = [] if same_shape(old.shape, new.shape) else ["shape"]
     altered += [] if old.margin == new.margin else ["margin"]
     if isinstance(old, AttachedObject) and isinstance(new, AttachedObject) and old.link == new.link:
@@ -165,9 +173,10 @@ def _things(scene: Scene) -> dict[str, Obstacle | AttachedObject]:
 def _between(
     old: Obstacle | AttachedObject, new: Obstacle | AttachedObject, before: World, after: World, q: Vector
 ) -> tuple[float, float]:
-    """How far a thing has moved from one world to the next [m] and turned [rad].
+    """Return how far a thing has moved [m] and turned [rad] from one world to the next.
 
-    Fingers that move between the two take with them what they hold, so that the place of the link counts either way.
+    Fingers that move between the two worlds carry along what they hold, so the place of the link in either world is
+    accepted, and the smallest difference counts.
     """
     differences = []
     if isinstance(old, AttachedObject) and isinstance(new, AttachedObject) and old.link == new.link:

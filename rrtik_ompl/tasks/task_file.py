@@ -1,4 +1,4 @@
-"""Task files (YAML, ``version: 1``): robot, scene, start and the stages of a task <-> `Task`."""
+"""Read and write task files (YAML, ``version: 1``): robot, scene, start and stages of a `Task`."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ from rrtik_ompl.world.world import World
 
 NO_STAGES = "it has a goal and no stages"
 NUMBER = re.compile(r"stage (\d+)")
-OF_TASKS = ("task", "goals")  # keys, one of which a task file has
+OF_TASKS = ("task", "goals")  # A task file has exactly one of these keys.
 
 
 class MoveToEntry(Section):
@@ -63,6 +63,7 @@ class MoveToEntry(Section):
         return _move_to(self.move_to, robot, [section.build(robot) for section in self.path_constraints])
 
 
+# Return the stage for a goal of a file; postures are kept by name.
 def _move_to(section: GoalSection, robot: Robot, constraints: Iterable[TaskRegion]) -> MoveTo:
     goal = section.posture if isinstance(section, Posture) else build_goal(section, robot)
     return MoveTo(goal, tuple(constraints))
@@ -185,7 +186,7 @@ class TaskFile(WorldKeys):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LoadedTask:
-    """What a task file says: the world at the beginning, the start, shape (dof,), the task, and the file's name."""
+    """The contents of a task file: the world at the beginning, the start, shape (dof,), the task, and its name."""
 
     world: World
     start: Vector
@@ -194,7 +195,7 @@ class LoadedTask:
 
 
 def list_tasks() -> tuple[str, ...]:
-    """Names of the tasks that packages ship.
+    """Return the names of the tasks that packages ship.
 
     Example:
         >>> "panda_pick_place" in rrtik.list_tasks()
@@ -207,11 +208,11 @@ def load_task(name_or_file: str | os.PathLike[str], *, trust_xacro: bool = False
     """Load a shipped task by name, or a task file.
 
     Args:
-        name_or_file: A name, or a path.
+        name_or_file: A name, or the path of a file.
         trust_xacro: Whether the macros of a robot's file are trusted, see `load_robot`.
 
     Raises:
-        UnknownNameError: If it is a bare word, and no name.
+        UnknownNameError: If it is a single word but not a known name.
         InputError: If the file cannot be used; one line with file, line, key, what was found and the remedy.
 
     Example:
@@ -224,6 +225,8 @@ def load_task(name_or_file: str | os.PathLike[str], *, trust_xacro: bool = False
         return _task(name_or_file)
 
 
+# Load a task; see :func:`load_task`.
+# The robot, the scene, the start and the stages are built in this order, so that errors name the line of their key.
 def _task(name_or_file: str | os.PathLike[str]) -> LoadedTask:
     path = file_name(name_or_file)
     if isinstance(name_or_file, str) and not path.suffix and len(path.parts) == 1:
@@ -259,7 +262,7 @@ def _task(name_or_file: str | os.PathLike[str]) -> LoadedTask:
 
 
 def _check(document: YamlDocument, key: str, task: Task, world: World) -> None:
-    """Refuse what can never be done, with the line of the stage."""
+    """Raise an error, with the line of the stage, if a stage can never be done."""
     try:
         check_program(steps_of(task.stages), world)
     except InputError as error:
@@ -269,7 +272,7 @@ def _check(document: YamlDocument, key: str, task: Task, world: World) -> None:
 
 
 def _stages(document: YamlDocument, entry: TaskFile, world: World, start: Vector) -> list[Stage]:
-    """The stages that a file lists, or one for each of its goals."""
+    """Return the stages that a file lists, or one stage for each of its goals."""
     if entry.task is not None:
         with document.at(("task",)):
             return [stage.build(world.robot) for stage in entry.task]
@@ -286,10 +289,10 @@ def _stages(document: YamlDocument, entry: TaskFile, world: World, start: Vector
 
 
 def stage_data(stage: Stage) -> dict[str, Any]:
-    """What a task file says about a stage.
+    """Return the entry of a task file for a stage.
 
     Raises:
-        InputError: If the format has no words for its goal.
+        InputError: If the format cannot express the stage's goal.
     """
     if isinstance(stage, Alternatives):
         return {"alternatives": [[stage_data(each) for each in row] for row in stage.options]}
@@ -310,6 +313,7 @@ def stage_data(stage: Stage) -> dict[str, Any]:
     return {"gripper": stage.state} | ({} if stage.width is None else {"width": stage.width})
 
 
+# Return the entry of a task file for the goal of a stage.
 def _goal_data(goal: Goal | Vector | str) -> dict[str, Any]:
     if isinstance(goal, str):
         return {"posture": goal}

@@ -1,4 +1,4 @@
-"""`plan_through()`: goals that are reached one after the other, as one path."""
+"""Plan one path through several goals in order: `plan_through()`."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ class PlanThrough:
     """A path through several goals.
 
     Attributes:
-        found: Whether all of them can be reached, in their order.
-        path: The whole way, or None.
-        reached: Number of the waypoint at which each goal is reached.
-        reason: "" if found, else which goal could not be reached, how often and why.
+        found: Whether all goals can be reached, in their order.
+        path: The whole path, or None.
+        reached: Index of the waypoint at which each goal is reached.
+        reason: "" if found, otherwise which goal could not be reached, how often and why.
 
     Example:
         >>> import rrtik_ompl as rrtik
@@ -46,10 +46,10 @@ class PlanThrough:
 def placed_constraints(
     world: World, start: ArrayLike | str, constraints: Iterable[TaskRegion]
 ) -> tuple[TaskRegion, ...]:
-    """Path constraints as seen from a start, for stages that begin elsewhere.
+    """Return path constraints with regions placed as seen from a start, for stages that begin elsewhere.
 
     Raises:
-        ProblemError: If the start does not keep them, or cannot be used.
+        ProblemError: If the start violates them, or cannot be used.
     """
     regions = listed(constraints, "path constraints")
     return Problem(world, start, start, constraints=regions).constraints if regions else ()
@@ -69,14 +69,14 @@ def plan_through(
     Args:
         world: Robot and scene.
         start: Configuration, shape (dof,), or the name of a posture.
-        goals: Each a goal, the name of a posture, a configuration, shape (dof,), or a pose of the tip as ``SE3`` or
+        goals: Each is a goal, the name of a posture, a configuration, shape (dof,), or a pose of the tip as ``SE3`` or
             matrix.
-        constraints: Regions that a frame must not leave on the whole path, those ``from_start`` as seen from the start.
+        constraints: Regions that a frame must not leave on the whole path; those ``from_start`` refer to the start.
         seconds: Time limit [s].
-        seed: The same seed gives the same path, as long as the time limit does not cut in.
+        seed: The same seed gives the same path, unless the time limit ends the search.
 
     Raises:
-        InputError: If there is no goal, or one makes no sense; its number is said.
+        InputError: If there are no goals, or one is not valid; the message gives its number.
         ProblemError: If the start is in collision, outside the limits or outside the region of a constraint.
 
     Example:

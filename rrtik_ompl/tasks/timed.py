@@ -1,4 +1,4 @@
-"""A whole task as one timed motion, with stops where the gripper works and objects are taken and put down."""
+"""Time a whole task as one motion, with stops where the gripper works and objects are taken or put down."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from rrtik_ompl.tasks.contact_life import MotionContact, world_from
 from rrtik_ompl.tasks.setting import world_of_motion
 from rrtik_ompl.world.world import World
 
-BLEND = 0.05  # [rad] or [m]
-PAUSE = 1.0  # [s]
-ROUNDED = (1.0, 0.3, 0.1, 0.03)  # of the blend, as long as what has parted would touch again
-LOOKS = 1000  # at a motion, for the place at which two have parted
+BLEND = 0.05  # [rad] or [m] default blend of corners
+PAUSE = 1.0  # [s] default rest for a gripper or an object
+ROUNDED = (1.0, 0.3, 0.1, 0.03)  # shares of the blend that are tried until things that parted stay apart
+LOOKS = 1000  # samples of a motion among which the place is found at which two things have parted
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,9 +29,9 @@ class TimedTask:
     """A task over time.
 
     Attributes:
-        trajectory: All of its motions one after the other; the arm rests where something is done.
-        begins: When each motion of the plan begins [s], shape (k,).
-        pauses: When the arm begins to rest for a gripper or an object, and when it goes on [s], shape (p, 2).
+        trajectory: All motions one after the other; the arm rests where something is done.
+        begins: Time at which each motion of the plan begins [s], shape (k,).
+        pauses: Times at which each rest for a gripper or an object begins and ends [s], shape (p, 2).
 
     Example:
         >>> loaded = rrtik.load_task("titan4_drawer")
@@ -55,18 +55,18 @@ def time_task(
     pause: float = PAUSE,
     **options: Any,
 ) -> TimedTask:
-    """Give a whole task its times: each motion as :func:`time_parameterize` has it, from rest to rest.
+    """Time a whole task: each motion as :func:`time_parameterize` times it, from rest to rest.
 
     Args:
-        plan: Of a task that is found.
-        limits: Of the joints; those of the robot if None.
+        plan: The plan of a task, which was found.
+        limits: Limits of the joints; None for those of the robot.
         blend: See :func:`time_parameterize`; rounded corners are checked in the world of their motion, and keep the
             constraints of their stage.
         pause: How long the arm rests where a gripper opens or closes and where an object is taken or put down [s].
         **options: Further options of :func:`time_parameterize`: ``clearance``, ``tip_speed``, ``payload``, ...
 
     Raises:
-        InputError: If there is no motion, or an option makes no sense.
+        InputError: If there is no motion, or an option is not valid.
 
     Example:
         >>> import rrtik_ompl as rrtik
@@ -83,7 +83,7 @@ def time_task(
 
     rate_limits = RateLimits.of(plan.worlds[0].robot) if limits is None else limits
     parts: list[Trajectory] = []
-    rests_before: list[float] = []  # [s] of rest before each part
+    rests_before: list[float] = []  # [s] rest before each part
     begins: list[float] = []
     pauses: list[tuple[float, float]] = []
     now = 0.0
@@ -116,7 +116,7 @@ def _timed(
     blend: float,
     options: dict[str, Any],
 ) -> Trajectory:
-    """A motion with its times, corners rounded less where what has parted would touch again."""
+    """Time a motion, with corners that are rounded less if things that have parted would touch again."""
     parting_waypoints = sorted({contact.until for contact in contacts if contact.until is not None})
     passed_with_world = [(path.waypoints[until], world_from(world, contacts, until)) for until in parting_waypoints]
     for share in ROUNDED:
@@ -127,7 +127,7 @@ def _timed(
 
 
 def _free_from(motion: Trajectory, q: Vector, world: World) -> bool:
-    """Whether a motion is proven free in a world from where it passes q, shape (dof,)."""
+    """Check whether a motion is proven free in a world from where it passes q, shape (dof,), to its end."""
     clock = np.linspace(0.0, motion.duration, LOOKS)
     passed = clock[np.linalg.norm(motion(clock).positions - q, axis=1).argmin()]
     first = min(int(np.searchsorted(motion.times, passed)), len(motion.times) - 2)
@@ -135,13 +135,13 @@ def _free_from(motion: Trajectory, q: Vector, world: World) -> bool:
 
 
 def _changed(before: World, after: World) -> bool:
-    """Whether the arm holds other things than before, or its fingers otherwise."""
+    """Check whether the arm holds other objects than before, or holds its fingers differently."""
     attached = [{(item.name, item.link) for item in world.scene.attached} for world in (before, after)]
     return attached[0] != attached[1] or before.robot.source != after.robot.source
 
 
 def _joined(parts: list[Trajectory], rests_before: list[float]) -> Trajectory:
-    """Motions that begin where the one before ends, at rest, with a rest [s] before each."""
+    """Join motions, each of which begins at rest where the one before ends, with a rest [s] before each."""
     times = []
     rows: dict[str, list[Matrix]] = {"positions": [], "velocities": [], "accelerations": []}
     now = 0.0
@@ -151,10 +151,12 @@ def _joined(parts: list[Trajectory], rests_before: list[float]) -> Trajectory:
         if rest > 0.0:
             times.append(np.array([now]))
             for name, columns in rows.items():
-                columns.append(values[name][:1] * (name == "positions"))  # nothing moves in a rest
+                # Velocities and accelerations are 0 during a rest.
+                columns.append(values[name][:1] * (name == "positions"))
 
         now += rest
-        last = -1 if part is not parts[-1] else len(part.times)  # the next one begins where a part ends
+        # The last knot of a part is omitted, as the next part begins with it.
+        last = -1 if part is not parts[-1] else len(part.times)
         times.append(now + part.times[:last])
         for name, columns in rows.items():
             columns.append(values[name][:last])
