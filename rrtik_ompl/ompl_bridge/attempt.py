@@ -169,12 +169,14 @@ def _in_ompl(
     seconds = max(budget.left, 0.0)
     max_motions = np.inf if budget.iterations is None else budget.iterations * MOTIONS_PER_ITERATION
 
+    # Make the problem definition and the planner.
     validity = ValidityCallback(problem.world, most_motions=max_motions)
     si = space_information(problem, goals, validity)
     definition = problem_definition(problem, goals, si)
     with _named(name):
         planner = other_planner(factory, name, si, definition, parameters)
 
+    # The time begins now. Both the condition and the checks can end the search.
     validity.deadline = time.monotonic() + seconds
     condition = ob.timedPlannerTerminationCondition(seconds)
     validity.stop = condition.terminate
@@ -194,6 +196,7 @@ def _in_ompl(
     if ends_refused_for_lack_of_time:
         status = ob.PlannerStatus(ob.PlannerStatus.TIMEOUT)
 
+    # Count the vertices and edges, and measure how long that takes.
     counting_began = time.perf_counter()
     graph = _graph(planner, si) if factory in OMPL_TRAITS and traits.has_graph else {}
     return Attempt(rows, str(status), {**validity.counts(), **graph}, counting=time.perf_counter() - counting_began)

@@ -107,7 +107,7 @@ def other_planner(
             _set(planner, name, key, value)
     except InputError:
         planner.setProblemDefinition(definition)  # AORRTC ends the process if it is destroyed before it was set up
-        with suppress(RuntimeError):  # which may refuse as much
+        with suppress(RuntimeError):  # setup may raise, too
             planner.setup()
         raise
 
@@ -121,6 +121,7 @@ def _why_not_made(factory: PlannerFactory, error: TypeError) -> str:
     return f"it cannot be made from an ompl.base.SpaceInformation: {str(error).splitlines()[0]}"
 
 
+# Calls the setter of an option, and turns the errors of the bindings into an InputError.
 def _set(planner: ob.Planner, name: str, key: str, value: object) -> None:
     setter = next(s for s in dir(planner) if s.startswith("set") and _snake(s) == key)
     if isinstance(value, float):
@@ -130,5 +131,5 @@ def _set(planner: ob.Planner, name: str, key: str, value: object) -> None:
         getattr(planner, setter)(value)
     except TypeError:
         raise InputError(f"planner {name}: parameter {key} cannot be {value!r}") from None
-    except (RuntimeError, ValueError, OverflowError) as error:  # what its C++ says of a number out of range
+    except (RuntimeError, ValueError, OverflowError) as error:  # raised by C++ for a number out of range
         raise InputError(f"planner {name}: parameter {key} cannot be {value!r}: {error}") from None

@@ -67,16 +67,16 @@ class PlannerTraits:
 ANYTIME = PlannerTraits(anytime=True, supports_iteration_limit=False)
 
 # Planners that are not listed have the default traits.
-# - PRM and PRMstar take up further goals in a second thread. It has motions checked by Python under a lock of the
-#   roadmap, for which the first thread waits while it holds Python's lock: with more than one goal they hang.
-# - AORRTC [15] gives up when it is led from one goal to another: with 16 goals of a UR5 its paths were thrice as long
-#   as with one. If a straight motion from the start to the goal is free it returns a path from the goal to the goal.
-#   Its graph is empty.
-# - SORRTstar finds a free straight motion, then draws from what could be shorter, which is nothing, and does not check
-#   its time meanwhile.
-# - BFMT puts every goal in its queue and then marks all but the last as unvisited, so that one can be put there again
-#   and taken out of it twice: one run in a hundred with several goals ended in a crash.
-# - BITstar's graph is never freed again (60 kB a run).
+# - PRM and PRMstar collect further goals in a second thread. This thread has motions checked by Python under a lock of
+#   the roadmap, for which the first thread waits while it holds Python's lock: with more than one goal they hang.
+# - AORRTC [15] gives up when it is led from one goal to another: with 16 goals of a UR5 its paths were three times as
+#   long as with one. If a straight motion from the start to the goal is free, it returns a path from the goal to the
+#   goal. Its graph is empty.
+# - SORRTstar finds a free straight motion, then samples the empty set of shorter paths, and does not check the time
+#   meanwhile.
+# - BFMT puts every goal in its queue and then marks all but the last as unvisited, so that a goal can be put there
+#   again and taken out of it twice: one run in a hundred with several goals ended in a crash.
+# - BITstar's graph is never freed (60 kB per run).
 _LISTED = {
     "AORRTC": PlannerTraits(
         anytime=True, one_goal=True, straight_first=True, has_graph=False, supports_iteration_limit=False
@@ -90,7 +90,7 @@ _LISTED = {
     "SORRTstar": PlannerTraits(anytime=True, straight_first=True, supports_iteration_limit=False),
 }
 
-# Geometric planners that OMPL 2.0.1 has and its wheel does not offer; those that a later wheel offers are left out.
+# Geometric planners of OMPL 2.0.1 that its wheel lacks. Those that a later wheel offers are left out.
 _UNBOUND = (
     "ABITstar AITstar AOXRRTConnect ATRRT AnytimePathShortening BLITstar BiEST BiRLRT BiTRRT CForest EIRMstar EITstar "
     "EST LBTRRT LazyLBTRRT LazyPRM LazyPRMstar LazyRRT PDST ProjEST QMP QMPStar QRRT QRRTStar RLRT RRTXstatic RRTsharp "

@@ -142,7 +142,9 @@ class PlannerGraph:
         """
         io = StateIO(si)
         data = ob.PlannerData(si)
-        states = [si.allocState() for _ in self.vertices]  # the data hold only their addresses until they are decoupled
+        # The data only hold the addresses of the states until they are decoupled, so the states have to live until
+        # then.
+        states = [si.allocState() for _ in self.vertices]
 
         starts = set(self.starts.tolist())
         goals = set(self.goals.tolist())
@@ -273,6 +275,7 @@ def _predecessors(graph: PlannerGraph) -> dict[int, int]:
     return predecessors
 
 
+# Yields the lines of a graph as GraphML.
 def _graph_ml(graph: PlannerGraph) -> Iterator[str]:
     yield '<?xml version="1.0" encoding="UTF-8"?>'
     yield '<graphml xmlns="http://graphml.graphdrawing.org/xmlns">'

@@ -109,7 +109,7 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         Raises:
             InputError: If the space is of another kind or the seed is no such number.
         """
-        coordinates_of(si)  # refuses other spaces
+        coordinates_of(si)  # raises an error for other spaces
         used = int(ou.RNG().uniformInt(0, 2**31 - 1)) if seed is None else whole_number(seed, "seed")
         super().__init__(si, name)
         self.seed = used
@@ -121,7 +121,7 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         self.graph_wanted = False
         self._graph: PlannerGraph | None = None
         self._world = world
-        self._second_check_world: World | None = None  # whose second check a path has to pass, during `solve`
+        self._second_check_world: World | None = None  # during `solve` a path has to pass its second check
         self._states: StateIO | None = None
         self._bounds: tuple[Vector, Vector] | None = None
 
@@ -275,7 +275,7 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
     def _io(self) -> StateIO:
         """The converter between states and arrays, made when it is first used."""
         if self._states is None:
-            self._states = StateIO(self.getSpaceInformation())  # holds the space, which knows nothing of planners
+            self._states = StateIO(self.getSpaceInformation())  # it holds the space, which does not refer to planners
         return self._states
 
     def _run_search(self, search: Callable[[], SearchResult]) -> tuple[ob.PlannerStatus, SearchResult | None]:
@@ -324,16 +324,19 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         began = time.perf_counter()
         ends = starts_and_goals(inputs, pdef, self._io, ptc, aimless=aimless)
 
+        # Angles of SO(2) are unrolled onto a line for the time of the search.
         unrolled = Unrolled(*ends, self._io.turning) if self._io.turns else None
         if unrolled is not None:
             ends = (unrolled.starts, unrolled.goals)
             self._bounds = unrolled.bounds(*self._bounds)
 
+        # Search, and fall back on the nearest approach to a goal if there is no path.
         found = self._search_until_accepted(*ends, ptc, unrolled)
         if found.path is None and isinstance(pdef.getGoal(), GoalSampler):
             pdef.getGoal().more()  # the next attempt has more goal configurations
         found = self._remember(found, ends[1], time.perf_counter() - began)
 
+        # An approximate path has not been checked yet.
         is_approximate = found.difference > 0.0
         if is_approximate and _refusal_of_second_check(self._world, found.path, unrolled):
             found = replace(found, path=None)
@@ -480,6 +483,7 @@ def change(planner: ob.Planner, name: str, value: object) -> None:
     planner.__dict__[GIVEN] = given
 
 
+# Returns a text as the value that it spells: None, a boolean, or anything in JSON; other values stay as they are.
 def _read(value: object) -> object:
     if not isinstance(value, str):
         return value

@@ -178,7 +178,7 @@ class PythonsStates(ob.SpaceInformation):  # type: ignore[misc]  # OMPL has no t
     """A SpaceInformation that also works for planners written in Python."""
 
     def freeState(self, state: ob.State) -> None:
-        """Do nothing: the bindings free a state of ``allocState`` themselves once Python does not use it any more."""
+        """Do nothing: the bindings free a state of ``allocState`` once Python does not use it any more."""
 
 
 def bounded_space(lower: Vector, upper: Vector) -> ob.SpaceInformation:

@@ -47,7 +47,7 @@ class WorldValidity(ob.StateValidityChecker):  # type: ignore[misc]  # OMPL has 
         return bool(np.isfinite(q).all()) and self._world.valid(q)
 
     def clearance(self, state: ob.State) -> float:
-        """Smallest signed distance of the arm from obstacles and from itself [m], less margins; called by OMPL."""
+        """Return the smallest signed distance of the arm from obstacles and itself less margins [m]; called by OMPL."""
         nearest = self._world.clearance(self._states.read(state))
         return nearest if math.isfinite(nearest) else FAR
 
@@ -230,11 +230,11 @@ def _judged(si: ob.SpaceInformation, world: World) -> ob.SpaceInformation:
     si.setStateValidityChecker(WorldValidity(si, world))
     space = si.getStateSpace()
     if isinstance(si, ob.ConstrainedSpaceInformation):
-        si.setup()  # before setup its space loses projections
+        si.setup()  # before setup the space would lose the projection
 
     tip = TipProjection(space, world.robot, coordinates_of(si, constrained=True))
     space.registerProjection(TIP_PROJECTION, tip)
-    if space.isCompound():  # has none of its own, and KPIECE1 and its kin need one
+    if space.isCompound():  # a compound has none of its own, which KPIECE1 needs
         space.registerDefaultProjection(tip)
 
     if not si.isSetup():

@@ -102,7 +102,7 @@ class StateIO:
         """Return rows, shape (k, n), as an ``ompl.geometric.PathGeometric``."""
         path = og.PathGeometric(si)
         state = si.allocState()
-        append = path.append  # copies
+        append = path.append  # append copies the state
         for row in rows:
             self.write(state, row)
             append(state)
@@ -232,8 +232,10 @@ def coordinates_of(si: ob.SpaceInformation, *, constrained: bool = False) -> Coo
     return found
 
 
+# Returns the coordinates of a space and, recursively, of its subspaces. `inside` completes the text of an error.
 def _coordinates(space: ob.StateSpace, inside: str) -> Coordinates:
-    kind = next(each for each in type(space).__mro__ if each.__module__.startswith("ompl"))  # below classes in Python
+    # OMPL's own class, even if the space is of a class derived from it in Python.
+    kind = next(each for each in type(space).__mro__ if each.__module__.startswith("ompl"))
     if kind is ob.RealVectorStateSpace:
         return Coordinates(kind, int(space.getDimension()))
     if kind is ob.SO2StateSpace:

@@ -198,7 +198,7 @@ class Turn:
     def take(self, row: Row, outcome: Attempt) -> None:
         """Add up the counts of an attempt, and keep its path if the second check accepts it.
 
-        Updates `totals`, `path` and, without the time spent on counting vertices and edges, `budget`.
+        Changes `totals` and `path`. Time that was spent on counting vertices and edges does not count against `budget`.
         """
         if outcome.counting:
             self.budget = self.budget.put_off(outcome.counting)
@@ -211,7 +211,7 @@ class Turn:
         # Each attempt also has a fixed cost beyond the motions that it checks.
         self._motions_spent[row.kind] += EFFORT_ITERATIONS * MOTIONS_PER_ITERATION
 
-        self.path = self._check.accept(outcome)  # None: another attempt follows
+        self.path = self._check.accept(outcome)  # if it is None, another attempt follows
         self.totals["rejected"] = self._check.num_rejected
 
     def finish(self) -> None:
@@ -260,7 +260,7 @@ class Turn:
         return at_goal or self.reason != ""
 
     def _is_over(self) -> bool:
-        """Whether there is a path, no time or iterations left, or nothing better to be expected."""
+        """Check whether there is a path, no time or iterations are left, or no better result can be expected."""
         if self.path is not None or self._best_will_do() or self._goal_is_unreachable():
             return True
         iterations_left = self._iterations_left()
@@ -336,7 +336,8 @@ class Turn:
         if not self._check.wants_proofs or self._traits.leaves_room:
             return False
         if self._traits.anytime and number == 0 and len(self._seeds) > 1:
-            return True  # an optimal path touches what it goes round, so it would not be proven
+            # An optimal path touches the obstacles that it goes round, so it could not be proven.
+            return True
         if self._check.num_unproven == 0:
             return False
         if self._traits.anytime or self._num_attempts["strict"] == 0:

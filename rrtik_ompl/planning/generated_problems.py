@@ -35,18 +35,18 @@ POSTURES = 512  # random postures drawn at a time
 DRAWS = 300  # scenes tried before a seed is given up
 SPACE_PER_DRAW = 0.01  # growth of the spacing with every scene
 STARTS = 2  # starts tried in each scene
-MIN_DISTANCE, MAX_DISTANCE = 0.4, 0.85  # of a goal's tip from the base, in reaches
-MIN_HEIGHT = -0.25  # of a goal's tip above the base, in reaches
+MIN_DISTANCE, MAX_DISTANCE = 0.4, 0.85  # distance of the tip from the base at a goal, in reaches
+MIN_HEIGHT = -0.25  # height of the tip above the base at a goal, in reaches
 AWAY = 0.3  # the tip's least distance between start and goal, in reaches
 OUTWARD = 0.3  # least cosine of the angle between the forearm and the direction away from the base
-PATIENCE = 60.0  # [s], never used up
+PATIENCE = 60.0  # [s] never reached, as iterations end the search
 
 Solids: TypeAlias = list[tuple[Shape, Any]]  # shapes and their poses in the frame of the place, in shares of the reach
 Builder: TypeAlias = Callable[[np.random.Generator, float], Solids]  # takes a random stream and the spacing, 1 or more
 
-THICKNESS = 0.03  # of boards and plates
+THICKNESS = 0.03  # thickness of boards and plates
 BARS = 0.02  # half the thickness of a frame's bars
-CLUTTER = 25  # solids
+CLUTTER = 25  # number of solids
 FREE_AROUND = 0.09  # room that pipes leave on both sides of the forearm
 
 

@@ -78,7 +78,8 @@ def improved(problem: Problem, first: Plan, planner: NamedPlanner, request: Requ
     bound = {name: work.bound} if work.bound > 0.0 else {}
     course = {"improving_rounds": work.rounds, "cost_over_time": tuple(work.course)}
     statistics = MappingProxyType({**first.statistics, **bound, **course})
-    path = work.best.with_waypoints(work.best.waypoints) if request.proof == "off" else work.best  # without its proof
+    # If no proofs are wanted, the path is returned without one.
+    path = work.best.with_waypoints(work.best.waypoints) if request.proof == "off" else work.best
     return replace(first, path=path, seconds=work.clock(), statistics=statistics)
 
 
@@ -108,7 +109,7 @@ class _Work:
         self.rounds = 0
         self._best_cost = self._cost(first.path)
         self.course = [(first.seconds, self._best_cost[1])]  # seconds and cost
-        self._rounds_without_gain = 0  # in a row
+        self._rounds_without_gain = 0  # counts consecutive rounds
         self._shortenings = 0
 
     def clock(self) -> float:
@@ -124,7 +125,7 @@ class _Work:
                 return
 
             self.rounds += 1
-            self._rounds_without_gain += 1  # `_keep_if_best` sets it back where it sees a gain
+            self._rounds_without_gain += 1  # `_keep_if_best` resets it after a gain
             (turn,) = walk([self._turn(int(seeds.integers(2**31)))])
             if turn.path is not None:
                 paths.append(self._shortened(turn.path, self._quick_checks))

@@ -91,6 +91,7 @@ def plan_many(
     require(parameters, Mapping | None, "parameters of a planner", "use {name of an option: value}")
     request = Request(Budget(seconds=time_limit(seconds)), parameters=parameters or {}, proof=proof)
 
+    # Bring starts and goals into the form of one row and one goal for each query.
     dof = world.robot.dof
     wanted = _goals(goals, world.robot)
     rows = finite_array(starts, (dof,) if dimensions(starts) == 1 else (None, dof), "starts")
@@ -98,9 +99,11 @@ def plan_many(
     if len(rows) != len(wanted):
         raise InputError(f"plan_many: as many starts as goals are needed, got {len(rows)} and {len(wanted)}")
 
+    # Give each query its own seed.
     seeds = np.random.SeedSequence(whole_number(seed, "seed")).generate_state(max(len(rows), 1), np.uint32).tolist()
     queries = list(zip(rows, wanted, seeds[: len(rows)], strict=True))
 
+    # Plan in batches of a fixed size, so that the results do not depend on the number of threads.
     alone = planner is not None and not is_auto(planner) and not is_safe(find_planner(planner))
     batches = [queries[first : first + TOGETHER] for first in range(0, len(queries), TOGETHER)]
     made = in_threads(partial(_batch, world, planner, request), batches, 1 if alone else threads)
@@ -190,6 +193,7 @@ def plans_together(
     any_problem = known_problem(world, *ends[0])
     load_kernels_for(any_problem, planner.factory)
 
+    # Select the queries that can be planned together, search for each, and prove the paths found.
     began = time.perf_counter()
     usable = _usable(world, ends)
     clearances_of = dict(
@@ -200,6 +204,7 @@ def plans_together(
     proofs = _proofs(world, {k: (found_path.path.waypoints, clearances_of[k]) for k, found_path in found.items()})
     seconds_per_query = (time.perf_counter() - began) / len(queries)
 
+    # Only queries with a proven path get a plan.
     for k, proof in proofs.items():
         query = found[k].query
         path = found[k].path.with_proof(proof)
@@ -265,7 +270,7 @@ class _Searcher:
         self._bounds = self._robot.lower, self._robot.upper
         options = {ITERATION_LIMIT: EFFORT_ITERATIONS, **request.parameters}
         brief = problem_in(problem, form_of(problem.world, accuracy="conservative"))
-        assert is_safe(planner.factory)  # as `serves` has seen
+        assert is_safe(planner.factory)  # `serves` has checked it
         space = shared_space(*self._bounds)
         self._planner: SafePlanner = safe_planner(planner.factory, planner.name, space, brief, 0, options)
 

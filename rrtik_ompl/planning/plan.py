@@ -23,7 +23,7 @@ from rrtik_ompl.world.clearances import check_clearance
 from rrtik_ompl.world.problem import Problem
 
 MAX_RESTARTS = 1_000_000
-MAX_SECONDS = 1e9  # thirty years; OMPL's clock overflows at about nine times as much
+MAX_SECONDS = 1e9  # [s] thirty years; OMPL's clock overflows at about nine times as much
 PROOF_MODES: tuple[ProofMode, ...] = get_args(ProofMode)
 OBJECTIVES: tuple[PathObjective, ...] = get_args(PathObjective)
 STRATEGIES: tuple[ImproveStrategy, ...] = get_args(ImproveStrategy)

@@ -93,7 +93,7 @@ def _turns(problem: Problem, request: Request) -> Iterator[Turn]:
         share = 1.0 if name == names[-1] else SHARE
         planner = NamedPlanner(name, find_planner(name))
         turn = Turn(problem, planner, request, replace(request.budget, seconds=share * left))
-        yield turn  # `walk` asks for the next one when this one is over
+        yield turn  # `walk` asks for the next turn when this one is over
         left -= turn.seconds
 
 

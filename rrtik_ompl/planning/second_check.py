@@ -154,6 +154,7 @@ class SecondCheck:
 
         world = self._problem.world
         clearance = clearances.proven_clearance
+        # Prove the path as it is.
         if self._traits.leaves_room:
             first = proved_as_clear(path, world, clearance)
             known_proof = None  # it may be of less clearance, so it is not reused
@@ -166,6 +167,7 @@ class SecondCheck:
         if detours_might_break_rules:
             return None
 
+        # Replace the motions that are not proven by detours, and prove the result.
         repaired = with_detours(
             world,
             path.waypoints,

@@ -57,6 +57,7 @@ def load_motion_bench_maker(
             and remedy.
         ProblemError: If start or goal is in collision or outside the limits.
     """
+    # Read both files.
     scene_file, request_file = _pair(Path(scene_path), None if request_path is None else Path(request_path))
     scene_document = read_yaml(scene_file)
     request_document = read_yaml(request_file)
@@ -68,6 +69,7 @@ def load_motion_bench_maker(
     with request_document.at(("start_state", "joint_state")):
         states = own_states | request.start_state.values()
 
+    # Load the robot, and apply what the scene and the path constraints say of it.
     arm = _arm(scene_document, message, request_document, request, robot, states)
     if robot is not None and message.robot_model_name not in _names_of(arm):
         line = f"the scene is of robot '{message.robot_model_name}', and is read with robot '{arm.name}'"
@@ -76,6 +78,7 @@ def load_motion_bench_maker(
     arm = _as_the_scene_says(scene_document, message, request_document, request, arm)
     _tell_misspelt_joints(request_document, request, arm)
 
+    # Determine the start, the configuration in which the scene is given, and the frames.
     with request_document.at(("start_state", "joint_state")):
         start = _configuration(arm, states, "start")
     with scene_document.at(("robot_state", "joint_state")):
@@ -83,6 +86,7 @@ def load_motion_bench_maker(
     with scene_document.at(("fixed_frame_transforms",)):
         frames = Frames(arm, shown, message.fixed_frame_transforms)
 
+    # Read the scene; objects are attached before and after the arm moves to the start.
     reader = SceneReader(arm, frames, message)
     reader.read_world(scene_document)
     reader.hold(scene_document, ("robot_state",), message.robot_state)
@@ -93,6 +97,7 @@ def load_motion_bench_maker(
     if over := passed_over(message.allowed_collision_matrix, arm):
         tell(scene_document, ("allowed_collision_matrix",), over)
 
+    # Build the world, the goal and the path constraints.
     with scene_document.at(("world",)):
         world = World(arm, scene)
     with request_document.at(("goal_constraints", 0)):
@@ -313,7 +318,7 @@ def _as_the_scene_says(
     request: RequestMessage,
     robot: Robot,
 ) -> Robot:
-    """The robot with the scales and paddings of its links, and with the ranges to which a path keeps its joints."""
+    """Return the robot with the scales and paddings of its links, and with limits narrowed by path constraints."""
     with scene_document.at(("link_scale",)):
         factors = {each.link_name: each.scale for each in scene.link_scale if each.scale != 1.0}
         robot = scaled(robot, factors) if factors else robot
@@ -354,6 +359,7 @@ def _configuration(robot: Robot, values: Mapping[str, float], what: str) -> Vect
     return np.array([values[joint] for joint in robot.joint_names])
 
 
+# Returns the goal of a request: joint values for every joint of the arm, or a goal of a link.
 def _goal(robot: Robot, request: RequestMessage, states: Mapping[str, float], frames: Frames) -> Goal:
     wanted = request.goal_constraints[0]
     if not wanted.joint_constraints or wanted.links:

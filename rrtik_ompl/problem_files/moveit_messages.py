@@ -96,7 +96,7 @@ def is_empty(value: object) -> bool:
         return all(map(is_empty, value.values()))
     if isinstance(value, list):
         return all(map(is_empty, value))
-    return value is None or value == "" or value == 0  # false equals 0
+    return value is None or value == "" or value == 0  # False equals 0
 
 
 class PoseMessage(Message):

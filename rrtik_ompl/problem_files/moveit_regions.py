@@ -1,4 +1,7 @@
-"""Constraints of MoveIt's messages -> goals and task-space regions. A region never holds more than its message says."""
+"""Conversion of constraints in MoveIt's messages to goals and regions.
+
+A region is never larger than its message says.
+"""
 
 from __future__ import annotations
 

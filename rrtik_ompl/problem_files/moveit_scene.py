@@ -79,7 +79,7 @@ class SceneReader:
             self._map = _mapped(self._message.world.octomap, self._frames)
 
     def start_at(self, q: Vector) -> Frames:
-        """The frames once the arm stands where a path begins, shape (dof,), and has taken along what it holds."""
+        """Move the arm, with the objects attached to it, to the start of a path, shape (dof,); return the frames."""
         self._frames = self._frames.moved_to(q)
         return self._frames
 

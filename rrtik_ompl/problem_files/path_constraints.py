@@ -215,6 +215,7 @@ def _region_data(region: TaskRegion) -> dict[str, Any]:
     return data
 
 
+# Returns the entry of an `upright` constraint, after a check that the region is one.
 def _upright_data(region: TaskRegion) -> dict[str, Any]:
     seen = region.T_world_w.rotation[:, 2]
     free = region.bounds

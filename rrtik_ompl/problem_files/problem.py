@@ -57,18 +57,20 @@ def load_problem(
         return _problem(name_or_file, robot)
 
 
+# Loads a problem as `load_problem` does. Errors of the problem name the line of the part that is at fault.
 def _problem(name_or_file: FilePath, robot: Robot | FilePath | None) -> Problem:
     path = problem_path(name_or_file)
     document = problem_document(path)
     if _is_motion_bench_maker(document.data):
-        from rrtik_ompl.problem_files.motion_bench_maker import load_motion_bench_maker  # takes long, and few need it
+        # Imported late, because it takes long and is rarely needed.
+        from rrtik_ompl.problem_files.motion_bench_maker import load_motion_bench_maker
 
         return load_motion_bench_maker(path, robot=robot)
 
     entry = parse(document, ProblemFile)
     settings = settings_of(document, entry, robot)
     with document.at(("scene",)):
-        world = World.of(settings)  # refuses a scene that does not fit the robot
+        world = World.of(settings)  # raises an error if the scene does not fit the robot
     start, goal = ends_of(document, entry, settings.robot)
     planner = planner_of(document, entry.planner)
     constraints = build_constraints(document, entry.path_constraints, settings.robot)

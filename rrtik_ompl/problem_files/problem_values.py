@@ -30,7 +30,8 @@ from rrtik_ompl.problem_files.scene import SceneEntry
 FilePath = str | os.PathLike[str]
 ONLY_PATHS = (".csv", ".txt")  # endings of path files; a .json may be a path or a problem
 NO_GOAL = "it has stages and no goal"
-OF_TASKS = {"task": NO_GOAL, "goals": "it has several goals, to be reached in order"}  # by keys
+# The reasons why a file is a task and not a problem, by the key that shows it.
+OF_TASKS = {"task": NO_GOAL, "goals": "it has several goals, to be reached in order"}
 OF_PATHS = ("waypoints", "points")  # keys of path and trajectory files
 ELSEWHERE = ("robot", "scene", "constraints")  # settings that have sections of their own in a file
 TYPES = {  # types of keys, by the types of settings
@@ -155,7 +156,7 @@ def planner_of(document: YamlDocument, name: str | None) -> str | None:
     """Return the name of a planner, or None, after a check that there is such a planner."""
     if name is not None and name.lower() not in list_planners():
         from rrtik_ompl.ompl_bridge.planner_names import (
-            is_planner_file,  # loads OMPL, which few files need
+            is_planner_file,  # this loads OMPL, which few files need
             options_of,
         )
 

@@ -123,7 +123,7 @@ class AttachedEntry(SolidEntry, json_schema_extra=ONE_SHAPE):
     margin: NotNegative = Field(0.0, description="[m] that it keeps beside that, also when it is set down")
 
     def build(self, folder: Path) -> AttachedObject:
-        """The attached object."""
+        """Return the attached object."""
         shape = self.build_shape(folder)
         pose = self.build_pose()
         return AttachedObject(self.name, self.link, shape, pose, tuple(self.allow), self.padding, self.margin)

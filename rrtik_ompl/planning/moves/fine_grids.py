@@ -21,8 +21,8 @@ from rrtik_ompl.planning.moves.lattice import MoveLattice, Values, spread_values
 from rrtik_ompl.planning.moves.rules import long_enough
 from rrtik_ompl.world.motion_queries import BatchedMotionQueries, OutOfTime
 
-# Configurations of one grid after the other, and whether their values are near those of the best route. The largest
-# take half a second in the kernels.
+# The grids in their order: number of configurations, and whether their values are near those of the best route. The
+# largest take half a second in the kernels.
 GRIDS = ((2**15, False), (2**18, False), (2**16, True), (2**18, False), (2**16, True))
 MOST_IDLE = 3  # grids in a row without a gain before the search ends
 NEAR = 0.02  # greatest distance of values near a route, as a share of the joint's range

@@ -45,8 +45,9 @@ class MoveLattice:
 
     def __init__(self, values: Sequence[Vector], motions_free: MotionsFree, costs: Vector) -> None:
         self.values = [distinct(v) for v in values]
-        # Joints that rest have no axis: an array has 64 at most. For each axis: its joint, its values, those times the
-        # cost of travel, and for each segment between neighbours along it whether that is free.
+        # Joints with one value have no axis, because an array has 64 axes at most. The lists below have an entry for
+        # each axis:
+        # its joint, its values, its values times the cost of travel, and which segments between neighbours are free.
         self._axis_joints = [joint for joint, v in enumerate(self.values) if len(v) > 1] or [0]
         self._axis_values = [self.values[joint] for joint in self._axis_joints]
         self._shape = tuple(len(v) for v in self._axis_values)
@@ -223,9 +224,10 @@ def _costs_after_a_move(costs: Costs, step_costs: list[tuple[int, Costs]]) -> Co
     best = costs.copy()
     for axis, cost_of_step in step_costs:
         before = costs.swapaxes(axis, 0)
-        after = best.swapaxes(axis, 0)  # a view: what is written here is written to `best`
+        after = best.swapaxes(axis, 0)  # a view: writing to it changes `best`
         count = len(cost_of_step)
         for forward in (True, False):
+            # Carry the least cost along the axis, from cell to cell.
             carried = np.full(before.shape[1:], np.inf)
             for k in range(count) if forward else range(count - 1, -1, -1):
                 tail, head = (k, k + 1) if forward else (k + 1, k)

@@ -113,7 +113,7 @@ class OneFreeValue:
         self._stop = stop
 
         self._others = [k for k in np.flatnonzero(moved(start, goal)).tolist() if k != joint]
-        self._all_arrived = (1 << len(self._others)) - 1  # the mask of a place where all others have arrived
+        self._all_arrived = (1 << len(self._others)) - 1  # the mask when all others have arrived
         self._depth = OverlapDepth(world.robot, world.bodies, world.pairs)
 
         ends = start[joint], goal[joint]
@@ -129,11 +129,13 @@ class OneFreeValue:
         if self._all_arrived >= MOST_CORNERS:
             return False
 
+        # Moves from or to the ends of the free joint do not depend on the free value, so they are checked once.
         corners = range(self._all_arrived + 1)
         self._free_ranges = {(mask, end): self._free_range(mask, end) for end in (START, GOAL) for mask in corners}
         steps = [step for end in (START, GOAL) for step in self._steps_of_others(end)]
         self._free_steps = {step for step in steps if self._step_is_free(step, 0.0)}
 
+        # Refute or halve the parts of the range, one after the other.
         parts = [(self._lower, self._upper)]
         for _ in range(MOST_WORK // (self._all_arrived + 1)):
             if not parts:
@@ -304,9 +306,11 @@ def reach_bound(world: World, joints: Sequence[int], start: Vector, goal: Vector
     cell_is_closed = np.zeros((1, 1), dtype=bool)
 
     for cells_per_joint in CELLS:
+        # Divide the cells further; parts of closed cells stay closed.
         finer = cells_per_joint // len(cell_is_closed)
         cell_is_closed = cell_is_closed.repeat(finer, axis=0).repeat(finer, axis=1)
         half_cell = 0.5 * (upper - lower) / cells_per_joint
+        # Find the open cells whose middles collide.
         cells = np.argwhere(~cell_is_closed)
         middles = np.repeat(start[None], len(cells), axis=0)
         middles[:, chosen] = lower + (2 * cells + 1) * half_cell
@@ -315,12 +319,14 @@ def reach_bound(world: World, joints: Sequence[int], start: Vector, goal: Vector
             break
         depths_left -= len(colliding)
 
+        # Close those that collide more deeply than any point of the arm moves within the cell.
         reach_of_cell = float(world.weights[chosen] @ (half_cell + SAME))
         is_deep = _deeper_than(depth, middles[colliding], reach_of_cell, stop)
         if is_deep is None:
             break
         cell_is_closed[tuple(cells[colliding[is_deep]].T)] = True
 
+        # Count the moves through open cells.
         ends = [_cell(q[chosen], lower, half_cell, cells_per_joint) for q in (start, goal)]
         bound = _moves_between(cell_is_closed, ends[0], ends[1], known_moves)
         if bound == known_moves:
@@ -358,8 +364,10 @@ def _moves_between(cell_is_closed: Mask, start: tuple[int, int], goal: tuple[int
 
 def _swept(reached: Mask, cell_is_closed: Mask) -> Mask:
     """Return a mask of the open cells that moves along the second axis reach from the reached cells."""
+    # Number the runs of open cells along the second axis; the offset keeps the numbers of different rows apart.
     runs = np.cumsum(np.insert(cell_is_closed, 0, True, axis=1), axis=1)[:, 1:]  # a number for each run of open cells
     runs += (cell_is_closed.shape[1] + 2) * np.arange(len(cell_is_closed))[:, None]
+    # A run is swept if one of its open cells has been reached.
     met = np.zeros(int(runs.max()) + 1, dtype=bool)
     met[runs[reached & ~cell_is_closed]] = True
     swept: Mask = met[runs] & ~cell_is_closed

@@ -81,7 +81,8 @@ class MoveRules:
 
         last_moves = np.diff(route[self.head(route) - 1 :], axis=0)
         moves_of_others = np.delete(last_moves, self.last_joints, axis=1)
-        move_counts = np.count_nonzero(np.diff(merge_moves(route, tolerance=0.0), axis=0), axis=0)  # of each joint
+        # Number of moves of each joint.
+        move_counts = np.count_nonzero(np.diff(merge_moves(route, tolerance=0.0), axis=0), axis=0)
         last_joints_move_once = (move_counts[self.last_joints] <= 1).all()
         frozen_joints_rest = (route[:, self.frozen_joints] == route[0, self.frozen_joints]).all()
 

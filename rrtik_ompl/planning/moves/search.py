@@ -33,12 +33,12 @@ from rrtik_ompl.planning.moves.staircase import staircase_orders
 from rrtik_ompl.world.motion_queries import BatchedMotionQueries, MotionsFree, OutOfTime
 
 MOST_NODES = 4096  # largest size of a lattice; it takes some milliseconds in the kernels
-MOST_FREE = 3  # joints with free values in one lattice
-WIDTHS = 0.1 * 0.5 ** np.arange(0, 16, 3)  # steps in the search for less travel, shares of a joint's range
+MOST_FREE = 3  # largest number of joints with free values in one lattice
+WIDTHS = 0.1 * 0.5 ** np.arange(0, 16, 3)  # widths in the search for less travel, as shares of a joint's range
 NEAR_NODES = 512  # largest size of a lattice close to a route
 CUTS = 3  # cuts in random orders without a gain before a round goes on
-SPARE = 8  # share of a lattice's size that is left for further values, as a factor
-REPEATS = 8  # repetitions of the search for less travel with the same step
+SPARE = 8  # a part that gets further values fills at most 1 / SPARE of the lattice without them
+REPEATS = 8  # repetitions of the search for less travel with the same width
 
 DIGITS = 9  # decimals of the travel that are compared; the rest is rounding
 NONE = 2**31  # number of moves if there is no route
@@ -209,17 +209,20 @@ class MoveSearch:
         if self.direct:
             return
         with suppress(OutOfTime):
+            # Begin with quick gains: corners of large boxes, and cuts of the offered routes.
             self._try_corners_of_large_boxes()
             if not self.proven:
                 self._offers = [self._cut(offered) for offered in self._offers]
                 self._cut_again()
 
+            # Search with one free joint at a time, then rearrange the offered routes.
             for joint in self._movable:
                 self._search_with_free_values([joint])
             for offered in self._offers:
                 if not self.proven:
                     self._rearrange(offered)
 
+            # Each round frees further joints, until the best route is proven to have the fewest moves.
             for joints in islice(self._free_joints(), rounds):
                 self._sharpen_bound()
                 if self.proven:
@@ -230,6 +233,7 @@ class MoveSearch:
                 if self.route is not None:
                     self._improve_part(self.route)
 
+            # Reduce the travel.
             self._reorder_detours()
             self._reduce_travel()
 

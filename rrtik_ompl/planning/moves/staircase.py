@@ -136,7 +136,9 @@ def _free_steps(a: Vector, b: Vector, joints: NDArray[np.int64], motions_free: M
         For each corner of the box, a bit mask of positions in ``joints`` that have the values of b, the positions of
         the joints that may move next.
     """
-    places = range(len(joints))[::-1]  # the last joint first: distal joints sweep less
+    # The last joint comes first, because distal joints sweep less space.
+    places = range(len(joints))[::-1]
+    # Go forward from corner to corner, one joint at a time, and keep the free steps of each layer.
     frontier = [0]
     layers = []
 
@@ -151,9 +153,10 @@ def _free_steps(a: Vector, b: Vector, joints: NDArray[np.int64], motions_free: M
         if not frontier:
             return {}
 
+    # Keep the steps that lead to the end.
     leads_to_end = {(1 << len(joints)) - 1}
     steps = dict[int, list[int]]()
-    for layer in reversed(layers):  # backwards, so that steps into dead ends fall away
+    for layer in reversed(layers):  # backwards, so that steps into dead ends are left out
         for corner, k in layer:
             if corner | 1 << k in leads_to_end:
                 steps.setdefault(corner, []).append(k)
@@ -188,6 +191,7 @@ def _converted(waypoints: Matrix, world: World, finest: float) -> Matrix:
     """
     rows = _without_tremble(waypoints)
     pieces = [_Piece(a, b, edge, []) for edge, (a, b) in enumerate(pairwise(rows)) if (a != b).any()]
+    # Halve the pieces without a free order until each piece has one.
     while any(not piece.orders for piece in pieces):
         orders_found = iter(_free_orders([piece for piece in pieces if not piece.orders], world))
         tried = [piece if piece.orders else replace(piece, orders=next(orders_found)) for piece in pieces]
@@ -196,6 +200,7 @@ def _converted(waypoints: Matrix, world: World, finest: float) -> Matrix:
         for piece in tried:
             pieces += [piece] if piece.orders else _halves(piece, world, finest)
 
+    # Choose an order for each piece, and join the staircases.
     parts_of_route = [rows[:1]]
     last = -1
     for piece in pieces:

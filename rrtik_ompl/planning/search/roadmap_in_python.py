@@ -116,7 +116,7 @@ class PythonGraph:
         num_edges = len(self._edges)
         for k, row in enumerate(np.concatenate([starts, goals])):
             self._add_near(row, num_vertices)
-            if k >= len(starts):  # a goal, to which each start may go straight
+            if k >= len(starts):  # goals are also joined straight with each start
                 for start in range(len(starts)):
                     self._join(num_vertices + start, num_vertices + k)
         found = self._search(range(num_vertices, num_vertices + len(starts)), goals, stop)

@@ -60,7 +60,7 @@ class RrtConnect:
         self._rules = rules
         self._motion_free = motion_free
         self._rng = rng
-        self._last_side = 1  # of the tree that grew last
+        self._last_side = 1  # index of the tree that grew last
         self._limit = np.inf if rules.max_iterations is None else rules.max_iterations
 
     @property

@@ -70,7 +70,8 @@ def _axis_rounds(route: Matrix, task: Task, _: Problem) -> Matrix:
 
 
 def _fewest_moves(route: Matrix, task: Task, problem: Problem) -> Matrix:
-    from rrtik_ompl.planning.shortening.fewest_moves import fewest_moves  # many paths are shortened without its search
+    # Imported late, because most paths are shortened without this search.
+    from rrtik_ompl.planning.shortening.fewest_moves import fewest_moves
 
     wishes = task.wishes
     found = fewest_moves(route, problem.world, budget=task.rest, rules=wishes.rules, clearance=wishes.clearance)

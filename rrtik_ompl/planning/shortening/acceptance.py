@@ -16,7 +16,8 @@ from rrtik_ompl.world.problem import Problem, densely_checked, problem_in
 from rrtik_ompl.world.proven_motions import proven_motions
 from rrtik_ompl.world.route_check import violations_of
 
-SPARE = 2.5e-4  # [m] beyond the clearance that searches keep if the ends have it: chords of timed motions need 0.1 mm
+# [m] Searches keep this much beyond the clearance if the ends have it: chords of timed motions need 0.1 mm of it.
+SPARE = 2.5e-4
 
 
 class Form(NamedTuple):

@@ -17,9 +17,9 @@ from rrtik_ompl.planning.shortening.task import Task
 from rrtik_ompl.world.motion_queries import KernelWorld, has_kernels
 
 STARTS = 3  # starts; random shortcuts lead to different homotopy classes of routes
-START_TRIES = 20  # shortcuts of a start
+START_TRIES = 20  # tries of random shortcuts for a start
 START_CHECKS = 60  # limit of the motions checked to pull a start taut
-ROUND_TRIES = 60  # shortcuts of a round
+ROUND_TRIES = 60  # tries of random shortcuts in a round
 ROUND_CHECKS = 60  # limit of the motions checked to pull it taut
 ROUNDS_WITHOUT_LIMIT = 4  # rounds if neither time nor checks are limited
 LEAST_GAIN = 1e-4  # share of the length that counts as a gain

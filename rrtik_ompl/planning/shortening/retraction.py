@@ -22,8 +22,8 @@ def retract(route: Matrix, task: Task, *, step: float | None = None, fineness: f
     """Retract a route, shape (k, n); deterministic.
 
     From a pivot, the last visible waypoint is found (phase 1). Along the edge behind it the last visible point is found
-    (phase 2), and then, back along the sight line to this point, the bend that still sees the next point (phase 3). The
-    bend is the next pivot.
+    (phase 2). On the sight line to this point, the point nearest to the pivot that still sees the next point of the
+    edge is the new bend (phase 3), and the next pivot.
 
     Args:
         route: Free, start first.

@@ -157,6 +157,7 @@ def attempt(world: World, way: Way, q: Vector, leaning: Leaning) -> Attempt:
             reason = why_stopped(robot, rail, followed)
             break
 
+    # Prove the motions, and cut the path off at the first one that is not proven.
     rows = np.concatenate(parts)
     shares = np.concatenate(places)
     proof = world.prover.route(rows, clearance=way.clearance_in(world)) if len(rows) > 1 else None
@@ -184,6 +185,7 @@ def _proven_part(world: World, way: Way, rows: Matrix, shares: Vector, proof: Pr
     b = rows[gap.motion + 1]
     clearance = way.clearance_in(world)
 
+    # Bisect the first motion that is not proven.
     proven_share = 0.0
     unproven_share = 1.0
     for _ in range(HALVINGS):
@@ -194,6 +196,7 @@ def _proven_part(world: World, way: Way, rows: Matrix, shares: Vector, proof: Pr
         else:
             unproven_share = middle
 
+    # Append the proven share of this motion, and prove the whole part.
     end = a + proven_share * (b - a)
     reason = why_blocked(world, end, b, (gap.first, gap.second))
     proven_rows = rows[: gap.motion + 1]

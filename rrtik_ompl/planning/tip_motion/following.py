@@ -160,6 +160,7 @@ def packed_rail(robot: Robot, rail: Rail, q: Vector, tolerance: Tolerance, leani
     return table
 
 
+# Sizes of the arrays in the table of a kernel call, for an arm with so many joints.
 @lru_cache(maxsize=64)
 def _plan(dof: int, joints: int) -> TablePlan:
     return sizes_of(
@@ -199,9 +200,11 @@ def follow_plainly(robot: Robot, rail: Rail, q: Vector, tolerance: Tolerance, le
             else _deviation_bound(robot, rail, rows[-1], trial, (shares[-1], tried_step), tolerance)
         )
 
+        # Accept the step if it deviates little enough.
         if trial is not None and deviation <= 1.0 - ROOM:
             rows.append(trial)
             shares.append(shares[-1] + tried_step)
+        # The deviation grows with the square of the step, so a next step of this size stays within the tolerance.
         change = 0.9 / np.sqrt(deviation) if deviation > 0.0 else LARGEST_GROWTH
         step = tried_step * min(max(change, SMALLEST_SHRINKING), LARGEST_GROWTH)
     return Followed(np.array(rows), np.array(shares))
