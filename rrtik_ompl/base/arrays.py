@@ -1,4 +1,4 @@
-"""Array types and the checks that every array from outside passes: shape, finiteness, a private read-only copy."""
+"""Array types and the validation of arrays from outside: shape, finiteness, a private read-only copy."""
 
 from __future__ import annotations
 
@@ -16,19 +16,22 @@ Matrix: TypeAlias = NDArray[np.float64]  # shape (m, n)
 Mask: TypeAlias = NDArray[np.bool_]  # shape (m,)
 
 TAU = 2.0 * np.pi  # [rad] a full turn
-MOST_NUMBERS = 100_000_000  # of one array, 0.8 GB; whoever has more asks in parts
-BLOCK_ROWS = 16_384  # that a batch computes at a time
-MOST_ROWS = 1_000_000  # waypoints of a path, times of a motion
+MOST_NUMBERS = 100_000_000  # largest size of one array, 0.8 GB
+BLOCK_ROWS = 16_384  # number of rows that are computed at a time
+MOST_ROWS = 1_000_000  # largest number of waypoints of a path, or of times of a motion
 _LISTS = frozenset((list, tuple))
-LARGEST = 1e6  # [m] or [rad]; numbers beyond are a slip of the pen, and the kernels' float32 cannot hold them
+LARGEST = 1e6  # [m] or [rad]; larger numbers are mistakes, and too large for the kernels' float32
 
 
 def in_blocks(work: Callable[..., NDArray[Any]], *rows: NDArray[Any]) -> NDArray[Any]:
-    """``work`` of many rows, block by block, so that it needs little memory beyond its answer.
+    """Compute a function of many rows block by block, so that it needs little memory in addition to its result.
 
     Args:
-        work: What makes rows of some rows, of arrays of equal length.
-        rows: These arrays.
+        work: Computes one row of the result for each row of its arguments.
+        rows: Arrays of equal length, the arguments of ``work``.
+
+    Returns:
+        The result for all rows, as if ``work`` had been called once.
     """
     count = len(rows[0])
     if count <= BLOCK_ROWS:
@@ -44,10 +47,10 @@ def in_blocks(work: Callable[..., NDArray[Any]], *rows: NDArray[Any]) -> NDArray
 
 
 def allocated(shape: tuple[int, ...], dtype: DTypeLike = np.float64) -> NDArray[Any]:
-    """Memory for an answer.
+    """Allocate an uninitialised array for a result.
 
     Raises:
-        InputError: If this machine has not so much.
+        InputError: If there is not enough memory.
     """
     try:
         return np.empty(shape, dtype)
@@ -64,7 +67,10 @@ def frozen(values: ArrayLike, dtype: DTypeLike = np.float64) -> NDArray[Any]:
 
 
 def distinct(values: ArrayLike) -> NDArray[Any]:
-    """The different ones of some numbers, ascending: as ``numpy.unique``, which takes longer for few, and to load."""
+    """Return the distinct numbers in ascending order, as ``numpy.unique`` does, but faster for few numbers.
+
+    It also avoids the time that numpy takes to load its function.
+    """
     ordered = np.sort(np.asarray(values), axis=None)
     first = np.ones(len(ordered), dtype=bool)
     np.not_equal(ordered[1:], ordered[:-1], out=first[1:])
@@ -82,7 +88,7 @@ def finite_array(values: ArrayLike, shape: tuple[int | None, ...], what: str) ->
     Raises:
         InputError: If the values are not numbers, have another shape, or are not all finite.
     """
-    # Most are floats already, and to ask what else they may be takes longer than all other questions.
+    # Most arguments are float arrays already; testing for other types takes longer than all other checks.
     array = values if type(values) is np.ndarray and values.dtype == np.float64 else _as_floats(values, what)
 
     if array.size > MOST_NUMBERS:
@@ -100,10 +106,10 @@ def finite_array(values: ArrayLike, shape: tuple[int | None, ...], what: str) ->
 
 
 def _as_floats(values: ArrayLike, what: str) -> NDArray[np.float64]:
-    """Return numbers given by a user as float64; the one place that says what is a number.
+    """Convert numbers given by a user to float64. This is the only place that decides what counts as a number.
 
     Raises:
-        InputError: If they are none (truths, texts and complex numbers are none), or too many.
+        InputError: If the values are not numbers (booleans, text and complex numbers are not), or too many.
     """
     try:
         if (count := _count(values)) > MOST_NUMBERS:
@@ -119,7 +125,7 @@ def _as_floats(values: ArrayLike, what: str) -> NDArray[np.float64]:
 
 
 def _count(values: object) -> int:
-    """Return how many members a value given by a user has, before they are copied; 0 if it does not say."""
+    """Return the length of a value given by a user before it is copied; 0 if it has none."""
     if isinstance(values, np.ndarray):
         return values.size
     try:
@@ -129,7 +135,7 @@ def _count(values: object) -> int:
 
 
 def _has_truths(values: Iterable[Any]) -> bool:
-    """Check whether True or False is among numbers, which numpy takes for 1 and 0; level by level of lists in lists."""
+    """Check whether nested lists contain True or False, which numpy would convert to 1 and 0, level by level."""
     while True:
         kinds = set(map(type, values))
         if bool in kinds or np.bool_ in kinds:
@@ -146,12 +152,12 @@ def _has_shape(array: NDArray[np.float64], shape: tuple[int | None, ...]) -> boo
 
 
 def too_many(count: int, what: str) -> InputError:
-    """Return the error for more numbers than a call takes."""
+    """Return the error for more numbers than a call accepts."""
     return InputError(f"{what}: {count} are more numbers than the {MOST_NUMBERS} of one call; give them in parts")
 
 
 def dimensions(values: object) -> int:
-    """Return how many dimensions a value given by a user has; 0 for nested lists that make no array."""
+    """Return the number of dimensions of a value given by a user; 0 for nested lists that do not form an array."""
     if not isinstance(values, np.ndarray) and _count(values) > MOST_NUMBERS:
         return 0
     try:
@@ -161,7 +167,7 @@ def dimensions(values: object) -> int:
 
 
 def bounded_array(values: ArrayLike, shape: tuple[int | None, ...], what: str) -> NDArray[np.float64]:
-    """As :func:`finite_array`, of numbers that reach the tables of the kernels: none beyond ``LARGEST``.
+    """Validate an array as :func:`finite_array`, and that no number exceeds ``LARGEST``, the range of the kernels.
 
     Raises:
         InputError: As :func:`finite_array`, or if a number is larger.
@@ -173,7 +179,7 @@ def bounded_array(values: ArrayLike, shape: tuple[int | None, ...], what: str) -
 
 
 def usable_waypoints(rows: Matrix) -> Matrix:
-    """Finite waypoints of a path, shape (k, n).
+    """Validate the number and range of finite waypoints of a path, shape (k, n), and return them.
 
     Raises:
         InputError: If there are none or too many, or a number is larger than ``LARGEST``.
@@ -187,7 +193,7 @@ def usable_waypoints(rows: Matrix) -> Matrix:
 
 
 def number_rows(values: ArrayLike, what: str) -> NDArray[np.float64]:
-    """Numbers given by a user as rows, one row or several; neither their number nor that they are finite is checked.
+    """Convert numbers given by a user to rows, one or several, which need not be finite.
 
     Raises:
         InputError: If they are not numbers, or too many.
@@ -199,7 +205,9 @@ def number_rows(values: ArrayLike, what: str) -> NDArray[np.float64]:
 
 
 def rows_of(values: ArrayLike, columns: int, what: str) -> Matrix:
-    """As :func:`number_rows`, shape (k, columns).
+    """Convert numbers given by a user to rows with a given number of columns, shape (k, columns).
+
+    As :func:`number_rows`, they need not be finite.
 
     Raises:
         InputError: If they are no such rows.
@@ -211,7 +219,7 @@ def rows_of(values: ArrayLike, columns: int, what: str) -> Matrix:
 
 
 def filled_rows(values: ArrayLike, columns: int, what: str) -> Matrix:
-    """As :func:`finite_array`, of one row at least, shape (k, columns).
+    """Validate at least one finite row, shape (k, columns), as :func:`finite_array`.
 
     Raises:
         InputError: If they are no such rows.
@@ -223,10 +231,10 @@ def filled_rows(values: ArrayLike, columns: int, what: str) -> Matrix:
 
 
 def truths(values: ArrayLike, what: str) -> Mask:
-    """Truths given by a user, or 0 and 1 in their place, as one row, shape (n,).
+    """Convert booleans given by a user, or 0 and 1, to a mask, shape (n,).
 
     Raises:
-        InputError: If they are neither.
+        InputError: If they are not numbers.
     """
     array = np.asarray(values) if isinstance(values, list | tuple | np.ndarray) and dimensions(values) else None
     if array is None or array.dtype != np.bool_:
@@ -236,7 +244,7 @@ def truths(values: ArrayLike, what: str) -> Mask:
 
 
 def finite_number(value: ArrayLike, what: str) -> float:
-    """Return a number given by a user.
+    """Validate a finite number given by a user and return it as float.
 
     Raises:
         InputError: If it is none, or not finite.
@@ -247,12 +255,12 @@ def finite_number(value: ArrayLike, what: str) -> float:
 
 
 def positive(value: ArrayLike, what: str, remedy: str = "") -> float:
-    """Return a number greater than 0 given by a user.
+    """Validate a finite number greater than 0 given by a user.
 
     Args:
-        value: What was given.
+        value: The value.
         what: Name of the value, with which the error message begins.
-        remedy: What to give instead; the error message ends with it.
+        remedy: Advice on what to give instead, with which the error message ends.
 
     Raises:
         InputError: If it is none.
@@ -264,7 +272,7 @@ def positive(value: ArrayLike, what: str, remedy: str = "") -> float:
 
 
 def length(value: ArrayLike, what: str) -> float:
-    """Return a length of a solid [m] given by a user: greater than 0, at most ``LARGEST``.
+    """Validate a length of a solid [m] given by a user: greater than 0, at most ``LARGEST``.
 
     Raises:
         InputError: If it is none.
@@ -273,7 +281,7 @@ def length(value: ArrayLike, what: str) -> float:
 
 
 def not_negative(value: ArrayLike, what: str) -> float:
-    """Return a number of at least 0 given by a user.
+    """Validate a finite number of at least 0 given by a user.
 
     Raises:
         InputError: If it is none.
@@ -285,14 +293,14 @@ def not_negative(value: ArrayLike, what: str) -> float:
 
 
 def whole_number(value: object, what: str, least: int = 0) -> int:
-    """Return a whole number given by a user, such as a seed.
+    """Validate a whole number of at least ``least`` given by a user, such as a seed.
 
     Raises:
         InputError: If it is none, or less than ``least``.
     """
     if type(value) is int and value >= least:
         return value
-    odd = isinstance(value, bool | np.timedelta64)  # which are of the kinds of whole numbers all the same
+    odd = isinstance(value, bool | np.timedelta64)  # these are subclasses of integer types
     if odd or not isinstance(value, int | np.integer) or value < least:
         raise InputError(f"{what} must be a whole number of at least {least}, got {value!r}")
     return int(value)

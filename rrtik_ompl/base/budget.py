@@ -1,4 +1,4 @@
-"""What a work may cost: one value that goes through in place of seconds, iterations, a stop and a seed."""
+"""The budget of a computation: one value in place of seconds, iterations, a stop function and a seed."""
 
 from __future__ import annotations
 
@@ -12,26 +12,26 @@ import numpy as np
 
 from rrtik_ompl.base.errors import InputError
 
-Stop: TypeAlias = Callable[[], object]  # true when it is time to stop
+Stop: TypeAlias = Callable[[], object]  # returns a true value when the computation has to end
 
 
 def no_stop() -> bool:
-    """It is never time to stop."""
+    """Return False always: the computation never has to end."""
     return False
 
 
 @dataclass(frozen=True, slots=True)
 class Budget:
-    """What a work may cost, and the seed of all that is random in it.
+    """The limits of a computation, and the seed of its random numbers.
 
-    Its time runs from the moment it is made; :meth:`begun_now` sets the clock back.
+    The time runs from the creation of the budget; :meth:`begun_now` restarts it.
 
     Attributes:
-        seed: Of everything random.
+        seed: Seed of all random numbers.
         seconds: Limit of wall time [s]; +inf for none.
-        iterations: Limit of whatever the work counts, so that the clock does not decide; None for none.
-        stop: Called often; true ends the work.
-        begun: When the time began [s, of ``time.monotonic``].
+        iterations: Limit of the steps that the computation counts, so that the clock does not decide; None for none.
+        stop: Called often; a true value ends the computation.
+        begun: When the time began [s, as ``time.monotonic``].
 
     Example:
         >>> budget = Budget(seed=1, seconds=60.0)
@@ -43,45 +43,46 @@ class Budget:
     seconds: float = np.inf
     iterations: int | None = None
     stop: Stop = no_stop
-    begun: float = field(default_factory=lambda: time.monotonic())  # looked up then: another clock may be in its place
+    # The lambda looks the clock up when it is called, so that tests can replace it.
+    begun: float = field(default_factory=lambda: time.monotonic())
 
     @property
     def elapsed(self) -> float:
-        """Time since the work began [s]."""
+        """Time since the computation began [s]."""
         return time.monotonic() - self.begun
 
     @property
     def left(self) -> float:
-        """Time that is left [s], whatever ``stop`` says; negative when it is over."""
+        """Remaining time [s], independent of ``stop``; negative when it is over."""
         return self.begun + self.seconds - time.monotonic()
 
     @property
     def limited(self) -> bool:
-        """Whether time or iterations end at some point, whatever ``stop`` says."""
+        """Whether time or iterations are limited, independent of ``stop``."""
         return self.iterations is not None or bool(np.isfinite(self.seconds))
 
     def over(self) -> bool:
-        """Check whether it is time to stop: a :data:`Stop` for searches that are given nothing else."""
+        """Check whether the computation has to end because of time or ``stop``. The bound method is a :data:`Stop`."""
         return time.monotonic() - self.begun >= self.seconds or bool(self.stop())
 
     def begun_now(self) -> Budget:
-        """Return the same budget, whose time begins now."""
+        """Return the same budget with its time starting now."""
         return replace(self, begun=time.monotonic())
 
     def part(self, share: float) -> Budget:
-        """Return a share of the time that is left, from now on."""
+        """Return a budget with a share of the remaining time, starting now."""
         return replace(self, seconds=max(share * self.left, 0.0), begun=time.monotonic())
 
     def put_off(self, seconds: float) -> Budget:
-        """Return the budget after some seconds that do not count."""
+        """Return the budget with its start shifted by some seconds, which then do not count."""
         return replace(self, begun=self.begun + seconds)
 
 
 def iteration_limit(limit: int | None) -> int | None:
-    """Return the largest number of iterations that a planner may do, a whole number; None for no limit.
+    """Validate the largest number of iterations of a planner and return it rounded up; None for no limit.
 
     Raises:
-        InputError: If the limit is no number of at least 1.
+        InputError: If the limit is not a number of at least 1.
     """
     if limit is None or limit == np.inf:
         return None

@@ -1,4 +1,4 @@
-"""The names that a caller chooses from, as types: each list stands here once, for editors, checks and commands."""
+"""The names that a caller chooses from, as types that editors, checks and commands share."""
 
 from __future__ import annotations
 
@@ -51,15 +51,15 @@ Name = TypeVar("Name", bound=str)
 
 
 def one_of(names: Iterable[Name], name: str, kind: str) -> Name:
-    """Return a name that was given as text, as one of those that there are.
+    """Check that a name given as text is one of the known ones, and return it.
 
     Args:
-        names: Those that there are.
+        names: The known names.
         name: The name that was given.
-        kind: What is named, for the error message.
+        kind: Kind of things that are named, for the error message.
 
     Raises:
-        UnknownNameError: If it is none of them.
+        UnknownNameError: If it is unknown.
     """
     known = tuple(names)
     for each in known:

@@ -1,4 +1,4 @@
-"""Copies of objects and views of them: values with other fields, copies for other threads and processes, lines."""
+"""Helpers of value classes: changed and pickled copies, copies for other threads, lazy values, short texts."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ if TYPE_CHECKING:
 Thing = TypeVar("Thing")
 Kind = TypeVar("Kind")
 Kept = TypeVar("Kept", bound="ForThread")
-MOST_SHOWN = 8  # numbers of an array, or items of a tuple, in one line
-MOST_CHANGES = 32  # of items, until all are written anew
-LONGEST_TEXT = 100  # letters of an item in one line
+MOST_SHOWN = 8  # largest number of numbers or items that are shown in one line
+MOST_CHANGES = 32  # number of changes after which all items are copied
+LONGEST_TEXT = 100  # largest number of letters of an item in one line
 
 
 def itself(thing: Thing, memo: object) -> Thing:
-    """What ``copy.deepcopy`` makes of an object that never changes; for ``__deepcopy__`` of its class."""
+    """Return the object itself, as ``__deepcopy__`` of immutable classes."""
     del memo
     return thing
 
 
 class Once(Generic[Kind]):
-    """What a function makes, once it is asked for; cheaper to set up than ``functools.cache``.
+    """The result of a function that is called on first use; cheaper to create than ``functools.cache``.
 
     Example:
         >>> made = Once(list, "ab")
@@ -47,18 +47,18 @@ class Once(Generic[Kind]):
         self._given = given
 
     def __call__(self) -> Kind:
-        """What the function has made; it is called if nobody has asked before."""
+        """Return the result; the function is called if this is the first time."""
         if not hasattr(self, "_made"):
             self._made = self._make(*self._given)
         return self._made
 
 
 class Items(Sequence[Kind]):
-    """Items of which single ones are exchanged; what that costs does not grow with their number.
+    """A sequence in which single items are replaced at a cost that does not depend on its length.
 
     Args:
-        items: All of them.
-        changes: Others in the place of some, by their numbers.
+        items: All items.
+        changes: Replacements of single items, by their indices.
 
     Example:
         >>> tuple(Items((1, 2, 3)).with_(1, 5))
@@ -71,7 +71,7 @@ class Items(Sequence[Kind]):
 
     @property
     def as_tuple(self) -> tuple[Kind, ...]:
-        """All of them."""
+        """All items."""
         if self._changes:
             every = list(self._items)
             for number, item in self._changes.items():
@@ -81,7 +81,7 @@ class Items(Sequence[Kind]):
         return self._items
 
     def with_(self, number: int, item: Kind) -> Items[Kind]:
-        """Return the same items but for one."""
+        """Return the same items with one replaced."""
         known = self._items if len(self._changes) < MOST_CHANGES else self.as_tuple
         return Items(known, {**self._changes, number: item})
 
@@ -102,9 +102,9 @@ class Items(Sequence[Kind]):
 
 
 def as_value(thing: object) -> tuple[Any, ...]:
-    """``__reduce__`` of a frozen dataclass, or of any object without slots.
+    """Pickle a frozen dataclass, or any object without slots, by its fields, as its ``__reduce__``.
 
-    What is read-only in it stays so in a deep copy and when unpickled.
+    Read-only arrays and mappings stay read-only in deep copies and when unpickled.
 
     Example:
         >>> @dataclass(frozen=True, slots=True)
@@ -117,7 +117,7 @@ def as_value(thing: object) -> tuple[Any, ...]:
 
 
 def restored(kind: type[Thing], state: dict[str, Any]) -> Thing:
-    """Return the object that :func:`as_value` took apart; nothing is checked again.
+    """Create an object from its fields, the inverse of :func:`as_value`, without validation.
 
     This is the only place where a value is made without its constructor.
     """
@@ -128,7 +128,7 @@ def restored(kind: type[Thing], state: dict[str, Any]) -> Thing:
 
 
 def changed(thing: Thing, **values: object) -> Thing:
-    """A frozen dataclass with other values in some of its fields; unlike ``dataclasses.replace`` it checks nothing.
+    """Return a frozen dataclass with some fields replaced, without validation, unlike ``dataclasses.replace``.
 
     Example:
         >>> @dataclass(frozen=True, slots=True)
@@ -151,7 +151,7 @@ class _ReadOnlyMapping(NamedTuple):
 
 
 def packed(value: object) -> object:
-    """Return a value in which what pickle cannot take, or would make writable, is marked."""
+    """Mark values that pickle cannot store, or would make writable: read-only mappings and arrays."""
     if isinstance(value, MappingProxyType):
         return _ReadOnlyMapping({key: packed(item) for key, item in value.items()})
     if isinstance(value, np.ndarray) and not value.flags.writeable:
@@ -160,14 +160,14 @@ def packed(value: object) -> object:
 
 
 def unpacked(value: object) -> object:
-    """Return the value that :func:`packed` marked."""
+    """Restore a value that :func:`packed` has marked."""
     if isinstance(value, _ReadOnlyMapping):
         return MappingProxyType({key: unpacked(item) for key, item in value.values.items()})
     return frozen(value.values, value.values.dtype) if isinstance(value, _ReadOnlyArray) else value
 
 
 def in_one_line(thing: DataclassInstance) -> str:
-    """``__repr__`` of a dataclass: long arrays by their shape, long tuples by their number of items.
+    """Return a dataclass in one line, as its ``__repr__``: long arrays by their shape, long tuples by their length.
 
     Example:
         >>> @dataclass(frozen=True, slots=True)
@@ -180,7 +180,7 @@ def in_one_line(thing: DataclassInstance) -> str:
 
 
 def _short(value: object) -> str:
-    """Return a value in some ten words."""
+    """Return a value as a short text."""
     if isinstance(value, np.ndarray):
         if value.size > MOST_SHOWN:
             return f"<array of shape {value.shape}>"
@@ -201,9 +201,9 @@ def _short(value: object) -> str:
 
 
 def in_notebook(thing: object) -> str | None:
-    """``_repr_html_`` of what a notebook shows as a 3-D page.
+    """Return the 3-D page of a value that a notebook shows, as its ``_repr_html_``.
 
-    The page stands above all values; the package itself knows where.
+    The page depends on modules above this one, so it is made by a function of the package.
     """
     package: Any = sys.modules["rrtik_ompl"]
     drawn: str | None = package.html_of(thing)
@@ -211,21 +211,21 @@ def in_notebook(thing: object) -> str | None:
 
 
 class ForThread(Protocol):
-    """What is not for two threads at a time, but can be had again."""
+    """An object that serves one thread at a time, and can be copied for another."""
 
     def for_thread(self) -> object:
-        """Return the same for another thread."""
+        """Return a copy for another thread."""
 
 
 class _Cell(threading.local):
-    """A value of the thread that has made it, and what other threads have in its place once they ask."""
+    """A thread-local value: the given one in the thread that made it, a copy in each other thread that reads it."""
 
     def __init__(self, value: ForThread, maker: int) -> None:
         self.value: Any = value if threading.get_ident() == maker else value.for_thread()
 
 
 class ThreadOwn(Generic[Kept]):
-    """An attribute of what several threads may use: the value that was set, or in other threads its like for them.
+    """An attribute of objects that several threads use: each thread reads the value set, or its own copy of it.
 
     Example:
         >>> class World:
@@ -240,7 +240,7 @@ class ThreadOwn(Generic[Kept]):
     @overload
     def __get__(self, thing: object, kind: type) -> Kept: ...
     def __get__(self, thing: object, kind: type) -> object:
-        """Return the value of this thread; it ends with the thread."""
+        """Return the value of the current thread; it ends with the thread."""
         return self if thing is None else vars(thing)[self._name].value
 
     def __set__(self, thing: object, value: Kept) -> None:

@@ -1,4 +1,4 @@
-"""All errors of the toolkit: one root, each message is one line that names what is wrong and how to mend it."""
+"""All errors of the library: one root class; each message is one line that names what is wrong and the remedy."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from itertools import islice
 from types import UnionType
 from typing import Any, NoReturn, get_args
 
-MOST_MEMBERS = 1_000_000  # of a list that is given
+MOST_MEMBERS = 1_000_000  # largest number of members of a list given by a user
 
 
 def _restored(kind: type[RrtikError], args: tuple[Any, ...], attributes: dict[str, Any]) -> RrtikError:
-    """Return the error that came from another process."""
+    """Create an error that was pickled, with its attributes, without calling its constructor."""
     error = kind.__new__(kind, *args)
     error.args = args
     vars(error).update(attributes)
@@ -21,7 +21,7 @@ def _restored(kind: type[RrtikError], args: tuple[Any, ...], attributes: dict[st
 
 
 def printable(text: str) -> str:
-    """Return the text with every letter that a terminal would obey instead of showing it, or cannot show, spelt out."""
+    """Return a text with all control characters and other unprintable letters replaced by escape sequences."""
     return text if text.isprintable() else "".join(c if c.isprintable() else _spelt(c) for c in text)
 
 
@@ -46,7 +46,7 @@ class RrtikError(Exception):
         super().__init__(printable(" ".join(str(message).split())))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _restored, (type(self), self.args, vars(self))  # whatever the constructor wants
+        return _restored, (type(self), self.args, vars(self))  # constructors take other arguments than args
 
 
 class InputError(RrtikError):
@@ -64,7 +64,7 @@ class MissingFileError(InputError):
 
 
 class UnknownNameError(InputError):
-    """A name was asked for that does not exist; carries the names that do.
+    """A name does not exist; the error carries the names that do.
 
     Attributes:
         name: The name that was asked for.
@@ -93,7 +93,7 @@ class ProblemError(RrtikError):
 
     Attributes:
         contacts: Pairs of names in collision, empty if the reason is another one.
-        part: What is wrong with it: "start" or "goal".
+        part: The part that is wrong: "start" or "goal".
 
     Example:
         >>> ball = rrtik.Obstacle("ball", rrtik.Sphere(0.5), [1.0, 0.0, 0.0])
@@ -110,7 +110,7 @@ class ProblemError(RrtikError):
 
 
 def in_file(path: object, error: InputError) -> InputError:
-    """Return the same error, naming the file before all else, as errors of its lines do by themselves."""
+    """Return an error whose message begins with the name of the file, unless it does already."""
     return error if str(error).startswith(str(path)) else InputError(f"{path}: {error}")
 
 
@@ -124,10 +124,10 @@ class PlannerError(RrtikError):
 
 
 def require(value: object, kind: type | UnionType, what: str, remedy: str = "") -> None:
-    """Refuse an argument that is not of the type, or of one of the types, that is needed.
+    """Refuse an argument that is not of the required type, or of one of several types.
 
     Raises:
-        InputError: It names the argument, what was expected, what was found, and the remedy.
+        InputError: The message names the argument, the expected and the given type, and the remedy.
     """
     if not isinstance(value, kind):
         wanted = " or ".join(each.__name__ for each in get_args(kind) or (kind,))
@@ -136,10 +136,10 @@ def require(value: object, kind: type | UnionType, what: str, remedy: str = "") 
 
 
 def called(value: object, what: str, *arguments: str) -> None:
-    """Refuse an argument that cannot be called with so many arguments, which are named.
+    """Refuse an argument that cannot be called with the given number of arguments; these are named for the message.
 
     Raises:
-        InputError: It names the argument, and what was found.
+        InputError: The message names the argument and its type.
     """
     wanted = f"{what}: expected a function of {' and '.join(arguments) or 'no arguments'}"
     if not callable(value):
@@ -149,15 +149,15 @@ def called(value: object, what: str, *arguments: str) -> None:
         signature(value).bind(*arguments)
     except TypeError as error:
         raise InputError(f"{wanted}: {error}") from None
-    except ValueError:  # some that are built in do not say
+    except ValueError:  # some built-in functions have no signature
         return
 
 
 def name_of(value: object, what: str) -> str:
-    """Return a name of a link, joint or solid: text that can be shown and written to a file.
+    """Validate the name of a link, joint or solid: text that can be shown and written to a file.
 
     Raises:
-        InputError: If it is no text, or has letters that no terminal shows.
+        InputError: If it is not text, or contains unprintable letters.
     """
     require(value, str, f"name of {what}")
     name = str(value)
@@ -167,10 +167,10 @@ def name_of(value: object, what: str) -> str:
 
 
 def at_most(count: float, limit: float, what: str, remedy: str = "") -> None:
-    """Refuse a number of things above what is sensible.
+    """Refuse a number of things above a limit.
 
     Raises:
-        InputError: It says the number and the limit.
+        InputError: The message names the number and the limit.
     """
     if count > limit:
         hint = f"; {remedy}" if remedy else ""
@@ -179,10 +179,10 @@ def at_most(count: float, limit: float, what: str, remedy: str = "") -> None:
 
 
 def listed(values: object, what: str, most: int = MOST_MEMBERS) -> tuple[Any, ...]:
-    """Return the members of a list, or of anything else that has members, but of a text.
+    """Return the members of a list or another iterable as a tuple; text is not accepted.
 
     Raises:
-        InputError: If it has none, or more than ``most``; of what never ends no more are taken.
+        InputError: If it is not iterable, or has more than ``most`` members; no more are taken from an endless one.
     """
     if isinstance(values, str) or not isinstance(values, Iterable) or getattr(values, "ndim", 1) == 0:
         raise InputError(f"{what} must be a list, got {type(values).__name__}")
@@ -193,38 +193,38 @@ def listed(values: object, what: str, most: int = MOST_MEMBERS) -> tuple[Any, ..
 
 
 def few(names: Iterable[str], most: int = 4) -> str:
-    """Return the first of some names, and how many more there are: "a, b and 3 more"."""
+    """Join the first of some names with the number of the others: "a, b and 3 more"."""
     known = tuple(names)
     rest = len(known) - most
     return ", ".join(known[:most]) + (f" and {rest} more" if rest > 0 else "")
 
 
 class MeshWarning(UserWarning):
-    """A mesh is missing or cannot be the solid that its author probably meant, but work can go on."""
+    """A mesh is missing or is probably not the solid that its author meant; the program continues."""
 
 
 class DescriptionWarning(UserWarning):
-    """A robot's description says something that is wrong or is not read, but work can go on."""
+    """A robot's description contains something wrong or unsupported; the program continues."""
 
 
 class TipWarning(UserWarning):
-    """Nobody has said where the tip of an arm is, and more than one link may be it."""
+    """The tip of an arm is not specified, and more than one link could be it."""
 
 
 class CloudWarning(UserWarning):
-    """A cloud of points, or a grid of heights, is probably not what its author meant, but work can go on."""
+    """A point cloud or a grid of heights is probably not what its author meant; the program continues."""
 
 
 class SceneWarning(UserWarning):
-    """Something that the file of a scene says is not as it says in the world that is made of it."""
+    """Something in a scene file is represented differently in the world that is made of it."""
 
 
 class PathWarning(UserWarning):
-    """What was asked for does not apply to a path, which stays as it is."""
+    """A request does not apply to a path, which stays unchanged."""
 
 
 class Renamed:
-    """An attribute that has another name now; whoever asks for it is told so.
+    """An attribute that was renamed; access raises an error that names the new attribute.
 
     Example:
         >>> class Arm:

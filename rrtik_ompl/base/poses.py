@@ -1,4 +1,4 @@
-"""Poses: ``pinocchio.SE3`` inside, position plus quaternion (x, y, z, w) or roll-pitch-yaw in files."""
+"""Poses and rotations: ``pinocchio.SE3`` inside, position plus quaternion (x, y, z, w) or roll-pitch-yaw in files."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ PoseLike: TypeAlias = pin.SE3 | ArrayLike  # a pose in any form that `rigid` tak
 Coordinate = TypeVar("Coordinate", float, Vector)
 
 IDENTITY_QUATERNION = (0.0, 0.0, 0.0, 1.0)  # x, y, z, w
-LAST_ROW = frozen([0.0, 0.0, 0.0, 1.0])  # of every pose
+LAST_ROW = frozen([0.0, 0.0, 0.0, 1.0])  # last row of every homogeneous matrix
 LAST_ROW_TOLERANCE = 1e-8
-NOT_RIGID = 1e-6  # largest entry of R R^T - 1 that still counts as rounding, and is removed
-ROUNDING = 1e-12  # the same of a rotation that stays as it is
-MOST_MOVING = 200  # joints with which Pinocchio computes: its memory grows with their cube, 32 GB at 1,000
+NOT_RIGID = 1e-6  # largest entry of R R^T - 1 that counts as a rounding error, which is removed
+ROUNDING = 1e-12  # largest entry of R R^T - 1 with which a rotation is used unchanged
+MOST_MOVING = 200  # largest number of joints for Pinocchio, whose memory grows with their cube (32 GB for 1,000)
 
 
 def pose(xyz: ArrayLike = (0.0, 0.0, 0.0), quat_xyzw: ArrayLike | None = None, what: str = "pose") -> pin.SE3:
     """Make a pose from a position [m] and a unit quaternion in the order x, y, z, w.
 
     Args:
-        xyz: The position, shape (3,); without ``quat_xyzw`` a pose in any form that :func:`rigid` takes, such as
-            [x, y, z, roll, pitch, yaw] in radians or a 4 x 4 matrix.
+        xyz: The position [m], shape (3,); without ``quat_xyzw`` a pose in any form that :func:`rigid` accepts, such as
+            [x, y, z, roll, pitch, yaw] in metres and radians or a 4 x 4 matrix.
         quat_xyzw: The orientation, shape (4,).
-        what: Its name, for messages.
+        what: Name of the pose, for messages.
 
     Raises:
         InputError: If a number is not finite, or the quaternion's length differs from 1 by more than 1e-3.
@@ -61,7 +61,7 @@ def pose_from_rpy(xyz: ArrayLike, rpy: ArrayLike, what: str = "pose") -> pin.SE3
 
 
 def quaternion_xyzw(placement: pin.SE3) -> Vector:
-    """Unit quaternion (x, y, z, w) of a pose, w not negative, so that equal rotations read equal. Shape (4,)."""
+    """Return the unit quaternion (x, y, z, w) of a pose, shape (4,), with w >= 0 so that it is unique."""
     quaternion: Vector = np.asarray(pin.Quaternion(placement.rotation).coeffs(), dtype=np.float64)
     return -quaternion if quaternion[3] < 0.0 else quaternion
 
@@ -72,39 +72,39 @@ def pose_row(placement: pin.SE3) -> Vector:
 
 
 def apart(first: pin.SE3, second: pin.SE3) -> tuple[float, float]:
-    """Return how far two poses are apart [m], and by which angle they are turned to each other [rad]."""
+    """Return the distance [m] and the rotation angle [rad] between two poses."""
     off = first.actInv(second)
     return float(np.linalg.norm(off.translation)), float(np.linalg.norm(pin.log3(off.rotation)))
 
 
 def working_memory(model: pin.Model) -> pin.Data:
-    """What Pinocchio needs to compute with a model (``pinocchio.Model``): its ``pinocchio.Data``.
+    """Allocate Pinocchio's working memory (``pinocchio.Data``) for a model (``pinocchio.Model``).
 
     Raises:
-        InputError: If the model has so many joints that this may be more than the machine has.
+        InputError: If the model has so many joints that the memory may not suffice.
     """
     few_joints(model)
     return model.createData()
 
 
 def few_joints(model: pin.Model) -> None:
-    """Refuse a model (``pinocchio.Model``) with more joints than :func:`working_memory` has room for.
+    """Refuse a model (``pinocchio.Model``) with more moving joints than ``MOST_MOVING``.
 
     Raises:
-        InputError: If it has.
+        InputError: If it has more.
     """
     at_most(int(model.nv), MOST_MOVING, f"robot '{model.name}': moving joints", "fix some; fk and jacobian take more")
 
 
 def rigid(T: PoseLike, what: str) -> pin.SE3:
-    """A copy (``pinocchio.SE3``) of a pose in any form that a person may give: every pose from outside passes here.
+    """Validate a pose in any accepted form and return a copy as ``pinocchio.SE3``. All poses from outside pass here.
 
-    What rounding has left of a rotation, up to ``NOT_RIGID``, is made one again.
+    Deviations from a rotation of up to ``NOT_RIGID``, as by rounding, are removed.
 
     Args:
-        T: ``pinocchio.SE3``; a matrix, shape (4, 4); a position [x, y, z] alone [m], which is not turned; with roll,
-            pitch, yaw [rad] behind it, shape (6,); or with a quaternion x, y, z, w, shape (7,).
-        what: Its name, for messages.
+        T: ``pinocchio.SE3``; a matrix, shape (4, 4); a position [x, y, z] [m] without rotation, shape (3,); the same
+            followed by roll, pitch, yaw [rad], shape (6,), or by a quaternion x, y, z, w, shape (7,).
+        what: Name of the pose, for messages.
 
     Raises:
         InputError: If it is none of these, has a number that is not finite, lies beyond ``LARGEST`` [m], or scales,
@@ -113,7 +113,7 @@ def rigid(T: PoseLike, what: str) -> pin.SE3:
     if not isinstance(T, pin.SE3) and dimensions(T) == 1:
         return _written_pose(T, what)
     matrix = finite_array(T.homogeneous if isinstance(T, pin.SE3) else T, (4, 4), what)
-    x, y, z, last = matrix.tolist()  # numbers of Python's own: four rows are too few for numpy
+    x, y, z, last = matrix.tolist()  # Python's floats are faster than numpy for so few numbers
 
     if max(abs(last[0]), abs(last[1]), abs(last[2]), abs(last[3] - 1.0)) > LAST_ROW_TOLERANCE:
         raise InputError(f"{what}: the last row must be 0 0 0 1, got {last}")
@@ -122,7 +122,8 @@ def rigid(T: PoseLike, what: str) -> pin.SE3:
 
     lengths = (_dot(x, x), _dot(y, y), _dot(z, z))
     corners = (_dot(x, y), _dot(y, z), _dot(z, x))
-    off = max(*(abs(square - 1.0) for square in lengths), *map(abs, corners))  # lengths first: they are never nan
+    # The lengths come first, because they are never NaN, which max would ignore or return depending on its place.
+    off = max(*(abs(square - 1.0) for square in lengths), *map(abs, corners))
 
     if off > NOT_RIGID:
         raise InputError(
@@ -155,7 +156,7 @@ def _written_pose(numbers: ArrayLike, what: str) -> pin.SE3:
 
 
 def left_handed(x: Sequence[Coordinate], y: Sequence[Coordinate], z: Sequence[Coordinate]) -> bool | Mask:
-    """Check whether the determinant of three vectors is negative; their coordinates are numbers or arrays of them."""
+    """Check whether the determinant of three vectors is negative; their coordinates are numbers or arrays."""
     return x[0] * (y[1] * z[2] - y[2] * z[1]) < x[1] * (y[0] * z[2] - y[2] * z[0]) - x[2] * (y[0] * z[1] - y[1] * z[0])
 
 
@@ -164,7 +165,7 @@ def _dot(a: Sequence[float], b: Sequence[float]) -> float:
 
 
 def unit_vector(values: ArrayLike, what: str) -> Vector:
-    """Return a direction, shape (3,).
+    """Validate a direction of length 1, shape (3,), and normalise it.
 
     Raises:
         InputError: If its length differs from 1 by more than 1e-3.
@@ -177,13 +178,16 @@ def unit_vector(values: ArrayLike, what: str) -> Vector:
 
 
 def turned_z(direction: Vector) -> NDArray[np.float64]:
-    """Return the shortest rotation that takes z to a unit vector, shape (3,): (3, 3)."""
+    """Return the shortest rotation that takes the z axis to a unit vector, (3,) -> (3, 3)."""
     rotation: NDArray[np.float64] = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), direction).matrix()
     return rotation
 
 
 def rotation_angles(rotations: NDArray[np.float64]) -> Vector:
-    """Angle of rotations, shape (m, 3, 3): atan2(|R - R^T| / (2 sqrt 2), (tr R - 1) / 2), accurate near 0 and pi."""
+    """Compute the angles of rotations, (m, 3, 3) -> (m,), accurately also near 0 and pi.
+
+    The formula is atan2(|R - R^T| / (2 sqrt 2), (tr R - 1) / 2).
+    """
     skew = (rotations - rotations.transpose(0, 2, 1)).reshape(len(rotations), 9)
     sine = np.sqrt(np.vecdot(skew, skew) / 8.0)
     angle: Vector = np.arctan2(sine, 0.5 * (rotations.trace(axis1=1, axis2=2) - 1.0))
@@ -191,7 +195,7 @@ def rotation_angles(rotations: NDArray[np.float64]) -> Vector:
 
 
 def rpy_matrices(angles: Matrix) -> NDArray[np.float64]:
-    """Rotations Rz(yaw) Ry(pitch) Rx(roll) for rows of roll, pitch, yaw [rad], shape (m, 3): (m, 3, 3)."""
+    """Compute the rotations Rz(yaw) Ry(pitch) Rx(roll) for roll, pitch, yaw [rad]: (m, 3) -> (m, 3, 3)."""
     cr, cp, cy = np.cos(angles).T
     sr, sp, sy = np.sin(angles).T
     rows = [
@@ -204,14 +208,23 @@ def rpy_matrices(angles: Matrix) -> NDArray[np.float64]:
 
 
 def joint_motions(axes: Matrix, prismatic: Mask, values: Matrix) -> NDArray[np.float64]:
-    """Transforms of n joints for values of shape (m, n): translations, or Rodrigues' rotation formula. (m, n, 4, 4)."""
+    """Compute the transforms of joints for their values: translations, or rotations by Rodrigues' formula.
+
+    Args:
+        axes: Unit axes, shape (n, 3).
+        prismatic: Which joints translate, shape (n,).
+        values: Joint values [rad or m], shape (m, n).
+
+    Returns:
+        Homogeneous matrices, shape (m, n, 4, 4).
+    """
     motions = np.zeros((*values.shape, 4, 4))
     motions[..., [0, 1, 2, 3], [0, 1, 2, 3]] = 1.0
 
     cross = np.zeros((len(axes), 3, 3))
     cross[:, [2, 0, 1], [1, 2, 0]] = axes
     cross[:, [1, 2, 0], [2, 0, 1]] = -axes
-    cross[prismatic] = 0.0  # they do not turn
+    cross[prismatic] = 0.0  # prismatic joints do not rotate
 
     sine = np.sin(values)[..., None, None]
     cosine = np.cos(values)[..., None, None]
@@ -221,7 +234,7 @@ def joint_motions(axes: Matrix, prismatic: Mask, values: Matrix) -> NDArray[np.f
 
 
 def cross_products(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Cross products of rows, shape (m, 3); numpy's own is some five times slower for few rows."""
+    """Compute the cross products of rows, shape (m, 3), about five times faster than numpy for few rows."""
     product = a[:, [1, 2, 0]] * b[:, [2, 0, 1]]
     product -= a[:, [2, 0, 1]] * b[:, [1, 2, 0]]
     return product

@@ -1,4 +1,4 @@
-"""What is made once of the same values, and shared by all that needs it while any of them lives."""
+"""Objects that are made once for equal arguments and shared as long as any user keeps them alive."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ PLAIN = {str, int, float, bool, type(None)}
 
 
 class Shared(Generic[Part]):
-    """Parts made of values: of the same values the same part, as long as somebody holds it.
+    """A cache of objects ("parts") by the arguments they are made of; a part stays as long as somebody refers to it.
 
-    Objects are the same if they are one; numbers and texts if they are equal; tuples if their members are the same. A
-    part with a method ``for_thread`` is for one thread at a time: every other thread is given its own, made by that.
+    Arguments are equal if they are the same object, equal numbers or texts, or tuples of equal members. A part with a
+    method ``for_thread`` serves one thread at a time: every other thread gets its own copy, made by that method.
 
     Args:
-        make: Makes a part of values.
+        make: Makes a part from the arguments of :meth:`of`.
 
     Example:
         >>> class Grid:
@@ -34,11 +34,11 @@ class Shared(Generic[Part]):
     def __init__(self, make: Callable[..., Part]) -> None:
         self._make = make
         self._parts: WeakValueDictionary[Hashable, Any] = WeakValueDictionary()
-        # Objects are told apart by their addresses, so they live as long as the parts that are made of them.
+        # Objects are identified by their addresses, so they must live as long as the parts that are made of them.
         self._values: WeakKeyDictionary[Any, tuple[object, ...]] = WeakKeyDictionary()
 
     def of(self, *values: object) -> Part:
-        """Return the part of some values, made if there is none."""
+        """Return the part for some values for the current thread; make it if there is none."""
         key = _key(values)
         thread = threading.get_ident()
         known: Part | None = self._parts.get((thread, key))
@@ -57,7 +57,7 @@ class Shared(Generic[Part]):
         return own
 
     def keep(self, part: Part, *values: object) -> Part:
-        """Take a part that somebody has made as that of some values; returns it."""
+        """Store a part that was made elsewhere as the part for some values, and return it."""
         key = _key(values)
         self._values[part] = values
         self._parts[key] = part
@@ -66,7 +66,7 @@ class Shared(Generic[Part]):
 
 
 def _key(value: object) -> Hashable:
-    """Equal for the same values."""
+    """Return a hashable key that is equal for equal values."""
     kind = type(value)
     if kind is tuple:
         return tuple([_key(member) for member in value])  # type: ignore[attr-defined]

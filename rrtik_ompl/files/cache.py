@@ -1,6 +1,6 @@
-"""Files in the user's cache folder. Nothing here ever fails: no cache, no gain.
+"""Files in the user's cache folder. Failures are ignored: without a cache everything is computed anew.
 
-Files appear whole (written aside, then renamed), so processes may share the folder.
+Files are written under a temporary name and then renamed, so several processes may share the folder.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from typing import IO
 
 from rrtik_ompl.files.notice import tell_once
 
-FOLDER_VARIABLE = "RRTIK_CACHE"  # another folder; empty: no cache
+FOLDER_VARIABLE = "RRTIK_CACHE"  # environment variable that names another folder, or switches the cache off if empty
 
 OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
 
 
 def cache_folder(kind: str) -> Path | None:
-    """Return the folder of cached files of a kind, or None if the cache is switched off or nobody's home is known."""
+    """Return the folder of cached files of a kind, or None if the cache is off or there is no home folder."""
     named = os.environ.get(FOLDER_VARIABLE)
     if named is not None:
         return Path(named) / kind if named else None
@@ -37,16 +37,16 @@ def cache_folder(kind: str) -> Path | None:
 
 
 def nobody_else_s(file: Path, *, among: int = OTHERS_WRITE) -> bool:
-    """Check whether a file, and all folders above it, belong to the user or root and nobody else can write to them.
+    """Check whether a file and all folders above it belong to the user or root, and nobody else can write to them.
 
-    What is executed, or decides what is free, is taken from no other file: whoever may write to a folder may put other
-    folders and files in place of those in it. Above the file's own folder one like ``/tmp`` is good enough, where
-    everybody may write but nobody may move what is another's (the sticky bit). False if there is no such file. What
-    is refused is told once.
+    Code that is executed, and data that decide what counts as free, must not come from other files: whoever can write
+    to a folder can replace the folders and files in it. Above the file's own folder, a folder like ``/tmp`` is
+    accepted, where everybody can write but nobody can move the files of others (sticky bit). The result is False if the
+    file does not exist. A refusal is reported once.
 
     Args:
         file: The file.
-        among: Bits of a mode, none of which may be set.
+        among: Permission bits, none of which may be set.
     """
     named = Path(os.path.abspath(file))
     try:
@@ -61,7 +61,7 @@ def nobody_else_s(file: Path, *, among: int = OTHERS_WRITE) -> bool:
     trusted = {os.geteuid(), 0, states[Path(named.anchor)].st_uid}
     own = {named, named.parent, real, real.parent}
     for place, state in states.items():
-        closed = stat.S_ISLNK(state.st_mode) or not state.st_mode & among  # a link's own mode means nothing
+        closed = stat.S_ISLNK(state.st_mode) or not state.st_mode & among  # the mode of a link has no effect
         sticky = place not in own and bool(state.st_mode & stat.S_ISVTX)
         if state.st_uid not in trusted or not (closed or sticky):
             tell_once(f"nothing is taken from {named.parent}, for others can write to {place}; chmod go-w closes it")
@@ -70,7 +70,7 @@ def nobody_else_s(file: Path, *, among: int = OTHERS_WRITE) -> bool:
 
 
 def write_whole(file: Path, write: Callable[[IO[bytes]], object]) -> None:
-    """Let ``write`` fill a file that appears all at once or, where it cannot be written, not at all."""
+    """Write a file by calling ``write`` with a stream, so that it appears complete, or not at all if it cannot be."""
     with contextlib.suppress(OSError):
         _make_closed(file.parent)
         handle, aside = tempfile.mkstemp(dir=file.parent, prefix=".writing-")
@@ -84,20 +84,21 @@ def write_whole(file: Path, write: Callable[[IO[bytes]], object]) -> None:
 
 
 def _make_closed(folder: Path) -> None:
-    """Make a folder, and those above it that are missing, to which only the user can write."""
+    """Create a folder and all missing ones above it, and let only the user write to them."""
     new = [place for place in folder.parents if not place.exists()]
     folder.mkdir(parents=True, exist_ok=True)
     for place in {folder, *new}:
         mode = stat.S_IMODE(place.stat().st_mode)
-        if mode & OTHERS_WRITE:  # by the umask of many systems
+        if mode & OTHERS_WRITE:  # set by the umask of many systems
             place.chmod(mode & ~OTHERS_WRITE)
 
 
 @contextlib.contextmanager
 def one_at_a_time(file: Path | None) -> Iterator[None]:
-    """Wait until no other process makes ``file``, and let none begin meanwhile; none waits where there is no lock.
+    """Hold a lock while a file is made, so that no other process makes it at the same time.
 
-    Whoever has waited looks again whether the file is there. A process that ends in any way gives its lock back.
+    After waiting, the caller should check whether the file exists by now. The lock is released when its process ends
+    for any reason. Without file locks, as on Windows, or without a file, nothing is locked.
     """
     try:
         import fcntl  # not on Windows

@@ -1,4 +1,4 @@
-"""Hashes of what is kept in files."""
+"""Hashes of data that are kept in files."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ if TYPE_CHECKING:
 
 
 def sha256(data: bytes = b"") -> _Hash:
-    """Return the hash of some bytes, to which more may be added.
+    """Return a hash object of some bytes, which can be updated with more.
 
-    Python's module takes 3.5 MB, of OpenSSL; who imports this package to plan without a cache does not load it.
+    The module is imported here, because it loads 3.5 MB of OpenSSL that planning without a cache does not need.
     """
     from hashlib import sha256 as of
 

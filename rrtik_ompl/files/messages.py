@@ -1,4 +1,4 @@
-"""JSON objects from the other side of a connection, whom nobody has checked: small and shallow ones, or none."""
+"""JSON objects received over a connection, which are not trusted: only small and shallow ones are accepted."""
 
 from __future__ import annotations
 
@@ -7,16 +7,16 @@ import re
 from itertools import accumulate
 from typing import Any
 
-MAX_DEPTH = 16  # lists and objects in each other
-MAX_LETTERS = 100  # of a value that is quoted
+MAX_DEPTH = 16  # largest depth of nested lists and objects
+MAX_LETTERS = 100  # largest number of letters of a quoted value
 _TEXTS = re.compile(r'"(?:[^"\\]|\\.)*"', re.DOTALL)
 _STEP = {"[": 1, "{": 1, "]": -1, "}": -1}
 
 
 def message_in(text: str | bytes) -> dict[str, Any] | None:
-    """Return the JSON object in a text; None if there is none, or it is nested more deeply than any message of ours.
+    """Return the JSON object in a text; None if it contains none, or is nested more deeply than ``MAX_DEPTH``.
 
-    Deep nesting is found before it is read: what reads it, or later shows it, would run out of stack.
+    The depth is checked before parsing, as the parser, or printing the result, would overflow the stack.
     """
     try:
         letters = text if isinstance(text, str) else text.decode("utf-8")
@@ -24,13 +24,13 @@ def message_in(text: str | bytes) -> dict[str, Any] | None:
         if max(accumulate(brackets), default=0) > MAX_DEPTH:
             return None
         found = json.loads(letters)
-    except (ValueError, RecursionError):  # not UTF-8, no JSON, or a number of thousands of digits
+    except (ValueError, RecursionError):  # not UTF-8, not JSON, or a number of thousands of digits
         return None
     return found if isinstance(found, dict) else None
 
 
 def quoted(value: object) -> str:
-    """Return the beginning of a value as a person reads it, whatever it is."""
+    """Return the first letters of any value as text, for a message."""
     try:
         return str(value)[:MAX_LETTERS]
     except (ValueError, RecursionError):  # a number of thousands of digits, or deep nesting

@@ -1,4 +1,4 @@
-"""Arrays by their names in a file of numpy's `.npz` kind. Objects, which would be unpickled, are never read."""
+"""Named arrays of a `.npz` file of numpy. Pickled objects are never read."""
 
 from __future__ import annotations
 
@@ -14,20 +14,21 @@ from numpy.typing import NDArray
 from rrtik_ompl.base.errors import InputError, at_most
 from rrtik_ompl.files.text import read_bytes
 
-LARGEST_FILE = 2**30  # bytes, of the file and of what it holds when unpacked
+LARGEST_FILE = 2**30  # [bytes] largest size of the file, and of its unpacked content
 _NOT_WHOLE: tuple[type[Exception], ...] = (BadZipFile, zlib.error, ValueError, KeyError, OSError, EOFError)
-_NOT_WHOLE += (NotImplementedError, RuntimeError, MemoryError, OverflowError)  # other kinds of zip; sizes that lie
+# These are raised for other kinds of zip archives and for wrong sizes in headers.
+_NOT_WHOLE += (NotImplementedError, RuntimeError, MemoryError, OverflowError)
 
 
 class NamedArrays:
-    """What a file holds.
+    """The arrays of a file, by their names.
 
     Args:
         path: The file.
 
     Raises:
-        InputError: If it is no such file, or half of one; later, if it lacks an array. Messages of the lookups do not
-            name the file (see :func:`rrtik_ompl.base.errors.in_file`).
+        InputError: If the file is not a complete `.npz` file. Lookups raise it for missing arrays; their messages do
+            not name the file (see :func:`rrtik_ompl.base.errors.in_file`).
     """
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
@@ -45,20 +46,20 @@ class NamedArrays:
         return name in self._arrays
 
     def __getitem__(self, name: str) -> NDArray[Any]:
-        """Return an array.
+        """Return the array of a given name.
 
         Raises:
-            InputError: If there is none of that name.
+            InputError: If there is none.
         """
         if name not in self._arrays:
             raise InputError(f"'{name}' is missing; save it again")
         return self._arrays[name]
 
     def whole_numbers(self, name: str) -> NDArray[np.int64]:
-        """Return an array of whole numbers.
+        """Return an integer array.
 
         Raises:
-            InputError: If there is none of that name, or it holds anything else.
+            InputError: If there is none of that name, or its numbers are not integers.
         """
         found = self[name]
         if not np.issubdtype(found.dtype, np.integer):
@@ -66,10 +67,10 @@ class NamedArrays:
         return found.astype(np.int64)
 
     def count(self, name: str) -> int:
-        """Return a whole number of at least 0.
+        """Return a single integer of at least 0.
 
         Raises:
-            InputError: If there is none of that name, or it is anything else.
+            InputError: If there is none of that name, or it is something else.
         """
         found = self.whole_numbers(name)
         if found.ndim != 0 or found < 0:

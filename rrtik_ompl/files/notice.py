@@ -1,4 +1,4 @@
-"""Who is told what takes a while and happens once per machine: kernels compiled, meshes covered."""
+"""Reports of slow work that happens once per machine, such as compiling kernels and covering meshes."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ def _silence(message: str) -> None:
     del message
 
 
-listener: Callable[[str], None] = _silence  # may be replaced; is told each thing at most once in a process
+listener: Callable[[str], None] = _silence  # may be replaced; receives each message at most once per process
 _told: set[str] = set()
 
 
 def tell_once(message: str) -> None:
-    """Report what is being made."""
+    """Report a message to the listener, unless this process has reported it already."""
     if message not in _told:
         _told.add(message)
         listener(message)

@@ -1,4 +1,4 @@
-"""What the headers of grey pictures say of their numbers: how many bits they had, and which one stands for no data."""
+"""Headers of grey pictures: the number of bits of their values, and the value that stands for missing data."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.base.errors import InputError
 
 PNG = b"\x89PNG\r\n\x1a\n"  # signature
-PNG_BITS = 24  # place of the bits of a sample
-PNG_COLOUR = 25  # place of its kind
+PNG_BITS = 24  # offset of the number of bits of a sample
+PNG_COLOUR = 25  # offset of the colour type
 # Tags of TIFF.
 BITS = 258
 PHOTOMETRIC = 262
 GDAL_METADATA = 42112
 GDAL_NODATA = 42113
-TIFF_SIZES = {1: 1, 2: 1, 3: 2, 4: 4, 5: 8, 11: 4, 12: 8, 16: 8}  # bytes of the types of values
+TIFF_SIZES = {1: 1, 2: 1, 3: 2, 4: 4, 5: 8, 11: 4, 12: 8, 16: 8}  # number of bytes of each type of value
 MOST_TAGS = 4096
 
 
 @dataclass(frozen=True)
 class PictureHeader:
-    """What a reader of pictures does not say.
+    """Data of a header that readers of pictures do not report.
 
     Attributes:
-        most: The largest number of the file where the reader stretches it to 255; None where it does not.
-        nodata: The number that stands for no data, None if there is none.
+        most: The largest possible value of the file if the reader stretches it to 255; None if it does not.
+        nodata: The value that stands for missing data; None if there is none.
     """
 
     most: int | None = None
@@ -38,10 +38,10 @@ class PictureHeader:
 
 
 def picture_header(data: bytes, what: str) -> PictureHeader:
-    """What the header of a picture says.
+    """Read the header of a picture of heights.
 
     Raises:
-        InputError: If its numbers are no heights: a bitmap, a picture whose white is 0, or scaled by what it says.
+        InputError: If its values are not heights: a bitmap, a picture whose white is 0, or one with a scale or offset.
     """
     if data.startswith(PNG) and len(data) > PNG_COLOUR:
         bits = data[PNG_BITS]
@@ -59,7 +59,7 @@ def picture_header(data: bytes, what: str) -> PictureHeader:
 
 
 def unstretched(rows: Matrix, header: PictureHeader) -> Matrix:
-    """Return the numbers of the file, from those of a reader that stretches them to 255."""
+    """Recover the values of the file from values that a reader has stretched to 255."""
     if header.most is None:
         return rows
     return np.round(rows * (header.most / 255.0))
@@ -83,7 +83,7 @@ def _tiff_header(data: bytes, what: str) -> PictureHeader:
 
 
 def _tags(data: bytes) -> Iterator[tuple[int, tuple[int, bytes]]]:
-    """Number, type and bytes of each tag of the first picture of a TIFF; what is damaged ends them."""
+    """Yield number, type and bytes of each tag of the first picture of a TIFF file; stop at damaged data."""
     order = "<" if data[:2] == b"II" else ">"
     try:
         (magic,) = struct.unpack_from(f"{order}H", data, 2)
@@ -100,7 +100,7 @@ def _tags(data: bytes) -> Iterator[tuple[int, tuple[int, bytes]]]:
             if length > inline:
                 (place,) = struct.unpack_from(f"{order}{'Q' if big else 'I'}", data, place)
             found = data[place : place + length]
-            # numbers are kept as little-endian ones of two bytes: of those that matter there are no others
+            # Numbers of two bytes are converted to little-endian; other numbers are not used.
             short = kind == 3 and order == ">"
             yield tag, (kind, np.frombuffer(found, dtype=">u2").astype("<u2").tobytes() if short else found)
             at += size
@@ -109,14 +109,14 @@ def _tags(data: bytes) -> Iterator[tuple[int, tuple[int, bytes]]]:
 
 
 def _numbers(tag: tuple[int, bytes] | None) -> list[int]:
-    """Return the numbers of two bytes of a tag; none if it has others."""
+    """Return the values of a tag with two-byte numbers; an empty list for other tags."""
     if tag is None or tag[0] != 3:
         return []
     return [int(value) for value in np.frombuffer(tag[1][: len(tag[1]) // 2 * 2], dtype="<u2")]
 
 
 def _number(text: bytes) -> float | None:
-    """Return the number in a text; None if there is none, or it is not finite."""
+    """Return the finite number in a text; None if there is none."""
     try:
         value = float(text.split(b"\0")[0].strip() or b"nan")
     except ValueError:

@@ -1,8 +1,8 @@
-"""Points and rows of numbers out of the bytes of files: text, .npy, PLY and PCD, as many as a header claims.
+"""Readers of points and rows of numbers from the bytes of text, .npy, PLY and PCD files.
 
-Of a PLY file (text, little- and big-endian) it is the element ``vertex``, of a PCD file (ascii, binary,
-binary_compressed) the fields x, y and z. The sensor's pose that a PCD file may state (VIEWPOINT) is not applied: points
-are taken as they stand in the file.
+From a PLY file (text, little- or big-endian) the element ``vertex`` is read, from a PCD file (ascii, binary,
+binary_compressed) the fields x, y and z. The pose of the sensor that a PCD file may state (VIEWPOINT) is not applied. A
+file must have as many points as its header claims.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from rrtik_ompl.base.errors import InputError
 
 AXES = ("x", "y", "z")
-LONGEST_LINE = 4 * 1024 * 1024  # bytes, that are surely read; a line takes ten times its size in memory
+LONGEST_LINE = 4 * 1024 * 1024  # [bytes] lines up to this length are read; a line takes ten times its size in memory
 PLY_TYPES = {"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4", "float": "f4"}
 PLY_TYPES |= {"double": "f8", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4"}
 PLY_TYPES |= {"float32": "f4", "float64": "f8"}
@@ -25,14 +25,14 @@ PLY_ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"
 PLY_END = b"end_header"
 PCD_KINDS = {"F": "f", "I": "i", "U": "u"}
 PCD_SIZES = ("1", "2", "4", "8")
-MOST_UNPACKED = 256 * 1024 * 1024  # bytes of compressed points
+MOST_UNPACKED = 256 * 1024 * 1024  # [bytes] largest size of compressed points after unpacking
 
 
 def claimed(text: str, what: str) -> int:
-    """Return a number of points that a header claims.
+    """Parse the number of points that a header claims.
 
     Raises:
-        InputError: If it is no whole number of at least 0.
+        InputError: If it is not a whole number of at least 0.
     """
     if not text.isascii() or not text.isdigit() or len(text) > 18:
         raise InputError(f"{what}: expected a number of points, got '{text[:20]}'")
@@ -40,10 +40,10 @@ def claimed(text: str, what: str) -> int:
 
 
 def records(data: bytes, offset: int, kind: np.dtype[Any], count: int, what: str) -> NDArray[Any]:
-    """Records from a place on, shape (count,), without a copy.
+    """Return ``count`` records of a file from a byte offset on, shape (count,), without copying.
 
     Raises:
-        InputError: If the file is too short for so many.
+        InputError: If the file is too short for them.
     """
     most = max(0, len(data) - offset) // max(1, kind.itemsize)
     if count > most:
@@ -52,10 +52,10 @@ def records(data: bytes, offset: int, kind: np.dtype[Any], count: int, what: str
 
 
 def npy_rows(data: bytes, what: str, columns: int | None = None) -> NDArray[Any]:
-    """Return the array of a .npy file of numpy, shape (n, columns); any number of columns if None.
+    """Read the array of a .npy file of numpy, shape (n, columns); any number of columns if None.
 
     Raises:
-        InputError: If it is none, its shape is another one, or the file is too short for what its header claims.
+        InputError: If it is not such a file, its shape is another one, or it is shorter than its header claims.
     """
     stream = io.BytesIO(data)
     try:
@@ -75,10 +75,16 @@ def npy_rows(data: bytes, what: str, columns: int | None = None) -> NDArray[Any]
 
 
 def text_rows(data: bytes, columns: Sequence[int] | None, what: str, most: int | None = None) -> NDArray[np.float64]:
-    """Columns of rows of numbers in a text, shape (n, len(columns)); all of them if None.
+    """Read columns of rows of numbers from a text, shape (n, len(columns)).
+
+    Args:
+        data: The text, with blanks or commas between numbers.
+        columns: Indices of the columns; None for all.
+        what: Name of the file, for messages.
+        most: Largest number of rows to read; None for all.
 
     Raises:
-        InputError: If a row is too short, too long, or has something else.
+        InputError: If a row is too short or too long, or contains other things than numbers.
     """
     for begin in range(0, len(data) - LONGEST_LINE, LONGEST_LINE):
         end = begin + LONGEST_LINE
@@ -90,7 +96,8 @@ def text_rows(data: bytes, columns: Sequence[int] | None, what: str, most: int |
     if not plain or plain.isspace():
         return np.zeros((0, len(columns or ())))
 
-    lines = io.TextIOWrapper(io.BytesIO(plain), "ascii", errors="replace")  # read line by line: all at once take memory
+    # Lines are read one by one, as a list of all of them would take much memory.
+    lines = io.TextIOWrapper(io.BytesIO(plain), "ascii", errors="replace")
     try:
         rows = np.loadtxt(lines, usecols=columns, ndmin=2, max_rows=most, dtype=np.float64)
     except ValueError as error:
@@ -99,7 +106,7 @@ def text_rows(data: bytes, columns: Sequence[int] | None, what: str, most: int |
 
 
 def coordinates(rows: NDArray[Any]) -> NDArray[Any]:
-    """Return the fields x, y and z of records as rows, shape (n, 3)."""
+    """Return the fields x, y and z of records as rows, shape (n, 3), in float32 unless a field is wider."""
     kind = np.float64 if any(rows.dtype[axis].itemsize > 4 for axis in AXES) else np.float32
     points = np.empty((len(rows), len(AXES)), dtype=kind)
     for k, axis in enumerate(AXES):
@@ -108,10 +115,10 @@ def coordinates(rows: NDArray[Any]) -> NDArray[Any]:
 
 
 def ply_points(data: bytes, what: str) -> NDArray[Any]:
-    """Return points of a PLY file, shape (n, 3).
+    """Read the points of a PLY file, shape (n, 3).
 
     Raises:
-        InputError: If it is none, or has no points; one line.
+        InputError: If it is not a PLY file, or has no points.
     """
     head, found, _ = data.partition(PLY_END)
     if not data.startswith(b"ply") or not found:
@@ -141,7 +148,15 @@ def ply_points(data: bytes, what: str) -> NDArray[Any]:
 
 
 def _vertex(lines: list[list[str]], what: str) -> tuple[list[list[str]], str]:
-    """The properties of the element ``vertex``, each "property", type and name, and how many points are claimed."""
+    """Parse the element ``vertex`` of the header of a PLY file.
+
+    Args:
+        lines: The words of each line of the header.
+        what: Name of the file, for messages.
+
+    Returns:
+        The properties, each as the words "property", type and name; the number of points as text.
+    """
     elements = [k for k, line in enumerate(lines) if line[0:1] == ["element"] and len(line) == 3]
     if not elements or lines[elements[0]][1] != "vertex":
         raise InputError(f"{what}: the first element of a PLY file must be 'vertex'; export points alone")
@@ -158,10 +173,10 @@ def _vertex(lines: list[list[str]], what: str) -> tuple[list[list[str]], str]:
 
 
 def pcd_points(data: bytes, what: str) -> NDArray[Any]:
-    """Return points of a PCD file, shape (n, 3).
+    """Read the points of a PCD file, shape (n, 3).
 
     Raises:
-        InputError: If it is none, or has no points; one line.
+        InputError: If it is not a PCD file, or has no points.
     """
     head, found, rest = data.partition(b"\nDATA ")
     if not found:
@@ -191,7 +206,7 @@ def pcd_points(data: bytes, what: str) -> NDArray[Any]:
 
 
 def _record(header: dict[str, list[str]], names: list[str], what: str) -> np.dtype[Any]:
-    """Return the type of one point."""
+    """Return the numpy type of one point of a PCD file from its header."""
     sizes = header.get("SIZE", [])
     kinds = header.get("TYPE", [])
     counts = header.get("COUNT", ["1"] * len(names))
@@ -213,7 +228,7 @@ def _record(header: dict[str, list[str]], names: list[str], what: str) -> np.dty
 
 
 def _columns(body: bytes, kind: np.dtype[Any], count: int, what: str) -> NDArray[Any]:
-    """Return the points of compressed data: all x, then all y, ..."""
+    """Read the points of compressed data, which contain all x, then all y and so on, shape (n, 3)."""
     if len(body) < 8:
         raise InputError(f"{what}: the compressed points are missing; save it again")
     packed, size = (int.from_bytes(body[k : k + 4], "little") for k in (0, 4))
@@ -235,10 +250,10 @@ def _columns(body: bytes, kind: np.dtype[Any], count: int, what: str) -> NDArray
 
 
 def unpacked(packed: bytes, size: int, what: str) -> bytes:
-    """Bytes out of Lehmann's LZF: runs of bytes, and copies of what came before.
+    """Decompress data of Lehmann's LZF format: literal runs of bytes, and copies of earlier output.
 
     Raises:
-        InputError: If they are damaged.
+        InputError: If the data are damaged.
     """
     plain = bytearray()
     place = 0
@@ -246,13 +261,13 @@ def unpacked(packed: bytes, size: int, what: str) -> bytes:
         while place < len(packed):
             control = packed[place]
             place += 1
-            # As many bytes as this says follow as they are.
+            # A literal run: the next control + 1 bytes are copied as they are.
             if control < 32:
                 plain += packed[place : place + control + 1]
                 place += control + 1
                 continue
 
-            # Or it is a copy: of how many bytes, and from how far back.
+            # A copy of earlier output: the control byte holds its length and a part of its distance.
             count = control >> 5
             if count == 7:
                 count += packed[place]
@@ -265,7 +280,7 @@ def unpacked(packed: bytes, size: int, what: str) -> bytes:
             end = begin + count + 2
             if end <= len(plain):
                 plain += plain[begin:end]
-            else:  # it goes on with what it has just copied
+            else:  # The copy overlaps its own output, so it is made byte by byte.
                 for k in range(begin, end):
                     plain.append(plain[k])
     except IndexError:

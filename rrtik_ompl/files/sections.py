@@ -1,4 +1,4 @@
-"""What the sections of our YAML files are made of, and how a pydantic complaint becomes one line for a person."""
+"""The base of the sections of YAML files, and the conversion of pydantic's errors to one line for a person."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
 
 
-SMALLEST = 1e-6  # [m]; geometry below is a slip of the pen and breaks collision checking
+SMALLEST = 1e-6  # [m] smaller geometry is a mistake and breaks collision checking
 
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-LARGEST, le=LARGEST)]
 Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0, le=LARGEST)]
@@ -32,7 +32,7 @@ Numbers = Annotated[list[Number], Field(min_length=1)]
 
 
 def _one(value: object) -> object:
-    if value is True:  # equal to 1 in Python, but not what a file should say
+    if value is True:  # True equals 1 in Python, but is not valid in a file
         raise PydanticCustomError("version", "must be 1, found true")
     return value
 
@@ -47,7 +47,8 @@ _TAG = "<"  # tags of unions begin with it, so that they differ from the keys in
 class Section(BaseModel):
     """A group of keys in a file; a key that it does not know is an error that lists those it knows."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)  # built when a file has such a section
+    # The validator of a section is built when a file first contains one.
+    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 
     @model_validator(mode="before")
     @classmethod
@@ -76,12 +77,12 @@ Model = TypeVar("Model", bound=BaseModel)
 
 
 def told_apart_by(*keys: str, what: str, text: str | None = None) -> Discriminator:
-    """Choose the member of a union by which of ``keys`` is there; members are tagged ``tag(key)``.
+    """Select the member of a union by which of ``keys`` is present; members are tagged ``tag(key)``.
 
     Args:
         keys: The keys that distinguish the members.
-        what: Name of the union in the message if none of them is there.
-        text: Tag word of the member that is plain text, if there is one.
+        what: Name of the union in the message if none of them is present.
+        text: Tag of the member that is plain text, if there is one.
     """
 
     def choose(data: object) -> str | None:
@@ -96,15 +97,15 @@ def told_apart_by(*keys: str, what: str, text: str | None = None) -> Discriminat
 
 
 def tag(key: str) -> str:
-    """Tag of the union member that is known by ``key``."""
+    """Return the tag of the union member that is recognised by ``key``."""
     return f"{_TAG}{key}>"
 
 
 def exactly_one(section: BaseModel, keys: Iterable[str], what: str) -> str:
-    """Return the only one of ``keys`` that has a value in a validated section.
+    """Return the only key of ``keys`` that has a value in a validated section.
 
     Raises:
-        PydanticCustomError: If none or several have one.
+        PydanticCustomError: If none or several of them have a value.
     """
     wanted = tuple(keys)
     given = [key for key in wanted if getattr(section, key) is not None]
@@ -115,12 +116,12 @@ def exactly_one(section: BaseModel, keys: Iterable[str], what: str) -> str:
 
 
 def parse(document: YamlDocument, model: type[Model], data: object = None) -> Model:
-    """Check a document against a model.
+    """Validate a document by a pydantic model.
 
     Args:
         document: The file.
         model: Its pydantic model.
-        data: What to check instead of the document's top level (same locations).
+        data: Data to validate instead of the document's top level, with the same locations; None for the document.
 
     Raises:
         InputError: One line with file, line, key, what was found and the remedy; further errors are counted.
@@ -134,7 +135,10 @@ def parse(document: YamlDocument, model: type[Model], data: object = None) -> Mo
 
 
 def without_null(schema: dict[str, Any]) -> dict[str, Any]:
-    """Return a JSON schema in which an absent key is absent, never null (pydantic writes ``anyOf: [.., null]``)."""
+    """Remove the null alternatives from a JSON schema that pydantic writes for optional keys.
+
+    An absent key is absent in our files, never null, as ``anyOf: [.., null]`` would allow.
+    """
     cleaned: dict[str, Any] = {k: _without_null(v) for k, v in schema.items() if not (k == "default" and v is None)}
     choices = [choice for choice in cleaned.get("anyOf", ()) if choice != {"type": "null"}]
     if len(choices) == 1:
@@ -164,7 +168,7 @@ def _message(error: ErrorDetails) -> str:
 
 
 def _unknown_kind(error: ErrorDetails) -> str:
-    """What stands where a key should tell the kind, and which key may be meant."""
+    """Describe what was found in place of a key that tells the kind, and suggest the key that may be meant."""
     data = error["input"]
     kinds = error["msg"].partition(_ONE_OF)[2].split(", ")
     near: list[str] = []

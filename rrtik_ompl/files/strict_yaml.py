@@ -1,7 +1,7 @@
-"""Strict YAML: no key twice, no tags, no bombs; every value knows its line, every error says FILE:LINE: key: remedy.
+"""A strict YAML reader: no duplicate keys, no tags, limited size; errors name file, line, key and remedy.
 
-Plain scalars are read as in YAML 1.2 (``1e-3`` is a number, ``yes`` and ``12:30`` are text). The events come from
-libyaml where PyYAML has it; locations are put together only when an error needs them.
+Plain scalars are read as in YAML 1.2 (``1e-3`` is a number, ``yes`` and ``12:30`` are text). Events come from libyaml
+if PyYAML has it. Locations of values are only computed when an error needs them.
 """
 
 from __future__ import annotations
@@ -19,11 +19,12 @@ import yaml
 from rrtik_ompl.base.errors import InputError, RrtikError
 from rrtik_ompl.files.text import file_name, read_text, write_text
 
-Location: TypeAlias = tuple[str | int, ...]  # keys and list numbers from the top: ("start", "joints", 2)
+Location: TypeAlias = tuple[str | int, ...]  # keys and list indices from the top: ("start", "joints", 2)
 
 MAX_DEPTH = 40
-MAX_VALUES = 1_000_000  # after aliases are followed
-_STYLE: dict[str, Any] = {"default_flow_style": None, "allow_unicode": True}  # innermost lists and groups on one line
+MAX_VALUES = 1_000_000  # largest number of values with all aliases expanded
+# The innermost lists and mappings are written on one line.
+_STYLE: dict[str, Any] = {"default_flow_style": None, "allow_unicode": True}
 _LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _INTEGER = re.compile(r"[-+]?[0-9]{1,4000}")
 _FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
@@ -36,13 +37,13 @@ _WORDS |= {sign + form: float(sign + "inf") for form in (".inf", ".Inf", ".INF")
 
 
 def key_path(location: Location) -> str:
-    """``("obstacles", 3, "box")`` as a person writes it: ``obstacles[3].box``."""
+    """Return a location as people write it: ``obstacles[3].box`` for ``("obstacles", 3, "box")``."""
     text = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in location)
     return text.removeprefix(".")
 
 
 def plain_value(text: str) -> bool | float | str | None:
-    """Value of an unquoted scalar: nothing, true/false, whole number, number, else text."""
+    """Return the value of an unquoted scalar: None, true or false, an integer, a number, or otherwise text."""
     if text in _WORDS:
         return _WORDS[text]
     if text[0] not in _NUMBER_STARTS:
@@ -54,16 +55,16 @@ def plain_value(text: str) -> bool | float | str | None:
 
 @dataclass(slots=True)
 class Group:
-    """A list or mapping of the file.
+    """A list or mapping of the file while it is read.
 
     Attributes:
         value: The list or mapping.
-        line: Where it begins, from 1.
+        line: Line where it begins, from 1.
         anchor: Its name for aliases.
-        key: Of a mapping, the key whose value comes next.
-        size, height: How many values it unfolds to, and in how many levels.
-        lines: The line of each entry, by its key or its number.
-        groups: Those of its entries that are groups themselves.
+        key: In a mapping, the key whose value comes next.
+        size, height: Number of values and of levels when aliases are expanded.
+        lines: The line of each entry, by its key or index.
+        groups: Those of its entries that are lists or mappings, by key or index.
     """
 
     value: Any
@@ -77,7 +78,7 @@ class Group:
 
     @property
     def place(self) -> str | int | None:
-        """Key or number of the entry that comes next; None where a mapping expects a key."""
+        """Key or index of the entry that comes next; None where a mapping expects a key."""
         return len(self.value) if type(self.value) is list else self.key
 
     def located(self, location: Location = ()) -> Iterator[tuple[Location, int]]:
@@ -90,13 +91,13 @@ class Group:
 
 @dataclass(slots=True)
 class Builder:
-    """Builds values from parser events with its own stack: the parser's composer overflows on deep nesting.
+    """Builds values from parser events with its own stack, as the parser's composer overflows on deep nesting.
 
     Attributes:
         path: The file, for errors.
         top: The value of the document.
-        group: The group that it is, if it is one.
-        documents: How many have begun.
+        group: The group of ``top`` if it is a list or mapping.
+        documents: Number of documents that have begun.
     """
 
     path: Path
@@ -107,7 +108,7 @@ class Builder:
     _anchors: dict[str, tuple[Any, int, int]] = field(default_factory=dict)  # value, size, height
 
     def read(self, text: str) -> None:
-        """Digest a whole file.
+        """Read a whole file into ``top`` and ``group``.
 
         Raises:
             InputError: If the file breaks one of the rules.
@@ -172,13 +173,13 @@ class Builder:
         self._add(*self._anchors[event.anchor], None, event)
 
     def _place(self, parent: Group, event: yaml.Event) -> str | int:
-        """Return where the next value of a group belongs."""
+        """Return the key or index of the next value of a group."""
         if (place := parent.place) is None:
             raise self._error(event, "a key must be a word, found a list or a group")
         return place
 
     def _add(self, value: object, size: int, height: int, anchor: str | None, event: yaml.Event) -> None:
-        """Put a finished value where it belongs and keep count of what the file unfolds to."""
+        """Store a finished value in its parent and update the size and height with aliases expanded."""
         if anchor is not None:
             self._anchors[anchor] = (value, size, height)
 
@@ -218,12 +219,12 @@ def _line(event: yaml.Event) -> int:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class YamlDocument:
-    """A YAML file that was read: its values and where each of them is.
+    """A YAML file that was read: its values and their locations.
 
     Attributes:
         path: The file, as it was named by the caller.
         data: The top-level mapping.
-        top: Where its groups begin.
+        top: The lines of all its values.
     """
 
     path: Path
@@ -236,7 +237,7 @@ class YamlDocument:
         return {(): self.top.line, **dict(self.top.located())}
 
     def place(self, location: Location) -> str:
-        """``FILE:LINE: key.path`` of a location (of its nearest parent that is in the file, for the line)."""
+        """Return ``FILE:LINE: key.path`` of a location; the line is that of its nearest parent in the file."""
         known = location
         lines = self.lines
         while known not in lines:
@@ -250,7 +251,7 @@ class YamlDocument:
 
     @contextmanager
     def at(self, location: Location) -> Iterator[None]:
-        """Put file, line and key in front of whatever error of ours is raised inside the ``with`` block."""
+        """Prepend file, line and key to errors of this library that are raised inside the ``with`` block."""
         try:
             yield
         except RrtikError as error:
@@ -277,7 +278,7 @@ def read_yaml(path: str | os.PathLike[str]) -> YamlDocument:
         if "nesting depth" in (error.problem or ""):  # libyaml's own limit, met before its events reach ours
             raise InputError(f"{path}: nested deeper than {MAX_DEPTH} levels") from error
         raise InputError(_syntax(file, text, error)) from error
-    except yaml.YAMLError as error:  # a control character, most often
+    except yaml.YAMLError as error:  # most often because of a control character
         raise InputError(f"{path}: not valid YAML: {str(error).splitlines()[0]}; is it a text file?") from error
 
     if not builder.documents or builder.top is None:
@@ -289,7 +290,7 @@ def read_yaml(path: str | os.PathLike[str]) -> YamlDocument:
 
 
 def write_yaml(path: str | os.PathLike[str], data: Mapping[str, Any]) -> None:
-    """Write a mapping of plain values as YAML, whole or not at all; every number reads back bit for bit.
+    """Write a mapping of plain values as YAML, completely or not at all; numbers read back bit for bit.
 
     Raises:
         InputError: If the file cannot be written.
@@ -298,7 +299,7 @@ def write_yaml(path: str | os.PathLike[str], data: Mapping[str, Any]) -> None:
 
 
 def describe(value: object) -> str:
-    """What was found, for an error message: ``text 'abc'``, ``a list of 3``, ``nothing``."""
+    """Describe a value for an error message: ``text 'abc'``, ``a list of 3``, ``nothing``."""
     if value is None:
         return "nothing"
     if isinstance(value, bool):

@@ -1,4 +1,4 @@
-"""The text of a path file: JSON (complete), CSV with a header of joint names, OMPL's matrix text; written and read."""
+"""The text of path files: JSON (complete), CSV with a header of joint names, and OMPL's matrix text."""
 
 from __future__ import annotations
 
@@ -14,7 +14,12 @@ FORMATS = (".json", ".csv", ".txt")
 
 
 def dumps(document: dict[str, Any], ending: str) -> str:
-    """Text of a path: ``document`` holds ``waypoints``, ``joint_names`` and whatever else JSON shall keep."""
+    """Return the text of a path file.
+
+    Args:
+        document: ``waypoints``, ``joint_names`` and other data; all of it is stored in JSON.
+        ending: ".json", ".csv" or ".txt".
+    """
     if ending == ".json":
         return json.dumps(document, indent=None if "certificate" in document else 1) + "\n"
     text = io.StringIO()
@@ -26,7 +31,7 @@ def dumps(document: dict[str, Any], ending: str) -> str:
 
 
 def loads(text: str, ending: str) -> dict[str, Any]:
-    """What :func:`dumps` wrote: ``waypoints``, and ``joint_names``, ``units`` and so on if the text says them.
+    """Parse the text of a path file: ``waypoints``, and ``joint_names``, ``units`` and so on if the text has them.
 
     Raises:
         InputError: If the text is malformed; the message names the line or the key.
@@ -42,7 +47,7 @@ def _from_table(text: str, separator: str | None) -> dict[str, Any]:
 
 
 def json_object(text: str, kind: str, key: str) -> dict[str, Any]:
-    """Return the JSON object of a file of version 1 and of this kind, that has this key; names and units are checked.
+    """Parse the JSON object of a file of version 1 and of a kind that has a key; names and units are checked.
 
     Raises:
         InputError: If the text is something else; the message names the line or the key.
@@ -60,7 +65,7 @@ def json_object(text: str, kind: str, key: str) -> dict[str, Any]:
 
 
 def checked_object(document: object, kind: str, key: str) -> dict[str, Any]:
-    """What has been read, as an object of version 1 and of a kind, that has this key.
+    """Validate parsed JSON as an object of version 1 and of a kind that has a key, and return it.
 
     Raises:
         InputError: If it is something else; the message names the key.
@@ -80,7 +85,7 @@ def _asked(kind: str) -> str:
 def _check_heads(document: dict[str, Any], kind: str) -> None:
     for key, expected in (("version", 1), ("kind", kind)):
         found = document.get(key, expected)
-        if found is True or found != expected:  # true is equal to 1 in Python, but not what a file should say
+        if found is True or found != expected:  # True equals 1 in Python, but is not valid in a file
             raise InputError(f"{key}: expected {expected!r}, got {found!r}")
 
     for key in ("units", "joint_names", "continuous"):
@@ -95,7 +100,14 @@ def _check_heads(document: dict[str, Any], kind: str) -> None:
 
 
 def table_rows(text: str, separator: str | None) -> tuple[list[str] | None, list[list[float]]]:
-    """Return names (if there is a separator, then they are in the first line) and numbers of a table.
+    """Parse a table of numbers.
+
+    Args:
+        text: The table.
+        separator: Separator of a table whose first line holds names; None for blanks and no names.
+
+    Returns:
+        The names, or None, and the rows.
 
     Raises:
         InputError: If a line is malformed; the message names it.

@@ -1,4 +1,4 @@
-"""Reading and writing text files: a failure is one line that names the file; a file is written whole or not at all."""
+"""Reading and writing of files: errors name the file in one line; a file is written completely or not at all."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from pathlib import Path
 
 from rrtik_ompl.base.errors import InputError
 
-MAX_BYTES = 64 * 1024 * 1024  # far above any problem or path file; keeps /dev/zero from filling the memory
+MAX_BYTES = 64 * 1024 * 1024  # [bytes] above any problem or path file; stops endless files such as /dev/zero
 
 
 def read_text(path: str | os.PathLike[str], limit: int = MAX_BYTES) -> str:
-    """Contents of a UTF-8 text file of at most ``limit`` bytes.
+    """Read a UTF-8 text file of at most ``limit`` bytes.
 
     Raises:
         InputError: If the file is missing, a folder, unreadable, too large, or not UTF-8 text.
@@ -29,7 +29,7 @@ def read_text(path: str | os.PathLike[str], limit: int = MAX_BYTES) -> str:
 
 
 def read_bytes(path: str | os.PathLike[str], limit: int = MAX_BYTES) -> bytes:
-    """Contents of a file of at most ``limit`` bytes.
+    """Read a file of at most ``limit`` bytes.
 
     Raises:
         InputError: If the file is missing, a folder, unreadable or too large.
@@ -37,7 +37,7 @@ def read_bytes(path: str | os.PathLike[str], limit: int = MAX_BYTES) -> bytes:
     file_name(path)
     try:
         with open(path, "rb") as file:
-            length = os.fstat(file.fileno()).st_size  # 0 of devices and pipes
+            length = os.fstat(file.fileno()).st_size  # 0 for devices and pipes
             data = file.read(limit + 1) if length <= limit else b""
     except FileNotFoundError:
         raise InputError(f"{path}: no such file{_similar(Path(path))}") from None
@@ -56,7 +56,7 @@ def read_bytes(path: str | os.PathLike[str], limit: int = MAX_BYTES) -> bytes:
 
 
 def _similar(path: Path) -> str:
-    """Return a hint at a file of nearly the same name in the same folder."""
+    """Return a hint that names a similarly named file in the same folder."""
     try:
         near = get_close_matches(path.name, os.listdir(path.parent), n=1, cutoff=0.8)
     except (OSError, ValueError):
@@ -65,7 +65,7 @@ def _similar(path: Path) -> str:
 
 
 def write_text(path: str | os.PathLike[str], text: str) -> None:
-    """Write a UTF-8 text file whole or not at all, see :func:`write_bytes`.
+    """Write a UTF-8 text file completely or not at all, see :func:`write_bytes`.
 
     Raises:
         InputError: If the folder does not exist or the file cannot be written.
@@ -79,17 +79,17 @@ def write_text(path: str | os.PathLike[str], text: str) -> None:
 
 
 def write_bytes(path: str | os.PathLike[str], data: bytes) -> None:
-    """Write a file so that an interruption leaves the old file or the new one, never a half.
+    """Write a file so that an interruption leaves either the old file or the new one, never a part.
 
-    The data goes to a temporary name in the same folder, which then takes the place of the old file, and its mode.
-    Devices and pipes (``/dev/stdout``) are written directly.
+    The data are written to a temporary file in the same folder, which then replaces the old file and takes over its
+    mode. Devices and pipes (``/dev/stdout``) are written directly.
 
     Raises:
         InputError: If the folder does not exist, or the file cannot be written or is write-protected.
     """
     name = file_name(path)
     try:
-        target = Path(os.path.realpath(name))  # a link stays a link: the file it points to is replaced
+        target = Path(os.path.realpath(name))  # a link is kept, and the file that it points to replaced
         if target.is_dir():
             raise IsADirectoryError(None, "this is a folder; give a file name")
         if target.exists() and not target.is_file():
@@ -105,7 +105,7 @@ def write_bytes(path: str | os.PathLike[str], data: bytes) -> None:
 
 
 def _replace(target: Path, data: bytes) -> None:
-    """Write a file aside, under a name of its own, and let it take the place of another."""
+    """Write a temporary file and let it replace the target, whose mode it takes over."""
     try:
         mode = stat.S_IMODE(target.stat().st_mode)
     except FileNotFoundError:
@@ -126,14 +126,16 @@ def _replace(target: Path, data: bytes) -> None:
 
 
 def _appears_whole(file: Path, data: bytes) -> bool:
-    """Write a file that has no name before it is whole, so that not even a kill leaves a half; False where none can be.
+    """Write a file without a name and name it when it is complete, so that even a killed process leaves no part of it.
+
+    The result is False if the system does not support this.
 
     Raises:
-        OSError: If there is no room for it.
+        OSError: If there is no space for it.
     """
     try:
         folder = os.open(file.parent, os.O_PATH)
-    except (AttributeError, OSError):  # Linux has such files, on most of its file systems
+    except (AttributeError, OSError):  # only Linux supports such files, on most file systems
         return False
     try:
         number = os.open(".", os.O_TMPFILE | os.O_WRONLY, 0o666, dir_fd=folder)
@@ -151,10 +153,10 @@ def _appears_whole(file: Path, data: bytes) -> bool:
 
 
 def make_folder(path: str | os.PathLike[str]) -> None:
-    """Make a folder and those above it, unless it is there.
+    """Create a folder and all missing ones above it.
 
     Raises:
-        InputError: If it cannot be made.
+        InputError: If it cannot be created.
     """
     try:
         file_name(path).mkdir(parents=True, exist_ok=True)
@@ -163,10 +165,10 @@ def make_folder(path: str | os.PathLike[str]) -> None:
 
 
 def known_ending(path: str | os.PathLike[str], endings: tuple[str, ...], what: str) -> str:
-    """Ending of a file in small letters, one of ``endings``; ``what`` says in the error message what the file holds.
+    """Return the ending of a file in lower case, one of ``endings``; ``what`` names its content in the message.
 
     Raises:
-        InputError: If it is another one.
+        InputError: If it has another ending.
     """
     ending = file_name(path).suffix.lower()
     if ending not in endings:
@@ -175,10 +177,10 @@ def known_ending(path: str | os.PathLike[str], endings: tuple[str, ...], what: s
 
 
 def check_target(path: Path | None, endings: tuple[str, ...]) -> None:
-    """Refuse a file that cannot be written before the work is done, not after; None is no file.
+    """Refuse a file that could not be written later, before the work is done; None stands for no file.
 
     Raises:
-        InputError: If the ending is none of ``endings``, or the folder does not exist or cannot be written to.
+        InputError: If the ending is not in ``endings``, or the folder does not exist or is not writable.
     """
     if path is None:
         return
@@ -187,7 +189,7 @@ def check_target(path: Path | None, endings: tuple[str, ...]) -> None:
 
     try:
         folder = path.is_dir()
-    except OSError as error:  # the name is too long
+    except OSError as error:  # raised if the name is too long
         raise InputError(f"{path}: cannot be written: {error.strerror or error}") from None
 
     if folder:
@@ -199,7 +201,7 @@ def check_target(path: Path | None, endings: tuple[str, ...]) -> None:
 
 
 def file_name(path: object) -> Path:
-    """Return the path, if it is text or a path object (a number would be taken for an open file by the system).
+    """Return a path given as text or path object as a Path. Numbers are refused, as they would denote open files.
 
     Raises:
         InputError: If it is something else.
@@ -210,7 +212,7 @@ def file_name(path: object) -> Path:
 
 
 def comma_numbers(text: str, option: str) -> list[float]:
-    """Return the numbers of an option of the command line, with commas between them, or one alone.
+    """Parse the value of a command-line option: one number, or several separated by commas.
 
     Raises:
         InputError: If the text is something else.

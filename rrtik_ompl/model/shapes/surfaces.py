@@ -100,7 +100,7 @@ def _signed_area(polygon: Matrix) -> float:
 
 
 def _quad(a: Vector, b: Vector, height: float) -> NDArray[np.float64]:
-    """Upright wall over the side from a to b, seen from the right of it, as two triangles, shape (2, 3, 3)."""
+    """Return a vertical wall above the edge from a to b as two triangles, shape (2, 3, 3), facing to its right."""
     z = 0.5 * height
     low = [[*a, -z], [*b, -z]]
     high = [[*a, z], [*b, z]]
