@@ -273,6 +273,12 @@ def _status(answer: object) -> ob.PlannerStatus:
 def _raise_failure(planner: ob.Planner, name: str, status: ob.PlannerStatus, error: Exception | None) -> None:
     """Raise the error that broke a planner: one from its callbacks, or one that the planner has kept.
 
+    Args:
+        planner: The planner after its ``solve``.
+        name: Its name.
+        status: Its status.
+        error: The first error of a callback, or None.
+
     Raises:
         PlannerError: If there is such an error.
     """

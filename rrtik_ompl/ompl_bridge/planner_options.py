@@ -91,6 +91,13 @@ def other_planner(
 ) -> ob.Planner:
     """Make a planner of OMPL or a third-party one, whose options are set by setters: ``goal_bias`` by ``setGoalBias``.
 
+    Args:
+        factory: Makes the planner.
+        name: Name of the planner in messages.
+        si: Its SpaceInformation.
+        definition: The problem; only needed to destroy a planner safely that refuses an option.
+        options: Options by name.
+
     Raises:
         UnknownNameError: If it has no option of that name.
         InputError: If it cannot be made, or refuses an option.

@@ -353,6 +353,12 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
 
         From the second search on, and for anytime planners from the first on, motions are checked as densely as by the
         second check.
+
+        Args:
+            starts: Shape (s, n).
+            goals: Shape (g, n).
+            stop: Returns True when it is time to stop.
+            unrolled: Divides a path for the second check, if the space has angles of SO(2).
         """
         world = self._world
         if not isinstance(world, World):  # without a world there is no second check
@@ -379,6 +385,11 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
 
     def _remember(self, found: SearchResult, goals: Matrix, seconds: float) -> SearchResult:
         """Record the graph and the progress of a search.
+
+        Args:
+            found: The result of the search.
+            goals: Shape (g, n).
+            seconds: Time of the search [s].
 
         Returns:
             The result of the search; without a path, the nearest approach to a goal in the graph takes its place, if

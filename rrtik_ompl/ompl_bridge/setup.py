@@ -97,7 +97,14 @@ class CheckedMotions(ob.MotionValidator):  # type: ignore[misc]  # OMPL has no t
 
 
 def planning_bounds(problem: Problem, goals: Matrix) -> tuple[Vector, Vector]:
-    """Return finite bounds to sample in, shapes (n,): the limits, or one turn beyond start and goals."""
+    """Return finite lower and upper bounds to sample in, shapes (n,).
+
+    They are the joint limits; a joint without limits is bounded to one turn beyond start and goals.
+
+    Args:
+        problem: The problem.
+        goals: Goal configurations, shape (k, n).
+    """
     robot = problem.world.robot
     if np.isfinite(robot.lower).all() and np.isfinite(robot.upper).all():
         return robot.lower, robot.upper

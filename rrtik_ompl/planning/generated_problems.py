@@ -149,6 +149,12 @@ def _axes(forward: Vector, upward: Vector) -> Matrix:
 def _starts(world: World, goal: Vector, reach: float, rng: np.random.Generator) -> list[Vector]:
     """Draw free configurations far from the goal from which no simple motion leads to it.
 
+    Args:
+        world: Robot and scene.
+        goal: Shape (dof,).
+        reach: Reach of the arm [m].
+        rng: Draws the configurations.
+
     Returns:
         At most `STARTS` configurations whose straight motion and single-joint moves to the goal all collide; none if
         the goal is not free.
@@ -196,7 +202,7 @@ def _proofs() -> tuple[tuple[str, int], ...]:
 
 
 def _board(low: tuple[float, float, float], high: tuple[float, float, float]) -> tuple[Shape, Any]:
-    """Return a box with two opposite corners given, and its pose."""
+    """Return a box between two opposite corners, and its pose."""
     corners = np.array([low, high])
     return Box(corners[1] - corners[0]), pin.SE3(np.eye(3), corners.mean(axis=0))
 

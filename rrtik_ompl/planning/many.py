@@ -77,7 +77,7 @@ def plan_many(
 
     Raises:
         UnknownNameError: If there is no planner of that name.
-        InputError: If starts and goals are no such arrays, or a number or a parameter makes no sense.
+        InputError: If starts or goals have the wrong shape, or a number or a parameter is invalid.
         PlannerError: If the planner broke.
 
     Example:

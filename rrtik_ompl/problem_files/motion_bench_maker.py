@@ -56,6 +56,11 @@ def load_motion_bench_maker(
         InputError: If a file cannot be used, or contains something that is not supported; one line with file, line, key
             and remedy.
         ProblemError: If start or goal is in collision or outside the limits.
+
+    Warns:
+        SceneWarning: If a name is unknown (a link that may be touched, an entry of the allowed collisions, a joint), if
+            the robot is not the one that the scene names or moves other joints than the group, or if the scene forbids
+            links to touch that the robot never compares.
     """
     # Read both files.
     scene_file, request_file = _pair(Path(scene_path), None if request_path is None else Path(request_path))
@@ -166,7 +171,10 @@ def _base_pose(state: RobotState) -> pin.SE3:
 def _said_where(
     scene_document: YamlDocument, request_document: YamlDocument, scene: SceneMessage, request: RequestMessage
 ) -> Iterator[None]:
-    """Add file, line and key to an error about a name that the robot does not have, inside a ``with`` block."""
+    """Add file, line and key to an error about a name that the robot does not have, inside a ``with`` block.
+
+    The place is the one at which the scene or the request uses the name.
+    """
     try:
         yield
     except UnknownNameError as error:

@@ -84,7 +84,13 @@ def held_regions_of(wanted: Constraints, frames: Frames) -> list[TaskRegion]:
 
 
 def _goal_region(place: PositionConstraint, turn: OrientationConstraint | None, frames: Frames) -> TaskRegion:
-    """Return a goal that needs a region: a box, a point off the link's origin, or a free axis."""
+    """Return a goal that needs a region: a box, a point off the link's origin, or a free axis.
+
+    Args:
+        place: Position constraint of the link.
+        turn: Orientation constraint of the same link, or None.
+        frames: Frames that the constraints refer to.
+    """
     box = _placed(place, frames)
     bounds, tolerance = _sides(place)
     offset = -np.array(place.offset)

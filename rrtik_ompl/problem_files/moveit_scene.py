@@ -86,6 +86,11 @@ class SceneReader:
     def hold(self, document: YamlDocument, location: Location, state: RobotState) -> None:
         """Read the objects that a state attaches to links; one with the name of an earlier one replaces it.
 
+        Args:
+            document: The file of the state.
+            location: Keys that lead to the state in the file.
+            state: The state.
+
         Raises:
             InputError: If one of them cannot be read; with file, line and key.
         """
@@ -278,7 +283,13 @@ def _mapped(placed: PlacedOctomap, frames: Frames) -> Obstacle | None:
 
 
 def _allowed(matrix: AllowedMatrix, robot: Robot, names: dict[str, list[str]]) -> tuple[tuple[str, str], ...]:
-    """Return the pairs of links and solids that may touch, by the table or else by the defaults of names."""
+    """Return the pairs of links and solids that may touch, by the table or else by the defaults of names.
+
+    Args:
+        matrix: The table of allowed collisions.
+        robot: Its own list decides about pairs of links, if it has one.
+        names: For each object the names of its parts.
+    """
     links = robot.link_names
     stated = matrix.stated()
     allowed = [pair for pair, free in stated.items() if free and {*pair} <= {*links, *names}]

@@ -21,7 +21,7 @@ from rrtik_ompl.problem_files.scene import PoseEntry
 
 
 class Constraint(Section):
-    """What all path constraints have."""
+    """Keys of all path constraints."""
 
     frame: Name | None = Field(None, description="link or attached object that is constrained; the tip if absent")
 

@@ -33,7 +33,7 @@ Padding: TypeAlias = Annotated[
 
 
 class _Mounted(Section):
-    """What every kind of robot may say besides."""
+    """Keys of every kind of robot."""
 
     base_pose: PoseEntry | None = Field(None, description="pose of the base in the world; identity if absent")
     tip: Name | None = Field(None, description="link or frame that goals refer to")
@@ -91,7 +91,7 @@ class Point2dRobot(_Mounted):
 
 
 class _Described(_Mounted):
-    """What robots of a URDF may say."""
+    """Keys of robots that are described by a URDF."""
 
     srdf: Name | None = Field(None, description="groups, named postures, allowed collisions, gripper")
     group: Name | None = Field(None, description="group of the SRDF whose joints move")

@@ -181,7 +181,7 @@ class SceneEntry(Section):
 
 
 class _SceneFile(Section):
-    """A file with a scene alone; a whole problem file will do as well, what else it says is not looked at."""
+    """A file with a scene, or a whole problem file, whose other keys are ignored."""
 
     version: Version
     scene: SceneEntry

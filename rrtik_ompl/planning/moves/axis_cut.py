@@ -204,6 +204,13 @@ def _moves_to_waypoint(route: Matrix, pivot: int, test: int, motions_free: Motio
 
     The edge to a neighbour is known to be free. If it moves one joint it is not checked again, so that an answer that
     differs by rounding cannot stop the pass.
+
+    Args:
+        route: Shape (k, n).
+        pivot: Index of the waypoint from which to move.
+        test: Index of the waypoint to reach.
+        motions_free: Returns which straight motions are free.
+        order: Order of the joints.
     """
     moves = axis_moves(route[pivot], route[test], order)
 

@@ -150,6 +150,13 @@ class FineGrids:
 
         The grid is checked in steps, and only the motions of a route are proven. Segments whose proof fails are closed,
         and the grid is searched again. The route has at most `max_moves` moves.
+
+        Args:
+            level: Level of clearance.
+            values: For each joint the values of the grid.
+            start: Shape (n,).
+            goal: Shape (n,).
+            max_moves: Limit of the moves of the route.
         """
         in_steps = BatchedMotionQueries(level.searched.motion_valid_batch, self.budget.over)
         proving = BatchedMotionQueries(level.proving.motion_valid_batch, self.budget.over)

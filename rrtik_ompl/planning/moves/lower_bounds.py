@@ -201,7 +201,14 @@ class OneFreeValue:
         return route[::-1]
 
     def _next_places(self, here: Place, low: float, high: float, refuted: set[Step]) -> Iterator[Place]:
-        """Yield the places that one move reaches from a place, as far as the move may be free."""
+        """Yield the places that one move reaches from a place, as far as the move may be free.
+
+        Args:
+            here: The place.
+            low: Least value of the free joint in the part of its range.
+            high: Greatest value of the free joint in that part.
+            refuted: Steps that are refuted while the free joint is in the part.
+        """
         mask, state = here
         for step in self._steps_from(here):
             may_be_free = step not in refuted if state == FREE else step in self._free_steps
@@ -269,6 +276,11 @@ class OneFreeValue:
 
         A change of the free joint moves no point of the arm farther than its weight times the change. A deeper overlap
         therefore persists.
+
+        Args:
+            step: Begin and end of the step.
+            value: Middle of the range of the free joint [rad or m].
+            half_width: Half the width of this range [rad or m].
         """
         rows = self._step_configurations(step, (value, value))
         needed_depth = float(self._world.weights[self._joint]) * half_width

@@ -94,7 +94,7 @@ class MoveRules:
         """Return how many waypoints of a route, shape (k, n), come before the last joints begin to move.
 
         Raises:
-            InputError: As :meth:`kept_by`.
+            InputError: For the reasons of :meth:`kept_by`.
         """
         route = self._route(route)
         waiting = (route[:, self.last_joints] == route[0, self.last_joints]).all(axis=1)

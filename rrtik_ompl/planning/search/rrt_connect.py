@@ -126,6 +126,15 @@ def extend(tree: ConfigurationTree, sample: Vector, rules: ConnectRules, motion_
     """EXTEND: add an edge from the nearest vertex towards a sample, shape (n,); return the new vertex, or None.
 
     A vertex whose extension was blocked before is only extended towards samples within the domain.
+
+    Args:
+        tree: Gets the new vertex, in place.
+        sample: Shape (n,).
+        rules: Length of edges and radius of the domain.
+        motion_free: Returns whether a straight motion is free.
+
+    Returns:
+        The index of the new vertex; None if the sample is out of the domain or the edge is blocked.
     """
     near = tree.nearest(sample)
     start = tree.row(near)
@@ -142,7 +151,14 @@ def extend(tree: ConfigurationTree, sample: Vector, rules: ConnectRules, motion_
 def reach(
     tree: ConfigurationTree, target: Vector, rules: ConnectRules, motion_free: MotionFree, stop: Stop
 ) -> int | None:
-    """CONNECT: add edges towards a target, shape (n,), until one is blocked.
+    """CONNECT: add edges towards a target, shape (n,), until it is reached or an edge is blocked.
+
+    Args:
+        tree: Gets the new vertices, in place.
+        target: Shape (n,).
+        rules: Length of edges.
+        motion_free: Returns whether a straight motion is free.
+        stop: Returns True to give up.
 
     Returns:
         The vertex from which the target itself is reached; the target is not added to the tree. None if it is not

@@ -269,6 +269,13 @@ def _shorten_in_forms(
 def _run(chosen: Method, form: Form, route: Matrix, wishes: Wishes, single: bool) -> tuple[Task, Matrix]:
     """Run a method on a route; if joints have weights, in coordinates in which lengths are weighted.
 
+    Args:
+        chosen: The method.
+        form: The form of the problem.
+        route: Shape (k, n).
+        wishes: Limits, rules and clearance.
+        single: Whether single-joint moves have to stay such.
+
     Returns:
         The task with its counts, and the new route in joint values, shape (m, n).
     """
@@ -294,7 +301,11 @@ def _keeps_single_joint_moves(path: JointPath, method: ShorteningMethod, one_joi
 
 
 def _split_before_last_joints(route: Matrix, rules: MoveRules | None) -> tuple[Matrix, Matrix]:
-    """Split a route where the joints that move last begin to move, into two arrays of waypoints."""
+    """Split a route where the joints that move last begin to move.
+
+    Returns:
+        Waypoints before these joints move, shape (k, n), and the waypoints after that, shape (m, n).
+    """
     if rules is None:
         return route, route[:0]
     if not rules.kept_by(route):

@@ -170,9 +170,17 @@ class _Corners:
         return [*done, *ahead]
 
     def _chord(self, a: Vector, bend: Vector, b: Vector) -> tuple[Vector, Vector] | None:
-        """Return the ends of the longest free chord across a bend; None if it gains too little.
+        """Find the longest free chord across a bend.
 
         Both ends are at the same distance from the bend. This distance is found by bisection.
+
+        Args:
+            a: Waypoint before the bend, shape (n,).
+            bend: Shape (n,).
+            b: Waypoint after the bend, shape (n,).
+
+        Returns:
+            The ends of the chord on the sides towards a and b, shapes (n,); None if it gains too little.
         """
         sides = float(np.linalg.norm(a - bend)), float(np.linalg.norm(b - bend))
         if min(sides) == 0.0:
@@ -208,6 +216,10 @@ def _bracket(visible: Callable[[float], bool], first: float) -> tuple[float, flo
     """Return a visible share (or 0) and a larger hidden one (or 1).
 
     The shares tried are ``first`` and then four times as much each time.
+
+    Args:
+        visible: Returns whether the point at a share of a segment is visible.
+        first: The first share to try.
     """
     seen = 0.0
     while first < 1.0:

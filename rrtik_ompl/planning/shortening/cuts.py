@@ -80,6 +80,14 @@ def kernel_search(route: Matrix, task: Task, *, seed: int, share: float, pull: f
     """Return a search in the kernels of a task's world, which must have them.
 
     With ``asking``, the world decides what the kernels cannot, if it can decide more.
+
+    Args:
+        route: Shape (k, n).
+        task: Its world has kernels.
+        seed: Seed of the random cuts.
+        share: Share of the ends of cuts that are waypoints.
+        pull: Share of the tries that pull a waypoint.
+        asking: Whether to ask the world where the kernels cannot decide.
     """
     world = task.kernel_world
     assert world is not None
@@ -126,7 +134,14 @@ def _plain(route: Matrix, task: Task, tries: int, share: float) -> Matrix:
 
 
 def _one_cut(route: Matrix, task: Task, rng: np.random.Generator, share: float) -> Matrix | None:
-    """Return the route after one random cut, or None if that gains nothing or is not free."""
+    """Return the route after one random cut, or None if that gains nothing or is not free.
+
+    Args:
+        route: Shape (k, n).
+        task: Checks motions.
+        rng: Draws the places.
+        share: Probability that an end of the cut is a waypoint.
+    """
     places = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(route, axis=0), axis=1)))
     first, second = sorted(_place(places, rng, share) for _ in range(2))
     first_edge = _edge_at(places, first)

@@ -165,7 +165,7 @@ def _keeps_level(level: Level, route: Matrix) -> bool:
 
 
 def turning_limits(robot: Robot, rows: Matrix) -> tuple[Vector, Vector]:
-    """Return finite limits of the joints, shapes (n,).
+    """Return finite lower and upper limits of the joints, shapes (n,).
 
     A joint without limits may turn one turn farther than the rows, shape (k, n), do.
     """

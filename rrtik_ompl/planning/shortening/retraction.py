@@ -103,6 +103,11 @@ def _last_visible(count: int, visible: Callable[[int], bool], *, last_is_hidden:
     """Find, by bisection, the index of a visible point that is the last one or is followed by a hidden one.
 
     The first point is known to be visible.
+
+    Args:
+        count: Number of points.
+        visible: Returns whether the point of an index is visible.
+        last_is_hidden: Whether the last point is known to be hidden, so that it need not be checked.
     """
     if count == 1 or (not last_is_hidden and visible(count - 1)):
         return count - 1

@@ -122,8 +122,8 @@ def arc(
 
     Raises:
         ProblemError: See :func:`straight`.
-        UnknownNameError: See there.
-        InputError: See there; also if the three points lie on a line.
+        UnknownNameError: See :func:`straight`.
+        InputError: See :func:`straight`; also if the three points lie on a line.
 
     Example:
         >>> world, q = rrtik.World(rrtik.load_robot("ur5")), np.array([0.0, -1.6, 1.8, -0.2, 1.6, 0.0])
@@ -163,8 +163,8 @@ def screw(
 
     Raises:
         ProblemError: See :func:`straight`.
-        UnknownNameError: See there.
-        InputError: See there; also if turns are wanted of a goal that is not turned.
+        UnknownNameError: See :func:`straight`.
+        InputError: See :func:`straight`; also if whole turns are wanted although the goal is not turned.
 
     Example:
         >>> world, q = rrtik.World(rrtik.load_robot("ur5")), np.array([0.0, -1.6, 1.8, -0.2, 1.6, 0.0])
@@ -203,8 +203,8 @@ def linear(
 
     Raises:
         ProblemError: See :func:`straight`.
-        InputError: See there; also if there is no pose.
-        UnknownNameError: See there.
+        InputError: See :func:`straight`; also if there is no pose.
+        UnknownNameError: See :func:`straight`.
 
     Example:
         >>> world, q = rrtik.World(rrtik.load_robot("ur5")), np.array([0.0, -1.6, 1.8, -0.2, 1.6, 0.0])
@@ -241,7 +241,17 @@ def _moved(
     clearance: float | None,
     seed: int,
 ) -> StraightResult:
-    """Check the arguments, and follow the rails that ``rails`` builds from the pose of the tip at the start."""
+    """Check the arguments, and follow the rails that ``rails`` builds from the pose of the tip at the start.
+
+    Args:
+        world: Robot and scene.
+        q: Start, see :func:`straight`.
+        rails: Returns the rails for the pose of the tip at the start.
+        deviation: Greatest distance of the tip from the rails [m].
+        turn_deviation: Greatest deviation of its orientation [rad].
+        clearance: Clearance from every obstacle on top of its margin [m].
+        seed: Seed of the random numbers.
+    """
     tolerance = Tolerance(positive(deviation, "deviation"), positive(turn_deviation, "turn_deviation"))
     if tolerance.turn > 1.0:
         raise InputError(f"turn_deviation must be 1 rad at most, got {tolerance.turn:g}; is it in radians?")

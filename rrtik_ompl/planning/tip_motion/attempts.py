@@ -217,7 +217,13 @@ def path_of(world: World, found: Attempt) -> JointPath | None:
 
 
 def why_stopped(robot: Robot, rail: Rail, followed: Followed) -> str:
-    """Return why the joints cannot follow a rail any farther: joints at their limits, or a singular posture."""
+    """Return why the joints cannot follow a rail any farther: joints at their limits, or a singular posture.
+
+    Args:
+        robot: The arm.
+        rail: The rail.
+        followed: The configurations up to where it stopped.
+    """
     if len(followed.rows) >= MOST_ROWS:
         return f"the line takes more than {MOST_ROWS} configurations: allow more deviation"
     q = followed.rows[-1]

@@ -123,7 +123,15 @@ def centred(robot: Robot) -> Leaning:
 
 
 def follow(robot: Robot, rail: Rail, q: Vector, tolerance: Tolerance, leaning: Leaning) -> Followed:
-    """Follow a rail from a configuration at its beginning, shape (dof,), to its end or as far as possible."""
+    """Follow a rail from a configuration at its beginning, shape (dof,), to its end or as far as possible.
+
+    Args:
+        robot: The arm.
+        rail: The rail.
+        q: Configuration at the beginning of the rail, shape (dof,).
+        tolerance: Allowed deviation of the tip.
+        leaning: Where a redundant arm is pulled.
+    """
     kernels = library(rail_layout.KERNELS)
     limb = limb_of(robot)
     if kernels is None or limb is None:
@@ -223,7 +231,15 @@ def _guess(robot: Robot, rows: list[Vector], shares: list[float], step: float, l
 
 
 def _correct(robot: Robot, rail: Rail, share: float, q: Vector, tolerance: Tolerance) -> Vector | None:
-    """Move the tip to a point of the rail by Newton's method, inside the limits; None if it does not converge."""
+    """Move the tip to a point of the rail by Newton's method, inside the limits; None if it does not converge.
+
+    Args:
+        robot: The arm.
+        rail: The rail.
+        share: Place on the rail, from 0 to 1.
+        q: Initial guess, shape (dof,).
+        tolerance: Allowed deviation, of which only the share `ARRIVED` is used up here.
+    """
     aim = rail.poses(share)[0]
     scale = np.repeat([1.0 / reach_of(robot), PER_CHORD], 3)
     for k in range(NEWTON_STEPS + 1):

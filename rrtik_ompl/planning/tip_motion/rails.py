@@ -134,6 +134,11 @@ def screw_rail(T_begin: pin.SE3, T_end: pin.SE3, turns: int = 0) -> Rail:
 
     Whole turns are added to the shortest way.
 
+    Args:
+        T_begin: Pose of the tip at the beginning.
+        T_end: Pose of the tip at the end.
+        turns: Whole turns on top of the shortest way; negative ones turn the other way.
+
     Raises:
         InputError: If turns are no whole number, too many, or wanted where the poses are not turned against each other.
     """
