@@ -1,1 +1,1 @@
-"""What every room stands on: errors of one line, checked arrays, poses, units."""
+"""Foundations of all packages: errors of one line, validated arrays, poses, units."""

@@ -210,7 +210,7 @@ def rows_of(values: ArrayLike, columns: int, what: str) -> Matrix:
     As :func:`number_rows`, they need not be finite.
 
     Raises:
-        InputError: If they are no such rows.
+        InputError: If they do not form such rows.
     """
     rows = number_rows(values, what)
     if rows.shape[1:] != (columns,):
@@ -222,7 +222,7 @@ def filled_rows(values: ArrayLike, columns: int, what: str) -> Matrix:
     """Validate at least one finite row, shape (k, columns), as :func:`finite_array`.
 
     Raises:
-        InputError: If they are no such rows.
+        InputError: If they do not form such rows, or a number is not finite.
     """
     rows = finite_array(values, (None, columns), what)
     if len(rows) == 0:
@@ -247,7 +247,7 @@ def finite_number(value: ArrayLike, what: str) -> float:
     """Validate a finite number given by a user and return it as float.
 
     Raises:
-        InputError: If it is none, or not finite.
+        InputError: If it is not a finite number.
     """
     if type(value) is float and -np.inf < value < np.inf:
         return value
@@ -263,7 +263,7 @@ def positive(value: ArrayLike, what: str, remedy: str = "") -> float:
         remedy: Advice on what to give instead, with which the error message ends.
 
     Raises:
-        InputError: If it is none.
+        InputError: If it is not such a number.
     """
     number = finite_number(value, what)
     if number <= 0.0:
@@ -275,7 +275,7 @@ def length(value: ArrayLike, what: str) -> float:
     """Validate a length of a solid [m] given by a user: greater than 0, at most ``LARGEST``.
 
     Raises:
-        InputError: If it is none.
+        InputError: If it is not such a number.
     """
     return positive(bounded_array(value, (), what), what)
 
@@ -284,7 +284,7 @@ def not_negative(value: ArrayLike, what: str) -> float:
     """Validate a finite number of at least 0 given by a user.
 
     Raises:
-        InputError: If it is none.
+        InputError: If it is not such a number.
     """
     number = finite_number(value, what)
     if number < 0.0:
@@ -296,7 +296,7 @@ def whole_number(value: object, what: str, least: int = 0) -> int:
     """Validate a whole number of at least ``least`` given by a user, such as a seed.
 
     Raises:
-        InputError: If it is none, or less than ``least``.
+        InputError: If it is not a whole number, or less than ``least``.
     """
     if type(value) is int and value >= least:
         return value

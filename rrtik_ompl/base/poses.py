@@ -122,7 +122,7 @@ def rigid(T: PoseLike, what: str) -> pin.SE3:
 
     lengths = (_dot(x, x), _dot(y, y), _dot(z, z))
     corners = (_dot(x, y), _dot(y, z), _dot(z, x))
-    # The lengths come first, because they are never NaN, which max would ignore or return depending on its place.
+    # The lengths come first, because they are never NaN: max ignores a NaN only if a number stands before it.
     off = max(*(abs(square - 1.0) for square in lengths), *map(abs, corners))
 
     if off > NOT_RIGID:
@@ -141,6 +141,7 @@ def rigid(T: PoseLike, what: str) -> pin.SE3:
     return pin.SE3(matrix)
 
 
+# Convert a pose that is written as 3, 6 or 7 numbers, see rigid.
 def _written_pose(numbers: ArrayLike, what: str) -> pin.SE3:
     values = finite_array(numbers, (None,), what)
     if len(values) == 3:

@@ -1,3 +1,3 @@
-"""The version, which the package's metadata are made of."""
+"""The version of the package, which its metadata take from here."""
 
 __version__ = "0.2.0"

@@ -200,6 +200,7 @@ class HeldRegion:
         region = self.region
         return max(metres - region.position_tolerance, 0.0), max(float(angle) - region.orientation_tolerance, 0.0)
 
+    # The measure of the orientation for rotations of shape (m, 3, 3), shape (m,); see measures.
     def _turned(self, R: NDArray[np.float64]) -> Vector:
         if self.turning == Turning.AXIS:
             z = R[:, :, 2]

@@ -131,6 +131,7 @@ def _placed(robot: Robot, scene: Scene, region: TaskRegion, label: str, start: V
 
 def _refuse_too_narrow(region: HeldRegion) -> None:
     """Refuse tolerances that even the smallest motions of all joints together would exceed."""
+    # The needed tolerance is the bound for a motion of SMALLEST_STEP with all joints moving alike.
     dof = region.robot.dof
     step = np.full((1, dof), SMALLEST_STEP / np.sqrt(dof))
     needed = region.deviations(np.zeros((1, dof)), step)[0] / INSET_SHARE
@@ -177,6 +178,7 @@ def _keeps(region: HeldRegion, A: Matrix, B: Matrix, ends: NDArray[np.float64]) 
         rows = _nodes(A[open_], B[open_], parts)
         measures = region.measures(rows.reshape(-1, A.shape[1])).reshape(len(open_), parts + 1, 2)
         highest = _highest(measures[:, :-1], measures[:, 1:], deviations[open_, None] / parts**2)
+        # A motion is kept if all its parts are, and is given up if a node is outside.
         done = (highest <= most).all(axis=(1, 2))
         kept[open_[done]] = True
         open_ = open_[~done & (measures <= most).all(axis=(1, 2))]

@@ -52,6 +52,7 @@ def projected_rows(robot: Robot, constraints: HeldRegions, rows: Matrix, steps: 
         if there.all() or number == steps:
             break
 
+        # A damped Gauss-Newton step, shortened to LARGEST_STEP and kept within the limits.
         pull = np.einsum("mkn,mk->mn", J, error)
         damped = np.swapaxes(J, 1, 2) @ J + (DAMPING + SHARE * square)[:, None, None] * np.eye(robot.dof)
         change = np.linalg.solve(damped, pull[..., None])[..., 0]
@@ -136,6 +137,7 @@ def _turn(
         axis = 0.5 * np.column_stack([R[:, 1, 2] - R[:, 2, 1], R[:, 2, 0] - R[:, 0, 2], R[:, 0, 1] - R[:, 1, 0]])
         cosine = 0.5 * (np.trace(R, axis1=1, axis2=2) - 1.0)
 
+    # If the angle is 0 or a half turn, the axis is not determined and replaced by any other one.
     sine = np.linalg.norm(axis, axis=1)
     known = sine >= SMALL
     axis = np.where(known[:, None], axis / np.where(known, sine, 1.0)[:, None], R[:, :, 0])
@@ -179,6 +181,7 @@ def contradiction(robot: Robot, constraints: HeldRegions) -> str:
         if there.any():
             continue
 
+        # Report by how much the second region is missed at least where the first one is kept.
         near, _ = projected_rows(robot, one, moved)
         left = [other.regions[0].outside(q) for q in near[one.held(near)]]
         if left:

@@ -192,12 +192,14 @@ def _blocked(region: HeldRegion, turns: list[Turn], end: Rotations, place: int, 
     corners = np.array(np.meshgrid(*[[-0.5, 0.5]] * len(others))).reshape(len(others), -1).T
 
     while len(owners) and len(owners) < MOST_BOXES:
+        # Drop the boxes of values that are no walls, and those without configurations of the region.
         angles = np.insert(middles, place, values[owners], axis=1)
         away = _angles(region, turns, end, angles)
         passed[owners[away <= limit]] = True
         left = (away - halves.sum() <= limit) & ~passed[owners]
         owners = owners[left]
         middles = middles[left]
+        # Halve the remaining boxes in all directions.
         middles = (middles[:, None] + corners * halves).reshape(-1, len(others))
         owners = np.repeat(owners, len(corners))
         halves = 0.5 * halves

@@ -48,11 +48,12 @@ def nobody_else_s(file: Path, *, among: int = OTHERS_WRITE) -> bool:
         file: The file.
         among: Permission bits, none of which may be set.
     """
+    # Check the path as it is named and as it is with all links resolved.
     named = Path(os.path.abspath(file))
     try:
         places = {named, *named.parents, *(real := named.resolve(strict=True)).parents, real}
         states = {place: os.lstat(place) for place in places}
-    except (OSError, RuntimeError):  # a loop of links
+    except (OSError, RuntimeError):  # a RuntimeError is raised for a loop of links
         return False
 
     if not hasattr(os, "geteuid"):  # Windows keeps a user's folders from others by itself

@@ -53,6 +53,7 @@ class Section(BaseModel):
     @model_validator(mode="before")
     @classmethod
     def _only_known_keys(cls, data: object) -> object:
+        # Report unknown and empty keys before pydantic does, with a hint at a similar key.
         if not isinstance(data, dict):
             return data
         for key, value in data.items():

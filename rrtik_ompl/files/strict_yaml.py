@@ -134,6 +134,7 @@ class Builder:
                     raise self._error(event, "a second document starts here ('---'); put one in a file")
 
     def _scalar(self, event: yaml.ScalarEvent) -> None:
+        # A scalar is a key where a mapping expects one, otherwise a value.
         if event.tag is not None:
             raise self._error(event, f"tag '{event.tag}' cannot be used; write the value alone")
 
@@ -149,6 +150,7 @@ class Builder:
             self._add(plain_value(text) if event.implicit[0] else text, 1, 1, event.anchor, event)
 
     def _open(self, event: yaml.CollectionStartEvent, value: object) -> None:
+        # Push a list or mapping that begins; it is added to its parent when it ends.
         if event.tag is not None:
             raise self._error(event, f"tag '{event.tag}' cannot be used; write the value alone")
 
@@ -275,7 +277,7 @@ def read_yaml(path: str | os.PathLike[str]) -> YamlDocument:
     try:
         builder.read(text)
     except yaml.MarkedYAMLError as error:
-        if "nesting depth" in (error.problem or ""):  # libyaml's own limit, met before its events reach ours
+        if "nesting depth" in (error.problem or ""):  # libyaml has a limit of its own
             raise InputError(f"{path}: nested deeper than {MAX_DEPTH} levels") from error
         raise InputError(_syntax(file, text, error)) from error
     except yaml.YAMLError as error:  # most often because of a control character
@@ -315,6 +317,7 @@ def describe(value: object) -> str:
     return repr(value)
 
 
+# Describe a syntax error with the line where it is, or where an unclosed quote or bracket begins.
 def _syntax(path: Path, text: str, error: yaml.MarkedYAMLError) -> str:
     unclosed = "end of stream" in (error.problem or "") and error.context_mark is not None
     mark = error.context_mark if unclosed else error.problem_mark or error.context_mark

@@ -82,6 +82,7 @@ def _asked(kind: str) -> str:
     return f"is this a {kind.partition('_')[2]} file?"
 
 
+# Validate the entries of a file that describe the waypoints: version, kind, units and names.
 def _check_heads(document: dict[str, Any], kind: str) -> None:
     for key, expected in (("version", 1), ("kind", kind)):
         found = document.get(key, expected)

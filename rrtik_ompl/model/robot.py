@@ -209,7 +209,7 @@ class Robot:
         value, near, *ends = (factor * float(x[joint]) for x in (q, self.clamp(q), self.lower, self.upper))
 
         shown = (n for n in range(6, 18) if f"{value:.{n}g}" != f"{near:.{n}g}")
-        digits = next(shown, 6)  # enough to see the difference; NaN has none
+        digits = next(shown, 6)  # as many digits as show the difference; 6 for NaN
         limits = " .. ".join(f"{end:.{digits}g}" for end in ends)
         return f"joint '{self.joint_names[joint]}' is at {value:.{digits}g} {unit}, outside its limits {limits} {unit}"
 

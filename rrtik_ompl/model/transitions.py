@@ -73,7 +73,7 @@ def merge_moves(waypoints: ArrayLike, tolerance: float = SAME) -> Matrix:
         Waypoints, shape (m, n), m <= k; a single row if nothing moves.
     """
     rows = _rows(waypoints)
-    values = rows.tolist()  # lists: most routes are short, and numpy takes longer for a row
+    values = rows.tolist()  # most paths are short, for which lists are faster than numpy
     corners = [0]
 
     for i in range(1, len(rows)):

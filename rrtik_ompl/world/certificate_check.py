@@ -204,6 +204,7 @@ class Motions:
         joints = [body.joint for body in self.bodies]
         self.joint_of_solid = np.array([joints[k] for k, _ in self.solid_numbers], dtype=np.int64)
 
+        # Only pairs of which a body moves are checked here; the header covers the others.
         moving = [
             (i, j, _common_joint(self.chain, joints[i], joints[j])) for i, j in world.pairs if joints[i] or joints[j]
         ]
@@ -262,6 +263,7 @@ class Motions:
                 acceleration = acceleration + rate * (2.0 * velocity + rate * distance_to_axis)
                 velocity = velocity + rate * distance_to_axis
 
+            # Bound the distances of the body's points from the origin and the axis of the next joint inwards.
             joint = int(chain.parent[k]) + 1
             origin = chain.placement[k][:3, 3]
             stroke = float(np.abs(self.values[:, k]).max()) if slides else 0.0
@@ -329,15 +331,18 @@ class Motions:
             pose[1] + _rotated(pose[0], c) for pose, c in zip(poses, centres, strict=True)
         )
 
+        # Second solid at rest: the point of the chord that is nearest to its ball's centre.
         chord = first_end - first_begin
         start = first_begin - second_begin
         length = partial(np.linalg.norm, axis=1)
         share = np.clip(-(start * chord).sum(axis=1) / np.maximum(1e-30, (chord * chord).sum(axis=1)), 0.0, 1.0)
 
+        # Second solid moving: each point of a chord is within half its length of its middle.
         half_chords = 0.5 * (length(chord) + length(second_end - second_begin))
         moving = length(0.5 * (first_begin + first_end - second_begin - second_end)) - half_chords
         balls = np.where(second_rests, length(start + share[:, None] * chord), moving) - [s.ball_radius for s in second]
 
+        # Second solid at rest: the chord's extent along each axis of its box, as far as it lies beyond the sides.
         to_box = (poses[2][0] @ np.array([s.axes for s in second])).transpose(0, 2, 1)
         begin_in_box, end_in_box = (
             _rotated(to_box, x - poses[2][1]) - [s.box_centre for s in second] for x in (first_begin, first_end)
@@ -363,6 +368,7 @@ class Motions:
         Returns:
             The gaps [m], shape (n,); -inf where a normal does not have unit length.
         """
+        # Extents along the normal: of the first solid against it, of the second one along it, at both ends.
         lengths = np.linalg.norm(normals, axis=1)
         heights = []
         numbers = (first_numbers, first_numbers, second_numbers, second_numbers)
@@ -398,6 +404,7 @@ class Motions:
             nodes, where = np.unique(places, return_inverse=True)
             rotations, origins = self._frames((nodes // 2.0).astype(np.int64), nodes % 2.0)
 
+            # Poses of both solids at both ends, seen from the frame of the pair.
             poses = list[Poses]()
             base = self.base_of_pair[pair]
             for solid, node in product((first_numbers, second_numbers), where.reshape(2, -1)):
@@ -412,6 +419,7 @@ class Motions:
                 plane_gaps = self._plane_gaps(first_numbers, second_numbers, poses, plane_normals)
                 gaps = np.where(plane_normals.any(axis=1), plane_gaps, gaps)
 
+            # Both solids deviate from their chords by at most the sum of their sagittas.
             sagittas = 0.125 * self.accelerations[pair, motion] * widths**2
             apart = gaps > self.required_gaps[pair] + sagittas  # False for NaN
             not_apart += (first + np.flatnonzero(~apart)).tolist()
@@ -450,6 +458,7 @@ class Motions:
         First all given entries are checked: they have to name known parts, cover a motion without a gap, and be apart.
         All other pairs have to be apart by the balls and boxes of their bodies, or of all their parts.
         """
+        # Convert the entries, which have to name known pairs, parts and levels.
         pair_numbers = {pair: k for k, pair in enumerate(self.pairs)}
         entries = list[Entry]()
         for number, motion in enumerate(motions):
@@ -468,6 +477,7 @@ class Motions:
             if [0.0, *ends] != [*(entry.begin for entry in intervals), 1.0]:
                 return self._fault_of(intervals[0], "have entries with a gap or an overlap, the first of them from")
 
+        # All solids of entries have to be apart on their intervals.
         for k in self._not_shown_apart(entries, np.concatenate([motion.normals for motion in motions])):
             if not self._measured_apart(entries[k]):
                 return self._fault_of(entries[k], "are not shown apart from")

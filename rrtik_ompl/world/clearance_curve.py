@@ -78,6 +78,7 @@ def clearance_on(checks: RowChecks, course: Course) -> ClearanceCurve:
     gaps += _nearest_of_proven(course, int(levels_of_proven.min()), set(unproven)) if levels_of_proven.size else []
     gaps = [(gap, level) for gap, level in gaps if np.isfinite(gap.share)]
 
+    # Add the places where proofs fail to the samples, in order along the course.
     if gaps:
         motions = np.array([gap.motion for gap, _ in gaps])
         shares = np.array([gap.share for gap, _ in gaps])
@@ -170,6 +171,7 @@ def _proven_levels(checks: RowChecks, places: Matrix) -> tuple[NDArray[np.int64]
     pairs = [("", "")] * len(places)
 
     while (undecided := np.flatnonzero(refused_levels - proven_levels > 1)).size:
+        # One bisection step for all configurations; those with the same level are proven together.
         tried_levels = (proven_levels[undecided] + refused_levels[undecided]) // 2
         for level in np.unique(tried_levels).tolist():
             group = undecided[tried_levels == level]

@@ -58,6 +58,7 @@ def with_detours(
         if repair is None:
             return None
 
+        # Renumber the remaining motions; the detour may have replaced some of them.
         added = len(repair.rows) - len(rows)
         rows = repair.rows
         unproven = [motion + added for motion in unproven if motion >= repair.last]
@@ -93,6 +94,7 @@ def _sidestepped(world: World, rows: Matrix, motion: int, clearance: float) -> R
     b = rows[motion + 1]
     others = np.flatnonzero(a == b)
 
+    # One sidestep for each size, direction and other joint: from near to far.
     sizes = np.array([sign * size for size in SIDESTEPS for sign in (1.0, -1.0)])
     offsets = np.zeros((len(sizes), len(others), len(a)))
     offsets[:, np.arange(len(others)), others] = sizes[:, None]

@@ -185,6 +185,7 @@ class ExactChecker:
         Configurations are visited from coarse to fine. The distance of a pair at one of them, divided by a bound on the
         approach of its bodies, gives a number of neighbouring steps at which the pair cannot touch and is skipped.
         """
+        # The configurations that the kernels leave undecided, from coarse to fine.
         order = spread_order(steps)
         rows = (1.0 - order / steps)[:, None] * start + (order / steps)[:, None] * end
         undecided = self.fast.classify(self._robot.chain.joint_values(rows)) != FREE
@@ -202,6 +203,7 @@ class ExactChecker:
             if gaps is None:
                 return False
 
+            # Mark the neighbouring steps at which a pair is still apart.
             for pair, gap in zip(open_pairs, gaps, strict=True):
                 approach = float(self.solids.approaches()[pair] @ travel)  # [m] along the whole motion
                 certain_gap = max(gap - DISTANCE_TOLERANCE, 0.0)
@@ -257,6 +259,7 @@ def distance(
     if is_ours(ends):
         return own_gap(ends, margin)
 
+    # Hulls first; a solid is its own hull.
     first, _, second, _ = ends
     result = coal.CollisionResult()
     hulls = around(first), around(second)

@@ -74,6 +74,7 @@ def judged_course(
     except InputError:
         faults = None
 
+    # Look for contacts at the samples and at the faults.
     places = course if curve is None else curve
     at = np.append(places.motions + places.shares, [piece + share for piece, share, _ in faults or ()])
     at = _with_ends(checks, course, np.unique(at))

@@ -210,6 +210,7 @@ class BatchedMotionQueries:
             parts.append(self._motions_free(tails[first:last], heads[first:last]))
             first = last
 
+            # Adapt the size of the next batch to the time that this one took.
             if time.thread_time() - begin > CALL_TARGET_SECONDS:
                 self._batch = max(self._batch // 2, 1)
             else:

@@ -77,6 +77,7 @@ class MovingWorld:
         self.scene = world.scene
         self.checked = 0
 
+        # Add the copies of obstacles, and keep the pairs of which a body moves.
         names_that_move = {o.name for o in self.scene.obstacles} if moving is None else set(moving)
         bodies = [self._with_clearance(body, body.margin) for body in world.bodies]
         self._bodies, pairs, self._copy_of_body = _with_copies(bodies, world.pairs, names_that_move, copies)
@@ -90,6 +91,7 @@ class MovingWorld:
         self._motions: dict[tuple[bool, float], FastMotions] = {}
         self._inflation = [0.0] * len(self._bodies)
 
+        # Fixed bodies cannot be avoided, so they are checked whenever obstacles are moved.
         self._pairs_at_rest = tuple(p for p in world.pairs if all(self._bodies[i].joint == 0 for i in p))
         self.blocked = self._contact_of_base()
 
@@ -138,6 +140,7 @@ class MovingWorld:
                 raise UnknownNameError("obstacle", name, self._first_obstacles, where="inflation")
             not_negative(metres, f"inflation: that of '{name}'")
 
+        # Change the bodies of obstacles that have moved; the tables are then updated in place.
         obstacles_of_copies = [{o.name: o for o in scene.obstacles} for scene in scenes]
         for k, body in enumerate(self._bodies):
             if body.kind != "obstacle":

@@ -87,6 +87,7 @@ class Problem:
         ends = usable_configurations(world, {"start": start, **joints})
         checked_start = frozen(ends["start"])
 
+        # Place the path constraints at the start, and add them to the world.
         known_regions = world.settings.constraints
         new_regions = [each for each in listed(constraints, "path constraints") if each not in known_regions]
         held_constraints = held_regions(world.robot, world.scene, (*known_regions, *new_regions), checked_start)

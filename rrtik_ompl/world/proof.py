@@ -214,6 +214,7 @@ class Prover:
         """Return which motions starts[k] -> ends[k], shapes (m, dof), are proven free, shape (m,)."""
         return in_blocks(partial(self._proven, clearance), starts, ends)
 
+    # The arguments are in the order that functools.partial and in_blocks need.
     def _proven(self, clearance: float, starts: Matrix, ends: Matrix) -> Mask:
         if len(mask := np.ones(len(starts), dtype=bool)) == 0:
             return mask
@@ -322,6 +323,7 @@ class Prover:
             sinks = written[0] + INT * first, written[1] + DOUBLE * first
             return int(kernels.prove(address, read[0] + skipped, read[1] + skipped, number, *sinks))
 
+        # Let the kernels prove all motions in batches, as long as there is time.
         looked_at = 0
         open_count = 0
         batch = 1 if packed.touching else MOTIONS_AT_ONCE  # the planes of contacts differ from motion to motion
@@ -334,12 +336,14 @@ class Prover:
             open_count += prove(first, number)
             looked_at += number
 
+        # A proof outside the bound on rounding errors does not count.
         if sound is not None:
             pairs[~sound] = NOT_LOOKED_AT
             places[~sound] = np.nan
         elif open_count == 0 and looked_at == count:
             return []
 
+        # Try the motions that failed at a pair of links again with coal's distances.
         for k in (k for k in np.flatnonzero(pairs >= 0).tolist() if by_coal.links[pairs[k]]):
             motion = np.stack([rows[0][k], rows[1][k]])
             by_coal.settle(motion, pairs[k : k + 1], places[k : k + 1], partial(prove, k, 1))
@@ -397,9 +401,11 @@ def _entries(log: MotionEntries, measured_intervals: NDArray[np.int64]) -> Motio
     if len(intervals) and (intervals == intervals[0]).all():
         intervals[:] = 0
 
+    # Drop what a verifier finds by itself, and what coal's measurements settle.
     settled_by_coal = (log.solids[:, None, ::2] == measured_intervals[None, :, :2]).all(axis=2).any(axis=1)
     needed = ((intervals[:, 0] > 0) | log.normals.any(axis=1)) & ~settled_by_coal
 
+    # An entry of two whole links has the part -1 for both.
     whole_links = np.insert(measured_intervals[:, :2], [1, 2], -1, axis=1)
     solids = np.vstack([log.solids[needed], whole_links])
     intervals = np.vstack([intervals[needed], measured_intervals[:, 2:]])
@@ -424,6 +430,7 @@ class CoalProof:
         self._robot = robot
         self._bodies = bodies
         self.packed = packed
+        # Select the pairs of links with a closed mesh and without an open one, which has no inside.
         is_of_arm = [body.kind != "obstacle" for body in bodies]
         is_mesh_of_arm = np.array(
             [of_arm and is_mesh(body.geometry) for of_arm, body in zip(is_of_arm, bodies, strict=True)], dtype=bool
@@ -509,7 +516,7 @@ class CoalProof:
             return []
 
         def spare_at(share: float) -> float:
-            """Return the distance of the bodies at a share of the motion minus the distance they must keep [m]."""
+            """Return the distance of the bodies at a share of the motion minus the required gap [m]."""
             return _gap_at(self._robot, pair, motion[0] + share * (motion[1] - motion[0])) - required_gap
 
         if spare_at(place) <= 0.0:
@@ -522,6 +529,7 @@ class CoalProof:
             level, number = undecided.pop()
             measured_count += 1
             width = 0.5**level
+            # From the middle to either end of the interval the bodies approach by at most 0.5 * approach * width.
             spare = spare_at((number + 0.5) * width)
             apart_on_interval = spare > 0.5 * approach * width
             if spare <= 0.0 or (not apart_on_interval and level == DEEPEST_LEVEL):

@@ -136,6 +136,7 @@ class RowChecks:
         frames = self.settings.robot.chain.joint_frames(rows)[0]
         contacts = list(measured(solids.bodies.as_tuple, pairs, frames, near_only=True))
 
+        # The distances may miss a body that is wholly inside another, which the second checker finds.
         if not contacts:
             same_pairs = not proven_pairs and self.settings.clearance == 0.0
             certificate = self.certificate if same_pairs else Certificate(solids.robot, solids.bodies.as_tuple, pairs)
@@ -195,6 +196,7 @@ class RowChecks:
         robot = self.settings.robot
         mask = inside_limits(robot, starts) & inside_limits(robot, ends) & (not self.solids.always_colliding)
 
+        # Both directions of a motion are checked at the same configurations.
         A, B = one_way(starts[mask], ends[mask])
         counts = step_counts(A, B, self.solids.weights, self.settings.motion_resolution)
 

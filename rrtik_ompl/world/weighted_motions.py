@@ -42,6 +42,7 @@ class WeightedMotions(MotionQueries):
         self._world = world
         self._scale = weights
 
+        # Joint values of the chain stay the same if the gain is divided by the weights.
         chain = replace(robot.chain, gain=frozen(robot.chain.gain / weights))
         lower = frozen(robot.lower * weights)
         upper = frozen(robot.upper * weights)

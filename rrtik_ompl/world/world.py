@@ -231,7 +231,7 @@ class World(Judge):
         """Return a world of the same robot in another scene, with the same settings.
 
         Raises:
-            InputError: If it is no scene, or does not fit the robot or the path constraints.
+            InputError: If it is not a scene, or does not fit the robot or the path constraints.
         """
         return self.with_settings(scene=scene)
 

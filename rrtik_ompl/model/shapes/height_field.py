@@ -172,6 +172,7 @@ def _far_beyond(rows: Matrix, cell: float) -> str:
         if len(steps) == 0:
             continue
 
+        # The largest step between consecutive heights separates the outliers from the rest.
         k = int(np.argmax(steps))
         rest = ends[k + 1 :]
         if steps[k] > FAR * max(float(rest[-1] - rest[0]), width):

@@ -170,6 +170,7 @@ class PointCloud(_Kept, Shape):
         if extent / size >= 1 << 20:
             raise InputError(f"voxel size {size:g} m is too small for a cloud {extent:.4g} m wide")
 
+        # Sort the points by the keys of their cubes, 21 bits for each coordinate.
         cells = ((self.points - low) / size).astype(np.int64)
         keys = (cells[:, 0] << 42) | (cells[:, 1] << 21) | cells[:, 2]
         order = np.argsort(keys, kind="stable")

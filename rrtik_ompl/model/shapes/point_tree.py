@@ -60,6 +60,7 @@ def extremes(points: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
 
 def point_tree(points: NDArray[np.float32]) -> PointTree:
     """Build the tree of one or more points, shape (n, 3)."""
+    # Sort the points along the curve and repeat the last one to fill its block.
     count = -(-len(points) // LEAF)
     order = np.argsort(_places(points))
     order = np.append(order, np.full(count * LEAF - len(points), order[-1]))
@@ -70,6 +71,7 @@ def point_tree(points: NDArray[np.float32]) -> PointTree:
     levels = []
     firsts = [0]
 
+    # Group the boxes of each level until a single group is left; missing boxes are empty.
     while True:
         groups = -(-len(low) // LEAF)
         sides = np.empty((2, groups * LEAF, 3), dtype=np.float32)
