@@ -1,4 +1,4 @@
-"""Many planning queries at once: in threads, in processes of this machine that may be lost, or on a Dask cluster."""
+"""Run many planning queries: in threads, in replaceable processes of this machine, or on a Dask cluster."""
 
 from __future__ import annotations
 
@@ -35,27 +35,27 @@ def plan_batch(
 ) -> list[dict[str, Any]]:
     """Plan for many problems.
 
-    Planners of ours, which end in time and run side by side, work in threads of this process, so that nobody waits for
-    others to begin. Those of OMPL, and shortening, work in processes: a query there that crashes, hangs or takes too
-    much memory is lost alone. Workers of a cluster are sent names of problems or files, not worlds: each makes the
-    world of a problem once, as long as its queries follow each other.
+    Our own planners, which respect their time limit and can run concurrently, work in threads of this process, which
+    saves the start of processes. OMPL's planners, and shortening, work in processes: if a query there crashes, hangs or
+    takes too much memory, only this query is lost. Workers of a cluster receive names of problems or files, not worlds:
+    each builds the world of a problem once, as long as its queries are consecutive.
 
-    The same seed gives the same paths however the queries are spread, as long as no time limit cuts in.
+    The same seed gives the same paths however the queries are distributed, unless the time limit ends a query.
 
     Args:
         problems: Names of shipped problems, or files.
-        planner: Name of one of :func:`rrtik_ompl.list_planners`; None: as of :func:`rrtik_ompl.plan`.
-        seconds: Wall time for planning, each [s]; a query that takes 30 s more than thrice as long is killed.
-        seed: Of all of them.
+        planner: Name of one of :func:`rrtik_ompl.list_planners`; None for the default of :func:`rrtik_ompl.plan`.
+        seconds: Time limit of each query [s]; a query in a process is killed 30 s after three times this limit.
+        seed: Seed of all queries.
         parameters: Options of the planner.
-        shorten: A method of shortening, "none", or "by-kind": axis for single-joint moves.
-        memory_mb: That a query in a process may take beside robot, scene and library [MB].
-        jobs: Queries at a time on this machine.
-        scheduler: Address of a Dask scheduler whose workers do them instead.
+        shorten: A shortening method, "none", or "by-kind": axis for single-joint moves.
+        memory_mb: Memory of a query in a process in addition to robot, scene and library [MB].
+        jobs: Number of concurrent queries on this machine.
+        scheduler: Address of a Dask scheduler whose workers run the queries instead.
 
     Returns:
-        One record for each problem, in their order: status ("solved", "not found", ...), reason, and what was
-        measured, as in the file of a campaign; ``waypoints`` is the path, shape (k, n), if it was solved.
+        One record for each problem, in their order: status ("solved", "not found", ...), reason, and measured values,
+        as in the file of a campaign; ``waypoints`` is the path, shape (k, n), if the problem was solved.
 
     Raises:
         UnknownNameError: If there is no such problem, planner, parameter or method of shortening.
@@ -78,7 +78,8 @@ def plan_batch(
     suite = Suite(
         name="batch",
         title="batch",
-        sources=tuple(replace(source, name=str(k)) for k, source in enumerate(named)),  # two may be of one name
+        # Numbers, because names may repeat.
+        sources=tuple(replace(source, name=str(k)) for k, source in enumerate(named)),
         entrants=(_entrant(planner, dict(parameters or {}), shorten),),
         runs=1,
         seconds=limit,
@@ -108,11 +109,11 @@ def _entrant(planner: str | None, parameters: dict[str, Any], shorten: SuiteShor
 
 
 def _beside(job: Mapping[str, Any]) -> bool:
-    """Whether a job may be done in a thread: its planner is one of ours, and nothing of OMPL shortens its path."""
+    """Check whether a job can run in a thread: the planner must be our own, without shortening."""
     if job["shorten"] != NONE:
         return False
     try:
         name = job["planner"] or build(from_plain(job["source"])).planner or AUTO
         return is_auto(name) or is_safe(find_planner(name))
-    except (RrtikError, MemoryError):  # a process will say what is wrong with the problem
+    except (RrtikError, MemoryError):  # the process will report what is wrong with the problem
         return False

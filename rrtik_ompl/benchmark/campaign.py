@@ -1,4 +1,4 @@
-"""A campaign: every planner of a suite on every problem, run after run, whatever becomes of any of them."""
+"""Run a campaign: every planner of a suite on every problem, repeatedly, with failures recorded as results."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ LIBRARIES = ("ompl", "pin", "coal", "numpy", "numba")
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """How far a campaign is: runs that are done, and all."""
+    """Progress of a campaign: the number of completed runs, and of all runs."""
 
     done: int
     total: int
@@ -38,18 +38,18 @@ def run_campaign(
     resume: bool = False,
     on_run: Callable[[Progress, Mapping[str, Any] | None], object] = lambda *_: None,
 ) -> Path:
-    """Do all runs of a suite that the folder does not hold yet.
+    """Run all runs of a suite that the folder does not contain yet.
 
-    Every run has its seed by its number alone, so it does not matter how runs are spread or how often the campaign
-    was interrupted. (Where the time limit ends a run, what it finds depends on the machine.)
+    The seed of a run depends only on its number, so the results do not depend on how runs are distributed, or how often
+    the campaign was interrupted. (If the time limit ends a run, its result depends on the machine.)
 
     Args:
         suite: What to run.
-        folder: Gets the file of records.
-        jobs: Runs at a time on this machine.
-        scheduler: Address of a Dask scheduler whose workers do the runs instead.
-        resume: Go on where a campaign of the same suite was interrupted.
-        on_run: Called at the beginning and after every run.
+        folder: Folder for the file of records.
+        jobs: Number of concurrent runs on this machine.
+        scheduler: Address of a Dask scheduler whose workers run the jobs instead.
+        resume: Continue a campaign of the same suite that was interrupted.
+        on_run: Called with the progress and the record, at the beginning (record None) and after every run.
 
     Returns:
         The file of records.
@@ -81,7 +81,7 @@ def run_campaign(
 
 
 def all_jobs(suite: Suite) -> Iterator[dict[str, Any]]:
-    """Every run as plain values; planners take turns, so that what slows the machine slows them alike."""
+    """Yield every run as plain values; planners alternate, so that a slow phase of the machine affects all of them."""
     for source in suite.sources:
         for number in range(suite.runs):
             seed = int(np.random.SeedSequence([suite.seed, number]).generate_state(1, np.uint32)[0])
@@ -108,7 +108,7 @@ def all_jobs(suite: Suite) -> Iterator[dict[str, Any]]:
 
 
 def machine(jobs: int, scheduler: str | None) -> dict[str, Any]:
-    """What a reader must know to compare times."""
+    """Return the information about machine and libraries that a reader needs to compare times."""
     from rrtik_ompl.base.version import __version__
 
     return {
@@ -132,13 +132,13 @@ def _processor() -> str:
 
 
 def _held(file: Path, suite: Suite, about: Mapping[str, Any], resume: bool) -> set[records.Key]:
-    """Which runs are done already."""
+    """Return the runs that are already in the file, after a check that it belongs to the same suite."""
     if not os.path.isfile(file) or file.stat().st_size == 0:
         return set()
 
     head = records.read_head(file)
     done = {records.key_of(record) for record in records.read_records(file)}
-    if not done:  # it never began, as where a scheduler did not answer
+    if not done:  # no run was completed, for example because a scheduler did not answer
         return done
     if not resume:
         raise InputError(f"{file}: holds {len(done)} runs already; continue with --resume, or choose another --out")
@@ -155,7 +155,7 @@ def _held(file: Path, suite: Suite, about: Mapping[str, Any], resume: bool) -> s
 
 
 def _warn_of_change(file: Path, before: Mapping[str, Any], now: Mapping[str, Any]) -> None:
-    """Reports name the machine that a campaign was begun on."""
+    """Warn if machine or libraries differ from those at the beginning, because reports name only the latter."""
     other = [f"{name} {before[name]}, now {now[name]}" for name in records.MACHINE[:-1] if before[name] != now[name]]
     if other:
         warnings.warn(f"{file}: was begun with {'; '.join(other)}: times may not compare", stacklevel=4)

@@ -1,7 +1,8 @@
-"""The process in which runs take place: one job a line comes in, one record a line goes out.
+"""The process in which runs take place: it reads one job a line, and writes one record a line.
 
-Planners of C++ may crash, hang or eat the memory, so this process is one that may be lost. The system itself ends a
-hang: its alarm needs neither Python, whose lock may be held for ever, nor a parent, who may be gone.
+Planners in C++ may crash, hang or exhaust the memory, so this process is expendable. A hang is ended by an alarm of the
+operating system, which depends neither on Python, whose lock may never be released, nor on the parent, which may have
+ended.
 """
 
 from __future__ import annotations
@@ -16,12 +17,12 @@ from typing import Any, TextIO
 
 from rrtik_ompl.benchmark.run import execute, prepare
 
-BUILDING = 600.0  # [s] for building a problem
+BUILDING = 600.0  # [s]; time limit for building a problem
 MEGABYTE = 2**20
 
 
 def main() -> None:
-    """Answer jobs until there are no more."""
+    """Read jobs and write their records until the input ends."""
     with _answers() as answers:
         from rrtik_ompl.kernels import warm_up
 
@@ -31,7 +32,7 @@ def main() -> None:
 
 
 def guarded(job: dict[str, Any]) -> dict[str, Any]:
-    """Do one job under its limits of time and memory."""
+    """Run one job under its limits of time and memory."""
     _alarm(BUILDING)
     prepare(job)
     _alarm(job["patience"])
@@ -51,19 +52,19 @@ def guarded(job: dict[str, Any]) -> dict[str, Any]:
 
 
 def _answers() -> TextIO:
-    """A stream of our own to the parent; what anybody prints goes to the file of errors instead."""
+    """Return a stream to the parent; redirect everything that is printed to the file of errors."""
     stream = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)
     return stream
 
 
 def _alarm(seconds: float) -> None:
-    signal.signal(signal.SIGALRM, signal.SIG_DFL)  # which ends the process
+    signal.signal(signal.SIGALRM, signal.SIG_DFL)  # the default action ends the process
     signal.setitimer(signal.ITIMER_REAL, seconds)
 
 
 def _data_bytes() -> int | None:
-    """What the system counts against the limit of data by now; None where it does not say (macOS)."""
+    """Return the memory that counts towards the data limit [bytes]; None if the system does not report it (macOS)."""
     try:
         lines = Path("/proc/self/status").read_text().splitlines()
     except OSError:
@@ -72,7 +73,7 @@ def _data_bytes() -> int | None:
 
 
 def _resident() -> float:
-    """Memory of the process [MB]: now, or its most where the system does not say."""
+    """Return the resident memory of the process [MB]; its maximum if the system does not report the present value."""
     try:
         return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / MEGABYTE
     except OSError:

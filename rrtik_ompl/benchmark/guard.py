@@ -1,4 +1,4 @@
-"""Runs in processes that may be lost: a crash, a hang, too much memory become records of failed runs."""
+"""Run jobs in expendable processes: a crash, a hang or too much memory becomes the record of a failed run."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ from rrtik_ompl.ompl_bridge.planner_names import find_planner, is_auto, label_of
 
 COMMAND = (sys.executable, "-m", "rrtik_ompl.benchmark.child")
 MEMORY_WORDS = ("bad_alloc", "MemoryError", "Cannot allocate memory")
-TAIL = 4000  # bytes of what a lost process has said
+TAIL = 4000  # bytes of a lost process's output that are examined
 LINES_OF_CODE = re.compile(r'^  File "(.+)", line (\d+) in ', re.MULTILINE)
 
 
 class Closed(RrtikError):
-    """It was to run after it was closed."""
+    """A run was requested after closing."""
 
 
 class Guard:
-    """A process that is started when it is needed, kept from run to run, and replaced when it is lost."""
+    """A process that is started on demand, reused from run to run, and replaced when it is lost."""
 
     def __init__(self) -> None:
         self._process: subprocess.Popen[str] | None = None
@@ -39,7 +39,7 @@ class Guard:
         self._closed = False
 
     def run(self, job: Mapping[str, Any]) -> dict[str, Any]:
-        """The record of a job, whatever becomes of its process.
+        """Run a job and return its record, even if the process is lost.
 
         Raises:
             Closed: If the guard was closed.
@@ -53,7 +53,7 @@ class Guard:
 
         if answer.endswith("\n"):
             record: dict[str, Any] = json.loads(answer)
-            if record["status"] == OUT_OF_MEMORY:  # what is left of it may be spoilt
+            if record["status"] == OUT_OF_MEMORY:  # its state may be corrupt
                 self._end(process)
             return record
         return self._lost(process, job)
@@ -76,7 +76,7 @@ class Guard:
                 stdout=subprocess.PIPE,
                 stderr=self._errors,
                 text=True,
-                start_new_session=True,  # Ctrl-C is for whoever keeps the books
+                start_new_session=True,  # Ctrl-C must reach only the parent, which writes the records
             )
         return self._process
 
@@ -97,13 +97,13 @@ class Guard:
         return {"status": CRASH, "reason": f"{ended}: {last}".rstrip(": ")}
 
     def _end(self, process: subprocess.Popen[str]) -> int:
-        """Its exit code; where it has only closed its mouth it is killed."""
+        """Kill the process, which may have closed only its output, and return its exit code."""
         self._process = None
         process.kill()
         return process.wait()
 
     def _forget_words(self) -> None:
-        """Empty the file of what was said in earlier runs; its place is shared with the process."""
+        """Empty the file of the output of earlier runs; the process shares its file position."""
         if self._errors is not None:
             self._errors.seek(0)
             self._errors.truncate()
@@ -117,7 +117,7 @@ class Guard:
 
 
 def _asked(process: subprocess.Popen[str], question: str) -> str:
-    """The line that a process returns; empty if it is lost."""
+    """Send a line to a process, and return its answer; "" if it is lost."""
     if process.stdin is None or process.stdout is None:
         return ""
     try:
@@ -129,11 +129,11 @@ def _asked(process: subprocess.Popen[str], question: str) -> str:
 
 
 def _why_plain_planners_crash(name: str | None, said: str) -> str:
-    """The usual cause, in a line, of a crash in a planner that derives from OMPL's class itself; "" for any other.
+    """Return the usual cause of a crash in a planner derived from OMPL's own class, in one line; "" for other planners.
 
     Args:
-        name: Of the planner.
-        said: By the process before it was lost, perhaps its stack, by :mod:`faulthandler`.
+        name: Name of the planner.
+        said: Output of the process before it was lost, perhaps with its stack, by :mod:`faulthandler`.
     """
     if name is None or is_auto(name):
         return ""
@@ -146,14 +146,14 @@ def _why_plain_planners_crash(name: str | None, said: str) -> str:
     if not is_plain(planner):
         return ""
 
-    places = [(Path(file), line) for file, line in LINES_OF_CODE.findall(said)]  # the innermost first
+    places = [(Path(file), line) for file, line in LINES_OF_CODE.findall(said)]  # innermost frame first
     own = next((place for place in places if place[0] == Path(inspect.getfile(planner))), None)
     where = "" if own is None else f" ({own[0].name}, line {own[1]})"
     return f"{label_of(name)} is derived from ompl.base.Planner{where}; {PLAIN_HINT}"
 
 
 class Guards:
-    """One guard for each thread that calls."""
+    """One guard for each calling thread."""
 
     def __init__(self) -> None:
         self._mine = threading.local()

@@ -1,4 +1,4 @@
-"""OMPL's log format and its database: what OMPL's reader turns into sqlite and Planner Arena shows."""
+"""Write OMPL's log format and its database, which Planner Arena displays."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from rrtik_ompl.files.text import make_folder, write_text
 DATABASE = "benchmark.db"
 OMPL_STATUSES = ("Unknown status", "Invalid start", "Invalid goal", "Unrecognized goal type", "Timeout",
                  "Approximate solution", "Exact solution", "Crash")  # fmt: skip
-TIMEOUT, EXACT, CRASH = 4, 6, 7  # places in OMPL_STATUSES
-# OMPL's name and type of each run property, and where it comes from.
+TIMEOUT, EXACT, CRASH = 4, 6, 7  # indices in OMPL_STATUSES
+# OMPL's name and type of each run property, and our quantity for it.
 PROPERTIES = {
     "time REAL": "plan_seconds",
     "memory REAL": "memory_mb",
@@ -41,8 +41,8 @@ PROPERTIES = {
     "simplified transitions INTEGER": "transitions",
     "seed INTEGER": "seed",
 }
-# Before them: what became of a run. `plan` returns no path that its second check refuses, so that the first path is
-# correct where there is one; strictly, if four times as many checks as the planner made find nothing either.
+# These columns come first: the outcome of a run. `plan` returns only paths that pass its second check, so every
+# path counts as correct. It is strictly correct if four times as many checks as the planner's find no collision, too.
 FLAGS = (
     "solved BOOLEAN",
     "status ENUM",
@@ -57,12 +57,12 @@ FLAGS = (
 
 
 def write_logs(found: Sequence[Result], head: Mapping[str, Any], folder: Path) -> list[Path]:
-    """Write one log for each label, an experiment of its own.
+    """Write one log, with one experiment, for each label.
 
     Args:
         found: Results of a campaign.
-        head: Of its records: suite and machine.
-        folder: Is made if it is not there.
+        head: Head of its records, with suite and machine.
+        folder: Created if it does not exist.
 
     Raises:
         InputError: If a file cannot be written.
@@ -79,7 +79,12 @@ def write_logs(found: Sequence[Result], head: Mapping[str, Any], folder: Path) -
 
 
 def write_database(logs: Sequence[Path], file: Path, runs: int) -> None:
-    """Make a database of logs with OMPL's own reader; it takes the place of an older one when it is whole.
+    """Convert logs to a database with OMPL's own reader; it replaces an older one only when it is complete.
+
+    Args:
+        logs: Files of the logs.
+        file: The database.
+        runs: Expected number of runs.
 
     Raises:
         InputError: If the reader cannot read a log, or the database does not hold all ``runs``.
@@ -108,7 +113,7 @@ def write_database(logs: Sequence[Path], file: Path, runs: int) -> None:
 
 
 def log_text(results: Sequence[Result], head: Mapping[str, Any]) -> str:
-    """One experiment: all planners on the same problems."""
+    """Return the text of one experiment: all planners on the same problems."""
     suite = head["suite"]
     machine = head["machine"]
     first = results[0]
@@ -167,7 +172,7 @@ def _planner(result: Result, entrant: Mapping[str, Any]) -> list[str]:
 
 
 def _flags(run: Mapping[str, Any]) -> list[str]:
-    """Values of ``FLAGS``; a run without a path has those of a solution empty, as OMPL does not write them then."""
+    """Return the values of ``FLAGS``; without a path, those of a solution are empty, as in OMPL's own logs."""
     status = {SOLVED: EXACT, INVALID: EXACT, NOT_FOUND: TIMEOUT}.get(run["status"], CRASH)
     found = run["status"] in (SOLVED, INVALID)
     valid = run["status"] == SOLVED
@@ -185,7 +190,7 @@ def _number(value: float | None) -> str:
 
 
 def _column(name: str) -> str:
-    """A name that SQL takes."""
+    """Return a name that is valid in SQL."""
     return re.sub(r"\W+", " ", name).replace("_", " ").strip()
 
 

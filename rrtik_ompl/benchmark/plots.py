@@ -1,4 +1,4 @@
-"""Results as pictures: how many runs are solved by when, box plots, and what growing problems cost."""
+"""Plot results: solved runs over time, box plots, and planning time over growing problems."""
 
 from __future__ import annotations
 
@@ -16,17 +16,18 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-Draw = Callable[[Any, Sequence[Result], Mapping[str, Any]], None]  # of a panel, results and the lines' styles
+# Draws results into a panel, with the styles of the lines.
+Draw = Callable[[Any, Sequence[Result], Mapping[str, Any]], None]
 
-PANELS = 24  # in a picture at most; tables hold the rest
+PANELS = 24  # largest number of panels in a picture; the tables contain the rest
 ACROSS = 3
-LEGENDS = 2  # names beside each other above a panel
+LEGENDS = 2  # columns of the legend for each panel
 BOXES = ("total_seconds", "length", "transitions")
-LEAST = 1e-4  # [s] where axes of time begin
+LEAST = 1e-4  # [s]; begin of the time axes
 
 
 def draw_all(results: Sequence[Result], folder: Path) -> list[Path]:
-    """Draw all pictures, each as PNG and SVG; those of which there is nothing to show are left out.
+    """Draw all pictures, each as PNG and SVG; pictures without data are left out.
 
     Raises:
         InputError: If a file cannot be written.
@@ -57,7 +58,15 @@ def draw_all(results: Sequence[Result], folder: Path) -> list[Path]:
 def _panels(
     groups: Mapping[str, list[Result]], planners: Sequence[str], draw: Draw, across: str | None, upward: str
 ) -> Figure | None:
-    """A panel for each group, with one legend; None without groups."""
+    """Draw a panel for each group, with a common legend; return None without groups.
+
+    Args:
+        groups: Results by title of the panel.
+        planners: All planners, whose order defines their styles.
+        draw: Draws one panel.
+        across: Label of the x axis; None for the quantity that grows.
+        upward: Label of the y axis.
+    """
     if not groups:
         return None
 

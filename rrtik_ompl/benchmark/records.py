@@ -1,6 +1,6 @@
-"""The file of a campaign: a line of JSON about the suite, then one for every run, appended as runs are finished.
+"""The file of a campaign: a line of JSON about the suite, then one for every run, appended when the run is finished.
 
-An interruption can leave nothing worse than half a line at the end, which is cut off when the campaign goes on.
+An interruption can at worst leave an incomplete line at the end, which is removed when the campaign is continued.
 """
 
 from __future__ import annotations
@@ -27,18 +27,18 @@ NEEDED = {
     **{"run": int, "seed": int, "status": str},
 }
 OF_A_PATH = ("plan_seconds", "length", "waypoints")
-NO_NUMBERS = {"reason": str, "counts": dict, "waypoints": list, **NEEDED}  # whatever else was measured is a number
-# What the head says of the machine, the beginning of the campaign last.
+NO_NUMBERS = {"reason": str, "counts": dict, "waypoints": list, **NEEDED}  # all other values are numbers
+# Entries of the head about the machine; the last one is the beginning of the campaign.
 MACHINE = ("rrtik-ompl", "ompl", "pin", "coal", "numpy", "python", "system", "processor", "cores", "at a time", "begun")
 
 
 def key_of(record: Mapping[str, Any]) -> Key:
-    """Which run a record is about."""
+    """Return the key of the run that a record describes."""
     return record["problem"], record["planner"], record["run"]
 
 
 def read_head(file: Path) -> Record:
-    """The first line: the suite and the machine.
+    """Return the first line, with suite and machine.
 
     Raises:
         InputError: If the file cannot be read or is something else.
@@ -57,7 +57,7 @@ def read_head(file: Path) -> Record:
 
 
 def read_records(file: Path) -> Iterator[Record]:
-    """All records in the order in which runs were finished; half a line at the end is left out.
+    """Yield all records in the order in which runs were finished; an incomplete last line is left out.
 
     Raises:
         InputError: If the file cannot be read, or a line in its middle is no record.
@@ -72,7 +72,7 @@ def read_records(file: Path) -> Iterator[Record]:
 
 
 def _fault(data: Record) -> str:
-    """What is wrong with a record; "" if nothing is."""
+    """Return what is wrong with a record; "" if nothing is."""
     status = data.get("status")
     for name in (*NEEDED, *(OF_A_PATH if status == SOLVED else ())):
         if name not in data:
@@ -90,7 +90,7 @@ def _fault(data: Record) -> str:
 
 
 def _lines(file: Path) -> Iterator[tuple[int, Record]]:
-    """Whole lines with their numbers."""
+    """Yield the complete lines with their numbers."""
     try:
         with open(file, "rb") as stream:
             for number, line in enumerate(stream, start=1):
@@ -116,11 +116,11 @@ def _corrupt(file: Path, number: int, why: str) -> InputError:
 
 
 class RecordFile:
-    """A file of records that is open for appending.
+    """A file of records, opened for appending.
 
     Args:
-        file: The file; it is made, with its folder, unless it is there.
-        head: Its first line.
+        file: The file; it is created, with its folder, if it does not exist.
+        head: First line of a new file.
 
     Raises:
         InputError: If it cannot be written, or another process is writing it.
@@ -146,7 +146,7 @@ class RecordFile:
             self.append(head)
 
     def append(self, record: Mapping[str, Any]) -> None:
-        """Write a record through to the disk's care; if there is no room, what was there before stays whole.
+        """Write a record without buffering; if there is no space, the incomplete line is removed.
 
         Raises:
             InputError: If it cannot be written.
@@ -171,7 +171,7 @@ class RecordFile:
         self._file.close()
 
     def _cut_half_line(self) -> None:
-        """What is not whole goes; so does a head without runs, for that of this campaign takes its place."""
+        """Remove an incomplete last line, and also a head without runs, which this campaign's head replaces."""
         data = self._name.read_bytes()
         self._end = data.rfind(b"\n") + 1 if data.count(b"\n") > 1 else 0
         if self._end < len(data):
@@ -185,6 +185,6 @@ class RecordFile:
 
 
 def json_like(data: Mapping[str, Any]) -> Record:
-    """The same as it reads back from a file: tuples are lists."""
+    """Return data as they are read back from a file: tuples become lists."""
     found: Record = json.loads(json.dumps(data))
     return found

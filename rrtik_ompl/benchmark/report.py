@@ -1,4 +1,4 @@
-"""Everything that is made of a campaign's records: logs, database, tables, pictures, the page."""
+"""Reports of a campaign, made from its records: logs, database, tables, pictures, and a web page."""
 
 from __future__ import annotations
 
@@ -39,10 +39,10 @@ def write_report(file: Path, *, views: int = VIEWS) -> tuple[list[Result], list[
 
     Args:
         file: The records.
-        views: 3-D views at most; drawing one takes a second or so.
+        views: Largest number of 3-D views; drawing one takes about a second.
 
     Returns:
-        The results, and what was written for a person: page, tables, database.
+        The results, and the files for a reader: page, tables, database.
 
     Raises:
         InputError: If the records cannot be read, or there are none, or a file cannot be written.
@@ -65,7 +65,7 @@ def write_report(file: Path, *, views: int = VIEWS) -> tuple[list[Result], list[
 
 
 def read_campaign(file: Path) -> tuple[records.Record, list[Result]]:
-    """The head of a file of records, and what was measured, in the order in which the suite names it.
+    """Return the head of a file of records, and the results in the order of the suite.
 
     Raises:
         InputError: If the records cannot be read, or there are none.
@@ -78,7 +78,7 @@ def read_campaign(file: Path) -> tuple[records.Record, list[Result]]:
 
 
 def _in_order(file: Path, found: list[Result], head: records.Record) -> list[Result]:
-    """As the suite names them: records come in the order in which runs were finished."""
+    """Sort results as in the suite, because records are in the order in which runs were finished."""
     suite = head["suite"]
     labels = list(dict.fromkeys(s["name"] if s["axis"] else s["group"] for s in suite["sources"]))
     planners = [entrant["label"] for entrant in suite["entrants"]]
@@ -97,7 +97,7 @@ def _in_order(file: Path, found: list[Result], head: records.Record) -> list[Res
 
 
 def _shortest_runs(runs: Iterable[Mapping[str, Any]], most: int) -> list[dict[str, Any]]:
-    """Of each group the valid run with the shortest path, of the first ``most`` groups."""
+    """Return, for each of the first ``most`` groups, the valid run with the shortest path."""
     best: dict[str, dict[str, Any]] = {}
     for record in runs:
         if record["status"] != SOLVED or (record["group"] not in best and len(best) >= most):
@@ -110,7 +110,10 @@ def _shortest_runs(runs: Iterable[Mapping[str, Any]], most: int) -> list[dict[st
 
 
 def _draw_views(chosen: Iterable[Mapping[str, Any]], head: Mapping[str, Any], folder: Path) -> dict[str, Path]:
-    """A 3-D page for each run, by what the link to it says; a problem that cannot be drawn here is left out.
+    """Write a 3-D page for each run; problems that cannot be drawn on this machine are left out.
+
+    Returns:
+        The files, by the texts of the links to them.
 
     Raises:
         InputError: If a file cannot be written.
@@ -137,13 +140,13 @@ def _draw_views(chosen: Iterable[Mapping[str, Any]], head: Mapping[str, Any], fo
 def _page(
     results: Sequence[Result], head: Mapping[str, Any], pictures: Iterable[Path], views: Mapping[str, Path]
 ) -> str:
-    """The page.
+    """Return the web page.
 
     Args:
-        results: Of the campaign.
-        head: Of its records.
-        pictures: Files of pictures; SVG are put into the page.
-        views: 3-D pages in a folder beside the page, by what their links say.
+        results: Results of the campaign.
+        head: Head of its records.
+        pictures: Files of pictures; those in SVG are embedded.
+        views: 3-D pages in a folder beside the page, by the texts of their links.
     """
     title = escape(head["suite"]["title"])
     said = escape(conditions(results, head)).replace("`", "")

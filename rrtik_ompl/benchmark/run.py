@@ -1,4 +1,4 @@
-"""One run: build the problem, plan, shorten, measure; what comes out is plain and fits on one line of a file."""
+"""One run of a benchmark: build the problem, plan, shorten, measure; the result is plain and fits on one line."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from rrtik_ompl.world.world import World
 
 SOLVED, NOT_FOUND, INVALID, ERROR = "solved", "not found", "invalid", "error"
 OUT_OF_MEMORY, CRASH, HANG = "out of memory", "crash", "hang"
-STRICT = 4.0  # times as many checks as planners make; OMPL's own figure for "strictly correct"
-LOOKED_AT = 8  # waypoints at most for a path's clearance
+STRICT = 4.0  # factor of checks over a planner's; OMPL's own value for "strictly correct"
+LOOKED_AT = 8  # largest number of waypoints whose clearance is measured
 STATUSES = (SOLVED, NOT_FOUND, INVALID, ERROR, OUT_OF_MEMORY, CRASH, HANG)
 
 
 def prepare(job: Mapping[str, Any]) -> Problem | None:
-    """Build the problem of a job, which is not part of the run; None if it cannot be built: the run will say why."""
+    """Build the problem of a job, which is not part of the run; None if that fails, as the run will report why."""
     try:
         return build(from_plain(job["source"]))
     except (RrtikError, MemoryError):
@@ -35,13 +35,13 @@ def prepare(job: Mapping[str, Any]) -> Problem | None:
 
 
 def execute(job: Mapping[str, Any]) -> dict[str, Any]:
-    """Do a job; whatever goes wrong in Python is an outcome.
+    """Run a job; every error in Python becomes a status.
 
     Args:
-        job: As :func:`rrtik_ompl.benchmark.campaign.all_jobs` writes it.
+        job: As :func:`rrtik_ompl.benchmark.campaign.all_jobs` returns it.
 
     Returns:
-        status, reason, and what was measured: seconds, lengths [rad, m], moves, clearance [m], counts of the planner,
+        Status, reason, and measured values: seconds, lengths [rad, m], moves, clearance [m], counts of the planner,
         waypoints.
     """
     try:
@@ -50,7 +50,7 @@ def execute(job: Mapping[str, Any]) -> dict[str, Any]:
         return {"status": ERROR, "reason": str(error)}
     except MemoryError as error:
         return {"status": OUT_OF_MEMORY, "reason": f"more than {job['memory_mb']:g} MB: {error}".rstrip(": ")}
-    except Exception as error:  # a campaign goes on, whatever a planner of another package does
+    except Exception as error:  # errors of other packages' planners must not end the campaign
         return {"status": ERROR, "reason": f"{type(error).__name__}: {error}"}
 
 
@@ -70,7 +70,7 @@ def _measured(job: Mapping[str, Any], problem: Problem) -> dict[str, Any]:
     path = _shortened(found.path, problem, job["shorten"], found.seed)
     record |= {"shorten_seconds": time.perf_counter() - begin}
 
-    faults = () if path is found.path else path.violations(problem.world)  # plan() has checked what it returns
+    faults = () if path is found.path else path.violations(problem.world)  # plan() has already checked its own path
     if faults or not problem.reached(path.end) or not (path.start == problem.start).all():
         reason = faults[0].reason if faults else "the path does not lead from the start to the goal"
         record |= {"status": INVALID, "reason": reason}
@@ -102,10 +102,7 @@ def _sizes(path: JointPath, world: World) -> dict[str, float | bool | None]:
 
 
 def clearance(path: JointPath, world: World) -> float | None:
-    """OMPL's measure [m]: the mean over the waypoints of the distance to contact; None if nothing can collide.
-
-    Of a path with many waypoints some are checked, evenly, for each takes a millisecond or many.
-    """
+    """Return OMPL's clearance of a path [m]: the mean distance to contact at its waypoints; None without obstacles."""
     rows = path.waypoints
     some = rows[np.unique(np.linspace(0, len(rows) - 1, LOOKED_AT).round().astype(int))]
     mean = float(np.mean([world.clearance(q) for q in some]))
@@ -113,7 +110,10 @@ def clearance(path: JointPath, world: World) -> float | None:
 
 
 def smoothness(path: JointPath) -> float:
-    """OMPL's measure, 0 for a straight line: the squares of the turns, each over the mean length of its two edges."""
+    """Return OMPL's smoothness of a path, 0 for a straight line.
+
+    It is the sum over the waypoints of the squared turning angle divided by the mean length of both edges.
+    """
     rows = path.waypoints
     sides = np.linalg.norm(np.diff(rows, axis=0), axis=1)
     before = sides[:-1]

@@ -1,4 +1,4 @@
-"""Problems of which one measure grows while the rest stays alike: joints of a chain, obstacles about an arm."""
+"""Families of problems in which one quantity grows: the joints of a chain, or the obstacles around an arm."""
 
 from __future__ import annotations
 
@@ -17,22 +17,24 @@ from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
 
 CHAIN_LENGTH = 3.0  # [m] of all links together
-BEND = np.pi / 2.0  # [rad] by which all joints of the chain together bend to either side at start and goal
-WAY = np.array([[2.1, 0.0]])  # [m] where the disc stands that keeps the straight motion from being free
+# [rad]; total bend of the chain, to one side at the start and to the other at the goal.
+BEND = np.pi / 2.0
+WAY = np.array([[2.1, 0.0]])  # [m]; centre of the disc that blocks the straight motion
 DISC, SMALL_DISC = 0.35, 0.12  # [m] radii
-SHELL = (0.25, 1.1)  # where the obstacles about an arm are, in reaches
-GATE, LARGEST = 0.1, 0.12  # radii in reaches: of the ball on the straight way, of a crowd of one
-CLEAR_SIZE_RATIO = 1.4  # times their size obstacles leave to the known way
+SHELL = (0.25, 1.1)  # inner and outer radius of the shell of obstacles around an arm, in units of its reach
+# Radii in units of the reach: of the ball on the straight motion, and of the obstacles if there is only one.
+GATE, LARGEST = 0.1, 0.12
+CLEAR_SIZE_RATIO = 1.4  # obstacles scaled by this factor must not touch the known path
 POSTURES, DRAWS, STOPS = 512, 200, 40
-APART = 0.6  # of the tip between start and goal, in reaches
+APART = 0.6  # least distance of the tip between start and goal, in units of the reach
 
 
 def planar_chain(joints: int, seed: int = 0) -> Problem:
-    """A chain in the plane, 3 m long whatever its number of links, that bends from one side of a disc to the other.
+    """Return the problem of a planar chain, 3 m long, that bends from one side of a disc to the other.
 
     Args:
         joints: 2 or more.
-        seed: Of the places of three smaller discs.
+        seed: Seed of the places of three smaller discs.
 
     Raises:
         InputError: If there are fewer than two joints, or no such scene leaves start and goal free.
@@ -57,7 +59,7 @@ def planar_chain(joints: int, seed: int = 0) -> Problem:
 
 
 def _bent(joints: int, angle: float) -> Vector:
-    """A chain whose base turns by half the angle, and whose other joints turn by the rest of it together."""
+    """Return a configuration of the chain: the base turns by half the angle, the other joints share the other half."""
     return np.array([0.5 * angle] + [0.5 * angle / (joints - 1)] * (joints - 1))
 
 
@@ -66,13 +68,13 @@ def _ball(number: int, centre: object, radius: float) -> Obstacle:
 
 
 def crowded_arm(robot: Robot, count: int, seed: int = 0) -> Problem:
-    """An arm between ``count`` boxes and balls; a way of two straight motions is known to be free.
+    """Return a problem of an arm among ``count`` boxes and balls, for which a path of two straight motions is known.
 
-    The first is a ball on the straight way. The others shrink as they grow in number, so that they fill the same share
-    of the room; those beside the known way are left out. Start and goal depend on the seed alone.
+    The first obstacle is a ball that blocks the straight motion. The others shrink as their number grows, so that they
+    fill the same share of space; those near the known path are left out. Start and goal depend only on the seed.
 
     Raises:
-        InputError: If ``count`` is below 1, or no such way turned up for the robot.
+        InputError: If ``count`` is below 1, or no such path was found for the robot.
     """
     if count < 1:
         raise InputError(f"obstacles about an arm must be 1 or more, got {count}")
@@ -101,7 +103,7 @@ def _postures(alone: World, rng: np.random.Generator) -> Matrix:
 
 
 def _detour(alone: World, reach: float, rng: np.random.Generator) -> tuple[Vector, Vector, Vector, Obstacle]:
-    """Start, another posture, goal, and a ball on the straight way that the way by the other posture does not touch."""
+    """Return start, via and goal configurations, and a ball that blocks the direct motion but not that through via."""
     robot = alone.robot
     for _ in range(DRAWS):
         rows = _postures(alone, rng)[:60]
@@ -123,7 +125,7 @@ def _detour(alone: World, reach: float, rng: np.random.Generator) -> tuple[Vecto
 
 
 def _beside(robot: Robot, stops: Matrix, count: int, reach: float, rng: np.random.Generator) -> list[Obstacle]:
-    """Obstacles that leave room to the arm at all stops."""
+    """Return obstacles that keep clear of the arm at all given configurations."""
     kept: list[Obstacle] = []
     size = LARGEST * reach / (count + 1) ** (1.0 / 3.0)
 
@@ -138,7 +140,7 @@ def _beside(robot: Robot, stops: Matrix, count: int, reach: float, rng: np.rando
 
 
 def _places(count: int, reach: float, rng: np.random.Generator) -> list[Any]:
-    """Random poses, evenly in the shell."""
+    """Return random poses, uniformly distributed in the shell."""
     ways = rng.normal(size=(count, 3))
     far = reach * rng.uniform(SHELL[0] ** 3, SHELL[1] ** 3, (count, 1)) ** (1.0 / 3.0)
     centres = far * ways / np.linalg.norm(ways, axis=1, keepdims=True)
@@ -146,7 +148,7 @@ def _places(count: int, reach: float, rng: np.random.Generator) -> list[Any]:
 
 
 def _solid(number: int, place: pin.SE3, size: float) -> Obstacle:
-    """Balls and boxes in turns."""
+    """Return a box for odd numbers, and a ball for even ones."""
     if number % 2:
         return Obstacle(f"box{number}", Box([1.6 * size] * 3), place)
     return Obstacle(f"sphere{number}", Sphere(size), place)

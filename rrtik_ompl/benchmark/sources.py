@@ -1,4 +1,4 @@
-"""Where the problems of a suite come from: small plain descriptions that any process can turn into the problem."""
+"""Sources of the problems of a suite: small plain descriptions from which any process can build the problem."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ from rrtik_ompl.planning.generated_problems import generated_problem
 from rrtik_ompl.problem_files.problem import load_problem
 from rrtik_ompl.world.problem import Problem
 
-CACHED_PROBLEMS = 4  # problems that a process remembers; runs of one problem follow each other
+CACHED_PROBLEMS = 4  # problems cached in a process; runs of one problem are consecutive
 
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """A problem that is not built yet.
+    """Description of a problem that is not built yet.
 
     Attributes:
         kind: One of KINDS.
-        name: Of the problem.
-        group: Of problems that are reported together.
-        arguments: Of the kind, plain values.
-        axis: What grows in a family that measures scaling, or "".
-        value: How much of it there is.
+        name: Name of the problem.
+        group: Group of problems that are reported together.
+        arguments: Arguments of the function in KINDS, plain values.
+        axis: Quantity that grows in a scaling family; "" otherwise.
+        value: Its value.
     """
 
     kind: str
@@ -41,27 +41,27 @@ class Source:
     value: float = 0.0
 
     def plain(self) -> dict[str, Any]:
-        """For JSON."""
+        """Return the source as plain values for JSON."""
         return asdict(self)
 
 
 def from_plain(data: Mapping[str, Any]) -> Source:
-    """A source as :meth:`Source.plain` writes it."""
+    """Return the source that :meth:`Source.plain` has written."""
     return Source(**{**data, "arguments": tuple(data["arguments"])})
 
 
 @lru_cache(maxsize=CACHED_PROBLEMS)
 def build(source: Source) -> Problem:
-    """The problem of a source.
+    """Build the problem of a source.
 
     Raises:
-        RrtikError: If it cannot be built, in the words of whoever builds it.
+        RrtikError: If it cannot be built, with the message of the builder.
     """
     return KINDS[source.kind](*source.arguments)
 
 
 def file_source(name: str, folder: Path) -> Source:
-    """A shipped problem by its name, or a file as seen from ``folder``.
+    """Return the source of a shipped problem by its name, or of a file relative to ``folder``.
 
     Raises:
         UnknownNameError: If there is no shipped problem of that name.
@@ -70,7 +70,7 @@ def file_source(name: str, folder: Path) -> Source:
     path = Path(name)
     if not path.suffix and len(path.parts) == 1:
         find_problem(name)
-        return Source("file", name, name, (name, None))  # which other machines keep in other folders
+        return Source("file", name, name, (name, None))  # by name, because other machines keep it in other folders
 
     file = (folder / path).resolve()
     if not os.path.isfile(file):
@@ -79,11 +79,11 @@ def file_source(name: str, folder: Path) -> Source:
 
 
 def folder_sources(folder: Path, robot: str | None) -> list[Source]:
-    """All problems in a folder and below: problem files, and MotionBenchMaker's pairs by their scenes.
+    """Return the sources of all problems in a folder and its subfolders: problem files and MotionBenchMaker's pairs.
 
     Args:
         folder: Where to search; problems of one folder are reported together.
-        robot: In place of the one that the files name.
+        robot: Used instead of the one that the files name; None to keep it.
 
     Raises:
         InputError: If there is none, or no such folder.
@@ -109,14 +109,14 @@ def folder_sources(folder: Path, robot: str | None) -> list[Source]:
 
 
 def generated_sources(robot: str, family: str, first: int, count: int) -> list[Source]:
-    """Problems of ``rrtik_ompl.planning.generated_problems`` with the seeds first, first + 1, ..."""
+    """Return sources of ``rrtik_ompl.planning.generated_problems`` with the seeds first, first + 1, ..."""
     group = f"{robot}/{family}"
     seeds = range(first, first + count)
     return [Source("generated", f"{group}/{seed}", group, (robot, family, seed)) for seed in seeds]
 
 
 def scaling_sources(axis: str, values: list[Any], *arguments: Any, group: str) -> list[Source]:
-    """One problem for each value of what grows: ``joints``, ``obstacles`` or ``resolution``."""
+    """Return one source for each value of the quantity that grows: ``joints``, ``obstacles`` or ``resolution``."""
     return [Source(axis, f"{group}/{value:g}", group, (*arguments, value), axis, float(value)) for value in values]
 
 

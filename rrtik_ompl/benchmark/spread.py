@@ -1,4 +1,4 @@
-"""Spreading jobs through joblib: over processes of this machine, or over the workers of a Dask cluster."""
+"""Distribute jobs with joblib: over threads and processes of this machine, or over the workers of a Dask cluster."""
 
 from __future__ import annotations
 
@@ -14,8 +14,9 @@ if TYPE_CHECKING:
     from distributed import Client
 
 
-CONNECT = 10  # [s] to reach a scheduler
-_here = Guards()  # of a worker of a cluster, which has no other place to keep them
+CONNECT = 10  # [s]; time limit for reaching a scheduler
+# The guards of a worker of a cluster, global because a worker keeps no other state between jobs.
+_here = Guards()
 
 Job = Mapping[str, Any]
 Done = dict[str, Any]
@@ -24,12 +25,12 @@ Done = dict[str, Any]
 def local(
     jobs: Iterable[Job], count: int, beside: Callable[[Job], bool] = lambda _: False
 ) -> Generator[Done, None, None]:
-    """Do jobs ``count`` at a time on this machine; records come as they are finished.
+    """Run jobs on this machine, and yield their records as they are finished.
 
     Args:
-        jobs: What is to be done.
-        count: See above.
-        beside: Which jobs are done in threads of this process; for others a thread waits for a guarded process.
+        jobs: The jobs.
+        count: Number of concurrent jobs.
+        beside: Whether a job runs in a thread of this process; for others a thread waits for a guarded process.
     """
     from joblib import Parallel, delayed
 
@@ -42,7 +43,7 @@ def local(
             return None
 
     try:
-        # one job ahead at most, so that a long list does not fill the memory
+        # Few jobs are dispatched ahead, so that a long list does not fill the memory.
         done = Parallel(n_jobs=count, backend="threading", return_as="generator_unordered", pre_dispatch="2*n_jobs",
                         batch_size=1)(delayed(one)(job) for job in jobs)  # fmt: skip
         yield from (record for record in done if record is not None)
@@ -51,7 +52,7 @@ def local(
 
 
 def cluster(jobs: Iterable[Job], address: str) -> Generator[Done, None, None]:
-    """Do jobs on the workers of a Dask scheduler; what a lost worker had in hand, others do again.
+    """Run jobs on the workers of a Dask scheduler; jobs of a lost worker are repeated by others.
 
     Raises:
         InputError: If Dask is not installed, the scheduler does not answer or has no workers, or a worker cannot run
@@ -94,7 +95,7 @@ def _version() -> str:
 
 @contextmanager
 def _one_line(address: str) -> Iterator[None]:
-    """What Dask raises of its own, as one line of ours."""
+    """Convert exceptions of Dask to our own, with a message of one line."""
     try:
         yield
     except RrtikError:

@@ -1,4 +1,4 @@
-"""What a campaign measured, in the figures of the reference evaluation: counts, mean, quartiles, 95 %."""
+"""Statistics of a campaign, as in the reference evaluation: counts, mean, quartiles, 95 % quantile."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from rrtik_ompl.benchmark.run import CRASH, ERROR, INVALID, SOLVED
 
-# Name of each quantity, what to call it, its unit. Lengths are Euclidean in joint values; moves are transitions.
+# Key, displayed name and unit of each quantity. Lengths are Euclidean in joint space; moves are called transitions.
 QUANTITIES: Mapping[str, tuple[str, str]] = MappingProxyType(
     {
         "plan_seconds": ("planning", "s"),
@@ -31,11 +31,11 @@ QUANTITIES: Mapping[str, tuple[str, str]] = MappingProxyType(
         "memory_mb": ("memory", "MB"),
     }
 )
-HEAVY = ("waypoints",)  # of a record; not needed for figures
+HEAVY = ("waypoints",)  # large entries of a record that statistics do not need
 
 
 class Spread(NamedTuple):
-    """How a quantity is spread over runs."""
+    """Statistics of a quantity over runs."""
 
     mean: float
     std: float
@@ -49,13 +49,13 @@ class Spread(NamedTuple):
 
 @dataclass(slots=True)
 class Result:
-    """One planner on the problems of one label.
+    """All runs of one planner on the problems of one label.
 
     Attributes:
         label: Problems that are reported together: a group, or one problem of a scaling family.
-        planner: Its label.
+        planner: Label of the planner.
         group, axis, value: As in a record.
-        runs: Records without what is heavy.
+        runs: Records without their large entries.
     """
 
     label: str
@@ -67,31 +67,31 @@ class Result:
 
     @property
     def total(self) -> int:
-        """Runs."""
+        """Number of runs."""
         return len(self.runs)
 
     @property
     def solved(self) -> int:
-        """Runs that gave a path."""
+        """Number of runs that returned a path."""
         return sum(run["status"] in (SOLVED, INVALID) for run in self.runs)
 
     @property
     def valid(self) -> int:
-        """Runs whose path was valid when it was checked again, densely."""
+        """Number of runs whose path passed a second, denser check."""
         return sum(run["status"] == SOLVED for run in self.runs)
 
     def values(self, quantity: str) -> list[float]:
-        """Of the runs with a valid path, in the order of runs; runs that did not count this quantity are left out."""
+        """Return a quantity of the runs with a valid path, in their order; runs that did not measure it are skipped."""
         found = (measured(run, quantity) for run in self.runs if run["status"] == SOLVED)
         return [value for value in found if value is not None]
 
     def spread(self, quantity: str) -> Spread | None:
-        """Over the runs with a valid path; None if there are none."""
+        """Return the statistics over the runs with a valid path; None if there are none."""
         return spread(self.values(quantity))
 
 
 def measured(record: Mapping[str, Any], quantity: str) -> float | None:
-    """A quantity of a record, None if it was not counted."""
+    """Return a quantity of a record; None if it was not measured."""
     if quantity == "total_seconds":
         return float(record["plan_seconds"] + record.get("shorten_seconds", 0.0)) if "plan_seconds" in record else None
 
@@ -105,7 +105,7 @@ def measured(record: Mapping[str, Any], quantity: str) -> float | None:
 
 
 def spread(values: Sequence[float]) -> Spread | None:
-    """Figures of a list, None if it is empty."""
+    """Return the statistics of a list of values; None if it is empty."""
     if not values:
         return None
     low, q25, median, q75, p95, high = np.quantile(values, (0.0, 0.25, 0.5, 0.75, 0.95, 1.0)).tolist()
@@ -113,7 +113,7 @@ def spread(values: Sequence[float]) -> Spread | None:
 
 
 def results(records: Iterable[Mapping[str, Any]]) -> list[Result]:
-    """Records by problems and planners, in the order in which these first appear, runs in order."""
+    """Group records by problem and planner, in the order of first appearance; the runs of each group are sorted."""
     found: dict[tuple[str, str], Result] = {}
     for record in records:
         label = record["problem"] if record["axis"] else record["group"]
@@ -128,7 +128,7 @@ def results(records: Iterable[Mapping[str, Any]]) -> list[Result]:
 
 
 def always_refused(found: Iterable[Result]) -> list[str]:
-    """Planners of which every run ended with an error, as with a parameter it cannot use, or ended its process."""
+    """Return the planners whose every run ended with an error, for example of a parameter, or with a crash."""
     statuses: dict[str, set[str]] = {}
     for result in found:
         statuses.setdefault(result.planner, set()).update(run["status"] for run in result.runs)
@@ -136,7 +136,7 @@ def always_refused(found: Iterable[Result]) -> list[str]:
 
 
 def by_label(found: Iterable[Result]) -> dict[str, list[Result]]:
-    """Results of the same problems together."""
+    """Group results by label."""
     sorted_by: dict[str, list[Result]] = {}
     for result in found:
         sorted_by.setdefault(result.label, []).append(result)

@@ -1,4 +1,4 @@
-"""A suite: which problems, which planners, how many runs, how long, how much memory; every name in it is looked up."""
+"""A suite: problems, planners, number of runs, limits of time and memory; every name in it is checked."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from rrtik_ompl.ompl_bridge.planner_names import is_planner_file, label_of, opti
 from rrtik_ompl.ompl_bridge.planner_traits import unbound_planners
 from rrtik_ompl.planning.generated_problems import FAMILIES
 
-BY_KIND: Final = "by-kind"  # of shortening, beside the methods
+BY_KIND: Final = "by-kind"  # a choice of shortening in addition to the methods
 NONE: Final = "none"
 SHORTENINGS: tuple[SuiteShortening, ...] = get_args(SuiteShortening)
 Count = Annotated[int, Field(strict=True, ge=1, le=1_000_000)]
@@ -36,7 +36,7 @@ Seed = Annotated[int, Field(strict=True, ge=0, le=2**31 - 1)]
 
 @dataclass(frozen=True, slots=True)
 class Entrant:
-    """A planner with its options under a label; without a name, the one that a problem names."""
+    """A planner with its options under a label; with the name None, the planner that each problem names."""
 
     label: str
     name: str | None
@@ -46,17 +46,17 @@ class Entrant:
 
 @dataclass(frozen=True, slots=True)
 class Suite:
-    """A campaign that has been checked: every name in it exists.
+    """A checked description of a campaign: every name in it exists.
 
     Attributes:
-        name: Of the file.
+        name: Name of the file.
         sources: The problems.
         entrants: The planners.
-        runs: Of each planner on each problem.
-        seconds: For planning in each run.
-        patience: Seconds after which a run is killed.
-        memory_mb: That a run may take beside robot, scene and library.
-        seed: Of the whole campaign.
+        runs: Runs of each planner on each problem.
+        seconds: Time limit of planning in each run [s].
+        patience: Time after which a run is killed [s].
+        memory_mb: Memory of a run in addition to robot, scene and library [MB].
+        seed: Seed of the whole campaign.
     """
 
     name: str
@@ -75,17 +75,17 @@ class Suite:
         return len(self.sources) * len(self.entrants) * self.runs
 
     def plain(self) -> dict[str, Any]:
-        """For JSON."""
+        """Return the suite as plain values for JSON."""
         return asdict(self)
 
 
 def load_suite(name_or_file: str | os.PathLike[str], *, folder: Path | None = None, runs: int | None = None) -> Suite:
-    """Read a suite and look up everything that it names.
+    """Read a suite, and check every name in it.
 
     Args:
         name_or_file: A shipped name (see ``rrtik list suites``) or a YAML file.
-        folder: Further problems: all problem files and MotionBenchMaker pairs in this folder and below.
-        runs: In place of the suite's.
+        folder: Adds all problem files and MotionBenchMaker pairs in this folder and its subfolders.
+        runs: Used instead of the suite's number of runs; None to keep it.
 
     Raises:
         InputError: One line with file, line, key and remedy.

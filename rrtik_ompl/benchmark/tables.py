@@ -1,4 +1,4 @@
-"""Results as tables: for the terminal, as Markdown, as CSV."""
+"""Tables of results: for the terminal, as Markdown, as CSV."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ OF_A_SPREAD = ("mean", "std", "min", "25 %", "median", "75 %", "95 %", "max")
 
 
 def overview(results: Iterable[Result]) -> list[tuple[str, ...]]:
-    """One row for each planner on each label; medians where nothing else is said."""
+    """Return one row for each planner on each label; single values are medians."""
     return [
         (
             result.label,
@@ -41,7 +41,7 @@ def overview(results: Iterable[Result]) -> list[tuple[str, ...]]:
 
 
 def terminal_table(results: Iterable[Result]) -> RichTable:
-    """The overview as a rich table."""
+    """Return the overview as a table of rich."""
     from rich import box
     from rich.table import Table
 
@@ -52,7 +52,7 @@ def terminal_table(results: Iterable[Result]) -> RichTable:
 
 
 def markdown(results: Sequence[Result], head: Mapping[str, Any]) -> str:
-    """A page: what was run where, the overview, what failed and why, and one table for each quantity."""
+    """Return a page with conditions, overview, failures, and one table for each quantity."""
     suite = head["suite"]
     lines = [f"# {suite['title']}", "", conditions(results, head), "", *markdown_table(OVERVIEW, overview(results))]
     lines += ["", remark(results, head)]
@@ -71,7 +71,7 @@ def markdown(results: Sequence[Result], head: Mapping[str, Any]) -> str:
 
 
 def conditions(results: Iterable[Result], head: Mapping[str, Any]) -> str:
-    """What a reader must know, in a paragraph."""
+    """Return the conditions of the campaign in one paragraph: command, limits, machine, versions."""
     suite = head["suite"]
     machine = head["machine"]
     runs = 1 + max(run["run"] for result in results for run in result.runs)
@@ -89,7 +89,7 @@ def conditions(results: Iterable[Result], head: Mapping[str, Any]) -> str:
 
 
 def remark(results: Iterable[Result], head: Mapping[str, Any]) -> str:
-    """What the figures are of, and how many paths came after the time limit."""
+    """Return a remark on what the values mean, and on paths that came after the time limit."""
     limit = head["suite"]["seconds"]
     late = sum(seconds > limit for result in results for seconds in result.values("plan_seconds"))
 
@@ -100,7 +100,7 @@ def remark(results: Iterable[Result], head: Mapping[str, Any]) -> str:
 
 
 def failures(results: Iterable[Result]) -> list[tuple[str, str, str, str]]:
-    """Runs that neither solved their problem nor ran out of time: problem, planner, how many, why."""
+    """Return the failures other than running out of time, as rows of problem, planner, number of runs, and reason."""
     rows = []
     for result in results:
         broken = [run for run in result.runs if run["status"] not in (SOLVED, NOT_FOUND)]
@@ -110,7 +110,7 @@ def failures(results: Iterable[Result]) -> list[tuple[str, str, str, str]]:
 
 
 def csv_text(results: Iterable[Result]) -> str:
-    """One row for each planner, label and quantity; SI units, full precision."""
+    """Return one row for each planner, label and quantity; SI units, full precision."""
     text = StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(("problem", "planner", "solved", "valid", "total", "quantity", "unit", *Spread._fields))
@@ -126,7 +126,7 @@ def csv_text(results: Iterable[Result]) -> str:
 
 
 def figure(value: float) -> str:
-    """A number with three digits that count."""
+    """Format a number with three significant digits."""
     return f"{value:.0f}" if abs(value) >= 100.0 else f"{value:.3g}"
 
 
@@ -139,6 +139,6 @@ def _two(spread: Spread | None) -> str:
 
 
 def markdown_table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
-    """Lines of a table in Markdown."""
+    """Return the lines of a table in Markdown."""
     cells = (" | ".join(text.replace("|", "\\|") for text in row) for row in rows)
     return ["| " + " | ".join(heads) + " |", "|" + "---|" * len(heads), *(f"| {row} |" for row in cells)]

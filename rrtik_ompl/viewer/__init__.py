@@ -1,6 +1,6 @@
 """Pictures that a person can turn, play and step through: one HTML page, written to a file or served to this machine.
 
-Nothing below this package imports it, and of meshcat it takes the viewer's script, without an import.
+No package below this one imports it. Only the script of meshcat's viewer is used; meshcat itself is not imported.
 """
 
 from __future__ import annotations
@@ -43,33 +43,33 @@ def view(
     port: int = 0,
     on_ready: Callable[[str], object] = webbrowser.open,
 ) -> Path | InlinePage | None:
-    """Show a problem and a path: robot, obstacles, start and goal as ghosts, the tip's trail, and a player.
+    """Show a problem and a path: robot, obstacles, start and goal as ghosts, the trail of the tip, and a player.
 
     Args:
         shown: A ``Problem``, ``World``, ``Robot`` or ``Scene``.
-        path: A ``JointPath``, or waypoints of shape (k, dof) [rad or m]; nothing moves if None. A ``Trajectory`` plays
-            in real time, a ``TaskPlan`` (with the first of its worlds), or what its ``played()`` gives, motion by
-            motion, with what is carried.
-        before: Another path to compare with, such as the one that ``path`` was shortened from: the trail of its tip
-            is drawn too.
-        ghosts: Configurations at which the arm is drawn like tinted glass, shape (k, dof), such as the solutions of
-            inverse kinematics; they take the place of the ghosts of start and goal. If the goal of a problem is
-            one of them, the page plans to whichever is chosen there.
+        path: A ``JointPath``, or waypoints of shape (k, dof) [rad or m]; None shows no motion. A ``Trajectory`` is
+            played in real time; a ``TaskPlan`` (with the first of its worlds), or the result of its ``played()``, is
+            played motion by motion, with the objects that are carried.
+        before: Another path for comparison, such as the one that ``path`` was shortened from: the trail of its tip is
+            drawn, too.
+        ghosts: Configurations at which the arm is drawn transparently, shape (k, dof), such as solutions of inverse
+            kinematics; they replace the ghosts of start and goal. If the goal of a problem is one of them, the page
+            plans to the ghost that is chosen there.
         marks: Further bodies: see ``rrtik_ompl.viewer.drawing.marks``.
-        run: A ``ReplanRun`` of :func:`rrtik_ompl.replanning.replan` to replay, in place of a path.
+        run: A ``ReplanRun`` of :func:`rrtik_ompl.replanning.replan` to replay instead of a path.
         html: File to write. If None, the page is served on 127.0.0.1 until Ctrl-C is pressed.
-        title: Heading of the page; made from the problem's or the robot's name if None.
-        still: Whether to leave out what plans in the page: with it, start, goal and obstacles of a problem can be
+        title: Heading of the page; None derives it from the name of the problem or robot.
+        still: Whether to leave out the planner of the page. With it, start, goal and obstacles of a problem can be
             dragged, and the page finds new paths by itself, without a network.
         inline: Whether to return the page for the output of a notebook's cell; None: if this runs in a notebook.
-        port: Port to serve on; a free one if 0.
-        on_ready: Called with the URL once the page is being served; opens the browser unless something else is given.
+        port: Port to serve on; 0 chooses a free one.
+        on_ready: Called with the URL once the page is being served; opens the browser by default.
 
     Returns:
         The file that was written, the page that a notebook shows, or None after serving.
 
     Raises:
-        InputError: If that cannot be shown, the file cannot be written or the port cannot be used.
+        InputError: If the input cannot be shown, the file cannot be written or the port cannot be used.
 
     Example:
         >>> problem = rrtik.load_problem("planar3_boxes")
@@ -86,7 +86,7 @@ def view(
     require(still, bool, "still")
     require(inline, bool | None, "inline")
 
-    played = path.played() if isinstance(path, TaskPlan) else path  # the plan is timed and proven by itself
+    played = path.played() if isinstance(path, TaskPlan) else path  # a TaskPlan brings its own timing and proof
     text = page(shown, played, before=before, ghosts=ghosts, marks=marks, run=run, title=title, still=still)
     if html is not None:
         write_text(html, text)
@@ -109,14 +109,14 @@ def play(
 ) -> None:
     """Serve the page that plans, with this process as a second opinion, until Ctrl-C is pressed.
 
-    Whatever is dragged, the page finds a path by itself, and sends it here to be proven; it says what this process
-    found.
+    Whenever something is dragged, the page finds a path by itself and sends it here to be proven; it displays the
+    result.
 
     Args:
         problem: A problem.
-        path: Its first path: a ``JointPath``, or waypoints of shape (k, dof) [rad or m]; none if None.
-        port: On 127.0.0.1; a free one if 0.
-        on_ready: Called with the URL once the page is being served; opens the browser unless something else is given.
+        path: The first path: a ``JointPath``, or waypoints of shape (k, dof) [rad or m]; None for none.
+        port: Port on 127.0.0.1; 0 chooses a free one.
+        on_ready: Called with the URL once the page is being served; opens the browser by default.
 
     Raises:
         InputError: If the page of this problem cannot plan, the port cannot be used, or this runs in a notebook.

@@ -1,4 +1,4 @@
-"""The page as a film: a headless browser draws its pictures, which become one GIF, MP4 or PNG."""
+"""Convert the page to a film: a headless browser draws the pictures, which are saved as GIF, MP4 or PNG."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ OPTIONS = (
     "--headless=new", "--no-sandbox", "--no-first-run", "--hide-scrollbars", "--mute-audio",
     "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
 )  # fmt: skip
-PATIENCE = 120.0  # [s] without a picture
-COLORS = 255  # of a GIF
-HOLD = 0.8  # [s] at the goal
+PATIENCE = 120.0  # [s]; longest time without a new picture
+COLORS = 255  # colours of a GIF
+HOLD = 0.8  # [s]; how long the last picture is shown
 MOST_FRAMES = 600
 PICTURE_ONLY = (
     "<style>header, aside, footer, #labels {{ display: none !important }} "
@@ -48,13 +48,13 @@ def film(
     rate: float = 12.0,
     size: tuple[int, int] = (640, 400),
 ) -> Path:
-    """Write a path as a moving picture, or a posture as a still one.
+    """Write a path as a film, or a configuration as a still picture.
 
     Args:
         shown: A ``Problem``, ``World``, ``Robot`` or ``Scene``.
-        path: What is played; with a PNG it may be None.
+        path: What is played; may be None for a PNG.
         file: .gif, .mp4 or .png (the first picture).
-        seconds: How long the whole path takes.
+        seconds: Duration of the whole path.
         rate: Pictures a second.
         size: Width and height [px].
 
@@ -86,11 +86,13 @@ def film(
 
 
 def drawn(text: str, frames: int, size: tuple[int, int]) -> list[Image.Image]:
-    """The pictures of a page from the beginning of its path to the end.
+    """Return the pictures of a page from the start of its path to the end.
+
+    A script in the page draws them and posts them to a local server, while a headless browser displays the page.
 
     Args:
         text: The page.
-        frames: How many there are.
+        frames: Number of pictures.
         size: Width and height [px].
 
     Raises:
@@ -137,7 +139,7 @@ def drawn(text: str, frames: int, size: tuple[int, int]) -> list[Image.Image]:
 
 
 def _write(file: Path, pictures: list[Image.Image], rate: float, held: int) -> None:
-    """Write pictures as one file; the last stays as long as ``held`` pictures do."""
+    """Write pictures to one file; the last one is shown for the time of ``held`` pictures."""
     kind = file.suffix.lower()
     if kind == ".png":
         pictures[0].save(file, optimize=True)

@@ -1,4 +1,4 @@
-"""The offline page inside a notebook: what values of the library draw of themselves there."""
+"""Display of values of the library in a notebook, as the offline page."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from rrtik_ompl.viewer.subject import Showable
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
 
-HEIGHT = 520  # [px] of the frame
+HEIGHT = 520  # [px]; height of the frame
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class InlinePage:
-    """A page that a notebook shows in the output of its cell.
+    """A page that a notebook shows in the output of a cell.
 
     Attributes:
         text: The whole page; it needs no other file and no network.
-        height: Of the frame around it [px].
+        height: Height of the frame around it [px].
     """
 
     text: str
@@ -34,15 +34,15 @@ class InlinePage:
         return f"InlinePage({len(self.text) / 1e6:.1f} MB; a notebook shows it)"
 
     def _repr_html_(self) -> str:
-        """The page in a frame of its own, so that neither disturbs the other."""
+        """Return the page in a frame of its own, so that it does not interfere with the notebook."""
         style = f"width: 100%; height: {self.height}px; border: 0"
         return f'<iframe title="3-D page" style="{style}" srcdoc="{html.escape(self.text)}"></iframe>'
 
 
 def html_of(value: Plan | JointPath | Problem | World | Trajectory) -> str | None:
-    """What a notebook shows of a value; None, which leaves it at its text, where there is nothing to draw.
+    """Return what a notebook shows of a value; None if nothing can be drawn, so that its text is shown.
 
-    A path or a trajectory alone knows its robot by name; of a robot that is not shipped there is no picture.
+    A path or a trajectory knows its robot only by name, so it is drawn only for shipped robots.
     """
     if isinstance(value, Plan):
         if value.problem is None:
@@ -64,6 +64,6 @@ def html_of(value: Plan | JointPath | Problem | World | Trajectory) -> str | Non
 
 
 def in_kernel() -> bool:
-    """Whether this process runs the cells of a notebook, where waiting for Ctrl-C would stop everything."""
+    """Check whether this process runs the cells of a notebook, where waiting for Ctrl-C would block everything."""
     shell = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
     return getattr(shell, "kernel", None) is not None

@@ -1,4 +1,4 @@
-"""What a page asks about a path that it has found, read, and asked of the scene that the page was left with."""
+"""Judge a path found by a page, in the scene as the user has left it there."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Row = list[Number]
 
 
 class _Placed(Section):
-    """An obstacle that the page can move, as it is there."""
+    """An obstacle that the page can move, in its present state."""
 
     name: Name
     shape: Literal["box", "sphere", "cylinder", "capsule"]
@@ -30,7 +30,7 @@ class _Placed(Section):
 
 
 class _Found(Section):
-    """What a page asks about: its problem, and the path that it has found."""
+    """A question of the page: its problem, and the path that it has found."""
 
     start: Row
     goal: Row
@@ -39,11 +39,11 @@ class _Found(Section):
 
 
 def opinion(problem: Problem, asked: bytes) -> dict[str, Any]:
-    """What this process says of a path.
+    """Judge a path found by a page.
 
     Args:
-        problem: The problem that the page was made of.
-        asked: JSON: start, goal, obstacles that can be moved as they are now, and the path's rows.
+        problem: The problem from which the page was made.
+        asked: JSON with start, goal, the present state of movable obstacles, and the waypoints of the path.
 
     Returns:
         ``verdict`` ("proven", "checked": free in steps but not proven, or "refused") and ``text``, one line.
@@ -62,7 +62,7 @@ def opinion(problem: Problem, asked: bytes) -> dict[str, Any]:
 
 
 def _scene(problem: Problem, placed: list[_Placed]) -> Scene:
-    """The scene of the problem with obstacles where the page has them, without those that were removed."""
+    """Return the scene of the problem with the obstacles as they are in the page, without removed ones."""
     scene = problem.world.scene
     there = {each.name: each for each in placed}
     known = {obstacle.name for obstacle in scene.obstacles}

@@ -1,4 +1,4 @@
-"""One self-contained HTML file: meshcat's script, the recorded picture, and our own panel and player around it."""
+"""Build one self-contained HTML file: meshcat's script, the recorded picture, and our own panel and player."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ from rrtik_ompl.viewer.subject import Showable, ShownPath, Subject, subject_of, 
 from rrtik_ompl.viewer.task_story import subject_of_task
 from rrtik_ompl.world.problem import Problem
 
-# The page may run its own script and nothing else: no request leaves the machine that shows it.
-# WebAssembly may be compiled, text may not be run as script.
+# The page may run only its own script, and send no request to other machines.
+# WebAssembly may be compiled; text must not be evaluated as script.
 SCRIPT_POLICY = "script-src 'unsafe-inline' 'wasm-unsafe-eval'"
 POLICY = f"default-src 'none'; {SCRIPT_POLICY}; style-src 'unsafe-inline'; img-src data: blob:"
-ASKING_POLICY = f"{POLICY}; connect-src 'self'"  # of a page that asks this machine, and nobody else
+ASKING_POLICY = f"{POLICY}; connect-src 'self'"  # for a page that may send requests to its own server
 SCRIPTS = ("kinematics.js", "stage.js", "panel.js", "replay.js", "clearance.js", "contacts.js", "player.js")
-BOX_SHARE = 0.1  # side of a box that is added, of the arm
+BOX_SHARE = 0.1  # side of an added box, as a share of the arm's diagonal
 STARTING = ("unpack.js", "start.js")
 KERNELS = ("kernels.js", "obstacles.js", "fixed.js")
 PLANNING = (
@@ -63,23 +63,23 @@ def page(
     still: bool = False,
     asks: bool = False,
 ) -> str:
-    """The page that shows something, as the text of one HTML file that needs no other file and no network.
+    """Return the page that shows something, as the text of one HTML file that needs no other file and no network.
 
     The same input gives the same text.
 
     Args:
         shown: A ``Problem``, ``World``, ``Robot`` or ``Scene``.
         path: A ``JointPath``, or waypoints of shape (k, dof) [rad or m]; a ``PlayedTask`` with the first of its worlds.
-        before: Another path, to compare with; the trail of its tip is drawn too.
-        ghosts: Configurations, shape (k, dof), drawn like tinted glass.
+        before: Another path for comparison; the trail of its tip is drawn, too.
+        ghosts: Configurations drawn transparently, shape (k, dof).
         marks: Further bodies.
-        run: A run to replay in place of a path; obstacles are where they were.
-        title: Heading; made from the problem's or the robot's name if None.
-        still: Whether to leave out what plans in the page.
-        asks: Whether the page asks whoever serves it about each path that it finds.
+        run: A run to replay instead of a path; obstacles are where they were in it.
+        title: Heading; None derives it from the name of the problem or robot.
+        still: Whether to leave out the planner of the page.
+        asks: Whether the page asks its server about each path that it finds.
 
     Raises:
-        InputError: If that cannot be shown, or the page asks and cannot plan.
+        InputError: If the input cannot be shown, or if the page shall ask but cannot plan.
     """
     if isinstance(path, PlayedTask):
         subject = subject_of_task(shown, path)
@@ -108,7 +108,7 @@ def page(
         style=asset("page.css"),
         notice=_meshcat("main.min.js.LICENSE.txt").replace("--", "- -"),
         meshcat=_packed_engine(),
-        story=story.replace("<", "\\u003c"),  # so that no name can end the element that holds it
+        story=story.replace("<", "\\u003c"),  # escaped, so that no name can close the script element
         commands=packed(json.dumps([base64.b64encode(each).decode("ascii") for each in recording.commands]).encode()),
         kernels=_packed_scripts(KERNELS if told["plan"] else ()),
         script=_packed_scripts(SCRIPTS + (PLANNING if told["plan"] else ())),
@@ -117,7 +117,7 @@ def page(
 
 
 def _planning(shown: Showable, subject: Subject, frame: Frame) -> dict[str, Any] | None:
-    """What the page needs to plan by itself; None where it cannot, or nothing is to be planned."""
+    """Return the data with which the page plans by itself; None if it cannot, or if there is nothing to plan."""
     plain = subject.run is None and subject.times is None
     if not isinstance(shown, Problem) or subject.end is None or not plain:
         return None
@@ -139,13 +139,13 @@ def _title(subject: Subject) -> str:
 
 @cache
 def asset(name: str) -> str:
-    """The text of one of the page's own files."""
+    """Return the text of one of the page's own files."""
     return files("rrtik_ompl.viewer").joinpath("assets", name).read_text(encoding="utf-8")
 
 
 @cache
 def _meshcat(name: str) -> str:
-    """A file of meshcat's viewer, found without an import of meshcat, which would take a second."""
+    """Return a file of meshcat's viewer, found without importing meshcat, which would take a second."""
     spec = find_spec("meshcat")
     folders = [] if spec is None else list(spec.submodule_search_locations or ())
     if not folders:

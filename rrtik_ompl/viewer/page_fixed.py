@@ -1,4 +1,4 @@
-"""What never moves of an arm, for a page whose obstacles do: the kernels compare what moves alone."""
+"""Data on the fixed parts of an arm, for a page with movable obstacles: the kernels check only moving parts."""
 
 from __future__ import annotations
 
@@ -16,15 +16,17 @@ from rrtik_ompl.kernels.layout import CONVEX_SOLID
 from rrtik_ompl.kernels.tables.solid_tables import convex_solids
 from rrtik_ompl.world.world import World
 
-DIGITS = 6  # of a metre, of corners of pieces around meshes; pieces are so much larger for it
-GRAIN = 1e-6  # [m] of the corners of triangles; obstacles are so much larger for it
-MOST_TRIANGLES = 10_000  # of a mesh; a page that has more would be too large, and takes the pieces around it
+DIGITS = 6  # decimals [m] of vertices of convex pieces around meshes, which are enlarged by the rounding error
+GRAIN = 1e-6  # [m]; rounding of the vertices of triangles, by which obstacles are enlarged
+# Larger meshes would make the page too large; it uses the convex pieces around them instead.
+MOST_TRIANGLES = 10_000
 
 
 def standing_parts(world: World) -> list[dict[str, Any]] | None:
-    """The bodies of the arm that stand still, in the world, and which obstacles must not touch each.
+    """Return the fixed bodies of the arm in the world frame, each with the obstacles that must not touch it.
 
-    None if one of them cannot be given as such solids.
+    Returns:
+        None if one of the bodies cannot be represented by such solids.
     """
     partners: dict[int, list[str]] = {}
     for i, j in by_motion(world.bodies, world.pairs)[1]:
@@ -64,7 +66,7 @@ def _solids(body: Body) -> list[dict[str, Any]] | None:
 
 
 def _surfaces(body: Body) -> list[dict[str, Any]]:
-    """The triangles of a mesh, in the world; none of another body, nor of a mesh of very many."""
+    """Return the triangles of a mesh in the world frame; an empty list for other bodies and very large meshes."""
     if not is_mesh(body.geometry):
         return []
 
@@ -86,21 +88,26 @@ def _surfaces(body: Body) -> list[dict[str, Any]]:
 
 
 def _steps(faces: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Triangles as small numbers: the lowest corner first, less that of the one before; the others less it."""
+    """Encode triangles as small numbers, which compress well, shape (m, 3).
+
+    Each triangle is rotated so that its lowest vertex index comes first. The triangles are sorted by it; the first
+    column holds differences to the previous triangle, the others differences to the first vertex.
+    """
     lowest = faces.argmin(axis=1)
-    turned = faces[np.arange(len(faces))[:, None], (lowest[:, None] + np.arange(3)) % 3]  # its sense stays
+    # A rotation keeps the orientation.
+    turned = faces[np.arange(len(faces))[:, None], (lowest[:, None] + np.arange(3)) % 3]
     turned = turned[np.argsort(turned[:, 0], kind="stable")]
     return np.column_stack([np.diff(turned[:, 0], prepend=0), turned[:, 1:] - turned[:, :1]])
 
 
 def _planes(rows: NDArray[Any]) -> bytes:
-    """Whole numbers, shape (n, 3), column by column, all their lowest bytes first: half as large once packed."""
+    """Return integers, shape (n, 3), column by column, with all lowest bytes first: half as large after compression."""
     columns = np.ascontiguousarray(rows.T).astype("<i4").reshape(-1)
     return np.ascontiguousarray(columns.view(np.uint8).reshape(-1, 4).T).tobytes()
 
 
 def _enclosed(body: Body) -> dict[str, Any]:
-    """What an open mesh encloses, as cells in its own frame, and how the page comes from the world to these."""
+    """Return the cells that an open mesh encloses in its own frame, and the transformation from the world to it."""
     found = enclosure(body.geometry)
     box = body.geometry.aabb_local
     return {
@@ -115,5 +122,5 @@ def _enclosed(body: Body) -> dict[str, Any]:
 
 
 def packed(data: bytes) -> str:
-    """Bytes as text that a page unpacks."""
+    """Return bytes as compressed text, which the page decompresses."""
     return base64.b64encode(gzip.compress(data, 9, mtime=0)).decode("ascii")

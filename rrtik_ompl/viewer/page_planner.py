@@ -1,4 +1,4 @@
-"""What a page needs to plan by itself: kernels as WebAssembly, the world's tables as an image, and their places."""
+"""Data with which a page plans by itself: kernels as WebAssembly, and a memory image of the world's tables."""
 
 from __future__ import annotations
 
@@ -50,14 +50,14 @@ from rrtik_ompl.world.clearances import Clearances, clearances_between, search_f
 from rrtik_ompl.world.problem import Problem, densely_checked
 from rrtik_ompl.world.world import World
 
-SAMPLES = 60_000  # of a search
-TRIES = 2000  # of shortcuts
-SPARES = {"box": 4, "sphere": 2, "cylinder": 2, "capsule": 2}  # what a person can add
+SAMPLES = 60_000  # samples of a search
+TRIES = 2000  # attempted shortcuts
+SPARES = {"box": 4, "sphere": 2, "cylinder": 2, "capsule": 2}  # obstacles that a user can add
 FAR_AWAY = 1e3  # [m] below the arm
-PATH_RESULTS = ("length", "transitions", "waypoints")  # of a path's file; the page adds its own
+PATH_RESULTS = ("length", "transitions", "waypoints")  # fields of a path file that the page fills in
 
-BASE = 1 << 20  # where the image begins; the stack of the kernels lies below
-VERTICES = 1 << 14  # of each tree
+BASE = 1 << 20  # address of the image; the stack of the kernels lies below
+VERTICES = 1 << 14  # capacity of each tree
 PATH_ROWS = 2048
 LAYOUTS: dict[str, ModuleType] = {
     "table": layout,
@@ -68,7 +68,7 @@ LAYOUTS: dict[str, ModuleType] = {
     "crdt": crdt_layout,
     "ik": ik_layout,
 }
-# Tables of the checks: their fields have names that repeat.
+# Tables of the checks, listed separately because the names of their fields repeat.
 TABLES: dict[str, type[Record]] = {
     "world": layout.WorldTable,
     "balls": layout.BallTable,
@@ -78,21 +78,24 @@ TABLES: dict[str, type[Record]] = {
 
 
 def page_planner(problem: Problem, goal: Vector, side: float, *, one_joint: bool = False) -> dict[str, Any] | None:
-    """What the page of a problem reads to plan from its start to joint values, as values of JSON.
+    """Return the data with which a page plans from the start of a problem to joint values, as values of JSON.
 
-    None where it cannot plan: there are no kernels, tasks constrain the path, an obstacle moves that is no simple
-    shape, or joints go farther than kernels check. Obstacles that move are where they are at time 0.
+    Obstacles that move are at their places of time 0.
 
     Args:
         problem: What the page shows.
-        goal: Where its path ends, shape (dof,).
-        side: Of the obstacles that a person may add, before they are made another size [m].
+        goal: End of the path, shape (dof,).
+        side: Initial side of the obstacles that a user may add [m].
         one_joint: Whether the page moves one joint at a time at first.
+
+    Returns:
+        None if the page cannot plan: there are no kernels, path constraints apply, a moving obstacle is no simple
+        shape, or joint ranges exceed what kernels check.
     """
     if problem.constraints:
         return None
 
-    # Before there are spares, which are in no file.
+    # Written before spare obstacles are added, which belong to no file.
     document = _document(problem)
     scene, courses = _standing_still(problem.world.scene)
     problem, spare = _with_spares(problem, scene, side)
@@ -108,7 +111,7 @@ def page_planner(problem: Problem, goal: Vector, side: float, *, one_joint: bool
     try:
         image, places = page_tables(problem, world, motions)
         tips = _tips(problem, image)
-    except InputError:  # beyond what the margins of the kernels cover
+    except InputError:  # joint ranges exceed what the margins of the kernels cover
         return None
 
     obstacles = _obstacles(problem.world, motions.fast, clearances.searched_clearance, spare)
@@ -149,7 +152,7 @@ def page_planner(problem: Problem, goal: Vector, side: float, *, one_joint: bool
 
 
 def _document(problem: Problem) -> dict[str, Any] | None:
-    """What the problem's file holds, seen from the present folder; None where the format has no words for it."""
+    """Return the contents of the problem's file, relative to the present folder; None if there is no such form."""
     try:
         return problem_data(problem, Path.cwd())
     except InputError:
@@ -157,7 +160,7 @@ def _document(problem: Problem) -> dict[str, Any] | None:
 
 
 def _standing_still(scene: Scene) -> tuple[Scene, list[dict[str, Any]]]:
-    """The scene at time 0 with obstacles that stay there, and how they would move on."""
+    """Return the scene at time 0 with obstacles at rest, and a description of their original motions."""
     scene = scene.at(0.0)
     courses = [_course(obstacle) for obstacle in scene.obstacles if obstacle.motion is not None]
     return replace(scene, obstacles=tuple(replace(obstacle, motion=None) for obstacle in scene.obstacles)), courses
@@ -172,7 +175,7 @@ def _course(obstacle: Obstacle) -> dict[str, Any]:
 
 
 def _with_spares(problem: Problem, scene: Scene, side: float) -> tuple[Problem, set[str]]:
-    """The problem in a scene and simple shapes far away, of which the page can take some, and their names."""
+    """Return the problem with additional simple shapes far away, which the page can use, and their names."""
     taken = {obstacle.name for obstacle in scene.obstacles} | {held.name for held in scene.attached}
     shapes = {
         "box": Box([side] * 3),
@@ -191,7 +194,7 @@ def _with_spares(problem: Problem, scene: Scene, side: float) -> tuple[Problem, 
 
 
 def _tips(problem: Problem, image: MemoryImage) -> list[dict[str, Any]]:
-    """The tips that can be dragged, each with where its inverse kinematics stand, which are added to the image."""
+    """Return the tips that can be dragged, with the addresses of their inverse kinematics, added to the image."""
     robot = problem.robot
     tips = []
     for name in dragged_tips(problem.robot, problem.goal):
@@ -201,7 +204,7 @@ def _tips(problem: Problem, image: MemoryImage) -> list[dict[str, Any]]:
 
 
 def _obstacles(world: World, fast: FastWorld, kept: float, spare: set[str]) -> list[dict[str, Any]]:
-    """The obstacles of simple shapes, which a page can move: how they are packed, and what is kept from each [m]."""
+    """Return the movable obstacles, which are simple shapes, in packed form and with their clearance [m]."""
     found = []
     shapes = {obstacle.name: obstacle.shape for obstacle in world.scene.obstacles}
 
@@ -229,7 +232,7 @@ def _obstacles(world: World, fast: FastWorld, kept: float, spare: set[str]) -> l
 
 
 def _packed_shape(body: Body) -> dict[str, Any] | None:
-    """The numbers of a body by which the kernels know it; None if a page cannot move it."""
+    """Return the numbers by which the kernels represent a body; None if a page cannot move it."""
     core = None if body.kind != "obstacle" else core_of(body.geometry)
     if core is None or len(convex_solids(body.geometry).around) != 1:
         return None
@@ -250,7 +253,7 @@ def _packed_shape(body: Body) -> dict[str, Any] | None:
 
 
 def _sizes(shape: Shape) -> list[float]:
-    """Its measures in the order of a problem's file [m]."""
+    """Return the sizes of a shape in the order of a problem file [m]."""
     return [float(size) for measure in shape.measures for size in np.ravel(getattr(shape, measure.name))]
 
 
@@ -262,7 +265,7 @@ def _names(world: World, numbers: Iterable[int]) -> str:
 
 
 def layout_numbers() -> dict[str, dict[str, int]]:
-    """The whole numbers that the layouts of these tables name, and the places of fields, by layout or table."""
+    """Return the integer constants of the table layouts, and the offsets of fields, by layout or table."""
 
     def places(table: type[Record]) -> dict[str, int]:
         return {name.upper(): place for name, place in table.places.items()}
@@ -279,12 +282,12 @@ def layout_numbers() -> dict[str, dict[str, int]]:
 
 
 def page_tables(problem: Problem, world: World, motions: FastMotions) -> tuple[MemoryImage, dict[str, int]]:
-    """The image, and where in it the page finds each table.
+    """Return the memory image, and the address of each table in it.
 
     Args:
-        problem: Its start is where searches begin at first.
-        world: In which they search.
-        motions: The motion table of that world.
+        problem: Its start is the first start of the searches.
+        world: World in which they search.
+        motions: Motion table of that world.
 
     Raises:
         InputError: If joints go farther than the kernels cover.
@@ -309,20 +312,20 @@ def page_tables(problem: Problem, world: World, motions: FastMotions) -> tuple[M
 
 
 def add_limb(image: MemoryImage, robot: Robot) -> dict[str, int] | None:
-    """Add what inverse kinematics of a tip needs: where the page finds it. None where a joint hangs on several."""
+    """Add the tables of a tip's inverse kinematics; return their addresses, None if a joint depends on several."""
     limb = limb_of(robot)
     return None if limb is None else {"limb": image.add(limb), "ik": image.add(call_table(limb, STEPS, PATIENCE))}
 
 
 def _add_connect(image: MemoryImage, problem: Problem, motions: FastMotions) -> int:
-    """RRT-Connect, with its trees, its ends and the path that it finds."""
+    """Add RRT-Connect with its trees, ends and path; return its address."""
     search = ConnectSearch(motions, *problem.robot.finite_range(), vertices=VERTICES)
     search.table.put(path=np.zeros((PATH_ROWS, motions.dof)))
     return image.add(search.table)
 
 
 def _add_crdt(image: MemoryImage, problem: Problem, world: World, motions: FastMotions) -> int:
-    """The search that moves one joint at a time, with its trees."""
+    """Add the search that moves one joint at a time, with its trees; return its address."""
     same = np.ones(motions.dof)
     none = np.zeros(motions.dof)
     rules = CrdtRules(*problem.robot.finite_range(), same, none, same)

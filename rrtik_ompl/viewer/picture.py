@@ -1,4 +1,4 @@
-"""The whole picture of a subject, recorded as commands of meshcat's viewer, and the box that the camera shows."""
+"""Record the whole picture of a subject as commands of meshcat's viewer, and compute the box that the camera shows."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ from rrtik_ompl.viewer.drawing.trail import draw_before, draw_trail
 from rrtik_ompl.viewer.subject import Subject
 
 FRAMING_SAMPLES = 100
-MIN_THICKNESS = 0.01  # of the picture: of a link that is a line
+MIN_THICKNESS = 0.01  # least thickness of a link, as a share of the picture
 
 
 def draw(subject: Subject) -> tuple[Recording, Frame]:
-    """Draw a subject: arm in its first posture, obstacles, goal and trail (ghosts are the page's copies of the arm)."""
+    """Draw a subject: arm in its first configuration, obstacles, goal and trail; the page adds the ghosts."""
     recording = Recording()
     vis = recording.root
     robot = subject.robot
@@ -67,7 +67,7 @@ def draw(subject: Subject) -> tuple[Recording, Frame]:
 
 
 def _draw_robot(vis: Node, robot: Robot, subject: Subject) -> Frame:
-    """Draw the arm in its first posture, and one for the page to copy as ghosts; return the box around everything."""
+    """Draw the arm and the model of its ghosts in the first configuration; return the box around everything."""
     shown = _spread(subject.waypoints)
     if subject.end is not None:
         shown = np.vstack([shown, subject.end])
@@ -95,7 +95,7 @@ def _draw_robot(vis: Node, robot: Robot, subject: Subject) -> Frame:
 
 
 def _draw_parts(node: Node, robot: Robot, parts: list[Part], frames: NDArray[np.float64], frame: Frame) -> None:
-    """Draw the arm; one that consists of lines and points alone is made thick enough to be visible."""
+    """Draw the arm; if it consists only of lines and points, it is made thick enough to be visible."""
     least = MIN_THICKNESS * frame.size
     seen = [replace(part, look=thickened(part.look, least)) for part in parts]
     too_thin = all(new.look is not old.look for new, old in zip(seen, parts, strict=True))
@@ -103,14 +103,14 @@ def _draw_parts(node: Node, robot: Robot, parts: list[Part], frames: NDArray[np.
 
 
 def _spread(waypoints: Matrix) -> Matrix:
-    """Configurations spread over a path, shape (m, dof), that the picture must show."""
+    """Return configurations distributed over a path, shape (m, dof), that must be in the picture."""
     places = np.arange(len(waypoints))
     wanted = np.linspace(0.0, places[-1], FRAMING_SAMPLES if len(places) > 1 else 1)
     return np.stack([np.interp(wanted, places, column) for column in waypoints.T], 1)
 
 
 def _flatten(vis: Node, frame: Frame) -> None:
-    """Make the obstacles of a plane world thin, so that seen from above they are beside the arm, not over it."""
+    """Flatten the obstacles of a planar world, so that, seen from above, they do not cover the arm."""
     height = max(2.0 * float(np.abs([frame.low[2], frame.high[2]]).max()), 1e-9)
     squeeze = np.diag([1.0, 1.0, min(0.01 * frame.size / height, 1.0), 1.0])
     vis["obstacles"].set_transform(squeeze)
@@ -118,6 +118,6 @@ def _flatten(vis: Node, frame: Frame) -> None:
 
 
 def _goal_points(goal: Goal | None) -> list[Matrix]:
-    """Positions of the tip that show a goal of it, shape (m, 3) each."""
+    """Return positions of the tip that represent each part of a goal, shape (m, 3) each."""
     parts = () if goal is None else goal.parts
     return [goal_frames(part.region())[:, :3, 3] for part in parts]

@@ -1,4 +1,4 @@
-"""The data with which the page replays a run: groups of ticks, poses of obstacles, and the tip's trail on each path."""
+"""Data with which the page replays a run: groups of ticks, poses of obstacles, and the tip's trail on each path."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from rrtik_ompl.viewer.drawing.robot_picture import node_name
 from rrtik_ompl.viewer.drawing.scene_picture import obstacle_look
 from rrtik_ompl.viewer.task_story import TASK
 
-MAX_POINTS = 40  # of a path's line
-SHOWN_SECONDS = 0.5  # of a path after it was replaced
+MAX_POINTS = 40  # points of the trail of a path
+SHOWN_SECONDS = 0.5  # how long a replaced path remains visible
 DIGITS = 5
 
 
 def run_story(run: ReplanRun, robot: Robot, scene: Scene, frame: Frame) -> dict[str, Any]:
-    """The part of the page's story that is about a run."""
+    """Return the part of the page's data that describes a run."""
     lines, numbers = _lines(run, robot)
     moved = sorted({name for tick in run.ticks for name in tick.poses})
     return {
@@ -40,12 +40,16 @@ def run_story(run: ReplanRun, robot: Robot, scene: Scene, frame: Frame) -> dict[
 
 
 def _motions(ticks: Iterable[Tick]) -> list[dict[str, Any]]:
-    """Groups of a task as :func:`_groups` makes them: one for each of its motions."""
+    """Return the groups of ticks of a task, as :func:`_groups` does, one for each motion."""
     return [{**group, "event": "motion", "text": group["reason"]} for group in _groups(ticks)]
 
 
 def _groups(ticks: Iterable[Tick]) -> list[dict[str, Any]]:
-    """Ticks of the same kind in a row: the first one's number, how many, the event and a text."""
+    """Group consecutive ticks of the same kind.
+
+    Returns:
+        For each group the number of its first tick, the number of ticks, the event, its reason, and a text.
+    """
     found: list[dict[str, Any]] = []
     for (event, reason), members in groupby(ticks, lambda tick: (tick.event, tick.reason)):
         rows = list(members)
@@ -58,7 +62,7 @@ def _groups(ticks: Iterable[Tick]) -> list[dict[str, Any]]:
 
 
 def _places(obstacle: Obstacle, run: ReplanRun, frame: Frame) -> dict[str, Any]:
-    """Where an obstacle is drawn in its own frame, and where that frame is in each tick."""
+    """Return the placement of an obstacle's geometry in its own frame, and the pose of that frame in each tick."""
     _, own = obstacle_look(obstacle, frame)
     poses = [pose_row(place) for place in _stated(obstacle.name, run)] or [
         tick.poses.get(obstacle.name, pose_row(obstacle.pose)) for tick in run.ticks
@@ -67,7 +71,7 @@ def _places(obstacle: Obstacle, run: ReplanRun, frame: Frame) -> dict[str, Any]:
 
 
 def _stated(name: str, run: ReplanRun) -> list[pin.SE3]:
-    """Where an obstacle is in each tick by its own motion, if the scene of the run states one."""
+    """Return the pose of an obstacle in each tick by its own motion; an empty list if the run's scene states none."""
     if not run.scenes or not run.scenes[0].stated:
         return []
     obstacle = run.scenes[0].scene.obstacle(name)
@@ -77,7 +81,7 @@ def _stated(name: str, run: ReplanRun) -> list[pin.SE3]:
 
 
 def _lines(run: ReplanRun, robot: Robot) -> tuple[list[list[list[float]]], list[int]]:
-    """The tip's trail on each path, and for each tick the number of its path; -1 for none."""
+    """Return the tip's trail on each path, and for each tick the number of its path; -1 for none."""
     lines: list[list[list[float]]] = []
     numbers: list[int] = []
     known: Matrix | None = None
@@ -96,7 +100,7 @@ def _lines(run: ReplanRun, robot: Robot) -> tuple[list[list[list[float]]], list[
 
 
 def _tips(robot: Robot, path: Matrix) -> Matrix:
-    """Points of the tip's trail, shape (m, 3), none twice running."""
+    """Return points of the tip's trail, shape (m, 3), without consecutive duplicates."""
     lengths: Vector = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1)))
     wanted = np.union1d(np.linspace(0.0, lengths[-1], MAX_POINTS), lengths)
     rows = np.stack([np.interp(wanted, lengths, column) for column in path.T], axis=1)
@@ -107,7 +111,7 @@ def _tips(robot: Robot, path: Matrix) -> Matrix:
 
 
 def _replaced(run: ReplanRun, numbers: list[int]) -> list[int]:
-    """For each tick the number of the path that a repair has replaced a moment ago, or -1."""
+    """Return, for each tick, the number of the path that a repair has recently replaced; -1 for none."""
     found = []
     last = -1
     until = -1

@@ -1,4 +1,4 @@
-"""A web server for one page, for this machine only."""
+"""Serve one page to this machine only."""
 
 from __future__ import annotations
 
@@ -17,25 +17,26 @@ from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.viewer.page import ASKING_POLICY, POLICY
 
 ADDRESS = "127.0.0.1"
-MOST_OPEN = 64  # connections at a time; a browser has some six
-OPEN_SECONDS = 60.0  # of a connection at most, however slowly its bytes trickle
+MOST_OPEN = 64  # concurrent connections; a browser opens about six
+OPEN_SECONDS = 60.0  # longest duration of a connection, however slowly its bytes arrive
 LOOK_SECONDS = 0.5
 QUESTIONS = "/opinion"
 LONGEST_QUESTION = 1 << 24  # bytes
 
-Taken: TypeAlias = socket.socket | tuple[bytes, socket.socket]  # the second of packets, of which there are none here
+Taken: TypeAlias = socket.socket | tuple[bytes, socket.socket]  # the tuple is for UDP, which is not used
 
 
 class PageServer:
-    """Serves one HTML text at ``url`` until it is left; use it as a context manager.
+    """Serve one HTML text at ``url`` until it is left; use it as a context manager.
 
-    It listens on 127.0.0.1 alone and answers only requests that name this address themselves: a web site elsewhere
-    that makes its own name point here (DNS rebinding), or that sends requests from its own page, is refused.
+    It listens only on 127.0.0.1, and answers only requests that name this address: a web site elsewhere that makes its
+    own name point here (DNS rebinding), or that sends requests from its own page, is refused.
 
     Args:
         text: The page.
-        port: Port to listen on; a free one if 0.
-        answer: Answers what the page asks (POST): the body to what can be written as JSON. One question at a time.
+        port: Port to listen on; 0 chooses a free one.
+        answer: Answers a question of the page (POST): takes the body, and returns a value that can be written as JSON.
+            It is called for one question at a time.
 
     Raises:
         InputError: If the port cannot be used.
@@ -59,7 +60,7 @@ class PageServer:
 
     @property
     def url(self) -> str:
-        """Where a browser on this machine finds the page."""
+        """The address of the page for a browser on this machine."""
         return f"http://{ADDRESS}:{self.port}/"
 
     def __enter__(self) -> PageServer:
@@ -72,7 +73,7 @@ class PageServer:
         self._thread.join()
 
     def wait(self) -> None:
-        """Return when Ctrl-C is pressed, which is how a person ends a live view.
+        """Wait until Ctrl-C is pressed, which ends a live view.
 
         Raises:
             InputError: If the server has ended by itself.
@@ -88,7 +89,7 @@ class PageServer:
 class _Server(socketserver.ThreadingTCPServer):
     allow_reuse_address = True
     daemon_threads = True
-    request_queue_size = MOST_OPEN  # of those who wait to be taken; whoever finds no place waits a second
+    request_queue_size = MOST_OPEN  # pending connections; further ones retry after a second
     body = b""
     answer: Callable[[bytes], object] | None = None
 
@@ -98,7 +99,7 @@ class _Server(socketserver.ThreadingTCPServer):
         super().__init__(address, handler)
 
     def process_request(self, request: Taken, client_address: object) -> None:
-        """Answer in a thread of its own; close at once where too many are open."""
+        """Answer in a separate thread; close the connection at once if too many are open."""
         if len(self._open) >= MOST_OPEN:
             self.shutdown_request(request)
             return
@@ -110,7 +111,7 @@ class _Server(socketserver.ThreadingTCPServer):
         super().shutdown_request(request)
 
     def service_actions(self) -> None:
-        """Cut connections that are open for too long."""
+        """Close connections that have been open for too long."""
         oldest = time.monotonic() - OPEN_SECONDS
         for each, begin in list(self._open.items()):
             if begin < oldest:
@@ -119,7 +120,7 @@ class _Server(socketserver.ThreadingTCPServer):
                     each.shutdown(socket.SHUT_RDWR)
 
     def handle_error(self, request: Taken, client_address: object) -> None:
-        """Print nothing: that a browser has gone, or talks nonsense, concerns nobody here."""
+        """Print nothing: it is no error of this process if a browser disconnects or sends invalid requests."""
 
 
 class _Handler(BaseHTTPRequestHandler):

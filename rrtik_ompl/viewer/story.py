@@ -1,4 +1,4 @@
-"""The data of the page's panel and player: joints with units, the chain, the waypoints and their times."""
+"""Data of the page's panel and player: joints with units, the kinematic chain, the waypoints and their times."""
 
 from __future__ import annotations
 
@@ -26,16 +26,16 @@ from rrtik_ompl.viewer.drawing.trail import pieces
 from rrtik_ompl.viewer.run_story import run_story
 from rrtik_ompl.viewer.subject import Subject
 
-PLAY_SPEED = np.deg2rad(30.0)  # [rad/s] of the joint that travels farthest in a move
+PLAY_SPEED = np.deg2rad(30.0)  # [rad/s]; speed of the joint that travels farthest in a move
 PLAY_SECONDS = (3.0, 60.0)  # shortest and longest playing time of a whole path
 DIGITS = 9
-OWN_JOINTS = 3  # of a branch that can be dragged; fewer are fingers
+OWN_JOINTS = 3  # least number of joints of a branch that can be dragged; shorter branches are fingers
 
 
 def story_of(subject: Subject, frame: Frame, title: str) -> dict[str, Any]:
-    """Everything that the page's own script reads, as numbers, texts, lists and dicts (to be written as JSON).
+    """Return all data that the page's own script reads, as numbers, texts, lists and dicts (to be written as JSON).
 
-    Lengths are in metres and angles in radians; the script turns them into degrees where a person reads them.
+    Lengths are in metres and angles in radians; the script converts them to degrees for display.
     """
     robot = subject.robot
     return {
@@ -108,7 +108,7 @@ def _obstacles(scene: Scene) -> list[dict[str, Any]]:
 
 
 def _ghosts(rows: Matrix | None) -> list[dict[str, Any]]:
-    """Configurations with a colour each; the colours repeat."""
+    """Return configurations with a colour each; the colours repeat."""
     colors = palette.SERIES
     return [
         {"name": f"solution {k + 1}", "color": colors[k % len(colors)], "q": _numbers(row)}
@@ -127,13 +127,13 @@ def _mark(mark: Mark, number: int) -> dict[str, Any]:
 
 
 def _compared(before: Matrix, after: Matrix) -> str:
-    """Number of moves and length of two paths: "12 moves, length 16.06; now 7, 3.16"."""
+    """Compare number of moves and length of two paths in words: "12 moves, length 16.06; now 7, 3.16"."""
     lengths = [f"{route_length(rows):.2f}" for rows in (before, after)]
     return f"{transitions(before)} moves, length {lengths[0]}; now {transitions(after)}, {lengths[1]}"
 
 
 def _moves(waypoints: Matrix) -> list[dict[str, Any]]:
-    """For each move: the numbers of the joints that move, and the piece of the trail to which it belongs."""
+    """Return, for each move, the numbers of the joints that move, and the piece of the trail to which it belongs."""
     movers = moved(waypoints[:-1], waypoints[1:])
     return [
         {"joints": np.flatnonzero(row).tolist(), "piece": int(piece)}
@@ -142,22 +142,23 @@ def _moves(waypoints: Matrix) -> list[dict[str, Any]]:
 
 
 def _times(subject: Subject, robot: Robot, frame: Frame) -> Vector:
-    """Time [s] at which each waypoint is shown: of a run or a timed motion its own."""
+    """Return the time at which each waypoint is shown [s]; runs and timed motions have their own times."""
     if subject.times is not None:
         return subject.times
     return play_times(robot, subject.waypoints, frame.arm) if subject.run is None else subject.run.times
 
 
 def play_times(robot: Robot, waypoints: Matrix, arm: float) -> Vector:
-    """Time [s] at which the page shows each waypoint: a move lasts as long as its farthest travelling joint needs.
+    """Return the time at which the page shows each waypoint [s], shape (k,).
 
-    Times are for display, not for execution: all joints turn at 30 deg/s, sliding joints run through the arm's box
-    in 6 s, and a whole path that would be shorter than 3 s or longer than 60 s is slowed down or sped up.
+    A move takes as long as its farthest travelling joint needs. These times are for display, not for execution:
+    revolute joints move at 30 deg/s, prismatic joints cross the arm's box in 6 s, and a whole path that would be
+    shorter than 3 s or longer than 60 s is slowed down or sped up.
 
     Args:
         robot: The arm.
         waypoints: Shape (k, dof).
-        arm: Diagonal of the box around the arm's postures [m].
+        arm: Diagonal of the box around the arm's configurations [m].
     """
     speed = _speeds(robot, arm)
     seconds = (np.abs(np.diff(waypoints, axis=0)) / speed).max(axis=1, initial=0.0)
@@ -169,25 +170,25 @@ def play_times(robot: Robot, waypoints: Matrix, arm: float) -> Vector:
 
 
 def play_pace(robot: Robot, arm: float) -> dict[str, Any]:
-    """What :func:`play_times` goes by, for paths that the page finds itself; rates are those of an arm that runs."""
+    """Return the parameters of :func:`play_times` for paths that the page finds itself, and the arm's real rates."""
     speeds = _speeds(robot, arm)
     rates = np.where(np.isfinite(robot.velocity), robot.velocity, speeds)
     return {"speeds": speeds.tolist(), "rates": rates.tolist(), "seconds": list(PLAY_SECONDS)}
 
 
 def _speeds(robot: Robot, arm: float) -> Vector:
-    """Of each joint [rad/s or m/s]."""
+    """Return the display speed of each joint, shape (dof,) [rad/s or m/s]."""
     return np.where(robot.prismatic, arm / 6.0, PLAY_SPEED)
 
 
 def _proof(verdict: Verdict) -> dict[str, Any]:
-    """What is proven, and the numbers of the moves that are not; a doubt names their colour, ``palette.UNPROVEN``."""
+    """Return what is proven, and the numbers of unproven moves; a doubt names their colour, ``palette.UNPROVEN``."""
     text = f"{verdict.doubt} (violet){verdict.text}" if verdict.doubt else verdict.text
     return {"proven": verdict.proven, "text": text, "unproven": list(verdict.unproven)}
 
 
 def _clearance(curve: ClearanceCurve) -> dict[str, Any]:
-    """The curve for the page: places as motion and share of it; distances that are too far to matter as null."""
+    """Return the clearance curve: places as motion and share of it, and distances, null where too far to matter."""
     near = curve.distances < FARTHEST
     return {
         "motions": curve.motions.tolist(),
@@ -199,7 +200,7 @@ def _clearance(curve: ClearanceCurve) -> dict[str, Any]:
 
 
 def _contact(contact: PathContact, robot: Robot, scene: Scene) -> dict[str, Any]:
-    """A stretch of the path in which bodies touch: what to draw red, what to say, where they touch if that is known."""
+    """Return an interval of the path with contact: nodes to draw in red, a text, and the point if it is known."""
     deepest = contact.deepest
     point = 0.5 * (deepest.point_first + deepest.point_second)
 
@@ -213,7 +214,7 @@ def _contact(contact: PathContact, robot: Robot, scene: Scene) -> dict[str, Any]
 
 
 def _places(subject: Subject) -> Matrix:
-    """Where the joints and the tip are at each waypoint, shape (m, 3)."""
+    """Return the positions of joints and tip at each waypoint, shape (m, 3)."""
     if subject.robot is None:
         return np.empty((0, 3))
     frames = subject.robot.joint_frames(subject.waypoints)[:, 1:, :3, 3].reshape(-1, 3)
@@ -221,7 +222,7 @@ def _places(subject: Subject) -> Matrix:
 
 
 def grid_cell(size: float) -> float:
-    """Width of a grid cell [m] for a picture of this size [m]: 1, 2 or 5 times a power of ten, about a fifteenth."""
+    """Return the width of a grid cell [m]: 1, 2 or 5 times a power of ten, about a fifteenth of ``size`` [m]."""
     power = 10.0 ** np.floor(np.log10(size / 15.0))
     return float(power * max(step for step in (1.0, 2.0, 5.0) if step * power <= size / 15.0))
 
@@ -260,23 +261,26 @@ def _numbers(values: NDArray[np.float64] | None) -> list[object] | None:
 
 
 def tip_entry(robot: Robot, name: str) -> dict[str, Any]:
-    """A tip for the page: its name, the number of the joint that carries it (0: none), its pose on that."""
+    """Return a tip for the page: its name, the number of the joint that carries it (0: none), and its pose there."""
     tip = robot.model.frames[robot.model.getFrameId(name)]
     return {"name": name, "joint": int(tip.parentJoint), "placement": _numbers(tip.placement.homogeneous.ravel())}
 
 
 def dragged_tips(robot: Robot, goal: Goal | None) -> list[str]:
-    """Links by which a person can drag the arm: the robot's tip first, those of a goal for several, ends of other arms.
+    """Return the links by which a user can drag the arm.
+
+    The robot's tip is first, then the tips of a goal for several, then ends of other branches with at least
+    `OWN_JOINTS` joints of their own.
 
     Args:
         robot: The arm.
-        goal: Of the problem.
+        goal: Goal of the problem.
     """
     named = () if goal is None else goal.frames
     tips = list(dict.fromkeys([robot.tip, *named]))
     carried = {row for tip in tips for row in _rows(robot, tip_entry(robot, tip)["joint"] - 1)}
 
-    # Rows that are nobody's parent are the ends of the tree's branches.
+    # Rows that are no parent of others are the ends of the tree's branches.
     for row in sorted(set(range(len(robot.chain.parent))) - set(robot.chain.parent.tolist())):
         own = set(_rows(robot, row)) - carried
         frames = [f for f in robot.model.frames if f.parentJoint == row + 1 and f.type == pin.FrameType.BODY]
@@ -288,12 +292,12 @@ def dragged_tips(robot: Robot, goal: Goal | None) -> list[str]:
 
 
 def _unlike(tip: pin.Frame, frame: pin.Frame) -> float:
-    """How much the place of a link on its joint differs from that of the robot's tip."""
+    """Return how much the pose of a link on its joint differs from that of the robot's tip."""
     return float(np.abs(frame.placement.homogeneous - tip.placement.homogeneous).max())
 
 
 def _rows(robot: Robot, row: int) -> list[int]:
-    """The joints from one to the base, as rows of the chain."""
+    """Return the joints from one to the base, as rows of the chain."""
     rows = []
     while row >= 0:
         rows.append(row)

@@ -1,4 +1,4 @@
-"""What a page can show: a problem with or without a path, a world, a robot alone, or a scene alone."""
+"""Subjects of a page: a problem with or without a path, a world, a robot alone, or a scene alone."""
 
 from __future__ import annotations
 
@@ -36,19 +36,19 @@ class HasWorld(Protocol):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Fingers:
-    """Where fingers are over time, seen from where they are drawn.
+    """Motion of gripper fingers over time, relative to the poses at which they are drawn.
 
     Attributes:
         poses: For each body, by the nodes of its joint and its own, its pose on the joint in each motion times the
-            inverse of the one that it is drawn at: x, y, z and quaternion x, y, z, w, shape (motions, 7).
-        at: For each tick the number of the motion whose fingers are shown; in between while they move, shape (ticks,).
+            inverse of the drawn pose: x, y, z and quaternion x, y, z, w, shape (motions, 7).
+        at: For each tick the number of the motion whose fingers are shown, shape (ticks,); fractions while they move.
     """
 
     poses: Mapping[tuple[str, str], Matrix]
     at: Vector
 
     def story(self) -> dict[str, Any]:
-        """For the page."""
+        """Return the motion as plain values for the page."""
         bodies = [
             {"joint": joint, "name": name, "poses": np.round(rows, FINGER_DIGITS).tolist()}
             for (joint, name), rows in self.poses.items()
@@ -61,22 +61,22 @@ class Subject:
     """The parts of what is shown.
 
     Attributes:
-        name: What to call it.
-        robot: The arm, or None if a scene is shown alone.
-        scene: What surrounds it.
-        goal: The goal of the problem, or None.
+        name: Name for display.
+        robot: The arm; None if only a scene is shown.
+        scene: Its surroundings.
+        goal: Goal of the problem, or None.
         waypoints: Configurations to play, shape (k, dof); a single row if there is no path, (0, 0) without a robot.
         is_path: Whether the waypoints are a path, as opposed to a single configuration.
-        before: Waypoints of a path to compare with, shape (m, dof), or None.
-        ghosts: Configurations drawn like tinted glass, shape (m, dof), or None.
+        before: Waypoints of a path for comparison, shape (m, dof), or None.
+        ghosts: Configurations drawn transparently, shape (m, dof), or None.
         marks: Further bodies.
-        run: The run whose ticks the waypoints are, or None.
-        verdict: What is proven of the motion that is played; None where there is none, or no world for it.
-        curve: How far the path stays from obstacles, or None if that is not known.
-        times: When the waypoints of a timed motion are reached [s], shape (k,), or None.
-        held: Regions of path constraints, and the configurations, shape (dof,), in which they begin to be held.
-        fingers: Of a task: where the gripper's fingers are in the ticks of the run, or None.
-        contacts: Where bodies touch along the waypoints; they are drawn red there.
+        run: The run whose ticks are the waypoints, or None.
+        verdict: What is proven of the motion; None without a motion, or without a world.
+        curve: Clearance along the path, or None if it is not known.
+        times: Times of the waypoints of a timed motion [s], shape (k,), or None.
+        held: Regions of path constraints, and the configurations, shape (dof,), at which they begin to hold.
+        fingers: For a task, the motion of the gripper's fingers in the ticks of the run, or None.
+        contacts: Contacts along the waypoints, which are drawn in red.
     """
 
     name: str
@@ -106,7 +106,7 @@ class Subject:
 
     @property
     def tips(self) -> tuple[str, ...]:
-        """Links whose ways are drawn: those of a goal for several, or the robot's tip."""
+        """Links whose trails are drawn: those of a goal for several, or the robot's tip."""
         if self.robot is None:
             return ()
         named = () if self.goal is None else self.goal.frames
@@ -116,7 +116,7 @@ class Subject:
     def end(self) -> Vector | None:
         """Configuration of the goal ghost, shape (dof,): end of the path or the goal's joint values, or None.
 
-        Ghosts take its place, but where the goal is one of them: that one can be dragged.
+        With ghosts there is no goal ghost, unless the goal is one of them: then this one can be dragged.
         """
         q = None if self.goal is None else self.goal.q
         if self.ghosts is not None:
@@ -130,14 +130,14 @@ class Subject:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Shown:
-    """An arm at a configuration, its surroundings and a goal: shown like a problem, but nothing is checked.
+    """An arm at a configuration, its surroundings and a goal; it is shown like a problem, but not checked.
 
     Attributes:
         robot: The arm.
         scene: Its surroundings.
         goal: A goal to draw, or None.
-        start: The posture, shape (dof,).
-        contacts: Where its bodies touch; they are drawn red.
+        start: The configuration, shape (dof,).
+        contacts: Contacts of its bodies, which are drawn in red.
     """
 
     robot: Robot
@@ -158,7 +158,7 @@ def subject_of(
     ghosts: ArrayLike | None = None,
     marks: tuple[Mark, ...] = (),
 ) -> Subject:
-    """The subject of what a caller wants to show.
+    """Return the subject for the input of `view`.
 
     Args:
         shown: A ``Problem``, a ``World``, a ``Robot`` or a ``Scene``.
@@ -202,14 +202,14 @@ def subject_of(
 
 
 def _drawn(marks: tuple[Mark, ...]) -> tuple[Mark, ...]:
-    """The marks that have something to draw."""
+    """Check marks, and return those that are not empty."""
     for mark in marks:
         require(mark, Mark, "mark of a view", "see rrtik_ompl.viewer.drawing.marks")
     return tuple(mark for mark in marks if len(mark.faces))
 
 
 def _posture(shown: Showable, robot: Robot, scene: Scene) -> Subject:
-    """A robot at its start, and its goal."""
+    """Return the subject of a robot at its start, with its goal."""
     named = getattr(shown, "name", "problem")
     name = robot.name if named == "problem" else str(named)
     start = getattr(shown, "start", None)
@@ -231,7 +231,7 @@ def _posture(shown: Showable, robot: Robot, scene: Scene) -> Subject:
 
 
 def _moving(subject: Subject, world: object, path: ShownPath) -> Subject:
-    """A subject on a path or a timed motion, and what is said of that in its world, if it has one."""
+    """Return a subject on a path or a timed motion, with the verdict on it if there is a world."""
     robot = subject.robot
     assert robot is not None, "a path has one"
     if isinstance(path, Trajectory):
@@ -256,7 +256,7 @@ def _moving(subject: Subject, world: object, path: ShownPath) -> Subject:
 
 
 def _path(robot: Robot, path: ShownPath) -> JointPath:
-    """A path of a robot: one that names its joints names those of the robot."""
+    """Return a path of a robot; if it names its joints, these must be the robot's."""
     given: Any = path
     for part in ("path", "trajectory", "run"):
         if isinstance(getattr(given, part, None), JointPath | Trajectory | ReplanRun):
@@ -274,17 +274,17 @@ def _path(robot: Robot, path: ShownPath) -> JointPath:
 
 
 def subject_of_run(problem: Showable, run: ReplanRun) -> Subject:
-    """What a run shows: the robot in every tick, and the obstacles where they are in the first one.
+    """Return the subject of a run: the robot in every tick, and the obstacles where they are in the first one.
 
     Raises:
         InputError: If it is no run, or not one of that problem's robot.
     """
     subject = replayed(problem, run)
-    scene = run.scenes[0].scene if run.scenes else subject.scene  # a feed may begin elsewhere than the problem
+    scene = run.scenes[0].scene if run.scenes else subject.scene  # a feed may begin with another scene than the problem
 
     still = tuple(replace(o, motion=None) for o in scene.at(0.0).obstacles)
     for name in {obstacle.name for obstacle in still}.union(*(tick.poses for tick in run.ticks)):
-        subject.scene.obstacle(name)  # or it is a run of another problem
+        subject.scene.obstacle(name)  # raises if the run belongs to another problem
     scene = replace(subject.scene, obstacles=still)
 
     judged = run.judged(problem if isinstance(problem, Problem) else None)
@@ -292,7 +292,7 @@ def subject_of_run(problem: Showable, run: ReplanRun) -> Subject:
 
 
 def replayed(shown: Showable, run: ReplanRun) -> Subject:
-    """A robot that is where it was in each tick of a run, in the scene that it is shown in.
+    """Return a subject whose robot is at its configuration in each tick of a run, in the scene that is shown.
 
     Raises:
         InputError: If it is no run, or not one of that robot.

@@ -1,4 +1,4 @@
-"""The plan of a task as a run that the page replays: the arm's motions, and objects where they are carried."""
+"""Convert the plan of a task to a run that the page replays: motions of the arm, and carried objects."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ from rrtik_ompl.viewer.drawing.robot_picture import joint_nodes, node_name
 from rrtik_ompl.viewer.subject import Fingers, Showable, Subject, replayed
 from rrtik_ompl.world.world import World
 
-TASK = "task"  # the planner of a run that shows one
-SAME_PLACE = 1e-9  # [m], and alike for a turn
-NO_SHIFT = 1e-9  # the same, of a finger on its joint
+TASK = "task"  # name of the planner in a run that shows a task
+SAME_PLACE = 1e-9  # [m], and the same for rotation matrices
+NO_SHIFT = 1e-9  # the same for a finger on its joint
 
 
 def subject_of_task(shown: Showable, played: PlayedTask) -> Subject:
-    """What a page shows of a plan: its run, the regions that are kept on the way, and the gripper at work.
+    """Return the subject of a task plan: its run, the regions that constrain it, and the motion of the gripper.
 
-    The arm, what stands and what is held are those of the plan's own worlds, whatever world it is shown with. What a
-    joint carries in the same place from beginning to end is drawn there, everything else where it is in each tick.
+    Arm, obstacles and attached objects are those of the plan's own worlds, whatever world it is shown with. An object
+    that stays in the same place on a joint throughout is drawn there, all others at their pose in each tick.
 
     Raises:
-        InputError: If it does not fit what is shown.
+        InputError: If the plan does not fit what is shown.
     """
     plan = played.plan
     first = plan.worlds[0]
@@ -57,7 +57,7 @@ def subject_of_task(shown: Showable, played: PlayedTask) -> Subject:
 
 
 def run_of(played: PlayedTask) -> ReplanRun:
-    """The run that shows a plan, tick by tick."""
+    """Return the run that shows a plan, tick by tick."""
     plan = played.plan
     robot = plan.worlds[0].robot
     kept = _kept(plan)
@@ -86,7 +86,7 @@ def run_of(played: PlayedTask) -> ReplanRun:
 
 
 def _kept(plan: TaskPlan) -> frozenset[str]:
-    """Names of what a joint carries in the same place in all motions."""
+    """Return the names of objects that stay in the same place on a joint in all motions."""
     carried = [_carried(world) for world in plan.worlds]
     return frozenset(
         name
@@ -99,7 +99,7 @@ def _kept(plan: TaskPlan) -> frozenset[str]:
 
 
 def _carried(world: World) -> dict[str, tuple[int, Matrix]]:
-    """For all that is held, the joint that carries it, and where on that, shape (4, 4)."""
+    """Return, for all attached objects, the joint that carries them, and their pose on it, shape (4, 4)."""
     model = world.robot.model
     frames = {item.name: model.frames[model.getFrameId(item.link)] for item in world.scene.attached}
     places = {item.name: frames[item.name].placement * item.pose for item in world.scene.attached}
@@ -107,13 +107,13 @@ def _carried(world: World) -> dict[str, tuple[int, Matrix]]:
 
 
 def _places(world: World, q: Vector) -> dict[str, pin.SE3]:
-    """Where obstacles and what is held are."""
+    """Return the poses of obstacles and attached objects."""
     places = {item.name: world.robot.fk(q, item.link) * item.pose for item in world.scene.attached}
     return places | {item.name: item.pose for item in world.scene.at(0.0).obstacles}
 
 
 def fingers_of(plan: TaskPlan, drawn: Robot, at: Vector) -> Fingers:
-    """The fingers of a plan's motions, beside a robot that is drawn; ``at`` as in :class:`Fingers`."""
+    """Return the finger motion of a plan relative to the robot that is drawn; ``at`` as in :class:`Fingers`."""
     nodes = joint_nodes(drawn)
     first = _placements(drawn)
     places = [_placements(world.robot) for world in plan.worlds]
@@ -129,6 +129,6 @@ def fingers_of(plan: TaskPlan, drawn: Robot, at: Vector) -> Fingers:
 
 
 def _placements(robot: Robot) -> dict[tuple[int, str], pin.SE3]:
-    """Pose of every body that is drawn on its joint, by the joint's number and the body's name."""
+    """Return the pose of every drawn body on its joint, by the joint's number and the body's name."""
     bodies = (robot.visual if robot.visual.ngeoms else robot.collision).geometryObjects
     return {(int(body.parentJoint), str(body.name)): body.placement for body in bodies}

@@ -1,1 +1,1 @@
-"""What a page shows as three.js draws it: arm, scene, trail, marks, colours, the first viewpoint."""
+"""Elements of a page in three.js: arm, scene, trail, marks, colours, and the first viewpoint."""

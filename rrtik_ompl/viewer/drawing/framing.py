@@ -1,4 +1,4 @@
-"""What the camera shows, and from where: the box around the arm's configurations and its surroundings.
+"""Choose what the camera shows, and from where: the box around the arm's configurations and its surroundings.
 
 The first viewpoint is the direction from which obstacles hide the least of the arm's motion.
 """
@@ -14,14 +14,16 @@ from rrtik_ompl.base.arrays import Mask, Matrix, Vector
 from rrtik_ompl.model.scene import Obstacle, Scene
 from rrtik_ompl.viewer.drawing.meshes import look_of_shape
 
-SURROUNDINGS_RATIO = 3.0  # of an obstacle's size to the arm's box, above which the picture shows only a part of it
-EMPTY_BOX = np.array([[-0.5] * 3, [0.5] * 3])  # [m] shown where there is nothing
-SURROUNDINGS_MARGIN = 0.5  # of the arm's box: how much of such an obstacle is shown
+# Ratio of an obstacle's size to that of the arm's box above which only a part of the obstacle is shown.
+SURROUNDINGS_RATIO = 3.0
+EMPTY_BOX = np.array([[-0.5] * 3, [0.5] * 3])  # [m]; shown if there is nothing else
+SURROUNDINGS_MARGIN = 0.5  # how far around the arm's box such an obstacle is shown, as a share of the box
 
 DEFAULT_AZIMUTH = np.deg2rad(-50.0)  # from in front of the arm (x), on its right
 ELEVATIONS = np.deg2rad([27.0, 42.0])
 TURNS = np.deg2rad([0, 30, -30, 60, -60, 90, -90, 120, -120, 150, -150, 180])  # tried in this order
-TURN_COST = 0.04  # share of hidden points that a turn by 90 degrees away from the default azimuth must save
+# A turn by 90 degrees from the default azimuth must reduce the share of hidden points by this much.
+TURN_COST = 0.04
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -30,8 +32,8 @@ class Frame:
 
     Attributes:
         low, high: Corners, shape (3,) [m].
-        arm: Diagonal of the box around the arm alone, not below a tenth of the whole box's, or of everything if there
-            is no arm [m].
+        arm: Diagonal of the box around the arm, at least a tenth of the whole box's [m]; that of the whole box if there
+            is no arm.
     """
 
     low: Vector
@@ -52,13 +54,13 @@ class Frame:
 def frame_around(
     arm_points: Matrix | None, scene: Scene, extra: Sequence[Matrix] = (), *, whole: bool = False
 ) -> Frame:
-    """Box around the arm, the bounded obstacles and further points.
+    """Return the box around the arm, the bounded obstacles and further points.
 
     Args:
-        arm_points: Points around the arm, shape (m, 3) [m], or None.
-        scene: Its obstacles are taken in, of huge ones only the part near the arm.
-        extra: Further points, each array of shape (m, 3) [m].
-        whole: Take in huge obstacles completely.
+        arm_points: Points around the arm, shape (m, 3) [m]; None for no arm.
+        scene: Its obstacles are included, of very large ones only the part near the arm.
+        extra: Further points, arrays of shape (m, 3) [m].
+        whole: Whether to include very large obstacles completely.
     """
     boxes = [obstacle_corners(o) for o in scene.obstacles if o.shape.bounded]
     if arm_points is None or len(arm_points) == 0:
@@ -84,18 +86,21 @@ def frame_around(
 
 
 def obstacle_corners(obstacle: Obstacle) -> Matrix:
-    """Corners in the world of a box around a bounded obstacle, shape (8, 3) [m]."""
+    """Return the corners of a box around a bounded obstacle in the world frame, shape (8, 3) [m]."""
     corners = look_of_shape(obstacle.shape).corners
     placed: Matrix = corners @ obstacle.pose.rotation.T + obstacle.pose.translation
     return placed
 
 
 def overview(points: Matrix, scene: Scene) -> Vector:
-    """Unit vector from the scene towards the viewer, shape (3,).
+    """Return the best first viewpoint: a unit vector from the scene towards the viewer, shape (3,).
+
+    Several directions are compared by the share of points that obstacles hide, plus a cost for turning away from the
+    default direction.
 
     Args:
-        points: Places that should be seen, shape (m, 3) [m].
-        scene: Its obstacles hide what lies behind the boxes around them.
+        points: Points that should be visible, shape (m, 3) [m].
+        scene: Each obstacle hides what lies behind the box around it.
     """
     obstacles = [o for o in scene.obstacles if o.shape.bounded]
     best = direction(0.0, float(ELEVATIONS[0]))
@@ -119,18 +124,18 @@ def overview(points: Matrix, scene: Scene) -> Vector:
 
 
 def direction(turn: float, elevation: float) -> Vector:
-    """Unit vector at an azimuth ``turn`` [rad] from the default one and an elevation [rad], shape (3,)."""
+    """Return the unit vector at an azimuth ``turn`` [rad] from the default one and an elevation [rad], shape (3,)."""
     azimuth = DEFAULT_AZIMUTH + turn
     return np.array([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)])
 
 
 def behind(points: Matrix, away: Vector, obstacle: Obstacle) -> Mask:
-    """Which points, shape (m, 3), have the box around an obstacle between them and a distant viewer. Shape (m,)."""
+    """Check which points, shape (m, 3), are hidden from a distant viewer by the box around an obstacle, shape (m,)."""
     corners = look_of_shape(obstacle.shape).corners
     rotation = obstacle.pose.rotation.T
     local = (points - obstacle.pose.translation) @ rotation.T
 
-    # Slabs: the ray is inside the box where it is inside all three pairs of planes.
+    # Slab method: a ray is inside the box where it is inside all three pairs of planes.
     ray = rotation @ away
     ray = np.where(np.abs(ray) < 1e-12, 1e-12, ray)
     to_low = (corners.min(axis=0) - local) / ray

@@ -1,4 +1,4 @@
-"""Marks: further bodies on a page beside arm and scene, of triangles, with a name and a switch each."""
+"""Marks: further bodies on a page, made of triangles, each with a name and a switch."""
 
 from __future__ import annotations
 
@@ -21,25 +21,25 @@ if TYPE_CHECKING:
 
     from rrtik_ompl.ik.reach import ReachMap
 
-TUBE_SIDES = 6  # few, for there may be thousands of tubes
+TUBE_SIDES = 6  # few, because there may be thousands of tubes
 BALL_SEGMENTS = 48
-CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])  # of a square face, in its plane
+CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])  # corners of a square face, in its plane
 SQUARE_FACES = np.array([[0, 1, 2, 0, 2, 3]])  # its triangles
 
-SCALE = ("#440154", "#3b528b", "#21918c", "#5ec962", "#fde725")  # of reachability, low to high: viridis
+SCALE = ("#440154", "#3b528b", "#21918c", "#5ec962", "#fde725")  # colours of reachability from low to high (viridis)
 MEANING = {"orientations": "of all directions", "manipulability": "manipulability", "samples": "samples"}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Mark:
-    """Something drawn in the world.
+    """A further body in the world.
 
     Attributes:
-        name: In the legend.
+        name: Name in the legend.
         color: '#rrggbb'.
         vertices: Shape (k, 3) [m].
-        faces: Rows of ``vertices``, shape (m, 3).
-        opacity: 1 is solid.
+        faces: Indices of vertices, shape (m, 3).
+        opacity: From 0 to 1, which is solid.
         shown: Whether the page shows it at first.
     """
 
@@ -59,13 +59,13 @@ class MarkOptions(TypedDict, total=False):
 
 
 def tubes(name: str, color: str, lines: Iterable[ArrayLike], radius: float, **options: Unpack[MarkOptions]) -> Mark:
-    """Lines as thin tubes, because WebGL draws lines one pixel wide.
+    """Return a mark of lines, drawn as thin tubes because WebGL draws lines only one pixel wide.
 
     Args:
-        name: For the legend.
+        name: Name in the legend.
         color: '#rrggbb'.
         lines: Each of shape (k, 3) with k at least 2 [m].
-        radius: Of the tubes [m].
+        radius: Radius of the tubes [m].
         **options: ``opacity`` and ``shown`` of the `Mark`.
     """
     return _joined(
@@ -74,7 +74,7 @@ def tubes(name: str, color: str, lines: Iterable[ArrayLike], radius: float, **op
 
 
 def balls(name: str, color: str, centres: ArrayLike, radius: float, **options: Unpack[MarkOptions]) -> Mark:
-    """Balls of one radius [m] at points, shape (k, 3)."""
+    """Return a mark of balls of one radius [m] at points, shape (k, 3)."""
     vertices, faces = round_ended(radius, 0.0, BALL_SEGMENTS)
     points = np.asarray(centres, dtype=np.float64)
     return _joined(name, color, ((vertices + point, faces) for point in points), options)
@@ -83,13 +83,13 @@ def balls(name: str, color: str, centres: ArrayLike, radius: float, **options: U
 def cubes(
     name: str, color: str, inside: NDArray[np.bool_], corner: ArrayLike, size: float, **options: Unpack[MarkOptions]
 ) -> Mark:
-    """Cells of a grid, without the faces between two of them.
+    """Return a mark of the cells of a grid, without the faces between two of them.
 
     Args:
-        name: For the legend.
+        name: Name in the legend.
         color: '#rrggbb'.
-        inside: Which cells, shape (x, y, z).
-        corner: Of the first cell, shape (3,) [m].
+        inside: Which cells are drawn, shape (x, y, z).
+        corner: Corner of the first cell, shape (3,) [m].
         size: Side of a cell [m].
         **options: ``opacity`` and ``shown`` of the `Mark`.
     """
@@ -135,11 +135,11 @@ def _joined(name: str, color: str, bodies: Iterable[tuple[Matrix, Faces]], optio
 
 
 def reach_marks(reach: ReachMap, *, cut: bool = True) -> list[Mark]:
-    """Marks to be shown by ``view(robot, marks=reach_marks(map))``.
+    """Return marks of a reachability map for ``view(robot, marks=reach_marks(map))``, one for each range of values.
 
     Args:
         reach: The map.
-        cut: Leave out the quarter in front of the base, on its right, so that the inside can be seen.
+        cut: Whether to leave out the quarter in front of the base, on its right, so that the inside is visible.
     """
     seen = np.array(reach.reached)
     if cut and seen.shape[2] > 1:

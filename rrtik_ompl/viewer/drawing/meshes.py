@@ -1,4 +1,4 @@
-"""What a shape or a coal geometry looks like: its geometry, its placement, and the box around it."""
+"""Convert shapes and coal geometries to drawable geometries with their placement and bounding box."""
 
 from __future__ import annotations
 
@@ -26,18 +26,20 @@ from rrtik_ompl.viewer.drawing.nodes import (
 )
 from rrtik_ompl.viewer.drawing.triangles import box_corners, split_creases, thin_out, tube
 
-MAX_OBSTACLE_TRIANGLES = 30_000  # a drawn mesh above this is thinned out; the one that is checked stays as it is
-MOST_POINTS = 200_000  # drawn of a cloud; a page has 16 bytes for each, and has to open soon
-BEAD = 0.9  # radius of the bead that stands for a robot that is a mere point, in thicknesses of a line
-_Y_TO_Z = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])  # three.js has its cylinders along y
+# Meshes with more triangles are simplified for drawing; collision checks use the original mesh.
+MAX_OBSTACLE_TRIANGLES = 30_000
+MOST_POINTS = 200_000  # largest number of points drawn of a cloud, limited because each adds 16 bytes to the page
+# Radius of the bead that represents a point robot, in units of the thickness of a line.
+BEAD = 0.9
+_Y_TO_Z = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])  # cylinders of three.js are along y
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Look:
-    """How one solid is drawn.
+    """The drawable form of one solid.
 
     Attributes:
-        geometry: The solid that three.js draws.
+        geometry: The geometry that three.js draws.
         placement: Pose (or pose and scale) of that geometry in the solid's frame, shape (4, 4).
         corners: Corners of a box around the solid in its frame, shape (8, 3) [m].
     """
@@ -48,10 +50,10 @@ class Look:
 
 
 def look_of_shape(shape: Shape, limit: int = MAX_OBSTACLE_TRIANGLES) -> Look:
-    """How a bounded shape is drawn; a mesh with at most ``limit`` triangles.
+    """Return the look of a bounded shape; a mesh is simplified to at most ``limit`` triangles.
 
     Raises:
-        InputError: For a half-space, which has no end: see :func:`half_space_plate`.
+        InputError: For a half-space, which is unbounded: see :func:`half_space_plate`.
     """
     own = OWN_LOOKS.get(type(shape))
     if own is not None:
@@ -65,7 +67,7 @@ def look_of_shape(shape: Shape, limit: int = MAX_OBSTACLE_TRIANGLES) -> Look:
 
 
 def look_of_margin(shape: Shape, margin: float) -> Look | None:
-    """How everything within a margin [m] of a shape is drawn; None if the shape does not know it."""
+    """Return the look of everything within a margin [m] of a shape; None if the shape cannot compute it."""
     grown = shape.grown(margin)
     if grown is None:
         return None
@@ -73,17 +75,20 @@ def look_of_margin(shape: Shape, margin: float) -> Look | None:
 
 
 def look_of_triangles(vertices: Matrix, faces: Faces) -> Look:
-    """How a triangle mesh is drawn, as it is."""
+    """Return the look of a triangle mesh, unchanged."""
     return Look(TriangleGeometry(vertices, faces), np.eye(4), box_corners(vertices))
 
 
 def half_space_plate(shape: HalfSpace, centre: ArrayLike, size: float) -> tuple[Look, NDArray[np.float64]]:
-    """A thin plate whose upper side lies in the plane of a half-space, and its pose in the half-space's frame.
+    """Return a thin plate whose upper side is in the plane of a half-space.
 
     Args:
         shape: The half-space.
-        centre: Point in the half-space's frame near which the plate is wanted, shape (3,) [m].
+        centre: Point in the half-space's frame near which the plate is placed, shape (3,) [m].
         size: Side length of the plate [m].
+
+    Returns:
+        The look of the plate, and its pose in the half-space's frame, shape (4, 4).
     """
     thickness = 0.002 * size
     near = np.asarray(centre, dtype=np.float64)
@@ -98,7 +103,7 @@ def half_space_plate(shape: HalfSpace, centre: ArrayLike, size: float) -> tuple[
 
 
 def _frame_along(normal: NDArray[np.float64]) -> NDArray[np.float64]:
-    """A rotation whose z axis is ``normal``, shape (3, 3)."""
+    """Return a rotation whose z axis is ``normal``, shape (3, 3)."""
     aside = np.eye(3)[int(np.argmin(np.abs(normal)))]
     x = np.cross(aside, normal)
     x /= np.linalg.norm(x)
@@ -106,7 +111,7 @@ def _frame_along(normal: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def thickened(look: Look, least: float) -> Look:
-    """The same, or for what is too thin to be seen a rod of thickness ``least`` [m], or for a point a larger bead."""
+    """Return a visible look: a rod of thickness ``least`` [m] for a thinner solid, a bead for a point."""
     sides = np.ptp(look.corners, axis=0)
     if np.median(sides) >= least:
         return look
@@ -122,12 +127,12 @@ def thickened(look: Look, least: float) -> Look:
 
 
 def triangle_count(geometry: coal.CollisionGeometry) -> int:
-    """Triangles of a coal mesh; 0 for every other geometry."""
+    """Return the number of triangles of a coal mesh; 0 for every other geometry."""
     return int(geometry.num_tris) if is_mesh(geometry) else 0
 
 
 def look_of_coal(geometry: coal.CollisionGeometry, limit: int = MAX_OBSTACLE_TRIANGLES) -> Look | None:
-    """How a coal geometry is drawn, with at most ``limit`` triangles; None if it has no bounded surface (a plane)."""
+    """Return the look of a coal geometry, with at most ``limit`` triangles; None if it is unbounded (a plane)."""
     if isinstance(geometry, coal.Ellipsoid):
         stretch = np.diag([*geometry.radii, 1.0])
         return Look(SphereGeometry(1.0), stretch, box_corners([-geometry.radii, geometry.radii]))
@@ -140,7 +145,7 @@ def look_of_coal(geometry: coal.CollisionGeometry, limit: int = MAX_OBSTACLE_TRI
     try:
         shape = _shape_of(geometry)
         return None if shape is None else look_of_shape(shape, limit)
-    except InputError:  # a link's mesh without area: nothing to see
+    except InputError:  # the mesh of a link has no area: nothing to draw
         return None
 
 
@@ -151,16 +156,16 @@ def _primitive(geometry: Geometry, placement: NDArray[np.float64], half: ArrayLi
 
 @once_per_geometry
 def _shape_of(geometry: coal.CollisionGeometry) -> Shape | None:
-    """The shape of a coal geometry; an arm and its ghosts, which have fewer triangles, ask for the same."""
+    """Return the shape of a coal geometry; cached, because an arm and its ghosts ask for the same."""
     return shape_of(geometry)
 
 
 def _points(cloud: PointCloud) -> PointGeometry:
-    """Points of a cloud, of a very large one some of them."""
+    """Return the points of a cloud; of a very large cloud only some of them."""
     return PointGeometry(cloud.points[:: -(-len(cloud.points) // MOST_POINTS)], cloud.radius)
 
 
-# What three.js draws by itself, smoother and in fewer bytes than triangles.
+# Shapes that three.js draws by itself, smoother and in fewer bytes than triangles.
 OWN_LOOKS: dict[type[Shape], Callable[[Any], Look]] = {
     Sphere: lambda ball: _primitive(SphereGeometry(ball.radius), np.eye(4), np.full(3, ball.radius)),
     Cylinder: lambda solid: _primitive(

@@ -1,7 +1,7 @@
-"""A tree of named nodes; what is set at them is recorded as the commands that meshcat's viewer replays in the page.
+"""A tree of named nodes; operations on them are recorded as the commands that meshcat's viewer replays in the page.
 
 Solids and materials are in the format of three.js's ObjectLoader. They are written here because ``import meshcat``
-takes a second and brings a notebook and a server along, and the page needs its viewer's script alone.
+takes a second and loads a notebook and a server, while the page needs only the script of its viewer.
 """
 
 from __future__ import annotations
@@ -16,22 +16,24 @@ from numpy.typing import NDArray
 from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.model.shapes.surfaces import Faces
 
-ROOT = "/meshcat"  # of the viewer's own tree
+ROOT = "/meshcat"  # root of the viewer's own tree
 
 BOTH_SIDES = 2  # three.js's DoubleSide
 IDENTITY = np.eye(4).ravel().tolist()
-GRAIN = 2.0**-14  # [m], to which corners of triangles are rounded: the zeros that follow take no room
-FLOATS, INDICES = ("Float32Array", 0x17), ("Uint32Array", 0x16)  # meshcat's numbers of msgpack extensions
+# [m]; vertices are rounded to this, because the trailing zeros compress well.
+GRAIN = 2.0**-14
+# Three.js's array types with meshcat's msgpack extensions.
+FLOATS, INDICES = ("Float32Array", 0x17), ("Uint32Array", 0x16)
 
 
 class Recording:
-    """The last command of each kind for each node, in order."""
+    """A recording of the last command of each kind for each node, in order."""
 
     def __init__(self) -> None:
         self._commands: dict[tuple[str, str], bytes] = {}
 
     def set(self, kind: str, path: str, **parts: Any) -> None:
-        """Record a command, in place of an earlier one of the same kind for the same node."""
+        """Record a command; it replaces an earlier one of the same kind for the same node."""
         self._commands.pop((kind, path), None)
         self._commands[kind, path] = umsgpack.packb({"type": kind, "path": path, **parts})
 
@@ -42,32 +44,32 @@ class Recording:
 
     @property
     def commands(self) -> tuple[bytes, ...]:
-        """The recorded commands, packed as the page's ``Viewer.handle_command_bytearray`` takes them."""
+        """The recorded commands, packed for the page's ``Viewer.handle_command_bytearray``."""
         return tuple(self._commands.values())
 
     @property
     def paths(self) -> tuple[str, ...]:
-        """Nodes that hold an object, in the order in which they were set."""
+        """Paths of the nodes that hold an object, in the order in which they were set."""
         return tuple(path for kind, path in self._commands if kind == "set_object")
 
 
 class Node:
-    """A place in the tree: ``node["name"]`` is a node below it, whose pose is relative to it."""
+    """A node of the tree: ``node["name"]`` is its child, whose pose is relative to it."""
 
     def __init__(self, recording: Recording, path: str) -> None:
         self._recording = recording
         self._path = path
 
     def __getitem__(self, name: str) -> Node:
-        """The node of this name below this one; a name without ``/``."""
+        """Return the child of this name, which must not contain ``/``."""
         return Node(self._recording, f"{self._path}/{name}")
 
     def set_object(self, geometry: Geometry, material: Material) -> None:
-        """Put a solid here."""
+        """Place a solid at this node."""
         self._recording.set("set_object", self._path, object=described_object(self._path, geometry, material))
 
     def set_transform(self, matrix: NDArray[Any]) -> None:
-        """Set the pose, or pose and scale, relative to the node above, shape (4, 4)."""
+        """Set the pose, or pose and scale, relative to the parent node, shape (4, 4)."""
         self._recording.set("set_transform", self._path, matrix=matrix.T.ravel().tolist())
 
 
@@ -75,7 +77,7 @@ class Geometry(Protocol):
     """A solid in its own frame."""
 
     def described(self) -> dict[str, Any]:
-        """Its kind and sizes."""
+        """Return kind and sizes in three.js's format."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +87,7 @@ class SphereGeometry:
     radius: float
 
     def described(self) -> dict[str, Any]:
-        """Its kind and sizes."""
+        """Return kind and sizes in three.js's format."""
         return {"type": "SphereGeometry", "radius": self.radius, "widthSegments": 20, "heightSegments": 20}
 
 
@@ -98,7 +100,7 @@ class CylinderGeometry:
     below: float
 
     def described(self) -> dict[str, Any]:
-        """Its kind and sizes."""
+        """Return kind and sizes in three.js's format."""
         radii = {"radiusTop": self.above, "radiusBottom": self.below}
         return {"type": "CylinderGeometry", **radii, "height": self.length, "radialSegments": 50}
 
@@ -110,19 +112,19 @@ class BoxGeometry:
     sides: tuple[float, float, float]
 
     def described(self) -> dict[str, Any]:
-        """Its kind and sizes."""
+        """Return kind and sizes in three.js's format."""
         return {"type": "BoxGeometry", **dict(zip(("width", "height", "depth"), self.sides, strict=True))}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TriangleGeometry:
-    """Triangles: corners, shape (n, 3) [m], and the numbers of each triangle's three, shape (m, 3)."""
+    """Triangles: vertices, shape (n, 3) [m], and the three vertex indices of each triangle, shape (m, 3)."""
 
     vertices: Matrix
     faces: Faces
 
     def described(self) -> dict[str, Any]:
-        """Its kind, corners and triangles."""
+        """Return kind, vertices and triangles in three.js's format."""
         corners = np.round(np.asarray(self.vertices, dtype=np.float64) / GRAIN) * GRAIN
         position = _packed(corners.astype(np.float32), FLOATS)
         index = _packed(np.asarray(self.faces, dtype=np.uint32), INDICES)
@@ -137,7 +139,7 @@ class PointGeometry:
     radius: float
 
     def described(self) -> dict[str, Any]:
-        """Its kind and points."""
+        """Return kind and points in three.js's format."""
         return {"type": "BufferGeometry", "data": {"attributes": {"position": _packed(self.points, FLOATS)}}}
 
 
@@ -148,13 +150,13 @@ def _packed(rows: NDArray[Any], kind: tuple[str, int]) -> dict[str, Any]:
 
 @dataclass(frozen=True, slots=True)
 class Material:
-    """How a surface looks.
+    """Appearance of a surface.
 
     Attributes:
         color: 0xRRGGBB.
-        opacity: 0 to 1.
-        shininess: Of its highlights; three.js's own if None.
-        hides: Whether it hides what is drawn behind it later; three.js's own choice if None.
+        opacity: From 0 to 1.
+        shininess: Shininess of its highlights; None for the default of three.js.
+        hides: Whether it hides what is drawn behind it later (depth writing); None for the default of three.js.
     """
 
     color: int
@@ -165,7 +167,7 @@ class Material:
     _FIXED: ClassVar[dict[str, Any]] = {"wireframe": False, "wireframeLinewidth": 1.0, "vertexColors": 0}
 
     def described(self) -> dict[str, Any]:
-        """Its kind and properties."""
+        """Return kind and properties in three.js's format."""
         look = {"color": self.color, "reflectivity": 0.5, "side": BOTH_SIDES}
         seen = {"transparent": self.opacity != 1.0, "opacity": self.opacity, "linewidth": 1.0}
         chosen = {"shininess": self.shininess, "depthWrite": self.hides}
@@ -174,7 +176,7 @@ class Material:
 
 
 def described_object(path: str, geometry: Geometry, material: Material) -> dict[str, Any]:
-    """A solid with its material; all parts are named after its path, so that the same picture gives the same bytes."""
+    """Return a solid with its material; parts are named after the path, so that equal pictures give equal bytes."""
     names = {part: f"{path}/{part}" for part in ("geometry", "material")}
     kind = "Mesh"
     look = material.described()

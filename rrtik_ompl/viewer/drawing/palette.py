@@ -12,7 +12,7 @@ OBSTACLE = "#e6b35a"
 ATTACHED = "#cc79a7"
 INK = "#1d2733"
 TRAIL = "#d55e00"
-UNPROVEN = "#7b3294"  # the way of the tip on motions that are not proven free
+UNPROVEN = "#7b3294"  # trail of the tip on motions that are not proven free
 BEFORE = "#56b4e9"
 TOUCHING = "#d1242f"  # bodies in collision
 SERIES = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#8c6bb1", "#7f7f7f")  # in this order
@@ -25,15 +25,15 @@ GRID_MIDDLE_DARK, GRID_DARK = "#4d5965", "#38434f"
 
 
 def number(color: str) -> int:
-    """The colour '#rrggbb' as the number that three.js takes."""
+    """Convert the colour '#rrggbb' to a number for three.js."""
     return int(color.removeprefix("#"), 16)
 
 
 def hexadecimal(fractions: Iterable[float]) -> str:
-    """Red, green and blue between 0 and 1 as the colour '#rrggbb'."""
+    """Convert red, green and blue between 0 and 1 to the colour '#rrggbb'."""
     return "#" + "".join(f"{round(255 * min(max(float(part), 0.0), 1.0)):02x}" for part in fractions)
 
 
 def fractions(color: str) -> list[float]:
-    """The colour '#rrggbb' as red, green and blue between 0 and 1."""
+    """Convert the colour '#rrggbb' to red, green and blue between 0 and 1."""
     return [int(color[k : k + 2], 16) / 255.0 for k in (1, 3, 5)]

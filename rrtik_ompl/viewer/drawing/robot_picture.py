@@ -1,4 +1,4 @@
-"""The arm in the scene tree: one node per joint, the links and what they carry below it."""
+"""Draw the arm in the scene tree: one node per joint, with the links and attached objects below it."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ from rrtik_ompl.viewer.drawing import palette
 from rrtik_ompl.viewer.drawing.meshes import Look, look_of_coal, look_of_shape, triangle_count
 from rrtik_ompl.viewer.drawing.nodes import Material, Node
 
-ROBOT_TRIANGLES = 40_000  # drawn for the whole arm at most; its meshes are thinned out above that
-GHOST_TRIANGLES = 15_000  # of each ghost
+ROBOT_TRIANGLES = 40_000  # largest number for the whole arm; meshes are simplified beyond that
+GHOST_TRIANGLES = 15_000  # largest number for each ghost
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Part:
-    """One solid that moves with a joint.
+    """A solid that moves with a joint.
 
     Attributes:
         name: Its name in the scene tree.
         joint: Pinocchio joint number, 0 for the base.
         placement: Pose in the joint's frame, shape (4, 4).
-        look: How it is drawn.
+        look: Its drawable form.
         color: '#rrggbb'.
     """
 
@@ -41,26 +41,26 @@ class Part:
 
 
 def node_name(name: str) -> str:
-    """A name as one step of a path in the scene tree; different names are different steps.
+    """Convert a name to one step of a path in the scene tree; the conversion is unique.
 
-    It begins with a colon, as the viewer keeps nodes in objects of JavaScript's, which have names such as
-    ``constructor`` of their own.
+    The step begins with a colon, because the viewer stores nodes in JavaScript objects, which already have properties
+    such as ``constructor``.
     """
     return ":" + name.replace("%", "%25").replace("/", "%2F")
 
 
 def held_node_name(name: str) -> str:
-    """The same for what is held, which hangs on the same node as the links of a joint."""
+    """Convert the name of an attached object, which shares the node of a joint with links."""
     return "held" + node_name(name)
 
 
 def joint_nodes(robot: Robot) -> list[str]:
-    """Names of the nodes that move, one per Pinocchio joint, the world first."""
+    """Return the names of the nodes that move, one per Pinocchio joint, the world first."""
     return [node_name(name) for name in robot.model.names]
 
 
 def link_parts(robot: Robot, triangles: int = ROBOT_TRIANGLES) -> list[Part]:
-    """The links in at most about so many triangles: the visual geometry, or the collision geometry if there is none."""
+    """Return the links' visual geometry, or else their collision geometry, with about ``triangles`` triangles."""
     drawn = _link_parts(robot.visual.geometryObjects, triangles)
     return drawn or _link_parts(robot.collision.geometryObjects, triangles)
 
@@ -80,17 +80,17 @@ def _link_parts(bodies: Sequence[pin.GeometryObject], triangles: int) -> list[Pa
 
 
 def _link_color(body: pin.GeometryObject) -> str:
-    """The colour of the robot's description, or one of two greys in turn, so that the joints are visible."""
+    """Return the colour in the robot's description, or one of two alternating greys, which make joints visible."""
     if body.overrideMaterial:
         return palette.hexadecimal(body.meshColor[:3])
     return palette.ROBOT_ALTERNATE if body.parentJoint % 2 else palette.ROBOT
 
 
 def attached_parts(robot: Robot, attached: Sequence[AttachedObject]) -> list[Part]:
-    """The objects that links hold.
+    """Return the attached objects as parts.
 
     Raises:
-        UnknownNameError: If one of them hangs on a link that the robot does not have.
+        UnknownNameError: If one of them is attached to a link that the robot does not have.
     """
     parts = []
     for item in attached:
@@ -107,7 +107,7 @@ def attached_parts(robot: Robot, attached: Sequence[AttachedObject]) -> list[Par
 
 
 def nodes_of(robot: Robot, scene: Scene, names: Collection[str]) -> list[list[str]]:
-    """Where links, attached objects and obstacles of these names are drawn: steps of paths in the scene tree."""
+    """Return the paths in the scene tree of links, attached objects and obstacles with the given names."""
     joints = joint_nodes(robot)
     frames = robot.model.frames
     solids = (*robot.visual.geometryObjects, *robot.collision.geometryObjects)
@@ -132,7 +132,7 @@ def draw_parts(node: Node, robot: Robot, parts: list[Part], frames: NDArray[np.f
 
 
 def swept_points(parts: list[Part], frames: NDArray[np.float64]) -> Matrix:
-    """Corners in the world of boxes around all parts, for frames of shape (m, joints + 1, 4, 4). Shape (p, 3)."""
+    """Return corners of boxes around all parts in the world frame, shape (p, 3), for frames (m, joints + 1, 4, 4)."""
     corners = []
     for part in parts:
         poses = frames[:, part.joint] @ part.placement

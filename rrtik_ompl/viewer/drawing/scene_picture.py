@@ -1,4 +1,4 @@
-"""The arm's surroundings: obstacles, moving ones with a part of their motion, and the goal's frame or point."""
+"""Draw the surroundings: obstacles, moving ones with a part of their motion, and the goal's frame or point."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ from rrtik_ompl.viewer.drawing.triangles import tube
 
 MAX_GOALS_DRAWN = 20
 FRAMES_PER_RANGE = 7
-LATER_SECONDS = (1.0, 2.0, 3.0)  # when an obstacle of constant velocity is drawn again, faintly
+LATER_SECONDS = (1.0, 2.0, 3.0)  # times at which an obstacle of constant velocity is drawn again, faintly
 
-SIDES = 24  # of a cone
-CONE = 0.3  # [diagonal of the arm] its length
-THINNEST = 0.004  # [diagonal of the arm] of a plane or a line
+SIDES = 24  # sides of a cone
+CONE = 0.3  # length of a cone, as a share of the arm's diagonal
+THINNEST = 0.004  # thickness of a plane or a line, as a share of the arm's diagonal
 OPACITY = 0.2
 
 
@@ -42,7 +42,7 @@ def draw_scene(vis: Node, scene: Scene, frame: Frame) -> None:
 
 
 def obstacle_look(obstacle: Obstacle, frame: Frame) -> tuple[Look, Matrix]:
-    """How an obstacle is drawn, and where that is in the obstacle's own frame, shape (4, 4)."""
+    """Return the look of an obstacle, and its placement in the obstacle's frame, shape (4, 4)."""
     if isinstance(obstacle.shape, HalfSpace):
         look, local = half_space_plate(obstacle.shape, obstacle.pose.actInv(frame.centre), 1.5 * frame.size)
         return look, local @ look.placement
@@ -59,7 +59,7 @@ def _draw_obstacle(node: Node, obstacle: Obstacle, frame: Frame) -> None:
 
 
 def _draw_margin(node: Node, obstacle: Obstacle, placement: Matrix) -> None:
-    """Draw what lies within an obstacle's margin under its node, which has ``placement`` in the obstacle's frame."""
+    """Draw the margin of an obstacle below its node, which has ``placement`` in the obstacle's frame."""
     look = look_of_margin(obstacle.shape, obstacle.margin) if obstacle.margin else None
     if look is not None:
         node.set_object(look.geometry, look_material(palette.OBSTACLE, opacity=0.2))
@@ -96,7 +96,7 @@ def draw_goal(vis: Node, goal: Goal | None, frame: Frame) -> None:
 
 
 def _draw_region(node: Node, region: TaskRegion, frame: Frame) -> None:
-    """Draw the box of a region's positions and frames of the tip along each of its ranges."""
+    """Draw the box of a region's positions, and frames of the tip along each of its ranges."""
     low, high = region.bounds.T
     if (low < high)[:3].any():
         look = look_of_shape(Box(np.maximum((high - low)[:3], 0.002 * frame.arm)))
@@ -109,7 +109,10 @@ def _draw_region(node: Node, region: TaskRegion, frame: Frame) -> None:
 
 
 def goal_frames(region: TaskRegion) -> NDArray[np.float64]:
-    """Poses of the tip that show a region: the one of least displacement, and others along each range; (k, 4, 4)."""
+    """Return poses of the tip that represent a region, shape (k, 4, 4).
+
+    The first one has the least displacement; the others vary it along each range that is free.
+    """
     low, high = region.bounds.T
     least = np.clip(np.zeros(6), low, high)
 
@@ -135,16 +138,16 @@ def draw_tube(node: Node, points: Matrix, radius: float, color: str) -> None:
 
 
 def look_material(color: str, opacity: float = 1.0) -> Material:
-    """A dull surface of a colour, seen through if its opacity is below 1."""
+    """Return a dull surface of a colour, transparent if its opacity is below 1."""
     return Material(color=palette.number(color), opacity=opacity, shininess=10, hides=opacity == 1.0)
 
 
 def draw_constraints(vis: Node, held: Iterable[tuple[HeldRegion, Vector]], frame: Frame) -> None:
-    """Draw regions under ``constraints``: what bounds the position where it is, a cone where the frame starts.
+    """Draw regions under ``constraints``: the box that bounds the position, and a cone for a bounded axis.
 
     Args:
-        vis: The page.
-        held: Regions, and the configurations, shape (dof,), in which they begin to be held.
+        vis: Root node of the page.
+        held: Regions, and the configurations, shape (dof,), at which they begin to hold.
         frame: What the page shows.
     """
     for k, (region, start) in enumerate(held):
@@ -165,17 +168,17 @@ def draw_constraints(vis: Node, held: Iterable[tuple[HeldRegion, Vector]], frame
 
 
 def _seen(bounds: Matrix, near: Vector, frame: Frame) -> tuple[Vector, Vector]:
-    """Lowest and highest coordinates of what is drawn of a box that may have no end, around a point."""
+    """Return the corners, shape (3,) each, of the drawn part of a box that may be unbounded, around a point."""
     half = 0.75 * frame.arm
     return np.maximum(bounds[:, 0], near - half), np.minimum(bounds[:, 1], near + half)
 
 
 def _cone(length: float, radius: float) -> tuple[Matrix, NDArray[np.int64]]:
-    """A cone that opens along z from its tip: corners and faces, shapes (n, 3)."""
+    """Return the vertices and faces, shapes (n, 3), of a cone that opens along z from its tip."""
     angles = 2.0 * np.pi * np.arange(SIDES) / SIDES
     rim = np.column_stack([radius * np.cos(angles), radius * np.sin(angles), np.full(SIDES, length)])
 
-    # Corner 0 is the tip, 1 to SIDES the rim, SIDES + 1 the middle of the lid.
+    # Vertex 0 is the tip, 1 to SIDES are the rim, SIDES + 1 is the centre of the lid.
     around = np.arange(SIDES) + 1
     following = np.roll(np.arange(SIDES) + 1, -1)
     faces = np.column_stack([np.zeros(SIDES, dtype=np.int64), following, around])

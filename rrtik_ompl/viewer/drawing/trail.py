@@ -1,4 +1,4 @@
-"""The trail of the tip, or of several: one tube per move, so that the page can highlight the present move."""
+"""The trail of one or several tips: one tube per move, so that the page can highlight the present move."""
 
 from __future__ import annotations
 
@@ -14,13 +14,14 @@ from rrtik_ompl.viewer.drawing import palette
 from rrtik_ompl.viewer.drawing.nodes import Material, Node, SphereGeometry
 from rrtik_ompl.viewer.drawing.scene_picture import draw_tube
 
-RING_STEP = np.deg2rad(3.0)  # [rad] between two rings of the tube; for sliding joints a share of the move
-MAX_RINGS = 1500  # of all tubes together, about
-MAX_PIECES = 150  # a path of more moves is drawn in this many pieces of several moves each
+# [rad]; motion of the joints between two rings of a tube.
+RING_STEP = np.deg2rad(3.0)
+MAX_RINGS = 1500  # approximate total number of rings
+MAX_PIECES = 150  # longer paths are drawn in this many pieces of several moves each
 
 
 def pieces(waypoints: Matrix) -> NDArray[np.int64]:
-    """Number of the trail's piece to which each move of a path, shape (k, dof), belongs. Shape (k - 1,)."""
+    """Return, for each move of a path, shape (k, dof), the number of its piece of the trail, shape (k - 1,)."""
     moves = len(waypoints) - 1
     return np.arange(moves) * min(moves, MAX_PIECES) // max(moves, 1)
 
@@ -37,12 +38,12 @@ def draw_trail(
     """Draw the trails of tips under ``trail/piece N``, and under ``beads`` a bead at every waypoint of the first.
 
     Args:
-        vis: The root of the tree of nodes.
+        vis: Root of the tree of nodes.
         arms: The arm, once for each of its tips whose trail is drawn.
         waypoints: Shape (k, dof) with k at least 2.
-        radius: Of the tube [m].
-        beads: Whether to draw them.
-        unproven: Numbers of the moves that are not proven free; the pieces with them have another colour.
+        radius: Radius of the tubes [m].
+        beads: Whether to draw the beads.
+        unproven: Numbers of the moves that are not proven free; pieces with such moves have another colour.
     """
     piece = pieces(waypoints)
     doubtful = set(piece[list(unproven)].tolist())
@@ -53,7 +54,7 @@ def draw_trail(
         for number, arm in enumerate(arms):
             tips = _way(arm, rows, radius)
             node = vis["trail"][f"piece {k}"]
-            if len(tips) > 1:  # a turning wrist need not move the tip
+            if len(tips) > 1:  # a rotating wrist may leave the tip in place
                 color = palette.UNPROVEN if k in doubtful else palette.TRAIL
                 draw_tube(node if number == 0 else node[f"tip {number + 1}"], tips, radius, color)
 
@@ -72,7 +73,7 @@ def draw_before(vis: Node, robot: Robot, waypoints: Matrix, radius: float) -> No
 
 
 def _way(arm: Robot, rows: Matrix, radius: float) -> Matrix:
-    """Positions of the tip, shape (m, 3), without those that a tube of this radius [m] would not show."""
+    """Return the positions of the tip, shape (m, 3), without those too close for a tube of this radius [m]."""
     tips = arm.fk_batch(rows)[:, :3, 3]
     far = np.linalg.norm(np.diff(tips, axis=0), axis=1) > 0.05 * radius
     way: Matrix = tips[np.insert(far, 0, True)]
@@ -80,7 +81,7 @@ def _way(arm: Robot, rows: Matrix, radius: float) -> Matrix:
 
 
 def _dense(robot: Robot, waypoints: Matrix, total: int) -> Matrix:
-    """Configurations along some moves, close enough that the tip's arcs appear round. Shape (m, dof)."""
+    """Return configurations along moves, shape (m, dof), so dense that the arcs of the tip appear round."""
     most = max(MAX_RINGS // total, 2)
     rows = [waypoints[:1]]
 

@@ -14,7 +14,9 @@ CREASE = np.deg2rad(35.0)  # faces that meet at a larger angle are drawn with an
 
 
 def split_creases(vertices: Matrix, faces: Faces, angle: float = CREASE) -> tuple[Matrix, Faces]:
-    """Give both sides of every sharp edge vertices of their own, so that averaged normals shade it as an edge.
+    """Duplicate the vertices at every sharp edge, so that averaged normals show it as an edge.
+
+    Corners of triangles at one vertex are joined across smooth edges only; each connected set becomes a vertex.
 
     Args:
         vertices: Without duplicates, shape (n, 3).
@@ -22,7 +24,7 @@ def split_creases(vertices: Matrix, faces: Faces, angle: float = CREASE) -> tupl
         angle: Edges between faces whose normals differ by more are sharp [rad].
 
     Returns:
-        Vertices, shape (n', 3) with n' >= n used ones, and faces, shape (m, 3), in the same order.
+        Vertices, shape (n', 3) with n' >= the number of used ones, and faces, shape (m, 3), in the same order.
     """
     start = faces.reshape(-1)
     end = np.roll(faces, -1, axis=1).reshape(-1)  # half-edge h starts at corner h
@@ -33,7 +35,7 @@ def split_creases(vertices: Matrix, faces: Faces, angle: float = CREASE) -> tupl
     first = first[smooth]
     second = second[smooth]
 
-    # Of both half-edges, the corners that stand at the same vertex; on a sound surface they run in opposite directions.
+    # Match the corners of both half-edges at the same vertex; on a consistent surface the half-edges are opposite.
     opposed = start[first] == end[second]
     at_start = np.where(opposed, _next_corner(second), second)
     at_end = np.where(opposed, second, _next_corner(second))
@@ -46,7 +48,7 @@ def split_creases(vertices: Matrix, faces: Faces, angle: float = CREASE) -> tupl
 
 
 def _half_edge_pairs(start: Faces, end: Faces, count: int) -> tuple[Faces, Faces]:
-    """Numbers of the two half-edges of every edge that belongs to exactly two triangles."""
+    """Return the numbers of the two half-edges of every edge that belongs to exactly two triangles."""
     key = np.minimum(start, end) * count + np.maximum(start, end)
     _, group, users = np.unique(key, return_inverse=True, return_counts=True)
     group = np.asarray(group).reshape(-1)
@@ -69,15 +71,15 @@ def _next_corner(half_edge: Faces) -> Faces:
 
 
 def _components(rows: Faces, columns: Faces, count: int) -> Faces:
-    """Number of the connected component of each of ``count`` nodes, joined by edges rows[k] - columns[k]."""
+    """Return the connected component of each of ``count`` nodes, joined by edges rows[k] - columns[k]."""
     graph = coo_array((np.ones(len(rows)), (rows, columns)), shape=(count, count))
     return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
 
 
 def thin_out(vertices: Matrix, faces: Faces, limit: int) -> tuple[Matrix, Faces]:
-    """Merge neighbouring vertices on a grid, coarser and coarser, until at most ``limit`` triangles remain.
+    """Merge neighbouring vertices on increasingly coarse grids, until at most ``limit`` triangles remain.
 
-    A mesh that is small enough comes back unchanged. Each merged vertex stands at the mean of those it replaces.
+    A mesh that is small enough is returned unchanged. Each merged vertex is the mean of those it replaces.
     """
     extent = float(np.ptp(vertices, axis=0).max())
     cell = extent / 400.0
@@ -86,7 +88,8 @@ def thin_out(vertices: Matrix, faces: Faces, limit: int) -> tuple[Matrix, Faces]
 
     while len(thin_faces) > limit and cell < extent:
         thin_vertices, thin_faces = _cluster(vertices, faces, cell)
-        cell *= max(1.1, 0.9 * np.sqrt(len(thin_faces) / limit))  # the number of triangles goes with the cell's area
+        # The number of triangles is about inversely proportional to the area of a cell.
+        cell *= max(1.1, 0.9 * np.sqrt(len(thin_faces) / limit))
     return thin_vertices, thin_faces
 
 
@@ -103,7 +106,7 @@ def _cluster(vertices: Matrix, faces: Faces, cell: float) -> tuple[Matrix, Faces
     kept = (merged[:, 0] != merged[:, 1]) & (merged[:, 1] != merged[:, 2]) & (merged[:, 2] != merged[:, 0])
     merged = merged[kept]
 
-    # Of triangles that now lie upon each other, as the two sides of a thin wall do, one is enough.
+    # Keep one of several coincident triangles, which result for example from the two sides of a thin wall.
     low, middle, high = np.sort(merged, axis=1).T
     _, different = np.unique((low * len(means) + middle) * len(means) + high, return_index=True)
 
@@ -111,7 +114,7 @@ def _cluster(vertices: Matrix, faces: Faces, cell: float) -> tuple[Matrix, Faces
 
 
 def tube(points: Matrix, radius: float, sides: int = 8) -> tuple[Matrix, Faces]:
-    """Tube of the given radius along a line through at least two points, shape (k, 3)."""
+    """Return a tube along a line through at least two points, shape (k, 3), with ``sides`` sides."""
     along = np.gradient(points, axis=0)
     along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-12)
 
@@ -129,12 +132,12 @@ def tube(points: Matrix, radius: float, sides: int = 8) -> tuple[Matrix, Faces]:
 
 
 def box_corners(points: ArrayLike) -> Matrix:
-    """The eight corners of the axis-aligned box around points, shape (8, 3)."""
+    """Return the eight corners of the axis-aligned box around points, shape (8, 3)."""
     rows = np.asarray(points, dtype=np.float64)
     low = rows.min(axis=0)
     high = rows.max(axis=0)
 
-    # Bits 0, 1 and 2 of a corner's number say where it is along x, y and z.
+    # Bits 0, 1 and 2 of a corner's number select low or high along x, y and z.
     pick = np.array([[k & 1, k >> 1 & 1, k >> 2 & 1] for k in range(8)], dtype=bool)
     corners: Matrix = np.where(pick, high, low)
     return corners

@@ -1,1 +1,1 @@
-"""Plots of joint values, of the genetic algorithm, of reachability maps and of the tree of MB-RRT (matplotlib)."""
+"""Plots of joint values, the genetic algorithm, reachability maps and the tree of MB-RRT, with matplotlib."""

@@ -1,4 +1,4 @@
-"""Joints over time, or over the waypoints of a path that has no times yet: a picture as a PNG or SVG file."""
+"""Plot joints over time, or over the waypoints of a path without times, to a PNG or SVG file."""
 
 from __future__ import annotations
 
@@ -22,25 +22,26 @@ if TYPE_CHECKING:
 
 
 FORMATS = (".png", ".svg")
-LETTERS_AN_INCH, LETTERS_BESIDE_A_NAME = 11.0, 9  # in the legend: as wide as the line and the gaps of an entry
-SAMPLES = 2000  # times at which a motion is drawn, beside its knots
-# Colour-blind people can distinguish them too [55]; black and grey for the rest.
+# Width of letters in the legend, and of the line and gaps of an entry, counted in letters.
+LETTERS_AN_INCH, LETTERS_BESIDE_A_NAME = 11.0, 9
+SAMPLES = 2000  # times at which a motion is drawn, in addition to its knots
+# Colours that colour-blind people can distinguish [55], then black and grey.
 COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#1d2733", "#8494a5")
-DASHES = ("solid", (0, (5, 2)), (0, (1, 1.5)))  # for the ninth joint and those after it
+DASHES = ("solid", (0, (5, 2)), (0, (1, 1.5)))  # the ninth joint and later ones repeat the colours with other dashes
 
 
 def plot_joints(
     motion: Trajectory | JointPath, file: str | os.PathLike[str], *, limits: RateLimits | None = None
 ) -> None:
-    """Draw the joints of a motion over time: positions, velocities and accelerations; of a path, its positions.
+    """Plot positions, velocities and accelerations of the joints of a motion over time; for a path, only its positions.
 
-    Degrees for turning joints, metres for sliding ones, in rows of their own. The same input gives the same file.
+    Revolute joints are in degrees, prismatic ones in metres, in separate panels. The same input gives the same file.
 
     Args:
-        motion: A trajectory, or a path, whose waypoints are then drawn at equal distances.
-        file: A .png or .svg file; written whole or not at all.
-        limits: Drawn as thin lines in the colours of their joints, for a trajectory. Where the acceleration jumps there
-            is a triangle in any case.
+        motion: A trajectory, or a path, whose waypoints are drawn at equal distances.
+        file: A .png or .svg file; written completely or not at all.
+        limits: For a trajectory, drawn as thin lines in the colours of their joints; None draws none. Jumps of the
+            acceleration are marked by triangles in any case.
 
     Raises:
         InputError: If the ending is another one, the file cannot be written, ``motion`` is something else, or the
@@ -76,10 +77,15 @@ def plot_joints(
 
 
 def _rows(motion: Trajectory | JointPath) -> tuple[Vector, str, list[tuple[str, str, Matrix]]]:
-    """What is drawn: over what, what that is called, and the rows of panels with name, power of time and values."""
+    """Return what is drawn.
+
+    Returns:
+        The values of the x axis, its label, and for each row of panels its name, its unit's power of time ("", "/s",
+        "/s²"), and the values, shape (k, dof).
+    """
     if isinstance(motion, JointPath):
         return np.arange(len(motion.waypoints), dtype=float), "waypoint", [("position", "", motion.waypoints)]
-    # a jump of acceleration is a vertical line: each knot is drawn from both sides
+    # Each knot is sampled from both sides, so that a jump of acceleration is a vertical line.
     knots = np.concatenate([motion.times, np.nextafter(motion.times[1:], 0.0)])
     clock = np.unique(np.concatenate([np.linspace(0.0, motion.duration, SAMPLES), knots]))
 
@@ -120,7 +126,7 @@ def _mark_jumps(panel: Axes, motion: Trajectory, mask: NDArray[np.bool_], factor
 
 
 def _legend(figure: Figure, motion: Trajectory | JointPath) -> None:
-    """One line for each joint, whichever panel draws it, in as many columns as have room beside each other."""
+    """Draw a legend with one line for each joint, in as many columns as fit."""
     lines = {line.get_label(): line for panel in figure.axes for line in panel.get_lines()}
     names = [_plain(name) for name in motion.joint_names]
     handles = [lines[name] for name in names]
@@ -129,7 +135,7 @@ def _legend(figure: Figure, motion: Trajectory | JointPath) -> None:
 
 
 def save_figure(figure: Figure, file: str | os.PathLike[str], *, dpi: int = 150) -> None:
-    """Write a matplotlib figure so that the same figure gives the same file, whole or not at all.
+    """Write a matplotlib figure, completely or not at all; the same figure gives the same file.
 
     Raises:
         InputError: If the ending is none of ``FORMATS``, or the file cannot be written.
@@ -147,7 +153,7 @@ def save_figure(figure: Figure, file: str | os.PathLike[str], *, dpi: int = 150)
 
 
 def tidy(panel: Axes, *, grid: bool = True) -> None:
-    """Leave out the frame's upper and right side; a pale grid behind everything."""
+    """Remove the upper and right side of the frame, and draw a pale grid in the background."""
     if grid:
         panel.grid(color="#e3e9ef", linewidth=0.8)
         panel.set_axisbelow(True)

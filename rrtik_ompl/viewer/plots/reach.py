@@ -1,4 +1,4 @@
-"""Slices of a map of reach, or of an effective workspace: a picture as a PNG or SVG file."""
+"""Plot slices of a reachability map, or of an effective workspace, to a PNG or SVG file."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ VEHICLE: dict[str, Any] = {"fill": False, "hatch": "//", "edgecolor": "#7f8a96"}
 def plot_slices(
     slices: Sequence[Slice], file: str | os.PathLike[str], *, title: str = "", label: str = "", colors: str = "viridis"
 ) -> None:
-    """Draw slices side by side to the same scale; 0 is left white.
+    """Draw slices side by side with the same colour scale; 0 is left white.
 
     Args:
         slices: At least one.
-        file: A .png or .svg file; written whole or not at all.
-        title: Of the picture.
-        label: Of the colour bar; no bar if "".
-        colors: matplotlib's name of a colour map.
+        file: A .png or .svg file; written completely or not at all.
+        title: Title of the picture.
+        label: Label of the colour bar; no bar if "".
+        colors: Name of a colour map of matplotlib.
 
     Raises:
         InputError: If there is no slice, the ending is another one, or the file cannot be written.
@@ -82,7 +82,7 @@ def plot_slices(
 
 
 def _keys(meanings: Mapping[float, str], image: AxesImage) -> list[Artist]:
-    """Lines of the legend."""
+    """Return the entries of the legend."""
     from matplotlib.colors import to_hex
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
