@@ -322,6 +322,7 @@ def simplified(problem: Problem, route: Matrix, budget: Budget) -> tuple[Matrix,
         validity = ValidityCallback(problem.world)
         si = space_information(problem, route, validity)
 
+        # Both the condition and the checks can end the work.
         seconds = 0.0 if budget.over() else min(budget.left, MAX_SECONDS)
         validity.deadline = time.monotonic() + seconds
         condition = ob.timedPlannerTerminationCondition(seconds)

@@ -281,6 +281,7 @@ def turns_either_way(factory: Factory) -> None:
             write(state, q)
         setup.setStartAndGoalStates(*ends)
 
+        # Solve it, and check the status, the edges and the ends of the path.
         planner = factory(si, seed=1)
         setup.setPlanner(planner)
 

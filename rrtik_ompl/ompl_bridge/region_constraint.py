@@ -75,10 +75,12 @@ class ProjectedMotions(ob.MotionValidator):  # type: ignore[misc]  # OMPL has no
         travelled = 0.0
 
         while distance_left > STEP:
+            # Go a step straight towards the end, and project it onto the constraint.
             new = here + STEP / distance_left * (end - here)
             if not self._constraint.project(new):
                 return False
 
+            # Reject detours and steps that come no nearer, as OMPL does, and check the step.
             step = float(np.linalg.norm(new - here))
             travelled += step
             new_distance_left = float(np.linalg.norm(end - new))

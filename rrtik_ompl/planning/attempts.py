@@ -10,8 +10,8 @@ results of the rows before it:
 | strict | in steps, with room beyond the clearance | 4, 16, ... | see below |
 | proving | by proofs, with that room | 2, 4, ... | after five strict ones, or without kernels |
 
-As soon as a path was valid but not proven, strict attempts get half of the effort. A plain attempt is limited by time
-alone if later attempts would have the same goal configurations.
+As soon as a path is found that is valid but not proven, strict attempts get half of the effort. A plain attempt is
+limited by time alone if later attempts would have the same goal configurations.
 
 `Turn.rows` yields a row, :func:`walk` makes the attempt and hands its outcome to `Turn.take`, and only then does `rows`
 resume: the state of the turn decides the next row.

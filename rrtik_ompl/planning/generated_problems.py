@@ -68,16 +68,19 @@ def generated_problem(robot: Robot, family: str, seed: int, *, motion_resolution
         raise UnknownNameError("family of generated problems", str(family), FAMILIES)
     whole_number(seed, "seed")
 
+    # The random stream depends on family and seed alone.
     rng = np.random.default_rng([list(FAMILIES).index(family), int(seed)])
     empty_world = World(robot)
     reach = _reach(robot)
     goals = _goals(empty_world, reach, rng)
 
     for number in range(DRAWS):
+        # Draw a goal posture and a scene around it; each further scene has a little more room.
         goal, place = next(goals)
         scene = Scene(obstacles(family, rng, place, reach, 1.0 + SPACE_PER_DRAW * number))
         world = World(robot, scene, motion_resolution=motion_resolution)
 
+        # Keep the first start for which the problem is solvable but not trivial.
         for start in _starts(world, goal, reach, rng):
             problem = Problem(world, start, goal, name=f"{robot.name}/{family}/{seed}")
             if _solvable(problem):
@@ -119,6 +122,7 @@ def _goals(empty_world: World, reach: float, rng: np.random.Generator) -> Iterat
         rows = _postures(robot, POSTURES, rng)
         rows = rows[empty_world.valid_batch(rows)]
 
+        # The forearm reaches from a joint in the middle of the chain to the tip.
         frames = robot.joint_frames(rows)
         tips = robot.fk_batch(rows)[:, :3, 3]
         elbow = frames[:, (len(robot.chain.parent) + 1) // 2, :3, 3]
@@ -128,6 +132,7 @@ def _goals(empty_world: World, reach: float, rng: np.random.Generator) -> Iterat
             forearm = tip - joint
             distance = float(np.linalg.norm(outward))
             length = np.linalg.norm(forearm)
+            # Keep postures with the tip at a suitable place and the forearm pointing away from the base.
             is_in_range = MIN_DISTANCE * reach < distance < MAX_DISTANCE * reach and outward[2] > MIN_HEIGHT * reach
             if is_in_range and length > 1e-3 * reach and forearm @ outward > OUTWARD * distance * length:
                 yield row, pin.SE3(_axes(forearm, axis), tip)

@@ -318,6 +318,7 @@ def _proofs(world: World, routes: Mapping[int, tuple[Matrix, Clearances | None]]
     proofs: dict[int, Proof] = {}
     clearances_wanted = {clearances.proven_clearance for _, clearances in routes.values() if clearances is not None}
     for clearance in sorted(clearances_wanted):
+        # Prove all motions of the routes with this clearance in one call.
         routes_of_clearance = {
             k: rows
             for k, (rows, clearances) in routes.items()
@@ -329,6 +330,7 @@ def _proofs(world: World, routes: Mapping[int, tuple[Matrix, Clearances | None]]
             clearance=clearance,
         )
 
+        # Split the answers by route.
         ends = np.cumsum([len(rows) - 1 for rows in routes_of_clearance.values()])
         for (k, rows), is_proven in zip(routes_of_clearance.items(), np.split(proven, ends[:-1]), strict=True):
             if is_proven.all():

@@ -244,6 +244,7 @@ def _tell_held_joints(robot: Robot, document: YamlDocument, group: str) -> None:
     frames = robot.model.frames
     above: list[str] = []
     for joint in robot.joint_names:
+        # Go up from the joint to the base or to the next joint of the arm, and collect the held joints on the way.
         number = robot.model.getFrameId(joint)
         below_another = False
         held = []
@@ -373,6 +374,7 @@ def _goal(robot: Robot, request: RequestMessage, states: Mapping[str, float], fr
     if not wanted.joint_constraints or wanted.links:
         return tip_goal(wanted, frames)
 
+    # Collect the joint values; joints outside the arm must already be there.
     values: dict[str, float] = {}
     for each in wanted.joint_constraints:
         name = each.joint_name

@@ -40,6 +40,7 @@ def tip_goal(wanted: Constraints, frames: Frames) -> Goal:
     solid, _ = place.volume()
     ranges, angle = (None, 0.0) if turn is None else _angles(turn)
 
+    # Simple goals need no region.
     if solid.type == "sphere" and not any(place.offset):
         centre = _placed(place, frames).translation
         radius = solid.dimensions[0]
@@ -65,12 +66,14 @@ def held_regions_of(wanted: Constraints, frames: Frames) -> list[TaskRegion]:
             )
 
     regions = []
+    # Positions, with free orientation.
     for place in wanted.position_constraints:
         bounds, tolerance = _sides(place)
         offset = pin.SE3(np.eye(3), -np.array(place.offset))
         region = TaskRegion(_placed(place, frames), _bounds(bounds, None), offset, tolerance, frame=place.link_name)
         regions.append(region)
 
+    # Orientations, with free position.
     for turn in wanted.orientation_constraints:
         ranges, angle = _angles(turn, ranged=True)
         if ranges is None:

@@ -112,6 +112,7 @@ class SceneReader:
         """
         names: dict[str, list[str]] = {}
 
+        # Collect the obstacles and attached objects, and the names of their parts.
         obstacles = []
         for name, item in self._objects.items():
             names[name] = _numbered(name, len(item.shapes))
@@ -131,6 +132,7 @@ class SceneReader:
             scene = Scene(tuple(obstacles), tuple(attached))
 
         with document.at(("allowed_collision_matrix",)):
+            # Add the allowed collisions, and warn of names that nothing has.
             matrix = self._message.allowed_collision_matrix
             allowed = _allowed(matrix, self._robot, names)
 
@@ -157,6 +159,7 @@ class SceneReader:
         item.check()
         known = self._objects.get(item.id)
 
+        # Move an object, append shapes to one, or add a new one.
         if item.operation == "move":
             if known is None:
                 raise UnknownNameError("object to move", item.id, self._objects)
@@ -171,6 +174,7 @@ class SceneReader:
         else:
             self._objects[item.id] = self._built(item)
 
+        # Other messages may refer to the object's frames from now on.
         placed = self._objects[item.id]
         self._frames.add(item.id, _frame_of(item, placed), placed.parts)
 
@@ -201,6 +205,7 @@ class SceneReader:
         if not self._robot.model.existFrame(item.link_name) or item.link_name not in self._robot.link_names:
             raise UnknownNameError(f"link of robot '{self._robot.name}'", item.link_name, self._robot.link_names)
 
+        # The shapes come with the message, or from an object of the world with this name.
         name = item.object.id
         if item.object.primitives:
             taken = self._built(item.object)
@@ -209,10 +214,12 @@ class SceneReader:
         else:
             raise InputError(f"'{name}' has no primitives, and the world has no object of that name")
 
+        # The object leaves the world.
         self._objects.pop(name, None)
         self._frames.forget(name)
         T_link_object = self._frames.pose(item.link_name).actInv(taken.pose)
 
+        # It takes over the padding and scale of the link.
         allow = tuple(link for link in item.touch_links if link in self._robot.link_names and link != item.link_name)
         thick = self._robot.padding.get(item.link_name, 0.0)
         factor = self._factors.get(item.link_name, 1.0)

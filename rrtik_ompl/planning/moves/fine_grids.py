@@ -84,9 +84,11 @@ class FineGrids:
             for nodes, near_best in GRIDS:
                 grids_without_gain += 1
                 for start, goal in pairs[:MOST_PAIRS]:
+                    # Stop at the lower bound, or if several grids have gained nothing.
                     if len(best_known) - 1 <= lower_bound or grids_without_gain > MOST_IDLE:
                         return best
 
+                    # Choose the values of the grid and the ends of its route.
                     if near_best:
                         values = self._grid_values_near(best_known, nodes, rng)
                         first = best_known[0]
@@ -96,6 +98,7 @@ class FineGrids:
                         first = start
                         last = goal
 
+                    # A route has to save at least one move.
                     found = self._clearest_route(values, first, last, max_moves=len(best_known) - 2)
                     if found is not None:
                         best = found

@@ -224,6 +224,7 @@ def _free_orders(pieces: list[_Piece], world: World) -> list[list[Order]]:
         for order in (joints_of_piece[::-1], joints_of_piece)
     ]
 
+    # Check the moves of all trials in one call, and split the answers by trial.
     stairs = [_staircase(*trial) for trial in trials]
     free = world.checks.motions_free(
         np.vstack([corners[:-1] for corners in stairs]), np.vstack([corners[1:] for corners in stairs])
@@ -232,6 +233,7 @@ def _free_orders(pieces: list[_Piece], world: World) -> list[list[Order]]:
     ends = np.cumsum([len(corners) - 1 for corners in stairs])[:-1]
     passed = [bool(is_free.all()) for is_free in np.split(free, ends)]
 
+    # Fall back on the search among all orders for a piece for which neither order is free.
     found = []
     for k, piece in enumerate(pieces):
         both = zip(trials[2 * k : 2 * k + 2], passed[2 * k : 2 * k + 2], strict=True)

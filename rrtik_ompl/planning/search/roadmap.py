@@ -308,6 +308,7 @@ def load_roadmap(path: str | os.PathLike[str], world: World, *, moved: bool = Fa
     except InputError as error:
         raise InputError(f"{path}: is no roadmap of robot '{world.robot.name}': {error}") from error
 
+    # The states of the edges only hold in the same world with the same checks; otherwise they are checked again.
     known = edges.astype(np.int32), states.astype(np.int32)
     found = world_digest(world.robot, world.bodies, world.pairs)
     if digest == found and same_checks:

@@ -151,6 +151,7 @@ class PythonGraph:
             if vertex in edge_into or (edge != ROOT and self._is_blocked(edge)):
                 continue
 
+            # The first time that a vertex is taken from the queue, it is reached by its shortest path.
             edge_into[vertex] = edge
             if vertex >= self.size - len(goals):
                 return self._path_to(vertex, edge_into)

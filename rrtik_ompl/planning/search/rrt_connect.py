@@ -84,6 +84,7 @@ class RrtConnect:
             self._last_side = side
             growing = self.trees[side]
             other = self.trees[1 - side]
+            # Extend one tree towards a random sample, then connect the other tree to the new vertex.
             vertex = extend(growing, lower + extent * self._rng.random(len(lower)), rules, motion_free)
             if vertex is None:
                 continue

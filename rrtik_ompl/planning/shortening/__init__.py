@@ -248,16 +248,19 @@ def _shorten_in_forms(
     )
 
     for form in acceptance.forms():
+        # The result must have the same ends and keep the rules.
         task, found = _run(chosen, form, head, replace(wishes, budget=wishes.budget.part(form.share)), single)
         rows = np.vstack([found, tail])
         ends_stay = (rows[[0, -1]] == path.waypoints[[0, -1]]).all()
         if not ends_stay or (rules is not None and not rules.kept_by(rows)):
             continue
 
+        # It has to pass the second check.
         shorter = acceptance.accepted(path_through(path, rows))
         if shorter is None:
             continue
 
+        # It must be no longer than the input; methods that keep moves guarantee no more moves instead.
         joint_weights = 1.0 if single else weights_of(problem.robot)
         if chosen.keeps_moves:
             return shorter

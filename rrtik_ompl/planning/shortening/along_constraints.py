@@ -43,6 +43,7 @@ def along_constraints(route: Matrix, task: Task, problem: Problem) -> Matrix:
         if failures >= PATIENCE or len(route) < 3 or task.expired():
             break
 
+        # Walk from one waypoint towards the other, and keep the walk if it is shorter.
         i, j = pair
         walk = search.connect(route[i], route[j], ask=ask) if j > i + 1 else None
         task.asked += int(search.statistics()["motions"])
@@ -52,6 +53,7 @@ def along_constraints(route: Matrix, task: Task, problem: Problem) -> Matrix:
             failures = 0
             task.report(route)
 
+        # Draw the next pair of waypoints.
         first, second = rng.integers(len(route), size=2)
         pair = int(min(first, second)), int(max(first, second))
     return route

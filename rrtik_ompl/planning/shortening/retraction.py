@@ -43,11 +43,13 @@ def retract(route: Matrix, task: Task, *, step: float | None = None, fineness: f
     ahead = route[1:]
     done = [route[:1]]
     while len(ahead) > 0 and not task.expired():
+        # Phase 1: the last visible waypoint.
         seen = _last_visible(len(ahead), _seen_from(pivot, ahead, task))
         if seen == len(ahead) - 1:
             done.append(task.moves(pivot, ahead[-1]))
             ahead = ahead[:0]
         else:
+            # Phases 2 and 3. If the new motions are not free, the waypoint itself becomes the bend.
             bend, rest = _one_bend(pivot, ahead[seen:], coarse, coarse / fineness, task)
             if not task.confirmed(_joined([pivot[None], bend], rest, task), route):
                 bend = task.moves(pivot, ahead[seen])

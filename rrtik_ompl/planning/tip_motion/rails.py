@@ -118,10 +118,12 @@ def arc_rail(T_begin: pin.SE3, T_end: pin.SE3, through: ArrayLike) -> Rail:
             "arc: the tip, the point that it shall pass and its goal lie on a line; take another point, or straight()"
         )
 
+    # The centre of the circle through the three points.
     across = float(normal @ normal)
     to_centre = np.cross(np.dot(first, first) * second - np.dot(second, second) * first, normal) / (2.0 * across)
     centre = a + to_centre
     unit = normal / np.sqrt(across)
+    # The angle from begin to end, in the direction that passes the middle point.
     begin = a - centre
     end = c - centre
     angle = np.arctan2(unit @ np.cross(begin, end), begin @ end) % TAU
