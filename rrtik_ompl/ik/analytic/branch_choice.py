@@ -1,4 +1,4 @@
-"""Which branch of a closed form to take: the one nearest to a posture, or one after another along a trajectory."""
+"""Choice of a branch of a closed form: the one nearest to a configuration, or one for each point of a trajectory."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from rrtik_ompl.ik.analytic.closed_form import SWEEP, ClosedForm, form_of, solut
 from rrtik_ompl.model.goal import joint_difference
 from rrtik_ompl.model.robot import Robot, inside_limits
 
-JUMP = 0.2  # [rad] or [m] of any joint between two points of a trajectory: more is another branch, not motion
-JUMP_COST = 1e3  # more than any motion can cost
-TIE = 1e-9  # distances this near count as equal
-MAX_CANDIDATES = 32  # candidates kept of a singular point
-MOST_TURNED = 1024  # candidates of a point in all turns; two points have the square of that to compare
-REFINEMENTS = 6  # sweeps along the curve of a singular pose, each 18 times finer than the one before
+JUMP = 0.2  # [rad] or [m]: a larger change of a joint between two points means another branch, not motion
+JUMP_COST = 1e3  # cost of a jump, more than any motion can cost
+TIE = 1e-9  # Distances that differ by less count as equal.
+MAX_CANDIDATES = 32  # number of candidates that are kept for a singular point
+MOST_TURNED = 1024  # number of candidates of a point in all turns; for two points, all pairs of them are compared
+REFINEMENTS = 6  # number of sweeps along the curve of a singular pose, each 18 times finer than the one before
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -27,11 +27,11 @@ class Track:
     """Configurations along a trajectory.
 
     Attributes:
-        q: Shape (k, dof); NaN where no branch reaches the target inside the limits.
+        q: Configurations, shape (k, dof); NaN where no branch reaches the target inside the limits.
         branch: Label of the branch of each point, "" where there is none.
-        jumps: Points at which a joint moves by more than the allowed jump, or that follow a gap.
-        changes: Points at which the label changes. Past a singularity that is no jump.
-        gaps: Points without a configuration.
+        jumps: Indices of points at which a joint moves by more than the allowed jump, or that follow a gap.
+        changes: Indices of points at which the label changes; at a singularity that need not be a jump.
+        gaps: Indices of points without a configuration.
     """
 
     q: Matrix
@@ -44,15 +44,16 @@ class Track:
 def nearest(
     robot: Robot, targets: ArrayLike, near: ArrayLike, *, weights: ArrayLike | None = None
 ) -> tuple[Matrix, Mask]:
-    """For each target the solution inside the limits that is nearest to a posture; of equals, the farthest from limits.
+    """Find for each target the solution inside the limits that is nearest to a configuration.
 
-    Of a singular target the whole curve of solutions is considered, not only its representatives.
+    Of equally near solutions the one farthest from the limits is taken. For a singular target the whole curve of
+    solutions is considered, not only its representatives.
 
     Args:
         robot: An arm with a closed form.
         targets: T_world_tip, shape (m, 4, 4), or points, shape (m, 3).
-        near: Posture, shape (dof,), or one per target, shape (m, dof).
-        weights: Of the joints in the distance, shape (dof,); ones if None.
+        near: Configuration, shape (dof,), or one for each target, shape (m, dof).
+        weights: Weights of the joints in the distance, shape (dof,); ones if None.
 
     Returns:
         Configurations, shape (m, dof), NaN where there is none, and whether there is one, shape (m,).
@@ -69,7 +70,7 @@ def nearest(
 
     q = found.branches[np.arange(len(goals)), best].copy()
     reached = np.isfinite(least_distance)
-    for k in np.flatnonzero(found.singular):  # few: singular poses are rare, and each has a curve to search
+    for k in np.flatnonzero(found.singular):  # A loop is fast enough, since singular poses are rare.
         member, distance = _nearest_member(robot, goals[k], hints[k], scale)
         if distance < least_distance[k]:
             q[k] = member
@@ -80,15 +81,24 @@ def nearest(
 
 
 def _distance(robot: Robot, q: NDArray[np.float64], near: NDArray[np.float64], scale: Vector) -> NDArray[np.float64]:
-    """Weighted joint distance of configurations from postures, shapes (..., dof); shape (...)."""
+    """Return the weighted joint distance between configurations, shapes (..., dof); shape (...)."""
     distance: NDArray[np.float64] = np.linalg.norm(joint_difference(robot, q, near) * scale, axis=-1)
     return distance
 
 
 def _nearest_member(robot: Robot, goal: Matrix, near: Vector, scale: Vector) -> tuple[Vector, float]:
-    """Of a singular target's curve the member inside the limits nearest to a posture, and its distance (inf: none).
+    """Find the member of a singular target's curve, inside the limits, that is nearest to a configuration.
 
-    A sweep over the whole curve, then ever finer sweeps around the best value of the free angle.
+    The whole curve is sampled first, then ever smaller intervals around the best value of the free angle.
+
+    Args:
+        robot: The arm.
+        goal: T_world_tip, shape (4, 4), or a point, shape (3,).
+        near: The configuration, shape (dof,).
+        scale: Weights of the joints, shape (dof,).
+
+    Returns:
+        The member, shape (dof,), and its distance; inf if there is none inside the limits.
     """
     free = list(form_of(robot).free)
     member = near
@@ -121,17 +131,18 @@ def follow(
     jump: float = JUMP,
     accept: Callable[[Matrix], Mask] | None = None,
 ) -> Track:
-    """One solution per point of a trajectory, such that the joints jump as seldom and move as little as they can.
+    """Choose one solution for each point of a trajectory, with the fewest jumps and then the least motion.
 
-    The shortest way through the layers of branches (dynamic programming), so that a branch that would run into a limit
-    later is not taken in the first place. Singular points are answered near each solution of the point before.
+    Dynamic programming finds the shortest path through the layers of branches, so a branch that would run into a limit
+    later is not taken in the first place. Singular points are solved near each solution of the point before.
 
     Args:
         robot: An arm with a closed form.
         targets: T_world_tip, shape (k, 4, 4), or points, shape (k, 3).
-        near: Posture before the first point; any if None.
-        jump: Motion of one joint between two points [rad or m] from which on it counts as a jump.
-        accept: Which of some solutions, shape (k, dof), will do; all inside the limits if None.
+        near: Configuration before the first point, shape (dof,); any if None.
+        jump: Motion of one joint between two points [rad or m] above which it counts as a jump.
+        accept: Checks which solutions, shape (k, dof), are acceptable and returns shape (k,); all inside the limits if
+            None.
 
     Raises:
         InputError: If the robot has no closed form, or a target is no pose.
@@ -154,7 +165,7 @@ def follow(
 
         parent = np.zeros(len(q), dtype=np.int64)
         if len(q):
-            # the first point costs nothing, unless there is a posture before it
+            # Motion to the first point costs nothing, unless a configuration before it is given.
             price = _price(robot, q, before, jump) if near is not None or any(len(each.q) for each in layers) else 0.0
             total = price + np.broadcast_to(cost, (len(q), len(before)))
             parent = np.argmin(total, axis=1)
@@ -167,7 +178,13 @@ def follow(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Layer:
-    """The candidates of one point: configurations, branch numbers, and the best candidate before each (past gaps)."""
+    """The candidates of one point.
+
+    Attributes:
+        q: Configurations, shape (c, dof); none for a gap.
+        tags: Number of the branch of each, shape (c,).
+        parent: Index of the best predecessor of each in the last layer that has candidates, shape (c,).
+    """
 
     q: Matrix
     tags: NDArray[np.int64]
@@ -175,7 +192,10 @@ class _Layer:
 
 
 def _price(robot: Robot, q: Matrix, before: Matrix, jump: float) -> Matrix:
-    """Cost of the motion from each of the rows ``before`` to each of the rows q; a jump costs more than any motion."""
+    """Return the cost of the motion from each row of ``before``, shape (b, dof), to each row of q, shape (c, dof).
+
+    A jump costs more than any motion. Shape (c, b).
+    """
     step = np.abs(joint_difference(robot, q[:, None], before[None]))
     price: Matrix = np.linalg.norm(step, axis=2) + JUMP_COST * (step.max(axis=2) > jump)
     return price
@@ -184,7 +204,18 @@ def _price(robot: Robot, q: Matrix, before: Matrix, jump: float) -> Matrix:
 def _candidates(
     robot: Robot, goal: Matrix, found: ClosedForm, k: int, before: Matrix
 ) -> tuple[Matrix, NDArray[np.int64]]:
-    """Solutions of point k inside the limits, in every full turn; of a singular point, those near ``before``."""
+    """Return the candidates of a point: solutions inside the limits, in all full turns, and their branches.
+
+    Args:
+        robot: The arm.
+        goal: Target of the point.
+        found: Branches of all points.
+        k: Index of the point.
+        before: Candidates of the point before, shape (b, dof); a singular point is solved near each of them.
+
+    Returns:
+        Configurations, shape (c, dof), and numbers of their branches, shape (c,).
+    """
     if not found.singular[k]:
         tags = np.flatnonzero(found.valid[k])
         return _in_every_turn(robot, found.branches[k, tags], tags)
@@ -197,9 +228,14 @@ def _candidates(
 
 
 def _in_every_turn(robot: Robot, q: Matrix, tags: NDArray[np.int64]) -> tuple[Matrix, NDArray[np.int64]]:
-    """The same postures also with joints full turns further, where the limits have room for that.
+    """Return configurations together with those in which joints are moved by full turns within their limits.
 
-    Where many joints have room for many turns, the last of these joints stay in the turn that they are in.
+    If there would be more than `MOST_TURNED` rows, further joints are not moved.
+
+    Args:
+        robot: The arm.
+        q: Configurations, shape (c, dof).
+        tags: A number for each, which its copies take over, shape (c,).
     """
     span = robot.upper - robot.lower
     for joint in np.flatnonzero(~robot.prismatic & ~robot.continuous & (span >= TAU)):
@@ -221,7 +257,15 @@ def _in_every_turn(robot: Robot, q: Matrix, tags: NDArray[np.int64]) -> tuple[Ma
 
 
 def _track(robot: Robot, layers: list[_Layer], last: int, near: Vector | None, jump: float) -> Track:
-    """Read the way backwards from its last candidate, then say where it jumps, changes the branch or has a gap."""
+    """Trace the best path back from its last candidate and find its jumps, changes of branch and gaps.
+
+    Args:
+        robot: The arm.
+        layers: Candidates of all points.
+        last: Index of the best candidate in the last layer that has any.
+        near: Configuration before the first point, shape (dof,), or None.
+        jump: Largest motion of a joint that is no jump [rad or m].
+    """
     labels = form_of(robot).branches
     q = np.full((len(layers), robot.dof), np.nan)
     branch = [""] * len(layers)

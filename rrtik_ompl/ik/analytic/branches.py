@@ -1,6 +1,6 @@
-"""The branches of a closed form placed in the world, held to the joint limits and checked: by its kernel, or in numpy.
+"""The branches of a closed form, placed in the world, turned into joint limits and checked: by a kernel or in numpy.
 
-Both give the same answers, the kernel many times faster; where there is none, and of singular poses, numpy answers.
+Both give the same answers, the kernel many times faster. Numpy is used without a kernel, and for singular poses.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ from rrtik_ompl.kernels.simd.processor import WIDTH
 from rrtik_ompl.kernels.tables.memory import PlannedTable, TablePlan, packed, sizes_of
 from rrtik_ompl.model.robot import FEW, LIMIT_TOLERANCE, Robot, poses
 
-UNBOUNDED_ANGLE = 1e300  # limits of continuous joints: kernels know no infinity
-AT_A_TIME = 2048  # targets at a time: their arrays stay in the cache
+UNBOUNDED_ANGLE = 1e300  # limits of continuous joints, since kernels know no infinity
+AT_A_TIME = 2048  # number of targets whose arrays fit into the cache
 
 
 def kernel_branches(
     robot: Robot, form: AnalyticSolver, poses: NDArray[np.float64], hints: Matrix | None, slack: float, check: bool
 ) -> list[NDArray[Any]] | None:
-    """As `reference_branches`, which answers the poses that are singular; None if there is no kernel for the arm."""
+    """Return the same as `reference_branches`, by a kernel where poses are not singular; None if there is no kernel."""
     kernels = library(branch_layout.KERNELS) if form.kernel else None
     arm = None if kernels is None else _arm_of(robot, form)
     if kernels is None or arm is None:
@@ -41,6 +41,7 @@ def kernel_branches(
     getattr(kernels, form.kernel)(arm.table.address, call.address)
     answers = call.answers()
 
+    # The kernel leaves singular poses out; they are solved in numpy and filled in.
     (odd,) = call.odd.nonzero()
     if len(odd):
         rest = _singular_branches(robot, form, poses[odd], None if hints is None else hints[odd], slack, check)
@@ -52,7 +53,7 @@ def kernel_branches(
 def _singular_branches(
     robot: Robot, form: AnalyticSolver, poses: NDArray[np.float64], hints: Matrix | None, slack: float, check: bool
 ) -> list[NDArray[Any]]:
-    """As `reference_branches`; of few poses remembered, for every plan to one of them asks again."""
+    """Return the same as `reference_branches`; results for a few poses are kept, since every plan to one repeats it."""
     if len(poses) > FEW:
         return reference_branches(robot, form, poses, hints, slack, check)
     return _remembered(robot, form, poses.tobytes(), None if hints is None else hints.tobytes(), slack, check)
@@ -62,25 +63,32 @@ def _singular_branches(
 def _remembered(
     robot: Robot, form: AnalyticSolver, poses: bytes, hints: bytes | None, slack: float, check: bool
 ) -> list[NDArray[Any]]:
-    """The same, of the bytes of poses and hints."""
+    """Return the same for poses, shape (m, 4, 4), and hints, shape (m, dof), given as bytes, which can be hashed."""
     near = None if hints is None else np.frombuffer(hints).reshape(-1, robot.dof)
     return reference_branches(robot, form, np.frombuffer(poses).reshape(-1, 4, 4), near, slack, check)
 
 
 def valid_branches(robot: Robot, form: AnalyticSolver, pose: Matrix, hint: Vector) -> Matrix | None:
-    """The branches of one pose, shape (4, 4), inside the joint limits, shape (k, dof), in their order.
+    """Return the branches of one pose inside the joint limits, by the kernel.
 
-    The call of the kernel is kept from one use to the next: to make it takes longer than it runs.
+    The kernel's call is kept between uses, since making one takes longer than running it.
+
+    Args:
+        robot: The arm.
+        form: Its closed form.
+        pose: T_world_tip, shape (4, 4).
+        hint: Configuration near which full turns are chosen, shape (dof,).
 
     Returns:
-        None if the pose is singular, or there is no kernel for the arm.
+        Configurations in the order of branches, shape (k, dof); None if the pose is singular or there is no kernel for
+        the arm.
     """
     kernels = library(branch_layout.KERNELS) if form.kernel else None
     arm = None if kernels is None else _arm_of(robot, form)
     if kernels is None or arm is None:
         return None
 
-    try:  # taken out while it is used, so that threads do not meet
+    try:  # The call is taken out of the list while it is used, so that two threads never share it.
         call = arm.spare.pop()
     except IndexError:
         call = _Call(pose[None], hint[None], 0.0, False)
@@ -95,7 +103,7 @@ def valid_branches(robot: Robot, form: AnalyticSolver, pose: Matrix, hint: Vecto
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Arm:
-    """Its table, and calls for one pose with a hint that nobody uses now."""
+    """The table of an arm, and calls for one pose with a hint that are not in use."""
 
     table: ArmTable
     spare: list[_Call] = field(default_factory=list)
@@ -103,7 +111,7 @@ class _Arm:
 
 @lru_cache(maxsize=64)
 def _arm_of(robot: Robot, form: AnalyticSolver) -> _Arm | None:
-    """None if forward kinematics in kernels does not know such a limb."""
+    """Return the table of an arm, or None if the kernel cannot compute its forward kinematics."""
     limb = limb_of(robot)
     if limb is None or limb.joints != DOF or limb.sliding.any():
         return None
@@ -125,7 +133,7 @@ def _arm_of(robot: Robot, form: AnalyticSolver) -> _Arm | None:
 
 
 class _Call:
-    """One call of a kernel. Answers are filled up to whole blocks."""
+    """Arguments and results of one call of a kernel; arrays of results are padded to whole blocks of ``WIDTH``."""
 
     def __init__(self, poses: NDArray[np.float64], hints: Matrix | None, slack: float, check: bool) -> None:
         self._count = len(poses)
@@ -140,12 +148,12 @@ class _Call:
             table.near.reshape(hints.shape)[:] = hints
 
     def begin(self, pose: Matrix, hint: Vector) -> None:
-        """Put another pose and hint in place of the only ones."""
+        """Prepare a call for one pose to run again with another pose, shape (4, 4), and hint, shape (dof,)."""
         self._table.poses.reshape(pose.shape)[:] = pose
         self._table.near[:] = hint
 
     def valid_rows(self) -> Matrix | None:
-        """Of the only pose the branches inside the limits, shape (k, dof); None if it is to be answered otherwise."""
+        """Return the branches of the only pose inside the limits, shape (k, dof); None if the pose is singular."""
         if self.odd[0]:
             return None
 
@@ -156,16 +164,16 @@ class _Call:
         return rows
 
     def intact(self) -> bool:
-        """Whether no kernel has written beyond an array."""
+        """Check that no kernel has written beyond an array."""
         return self._table.intact()
 
     @property
     def odd(self) -> NDArray[np.bool_]:
-        """Which targets are to be answered otherwise, shape (m,)."""
+        """Whether each target is left to numpy, as singular ones are, shape (m,)."""
         return self._table.odd.view(np.bool_)[: self._count]
 
     def answers(self) -> list[NDArray[Any]]:
-        """As `reference_branches` gives them; those of the odd targets are to be filled in."""
+        """Return the arrays of `reference_branches`, where those of odd targets are still to be filled in."""
         table = self._table
         asked = slice(self._count)
         q = table.q.reshape(DOF, *self._shape)[:, :, asked]
@@ -194,13 +202,13 @@ def _plan_of(count: int, hinted: bool, check: bool) -> TablePlan:
 
 
 def _blocks(count: int) -> int:
-    """Of ``WIDTH`` targets, the last one filled up."""
+    """Return the number of blocks of ``WIDTH`` targets, the last one padded."""
     return -(-count // WIDTH)
 
 
 @lru_cache(maxsize=64)
 def tip_fault(robot: Robot, form: AnalyticSolver) -> str:
-    """A line if the robot's tip is carried by another joint than the frame that the form places; else ""."""
+    """Return why the form does not fit the tip, which another joint carries than the form's frame; "" if it fits."""
     tip, solver_frame = (robot.model.frames[robot.model.getFrameId(name)] for name in (robot.tip, form.frame))
     if tip.parentJoint == solver_frame.parentJoint:
         return ""
@@ -210,7 +218,7 @@ def tip_fault(robot: Robot, form: AnalyticSolver) -> str:
 def reference_branches(
     robot: Robot, form: AnalyticSolver, poses: NDArray[np.float64], hints: Matrix | None, slack: float, check: bool
 ) -> list[NDArray[Any]]:
-    """What `rrtik_ompl.ik.analytic.closed_form.ClosedForm` holds, in its order, the targets in the last axis of each.
+    """Compute the branches of poses in numpy.
 
     Args:
         robot: The arm.
@@ -219,6 +227,10 @@ def reference_branches(
         hints: Configurations that solutions are wanted near to, shape (m, dof), or None.
         slack: See `AnalyticSolver`.
         check: Whether residuals are wanted; their array is empty if not.
+
+    Returns:
+        The arrays of `rrtik_ompl.ik.analytic.closed_form.ClosedForm` in its order, with the targets in the last axis:
+        branches (dof, b, m), real (b, m), valid (b, m), singular (m,) and residuals (2, b, m).
     """
     parts = []
     for begin in range(0, max(len(poses), 1), AT_A_TIME):
@@ -230,7 +242,7 @@ def reference_branches(
 def _block(
     robot: Robot, form: AnalyticSolver, poses: NDArray[np.float64], hints: Matrix | None, slack: float, check: bool
 ) -> list[NDArray[Any]]:
-    """The same for as many targets as the cache has room for."""
+    """Compute the branches as `reference_branches` does, for so few targets that their arrays fit into the cache."""
     found = form(_placed(robot, form, poses), hints, slack, (robot.lower, robot.upper))
     q = np.array(found.q.T, order="C")
     real = np.array(found.real.T)
@@ -240,7 +252,7 @@ def _block(
 
 
 def _placed(robot: Robot, form: AnalyticSolver, poses: NDArray[np.float64]) -> NDArray[np.float64]:
-    """T_base_frame for T_world_tip: the base may be anywhere, and the tip may be another frame of the last link."""
+    """Return T_base_frame for T_world_tip, shape (m, 4, 4), by the placements of base and tip, see `mountings`."""
     T_base_world, T_tip_frame = mountings(robot, form)
     if T_base_world is not None:
         poses = T_base_world @ poses
@@ -249,7 +261,7 @@ def _placed(robot: Robot, form: AnalyticSolver, poses: NDArray[np.float64]) -> N
 
 @lru_cache(maxsize=64)
 def mountings(robot: Robot, form: AnalyticSolver) -> tuple[Matrix | None, Matrix | None]:
-    """T_base_world and T_tip_frame, None where they are the identity."""
+    """Return T_base_world and T_tip_frame, shape (4, 4) each; None in place of an identity."""
     frames = robot.model.frames
     base, tip, solver_frame = (
         frames[robot.model.getFrameId(name)] for name in (robot.link_names[0], robot.tip, form.frame)
@@ -260,12 +272,15 @@ def mountings(robot: Robot, form: AnalyticSolver) -> tuple[Matrix | None, Matrix
 
 
 def _turn_inside(robot: Robot, q: NDArray[np.float64], near: Matrix | None) -> NDArray[np.bool_]:
-    """Turn joints by full turns into their limits, towards ``near`` if there is room; which configurations fit.
+    """Move joints by full turns into their limits, as near to ``near`` as these allow, in place.
 
     Args:
         robot: The arm.
-        q: Shape (dof, b, m), changed in place.
-        near: Shape (m, dof) or None.
+        q: Configurations, shape (dof, b, m), changed in place.
+        near: Configurations to be near to, shape (m, dof), or None for 0.
+
+    Returns:
+        Whether each configuration is inside the limits, shape (b, m).
     """
     fits = np.ones(q.shape[1:], dtype=bool)
     for joint in np.flatnonzero(~robot.prismatic):
@@ -282,7 +297,7 @@ def _turn_inside(robot: Robot, q: NDArray[np.float64], near: Matrix | None) -> N
 def _full_turns(
     values: NDArray[np.float64], low: float, high: float, near: NDArray[np.float64] | float
 ) -> NDArray[np.float64]:
-    """Equal angles: the one nearest to ``near``, or else the nearest to that inside low .. high if there is one."""
+    """Return angles moved by full turns to lie as near to ``near`` as possible, inside low .. high where possible."""
     nearest = near + wrapped(values - near)
     nearest = nearest - TAU * np.ceil(np.maximum(nearest - high, 0.0) / TAU)
     turned: NDArray[np.float64] = nearest + TAU * np.ceil(np.maximum(low - nearest, 0.0) / TAU)
@@ -292,7 +307,7 @@ def _full_turns(
 def tip_residuals(
     robot: Robot, q: NDArray[np.float64], poses: NDArray[np.float64], oriented: bool = True
 ) -> NDArray[np.float64]:
-    """By forward kinematics how far configurations are from poses.
+    """Return how far configurations are from poses, by forward kinematics.
 
     Args:
         robot: The arm.
@@ -317,7 +332,10 @@ def tip_residuals(
 
 
 def _tips(robot: Robot, q: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Columns x, y, z and position of the tip for q of shape (dof, b, m), shape (4, 3, b, m)."""
+    """Return the columns x, y, z of the rotation and the position of the tip for q, shape (dof, b, m).
+
+    Shape (4, 3, b, m).
+    """
     rows = q.reshape(robot.dof, -1).T
     if len(rows) > FEW:
         return tip_columns(robot).poses(q)

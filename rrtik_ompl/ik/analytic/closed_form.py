@@ -1,4 +1,4 @@
-"""Closed-form inverse kinematics of a robot that brings it: placed in the world, held to the limits, checked."""
+"""Closed-form inverse kinematics: the branches of a robot, placed in the world, turned into the limits and checked."""
 
 from __future__ import annotations
 
@@ -16,23 +16,23 @@ from rrtik_ompl.ik.analytic.branches import kernel_branches, reference_branches,
 from rrtik_ompl.ik.analytic.planar import planar_form
 from rrtik_ompl.model.robot import Robot
 
-SAME_ANGLE = 1e-6  # [rad] or [m]
-SWEEP = 72  # samples of a singular pose's curve of solutions
+SAME_ANGLE = 1e-6  # [rad] or [m]: rows that differ by less count as equal
+SWEEP = 72  # number of samples along a singular pose's curve of solutions
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ClosedForm:
-    """All postures for m targets, b branches each; labels in ``form_of(robot).branches``.
+    """All solutions for m targets, b branches each; ``form_of(robot).branches`` has the labels of the branches.
 
     Attributes:
-        branches: Joint values, shape (m, b, dof), turned into the joint limits where a full turn does that. A branch
-            that is not real holds the posture that comes nearest on it.
-        real: Which branches reach the target, shape (m, b).
-        valid: Which do so inside the joint limits, shape (m, b).
-        singular: Bit k is set where the target belongs to family k of ``form_of(robot).families`` and has a whole
-            curve of solutions, of which ``branches`` holds representatives. Shape (m,).
-        residuals: Distance [m] and angle [rad] of the robot's forward kinematics from the target, shape (m, b, 2);
-            the angle is 0 for a position. None if not asked for.
+        branches: Joint values, shape (m, b, dof), moved by full turns into the joint limits where possible. A branch
+            that is not real holds its configuration that comes nearest to the target.
+        real: Whether each branch reaches the target, shape (m, b).
+        valid: Whether it does so inside the joint limits, shape (m, b).
+        singular: Bit k is set where the target belongs to family k of ``form_of(robot).families`` and so has a whole
+            curve of solutions, of which ``branches`` holds representatives; shape (m,).
+        residuals: Distance [m] and angle [rad] from the target by forward kinematics, shape (m, b, 2); the angle is 0
+            for a position. None if no check was asked for.
     """
 
     branches: NDArray[np.float64]
@@ -43,10 +43,10 @@ class ClosedForm:
 
 
 def form_of(robot: Robot) -> AnalyticSolver:
-    """What the robot brings, or the form of planar arms if it is one.
+    """Return the closed form that the robot brings, or that of planar arms if it is one.
 
     Raises:
-        InputError: If there is none; it names the methods that fit.
+        InputError: If there is none; the message names a method that fits.
     """
     if isinstance(robot.closed_form, AnalyticSolver):
         return robot.closed_form
@@ -60,26 +60,26 @@ def form_of(robot: Robot) -> AnalyticSolver:
 
 
 def has_closed_form(robot: Robot) -> bool:
-    """Whether `form_of` finds a closed form."""
+    """Check whether `form_of` finds a closed form."""
     return isinstance(robot.closed_form, AnalyticSolver) or planar_form(robot) is not None
 
 
 def solutions(
     robot: Robot, targets: ArrayLike, *, near: ArrayLike | None = None, slack: float = 0.0, check: bool = True
 ) -> ClosedForm:
-    """All branches for many targets.
+    """Return all branches for many targets.
 
     Args:
         robot: An arm with a closed form.
-        targets: T_world_tip, shape (m, 4, 4); or points [m], shape (m, 3), if the robot's form is one of positions.
-        near: Configuration or configurations, shape (dof,) or (m, dof): singular targets are answered by the members
+        targets: T_world_tip, shape (m, 4, 4); or points [m], shape (m, 3), if the robot's form is one for positions.
+        near: One configuration, shape (dof,), or one for each target, shape (m, dof): singular targets get the members
             of their curve nearest to it, and full turns are chosen to lie near it. Zeros if None.
-        slack: A target that is this near to a singular one [m, sine of an angle] is answered as if it were singular,
-            with residuals up to about that; for targets that are only known so well.
-        check: Whether forward kinematics checks every solution (``residuals``); that takes most of the time.
+        slack: A target that is this near to a singular one [m, sine of an angle] is solved as if it were singular, with
+            residuals up to about that; for targets that are not known more accurately.
+        check: Whether forward kinematics checks every solution (``residuals``), which takes most of the time.
 
     Raises:
-        InputError: If the robot has no closed form, or a target is no pose or lies beyond numbers.
+        InputError: If the robot has no closed form, or a target is no pose or not finite.
     """
     poses = _poses(robot, form_of(robot), targets)
     return branches_of(robot, poses, None if near is None else _hints(robot, near, len(poses)), slack, check)
@@ -88,7 +88,15 @@ def solutions(
 def branches_of(
     robot: Robot, poses: NDArray[np.float64], hints: Matrix | None = None, slack: float = 0.0, check: bool = True
 ) -> ClosedForm:
-    """As `solutions`, for poses and configurations near them, one for each, that need no check any more."""
+    """Return all branches as `solutions` does, for arguments that have been checked.
+
+    Args:
+        robot: An arm with a closed form.
+        poses: T_world_tip, shape (m, 4, 4).
+        hints: For each pose the configuration to be near to, shape (m, dof), or None.
+        slack: See `solutions`.
+        check: See `solutions`.
+    """
     form = form_of(robot)
     fault = tip_fault(robot, form)
     if fault:
@@ -105,12 +113,12 @@ def branches_of(
 
 
 def family(robot: Robot, target: ArrayLike, *, samples: int = SWEEP, slack: float = 0.0) -> Matrix:
-    """The solutions inside the joint limits of one target, singular or not: of a curve, samples along it.
+    """Return the solutions of one target inside the joint limits; for a singular target samples of its curve.
 
     Args:
         robot: An arm with a closed form.
         target: T_world_tip, shape (4, 4), or a point, shape (3,).
-        samples: Values of the free angle over a full turn.
+        samples: Number of values of the free angle over a full turn.
         slack: See `solutions`.
 
     Returns:
@@ -147,13 +155,18 @@ def _poses(robot: Robot, form: AnalyticSolver, targets: ArrayLike) -> NDArray[np
 def check_poses(poses: NDArray[np.float64], what: str) -> None:
     """Refuse matrices, shape (m, 4, 4), that are no poses.
 
+    Args:
+        poses: The matrices.
+        what: Name of the argument, which begins the message.
+
     Raises:
-        InputError: It says which one and how far it is from orthonormal.
+        InputError: If one is no pose; the message says which one, and how far it is from orthonormal.
     """
     if len(poses) == 0:
         return
 
-    columns = np.ascontiguousarray(poses[:, :3, :3].transpose(2, 1, 0))  # products of these beat small matrices
+    # Products of whole columns are faster than products of many small matrices.
+    columns = np.ascontiguousarray(poses[:, :3, :3].transpose(2, 1, 0))
     errors = np.zeros(len(poses))
     with np.errstate(over="ignore", invalid="ignore"):
         for j, k in combinations_with_replacement(range(3), 2):
@@ -176,7 +189,7 @@ def check_poses(poses: NDArray[np.float64], what: str) -> None:
 
 
 def _hints(robot: Robot, near: ArrayLike, count: int) -> Matrix:
-    """One configuration for every target, shape (count, dof)."""
+    """Return one configuration for every target, shape (count, dof)."""
     if np.ndim(near) < 2:
         return np.broadcast_to(robot.configuration(near, "near"), (count, robot.dof))
     return finite_array(near, (count, robot.dof), "near")

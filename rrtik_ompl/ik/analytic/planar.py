@@ -1,4 +1,4 @@
-"""Closed form of planar arms, which belongs to no robot: two links reach a point, three links a pose, in two ways."""
+"""Closed form for any planar arm of two links, which reach a point, or three links, which reach a pose, in two ways."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ class PlanarArm:
     """Two or three links in a plane.
 
     Attributes:
-        to_plane: T_plane_base; the plane's origin is the first joint, its z axis the axis of all joints.
-        links: From joint to joint and to the tip, in the plane, with all joints at zero [m], shape (dof, 2).
+        to_plane: T_plane_base, shape (4, 4); the plane's origin is the first joint, its z axis the axis of all joints.
+        links: Vectors from joint to joint and to the tip, in the plane, with all joints at zero [m], shape (dof, 2).
         tip: T_plane_tip with all joints at zero.
     """
 
@@ -31,7 +31,10 @@ class PlanarArm:
     tip: NDArray[np.float64]
 
     def solve(self, poses: NDArray[np.float64], *_: object) -> Branches:
-        """Both branches for T_base_tip, shape (m, 4, 4); nothing else is used, for no pose is singular."""
+        """Return both branches for T_base_tip, shape (m, 4, 4).
+
+        Other arguments of :attr:`AnalyticSolver.solve` have no effect, since no pose is treated as singular.
+        """
         targets = self.to_plane @ poses
         point = targets[:, :2, 3]
         real = np.abs(targets[:, 2, 3] - self.tip[2, 3]) <= IN_PLANE
@@ -54,14 +57,14 @@ class PlanarArm:
         return Branches(q, np.repeat((real & reached)[:, None], 2, axis=1), np.zeros(len(poses), dtype=np.uint8))
 
     def nearness(self, Q: Matrix) -> dict[str, Vector]:
-        """``elbow``: sine of the angle between the first two links, for Q of shape (m, dof)."""
+        """Return ``elbow``, the sine of the angle between the first two links, for Q, shape (m, dof); shape (m,)."""
         angles = np.arctan2(self.links[:, 1], self.links[:, 0])
         return {"elbow": np.abs(np.sin(Q[:, 1] + angles[1] - angles[0]))}
 
 
 @lru_cache(maxsize=64)
 def planar_form(robot: Robot) -> AnalyticSolver | None:
-    """The closed form of a robot whose two or three joints turn about parallel axes, one after another; else None."""
+    """Return the closed form of a robot that is a chain of two or three joints with parallel axes; else None."""
     chain = robot.chain
     plain = np.array_equal(chain.gain, np.eye(robot.dof)) and not chain.offset.any() and not robot.prismatic.any()
     if robot.dof not in (2, 3) or not plain or (chain.parent != np.arange(-1, robot.dof - 1)).any():
@@ -86,7 +89,7 @@ def planar_form(robot: Robot) -> AnalyticSolver | None:
 
 
 def _plane(origin: Vector, axis: Vector) -> NDArray[np.float64]:
-    """T_base_plane: at the first joint, z along its axis."""
+    """Return T_base_plane, shape (4, 4), with its origin at the first joint and z along the joint's axis."""
     across = np.cross(np.eye(3)[int(np.argmin(np.abs(axis)))], axis)
     x = across / np.linalg.norm(across)
     plane = np.eye(4)

@@ -1,7 +1,7 @@
-"""How far configurations are from the goal: of the tip in the workspace, or in joint space where the goal is there.
+"""Distance of configurations from the goal: of the tip in the workspace, or in joint space for goal configurations.
 
 Source: [1, ch. 5.1], whose metric of a pose is the root of (mu times the distance)^2 plus the square of the angle
-between the unit quaternions, which is half the rotation angle. Its absolute value is missing in print.
+between the unit quaternions, which is half the rotation angle. (The absolute value in that angle is missing in print.)
 """
 
 from __future__ import annotations
@@ -17,25 +17,25 @@ from rrtik_ompl.ik.tip_columns import tip_columns
 from rrtik_ompl.model.goal import Target
 from rrtik_ompl.model.robot import Robot, poses
 
-REACH_PER_TURN = 1.0  # a full turn of the tip counts as far as so many times the reach, unless given
-JOINT_RADIUS = 1e-3  # [rad] from a goal configuration, which is then reached exactly
-INSIDE = 0.99  # of the tolerances, or what is just inside in the metric would be outside after rounding
-NEAREST_START = 0.1  # of the reach: mu does not grow further when the tip starts nearer to the goal
+REACH_PER_TURN = 1.0  # default weight of rotation: a full turn of the tip counts as so many times the reach
+JOINT_RADIUS = 1e-3  # [rad]: this near to a goal configuration it can be reached exactly
+INSIDE = 0.99  # Share of the tolerances that is used, so that rounding cannot lead outside them.
+NEAREST_START = 0.1  # share of the reach; mu does not grow further if the tip starts nearer to the goal
 
 
 class Metric(Protocol):
-    """A distance from the goal, and how many configurations it was computed for.
+    """A distance from the goal that counts for how many configurations it was computed.
 
     Attributes:
-        evaluations: Configurations so far.
-        radius: Distance within which the goal counts as reached, whichever way the error lies.
+        evaluations: Number of configurations so far.
+        radius: Distance within which the goal counts as reached, in whichever direction the error lies.
     """
 
     evaluations: int
     radius: float
 
     def distance(self, Q: Matrix) -> Vector:
-        """Of each row of Q, shape (m, n), from the goal; shape (m,)."""
+        """Return the distance of each row of Q, shape (m, n), from the goal; shape (m,)."""
 
 
 class TipMetric:
@@ -43,12 +43,12 @@ class TipMetric:
 
     Attributes:
         robot: The arm.
-        targets: Poses and positions; one of them is enough.
-        metres_per_radian: Weight of the rotation angle; 0 where the targets are positions.
-        unit: What a metre counts; 1 makes it a distance in metres.
-        evaluations: Forward kinematics so far.
-        radius: See :class:`Metric`; from the tolerances of the targets.
-        scale: What a metre and a radian count in the metric, shape (6,).
+        targets: Poses and positions; reaching one of them is enough.
+        metres_per_radian: Weight of the rotation angle [m/rad]; 0 if the targets are positions.
+        unit: Weight of a metre; with 1 the metric is in metres.
+        evaluations: Number of forward kinematics so far.
+        radius: See :class:`Metric`; follows from the tolerances of the targets.
+        scale: Weight of each entry of a twist (linear; angular) in the metric, shape (6,).
     """
 
     def __init__(
@@ -66,9 +66,13 @@ class TipMetric:
 
     @classmethod
     def published(cls, robot: Robot, targets: list[Target], start: Vector, mu: float | None = None) -> TipMetric:
-        """The published metric: metres for positions; for poses the quaternion angle [rad] and ``mu`` [1/m].
+        """Make the published metric: metres for positions; for poses the quaternion angle [rad] and ``mu`` [1/m].
 
-        If ``mu`` is None, the first distance counts as much as the largest angle.
+        Args:
+            robot: The arm.
+            targets: Poses and positions.
+            start: Configuration at the start, shape (n,).
+            mu: Weight of the distance; if None, the distance at the start counts as much as the largest angle.
         """
         if not any(target.oriented for target in targets):
             return cls(robot, targets, metres_per_radian=0.0)
@@ -79,12 +83,12 @@ class TipMetric:
         return cls(robot, targets, metres_per_radian=0.5 / mu, unit=mu)
 
     def distance(self, Q: Matrix) -> Vector:
-        """Of the tip at each row of Q, shape (m, n), from the nearest target; shape (m,)."""
+        """Return the distance of the tip from the nearest target for each row of Q, shape (m, n); shape (m,)."""
         self.evaluations += len(Q)
         return self._each(poses(self.robot, Q)).min(axis=0)  # type: ignore[no-any-return]
 
     def pull(self, tips: NDArray[np.float64]) -> tuple[Matrix, Vector]:
-        """Where tips, shape (m, 4, 4), would have to go, and how far.
+        """Return the twists that lead tips, shape (m, 4, 4), to their nearest targets.
 
         Returns:
             The twist to the nearest target in units of the metric, shape (m, 6), and its length, which is the distance
@@ -96,22 +100,22 @@ class TipMetric:
         return twists[nearest], lengths[nearest]
 
     def errors(self, q: Vector) -> Vector:
-        """Distance [m] and angle [rad] of the tip at q, shape (n,), from the nearest target; shape (2,)."""
+        """Return distance [m] and angle [rad] of the tip at q, shape (n,), from the nearest target; shape (2,)."""
         tip = poses(self.robot, q[None])
         nearest = self.targets[int(self._each(tip)[:, 0].argmin())]
         return np.array(nearest.tip_errors(tip))[:, 0]
 
     def _each(self, tips: NDArray[np.float64]) -> Matrix:
-        """Distance of each tip, shape (m, 4, 4), from each target in units of the metric, shape (targets, m)."""
+        """Return the distance of each tip, shape (m, 4, 4), from each target in the metric; shape (targets, m)."""
         pairs = (target.tip_errors(tips) for target in self.targets)
         return self.unit * np.array([np.hypot(away, self.metres_per_radian * angle) for away, angle in pairs])
 
 
 class ConfigurationMetric:
-    """Euclidean distance in joint space from the nearest of some configurations.
+    """Euclidean distance in joint space from the nearest of several goal configurations.
 
     Args:
-        goals: Shape (k, n).
+        goals: Goal configurations, shape (k, n).
         radius: See :class:`Metric`.
     """
 
@@ -121,18 +125,18 @@ class ConfigurationMetric:
         self.radius = radius
 
     def distance(self, Q: Matrix) -> Vector:
-        """See :class:`Metric`."""
+        """Return the distance of each row of Q, shape (m, n), from the nearest goal; shape (m,)."""
         self.evaluations += len(Q)
         distances: Vector = np.linalg.norm(Q[:, None] - self.goals, axis=2).min(axis=1)
         return distances
 
 
 def reach(robot: Robot) -> float:
-    """Sum of the lengths between the joints that move the tip, and from the last one to it [m]; 1 if there are none."""
+    """Return the sum of the lengths from joint to joint along the chain, up to the tip [m]; 1 if it is 0."""
     return float(np.linalg.norm(tip_columns(robot).fixed[1:, :3, 3], axis=1).sum()) or 1.0
 
 
 def _radius(target: Target, metres_per_radian: float) -> float:
-    """Distance within which a target counts as reached [m]."""
+    """Return the distance within which a target counts as reached [m], for any direction of the error."""
     max_distance, max_angle = target.tolerances
     return min(max_distance, metres_per_radian * max_angle) if target.oriented else max_distance

@@ -15,16 +15,16 @@ from rrtik_ompl.ik.ikurt.tree import IkurtTree
 
 @dataclass(frozen=True, slots=True)
 class Steps:
-    """The numbers of the published algorithm.
+    """The parameters of the published algorithm.
 
     Attributes:
         step: Growth step delta0 [rad].
-        threshold: Distance in the metric at which the step begins to shrink, in proportion.
+        threshold: Distance in the metric below which the step shrinks, in proportion to the distance.
         accuracy: Distance in the metric at which the goal counts as reached, the published min_threshold.
-        beyond: By how much of a joint's range samples may lie beyond its limits, on which steps are then put; 0 as
-            published.
-        misses: Blocked steps in a row that CONNECT lives through; 0 as published.
-        even: Whether CONNECT steps in directions of equal chance instead of towards samples; not as published.
+        beyond: Share of a joint's range by which samples may lie beyond its limits; steps are then clipped to the
+            limits. 0 as published.
+        misses: Number of blocked steps in a row after which CONNECT still goes on; 0 as published.
+        even: Whether CONNECT steps in isotropic random directions instead of towards samples; False as published.
     """
 
     step: float
@@ -41,14 +41,14 @@ class PublishedSearch:
 
     Attributes:
         metric: Distance from the goal.
-        steps: The numbers.
+        steps: The parameters.
         lower, upper: Bounds of the samples, shape (n,).
-        motion_free: Whether a straight motion is free, its end inside the limits.
-        stop: True when the time is up.
-        rng: Random numbers.
-        start: Shape (n,).
-        tree: Grown from there.
-        connects: How often CONNECT was tried.
+        motion_free: Checks whether a straight motion is free and its end inside the limits.
+        stop: Returns True when the time is up.
+        rng: Source of random numbers.
+        start: Start configuration, shape (n,).
+        tree: The tree that grows from the start.
+        connects: Number of times that CONNECT was tried.
     """
 
     metric: Metric
@@ -65,7 +65,7 @@ class PublishedSearch:
         self.connects = 0
 
     def run(self) -> int | None:
-        """Algorithm 4: the vertex at the goal, or None if the time was up first."""
+        """Run algorithm 4; return the vertex at the goal, or None if the time was up first."""
         while not self.stop():
             vertex = int(self.tree.distance.argmin())
             self.connects += 1
@@ -73,7 +73,7 @@ class PublishedSearch:
             if reached:
                 return vertex
 
-            # one step of a basic RRT after every failure
+            # After every failure the tree makes one step of a basic RRT.
             q_rand = self._random()
             near = int(self.tree.nearest(q_rand[None])[0])
             q_new = self._inside(_extend(self.tree.q[near], q_rand, self.steps.step))
@@ -82,7 +82,11 @@ class PublishedSearch:
         return None
 
     def _connect(self, near: int) -> tuple[int, bool]:
-        """Algorithm 5: step after step, until one is blocked; the last vertex, and whether it is at the goal."""
+        """Run algorithm 5: step from a vertex and keep those that lower the distance, until one is blocked.
+
+        Returns:
+            The last vertex, and whether it is at the goal.
+        """
         delta = self.steps.step
         missed = 0
         q_near = self.tree.q[near].copy()
@@ -108,15 +112,15 @@ class PublishedSearch:
         return near, False
 
     def _towards_any(self, q: Vector, delta: float) -> Vector:
-        """A step from a configuration in a random direction, or towards a random sample, as the options say."""
+        """Return a step of length ``delta`` from q in a random direction, or towards a sample, as ``even`` says."""
         if not self.steps.even:
             return self._inside(_extend(q, self._random(), delta))
         direction = self.rng.normal(size=len(q))
         return self._inside(q + direction * (delta / np.linalg.norm(direction)))
 
     def _inside(self, q: Vector) -> Vector:
-        """A configuration clipped to the limits, where a step may leave them."""
-        # as published, samples lie inside the limits, and with them all steps towards samples
+        """Return a configuration clipped to the limits, if a step may leave them."""
+        # As published, samples lie inside the limits, so steps towards samples do too.
         cannot_leave = self.steps.beyond == 0.0 and not self.steps.even
         return q if cannot_leave else np.clip(q, self.lower, self.upper)
 
@@ -124,7 +128,7 @@ class PublishedSearch:
         return float(self.metric.distance(q[None])[0])
 
     def _random(self) -> Vector:
-        """A uniform sample, shape (n,), in the limits widened by the share ``beyond`` of their range."""
+        """Return a uniform sample, shape (n,), in the limits widened by the share ``beyond`` of their range."""
         margin = self.steps.beyond * (self.upper - self.lower)
         return self.rng.uniform(self.lower - margin, self.upper + margin)
 
@@ -133,7 +137,7 @@ class PublishedSearch:
 
 
 def _extend(a: Vector, b: Vector, step: float) -> Vector:
-    """From a towards b by at most ``step`` [rad]."""
+    """Return the configuration at most ``step`` [rad] from a towards b."""
     towards = b - a
     length = float(np.linalg.norm(towards))
     moved: Vector = b if length <= step else a + towards * (step / length)

@@ -7,16 +7,16 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Matrix, Vector
 
-FIRST_ROOM = 256  # vertices; doubled whenever it is full
-PENALTY = 1.3  # a vertex from which CONNECT has failed counts as so many times as far, each time
+FIRST_ROOM = 256  # vertices that arrays have room for at first; doubled whenever they are full
+PENALTY = 1.3  # factor on the distance of a vertex for each time that CONNECT has failed from it
 
 
 class IkurtTree:
-    """Vertices in the order in which they were added, roots first.
+    """A tree of configurations, in the order in which they were added, roots first.
 
     Args:
-        roots: Shape (k, n).
-        distances: Of the roots from the goal, shape (k,).
+        roots: Configurations of the roots, shape (k, n).
+        distances: Distances of the roots from the goal, shape (k,).
     """
 
     def __init__(self, roots: Matrix, distances: Vector) -> None:
@@ -38,7 +38,13 @@ class IkurtTree:
         return self._distance[: self.size]
 
     def add(self, q: Matrix, parents: NDArray[np.int64], distances: Vector) -> NDArray[np.int64]:
-        """Add vertices q, shape (k, n), below others; returns their numbers, shape (k,)."""
+        """Add vertices and return their numbers, shape (k,).
+
+        Args:
+            q: Configurations, shape (k, n).
+            parents: Numbers of their parents, -1 for roots, shape (k,).
+            distances: Their distances from the goal, shape (k,).
+        """
         while self.size + len(q) > len(self._q):
             self._grow()
         numbers = np.arange(self.size, self.size + len(q))
@@ -49,28 +55,28 @@ class IkurtTree:
         return numbers
 
     def grown(self) -> tuple[Matrix, NDArray[np.int64]]:
-        """The vertices, shape (size, n), and their parents, shape (size,), -1 for a root."""
+        """Return copies of the vertices, shape (size, n), and their parents, shape (size,), -1 for a root."""
         return self.q.copy(), self._parent[: self.size].copy()
 
     def best(self) -> int:
-        """The vertex nearest to the goal in the workspace, penalties counted."""
+        """Return the vertex with the least workspace distance from the goal, penalties included."""
         return int(self._penalised_distance[: self.size].argmin())
 
     def penalise(self, first: int, last: int) -> None:
-        """CONNECT has failed on its way from vertex ``first`` down to ``last``: prefer other vertices to these."""
+        """Penalise the vertices from ``last`` back to its ancestor ``first``, along which CONNECT has failed."""
         vertex = last
         while vertex >= 0:
             self._penalised_distance[vertex] *= PENALTY
             vertex = -1 if vertex == first else int(self._parent[vertex])
 
     def nearest(self, Q: Matrix) -> NDArray[np.int64]:
-        """The vertex nearest in joint space (Euclidean) to each of Q, shape (m, n); shape (m,)."""
+        """Return the vertex nearest in joint space (Euclidean) to each row of Q, shape (m, n); shape (m,)."""
         square = np.einsum("ij,ij->i", self.q, self.q)
         nearest: NDArray[np.int64] = (square - 2.0 * Q @ self.q.T).argmin(axis=1)
         return nearest
 
     def branch(self, vertex: int) -> Matrix:
-        """The way from a root to a vertex, shape (k, n)."""
+        """Return the path from a root to a vertex, shape (k, n)."""
         numbers = [vertex]
         while self._parent[numbers[-1]] >= 0:
             numbers.append(int(self._parent[numbers[-1]]))
