@@ -119,7 +119,7 @@ def as_value(thing: object) -> tuple[Any, ...]:
 def restored(kind: type[Thing], state: dict[str, Any]) -> Thing:
     """Create an object from its fields, the inverse of :func:`as_value`, without validation.
 
-    This is the only place where a value is made without its constructor.
+    This is the only function that creates values without their constructors.
     """
     thing = object.__new__(kind)
     for name, value in state.items():

@@ -30,9 +30,9 @@ def _spelt(letter: str) -> str:
 
 
 class RrtikError(Exception):
-    """Root of every error raised on purpose by the toolkit.
+    """Root of all errors that the library raises on purpose.
 
-    Its text is always a single line fit for a person: the file, the field, what was found, the remedy.
+    The text is always a single line for a person: the file, the field, what was found and the remedy.
 
     Example:
         >>> try:
@@ -89,7 +89,7 @@ class UnknownNameError(InputError):
 
 
 class ProblemError(RrtikError):
-    """A planning problem is ill-posed: start or goal in collision, outside limits, or unreachable by construction.
+    """A planning problem is ill-posed: its start or goal is in collision, outside the limits or cannot be reached.
 
     Attributes:
         contacts: Pairs of names in collision, empty if the reason is another one.
@@ -115,7 +115,7 @@ def in_file(path: object, error: InputError) -> InputError:
 
 
 class PlannerError(RrtikError):
-    """A planner broke (as opposed to not finding a path, which is data: see ``Plan.reason``).
+    """A planner failed with an error, as opposed to not finding a path, which is a result (``Plan.reason``).
 
     Example:
         >>> issubclass(rrtik.PlannerError, rrtik.RrtikError)

@@ -29,7 +29,7 @@ def upright(
 ) -> TaskRegion:
     """Keep an axis of a frame within an angle of the direction in the world that it has at the start of the path.
 
-    Turning about the axis and moving anywhere are free. A cup that starts upside down stays so.
+    Rotations about the axis and the position are free. A cup that starts upside down has to stay so.
 
     Args:
         robot: The arm.
@@ -78,7 +78,7 @@ def on_plane(
     frame: str | None = None,
     allowance: float = 0.0,
 ) -> TaskRegion:
-    """Keep the origin of a frame on a plane of the world, its orientation free.
+    """Keep the origin of a frame on a plane of the world, with free orientation.
 
     Args:
         point: A point of the plane [m], shape (3,).
@@ -107,7 +107,7 @@ def on_line(
     frame: str | None = None,
     allowance: float = 0.0,
 ) -> TaskRegion:
-    """Keep the origin of a frame on a straight line of the world, its orientation free.
+    """Keep the origin of a frame on a straight line of the world, with free orientation.
 
     Args:
         point: A point of the line [m], shape (3,).
@@ -131,7 +131,7 @@ def on_line(
 def orientation_of(
     pose: PoseLike, tolerances_deg: ArrayLike = 1.0, *, frame: str | None = None, allowance_deg: float = 0.0
 ) -> TaskRegion:
-    """Keep the orientation of a frame, its position free.
+    """Keep the orientation of a frame, with free position.
 
     Args:
         pose: ``pinocchio.SE3`` or a matrix of shape (4, 4) whose orientation is kept.
@@ -173,7 +173,7 @@ def orientation_of(
 def inside(
     pose: PoseLike, sides: ArrayLike, *, tolerance: float = 1e-3, frame: str | None = None, allowance: float = 0.0
 ) -> TaskRegion:
-    """Keep the origin of a frame inside a box of the world, its orientation free.
+    """Keep the origin of a frame inside a box of the world, with free orientation.
 
     Args:
         pose: Pose of the box's centre, ``pinocchio.SE3`` or a matrix of shape (4, 4).

@@ -82,7 +82,7 @@ class Group:
         return len(self.value) if type(self.value) is list else self.key
 
     def located(self, location: Location = ()) -> Iterator[tuple[Location, int]]:
-        """Yield each location in the group and its line."""
+        """Yield the location and line of each value in the group."""
         for place, line in self.lines.items():
             yield (*location, place), line
         for place, group in self.groups.items():

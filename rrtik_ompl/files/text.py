@@ -224,7 +224,7 @@ def comma_numbers(text: str, option: str) -> list[float]:
 
 
 def is_number(text: str) -> bool:
-    """Check whether a text reads as a number."""
+    """Check whether a text can be parsed as a number."""
     try:
         float(text)
     except ValueError:

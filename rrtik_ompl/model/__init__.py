@@ -1,1 +1,1 @@
-"""The values: what an arm is, what surrounds it, what it has to reach."""
+"""Immutable values: the arm, its surroundings, goals, paths, proofs and settings."""

@@ -122,10 +122,10 @@ class Certificate:
         }
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the certificate to a JSON file, whole or not at all.
+        """Write the certificate to a JSON file, completely or not at all.
 
         Raises:
-            InputError: If the ending is another one or the file cannot be written.
+            InputError: If the file has another ending or cannot be written.
         """
         known_ending(path, (".json",), "certificate")
         write_text(path, json.dumps(self.document(), separators=(",", ":")) + "\n")

@@ -152,7 +152,7 @@ class JointPath:
 
     @property
     def one_joint_at_a_time(self) -> bool:
-        """Whether every edge moves exactly one joint, so that :meth:`moves` can list them."""
+        """Whether every edge moves exactly one joint, so that :meth:`moves` can list the moves."""
         return single_joint(merge_moves(self.waypoints), SAME)
 
     def moves(self) -> tuple[Move, ...]:
@@ -205,7 +205,8 @@ class JointPath:
         """Return the same path with a proof of its motions, made by :meth:`rrtik_ompl.World.prove`.
 
         Raises:
-            InputError: If the path is another robot's, there is no world, or the clearance is negative or infinite.
+            InputError: If the path is another robot's, ``world`` is not a world, or the clearance is negative or
+                infinite.
         """
         require_judge(world, "world of a path's proof")
         require_joints(world.robot, self.joint_names, "path")
@@ -242,15 +243,15 @@ class JointPath:
     def save(self, path: str | os.PathLike[str], *, proof: bool = False) -> None:
         """Write the path to a file: .json (complete), .csv (a header of joint names), .txt (OMPL's matrix text).
 
-        The file is written whole or not at all.
+        The file is written completely or not at all.
 
         Args:
             path: Name of the file.
             proof: Whether a .json file also contains the certificate of the path, for ``rrtik check``.
 
         Raises:
-            InputError: If the ending is another one, the file cannot be written, or a proof is asked for and the path
-                has none that covers it.
+            InputError: If the file has another ending or cannot be written, or a proof is requested and the path has
+                none that covers it.
 
         Example:
             >>> path = rrtik.plan(rrtik.load_problem("planar3_boxes"), seed=1).path

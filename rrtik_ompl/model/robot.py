@@ -36,7 +36,7 @@ class Chain:
         parent: Row of the parent joint, -1 for the world, shape (n,).
         placement: Fixed transform from the parent joint's frame to this joint's frame at zero, shape (n, 4, 4).
         axis: Unit axis in the joint's own frame, shape (n, 3).
-        prismatic: True for sliding joints, shape (n,).
+        prismatic: True for prismatic joints, shape (n,).
         gain: Joint value of the model = gain @ q + offset (mimic joints have a gain other than 1), shape (n, dof).
         offset: See ``gain``, shape (n,).
     """

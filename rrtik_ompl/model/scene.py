@@ -190,7 +190,7 @@ class Touching:
     A task creates these for objects that are in contact when grasped or set down; they end when the two have parted.
 
     Attributes:
-        first, second: Names; one of them at least is an obstacle or attached object.
+        first, second: The names; at least one of them is that of an obstacle or attached object.
         distance: The least distance that they must keep [m], not above 0; negative is the depth to which they may
             overlap.
 
@@ -225,7 +225,7 @@ class Touching:
 
     @property
     def pair(self) -> frozenset[str]:
-        """Both names, in no order."""
+        """Both names as an unordered pair."""
         return frozenset(self.names)
 
 

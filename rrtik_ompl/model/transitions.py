@@ -36,7 +36,7 @@ class Move(NamedTuple):
 
     @property
     def change(self) -> float:
-        """How far the joint moves, with its sign [rad or m]."""
+        """Signed displacement of the joint [rad or m]."""
         return self.end - self.start
 
 
@@ -94,7 +94,7 @@ def without_repeats(route: Matrix) -> Matrix:
 
 
 def transitions(waypoints: ArrayLike, tolerance: float = SAME) -> int:
-    """Return the number of moves of a route, shape (k, n): its edges after :func:`merge_moves`.
+    """Return the number of moves of a path, shape (k, n): its edges after :func:`merge_moves`.
 
     An edge that moves several joints at once counts as one; :func:`single_joint` tells whether there is such an edge.
     """
@@ -102,7 +102,7 @@ def transitions(waypoints: ArrayLike, tolerance: float = SAME) -> int:
 
 
 def single_joint(waypoints: ArrayLike, tolerance: float = 0.0) -> bool:
-    """Check whether every edge of the route, shape (k, n), moves exactly one joint."""
+    """Check whether every edge of a path, shape (k, n), moves exactly one joint."""
     rows = _rows(waypoints)
     return bool((moved(rows[:-1], rows[1:], tolerance).sum(axis=1) == 1).all())
 
@@ -119,7 +119,7 @@ def length_of(rows: Matrix) -> float:
 
 
 def _same_joint(a: list[float], b: list[float], c: list[float], tolerance: float) -> bool:
-    """Check whether a -> b and b -> c move one and the same joint."""
+    """Check whether a -> b and b -> c move the same single joint."""
     first = _moved_joints(a, b, tolerance)
     return len(first) == 1 and first == _moved_joints(b, c, tolerance)
 

@@ -79,7 +79,7 @@ class ArmCache:
 
 @lru_cache(maxsize=MAX_ROBOTS)
 def arm_cache(robot: Robot) -> ArmCache:
-    """Return the cache of a robot; ``arm_cache.cache_clear()`` forgets all of them."""
+    """Return the cache of a robot, the same object each time; ``arm_cache.cache_clear()`` drops all caches."""
     return ArmCache(robot)
 
 

@@ -16,11 +16,11 @@ from rrtik_ompl.world.world import World
 
 @runtime_checkable
 class HasWaypoints(Protocol):
-    """A path."""
+    """An object with waypoints, such as a path."""
 
     @property
     def waypoints(self) -> Matrix:
-        """Shape (k, dof)."""
+        """The waypoints, shape (k, dof)."""
 
 
 def certificate_of(world: World, path: HasWaypoints | ArrayLike, clearance: float = 0.0) -> Certificate | None:

@@ -50,7 +50,11 @@ def clearances_between(world: World, ends: Matrix, clearance: float | None) -> C
 
 
 def clearances_of_pairs(world: World, ends: NDArray[np.float64], clearance: float | None) -> list[Clearances | None]:
-    """:func:`clearances_between` for several pairs of configurations, shape (m, 2, dof), in a few calls."""
+    """Apply :func:`clearances_between` to several pairs of configurations, shape (m, 2, dof), in a few calls.
+
+    Returns:
+        The clearances of each pair, or None.
+    """
     found: list[Clearances | None] = [None] * len(ends)
     undecided = np.arange(len(ends))
     for clearances in _candidates(world, clearance):

@@ -79,10 +79,6 @@ class ExactChecker:
         Args:
             solids: The arrangement with the bodies at their new poses.
             numbers: Indices of the bodies that were moved.
-
-        Args:
-            solids: Where the bodies are now.
-            numbers: Of those that stand elsewhere.
         """
         bodies = solids.bodies
         if self.clearance != 0.0:
@@ -237,7 +233,7 @@ class ExactChecker:
         return None if self.solids.containment.between(pairs, self._data.oMi) else gaps
 
     def _transform(self, number: int) -> coal.Transform3s:
-        """Coal's pose of a body in the world."""
+        """Return the pose of a body in the world as coal's type."""
         body = self.bodies[number]
         pose = self._data.oMi[body.joint] * body.placement
         return coal.Transform3s(pose.rotation, pose.translation)

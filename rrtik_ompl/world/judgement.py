@@ -132,7 +132,7 @@ def _faults_of_path(checks: RowChecks, rows: Matrix) -> list[Fault]:
 
 
 def contacts_along(checks: RowChecks, waypoints: Matrix) -> tuple[PathContact, ...]:
-    """Return the contacts of a path, waypoints of shape (k, dof), at places spread evenly over how far the arm moves.
+    """Return the contacts of a path, waypoints of shape (k, dof), at the samples of :func:`places_along`.
 
     A contact that is shorter than the distance between two samples can be missed. The result explains what is wrong
     with a path, but does not check it.

@@ -161,10 +161,7 @@ class Prover:
         return sorted(gaps + breaches, key=lambda gap: gap.motion)
 
     def certificate(self, rows: Matrix, clearance: float) -> Certificate | None:
-        """Return the certificate of a path, waypoints of shape (k, dof), for a clearance [m].
-
-        Returns:
-            None if not every motion is proven.
+        """Return the certificate of a path, waypoints of shape (k, dof), for a clearance [m]; None if it is not proven.
 
         Raises:
             InputError: If the scene has a point cloud.

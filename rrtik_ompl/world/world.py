@@ -131,7 +131,7 @@ class World(Judge):
 
     @property
     def scene(self) -> Scene:
-        """The surroundings."""
+        """The surroundings of the arm."""
         return self._settings.scene
 
     @property
@@ -214,7 +214,7 @@ class World(Judge):
         """Return the same world with some settings changed; all data that does not depend on them is shared.
 
         Args:
-            **changes: Values by the names of :class:`~rrtik_ompl.model.world_settings.WorldSettings`.
+            **changes: New values of fields of :class:`~rrtik_ompl.model.world_settings.WorldSettings`.
 
         Raises:
             InputError: If a value makes no sense.
@@ -316,7 +316,10 @@ class World(Judge):
         return self.checks.free(self._rows(Q, 2))
 
     def motion_valid(self, a: ArrayLike, b: ArrayLike) -> bool:
-        """Check whether the straight motion from a to b, shape (dof,) each, is valid; the same answer from b to a."""
+        """Check whether the straight motion from a to b, shape (dof,) each, is valid.
+
+        The answer is the same for the motion from b to a.
+        """
         return bool(self.checks.motions_free(self._rows(a, 1), self._rows(b, 1))[0])
 
     def motion_valid_batch(self, A: ArrayLike, B: ArrayLike) -> Mask:
@@ -375,7 +378,7 @@ class World(Judge):
         return proof.proven and proof.clearance >= self._settings.required_clearance and self.prover.made(proof)
 
     def violations(self, waypoints: ArrayLike, *, resolution: float | None = None) -> tuple[Violation, ...]:
-        """Check the straight motions between waypoints, shape (k, dof), again: the second check of a path.
+        """Check the straight motions between waypoints, shape (k, dof), a second time, independently of planners.
 
         A motion that is proven free for its whole length (:meth:`prove`) needs no other check. Every other motion is
         sampled so densely that no point of the arm moves more than half of the motion resolution (or ``resolution``
