@@ -357,13 +357,16 @@ class Motions:
     def _plane_gaps(
         self, first_numbers: Numbers, second_numbers: Numbers, poses: list[Poses], normals: Matrix
     ) -> Vector:
-        """Compute the gaps between solids along given normals: the smaller extents at both ends of the intervals count.
+        """Compute lower bounds of the gaps between solids on intervals, along given normals.
+
+        The gap is the least height of the first solid above the highest point of the second one, each taken at the end
+        of the interval where it is worst.
 
         Args:
             first_numbers: Indices of the first solids, shape (n,).
             second_numbers: Indices of the second solids, shape (n,).
             poses: See :meth:`_ball_gaps`.
-            normals: Unit normals from the first solid to the second, in the pair's frame, shape (n, 3).
+            normals: Unit normals in the pair's frame, pointing from the second solid to the first, shape (n, 3).
 
         Returns:
             The gaps [m], shape (n,); -inf where a normal does not have unit length.

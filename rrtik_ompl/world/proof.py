@@ -58,7 +58,7 @@ MOTIONS_AT_ONCE = 64  # motions per kernel call; the clock and Ctrl-C are only l
 FEW = 200  # number of configurations for which no proof table is made
 PROVEN, NOT_LOOKED_AT = -1, -2  # written in place of the index of an unproven pair
 MOST_DISTANCES = 400  # largest number of coal distances for a pair in one motion, which take some tenths of a second
-DEEPEST_LEVEL = 9  # smallest interval of a bisection: 2^-9 of a motion
+DEEPEST_LEVEL = 9  # largest level of an interval in a bisection, 2^-9 of a motion
 # Factor on the bound of the approach of two bodies, because a verifier may bound it by other balls.
 APPROACH_SPARE = 1.01
 FAR_APART = 1e6  # [m]; a pair with the margin -FAR_APART is always proven apart
@@ -211,7 +211,7 @@ class Prover:
         """Return which motions starts[k] -> ends[k], shapes (m, dof), are proven free, shape (m,)."""
         return in_blocks(partial(self._proven, clearance), starts, ends)
 
-    # The arguments are in the order that functools.partial and in_blocks need.
+    # As proven, for one block of motions.
     def _proven(self, clearance: float, starts: Matrix, ends: Matrix) -> Mask:
         if len(mask := np.ones(len(starts), dtype=bool)) == 0:
             return mask

@@ -31,6 +31,7 @@ from rrtik_ompl.world.exact_checks import ExactChecker, one_way
 from rrtik_ompl.world.proof import Prover
 
 
+# Make the prover of an arrangement. With path constraints it shares the tables of the one without them.
 def _prover_of(solids: Arrangement, constraints: HeldRegions | None) -> Prover:
     if constraints is not None:
         return PROVERS.of(solids, None).holding(constraints)
@@ -182,6 +183,7 @@ class RowChecks:
     def _exact(self) -> bool:
         return self.settings.accuracy == "exact"
 
+    # As free, for one block of rows.
     def _free(self, rows: Matrix) -> Mask:
         mask = inside_limits(self.settings.robot, rows) & (not self.solids.always_colliding)
         if mask.all():
@@ -192,6 +194,7 @@ class RowChecks:
             mask[mask] = self.constraints.held(rows[mask])
         return mask
 
+    # As motions_free, for one block of motions.
     def _motions_free(self, starts: Matrix, ends: Matrix) -> Mask:
         robot = self.settings.robot
         mask = inside_limits(robot, starts) & inside_limits(robot, ends) & (not self.solids.always_colliding)
