@@ -1,4 +1,4 @@
-"""The command line. Each command ends with one of these exit codes."""
+"""The command line, and the exit codes with which its commands end."""
 
 FOUND = 0  # or valid, or done
 NOT_FOUND = 1  # or not valid

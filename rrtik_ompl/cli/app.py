@@ -31,8 +31,8 @@ from rrtik_ompl.cli.trust import with_trust
 from rrtik_ompl.files.tables import FORMATS as PATH_FORMATS
 from rrtik_ompl.files.text import check_target
 
-COMPLETING = "_RRTIK_COMPLETE"  # by which a shell asks for completions
-UsageError: Any = typer.BadParameter.__bases__[0]  # click's, which typer carries under a private name
+COMPLETING = "_RRTIK_COMPLETE"  # set by a shell that asks for completions
+UsageError: Any = typer.BadParameter.__bases__[0]  # click's class, which typer bundles under a private name
 
 
 class Kind(str, Enum):
@@ -140,13 +140,13 @@ COMMANDS: dict[str, Callable[..., int]] = {
     "warmup": warmup,
     "convert": convert,
 }
-OPEN_NO_FILES = ("reproduce", "bench", "list", "warmup")  # of robots; what `bench` opens, it opens in other processes
+OPEN_NO_FILES = ("reproduce", "bench", "list", "warmup")  # commands that open no robot files in this process
 HELP = "Plan collision-free paths for robot arms.\n\nExit 0: found or valid; 1: not; 2: bad input; 130: interrupted."
-MARKERS = "markers"  # a group of commands
+MARKERS = "markers"  # name of a group of commands
 
 
 def command_line(given: list[str]) -> typer.Typer:
-    """The command line, with no more than the command that is called: to read what each of them takes takes long."""
+    """Return the command line with only the command that is called, because parsing the options of all takes long."""
     called = given[:1] if given and given[0] in {*COMMANDS, MARKERS} else [*COMMANDS, MARKERS]
 
     # rrtik --install-completion, for bash, zsh and fish
@@ -174,7 +174,7 @@ def run(arguments: list[str] | None = None) -> int:
     try:
         if not given and COMPLETING in os.environ:
             return _complete()
-        if not given:  # the help, but no success: nothing was asked
+        if not given:  # without arguments, print the help, but report an error
             with redirect_stdout(sys.stderr):
                 command_line(given)(args=["--help"], prog_name="rrtik", standalone_mode=False)
             return BAD_INPUT
@@ -182,7 +182,7 @@ def run(arguments: list[str] | None = None) -> int:
         with stoppable():
             code = command_line(given)(args=given, prog_name="rrtik", standalone_mode=False)
         sys.stdout.flush()
-        if code == INTERRUPTED:  # what typer makes of KeyboardInterrupt
+        if code == INTERRUPTED:  # typer converts KeyboardInterrupt to this exit code
             raise KeyboardInterrupt
         return int(code or 0)
     except RrtikError as error:
@@ -192,7 +192,7 @@ def run(arguments: list[str] | None = None) -> int:
     except (KeyboardInterrupt, typer.Abort):
         print("rrtik: interrupted; no file is half-written", file=sys.stderr)
         return INTERRUPTED
-    except (BrokenPipeError, SystemExit):  # the reader has gone, nobody is left to tell; typer makes an exit of it
+    except (BrokenPipeError, SystemExit):  # the reader has closed the pipe; typer converts that to an exit
         drop_output()
         return FOUND
     except OSError as error:
@@ -201,7 +201,7 @@ def run(arguments: list[str] | None = None) -> int:
 
 
 def _complete() -> int:
-    """Answer a shell that completes a command; typer ends that by an exit."""
+    """Answer a shell that completes a command; typer ends this with SystemExit."""
     try:
         command_line([])(prog_name="rrtik", standalone_mode=False)
     except SystemExit:
@@ -215,8 +215,8 @@ def _fail(message: str) -> int:
 
 
 def _usage(text: str, context: typer.Context | None, given: list[str]) -> int:
-    """Say in one line what is wrong with a command."""
-    named = [word for word in given[:1] if not word.startswith("-")]  # an option with too few words has no context
+    """Print in one line what is wrong with a command, and return the exit code."""
+    named = [word for word in given[:1] if not word.startswith("-")]  # there is no context if an option lacks its value
     command = " ".join(["rrtik", *named]) if context is None else context.command_path
     return _fail(f"{' '.join(text.replace('Value error, ', '').split())} (see: {command} --help)")
 

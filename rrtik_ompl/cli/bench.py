@@ -44,7 +44,7 @@ def bench(
     campaign = load_suite(suite, folder=problems, runs=runs)
     folder = Path(f"bench-{campaign.name}") if out is None else out
     if scheduler is None:
-        warm_up(lambda _: None)  # once, before processes that work side by side would all compile
+        warm_up(lambda _: None)  # compile once, before concurrent processes would all do so
 
     total = campaign.total
     outcomes: Counter[str] = Counter()

@@ -1,4 +1,4 @@
-"""The command `rrtik check`: what is known of a problem, and of a path, a motion, a run or a task's plan for it."""
+"""The command `rrtik check`: check a problem, and optionally a path, a motion, a run or a task plan for it."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ if TYPE_CHECKING:
     from rrtik_ompl.motion.trajectory import Trajectory
     from rrtik_ompl.world.problem import Problem
 
-SLACK = 1e-6  # share of a joint's fastest rate that rounding may add
-HEAD = 4096  # bytes in which a record says what it is
-MOST_LINES = 20  # about the violations of a run
+SLACK = 1e-6  # relative excess of a joint's velocity limit that is attributed to rounding
+HEAD = 4096  # bytes at the beginning of a record that contain its kind
+MOST_LINES = 20  # largest number of lines about the violations of a run
 
 PathFile = Annotated[
     Path | None, typer.Argument(help="A path: .json, .csv or .txt; or a timed motion: .json, .csv, .yaml.")
@@ -67,7 +67,8 @@ def check(
     if _is_record(path):
         return _check_run(question, path)
 
-    route = None if path is None else load_motion_or_path(path, world.robot)  # a bad file is refused at once
+    # Loaded first, so that an invalid file is refused before anything is printed.
+    route = None if path is None else load_motion_or_path(path, world.robot)
     kept = " beyond the margins" if any(obstacle.margin for obstacle in world.scene.obstacles) else ""
     _say_ends(question, kept)
 
@@ -97,7 +98,7 @@ def check(
 
 
 def _say_ends(problem: Problem, kept: str) -> None:
-    """Say how much room start and goal have."""
+    """Print the clearance of start and goal; ``kept`` is appended to it."""
     goal = problem.goal.q
     ends = {"start": problem.start} | ({} if goal is None else {"goal": goal})
     for end, q in ends.items():
@@ -109,18 +110,18 @@ def _millimetres(distance: float) -> str:
 
 
 def _faults_of_path(problem: Problem, route: JointPath) -> list[str]:
-    """A line for each motion of a path that is not free, and for ends that are not the problem's."""
+    """Return one line for each motion of a path that is not free, and for ends that differ from the problem's."""
     lines = [f"motion {v.edge + 1}: {v.reason}" for v in route.violations(problem.world)]
     return lines + _wrong_ends(problem, route)
 
 
 def _faults_of_motion(problem: Problem, motion: Trajectory) -> list[str]:
-    """The same of a timed motion, and a line for each joint that is too fast."""
+    """Return the faults of a timed motion, including one line for each joint that is too fast."""
     return [*motion.faults(problem.world), *_too_fast(problem.robot, motion), *_wrong_ends(problem, motion.path())]
 
 
 def _wrong_ends(problem: Problem, path: JointPath) -> list[str]:
-    """A line for each end of a path that is not that of its problem."""
+    """Return one line for each end of a path that differs from the problem's."""
     wrong = {
         "the path does not begin at the start of the problem": abs(path.start - problem.start).max() > 1e-6,
         "the path does not end at the goal of the problem": not problem.reached(path.end),
@@ -129,7 +130,7 @@ def _wrong_ends(problem: Problem, path: JointPath) -> list[str]:
 
 
 def _too_fast(robot: Robot, motion: Trajectory) -> list[str]:
-    """A line for each joint that goes faster than the robot's description allows."""
+    """Return one line for each joint that exceeds its velocity limit."""
     most = motion.peaks().velocity
     units = ["m/s" if slides else "rad/s" for slides in robot.prismatic]
     rows = zip(robot.joint_names, most.tolist(), robot.velocity.tolist(), units, strict=True)
@@ -142,7 +143,7 @@ def _too_fast(robot: Robot, motion: Trajectory) -> list[str]:
 
 
 def _how_proven(problem: Problem, motion: Trajectory) -> str:
-    """How much of a timed motion without faults is proven free, in a few words."""
+    """Return, in a few words, how much of a timed motion without faults is proven free."""
     from rrtik_ompl.world.route_check import as_it_stands
 
     proof = motion.prove(problem.world)
@@ -155,7 +156,7 @@ def _how_proven(problem: Problem, motion: Trajectory) -> str:
 
 
 def _path_lines(problem: Problem, route: JointPath, kept: str) -> list[str]:
-    """What is said of a path without faults; ``kept`` follows its clearance."""
+    """Return the lines about a path without faults; ``kept`` is appended to its clearance."""
     from rrtik_ompl.world.clearance_curve import clearance_along
     from rrtik_ompl.world.route_check import how_checked
 
@@ -172,7 +173,7 @@ def _path_lines(problem: Problem, route: JointPath, kept: str) -> list[str]:
 
 
 def _check_beside(problem: Problem, route: JointPath, file: Path) -> int:
-    """Say whether the certificate holds that a path's file has, if it has one."""
+    """Check the certificate in a path's file, if there is one; print the result and return the exit code."""
     from rrtik_ompl.model.certificate import certificate_beside
 
     found = certificate_beside(file)
@@ -180,7 +181,7 @@ def _check_beside(problem: Problem, route: JointPath, file: Path) -> int:
 
 
 def _say_certified(problem: Problem, path: JointPath, certificate: Certificate, file: Path) -> int:
-    """Say whether a certificate, of a file, proves that a path solves a problem."""
+    """Check whether a certificate proves that a path solves a problem; print the result and return the exit code."""
     from rrtik_ompl.world.certificate_check import certificate_fault
     from rrtik_ompl.world.route_check import as_it_stands
 
@@ -201,7 +202,7 @@ def _say_certified(problem: Problem, path: JointPath, certificate: Certificate, 
 
 
 def _is_record(file: Path | None) -> TypeGuard[Path]:
-    """Whether a file is the record of a run."""
+    """Check whether a file is the record of a run."""
     from rrtik_ompl.replanning.record import KIND
 
     if file is None or file.suffix.lower() != ".json" or not file.is_file():
@@ -211,7 +212,7 @@ def _is_record(file: Path | None) -> TypeGuard[Path]:
 
 
 def _check_run(problem: Problem, file: Path) -> int:
-    """Say what a judge says of a record: whether something touches in it."""
+    """Judge a record: print whether bodies touch in it, and return the exit code."""
     from rrtik_ompl.replanning.record import load_run
 
     run = load_run(file)
@@ -238,7 +239,7 @@ def _check_run(problem: Problem, file: Path) -> int:
 
 
 def _check_task_plan(name: str) -> int:
-    """Say of each motion of a saved plan how it is known to be free, and on what contacts."""
+    """Print for each motion of a saved plan how it is known to be free, and its contacts; return the exit code."""
     from rrtik_ompl.tasks.plan_file import load_task_plan
     from rrtik_ompl.tasks.setting import world_of_motion
 

@@ -87,7 +87,7 @@ def show(
 
 
 def _subject(name: str, scene: Path | None) -> tuple[Any, Robot, str]:
-    """What is shown, its robot, and why its start is no start, "" if it is one."""
+    """Return what is shown, its robot, and why its start is invalid; "" if it is valid."""
     from rrtik_ompl import Scene, World, list_problems, list_robots, load_problem, load_robot, load_scene
     from rrtik_ompl.problem_files.problem_values import load_unchecked
     from rrtik_ompl.viewer.subject import Shown
@@ -181,7 +181,7 @@ def overlay(
 def _drawn(
     arm: ArmInPictures, pictures: Iterable[Picture], why_nothing: Callable[[], str]
 ) -> Iterator[NDArray[np.uint8]]:
-    """All pictures with the arm; an error after the last one if the base was in none of them."""
+    """Yield all pictures with the arm; raise an error after the last one if the base was in none of them."""
     for picture in pictures:
         yield arm.draw(picture)
     if arm.without_base == arm.count:

@@ -1,4 +1,4 @@
-"""The command `rrtik` before anything else is loaded, so that Ctrl-C ends it with one line from the first moment on."""
+"""Entry point of the command `rrtik`, loaded before anything else, so that Ctrl-C ends it with one line at any time."""
 
 from __future__ import annotations
 
@@ -14,27 +14,29 @@ from rrtik_ompl.cli import INTERRUPTED
 
 def main() -> None:
     """Run the command line and exit with its code."""
-    # The threads that numpy starts for its matrices: ours are small, and starting them takes as long as all of numpy.
+    # Our matrices are small, and starting numpy's threads takes as long as importing the rest of numpy.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     usual = signal.getsignal(signal.SIGINT)
-    if usual is signal.default_int_handler:  # not in a shell's background, where Ctrl-C is ignored
+    if usual is signal.default_int_handler:  # in a shell's background Ctrl-C is ignored, and stays so
         signal.signal(signal.SIGINT, _leave)
 
     from rrtik_ompl.cli.app import run
 
     signal.signal(signal.SIGINT, usual)
     code = run()
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # everything is written and said
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # all output is complete
     _end(code, everything_else=code != INTERRUPTED)
 
 
 def _end(code: int, *, everything_else: bool) -> None:
-    """End before all libraries are taken down, a tenth of a second for which nobody who waits has any use.
+    """Exit without the shutdown of all libraries, which would take a tenth of a second.
 
-    What was to be done at the end (``everything_else``) is done, but whoever interrupts does not wait for it.
+    Functions registered by ``atexit`` are called first if ``everything_else`` is true; an interrupted command skips
+    them.
     """
     if everything_else:
-        watched = sys.gettrace() is not None or sys.getprofile() is not None  # by who wants to see the end
+        # A debugger or profiler needs the normal exit.
+        watched = sys.gettrace() is not None or sys.getprofile() is not None
         if watched or any(not t.daemon and t is not threading.main_thread() for t in threading.enumerate()):
             sys.exit(code)
         atexit._run_exitfuncs()  # noqa: SLF001 - as the interpreter would at its end
@@ -46,6 +48,6 @@ def _end(code: int, *, everything_else: bool) -> None:
 
 
 def _leave(*_: object) -> None:
-    """End at once: nothing has been done, and half-loaded libraries turn an exception into something else."""
+    """Exit at once: nothing has been done yet, and half-loaded libraries would turn an exception into another error."""
     os.write(2, b"rrtik: interrupted; no file is half-written\n")
     os._exit(INTERRUPTED)

@@ -26,13 +26,20 @@ if TYPE_CHECKING:
     from rrtik_ompl.world.problem import Problem
     from rrtik_ompl.world.world import World
 
-MAX_ROWS = 40  # of a table; CSV and JSON have them all
+MAX_ROWS = 40  # largest number of rows in a table; CSV and JSON contain all
 
 Triple = tuple[float, float, float]
 
 
 class Setting(NamedTuple):
-    """The arm and what surrounds it: ``goal`` and ``near`` come from a problem, and are None without one."""
+    """Robot, world and defaults of the command.
+
+    Attributes:
+        robot: The arm.
+        world: Its surroundings; None without a scene or problem.
+        goal: Goal of the problem; None without a problem.
+        near: Configuration near which solutions are preferred, shape (dof,); None if it is not given.
+    """
 
     robot: Robot
     world: World | None
@@ -41,7 +48,7 @@ class Setting(NamedTuple):
 
 
 class Output(NamedTuple):
-    """In which form results are printed."""
+    """The form in which results are printed."""
 
     as_json: bool
     as_csv: bool
@@ -138,7 +145,7 @@ def _setting(
 
 
 def _tolerances(millimetres: float | None, degrees: float | None) -> dict[str, float]:
-    """Those that are given, by the names of `PoseGoal`, in metres and radians."""
+    """Return the given tolerances by the parameter names of `PoseGoal`, in metres and radians."""
     from rrtik_ompl.base.arrays import positive
 
     for option, value in (("--tolerance-mm", millimetres), ("--tolerance-deg", degrees)):
@@ -166,7 +173,7 @@ def _goal(
     rpy_deg: Triple | None,
     tolerances: dict[str, float],
 ) -> TipGoal:
-    """The goal that the options describe; of a problem whose goal is joint values, the pose of the tip there."""
+    """Return the goal described by the options, or that of the problem; for joint values it is the tip's pose there."""
     import numpy as np
 
     from rrtik_ompl import PoseGoal
@@ -195,7 +202,7 @@ def _goal(
 
 
 def _point(position: ArrayLike, tolerances: dict[str, float]) -> PositionGoal:
-    """A goal of the tip's position alone, which has no tolerance of orientation."""
+    """Return a goal for the position of the tip, without orientation."""
     from rrtik_ompl import PositionGoal
 
     _refuse_orientation(tolerances, "give --quaternion or --rpy-deg, or leave it out")
@@ -203,7 +210,7 @@ def _point(position: ArrayLike, tolerances: dict[str, float]) -> PositionGoal:
 
 
 def _refuse_orientation(tolerances: dict[str, float], remedy: str) -> None:
-    """Refuse a tolerance of orientation where there is none."""
+    """Raise an error if a tolerance of orientation is given for a goal without orientation."""
     if "orientation_tolerance" in tolerances:
         raise InputError(f"--tolerance-deg is of an orientation, and a point has none: {remedy}")
 
@@ -289,9 +296,15 @@ def _many(
 
 
 class Solved(NamedTuple):
-    """Inverse kinematics of many poses: joint values, errors, reasons and details row by row.
+    """Inverse kinematics of m poses.
 
-    Of a trajectory also a note for each row, such as a jump, and a line about the whole.
+    Attributes:
+        q: Joint values, shape (m, dof), rows of NaN without a solution.
+        residuals: Errors of position [m] and orientation [rad], shape (m, 2).
+        reasons: Why there is no solution, "" if there is one.
+        details: Further explanations of these reasons.
+        notes: Notes for each pose of a trajectory, such as a jump.
+        line: A remark on the whole trajectory.
     """
 
     q: Matrix
@@ -303,7 +316,7 @@ class Solved(NamedTuple):
 
 
 def _each(robot: Robot, rows: NDArray[np.float64], tolerances: dict[str, float], common: dict[str, Any]) -> Solved:
-    """Joint values, residuals, reasons and details: poses as one batch unless tolerances are given, else singly."""
+    """Solve each pose by itself: as one batch, or one after the other if points or tolerances are given."""
     import numpy as np
 
     from rrtik_ompl import PoseGoal, solve_ik, solve_ik_batch
@@ -330,7 +343,7 @@ def _each(robot: Robot, rows: NDArray[np.float64], tolerances: dict[str, float],
 
 
 def _followed(robot: Robot, rows: NDArray[np.float64], tolerances: dict[str, float], common: dict[str, Any]) -> Solved:
-    """The same, details of the first point without a solution alone, with a note for each: a jump, a collision."""
+    """Solve the poses as a trajectory, with notes on jumps and collisions; only the first failure has details."""
     from rrtik_ompl import solve_ik_trajectory
 
     options: dict[str, Any] = dict(tolerances)
@@ -343,7 +356,7 @@ def _followed(robot: Robot, rows: NDArray[np.float64], tolerances: dict[str, flo
             notes[k] = f"{notes[k]}, {text}" if notes[k] else text
 
     line = f", {plural(len(done.jumps), 'jump')}, {done.method}, {_milliseconds(done)}"
-    if done.detail:  # which names its point, counted from 0
+    if done.detail:  # the detail begins with the number of the point, counted from 0
         first = next(k for k, reason in enumerate(done.reasons) if reason)
         details[first] = done.detail.partition(": ")[2]
 
@@ -363,7 +376,7 @@ def _more(rows: int) -> list[str]:
 
 
 def _draw(given: Setting, goal: TipGoal | None, q: Matrix, output: Output, *, moving: bool = False) -> None:
-    """The page: solutions of which one is a goal to drag, or the arm moving through all points of a trajectory."""
+    """Write the page: solutions, of which one is a goal to drag, or the arm moving through a trajectory."""
     if output.html is None:
         if not output.as_json and not output.as_csv:
             suggest("see it: --html ik.html", *(["every solution: --all"] if len(q) == 1 else []))
@@ -391,7 +404,10 @@ def _draw(given: Setting, goal: TipGoal | None, q: Matrix, output: Output, *, mo
 
 
 def _question(given: Setting, q: Matrix) -> Problem | None:
-    """A problem from the given posture to the first free solution, whose page plans; None where there is none."""
+    """Return a problem from the given configuration to the first free solution, or None if there is none.
+
+    With a problem the page can plan. If the given configuration is in collision, the problem starts at its goal.
+    """
     import numpy as np
 
     from rrtik_ompl import Problem, World

@@ -1,4 +1,4 @@
-"""Results of inverse kinematics in words and tables for a person (degrees, millimetres), as CSV, and for machines."""
+"""Results of inverse kinematics as text and tables (degrees, millimetres), as CSV, and as JSON."""
 
 from __future__ import annotations
 
@@ -24,14 +24,17 @@ if TYPE_CHECKING:
     from rrtik_ompl.model.goal import TipGoal
 
 
-SAME = 1e-5  # [rad] or [m]; a double root is known to the square root of the rounding
+SAME = 1e-5  # [rad or m]; a double root is accurate to the square root of the rounding error
 MILLIMETRES = 1e3
 
 
 def branch_names(robot: Robot, goal: TipGoal, Q: Matrix) -> list[str]:
-    """What the arm's closed form calls each configuration, shape (k, dof); "" where it has no name for it.
+    """Return the name of each configuration's branch in the closed form, such as ``front near up``; "" if unknown.
 
-    A branch such as ``front near up``; of a singular pose, which has a curve of solutions, its families too.
+    Args:
+        robot: The arm.
+        goal: The goal that the configurations solve.
+        Q: Configurations, shape (k, dof).
     """
     targets = _targets(robot, goal)
     if targets is None or len(Q) == 0:
@@ -52,16 +55,17 @@ def branch_names(robot: Robot, goal: TipGoal, Q: Matrix) -> list[str]:
 
 
 def fold_full_turns(robot: Robot, result: IkResult, near: Vector | None) -> tuple[IkResult, list[int]]:
-    """The result with one solution of those that differ by full turns of joints: the arm is at the same place in all.
+    """Merge solutions that differ only by full turns of joints, at which the arm is in the same place.
 
     Args:
         robot: The arm.
-        result: What inverse kinematics found.
-        near: Joints are turned as near to this posture, shape (dof,), as the limits allow; their middle if None.
+        result: Result of inverse kinematics.
+        near: Joints are turned as near to this configuration, shape (dof,), as the limits allow; None for the middle of
+            their ranges.
 
     Returns:
-        The result, nearest first, and for each of its solutions how many more there are inside the limits by full
-        turns, found or not. Joints that turn without limits are not counted.
+        The result, nearest first, and for each of its solutions the number of further ones within the limits by full
+        turns, found or not. Joints without limits are not counted.
     """
     posture = mid_range_configuration(robot) if near is None else near
     whole = robot.chain.whole_turns()
@@ -69,7 +73,7 @@ def fold_full_turns(robot: Robot, result: IkResult, near: Vector | None) -> tupl
     turned = result.solutions - TAU * np.round((result.solutions - posture) / TAU)
     Q = np.where(counted & (robot.lower <= turned) & (turned <= robot.upper), turned, result.solutions)
 
-    # Angles are the same where cosine and sine are.
+    # Angles are compared by cosine and sine, which are equal after full turns.
     looks = np.hstack([np.where(whole, np.cos(Q), Q), np.where(whole, np.sin(Q), 0.0)])
     kept = different_rows(looks, np.linalg.norm(Q - posture, axis=1).argsort(kind="stable"))
     q = Q[kept][:, counted]
@@ -83,7 +87,7 @@ def fold_full_turns(robot: Robot, result: IkResult, near: Vector | None) -> tupl
 
 
 def _targets(robot: Robot, goal: TipGoal) -> NDArray[np.float64] | None:
-    """The target of a goal as the robot's closed form takes it; None if there is no such form or it does not fit."""
+    """Return a goal's target for the robot's closed form: a pose, (1, 4, 4), or a point, (1, 3); None without one."""
     if not has_closed_form(robot) or tip_fault(robot, form_of(robot)):
         return None
     if not isinstance(goal, Target):
@@ -95,7 +99,7 @@ def _targets(robot: Robot, goal: TipGoal) -> NDArray[np.float64] | None:
 
 
 def joint_heads(robot: Robot) -> list[str]:
-    """Names of the joints with the unit in which a person reads them."""
+    """Return the names of the joints with their units for display."""
     return [
         f"{name} [{shown_unit(slides)[1]}]" for name, slides in zip(robot.joint_names, robot.prismatic, strict=True)
     ]
@@ -109,9 +113,9 @@ def solutions_table(
     clearances: Sequence[float],
     most: int,
 ) -> Table:
-    """One row per solution, nearest first, at most so many: branch, joints, residuals, full turns, clearance.
+    """Return a table with one row per solution, nearest first: branch, joints, residuals, full turns, clearance.
 
-    Columns that have nothing to say are left out.
+    Columns without content are left out; there are at most ``most`` rows.
     """
     named = any(names)
     turned = any(turns)
@@ -129,7 +133,7 @@ def solutions_table(
 
 
 def rows_table(robot: Robot, q: Matrix, residuals: Matrix, reasons: Sequence[str], notes: Sequence[str]) -> Table:
-    """One row per pose of many: joints and residuals, or the reason why there is no solution; and notes."""
+    """Return a table with one row per pose: joints and residuals, or the reason why there is no solution, and notes."""
     noted = any(notes)
     heads = ["no.", *joint_heads(robot), "off [mm]", "off [deg]", "no solution", *(["note"] if noted else [])]
     table = Table(*heads, right=range(robot.dof + 3))
@@ -142,7 +146,7 @@ def rows_table(robot: Robot, q: Matrix, residuals: Matrix, reasons: Sequence[str
 
 
 def rows_csv(robot: Robot, q: Matrix, residuals: Matrix, reasons: Sequence[str], notes: Sequence[str]) -> str:
-    """The same as CSV; joints in degrees (metres if they slide), residuals in millimetres and degrees."""
+    """Return the same as CSV; joints in degrees (metres if prismatic), residuals in millimetres and degrees."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(["number", *joint_heads(robot), "off [mm]", "off [deg]", "no solution", "note"])
@@ -157,13 +161,13 @@ def rows_csv(robot: Robot, q: Matrix, residuals: Matrix, reasons: Sequence[str],
 
 
 def solution_notes(names: Sequence[str], turns: Sequence[int]) -> list[str]:
-    """The branch of each solution, and how many more there are by full turns."""
+    """Return the branch of each solution, and how many more there are by full turns."""
     more = [f"{number} more by full turns" if number else "" for number in turns]
     return [", ".join(filter(None, parts)) for parts in zip(names, more, strict=True)]
 
 
 def document(robot: Robot, result: IkResult, names: Sequence[str], turns: Sequence[int]) -> dict[str, Any]:
-    """One answer for machines: rad, m, s; ``by_full_turns`` says how many more there are by full turns of joints."""
+    """Return one result as plain values: rad, m, s; ``by_full_turns`` counts further solutions by full turns."""
     return {
         "robot": robot.name,
         "method": result.method,
@@ -183,7 +187,7 @@ def document(robot: Robot, result: IkResult, names: Sequence[str], turns: Sequen
 def rows_document(
     robot: Robot, q: Matrix, residuals: Matrix, reasons: Sequence[str], details: Sequence[str]
 ) -> dict[str, Any]:
-    """Results for many poses for machines: rad and m; null where there is none."""
+    """Return the results for many poses as plain values: rad and m; null where there is none."""
     return {
         "robot": robot.name,
         "joint_names": list(robot.joint_names),

@@ -28,12 +28,12 @@ markers = typer.Typer(help="Print markers, calibrate cameras, find marked object
 Dictionary = Annotated[
     str, typer.Option(help="4x4_50 is found farthest away, aruco_mip_36h12 confused least; apriltag_36h11.")
 ]
-BOARD_MARKER = 0.73  # side of a board's markers, of a chess square, where it is not said
+BOARD_MARKER = 0.73  # default side of a board's markers, as a share of a chess square
 PICTURES, SCENES = (".png", ".jpg"), (".yaml", ".yml")
 
 
 class Kind(str, Enum):
-    """What can be printed."""
+    """The sheets that can be printed."""
 
     markers = "markers"
     board = "board"
@@ -122,7 +122,7 @@ def calibrate_camera(
 
 
 def _calibrate_rig(photographs: list[Path], out: Path, board: Board) -> int:
-    """Calibrate cameras that are fixed to each other."""
+    """Calibrate cameras that are fixed to each other, write their files, and print the results."""
     import numpy as np
     from pinocchio.rpy import matrixToRpy
 
@@ -150,7 +150,7 @@ def _calibrate_rig(photographs: list[Path], out: Path, board: Board) -> int:
 
 
 def _tell(found: Calibration, names: list[str]) -> None:
-    """What became of each photograph, and the numbers of the camera."""
+    """Print the error of each photograph, or why it was not used, and the intrinsics of the camera."""
     for name, error, unused in zip(names, found.view_errors, found.unused, strict=True):
         say(f"{name}: {unused or f'{error:.3f} px'}")
 
@@ -231,7 +231,7 @@ def sense(
 
 
 def _task_goal(task: Path | None, problem: str | None, grasp: str | None) -> tuple[str, str, int]:
-    """Object, grasp type and level of a task."""
+    """Return object, grasp type and level of a task; empty values if there is no task."""
     if len({task is None, problem is None, grasp is None}) > 1:
         raise InputError("--task FILE, --problem PROBLEM and --grasp OBJECT:TYPE:LEVEL go together; give all or none")
     if grasp is None:
@@ -245,7 +245,7 @@ def _task_goal(task: Path | None, problem: str | None, grasp: str | None) -> tup
 
 
 def _camera_or_rig(sources: list[str], camera: Path | None, rig: Path | None) -> Camera | Rig:
-    """What took the pictures."""
+    """Load the camera or the rig that took the pictures."""
     from rrtik_ompl.sensing.camera_file import load_camera
     from rrtik_ompl.sensing.rig_file import load_rig
 
@@ -276,7 +276,7 @@ def _views(sensor: Sensor, sources: list[str], frames: int) -> Iterator[View]:
 
 
 def _numbers(text: str) -> list[int]:
-    """``0-3,7`` as [0, 1, 2, 3, 7]."""
+    """Parse a list of numbers and ranges: ``0-3,7`` becomes [0, 1, 2, 3, 7]."""
     found: list[int] = []
     for word in text.split(","):
         first, dash, last = word.strip().partition("-")

@@ -1,4 +1,4 @@
-"""The commands of `rrtik` for a path: its list of single-joint moves, and its time parameterisation."""
+"""The commands of `rrtik` for a path: its list of single-joint moves, and its time parameterization."""
 
 from __future__ import annotations
 
@@ -149,7 +149,7 @@ def time_path(
 
 
 def _peaks_table(trajectory: Trajectory, limits: RateLimits) -> Table:
-    """One row per joint: its largest velocity, acceleration and jerk beside their limits; degrees, or metres."""
+    """Return a table with the largest velocity, acceleration and jerk of each joint beside their limits; deg or m."""
     from rrtik_ompl.base.units import shown_unit
     from rrtik_ompl.motion.trajectory import motion_report
 
@@ -159,7 +159,7 @@ def _peaks_table(trajectory: Trajectory, limits: RateLimits) -> Table:
 
     often = motion_report(trajectory, limits).switches
     peaks = trajectory.peaks()
-    words = ("jumps", "none")  # said of a peak, of a limit, that is infinite
+    words = ("jumps", "none")  # words for an infinite peak, and for an infinite limit
     pairs = ((peaks.velocity, limits.velocity), (peaks.acceleration, limits.acceleration), (peaks.jerk, limits.jerk))
 
     for k, name in enumerate(trajectory.joint_names):
@@ -174,7 +174,7 @@ def _rate(value: float, word: str) -> str:
 
 
 def _timing_document(problem: Problem, trajectory: Trajectory, limits: RateLimits) -> dict[str, Any]:
-    """A timed motion for machines: duration and each joint's peaks (a jerk of null is a jump of acceleration)."""
+    """Return a timed motion as plain values: duration and joints' peaks (a jerk of null is a jump of acceleration)."""
     from rrtik_ompl.motion.trajectory import motion_report
 
     peaks = trajectory.peaks()
@@ -195,7 +195,7 @@ def _timing_document(problem: Problem, trajectory: Trajectory, limits: RateLimit
 
 
 def _path_of_moves(path: Path, problem: str | None, shorten: str | None) -> JointPath:
-    """The path as single-joint moves."""
+    """Load a path as single-joint moves; convert and shorten it if a problem is given."""
     from rrtik_ompl import load_path, load_problem, one_joint_moves
     from rrtik_ompl.planning.shortening import METHODS
     from rrtik_ompl.planning.shortening import shorten as shortened
@@ -222,7 +222,7 @@ def _path_of_moves(path: Path, problem: str | None, shorten: str | None) -> Join
 
 
 def _valid_path(path: Path, task: Problem) -> JointPath:
-    """A path of a file, checked against its problem."""
+    """Load a path, and check it against its problem."""
     from rrtik_ompl import load_path
 
     route = load_path(path, task.robot)
@@ -238,7 +238,7 @@ def _check_waypoints(path: Path, route: JointPath) -> None:
 
 
 def _rates(text: str, option: str) -> list[float]:
-    """Numbers greater than 0."""
+    """Parse numbers, which must be greater than 0."""
     row = comma_numbers(text, option)
     if not all(number > 0.0 for number in row):
         raise InputError(f"{option}: expected numbers greater than 0, got {text}")
@@ -246,5 +246,5 @@ def _rates(text: str, option: str) -> list[float]:
 
 
 def _scaled(row: list[float], factors: Vector) -> ArrayLike:
-    """Degrees as radians; a row of the wrong length stays as it is, and the limits refuse it."""
+    """Convert degrees to radians; a row of the wrong length stays as it is, because the limits will refuse it."""
     return row if len(row) not in (1, len(factors)) else row * factors

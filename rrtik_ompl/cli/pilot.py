@@ -104,7 +104,7 @@ def pilot(
 
 
 def _second(given: str | None) -> int | Path | None:
-    """A number of a camera, or a file."""
+    """Return the number of a camera, or a file."""
     if given is None:
         return None
     return int(given) if given.isdecimal() else Path(given)

@@ -27,7 +27,7 @@ PROOF_MODES: tuple[ProofMode, ...] = get_args(ProofMode)
 
 
 def _chosen(names: tuple[Name, ...], what: str) -> Callable[[str], Name]:
-    """What turns an option's text into one of some names."""
+    """Return a parser that converts the text of an option to one of the given names."""
 
     def parse(name: str) -> Name:
         try:
@@ -135,7 +135,7 @@ def plan(
 
 
 def _next_steps(problem: str, path: JointPath | None, out: Path | None, html: Path | None) -> list[str]:
-    """What may come after a plan."""
+    """Return suggestions for what to do after planning."""
     if path is None:
         return [f"look at it: {command('show', problem)}", "give it more time: --seconds"]
     seen = f"see it move: {command('plan', problem, '--html', 'plan.html')}" if html is None else f"open {html}"
@@ -144,7 +144,7 @@ def _next_steps(problem: str, path: JointPath | None, out: Path | None, html: Pa
 
 
 def _say_path(path: JointPath | None, written: tuple[Path | None, ...]) -> None:
-    """Print the moves or waypoints of a path, if there is one, and the files that it was written to."""
+    """Print the moves or waypoints of a path, if there is one, and the files that were written."""
     if path is None:
         return
     from rrtik_ompl.cli import plan_report as report
@@ -163,7 +163,7 @@ def _write(
     *,
     still: bool,
 ) -> str:
-    """Write the files that were asked for; returns why there is no certificate, "" if nothing is missing."""
+    """Write the requested files; return why there is no certificate, "" if nothing is missing."""
     if out is not None:
         path.save(out)
     if html is not None:
@@ -187,7 +187,10 @@ def _shortened(
     rules: dict[str, Any],
     clearance: float | None,
 ) -> tuple[JointPath | None, float]:
-    """The path made shorter, by the rules of single-joint moves that the planner had; and the time [s]."""
+    """Return the shortened path, or the given one, and the time that it took [s].
+
+    The planner's rules of single-joint moves also apply to shortening.
+    """
     from rrtik_ompl.planning.shortening import MoveRules, shorten
     from rrtik_ompl.world.clearances import possible_clearance
 
@@ -203,7 +206,7 @@ def _shortened(
 
 
 def _parameters(pairs: list[str]) -> dict[str, Any]:
-    """``--set range=0.5`` as {"range": 0.5}: JSON values, anything else is text."""
+    """Parse options: ``--set range=0.5`` becomes {"range": 0.5}; values are JSON, anything else is text."""
     found = {}
     for pair in pairs:
         name, equals, value = pair.partition("=")

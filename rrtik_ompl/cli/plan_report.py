@@ -1,4 +1,4 @@
-"""A path and its plan in words and tables for a person: degrees, millimetres, one row per move; its certificate."""
+"""A path and its plan as text and tables: degrees, millimetres, one row per move; and its certificate."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from rrtik_ompl.world.route_check import how_checked
 
 
 def moves_table(path: JointPath) -> Table:
-    """One row per single-joint move: joint, from, to, change; degrees, or metres for a prismatic joint."""
+    """Return a table with one row per single-joint move; degrees, or metres for a prismatic joint."""
     table = Table(*COLUMNS, right=(0, 2, 3, 4))
     for number, move in enumerate(path.moves(), start=1):
         start, unit = reading(move.start, move.unit)
@@ -31,7 +31,7 @@ def moves_table(path: JointPath) -> Table:
 
 
 def waypoints_table(path: JointPath) -> Table:
-    """One row per waypoint, one column per joint; degrees, or metres for a prismatic joint."""
+    """Return a table with one row per waypoint, one column per joint; degrees, or metres for a prismatic joint."""
     factors, units = zip(*map(shown_unit, path.prismatic), strict=True)
     heads = [f"{name} [{unit}]" for name, unit in zip(path.joint_names, units, strict=True)]
     table = Table("waypoint", *heads, right=range(len(heads) + 1))
@@ -45,9 +45,9 @@ def waypoints_table(path: JointPath) -> Table:
 
 
 def fewest_moves(problem: Problem, plan: Plan) -> int | None:
-    """A lower bound of the number of moves of any path of the problem; None if the goal is no configuration.
+    """Return a lower bound on the number of moves of any path of the problem; None if the goal is no configuration.
 
-    It is c, the number of joints that differ, or what the planner has proven beyond that.
+    It is the number of joints whose values differ between start and goal, or a larger bound proven by the planner.
     """
     if problem.goal.q is None:
         return None
@@ -57,14 +57,14 @@ def fewest_moves(problem: Problem, plan: Plan) -> int | None:
 def summary(
     problem: Problem, plan: Plan, path: JointPath | None, shorten_seconds: float, named: str | None = None
 ) -> list[str]:
-    """A few lines that say what was found, by which planner and why by that, how good it is, and how long it took.
+    """Return a few lines about a plan: what was found by which planner, why by this one, its quality, and the time.
 
     Args:
-        problem: What was to be solved.
-        plan: The outcome.
-        path: What became of its path.
-        shorten_seconds: What that took [s].
-        named: The planner that was asked for, or None.
+        problem: The problem.
+        plan: The result of planning.
+        path: Its path after shortening; None if there is none.
+        shorten_seconds: Time of shortening [s].
+        named: The planner that was requested; None if none was.
     """
     asked = named or problem.planner or AUTO
     why = "" if named == plan.planner else f" ({asked})" if is_auto(asked) else " (named by the problem)"
@@ -98,7 +98,7 @@ def summary(
 
 
 def less_clearance(path: JointPath | None, asked: float | None) -> str:
-    """A line that says that a proven path keeps less than what was asked for [m]; "" if it does not."""
+    """Return a line if a proven path keeps less clearance than was asked for [m]; "" otherwise."""
     proof = None if path is None else path.proof
     if proof is None or asked is None or not proof.proven or proof.clearance >= asked:
         return ""
@@ -109,7 +109,7 @@ def less_clearance(path: JointPath | None, asked: float | None) -> str:
 
 
 def document(problem: Problem, plan: Plan, path: JointPath | None, shorten_seconds: float) -> dict[str, Any]:
-    """The same for machines: plain values that json can write; rad, m, s."""
+    """Return the plan as plain values for JSON; rad, m, s."""
     found: dict[str, Any] = {
         "problem": problem.name,
         "robot": problem.world.robot.name,
@@ -142,9 +142,9 @@ def document(problem: Problem, plan: Plan, path: JointPath | None, shorten_secon
 
 
 def write_certificate(problem: Problem, path: JointPath, file: Path, *, beside: bool = False) -> str:
-    """Write a path's certificate; returns why there is none, "" if it is written.
+    """Write the certificate of a path; return why there is none, "" if it was written.
 
-    It is for the clearance that the path is known to keep. ``beside``: the file takes the path too.
+    It certifies the clearance that the path is known to keep. With ``beside``, the file also contains the path.
 
     Raises:
         InputError: If the file cannot be written, or the scene has a cloud.

@@ -1,4 +1,4 @@
-"""The command `rrtik reach`: where an arm can bring its tip, as numbers, slices, a file, and bodies in the 3-D page."""
+"""The command `rrtik reach`: the reachable space of a tip, as numbers, slices, a file, and bodies in the 3-D page."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The command of `rrtik` that moves a robot among moving obstacles, and replays what happened."""
+"""The command `rrtik replan`: move a robot among moving obstacles, and replay recorded runs."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from rrtik_ompl.replanning.scenario import Scenario as Chosen
 
 PLANNER = "drrt-con"
-REMEDIES = {  # of plan_in_time(), and what the command has in their place
+REMEDIES = {  # remedies of plan_in_time(), and their replacements in this command
     "raise horizon": "raise --seconds, or call plan_in_time(), which has more options",
     "raise rate": "lower --clearance or the scenario's margin, or call plan_in_time(), which has a rate",
 }
@@ -102,7 +102,7 @@ def replan_scenario(
 
 
 def _new_run(chosen: Chosen, seed: int, given: Mapping[str, Any]) -> ReplanRun:
-    """A run that is replanned on its way."""
+    """Run the scenario with replanning on the way."""
     options = {"planner": PLANNER, **given}
     try:
         with progress(f"{chosen.problem.name} with {options['planner']}"):
@@ -114,10 +114,10 @@ def _new_run(chosen: Chosen, seed: int, given: Mapping[str, Any]) -> ReplanRun:
 
 
 def _foreseen(chosen: Chosen, seed: int, given: Mapping[str, Any]) -> ReplanRun | str:
-    """A run that is planned in time, before it begins; if there is none, why.
+    """Plan a run in configuration and time before it begins; return why there is none if planning fails.
 
     Raises:
-        InputError: If an option does not belong here, or the goal moves.
+        InputError: If an option does not apply, or the goal moves.
     """
     from rrtik_ompl.replanning.in_time import plan_in_time
 
@@ -128,7 +128,7 @@ def _foreseen(chosen: Chosen, seed: int, given: Mapping[str, Any]) -> ReplanRun 
         raise InputError("--foreseen: the goal of this scenario moves; leave out --foreseen")
 
     changes = {name: given[name] for name in ("seconds", "clearance") if name in given}
-    settings = replace(chosen.settings, **changes)  # checks them by the names that the options have
+    settings = replace(chosen.settings, **changes)  # reports invalid values by the names of the options
 
     with progress(f"{chosen.problem.name}, planned in time"):
         plan = plan_in_time(
@@ -147,14 +147,14 @@ def _foreseen(chosen: Chosen, seed: int, given: Mapping[str, Any]) -> ReplanRun 
 
 
 def _in_options(reason: str) -> str:
-    """Why nothing was found, with what the command offers in the place of arguments that it has not."""
+    """Replace the remedy in a reason by the corresponding options of this command."""
     what, _, remedy = reason.partition("; ")
     here = next((ours for theirs, ours in REMEDIES.items() if remedy.startswith(theirs)), remedy)
     return f"{what}; {here}" if here else what
 
 
 def _recorded(file: Path, problem: str) -> ReplanRun:
-    """The run of a record, which must be one of the problem.
+    """Load a recorded run, which must belong to the problem.
 
     Raises:
         InputError: If it is not, or is no record.

@@ -1,4 +1,4 @@
-"""The command `rrtik reproduce`: published tables measured again, printed beside what was published."""
+"""The command `rrtik reproduce`: measure published tables again, and print both side by side."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from rich.table import Table as RichTable
 
 NONE: Mapping[str, str] = MappingProxyType({})
-WIDTH = 60  # of a reading in a table for a person
+WIDTH = 60  # width of the column "reading" in a printed table
 
 KEYS = ("name", "published", "measured", "verdict", "reading")
 HEADS = ("figure", *KEYS[1:])
@@ -36,7 +36,7 @@ MEANINGS = (
 
 
 def _folder(given: Path | None) -> Path | None:
-    """The folder; no other option, which typer takes for one where the folder is left out."""
+    """Return the folder; refuse an option, which typer takes for the folder if that is left out."""
     if f"{given or ''}".startswith("-"):
         raise InputError(f"--plot: give a folder, not {given}; ./{given} if it has that name")
     return given
@@ -110,7 +110,7 @@ def reproduce(
 
 
 def _rows(table: Table, quick: bool, kept: Kept, *, shown: bool) -> Sequence[Row]:
-    """Measured, or as an earlier round that was interrupted left them."""
+    """Return the rows of a table: measured now, or kept from an interrupted round."""
     begin = time.perf_counter()
     known = kept.known(table)
     with progress(f"{table.name}: {table.title}, about {_time(_seconds(table, quick))}"):
@@ -145,12 +145,14 @@ def _draw(tables: Iterable[Table], quick: bool, folder: Path) -> int:
 
 
 def chosen(known: Mapping[str, Table], names: Iterable[str], also: Mapping[str, str] = NONE) -> list[Table]:
-    """The tables of these names, in the order of ``known``; ``mb-rrt`` stands for all whose name begins so.
+    """Return the tables with the given names, in the order of ``known``.
+
+    A beginning of names, such as ``mb-rrt``, selects all tables whose names continue it after a hyphen.
 
     Args:
         known: All tables by name.
-        names: Of those that are wanted.
-        also: Other words for beginnings of names.
+        names: Names that are wanted.
+        also: Alternative words for beginnings of names.
 
     Raises:
         UnknownNameError: If a name fits none.
@@ -174,35 +176,35 @@ def _seconds(table: Table, quick: bool) -> float:
 
 
 class Verdict(Protocol):
-    """What to make of a figure: the word that is shown, and whether the comparison is a success."""
+    """The result of comparing a figure: a word for display, and whether it counts as a success."""
 
     @property
     def value(self) -> str:
-        """The word."""
+        """The word for display."""
 
     @property
     def passes(self) -> bool:
-        """Whether it is a success."""
+        """Whether it counts as a success."""
 
 
 class Row(Protocol):
-    """One figure, as printed and as measured, and how the text was read; no verdict where there is nothing to judge."""
+    """One figure as published and as measured, and the reading of the text; without comparison there is no verdict."""
 
     @property
     def name(self) -> str:
-        """What it is."""
+        """Name of the figure."""
 
     @property
     def published(self) -> str:
-        """As printed."""
+        """The published value."""
 
     @property
     def measured(self) -> str:
-        """As it comes out here."""
+        """The measured value."""
 
     @property
     def verdict(self) -> Verdict | None:
-        """What to make of it."""
+        """The result of the comparison."""
 
     @property
     def reading(self) -> str:
@@ -210,18 +212,18 @@ class Row(Protocol):
 
 
 class Figure(Protocol):
-    """A figure of a publication, drawn from our measurement; see `rrtik_bench.figures.Figure`."""
+    """A figure of a publication, drawn from our own measurement; see `rrtik_bench.figures.Figure`."""
 
     name: str
     title: str
     source: str
 
     def save(self, file: Path, quick: bool, /) -> None:
-        """Measure what it shows, and draw it."""
+        """Measure what the figure shows, and draw it."""
 
 
 class Table(Protocol):
-    """A published table as a package offers it; see `rrtik_bench.tables.Table`."""
+    """A published table offered by a package; see `rrtik_bench.tables.Table`."""
 
     name: str
     title: str
@@ -233,7 +235,7 @@ class Table(Protocol):
     figures: Sequence[Figure]
 
     def run(self, quick: bool, /) -> Sequence[Row]:
-        """Measure it again."""
+        """Measure the table again."""
 
 
 Done = Sequence[tuple[Table, Sequence[Row]]]
@@ -243,18 +245,18 @@ Done = Sequence[tuple[Table, Sequence[Row]]]
 
 
 def cells(row: Row) -> tuple[str, ...]:
-    """As a table shows it."""
+    """Return the texts of a row of a printed table."""
     return row.name, row.published, row.measured, "-" if row.verdict is None else row.verdict.value, row.reading
 
 
 def plain(row: Row) -> dict[str, str | None]:
-    """As JSON has it: ``verdict`` is null where there is nothing to judge."""
+    """Return a row as plain values for JSON; ``verdict`` is null if nothing is compared."""
     verdict = None if row.verdict is None else row.verdict.value
     return {**dict(zip(KEYS, cells(row), strict=True)), "verdict": verdict}
 
 
 def counted(done: Done) -> str:
-    """How many of each verdict."""
+    """Return the number of each verdict, in words."""
     counts = Counter(row.verdict.value for _, rows in done for row in rows if row.verdict is not None)
     silent = sum(row.verdict is None for _, rows in done for row in rows)
     words = [f"{counts[word]} {word}" for word in sorted(counts, key=VERDICTS.index)]
@@ -262,7 +264,7 @@ def counted(done: Done) -> str:
 
 
 def page(done: Done, quick: bool) -> str:
-    """The whole comparison as Markdown."""
+    """Return the whole comparison as Markdown."""
     import platform
 
     from rrtik_ompl.benchmark.tables import markdown_table
@@ -315,19 +317,19 @@ def _time(seconds: float) -> str:
 
 @dataclass(frozen=True, slots=True)
 class KeptVerdict:
-    """A verdict as it was kept."""
+    """A verdict read back from a file."""
 
     value: str
 
     @property
     def passes(self) -> bool:
-        """Whether it is a success."""
+        """Whether it counts as a success."""
         return self.value != "missed"
 
 
 @dataclass(frozen=True, slots=True)
 class KeptRow:
-    """A row as it was kept."""
+    """A row read back from a file."""
 
     name: str
     published: str
@@ -337,11 +339,11 @@ class KeptRow:
 
 
 class Kept:
-    """The tables that a round has measured, in a file beside its page; without a page nothing is kept.
+    """Storage for the tables that a round has measured, in a file beside its page; without a page nothing is kept.
 
     Args:
         markdown: The page.
-        quick: Whether the round is the quick one; the rows of another round, or of another version, are not taken.
+        quick: Whether the round is the quick one; rows of another round, or of another version, are not used.
     """
 
     def __init__(self, markdown: Path | None, quick: bool) -> None:
@@ -354,17 +356,17 @@ class Kept:
                 self._lines[json.loads(line)["table"]] = line
 
     def known(self, table: Table) -> Sequence[Row] | None:
-        """The rows of a table that this round has measured before it was interrupted."""
+        """Return the rows of a table that this round measured before it was interrupted; None if there are none."""
         line = self._lines.get(table.name)
         if line is None or json.loads(line)["round"] != self._round:
             return None
         return [_row(each) for each in json.loads(line)["rows"]]
 
     def add(self, table: Table, rows: Sequence[Row]) -> None:
-        """Keep the rows of a table.
+        """Store the rows of a table.
 
         Raises:
-            InputError: If there is no room for them; what was kept before is still there.
+            InputError: If the disk is full; rows stored before are still there.
         """
         if self.file is None:
             return
@@ -373,7 +375,7 @@ class Kept:
         write_text(self.file, "".join(f"{each}\n" for each in self._lines.values()))
 
     def forget(self) -> None:
-        """The round has come to its end."""
+        """Delete the file at the end of the round."""
         if self.file is not None:
             self.file.unlink(missing_ok=True)
 

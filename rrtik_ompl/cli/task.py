@@ -1,4 +1,4 @@
-"""The commands `rrtik straight` and `rrtik task`: lines of the tip, and sequences of stages."""
+"""The commands `rrtik straight` and `rrtik task`: linear motions of the tip, and sequences of stages."""
 
 from __future__ import annotations
 
@@ -142,14 +142,14 @@ def task(
 
 
 def _document(plan: TaskPlan) -> dict[str, Any]:
-    """A plan for machines."""
+    """Return a plan as plain values for JSON."""
     motions = [{"stage": str(s), "waypoints": len(p.waypoints)} for s, p in zip(plan.stages, plan.paths, strict=True)]
     kept = {"found": plan.found, "reason": plan.reason, "chosen": list(plan.chosen), "notes": list(plan.notes)}
     return {**kept, "motions": motions}
 
 
 def plan_lines(name: str, plan: TaskPlan, wrong: frozenset[int] = frozenset()) -> list[str]:
-    """A plan for a person: a line for each motion, and its notes; ``wrong``: numbers of motions that are not valid."""
+    """Return a plan as text: a line for each motion, and its notes; ``wrong``: numbers of the invalid motions."""
     from rrtik_ompl.world.route_check import as_it_stands
 
     chosen = f", alternatives {', '.join(str(k + 1) for k in plan.chosen)}" if plan.chosen else ""
@@ -164,7 +164,7 @@ def plan_lines(name: str, plan: TaskPlan, wrong: frozenset[int] = frozenset()) -
 
 
 def _timed(plan: TaskPlan, file: Path, share: float, pause: float) -> float:
-    """Time a task and save its trajectory; its duration [s]."""
+    """Time a task and save its trajectory; return its duration [s]."""
     from rrtik_ompl import RateLimits, time_task
 
     with progress("timing"):

@@ -1,4 +1,4 @@
-"""What a person sees of the command line: text and tables on standard output, progress and warnings on the other."""
+"""Output of the command line: text and tables on standard output, progress and warnings on standard error."""
 
 from __future__ import annotations
 
@@ -23,17 +23,18 @@ if TYPE_CHECKING:
 
 TRAJECTORY_FORMATS = (".json", ".csv", ".yaml", ".mcap")
 PAGE_FORMATS = (".html", ".htm")
-SPINNER_AFTER = 0.3  # [s]; what takes no longer is done before anybody has read what it is
-GAP = "   "  # between two columns
-AGAIN_SECONDS = 0.02  # until a Ctrl-C that was lost comes once more
+# [s]; a spinner appears only after this time, because shorter tasks end before the message can be read.
+SPINNER_AFTER = 0.3
+GAP = "   "  # gap between two columns
+AGAIN_SECONDS = 0.02  # delay after which a lost Ctrl-C is repeated
 
 
 class Table:
-    """Rows under heads, every column as wide as it needs.
+    """A table of text with columns as wide as their contents.
 
     Args:
-        heads: Of the columns.
-        right: Numbers of the columns whose cells end in line.
+        heads: Headings of the columns.
+        right: Numbers of the columns that are aligned to the right.
     """
 
     def __init__(self, *heads: str, right: Collection[int] = ()) -> None:
@@ -41,7 +42,7 @@ class Table:
         self._right = right
 
     def add_row(self, *cells: str) -> None:
-        """Add a row below the others."""
+        """Append a row."""
         self._rows.append(cells)
 
     def __str__(self) -> str:
@@ -56,24 +57,24 @@ class Table:
 
 
 def _width(text: str) -> int:
-    """How many places of a terminal a text takes."""
+    """Return the number of terminal columns that a text occupies."""
     return sum(2 if east_asian_width(letter) in "WF" else 1 for letter in text)
 
 
 def warn(message: Warning | str, *_: Any, **__: Any) -> None:
-    """Say a warning in one line, in place of ``warnings.showwarning``."""
+    """Print a warning in one line; a replacement for ``warnings.showwarning``."""
     print(f"rrtik: warning: {message}", file=sys.stderr)
 
 
 def note(message: str) -> None:
-    """Say in one line, on standard error, what takes a while."""
+    """Print a message in one line on standard error."""
     print(f"rrtik: {message}", file=sys.stderr)
 
 
 def prepare_terminal() -> None:
-    """Say warnings and notices here, and make printing safe.
+    """Redirect warnings and notices to this module, and make printing safe.
 
-    A stream that was closed leads nowhere; a letter that a terminal lacks is spelt out.
+    A closed stream is replaced by the null device; letters that a terminal lacks are escaped.
     """
     warnings.showwarning = warn
     notice.listener = note
@@ -86,16 +87,16 @@ def prepare_terminal() -> None:
 
 
 def drop_output() -> None:
-    """Let what could not be printed go, so that the end of the process does not try again."""
+    """Discard output that could not be printed, so that the end of the process does not try again."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 @contextmanager
 def stoppable() -> Iterator[None]:
-    """Let Ctrl-C end what is done here with KeyboardInterrupt, wherever it comes.
+    """Make Ctrl-C end the block with KeyboardInterrupt, wherever it occurs.
 
-    Where numpy compares rows it makes another error of it, and where the collector of garbage calls something Python
-    prints it and goes on: then it comes once more.
+    While numpy compares rows, it converts KeyboardInterrupt to another error, which is converted back here. In a
+    callback of the garbage collector, Python prints it and goes on; then the signal is sent again.
     """
     usual = signal.getsignal(signal.SIGINT)
     unraised = sys.unraisablehook
@@ -106,7 +107,7 @@ def stoppable() -> Iterator[None]:
         came = True
         if not in_hook:
             raise KeyboardInterrupt
-        once_more()  # for Python would lose this one, too
+        once_more()  # Python would lose this one, too
 
     def lost(what: sys.UnraisableHookArgs) -> None:
         nonlocal in_hook
@@ -118,7 +119,7 @@ def stoppable() -> Iterator[None]:
         in_hook = False
 
     def once_more() -> None:
-        again = Timer(AGAIN_SECONDS, os.kill, (os.getpid(), signal.SIGINT))  # which ends what waits, too
+        again = Timer(AGAIN_SECONDS, os.kill, (os.getpid(), signal.SIGINT))  # a signal also ends blocking calls
         again.daemon = True
         again.start()
 
@@ -141,7 +142,7 @@ def stoppable() -> Iterator[None]:
 
 
 def say(*items: Any) -> None:
-    """Print texts and tables, rich's too, on standard output."""
+    """Print texts and tables, also those of rich, on standard output."""
     if all(isinstance(item, str | Table) for item in items):
         for item in items:
             print(item)
@@ -149,7 +150,7 @@ def say(*items: Any) -> None:
 
     from rich.console import Console
 
-    # Wider than any table: where there is less room lines are broken, but no number is cut.
+    # The console is wider than any table: a narrow terminal wraps lines, but no number is truncated.
     console = Console(highlight=False, soft_wrap=True, markup=False, width=1000)
 
     with console.capture() as captured:
@@ -159,24 +160,24 @@ def say(*items: Any) -> None:
 
 
 def suggest(*steps: str) -> None:
-    """Say in a last line what may come next, where a person reads it: on a terminal, not in a file or a pipe."""
+    """Print possible next steps in a last line, but only on a terminal, not to a file or a pipe."""
     if steps and sys.stdout.isatty():
         say(f"next: {'; '.join(steps)}")
 
 
 def plural(number: int, noun: str) -> str:
-    """A number with its noun: "1 pose", "2 poses"."""
+    """Return a number with its noun: "1 pose", "2 poses"."""
     return f"{number} {noun}{'' if number == 1 else 's'}"
 
 
 def command(*words: object) -> str:
-    """A command of ours as it is typed."""
+    """Return a command of `rrtik` as it is typed."""
     return shlex.join(["rrtik", *map(str, words)])
 
 
 @contextmanager
 def progress(message: str) -> Iterator[None]:
-    """A spinner on standard error if something takes time; nothing unless that is a terminal."""
+    """Show a spinner on standard error if a task takes time; nothing unless that is a terminal."""
     if not sys.stderr.isatty():
         yield
         return
@@ -190,7 +191,7 @@ def progress(message: str) -> Iterator[None]:
         shown[0].start()
 
     timer = Timer(SPINNER_AFTER, show)
-    timer.daemon = True  # nobody waits for it if the program is to end
+    timer.daemon = True  # must not delay the end of the program
     timer.start()
 
     try:
@@ -204,7 +205,11 @@ def progress(message: str) -> Iterator[None]:
 
 @contextmanager
 def counter(message: str, total: int) -> Iterator[Callable[[int], object]]:
-    """A bar on standard error, showing how many of ``total`` are done; nothing unless that is a terminal."""
+    """Show a bar on standard error with the progress up to ``total``; nothing unless that is a terminal.
+
+    Yields:
+        A function that is called with the number of completed steps.
+    """
     if not sys.stderr.isatty():
         yield lambda _: None
         return
@@ -219,14 +224,14 @@ def counter(message: str, total: int) -> Iterator[Callable[[int], object]]:
 
 
 def problem_names(incomplete: str) -> list[str]:
-    """Shipped problems that begin so: what a shell completes."""
+    """Return the shipped problems that begin with a text, for the completion of a shell."""
     from rrtik_ompl.description.catalog import list_problems
 
     return [name for name in list_problems() if name.startswith(incomplete)]
 
 
 def shown_names(incomplete: str) -> list[str]:
-    """Shipped problems and robots that begin so."""
+    """Return the shipped problems and robots that begin with a text, for the completion of a shell."""
     from rrtik_ompl.description.catalog import list_robots
 
     return problem_names(incomplete) + [name for name in list_robots() if name.startswith(incomplete)]

@@ -15,7 +15,7 @@ TrustXacro = Annotated[
 
 
 def with_trust(command: Callable[..., int]) -> Callable[..., int]:
-    """A command that takes one option more; all that it opens is then trusted."""
+    """Return a command with the additional option `--trust-xacro`, which applies to all files that it opens."""
 
     @wraps(command)
     def run(*, trust_xacro: bool = False, **given: Any) -> int:
@@ -26,7 +26,8 @@ def with_trust(command: Callable[..., int]) -> Callable[..., int]:
 
     option = inspect.Parameter("trust_xacro", inspect.Parameter.KEYWORD_ONLY, default=False, annotation=TrustXacro)
 
-    signature = inspect.signature(command, eval_str=True)  # typer looks names up where the wrapper is, not the command
+    # Annotations are evaluated here, because typer would look names up in the wrapper's module.
+    signature = inspect.signature(command, eval_str=True)
     shown = [each.replace(kind=inspect.Parameter.KEYWORD_ONLY) for each in signature.parameters.values()]
     run.__signature__ = signature.replace(parameters=[*shown, option])  # type: ignore[attr-defined]
     run.__annotations__ = {each.name: each.annotation for each in (*shown, option)}
