@@ -1,4 +1,4 @@
-"""The methods that others use, beside which ours are measured."""
+"""Inverse kinematics methods in common use, as baselines for comparison."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from rrtik_ompl.ik.numeric.restarts import MAX_ROUNDS, STARTS, Walk, restarted
 from rrtik_ompl.model.goal import Target
 from rrtik_ompl.model.robot import Robot
 
-SUFFICIENT_STARTS = 4  # starts that arrive before the others of a round are given up
+SUFFICIENT_STARTS = 4  # number of starts whose arrival ends a round
 
 
 def _walks(walk: Walk, starts: int = STARTS, rounds: int = MAX_ROUNDS) -> Callable[[IkRequest], IkResponse]:

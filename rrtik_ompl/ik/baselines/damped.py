@@ -1,4 +1,4 @@
-"""Steps by the Jacobian: damped least squares for many starts at once, and Pinocchio's iteration for one.
+"""Jacobian methods: damped least squares for many starts at once, and Pinocchio's iteration for one start.
 
 Sources: [24]; the inverse kinematics example in Pinocchio's documentation (step 0.1, damping 1e-12, at most 1000
 steps), which does not regard joint limits.
@@ -16,28 +16,28 @@ from rrtik_ompl.model.goal import Target
 from rrtik_ompl.model.robot import Robot, jacobians, pinocchio_rows, poses
 
 ITERATIONS = 200
-DAMPING = 0.05  # [m] or [rad]; constant, squared where it is used
-LARGEST_STEP = 0.5  # [rad] or [m] of any joint
-STEPS = 1000  # of Pinocchio's iteration, at most
-STEP = 0.1  # of it: the share of the error that one removes
-TINY = 1e-12  # its damping
-CLOSE = 1e-4  # [m] and [rad], the norm of the error at which it ends
+DAMPING = 0.05  # constant damping [m or rad]; it is squared where it is used
+LARGEST_STEP = 0.5  # largest step of any joint [rad or m]
+STEPS = 1000  # largest number of steps of Pinocchio's iteration
+STEP = 0.1  # share of the error that one step of Pinocchio's iteration removes
+TINY = 1e-12  # damping of Pinocchio's iteration
+CLOSE = 1e-4  # norm of the error [m and rad] at which Pinocchio's iteration ends
 
 
 def damped_least_squares(
     robot: Robot, goal: Target, starts: Matrix, *, iterations: int = ITERATIONS, enough: int | None = None
 ) -> tuple[Matrix, int]:
-    """Steps dq = J^T (J J^T + damping^2)^-1 e from many starts, cut off at the limits.
+    """Take steps dq = J^T (J J^T + damping^2 I)^-1 e from many starts, clipped to the limits.
 
     Args:
         robot: The arm.
         goal: A pose, or a position with any orientation.
-        starts: Shape (m, dof).
-        iterations: At most.
-        enough: Stop when so many starts have arrived; all of them if None.
+        starts: Configurations to start from, shape (m, dof).
+        iterations: Largest number of steps.
+        enough: Number of starts that have to arrive; all of them if None.
 
     Returns:
-        Where each start has led to, shape (m, dof), and the steps taken.
+        The last configuration of each start, shape (m, dof), and the number of steps taken.
     """
     rows = slice(0, 6 if goal.oriented else 3)
 
@@ -52,10 +52,10 @@ def damped_least_squares(
 
 
 def pinocchio_iteration(robot: Robot, goal: Target, starts: Matrix) -> tuple[Matrix, int]:
-    """Pinocchio's own loop, start after start; angles are brought into the limits by full turns where that helps.
+    """Run Pinocchio's own loop from each start; angles are moved into the limits by full turns where that helps.
 
     Returns:
-        Where each start has led to, inside the limits or not, shape (m, dof), and the steps taken.
+        The last configuration of each start, inside the limits or not, shape (m, dof), and the number of all steps.
     """
     walked = [_one_start(robot, goal, q) for q in starts]
     return np.array([q for q, _ in walked]), sum(steps for _, steps in walked)
@@ -91,7 +91,7 @@ def _one_start(robot: Robot, goal: Target, q: Vector) -> tuple[Vector, int]:
 
 
 def _into_limits(robot: Robot, q: Vector) -> Vector:
-    """Turning joints moved by full turns to the lowest value above their lower limit."""
+    """Move joints that turn by full turns to the lowest value above their lower limit."""
     turning = ~robot.prismatic & np.isfinite(robot.lower)
     moved: Vector = np.where(turning, q + TAU * np.ceil((np.where(turning, robot.lower, 0.0) - q) / TAU), q)
     return moved

@@ -1,15 +1,15 @@
 """Methods that turn one joint at a time: cyclic coordinate descent, and FABRIK.
 
 Cyclic coordinate descent [27] sets each joint to its own optimum, from the last to the first. The cost of a pose is the
-squared distance of the tip and of the ends of its three axes, drawn as long as a part of the reach.
+sum of the squared distances of the tip and of the ends of its three axes, whose length is a share of the reach.
 
-FABRIK [28] takes the joints as points at fixed distances, pulled to the goal from the tip, then back to the base. On
-the way back each joint turns about its own axis, inside its limits, to where it brings the points after it nearest to
-where they were pulled, so that the arm keeps its joints in the plane and in space. With that convergence is no longer
-certain, and other starts are tried.
+FABRIK [28] treats the joints as points at fixed distances, which are pulled to the goal from the tip, then back to the
+base. Here, on the way back each joint turns about its own axis, inside its limits, to bring the points after it nearest
+to where they were pulled. So the result is a configuration of the arm in the plane and in space, but convergence is no
+longer certain, and other starts are tried.
 
-A joint that turns vectors v about its axis a brings them nearest to wanted vectors u where
-A cos(angle) + B sin(angle) is greatest, A being the sum of u.(v - (a.v) a) and B that of u.(a x v).
+A joint that turns vectors v about its axis a brings them nearest to wanted vectors u at the angle that maximises
+A cos(angle) + B sin(angle), where A is the sum of u.(v - (a.v) a) and B the sum of u.(a x v).
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ from rrtik_ompl.model.goal import Target
 from rrtik_ompl.model.robot import Robot, poses, reach_of
 
 SWEEPS = 300
-AXIS_LENGTH = 0.3  # of the tip's axes, in units of the reach
+AXIS_LENGTH = 0.3  # length of the tip's axes, in units of the reach
 PASSES = 200
-TIP_WEIGHT = 3.0  # in space, beside the other points; the next point alone never led spatial arms to the goal
-# three rows of nine: the matrices of v -> (x, y, z axis) x v, for rows v
+TIP_WEIGHT = 3.0  # Weight of the tip for spatial arms, which never reached the goal if only the next point counted.
+# Each row is a flattened 3 x 3 matrix M, for one of the axes x, y, z, such that v @ M is the cross product axis x v.
 CROSS = np.array(
     [[0, 0, 0, 0, 0, 1, 0, -1, 0], [0, 0, -1, 0, 0, 0, 1, 0, 0], [0, 1, 0, -1, 0, 0, 0, 0, 0]], dtype=float
 )
@@ -37,17 +37,17 @@ CROSS = np.array(
 def ccd(
     robot: Robot, goal: Target, starts: Matrix, *, sweeps: int = SWEEPS, enough: int | None = None
 ) -> tuple[Matrix, int]:
-    """Sweep over the joints from many starts, inside the limits.
+    """Run cyclic coordinate descent from many starts, inside the limits.
 
     Args:
         robot: An arm without coupled joints.
         goal: A pose, or a position with any orientation.
-        starts: Shape (m, dof).
-        sweeps: At most.
-        enough: Stop when so many starts have arrived; all of them if None.
+        starts: Configurations to start from, shape (m, dof).
+        sweeps: Largest number of sweeps over the joints.
+        enough: Number of starts that have to arrive; all of them if None.
 
     Returns:
-        Where each start has led to, shape (m, dof), and the sweeps taken.
+        The last configuration of each start, shape (m, dof), and the number of sweeps taken.
     """
     joints = joints_to_tip(robot)[::-1]
     length = AXIS_LENGTH * reach_of(robot)
@@ -55,7 +55,10 @@ def ccd(
 
 
 def _sweep(robot: Robot, goal: Target, Q: Matrix, joints: tuple[Joint, ...], length: float) -> Matrix:
-    """Every joint once; the frames before a joint stay where they were, so that one forward kinematics is enough."""
+    """Set every joint once to its optimum, from the last to the first; Q, shape (m, dof), is changed in place.
+
+    Frames before a joint do not move with it, so forward kinematics is computed only once.
+    """
     frames = robot.chain.joint_frames(Q)
     tips = poses(robot, Q)
 
@@ -83,7 +86,20 @@ def _move(
     points: NDArray[np.float64],
     wanted: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Set one joint of Q in place to its optimum, and move the points, shape (m, k, 3), with it."""
+    """Set one joint to its optimum, and move the points that it carries.
+
+    Args:
+        robot: The arm.
+        joint: The joint.
+        Q: Configurations, shape (m, dof), changed in place.
+        axis: Axis of the joint in the world, shape (m, 3).
+        origin: Origin of the joint in the world, shape (m, 1, 3).
+        points: Points that the joint moves, shape (m, k, 3).
+        wanted: Wanted points, shape (1, k, 3).
+
+    Returns:
+        The moved points, shape (m, k, 3).
+    """
     column = joint.column
     low, high = room(robot, joint, Q)
     if joint.prismatic:
@@ -99,7 +115,7 @@ def _move(
 
 
 def fabrik_misfit(robot: Robot, target: Target) -> str:
-    """Why it does not fit: poses, sliding or coupled joints."""
+    """Return why FABRIK does not fit: the target is a pose, or joints slide or are coupled; "" if it fits."""
     if target.oriented:
         return "it moves points and knows no orientation; give a position"
     if robot.prismatic.any():
@@ -110,17 +126,17 @@ def fabrik_misfit(robot: Robot, target: Target) -> str:
 def fabrik(
     robot: Robot, goal: Target, starts: Matrix, *, iterations: int = PASSES, enough: int | None = None
 ) -> tuple[Matrix, int]:
-    """Pull from many starts, inside the limits.
+    """Run FABRIK from many starts, inside the limits.
 
     Args:
         robot: An arm of turning joints.
         goal: A position.
-        starts: Shape (m, dof).
-        iterations: Backward and forward passes, at most.
-        enough: Stop when so many starts have arrived; all of them if None.
+        starts: Configurations to start from, shape (m, dof).
+        iterations: Largest number of backward and forward passes.
+        enough: Number of starts that have to arrive; all of them if None.
 
     Returns:
-        Where each start has led to, shape (m, dof), and the iterations taken.
+        The last configuration of each start, shape (m, dof), and the number of passes taken.
     """
     joints = joints_to_tip(robot)
     return walked(robot, goal, starts, lambda Q: _pass(robot, goal, Q, joints), iterations, enough)
@@ -148,7 +164,10 @@ def _pass(robot: Robot, goal: Target, Q: Matrix, joints: tuple[Joint, ...]) -> M
 
 
 def _pulled(points: NDArray[np.float64], goal: Target) -> NDArray[np.float64]:
-    """The points, shape (m, k, 3), pulled after the last one, which is put on the goal; the distances are kept."""
+    """Put the last of the points, shape (m, k, 3), on the goal and pull the others after it; distances are kept.
+
+    The first point, at the base, stays where it is.
+    """
     pulled = points.copy()
     pulled[:, -1] = goal.point
     for k in range(points.shape[1] - 2, 0, -1):
@@ -160,7 +179,7 @@ def _pulled(points: NDArray[np.float64], goal: Target) -> NDArray[np.float64]:
 
 
 def _weights(robot: Robot, points: int) -> Vector:
-    """What the points that a joint moves count in its angle: in the plane the next one alone, in space all of them."""
+    """Return the weights of points that a joint moves, shape (points,): for planar arms only the next one counts."""
     weights = np.ones(points)
     if robot.planar:
         weights[1:] = 0.0
@@ -171,7 +190,14 @@ def _weights(robot: Robot, points: int) -> Vector:
 
 @dataclass(frozen=True, slots=True)
 class Joint:
-    """A joint on the way to the tip: its row in the chain, its column in q, radians (or metres) per unit of q."""
+    """A joint between base and tip.
+
+    Attributes:
+        row: Its row in the chain.
+        column: Its entry of q.
+        gain: Motion of the joint [rad or m] per unit of that entry.
+        prismatic: Whether it slides.
+    """
 
     row: int
     column: int
@@ -180,14 +206,14 @@ class Joint:
 
 
 def coupled_fault(robot: Robot) -> str:
-    """Why joints cannot be moved one at a time: "" if none is coupled."""
+    """Return why the joints cannot be moved one at a time; "" if none is coupled."""
     used = robot.chain.gain != 0.0
     alone = (used.sum(axis=1) <= 1).all() and (used.sum(axis=0) == 1).all()
     return "" if alone else "it moves one joint at a time, and this robot couples some"
 
 
 def joints_to_tip(robot: Robot) -> tuple[Joint, ...]:
-    """The joints that move the tip, base first."""
+    """Return the joints that move the tip, base first."""
     row = robot.model.frames[robot.model.getFrameId(robot.tip)].parentJoint - 1
     found: list[Joint] = []
     while row >= 0:
@@ -201,12 +227,12 @@ def joints_to_tip(robot: Robot) -> tuple[Joint, ...]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Swing:
-    """Vectors, shape (m, k, 3), seen from unit axes about which they turn.
+    """Vectors that turn about unit axes; all arrays have shape (m, k, 3).
 
     Attributes:
-        vectors: As given.
-        outward: Their parts across the axes.
-        ahead: Where these parts move, as long as they are: axis x vector.
+        vectors: The vectors.
+        outward: Their components perpendicular to the axes.
+        ahead: The directions in which these components move, axis x vector.
     """
 
     vectors: NDArray[np.float64]
@@ -215,32 +241,37 @@ class Swing:
 
     @classmethod
     def about(cls, axis: Matrix, vectors: NDArray[np.float64]) -> Swing:
-        """Rotation of vectors, shape (m, k, 3), from axes, shape (m, 3)."""
+        """Prepare the rotation of vectors, shape (m, k, 3), about unit axes, shape (m, 3)."""
         cross = (axis @ CROSS).reshape(-1, 3, 3)  # v @ cross = axis x v
         ahead = vectors @ cross
         return cls(vectors, -(ahead @ cross), ahead)
 
     def best(self, wanted: NDArray[np.float64], low: Vector, high: Vector) -> Vector:
-        """Angles in [low, high], shape (m,), that bring the vectors nearest to wanted ones, shape (m, k, 3).
+        """Return the angles in [low, high] [rad], shape (m,), that bring the vectors nearest to wanted ones.
 
-        Where the angle does not matter (vectors on the axis) 0, or the end nearest to it.
+        Where the angle does not matter (vectors on the axis) it is 0, or the end nearest to 0.
+
+        Args:
+            wanted: Wanted vectors, shape (m, k, 3).
+            low: Smallest angles [rad], shape (m,).
+            high: Largest angles [rad], shape (m,).
         """
         A = (self.outward * wanted).sum(axis=(1, 2))
         B = (self.ahead * wanted).sum(axis=(1, 2))
         best = np.arctan2(B, A)
 
-        # by full turns into the limits, from below, then from above
+        # Move the angles by full turns into the limits, from below, then from above.
         best = best + TAU * np.ceil((low - best) / TAU).clip(0.0, None)
         best = best - TAU * np.ceil((best - high) / TAU).clip(0.0, None)
 
-        # where no turn of it is inside, the better end of the two
+        # If no such angle is inside, take the better one of the two ends.
         lower_end = A * np.cos(low) + B * np.sin(low) >= A * np.cos(high) + B * np.sin(high)
         is_inside = (best >= low) & (best <= high)
         angle: Vector = np.where(is_inside, best, np.where(lower_end, low, high))
         return np.where(np.hypot(A, B) > 0.0, angle, np.clip(0.0, low, high))
 
     def turned(self, angle: Vector) -> NDArray[np.float64]:
-        """The vectors turned by angles, shape (m,)."""
+        """Return the vectors turned by angles [rad], shape (m,); shape (m, k, 3)."""
         cosine = np.cos(angle)[:, None, None]
         sine = np.sin(angle)[:, None, None]
         rotated: NDArray[np.float64] = self.vectors + sine * self.ahead - (1.0 - cosine) * self.outward
@@ -248,7 +279,10 @@ class Swing:
 
 
 def room(robot: Robot, joint: Joint, Q: Matrix) -> tuple[Vector, Vector]:
-    """How far a joint of the chain may still move down and up [rad or m], each of shape (m,), 1000 if no limit."""
+    """Return how far a joint may still move down (at most 0) and up [rad or m], shape (m,) each.
+
+    A missing limit counts as 1000.
+    """
     limits = np.array([robot.lower[joint.column], robot.upper[joint.column]]).clip(-1e3, 1e3)
     low, high = np.sort((limits[:, None] - Q[:, joint.column]) * joint.gain, axis=0)
     return low, high

@@ -1,7 +1,7 @@
-"""Particle swarms: several at once, with velocities, or fully resampled: every particle drawn anew each time.
+"""Particle swarm optimisation, several swarms at once: with velocities, or with particles resampled in each iteration.
 
-Sources: [29] (constriction); [30] (no velocity: a particle is drawn from the normal distribution between its own best
-place and the swarm's).
+Sources: [29] (constriction); [30] (no velocity: a particle is drawn from a normal distribution around the middle of its
+own best place and the swarm's).
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.model.goal import Target
 from rrtik_ompl.model.robot import Robot
 
-PARTICLES = 32  # of a swarm
+PARTICLES = 32  # particles of a swarm
 ITERATIONS = 400
-CONSTRICTION = 0.7298  # of the motion before, with which [29] makes swarms come to rest
-ATTRACTION = 1.49618  # most of the way to the own best place, and to the swarm's
+CONSTRICTION = 0.7298  # factor on the last motion, with which [29] makes swarms come to rest
+ATTRACTION = 1.49618  # largest factor on the way to a particle's best place, and on that to the swarm's
 ORIENTATION_WEIGHT = 0.3  # [m/rad]; with 0.1 or 1 swarms of TITAN-4 and Panda arrived half as often
 
 Swarms: TypeAlias = NDArray[np.float64]  # shape (swarms, particles, dof)
@@ -27,29 +27,31 @@ Move: TypeAlias = Callable[[np.random.Generator, Swarms, Swarms, Swarms, Swarms]
 
 
 def pso(robot: Robot, goal: Target, starts: Matrix) -> tuple[Matrix, int]:
-    """Swarms with velocities. As `swarm`."""
+    """Search for a goal by swarms with velocities; arguments and results are those of `swarm`."""
     return swarm(robot, goal, starts, _with_velocity)
 
 
 def resampled_pso(robot: Robot, goal: Target, starts: Matrix) -> tuple[Matrix, int]:
-    """Swarms without velocities, all particles drawn anew each iteration. As `swarm`."""
+    """Search for a goal by swarms whose particles are resampled; arguments and results are those of `swarm`."""
     return swarm(robot, goal, starts, _drawn)
 
 
 def swarm(
     robot: Robot, goal: Target, starts: Matrix, move: Move, *, iterations: int = ITERATIONS
 ) -> tuple[Matrix, int]:
-    """Let swarms search for a goal, until one of them is there.
+    """Let swarms search for a goal until one of them is there.
 
     Args:
         robot: The arm.
         goal: A pose, or a position with any orientation.
-        starts: First places, shape (m, dof); `PARTICLES` of them make a swarm. The random numbers follow from them.
-        move: From random numbers, places, places before, own best places and the swarms' best to the next places.
-        iterations: At most.
+        starts: First configurations, shape (m, dof); `PARTICLES` of them make a swarm. They also seed the random
+            numbers.
+        move: Function from the random generator, places, places before, each particle's best places and the swarms'
+            best places to the next places.
+        iterations: Largest number of iterations.
 
     Returns:
-        The best place of each swarm, shape (swarms, dof), and the iterations taken.
+        The best configuration of each swarm, shape (swarms, dof), and the number of iterations taken.
     """
     rng = np.random.default_rng(np.frombuffer(np.ascontiguousarray(starts).tobytes(), dtype=np.uint32))
     swarms = max(1, len(starts) // PARTICLES)
@@ -80,7 +82,7 @@ def swarm(
 def _with_velocity(
     rng: np.random.Generator, places: Swarms, places_before: Swarms, best_places: Swarms, leader: Swarms
 ) -> Swarms:
-    """Where particles move that have a velocity and are drawn to their own best place and to the leader's."""
+    """Return the next places of particles with a velocity that are attracted by their best place and the leader's."""
     to_best, to_leader = rng.uniform(0.0, ATTRACTION, (2, *places.shape))
     moved: Swarms = (
         places
@@ -94,13 +96,16 @@ def _with_velocity(
 def _drawn(
     rng: np.random.Generator, places: Swarms, places_before: Swarms, best_places: Swarms, leader: Swarms
 ) -> Swarms:
-    """Where particles move that are drawn anew, about the middle of their own best place and the leader's."""
+    """Return places drawn from a normal distribution around the middle of each particle's best place and the leader's.
+
+    Its standard deviation is the distance between these two, joint by joint.
+    """
     del places_before
     drawn: Swarms = 0.5 * (best_places + leader) + np.abs(best_places - leader) * rng.standard_normal(places.shape)
     return drawn
 
 
 def _cost(robot: Robot, goal: Target, Q: Matrix) -> NDArray[np.float64]:
-    """Distance from the goal [m], the angle weighted, of configurations, shape (m, dof); shape (m,)."""
+    """Return distance plus weighted angle from the goal [m] for configurations, shape (m, dof); shape (m,)."""
     distance, angle = goal.errors(robot, Q)
     return distance + ORIENTATION_WEIGHT * angle

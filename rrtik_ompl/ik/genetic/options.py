@@ -1,4 +1,4 @@
-"""What can be set in the genetic algorithm, and the settings that have a name."""
+"""Options of the genetic algorithm, and named presets."""
 
 from __future__ import annotations
 
@@ -16,26 +16,29 @@ from rrtik_ompl.base.units import DEGREE
 
 @dataclass(frozen=True, slots=True)
 class GeneticOptions:
-    """Settings, those of [2] unless said otherwise.
+    """Options of the genetic algorithm; the defaults are those of [2] unless said otherwise.
 
     Attributes:
-        population: Individuals, an even number.
-        tournament: Individuals drawn for each parent, of which the best is taken.
+        population: Number of individuals, an even number.
+        tournament: Number of individuals drawn for each parent, of which the best is taken.
         bit_mutation: Probability with which each bit is flipped.
-        gene_mutation: Probability with which one bit of a gene, drawn at random, is flipped.
+        gene_mutation: Probability with which one random bit of a gene is flipped.
         window: Width of the search [rad or m] from the second point on; None searches the whole range throughout.
-        gain: Of the extrapolation that places the window: 0 at the last point, 1 at its continuation along the last
-            two. None: 1 for an arm with as many joints as the task has dimensions, 0 for one with more (where
-            nothing would brake the motion that leaves the tip at rest).
-        generations: Limit for the whole trajectory.
-        stall: Generations without an improvement by 1 % after which the population is drawn anew; None: never.
-        start_over: Generations without a point gained after which the trajectory begins anew; None: never.
-        refined: How many of the best individuals take a damped Newton step each generation (not in [2]).
-        orientation_weight: What an angle counts [m/rad] beside the distance.
-        motion_weight: What the joints' motion from the last point counts [m/rad].
-        largest_step: Of any joint between two points [rad or m]; individuals farther away are not taken. None: any.
-        singularity_weight: What manipulability counts in favour of a posture [m]; lengths in units of the reach.
-        gray: Whether genes are Gray code; natural binary if not, beside which [2] found it faster.
+        gain: Gain of the extrapolation that places the window: 0 at the last point, 1 at the linear extrapolation of
+            the last two. None means 1 for an arm with as many joints as the task has dimensions, and 0 for one with
+            more (where nothing would brake a motion that leaves the tip at rest).
+        generations: Largest number of generations for the whole trajectory.
+        stall: Number of generations without an improvement by 1 % after which the population is drawn again; None for
+            never.
+        start_over: Number of generations without reaching a point after which the trajectory is begun again; None for
+            never.
+        refined: Number of the best individuals that take a damped Newton step each generation (not in [2]).
+        orientation_weight: Weight of the angle in the cost [m/rad].
+        motion_weight: Weight of the joints' motion from the last point in the cost [m/rad].
+        largest_step: Largest motion of a joint between two points [rad or m]; individuals farther away are not taken.
+            None for any.
+        singularity_weight: Weight of manipulability, with lengths in units of the reach, which lowers the cost [m].
+        gray: Whether genes are Gray code, which [2] found faster; natural binary otherwise.
     """
 
     population: int = 100
@@ -78,9 +81,9 @@ class GeneticOptions:
 
 
 STANDARD = GeneticOptions()
-# fitted to the published counts after the fact: about two flipped bits a generation in the whole population
+# Fitted to the published counts afterwards: about two bits are flipped per generation in the whole population.
 HISTORICAL = GeneticOptions(bit_mutation=0.0, gene_mutation=0.007, stall=1500, start_over=None)
-# a little weight on motion keeps joints at rest that the target leaves free, and the extrapolation from running away
+# A small weight on motion keeps joints at rest that the target leaves free, and keeps the extrapolation stable.
 REFINED = GeneticOptions(refined=10, motion_weight=0.005)
 PRESETS: Mapping[GeneticPreset, GeneticOptions] = MappingProxyType(
     {"standard": STANDARD, "historical": HISTORICAL, "refined": REFINED}

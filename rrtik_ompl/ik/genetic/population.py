@@ -1,8 +1,8 @@
-"""A population of chromosomes, the window of joint values that they encode, and one generation from another.
+"""A population of chromosomes, the window of joint values that they encode, and how a generation follows another.
 
-A chromosome has 16 bits a joint, Gray code or natural binary. Source: [2], equation 1. Every one is a configuration
-inside its window, so that limits need no penalty. Tournament, uniform crossover of bits, mutation: nobody survives
-unchanged.
+A chromosome has 16 bits for each joint, in Gray code or natural binary. Source: [2], equation 1. Every chromosome is a
+configuration inside its window, so that limits need no penalty. The steps are a tournament, uniform crossover of bits,
+and mutation; no individual is carried over unchanged on purpose.
 """
 
 from __future__ import annotations
@@ -24,13 +24,16 @@ Genes: TypeAlias = NDArray[np.uint16]  # shape (population, dof)
 
 
 def to_gray(numbers: Genes) -> Genes:
-    """Gray code of numbers: neighbours differ in one bit. Any shape."""
+    """Return the Gray codes of numbers, in which neighbouring numbers differ in one bit; any shape."""
     codes: Genes = numbers ^ np.right_shift(numbers, 1, dtype=np.uint16)
     return codes
 
 
 def from_gray(codes: Genes) -> Genes:
-    """Numbers of Gray codes, the inverse of `to_gray`: bit k is the parity of the bits from k on. Any shape."""
+    """Return the numbers of Gray codes, the inverse of `to_gray`; any shape.
+
+    Bit k of a number is the parity of the code's bits from k on.
+    """
     numbers: Genes = codes
     for shift in (8, 4, 2, 1):
         numbers = numbers ^ np.right_shift(numbers, shift, dtype=np.uint16)
@@ -39,9 +42,12 @@ def from_gray(codes: Genes) -> Genes:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Window:
-    """The joint values among which is searched: ``centre`` and ``width`` [rad or m], shapes (dof,).
+    """The box of joint values that chromosomes encode.
 
-    ``gray``: whether the genes are Gray code; else natural binary.
+    Attributes:
+        centre: Centre of the box [rad or m], shape (dof,).
+        width: Widths of the box [rad or m], shape (dof,).
+        gray: Whether the genes are Gray code; natural binary otherwise.
     """
 
     centre: Vector
@@ -49,42 +55,42 @@ class Window:
     gray: bool = True
 
     def decode(self, genes: Genes) -> Matrix:
-        """Configurations of chromosomes, shape (population, dof)."""
+        """Return the configurations of chromosomes, shape (population, dof)."""
         numbers = from_gray(genes) if self.gray else genes
         q: Matrix = self.centre + (numbers / LARGEST - 0.5) * self.width
         return q
 
     def encode(self, Q: Matrix) -> Genes:
-        """The chromosomes nearest to configurations, shape (m, dof); outside the window those at its edge."""
+        """Return chromosomes nearest to configurations, shape (m, dof); values outside are clipped to the window."""
         share = (Q - self.centre) / np.where(self.width > 0.0, self.width, 1.0) + 0.5
         numbers = np.round(np.clip(share, 0.0, 1.0) * LARGEST).astype(np.uint16)
         return to_gray(numbers) if self.gray else numbers
 
 
 def whole_range(robot: Robot, *, gray: bool = True) -> Window:
-    """All values inside the limits; of a joint without limits one turn."""
+    """Return the window of all values inside the limits; one turn for a joint without limits."""
     lower, upper = robot.finite_range()
     return Window(0.5 * (lower + upper), upper - lower, gray)
 
 
 def around(robot: Robot, centre: Vector, width: float, *, gray: bool = True) -> Window:
-    """A window of a width [rad or m] at a posture, moved inside the limits; at most as wide as these."""
+    """Return a window of a width [rad or m] around a configuration, moved inside the limits and no wider than these."""
     widths = np.minimum(width, robot.upper - robot.lower)
     return Window(np.clip(centre, robot.lower + 0.5 * widths, robot.upper - 0.5 * widths), widths, gray)
 
 
 def random_genes(rng: np.random.Generator, population: int, dof: int) -> Genes:
-    """Chromosomes drawn uniformly, shape (population, dof)."""
+    """Return chromosomes drawn uniformly, shape (population, dof)."""
     return rng.integers(0, LARGEST + 1, (population, dof), dtype=np.uint16)
 
 
 def children(rng: np.random.Generator, genes: Genes, cost: Vector, options: GeneticOptions) -> Genes:
-    """A new population of the same size.
+    """Breed a new population of the same size.
 
     Args:
-        rng: Random numbers.
-        genes: Shape (population, dof).
-        cost: What is to be small, shape (population,).
+        rng: Source of random numbers.
+        genes: The population, shape (population, dof).
+        cost: Costs of the individuals, shape (population,).
         options: Size of the tournament and rates of mutation.
     """
     parents = genes[_winners(rng, cost, options.tournament)]
@@ -104,7 +110,7 @@ def children(rng: np.random.Generator, genes: Genes, cost: Vector, options: Gene
 
 
 def _winners(rng: np.random.Generator, cost: Vector, size: int) -> np.ndarray:
-    """One winner per place in the population: the best of ``size`` individuals drawn with replacement."""
+    """Return indices of tournament winners, as many as individuals: each the best of ``size`` random individuals."""
     ranks = np.empty(len(cost), dtype=np.int64)
     order = np.argsort(cost, kind="stable")
     ranks[order] = np.arange(len(cost))
@@ -114,7 +120,7 @@ def _winners(rng: np.random.Generator, cost: Vector, size: int) -> np.ndarray:
 
 
 def _flip_bits(rng: np.random.Generator, genes: Genes, rate: float) -> None:
-    """Flip every bit with a probability, in place: as many bits as that gives, at places drawn without repetition."""
+    """Flip every bit with a probability, in place: draw the number of flips, then different places for them."""
     bits = genes.size * BITS
     places = rng.choice(bits, rng.binomial(bits, rate), replace=False, shuffle=False)
     np.bitwise_xor.at(genes.reshape(-1), places // BITS, _bit(places % BITS))

@@ -1,7 +1,7 @@
 """The genetic algorithm along a trajectory: one population follows a target that moves on whenever it is reached.
 
-Source: [2]. The bit strings are kept when the window moves, so that a constant chromosome is a constant velocity
-(gain 0) or acceleration (gain 1), and the population predicts the next point.
+Source: [2]. The window of joint values moves with the target while the bit strings are kept. So a constant chromosome
+means constant velocity (gain 0) or acceleration (gain 1), and the population predicts the next point.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from rrtik_ompl.model.goal import Target, joint_difference
 from rrtik_ompl.model.robot import Robot, inside_limits, jacobians, poses, reach_of
 
 ENDLESS = Budget()
-IMPROVEMENT = 0.99  # of the best cost: less counts as standing still
-MAX_ROUNDS = 64  # populations, after which it gives up
-GENERATIONS = 40  # of each; most that reach the goal do so in ten
+IMPROVEMENT = 0.99  # A cost counts as improved if it falls below this share of the best one.
+MAX_ROUNDS = 64  # number of populations after which the method gives up
+GENERATIONS = 40  # generations of each population; most that reach the goal do so in ten
 
 
 def genetic(request: IkRequest) -> IkResponse:
-    """One population after another, each until it reaches a target or stalls; the targets take turns."""
+    """Solve a request by one population after another, each for `GENERATIONS`; the targets take turns."""
     options = replace(REFINED, generations=GENERATIONS, stall=None, start_over=None)
     found = np.zeros((0, request.robot.dof))
     generations = 0
@@ -55,7 +55,10 @@ def genetic(request: IkRequest) -> IkResponse:
 
 
 def _given_up(request: IkRequest, found: Matrix, generations: int, *, timed_out: bool) -> IkResponse:
-    """What there is, and a posture for the reason: if it is at the goal and will not do, that is the reason."""
+    """Return the response without an acceptable solution, with the configuration that comes nearest to the goal.
+
+    If that one is at the goal but not accepted, it is added to the found ones, so that collision is the reason.
+    """
     robot = request.robot
     nearest = nearest_posture(request)
     row = nearest[None]
@@ -65,17 +68,17 @@ def _given_up(request: IkRequest, found: Matrix, generations: int, *, timed_out:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GeneticRun:
-    """What a run came to.
+    """The result of a run along a trajectory.
 
     Attributes:
-        q: Configurations of the points gained (of the attempt that came farthest), shape (k, dof).
-        generations: In all, over all attempts.
-        cost_of_point: Generations that each of these points took, shape (k,).
-        distances: Of the best individual of every generation from its target [m], shape (generations,).
-        nearest: The configuration that came nearest to the point not gained; that of the last point if all were.
-        fresh: How often the population was drawn anew.
-        attempts: How often the trajectory was begun.
-        timed_out: Whether the clock stopped it, not the limit of generations.
+        q: Configurations of the points reached in the attempt that came farthest, shape (k, dof).
+        generations: Number of generations of all attempts.
+        cost_of_point: Number of generations that each of these points took, shape (k,).
+        distances: Distance of the best individual of each generation from its target [m], shape (generations,).
+        nearest: The configuration that came nearest to the first point not reached; that of the last point if all were.
+        fresh: Number of times that the population was drawn again.
+        attempts: Number of times that the trajectory was begun.
+        timed_out: Whether the time limit ended the run, not the limit of generations.
     """
 
     q: Matrix
@@ -98,16 +101,16 @@ def follow_targets(
     near: Vector | None = None,
     budget: Budget = ENDLESS,
 ) -> GeneticRun:
-    """Reach one target after another until the last is reached, the generations are used up or the time is over.
+    """Reach one target after another until the last is reached, the generations are used up or the time is up.
 
     Args:
         robot: The arm.
         targets: Poses or positions, at least one.
-        options: Of the algorithm.
-        rng: Random numbers.
-        accept: Which of some configurations, shape (k, dof), will do; all if None.
-        near: Posture before the first point, shape (dof,): one individual begins there.
-        budget: How long it may take.
+        options: Options of the algorithm.
+        rng: Source of random numbers.
+        accept: Checks which configurations, shape (k, dof), are acceptable; returns shape (k,). All if None.
+        near: Configuration before the first point, shape (dof,), where one individual begins; or None.
+        budget: Time limit.
     """
     run = GaRun(robot, targets, options, rng, accept, near)
     while len(run.points) < len(targets) and run.generation < options.generations:
@@ -119,22 +122,23 @@ def follow_targets(
 
 @dataclass(eq=False)
 class GaRun:
-    """The state of a run: a population, its window, the points gained so far, and what the restarts watch.
+    """The state of a run: a population, its window, the points reached so far, and counts for restarts.
 
     Attributes:
         robot, targets, options, rng, accept, near: See `follow_targets`.
-        generation: How many there were.
-        attempts: How often the run began before the first point.
-        num_redrawn: How often a population that had stalled was drawn anew.
+        generation: Number of generations so far.
+        attempts: Number of times that the run began at the first point.
+        num_redrawn: Number of times that a population that had stalled was drawn again.
         distances: Best distance of every generation [m].
-        farthest: The points of the attempt that came farthest, each shape (dof,).
-        nearest: The posture that came nearest to the point after these, shape (dof,).
-        best_cost_of_farthest: Its cost; infinite before there is one.
-        points: Of this attempt, each shape (dof,).
-        window: Which angles the bit strings stand for.
+        farthest: The points of the attempt that came farthest, each of shape (dof,).
+        nearest: The configuration that came nearest to the point after these, shape (dof,).
+        best_cost_of_farthest: Cost of ``nearest``; infinite before there is one.
+        points: The points reached in this attempt, each of shape (dof,).
+        window: The joint values that the bit strings stand for.
         genes: The population, shape (population, dof).
-        refined_rows: Individuals that were refined and are not rounded to 16 bits; the first ones, shape (k, dof).
-        best: Best cost since the population was drawn or a point was gained; infinite before there is one.
+        refined_rows: Configurations of the first individuals, if they were refined, without rounding to 16 bits; shape
+            (k, dof).
+        best: Best cost since the population was drawn or a point was reached; infinite before there is one.
     """
 
     robot: Robot
@@ -160,7 +164,7 @@ class GaRun:
         self.begin()
 
     def begin(self) -> None:
-        """Begin before the first point, with a random population in the whole range."""
+        """Begin an attempt at the first point, with a random population in the whole range of the joints."""
         self.points: list[Vector] = []
         self.generations_by_point: list[int] = []
         self.window = whole_range(self.robot, gray=self.options.gray)
@@ -171,7 +175,7 @@ class GaRun:
         self.generations_since_point = 0
 
     def draw(self) -> None:
-        """Draw a random population, and count anew for how long it stands still."""
+        """Draw a random population and reset the count of generations without an improvement."""
         self.genes = random_genes(self.rng, self.options.population, self.robot.dof)
         self.refined_rows = np.zeros((0, self.robot.dof))
         self.best = np.inf
@@ -179,11 +183,11 @@ class GaRun:
 
     @property
     def last(self) -> Vector | None:
-        """The configuration before the one that is sought."""
+        """The configuration at the point before the one that is sought, shape (dof,), or None."""
         return self.points[-1] if self.points else self.near
 
     def step(self) -> None:
-        """One generation: score the population, then move on to the next point or breed."""
+        """Do one generation: score the population, then move on to the next point, start again, redraw or breed."""
         Q = self.window.decode(self.genes)
         Q[: len(self.refined_rows)] = self.refined_rows
         scored = score(self.robot, self.targets[len(self.points)], Q, self.last, self.options, self.will_do)
@@ -203,7 +207,7 @@ class GaRun:
             self.breed(Q, scored)
 
     def will_do(self, Q: Matrix) -> Mask:
-        """Which configurations may be taken: near enough to the last point, and accepted."""
+        """Check which configurations, shape (k, dof), are near enough to the last point and accepted; shape (k,)."""
         usable = np.ones(len(Q), dtype=bool)
         if self.options.largest_step is not None and self.points:
             usable = np.abs(joint_difference(self.robot, Q, self.points[-1])).max(axis=1) <= self.options.largest_step
@@ -212,7 +216,7 @@ class GaRun:
         return usable
 
     def remember(self, Q: Matrix, scored: Score) -> None:
-        """Keep the best distance for the record, and the posture that came nearest to the farthest point so far."""
+        """Record the best distance, and the configuration that came nearest to the farthest point so far."""
         best = int(np.argmin(scored.cost))
         self.distances.append(float(scored.distance[best]))
         if len(self.points) >= len(self.farthest) and scored.cost[best] < self.best_cost_of_farthest:
@@ -220,7 +224,10 @@ class GaRun:
             self.best_cost_of_farthest = float(scored.cost[best])
 
     def advance(self, q: Vector) -> None:
-        """A point is gained: place the window for the next one; the bit strings stay as they are."""
+        """Take a configuration, shape (dof,), for the current point, and move the window for the next one.
+
+        The window is centred at the extrapolation of the last two points; the bit strings stay as they are.
+        """
         self.generations_by_point.append(self.generations_since_point)
         self.points.append(q.copy())
         self.generations_since_point = 0
@@ -240,10 +247,10 @@ class GaRun:
             self.window = around(self.robot, centre, self.options.window, gray=self.options.gray)
 
     def count_stall(self, cost: float) -> bool:
-        """Take note of the best cost of a generation.
+        """Compare the best cost of a generation with the best one so far.
 
         Returns:
-            Whether it has not improved for as long as the options allow.
+            Whether there was no improvement for as many generations as the options allow.
         """
         if cost < self.best - (1.0 - IMPROVEMENT) * abs(self.best) or not np.isfinite(self.best):
             self.best = cost
@@ -253,7 +260,7 @@ class GaRun:
         return self.options.stall is not None and self.generations_without_gain >= self.options.stall
 
     def breed(self, Q: Matrix, scored: Score) -> None:
-        """The next generation; the best individuals, if some are to be refined, take a damped Newton step into it."""
+        """Breed the next generation; if the options say so, the best individuals join it after a damped Newton step."""
         self.genes = children(self.rng, self.genes, scored.cost, self.options)
         if self.options.refined:
             best = np.argsort(scored.cost, kind="stable")[: self.options.refined]
@@ -261,7 +268,7 @@ class GaRun:
             self.genes[: len(best)] = self.window.encode(self.refined_rows)
 
     def result(self, timed_out: bool) -> GeneticRun:
-        """The attempt that came farthest."""
+        """Return the result of the attempt that came farthest."""
         return GeneticRun(
             q=frozen(np.array(self.farthest).reshape(-1, self.robot.dof)),
             generations=self.generation,
@@ -276,7 +283,14 @@ class GaRun:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Score:
-    """Of every individual: its cost [m], distance [m] and angle [rad] from the target, whether it is there."""
+    """Scores of all individuals, shape (population,) each.
+
+    Attributes:
+        cost: The cost that selection minimises [m].
+        distance: Distance from the target [m].
+        angle: Angle from the target [rad].
+        reached: Whether the individual is at the target and acceptable.
+    """
 
     cost: Vector
     distance: Vector
@@ -292,17 +306,17 @@ def score(
     options: GeneticOptions,
     accept: Callable[[Matrix], Mask],
 ) -> Score:
-    """Score configurations, shape (m, dof).
+    """Score configurations.
 
-    The fitness in [2] is 100 inches less the distance; as a tournament only compares, the distance serves as well.
+    The fitness in [2] is 100 inches less the distance; since a tournament only compares, the distance serves as well.
 
     Args:
         robot: The arm.
         target: A pose, or a position with any orientation.
-        Q: The population.
+        Q: The population, shape (m, dof).
         last: Configuration at the point before, shape (dof,), or None.
         options: The weights.
-        accept: Which configurations will do; the others cost as much as the arm's reach more.
+        accept: Checks which configurations are acceptable; the cost of the others is raised by the arm's reach.
     """
     tips = poses(robot, Q)
     max_distance, max_angle = target.tolerances
@@ -326,11 +340,11 @@ def score(
 
 
 def manipulability(robot: Robot, Q: Matrix, position_only: bool) -> Vector:
-    """Product of the singular values of the Jacobian, sqrt(det(J J^T)) [31], lengths in units of the reach.
+    """Return the product of the Jacobian's singular values, sqrt(det(J J^T)) [31], with lengths in units of the reach.
 
     Args:
         robot: The arm.
-        Q: Shape (m, dof).
+        Q: Configurations, shape (m, dof).
         position_only: Whether the task is the position of the tip, not its pose.
 
     Returns:
