@@ -1,4 +1,4 @@
-"""How an arm is described: URDF with SRDF and joint limits, DH tables; each becomes one tree, and the tree a `Robot`.
+"""Read descriptions of robots (URDF with SRDF and joint limits, MJCF, DH tables): each becomes a tree, then a `Robot`.
 
-`load_robot` in `rrtik_ompl.description.catalog` is the face of all this.
+`load_robot` in `rrtik_ompl.description.catalog` is the public interface to all of this.
 """

@@ -1,8 +1,8 @@
-"""Names to things: robots, planners and problems that installed packages offer through entry points, and robot files.
+"""Look up by name the robots, planners and problems that installed packages offer, and load robots from files.
 
-Another package adds its own by entry points in the groups ``rrtik_ompl.robots`` (name -> a function that takes keyword
+Packages offer them through entry points in these groups: ``rrtik_ompl.robots`` (name -> a function that takes keyword
 options and returns a `Robot`), ``rrtik_ompl.planners`` (name -> a class), ``rrtik_ompl.problems`` (any name -> the
-``Path`` of a folder of problem files), ``rrtik_ompl.suites`` (the same of suites for ``rrtik bench``),
+``Path`` of a folder of problem files), ``rrtik_ompl.suites`` (likewise, suites for ``rrtik bench``),
 ``rrtik_ompl.tables`` (any name -> published tables for ``rrtik reproduce``, see `rrtik_bench.tables.Collection`) and
 ``rrtik_ompl.workspaces`` (name of a robot -> a function that returns slices of its effective workspace, see
 `rrtik_ompl.ik.reach.Slice`).
@@ -37,37 +37,38 @@ from rrtik_ompl.model.robot import Robot
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint, EntryPoints
 
-# What an option of a robot can be: a name, a number, a file, a pose, or groups and lists of these.
+# Value of a robot's option: a name, a number, a file, a pose, or a mapping or list of these.
 RobotOption: TypeAlias = (
     str | float | os.PathLike[str] | Mapping[str, object] | Sequence[object] | NDArray[np.float64] | pin.SE3 | None
 )
 
 FILE_OPTIONS = ("urdf", "srdf", "joint_limits", "dh", "moveit", "mjcf")
 FILE_KINDS = (".urdf", ".xml", ".mjcf", ".xacro", ".yaml", ".yml")
-PARAMETRIC = ("planar", "point2d")  # robots that a problem file describes by a group of keys of their own
-CALLER_OPTIONS = ("trust_xacro", "xacro_limits")  # which no file may give
-COMMON_OPTIONS: Mapping[str, Callable[..., Robot]] = {  # of any robot, each with what applies it
+PARAMETRIC = ("planar", "point2d")  # robots that a problem file describes by their own group of keys
+CALLER_OPTIONS = ("trust_xacro", "xacro_limits")  # options that no file may give
+# Options of any robot, each with the function that applies it.
+COMMON_OPTIONS: Mapping[str, Callable[..., Robot]] = {
     "scale": scaled,
     "padding": padded,
     "joint_ranges": narrowed,
     "joint_weights": weighted,
 }
 CACHED_ROBOTS = 64
-MOUNTING = ("base_pose", "tip", *COMMON_OPTIONS)  # keys that stand beside that group
+MOUNTING = ("base_pose", "tip", *COMMON_OPTIONS)  # keys beside the group of a parametric robot
 
 
 def list_robots() -> tuple[str, ...]:
-    """Names that `load_robot` knows."""
+    """Return the names that `load_robot` knows."""
     return tuple(sorted(_offers("robots")))
 
 
 def list_planners() -> tuple[str, ...]:
-    """Names of the planners that packages offer (OMPL's own are not among them)."""
+    """Return the names of the planners that packages offer (without OMPL's own)."""
     return tuple(sorted(_offers("planners")))
 
 
 def find_planner(name: str) -> type[Any]:
-    """Planner class of a name.
+    """Return the planner class of a name.
 
     Raises:
         UnknownNameError: If no package offers it.
@@ -78,10 +79,10 @@ def find_planner(name: str) -> type[Any]:
 
 @cache
 def portfolio() -> dict[str, str]:
-    """Names of the planners that "auto" lets search, in the order of their turns, each with what it solves.
+    """Return the planners that "auto" uses, in the order of their turns, each with the kind of goal that it solves.
 
-    A package that offers planners says so in ``PORTFOLIO`` of its outermost module: by name "any goal", "goal of the
-    tip" (the planner finds the configurations itself) or "path constraints". No planner is imported for that.
+    A package that offers planners lists them in ``PORTFOLIO`` of its top-level module, by name: "any goal", "goal of
+    the tip" (the planner finds the configurations itself) or "path constraints". No planner is imported for this.
     """
     packages = sorted({entry.module.partition(".")[0] for entry in _offers("planners").values()})
     found: dict[str, str] = {}
@@ -91,7 +92,7 @@ def portfolio() -> dict[str, str]:
 
 
 def find_workspace(robot: str) -> Callable[[], Any]:
-    """What draws a robot's effective workspace: a function without arguments that returns slices.
+    """Return the function that computes a robot's effective workspace; it takes no arguments and returns slices.
 
     Raises:
         UnknownNameError: If no package offers one for this robot.
@@ -101,12 +102,12 @@ def find_workspace(robot: str) -> Callable[[], Any]:
 
 
 def list_problems() -> tuple[str, ...]:
-    """Names of the problems that packages ship."""
+    """Return the names of the problems that packages ship."""
     return tuple(sorted(_problem_files()))
 
 
 def find_problem(name: str) -> Path:
-    """File of a shipped problem.
+    """Return the file of a shipped problem.
 
     Raises:
         UnknownNameError: If no package ships it.
@@ -118,12 +119,12 @@ def find_problem(name: str) -> Path:
 
 
 def list_suites() -> tuple[str, ...]:
-    """Names of the suites of benchmarks that packages ship."""
+    """Return the names of the benchmark suites that packages ship."""
     return tuple(sorted(_shipped("suite", "suites")))
 
 
 def find_suite(name: str) -> Path:
-    """File of a shipped suite.
+    """Return the file of a shipped suite.
 
     Raises:
         UnknownNameError: If no package ships it.
@@ -135,7 +136,7 @@ def find_suite(name: str) -> Path:
 
 
 def find_tables() -> tuple[Any, ...]:
-    """Collections of published tables that packages offer, one a package.
+    """Return the collections of published tables that packages offer, one per package.
 
     Raises:
         InputError: If one of them cannot be loaded.
@@ -144,12 +145,12 @@ def find_tables() -> tuple[Any, ...]:
 
 
 def problem_folders() -> tuple[Path, ...]:
-    """Folders of the problems that packages ship."""
+    """Return the folders of the problems that packages ship."""
     return _folders("problem", "problems")
 
 
 def task_files() -> dict[str, Path]:
-    """Files of the tasks that packages ship, by name; they lie in a folder below that of the problems."""
+    """Return the files of the tasks that packages ship, by name; they are in a subfolder of the problems' folder."""
     return _shipped("problem", "problems", "tasks/")
 
 
@@ -160,21 +161,21 @@ def load_robot(
     xacro_limits: Mapping[str, float] | None = None,
     **options: RobotOption,
 ) -> Robot:
-    """Load a robot by name or from a file; the same call gives the same object, unless a file of it has changed.
+    """Load a robot by name or from a file; the same call returns the same object, unless one of its files has changed.
 
     Args:
         name: A name from `list_robots`; or the path of a URDF (``.urdf``, ``.xml``; ``.xacro`` needs the package
             xacro), of an MJCF (``.xml``, ``.mjcf``), of a DH table (``.yaml``), or of a MoveIt configuration folder.
-        trust_xacro: Whether the expressions of macros go to xacro's own evaluator, which can run anything, and macros
-            may read files anywhere. Without it expressions that are not on a list are refused.
-        xacro_limits: What the expansion of macros may take: ``{"seconds": 10, "gigabytes": 1}``, or one of these.
-        **options: What the robot takes: any ``scale`` (see `rrtik_ompl.scaled`), ``padding`` (`padded`),
+        trust_xacro: Whether macros are evaluated by xacro's own evaluator, which can run any code, and may read files
+            anywhere. Otherwise expressions that are not on a list of allowed ones are refused.
+        xacro_limits: Limits for the expansion of macros: ``{"seconds": 10, "gigabytes": 1}``, or one of these.
+        **options: Options of the robot. Every robot takes ``scale`` (see `rrtik_ompl.scaled`), ``padding`` (`padded`),
             ``joint_ranges`` (`narrowed`) and ``joint_weights`` (`weighted`), and ``base_pose``, ``tip`` and ``locked``
             where they apply; a URDF ``srdf, group, joints, joint_limits, packages, xacro_args``, a folder also
-            ``urdf``; a shipped robot for instance ``limits="envelope"``. ``base_pose`` is a ``pinocchio.SE3`` or
-            ``{"xyz": [..], "quat_xyzw": [..]}``. With ``strict=True`` a URDF, folder or MJCF is refused of which a
-            `DescriptionWarning` would say that a name in it does not exist, that a posture is outside the limits, or
-            that something in it is not read.
+            ``urdf``; a shipped robot its own, such as ``limits="envelope"``. ``base_pose`` is a ``pinocchio.SE3`` or
+            ``{"xyz": [..], "quat_xyzw": [..]}``. With ``strict=True`` a URDF, folder or MJCF is refused if it would
+            otherwise give a `DescriptionWarning`: because a name in it does not exist, a posture is outside the limits,
+            or something in it is not read.
 
     Raises:
         UnknownNameError: If there is no robot of that name.
@@ -207,14 +208,16 @@ def load_robot(
 
 @dataclass(frozen=True, slots=True)
 class _Recipe:
-    """How to make a robot: from what, with which options."""
+    """How to make a robot: kind of source, source (a name or an absolute path), function, and accepted options."""
 
     kind: str
     target: str
     make: Callable[..., Robot]
     options: tuple[str, ...]
-    further_files: tuple[str, ...] = ()  # files that say how to make it, besides the target and the options
+    # Further files on which the robot depends, besides the target and the options.
+    further_files: tuple[str, ...] = ()
 
+    # Return the entry that a problem file has for the robot, from the given options.
     def source(self, values: Mapping[str, Any]) -> dict[str, Any]:
         options = source_entry(values)
         if self.target not in PARAMETRIC:
@@ -223,6 +226,8 @@ class _Recipe:
         return {self.target: options} | mounting
 
 
+# Return the recipe for a name, a file or a folder.
+# The modules that read a kind of file are imported only when it occurs, as they load slowly.
 def _recipe(name: str | os.PathLike[str]) -> _Recipe:
     text = os.fspath(name)
     path = Path(text)
@@ -231,7 +236,7 @@ def _recipe(name: str | os.PathLike[str]) -> _Recipe:
         return _Recipe("name", text, make, tuple(sorted(inspect.signature(make).parameters)))
 
     suffix = path.suffix.lower()
-    if suffix in (".yaml", ".yml"):  # what reads YAML is not loaded before there is some
+    if suffix in (".yaml", ".yml"):  # The reader of YAML is only loaded when it is needed.
         from rrtik_ompl.description.dh_file import DH_OPTIONS, robot_from_dh_file
 
         return _Recipe("dh", str(path.resolve()), lambda **given: robot_from_dh_file(path, **given), DH_OPTIONS)
@@ -254,23 +259,23 @@ def _recipe(name: str | os.PathLike[str]) -> _Recipe:
             "moveit", str(target), lambda **given: robot_from_moveit(path, **given), CONFIG_OPTIONS, choosing_files
         )
 
-    if path.parent != Path() or os.path.exists(path):  # which takes a name of any length
+    if path.parent != Path() or os.path.exists(path):  # os.path.exists() accepts names of any length.
         raise InputError(f"{text}: not a robot file; expected a URDF (.urdf, .xacro), a DH table (.yaml) or a folder")
     raise UnknownNameError("robot", text, list_robots())
 
 
-_Stamp = tuple[str, int, int]  # of a file: its path, time and size
+_Stamp = tuple[str, int, int]  # path, modification time [ns] and size of a file
 
 
 class _RobotCache:
-    """The robots loaded last, each with the size and time of the files it came from."""
+    """The robots loaded last, each with the modification times and sizes of its files."""
 
     def __init__(self) -> None:
         self._robots: OrderedDict[str, tuple[Robot, tuple[_Stamp, ...]]] = OrderedDict()
         self._lock = threading.Lock()
 
     def get(self, key: str) -> Robot | None:
-        """The robot kept under ``key``, unless a file of it has changed since."""
+        """Return the robot stored under ``key``; None if there is none or one of its files has changed since."""
         with self._lock:
             found = self._robots.get(key)
             if found is None or _stamps(path for path, _, _ in found[1]) != found[1]:
@@ -279,7 +284,7 @@ class _RobotCache:
             return found[0]
 
     def put(self, key: str, robot: Robot, files: Iterable[str]) -> Robot:
-        """Keep a robot that was made from ``files`` (and from the meshes that it names); returns it."""
+        """Store a robot that was made from ``files`` and the meshes that it names, and return it."""
         meshes = (solid.meshPath for solid in robot.collision.geometryObjects)
         stamps = _stamps({*files, *meshes, *getattr(robot.looks, "files", ())})
         with self._lock:
@@ -294,7 +299,7 @@ def _stamps(paths: Iterable[str]) -> tuple[_Stamp, ...]:
     for path in sorted(paths):
         try:
             state = os.stat(path)
-        except (OSError, ValueError):  # a name, or a file that is gone: then the next load says so
+        except (OSError, ValueError):  # Not a file, or a deleted one, which the next load will report.
             continue
         found.append((path, state.st_mtime_ns, state.st_size))
     return tuple(found)
@@ -304,9 +309,9 @@ _cache = _RobotCache()
 
 
 def _checked(key: str, value: object, where: str) -> object:
-    """The value of an option that names files, joints or links, of a type that makes sense; of others as it is.
+    """Check the type of an option that names files, joints or links; return the others as they are.
 
-    Files have their absolute path, so that the cache does not depend on the current folder.
+    Files are returned with their absolute path, so that the cache does not depend on the current folder.
     """
     what = f"{where}: {key}"
     if key in FILE_OPTIONS:
@@ -336,7 +341,7 @@ def _option_files(options: Mapping[str, Any]) -> list[str]:
 
 
 def robot_called(name: str, joint_names: tuple[str, ...]) -> Robot | None:
-    """The robot that a path names, if it can be loaded by that name and has these joints."""
+    """Return the robot with this name if it can be loaded and has these joints, otherwise None."""
     try:
         robot = load_robot(name)
     except RrtikError:
@@ -345,12 +350,12 @@ def robot_called(name: str, joint_names: tuple[str, ...]) -> Robot | None:
 
 
 def robot_from_entry(entry: str | Mapping[str, Any], folder: str | os.PathLike[str] = ".") -> Robot:
-    """Robot that a problem file names under ``robot``.
+    """Load the robot that a problem file names under ``robot``.
 
     Args:
-        entry: A name; or ``{name: .., options}``; or ``{urdf: FILE, options}``, ``{moveit: FOLDER, options}``, and so
-            with ``mjcf`` and ``dh``; ``{planar: {..}}``, ``{point2d: {..}}``, which take ``base_pose`` beside them.
-        folder: Folder of the problem file; files are named relative to it.
+        entry: A name; or ``{name: .., options}``; or ``{urdf: FILE, options}``, ``{moveit: FOLDER, options}``, likewise
+            ``mjcf`` and ``dh``; or ``{planar: {..}}``, ``{point2d: {..}}``, which take ``base_pose`` beside them.
+        folder: Folder of the problem file, relative to which files are named.
 
     Raises:
         InputError: If the entry has another form, or the robot cannot be loaded.
@@ -365,7 +370,7 @@ def robot_from_entry(entry: str | Mapping[str, Any], folder: str | os.PathLike[s
 
     present = [key for key in kinds if key in entry]
     if "moveit" in present and "urdf" in present:
-        present.remove("urdf")  # there it is an option: the URDF that is read in place of the folder's
+        present.remove("urdf")  # Here it is an option: the URDF to read instead of the folder's.
     if len(present) != 1:
         listed = ", ".join(present) or "none"
         raise InputError(f"robot: needs exactly one of the keys {', '.join(kinds)}; found {listed}")
@@ -384,12 +389,13 @@ def robot_from_entry(entry: str | Mapping[str, Any], folder: str | os.PathLike[s
 
 
 def _refuse_caller_options(entry: Mapping[str, object]) -> None:
-    """Refuse options in a file that only whoever opens it may give: a file must not say that it is to be trusted."""
+    """Raise an error if a file gives options that only the caller may give: a file must not declare itself trusted."""
     for key in CALLER_OPTIONS:
         if key in entry:
             raise InputError(f"robot: {key} is for whoever opens the file to give, not for the file; take it out")
 
 
+# Return the value of an option with file names resolved relative to a folder.
 def _resolved(key: str, value: object, folder: str | os.PathLike[str]) -> object:
     if key in FILE_OPTIONS and isinstance(value, str):
         return _in_folder(value, folder)
@@ -404,6 +410,7 @@ def _in_folder(path: str, folder: str | os.PathLike[str]) -> Path:
     return Path(folder) / path
 
 
+# Return the entry points of a group by name.
 @cache
 def _offers(group: str) -> dict[str, EntryPoint]:
     return {entry.name: entry for entry in _entry_points().select(group=f"rrtik_ompl.{group}")}
@@ -411,11 +418,15 @@ def _offers(group: str) -> dict[str, EntryPoint]:
 
 @cache
 def _entry_points() -> EntryPoints:
-    """Those of all groups: looking through the installed packages takes most of the time, loading this 2 MB."""
+    """Return the entry points of all groups; cached, as searching the installed packages takes time.
+
+    The module importlib.metadata is imported late because it is large.
+    """
     found: EntryPoints = import_module("importlib.metadata").entry_points()
     return found
 
 
+# Load what a package offers under a name of a group; ``what`` describes it in error messages.
 @cache
 def _load(what: str, group: str, name: str) -> Any:  # noqa: ANN401 - what another package offers
     offers = _offers(group)
@@ -432,7 +443,7 @@ def _problem_files() -> dict[str, Path]:
 
 
 def _shipped(what: str, group: str, below: str = "") -> dict[str, Path]:
-    """YAML files by name in the folders that packages offer."""
+    """Return YAML files by name in the folders that packages offer."""
     return {file.stem: file for folder in _folders(what, group) for file in sorted(folder.glob(f"{below}*.yaml"))}
 
 

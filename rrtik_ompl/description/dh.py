@@ -1,4 +1,4 @@
-"""Robots from Denavit-Hartenberg tables, standard [32] or modified [33]: the caller says which."""
+"""Make robots from Denavit-Hartenberg tables, standard [32] or modified [33]; the caller says which."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 CONVENTIONS: tuple[DhConvention, ...] = get_args(DhConvention)
 ROW_KINDS = tuple(name for name, kind in JOINT_KINDS.items() if kind.moves)
-SMALLEST_RADIUS = 1e-4  # [m], stands for a radius of 0
+SMALLEST_RADIUS = 1e-4  # [m] replaces a radius of 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,10 +42,10 @@ class DhRow:
     Attributes:
         a, d: Lengths [m].
         alpha, theta: Angles [rad].
-        joint: Name; joint1, joint2, ... if empty.
+        joint: Name of the joint; joint1, joint2, ... if empty.
         kind: One of ``ROW_KINDS``.
         limits: Lower and upper position limit [rad or m]; without meaning for continuous joints.
-        velocity, acceleration, jerk: Limits, inf if unknown.
+        velocity, acceleration, jerk: Limits [rad or m per s, s^2, s^3], inf if unknown.
     """
 
     a: float = 0.0
@@ -78,27 +78,27 @@ def robot_from_dh(
 ) -> Robot:
     """Make a robot from a Denavit-Hartenberg table.
 
-    Links are named ``base, link1, link2, ...``, the tip frame ``tip``. Each link is drawn and checked as the capsules
-    along its d and a; links between which lies no solid of another link are not checked against each other.
+    Links are named ``base, link1, link2, ...``, the tip frame ``tip``. Each link is drawn and checked as capsules along
+    its d and a; consecutive links with solids are not checked against each other.
 
     Args:
         name: Name used in messages.
         rows: The table.
         convention: ``"standard"`` or ``"modified"``; there is no default because the two give different arms.
-        radius: Of the capsules [m], one number or one per row; 0 stands for 1e-4.
-        floor_gap: How far along its d the first link's capsule begins [m]; its radius keeps the cap above a floor at
-            the height of the base.
+        radius: Radius of the capsules [m], one number or one per row; 0 is replaced by 1e-4.
+        floor_gap: Distance along its d at which the first link's capsule begins [m]; with its radius, the cap stays
+            above a floor at the height of the base.
         tool: Pose of the tip in the frame of the last row, ``pinocchio.SE3``; identity if None.
         tip: Link that goals refer to.
         base_pose: ``pinocchio.SE3`` T_world_base.
-        postures: Named configurations, each of as many numbers [rad or m] as there are rows.
+        postures: Named configurations, each with one number per row [rad or m].
         self_collision: Whether links are checked against each other.
         planar: Whether the arm moves in the xy-plane.
-        colour: Of the links: red, green, blue, opacity.
+        colour: Colour of the links: red, green, blue, opacity.
         **options: Passed to `build_robot` (``closed_form``, ``source``, ``allowed_collisions``).
 
     Raises:
-        InputError: If the table is empty, or a number, kind or limit in it makes no sense.
+        InputError: If the table is empty, or a number, kind or limit in it is not valid.
     """
     table = _checked(name, rows)
     if convention not in CONVENTIONS:
@@ -135,6 +135,7 @@ def robot_from_dh(
     )
 
 
+# Check the rows of a table and return them with names for all joints.
 def _checked(name: str, rows: Iterable[DhRow]) -> list[DhRow]:
     given = list(rows)
     at_most(len(given) + 1, MOST_JOINTS, f"robot '{name}': joints")
@@ -165,7 +166,12 @@ def _radii(name: str, radius: float | Sequence[float], count: int) -> list[float
 
 
 def _fixed_parts(table: Sequence[DhRow], convention: DhConvention, tool: pin.SE3) -> tuple[list[pin.SE3], pin.SE3]:
-    """What lies before each joint's own motion (a turn about z or a slide along it), and what lies after the last."""
+    """Return the fixed transforms between the joints' own motions (a rotation about z or a translation along it).
+
+    Returns:
+        For each joint the transform from the joint before (or the base), and the transform from the last joint to the
+        tip.
+    """
     before = []
     after = pin.SE3.Identity()
     for row in table:
@@ -175,12 +181,12 @@ def _fixed_parts(table: Sequence[DhRow], convention: DhConvention, tool: pin.SE3
 
 
 def _z_part(row: DhRow) -> pin.SE3:
-    """Rz(theta) Tz(d)."""
+    """Return Rz(theta) Tz(d)."""
     return pin.SE3(pin.rpy.rpyToMatrix(0.0, 0.0, row.theta), np.array([0.0, 0.0, row.d]))
 
 
 def _x_part(row: DhRow) -> pin.SE3:
-    """Tx(a) Rx(alpha), which is the same as Rx(alpha) Tx(a)."""
+    """Return Tx(a) Rx(alpha), which equals Rx(alpha) Tx(a)."""
     return pin.SE3(pin.rpy.rpyToMatrix(row.alpha, 0.0, 0.0), np.array([row.a, 0.0, 0.0]))
 
 
@@ -195,7 +201,7 @@ def _posture(name: str, key: str, values: ArrayLike, table: Sequence[DhRow]) -> 
 
 
 def _corners(table: Sequence[DhRow], convention: DhConvention, tool: pin.SE3) -> list[list[Vector]]:
-    """Corner points of each link, base first, in the frame of its joint: along d, then along the a that follows."""
+    """Return the corner points of each link, base first, in its joint's frame: along d, then along the next a."""
     shift = 0 if convention == "standard" else 1
     corners = [[np.zeros(3)] + ([_x_part(table[0]).translation] if shift else [])]
 
@@ -212,6 +218,7 @@ def _corners(table: Sequence[DhRow], convention: DhConvention, tool: pin.SE3) ->
     return corners
 
 
+# Return capsules along the segments between successive points; segments of no length are left out.
 def _capsules(points: Sequence[Vector], radius: float, colour: tuple[float, float, float, float]) -> tuple[Solid, ...]:
     solids = []
     for start, end in pairwise(points):
@@ -223,6 +230,6 @@ def _capsules(points: Sequence[Vector], radius: float, colour: tuple[float, floa
 
 
 def _touching(links: Sequence[Link]) -> set[frozenset[str]]:
-    """Pairs of links with solids but none on the links between them: they meet in one point for ever."""
+    """Return the pairs of consecutive links with solids, which always meet in one point."""
     solid = [link for link in links if link.collision]
     return {frozenset((a.name, b.name)) for a, b in pairwise(solid)}

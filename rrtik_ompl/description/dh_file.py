@@ -1,4 +1,4 @@
-"""DH tables in YAML files: ``version: 1``, ``name``, ``dh: {convention, rows, radius, tool}``, ``postures_deg``."""
+"""Read DH tables from YAML: ``version: 1``, ``name``, ``dh: {convention, rows, radius, tool}``, ``postures_deg``."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def robot_from_dh_file(path: str | os.PathLike[str], *, tip: str = "tip", base_p
         base_pose: ``pinocchio.SE3`` T_world_base.
 
     Raises:
-        InputError: If the file cannot be read or a value in it makes no sense; with file, line and key.
+        InputError: If the file cannot be read or a value in it is not valid; with file, line and key.
     """
     document = read_yaml(path)
     entry = parse(document, DhFile)
@@ -115,6 +115,7 @@ def robot_from_dh_file(path: str | os.PathLike[str], *, tip: str = "tip", base_p
         )
 
 
+# Convert a row of the file, in degrees and metres, to a `DhRow`, in radians and metres.
 def _row(document: YamlDocument, number: int, row: RowEntry) -> DhRow:
     place = ("dh", "rows", number)
     slides = JOINT_KINDS[row.type].slides

@@ -1,4 +1,4 @@
-"""What is wrong in a robot's description, or is not read, though the robot can be loaded: a warning, or a refusal."""
+"""Report what is wrong in a robot's description, or not read, although the robot can be loaded: warn or refuse."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ import numpy as np
 from rrtik_ompl.base.errors import DescriptionWarning, InputError, few, printable
 from rrtik_ompl.model.robot import Robot
 
-MOST_NAMED = 3  # faults in one line
-MOST_UNREAD = 8  # things in one line
+MOST_NAMED = 3  # most faults in one line
+MOST_UNREAD = 8  # most things that are not read in one line
 
 
 def tell(faults: Sequence[str], strict: bool) -> None:
-    """Warn of faults, all in one line; or refuse them.
+    """Warn of faults in one line, or raise an error.
 
     Args:
-        faults: Each with its file, and its line if that is known.
-        strict: Whether any of them is an error.
+        faults: The faults, each with its file, and its line if that is known.
+        strict: Whether any fault is an error.
 
     Raises:
         InputError: If there are any, and ``strict``.
@@ -37,16 +37,16 @@ def tell(faults: Sequence[str], strict: bool) -> None:
 
 
 def not_read(where: str, things: Sequence[str]) -> list[str]:
-    """The fault of a file that says more than is read of it; none if there is nothing."""
+    """Return the fault that things in a file are not read; an empty list if there are no such things."""
     return [f"{where}: not read: {few(things, MOST_UNREAD)}"] if things else []
 
 
 def postures_outside(robot: Robot, told: Mapping[str, Mapping[str, float]]) -> Iterator[tuple[str, str]]:
-    """The postures that a file has outside the limits, be it only by full turns: name, and what is wrong.
+    """Yield the postures that a file puts outside the limits, even if only by full turns: name, and what is wrong.
 
     Args:
-        robot: The robot, whose postures are turned into its limits where a full turn does it.
-        told: Values of joints [rad or m] by posture, as the file has them.
+        robot: The robot, whose postures are turned into its limits if a full turn does that.
+        told: Values of joints [rad or m] by posture, as in the file.
     """
     for name in sorted(robot.postures.keys() & told.keys()):
         fault = robot.limit_fault(np.array([told[name][joint] for joint in robot.joint_names]))
@@ -56,6 +56,6 @@ def postures_outside(robot: Robot, told: Mapping[str, Mapping[str, float]]) -> I
 
 
 def nearest_name(name: str, known: Iterable[str]) -> str:
-    """A question about the nearest of the known names: "; did you mean 'elbow'?", or nothing."""
+    """Return a question about the nearest of the known names, "; did you mean 'elbow'?", or ""."""
     near = get_close_matches(name, list(known), n=1)
     return f"; did you mean '{near[0]}'?" if near else ""

@@ -1,4 +1,4 @@
-"""Joints that open and close a gripper. They are held still while the arm moves; a task changes where they are held."""
+"""Model the joints of a gripper, which are held fixed while the arm moves; tasks change their values."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ from rrtik_ompl.description.tree import Tree
 from rrtik_ompl.description.tree_model import build_models
 
 STATES = ("open", "closed")
-NAMES = {"open": ("open", "opened"), "closed": ("closed", "close")}  # of states, in lower case
+NAMES = {"open": ("open", "opened"), "closed": ("closed", "close")}  # names of states, in lower case
 
 
 @dataclass(frozen=True, slots=True)
 class GripperJoints:
-    """The joints of a gripper, and how far its fingers are apart.
+    """The joints of a gripper, and how far it opens.
 
-    What it returns is what `rrtik_ompl.load_robot` takes as ``locked``.
+    The methods return joint values that `rrtik_ompl.load_robot` takes as ``locked``.
 
     Attributes:
-        joints: Their names; what mimics them follows.
-        opened, closed: Their values [rad or m] where the gripper is open and closed.
-        width: How much farther the fingers are apart where it is open than where it is closed [m], in proportion in
-            between; 0 if that is not known.
+        joints: Names of the joints, without those that mimic them.
+        opened, closed: Their values in the open and in the closed state [rad or m].
+        width: Distance between the fingers in the open state minus that in the closed state [m]; in between, it is
+            taken as proportional; 0 if it is not known.
 
     Example:
         >>> import rrtik_ompl as rrtik
@@ -47,7 +47,7 @@ class GripperJoints:
     width: float
 
     def posture(self, state: str) -> dict[str, float]:
-        """Values of the joints by name where the gripper is "open" or "closed" ("close" is the same).
+        """Return the joint values by name in the state "open" or "closed" ("close" is the same).
 
         Raises:
             UnknownNameError: If the state is another one.
@@ -57,7 +57,7 @@ class GripperJoints:
         return dict(zip(self.joints, self.opened if state == "open" else self.closed, strict=True))
 
     def close_on(self, width: float) -> dict[str, float]:
-        """Values of the joints by name where the fingers are a width [m] apart.
+        """Return the joint values by name at which the fingers are a width [m] apart.
 
         Raises:
             InputError: If the gripper does not open so far.
@@ -74,9 +74,15 @@ class GripperJoints:
 
 
 def srdf_gripper(semantics: Srdf, tree: Tree, mimics: Iterable[Mimic], actuated: Iterable[str]) -> GripperJoints | None:
-    """The gripper at the end of the actuated joints, if there is one and no more.
+    """Return the gripper at the end of the actuated joints; None if there is none, or more than one.
 
-    Its width is how much farther its fingers' solids are apart where it is open than where it is closed.
+    Its width is the distance of the fingers' solids in the open state minus that in the closed state.
+
+    Args:
+        semantics: The SRDF.
+        tree: Links and joints of the robot.
+        mimics: Joints that follow others.
+        actuated: Names of the actuated joints.
     """
     mimics_read = tuple(mimics)
     arm = set(actuated)
@@ -88,7 +94,7 @@ def srdf_gripper(semantics: Srdf, tree: Tree, mimics: Iterable[Mimic], actuated:
             continue
         try:
             joints = tuple(joint for joint in semantics.movable(end.group, tree) if joint not in followers)
-        except InputError:  # an SRDF for several forms of a robot, of which this one has no such hand
+        except InputError:  # The SRDF may be for several variants of a robot, of which this one lacks the hand.
             continue
 
         states = [_named_state(semantics, end.group, joints, names) for names in NAMES.values()]
@@ -101,7 +107,7 @@ def srdf_gripper(semantics: Srdf, tree: Tree, mimics: Iterable[Mimic], actuated:
 
 
 def _carries(tree: Tree, link: str, arm: set[str]) -> bool:
-    """Whether a link is there and any of some joints moves it."""
+    """Check whether a link exists and is moved by one of the joints."""
     return any(link == candidate.name for candidate in tree.links) and any(
         joint.name in arm for joint in tree.chain(link)
     )
@@ -110,9 +116,9 @@ def _carries(tree: Tree, link: str, arm: set[str]) -> bool:
 def _named_state(
     semantics: Srdf, group: str, joints: tuple[str, ...], names: tuple[str, ...]
 ) -> tuple[float, ...] | None:
-    """Values of the joints in the state of a group that has one of the names, or the only one with a name inside its.
+    """Return the joint values in a group's state of one of the names, or in the only state that contains one of them.
 
-    A state that does not have all joints counts for none.
+    States that do not have values for all joints are ignored; None if no state fits.
     """
     complete_states = {
         state.lower(): values
@@ -127,12 +133,12 @@ def _named_state(
 
 
 def _finger_distance(tree: Tree, mimics: tuple[Mimic, ...], values: Mapping[str, float]) -> float:
-    """Least distance of the solids of different fingers where the gripper's joints have values [m]; 0 if unknown."""
+    """Return the least distance between solids of different fingers at given joint values [m]; 0 if it is unknown."""
     joint_values = dict(values) | {
         tie.joint: tie.multiplier * values[tie.source] + tie.offset for tie in mimics if tie.source in values
     }
 
-    carrying_joint: dict[str, str] = {}  # for each link of a finger the joint that carries the finger
+    carrying_joint: dict[str, str] = {}  # for each link of a finger, the joint that moves the whole finger
     for joint in tree.walk():
         if joint.parent in carrying_joint or joint.name in joint_values:
             carrying_joint[joint.child] = carrying_joint.get(joint.parent, joint.name)

@@ -1,4 +1,4 @@
-"""MoveIt's ``joint_limits.yaml``: velocity, acceleration, jerk and position limits by joint."""
+"""Read MoveIt's ``joint_limits.yaml``: velocity, acceleration, jerk and position limits by joint."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ _UNUSED = ("max_deceleration", "min_jerk", "max_effort", "angle_wraparound", "k_
 _SOFT = ("soft_lower_limit", "soft_upper_limit")
 _NARROWING = {"max_deceleration": "deceleration", "min_jerk": "jerk", **dict.fromkeys(_SOFT, "soft")}  # of _UNUSED
 _KEYS = (*(f"has_{flag}_limits" for flag in _FLAGS), *_NUMBERS, *_UNUSED, *_SOFT)
-ROS = ("/**", "ros__parameters")  # around the parameters of a node of ROS 2
+ROS = ("/**", "ros__parameters")  # keys that enclose the parameters of a node in ROS 2
 
 
 def read_joint_limits(path: str | os.PathLike[str], joints: Iterable[str]) -> dict[str, JointLimits]:
     """Read the limits of a robot's joints.
 
-    A limit counts unless its ``has_..._limits`` says false; ``has_velocity_limits: false`` lifts the URDF's own limit.
+    A limit counts unless its ``has_..._limits`` is false; ``has_velocity_limits: false`` removes the URDF's own limit.
 
     Args:
         path: The file.
         joints: Names of the robot's joints; any other name in the file is an error.
 
     Raises:
-        InputError: If the file cannot be read, or a name, key or value in it makes no sense; with its line.
+        InputError: If the file cannot be read, or a name, key or value in it is not valid; with its line.
     """
     document = read_yaml(path)
     joint_names = tuple(joints)
@@ -52,13 +52,16 @@ def read_joint_limits(path: str | os.PathLike[str], joints: Iterable[str]) -> di
     return limits
 
 
+# Check the keys of one joint and return its limits.
 def _joint(document: YamlDocument, location: Location, values: Mapping[str, Any]) -> JointLimits:
     for key, value in values.items():
         if key not in _KEYS:
             raise UnknownNameError("key", key, _KEYS, where=document.place((*location, key)))
         if key.startswith("has_") and not isinstance(value, bool):
             raise document.error((*location, key), f"expected true or false, found {describe(value)}")
-        if key in _NUMBERS and values.get(f"has_{key.partition('_')[2]}_limits") is not False:  # else MoveIt writes 0
+        if (
+            key in _NUMBERS and values.get(f"has_{key.partition('_')[2]}_limits") is not False
+        ):  # For limits that do not apply, MoveIt writes 0.
             _number(document, (*location, key), value, positive=not key.endswith("position"))
 
     limits: dict[str, float | None] = {}
@@ -84,7 +87,7 @@ def _number(document: YamlDocument, location: Location, value: object, *, positi
 
 
 def unread_limits(path: str | os.PathLike[str]) -> list[str]:
-    """What a file that :func:`read_joint_limits` takes says about limits and is not read: "max_deceleration of 'a'"."""
+    """Return the limits in a file of :func:`read_joint_limits` that are not read, such as "max_deceleration of 'a'"."""
     _, section = parameters(read_yaml(path), "robot_description_planning")
     joints_of_key: dict[str, list[str]] = {}
     for joint, values in section["joint_limits"].items():
@@ -95,11 +98,11 @@ def unread_limits(path: str | os.PathLike[str]) -> list[str]:
 
 
 def parameters(document: YamlDocument, name: str) -> tuple[Location, Mapping[str, Any]]:
-    """Where the parameters of a file stand, and what they are.
+    """Return where the parameters are in a file, and the parameters.
 
     Args:
         document: The file.
-        name: What they are called on ROS's parameter server, such as "robot_description_planning".
+        name: Their name on ROS's parameter server, such as "robot_description_planning".
     """
     location: Location = ()
     found: Mapping[str, Any] = document.data

@@ -1,4 +1,4 @@
-"""A MoveIt configuration folder: which files describe the robot, and which group of its joints is the arm."""
+"""Find in a MoveIt configuration folder the files that describe the robot, and the group of joints that is the arm."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from rrtik_ompl.description.xacro_text import is_xacro, robot_text
 from rrtik_ompl.files.strict_yaml import read_yaml
 from rrtik_ompl.model.robot import Robot
 
-ASSISTANT = ".setup_assistant"  # where MoveIt's setup assistant writes which URDF a folder is for
+ASSISTANT = ".setup_assistant"  # file in which MoveIt's setup assistant states the URDF of a folder
 CHOOSING_FILES = (ASSISTANT, "kinematics.yaml", "config/kinematics.yaml", ".", "config")  # which URDF, which group
-SIMULATED = "gazebo_"  # begins the name of the URDF that the assistant writes for Gazebo, maybe long ago
+SIMULATED = "gazebo_"  # prefix of the URDF that the assistant writes for Gazebo, which may be out of date
 CONFIG_OPTIONS = tuple(sorted({*URDF_OPTIONS, "urdf"}))
 FilePath = str | os.PathLike[str]
 
@@ -28,15 +28,15 @@ FilePath = str | os.PathLike[str]
 def robot_from_moveit(folder: FilePath, **options: Any) -> Robot:
     """Load a robot from a folder that MoveIt's setup assistant wrote.
 
-    Read are the SRDF (groups, postures, allowed collisions, end effectors), ``joint_limits.yaml``, ``kinematics.yaml``
-    (which groups have inverse kinematics; the solver is ours), and the URDF: one in the folder, that of the package
-    which ``.setup_assistant`` names, with the arguments that stand there, or a ``.urdf.xacro`` in the folder. Robots of
-    several groups need ``group`` if not exactly one has a solver.
+    The following files are read: the SRDF (groups, postures, allowed collisions, end effectors), ``joint_limits.yaml``,
+    ``kinematics.yaml`` (which groups have inverse kinematics; the solver is ours), and the URDF. The URDF is one in the
+    folder; or that of the package which ``.setup_assistant`` names, with the arguments stated there; or a
+    ``.urdf.xacro`` in the folder. A robot of several groups needs ``group``, unless exactly one has a solver.
 
     Args:
-        folder: With the files, or with a folder ``config`` that has them.
-        **options: As of `rrtik_ompl.description.urdf.robot_from_urdf_text`, and ``urdf``; a file that is given is read
-            in place of the folder's; ``xacro_args`` are added to the folder's.
+        folder: Folder with the files, or with a folder ``config`` that has them.
+        **options: Options of `rrtik_ompl.description.urdf.robot_from_urdf_text`, and ``urdf``; a file that is given is
+            read instead of the folder's; ``xacro_args`` are added to the folder's.
 
     Raises:
         InputError: If a file is missing or cannot be used; one line names it and the remedy.
@@ -46,9 +46,9 @@ def robot_from_moveit(folder: FilePath, **options: Any) -> Robot:
 
 
 def config_files(folder: FilePath, given: Mapping[str, Any]) -> dict[str, Any]:
-    """The files of a folder, ``urdf, srdf, joint_limits``, the arguments of macros, and the ``group``.
+    """Return the files of a folder, ``urdf, srdf, joint_limits``, the arguments of macros, and the ``group``.
 
-    What is given stays so; arguments of macros that are given are added to the folder's.
+    Options that are given take precedence; arguments of macros that are given are added to the folder's.
 
     Raises:
         InputError: See :func:`robot_from_moveit`.
@@ -81,7 +81,7 @@ def config_files(folder: FilePath, given: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _assistant(home: Path, config: Path) -> Mapping[str, Any]:
-    """What the setup assistant wrote about the URDF and the SRDF: ``{"urdf": {..}, "srdf": {..}}``."""
+    """Return what the setup assistant wrote about the URDF and the SRDF: ``{"urdf": {..}, "srdf": {..}}``."""
     file = next((each for each in (home / ASSISTANT, config.parent / ASSISTANT) if os.path.isfile(each)), None)
     if file is None:
         return {}
@@ -93,6 +93,7 @@ def _assistant(home: Path, config: Path) -> Mapping[str, Any]:
     return {str(key).lower(): value for key, value in top.items() if isinstance(value, Mapping)}
 
 
+# Return the SRDF that the setup assistant names, or the only one in the folder.
 def _srdf(home: Path, config: Path, assistant: Mapping[str, Any]) -> Path:
     relative = assistant.get("srdf", {}).get("relative_path")
     if isinstance(relative, str) and os.path.isfile(home / relative):
@@ -101,7 +102,10 @@ def _srdf(home: Path, config: Path, assistant: Mapping[str, Any]) -> Path:
 
 
 def _only(config: Path, patterns: Iterable[str], kind: str, option: str) -> Path | None:
-    """The only file of the first pattern that any file has; None if none has. Those for Gazebo must be asked for."""
+    """Return the only file of the first pattern that matches any; None if no pattern does; several are an error.
+
+    Files for Gazebo only match a pattern that names them.
+    """
     for pattern in patterns:
         includes_simulated = pattern.startswith(SIMULATED)
         files = sorted(
@@ -119,6 +123,9 @@ def _missing(config: Path, kind: str, option: str) -> Path:
     raise InputError(f"{config}: no {kind} in this folder; is it of MoveIt? give {option}=FILE")
 
 
+# Return the URDF of a folder.
+# Candidates are, in this order: a URDF in the folder, the one of the package that the setup assistant names, one with
+# macros in the folder, and one for Gazebo.
 def _urdf(home: Path, config: Path, assistant: Mapping[str, Any], packages: Iterable[Path]) -> Path:
     urdf = _only(config, ("*.urdf",), "URDF", "urdf")
     if urdf is not None:
@@ -139,9 +146,9 @@ def _urdf(home: Path, config: Path, assistant: Mapping[str, Any], packages: Iter
 
 
 def _xacro_args(home: Path, assistant: Mapping[str, Any]) -> dict[str, str]:
-    """Arguments with which the setup assistant has expanded the URDF, as behind the command xacro.
+    """Return the arguments with which the setup assistant expanded the URDF, as for the command xacro.
 
-    One text, or a list of words; words such as ``--inorder`` are switches of the command and not for the macros.
+    They are one text or a list of words; words such as ``--inorder`` are switches of the command, and are skipped.
     """
     written = assistant.get("urdf", {}).get("xacro_args") or ""
     texts = written if isinstance(written, list) else [written]
@@ -157,7 +164,7 @@ def _xacro_args(home: Path, assistant: Mapping[str, Any]) -> dict[str, str]:
 
 
 def _group(home: Path, config: Path, files: Mapping[str, Any], packages: list[Path]) -> str:
-    """The group that is the arm: the only one that has a solver, or the only one that moves; but no gripper's."""
+    """Return the group that is the arm: the only one with a solver, or the only one that moves, grippers aside."""
     semantics = read_srdf(robot_text(files["srdf"], packages), str(files["srdf"]))
     urdf = files["urdf"]
     text = robot_text(urdf, packages, files.get("xacro_args"))
@@ -178,7 +185,7 @@ def _group(home: Path, config: Path, files: Mapping[str, Any], packages: list[Pa
 
 
 def _size(semantics: Srdf, group: str, tree: Tree) -> int:
-    """Number of movable joints of a group; 1 if it names what is not there, which an error says if it is chosen."""
+    """Return the number of movable joints of a group; 1 if it names unknown joints, an error once it is chosen."""
     try:
         return len(semantics.movable(group, tree))
     except InputError:
@@ -186,7 +193,7 @@ def _size(semantics: Srdf, group: str, tree: Tree) -> int:
 
 
 def _solved(config: Path, semantics: Srdf) -> set[str]:
-    """Groups for which ``kinematics.yaml`` names a solver."""
+    """Return the groups for which ``kinematics.yaml`` names a solver."""
     file = config / "kinematics.yaml"
     if not os.path.isfile(file):
         return set()
@@ -199,9 +206,10 @@ def _solved(config: Path, semantics: Srdf) -> set[str]:
 
 
 def _grippers(semantics: Srdf, sizes: Mapping[str, int], solved: set[str]) -> set[str]:
-    """Groups of end effectors, but for one that an SRDF calls so by mistake: it has more joints than any other one.
+    """Return the groups of end effectors.
 
-    Where another one has as many, a solver tells.
+    An SRDF may call the arm an end effector by mistake: a group with more joints than any other one is left out, and so
+    is one with as many as another if it has a solver.
     """
     grippers = set()
     for end in semantics.end_effectors:

@@ -1,4 +1,4 @@
-"""Where a mesh named in a URDF lies: ``package://``, ``file://``, absolute, or beside the URDF."""
+"""Find the mesh files that a URDF names: by ``package://``, ``file://``, absolute, or relative to the URDF."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ _FIND = re.compile(r"\$\(find\s+([^)\s]+)\s*\)/*(.*)")
 
 
 def resolve_mesh(uri: str, folder: Path | None, packages: Iterable[Path], where: str) -> Path:
-    """Absolute path of an existing mesh file.
+    """Return the absolute path of an existing mesh file.
 
-    ``package://NAME/REST`` is sought as DIR/NAME/REST in ``packages``, in the URDF's folder and in every folder
-    above it, and as DIR/REST where DIR itself is called NAME; ``file://$(find NAME)/REST`` of xacro likewise.
+    ``package://NAME/REST`` is sought as DIR/NAME/REST in ``packages``, in the URDF's folder and in every folder above
+    it, and as DIR/REST if DIR itself is called NAME; ``file://$(find NAME)/REST`` of xacro likewise.
 
     Args:
-        uri: What the URDF says.
+        uri: The name of the mesh in the URDF.
         folder: Folder of the URDF, if it came from a file.
         packages: Further folders to search, first.
-        where: File and element, put in front of the error message.
+        where: File and element, put in front of error messages.
 
     Raises:
         MissingFileError: If there is no such file.
@@ -41,7 +41,7 @@ def resolve_mesh(uri: str, folder: Path | None, packages: Iterable[Path], where:
     roots = [Path(p) for p in packages]
     roots += [] if folder is None else [folder, *folder.parents]
     name = unquote(rest) if scheme else rest
-    name = name.lstrip("/") if scheme in ("package", "model") else name  # package:///NAME is a common slip
+    name = name.lstrip("/") if scheme in ("package", "model") else name  # package:///NAME is a common mistake.
 
     candidates = _in_packages(name, roots) if scheme in ("package", "model") else _beside(name, folder)
     file = next((path for path in candidates if os.path.isfile(path)), None)
@@ -72,7 +72,7 @@ def _beside(name: str, folder: Path | None) -> Iterator[Path]:
 
 
 def package_folder(name: str, folder: Path, packages: Iterable[Path]) -> Path | None:
-    """The folder of a package: in ``packages`` or one of them, in ``folder`` or any above it; None if there is none."""
+    """Return the folder of a package, from ``packages`` or from ``folder`` and all folders above; None if missing."""
     roots = [*packages, folder, *folder.parents]
     candidates = (root if root.name == name else root / name for root in roots)
     return next((candidate for candidate in candidates if name and os.path.isdir(candidate)), None)

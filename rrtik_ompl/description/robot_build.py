@@ -1,4 +1,4 @@
-"""From a tree of links and joints to a `Robot`: hold joints still, tie mimics, place the base, name the tip."""
+"""Build a `Robot` from a tree of links and joints: fix joints, apply mimics, place the base, choose the tip."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from rrtik_ompl.description.tree_model import build_models
 from rrtik_ompl.model.robot import LIMIT_TOLERANCE, Chain, Robot
 
 RATES = ("velocity", "acceleration", "jerk")
-MOST_TURNS = 100  # of a joint without limits that something follows at a fraction
+MOST_TURNS = 100  # most turns of a joint without limits that another joint follows at a fraction
 
 
 @dataclass(frozen=True, slots=True)
 class Mimic:
-    """Joint ``joint`` follows ``source``: value = multiplier * source + offset."""
+    """A joint that follows another one: value of ``joint`` = multiplier * value of ``source`` + offset."""
 
     joint: str
     source: str
@@ -39,7 +39,7 @@ class Mimic:
 
 @dataclass(frozen=True, slots=True)
 class JointLimits:
-    """Limits of one joint; None keeps what the model says. Position in rad or m, the others per second."""
+    """Limits of one joint; None keeps those of the model. Positions in rad or m, rates in these per s, s^2 and s^3."""
 
     lower: float | None = None
     upper: float | None = None
@@ -49,7 +49,7 @@ class JointLimits:
 
 
 def merge_limits(base: Mapping[str, JointLimits], over: Mapping[str, JointLimits]) -> dict[str, JointLimits]:
-    """Limits by joint in which every number of ``over`` replaces that of ``base``."""
+    """Return limits by joint in which every number of ``over`` replaces that of ``base``."""
     merged = dict(base)
     for joint, limits in over.items():
         given = {key: value for key in JointLimits.__slots__ if (value := getattr(limits, key)) is not None}
@@ -76,29 +76,29 @@ def build_robot(
     planar: bool = False,
     source: Mapping[str, Any] | None = None,
 ) -> Robot:
-    """Assemble a robot.
+    """Build a robot.
 
     Args:
         name: Name used in messages and files.
         tree: Links and joints.
         joints: Actuated joints, in the order wanted for q; every joint that does not mimic if None.
         mimics: Joints that follow others (which follow nothing themselves).
-        locked: Values at which joints that are not actuated are held [rad or m]; 0, moved into the limits, if absent.
+        locked: Values at which joints that are not actuated are held [rad or m]; by default 0, moved into the limits.
         tip: Frame that goals refer to; the last link that every actuated joint moves if None.
         base_pose: ``pinocchio.SE3`` T_world_base; identity if None.
-        limits: Limits by joint name; what is given replaces the tree's. Those of a joint that follows another hold for
-            what it follows, too.
+        limits: Limits by joint name, which replace those of the tree. Limits of a joint that follows another also
+            restrict the one that it follows.
         postures: Named configurations by joint name; only those that name every actuated joint are kept.
-        allowed_collisions: Pairs of link names never checked.
+        allowed_collisions: Pairs of link names that are never checked.
         checked_collisions: Pairs of link names that are checked although a joint joins them.
-        unchecked_solids: Pairs of solids never checked, by their links' names and numbers: "hand_0".
+        unchecked_solids: Pairs of solids that are never checked, by their links' names and numbers: "hand_0".
         self_collision: Whether links are checked against each other.
         closed_form: The robot's own inverse kinematics.
         planar: Whether the arm moves in the xy-plane.
-        source: How to load it again (what a problem file says under ``robot``).
+        source: How to load the robot again (the entry ``robot`` of a problem file).
 
     Raises:
-        InputError: If a joint, frame or limit does not make sense; the message names it.
+        InputError: If a joint, frame or limit is not valid; the message names it.
     """
     mimic_of = {m.joint: m for m in mimics}
     movable = {joint.name: joint for joint in tree.walk() if joint.moves}
@@ -155,6 +155,7 @@ def build_robot(
     )
 
 
+# Raise an error unless the actuated, following and locked joints exist and do not contradict each other.
 def _check_joints(
     name: str, known: tuple[str, ...], actuated: tuple[str, ...], ties: Mapping[str, Mimic], locked: Mapping[str, float]
 ) -> None:
@@ -183,10 +184,20 @@ def _followed(
     mimic_of: Mapping[str, Mimic],
     given: Mapping[str, JointLimits],
 ) -> dict[str, dict[str, float]]:
-    """The limits of all movable joints, each cut so that what follows the joint stays within its own.
+    """Return the limits of all movable joints, reduced so that joints which follow them keep their own limits.
+
+    Args:
+        name: Name of the robot.
+        movable: All movable joints by name.
+        actuated: Names of the actuated joints.
+        mimic_of: The rule of each joint that follows another.
+        given: Limits that replace those of the tree.
+
+    Returns:
+        For each joint its limits by name: lower, upper, velocity, acceleration, jerk; infinite if there is none.
 
     Raises:
-        InputError: If no value of an actuated joint is within its limits and those of one that follows it.
+        InputError: If no value of an actuated joint is within its limits and those of a joint that follows it.
     """
     own_limits = {joint.name: _own_limits(joint, given.get(joint.name)) for joint in movable.values()}
     limits = dict(own_limits)
@@ -207,7 +218,7 @@ def _followed(
 
 
 def _own_limits(joint: Joint, given: JointLimits | None) -> dict[str, float]:
-    """All limits of a joint by their names, infinite where there is none."""
+    """Return all limits of a joint by name, infinite where there is none; given limits replace those of the tree."""
     limits = {
         "lower": -np.inf if joint.endless else joint.lower,
         "upper": np.inf if joint.endless else joint.upper,
@@ -221,8 +232,11 @@ def _own_limits(joint: Joint, given: JointLimits | None) -> dict[str, float]:
 def _limits_kept_by_follower(
     leader: Mapping[str, float], follower: Mapping[str, float], tie: Mimic
 ) -> dict[str, float]:
-    """Limits of a joint that are kept where what follows it keeps its own. Torques are not compared: none is known."""
-    if tie.multiplier == 0.0:  # it stands still
+    """Return the limits of a joint within which the joint that follows it keeps its own limits.
+
+    If no value does, lower is above upper. Torques are not compared, as none are known.
+    """
+    if tie.multiplier == 0.0:  # The follower stands still.
         is_kept = follower["lower"] - LIMIT_TOLERANCE <= tie.offset <= follower["upper"] + LIMIT_TOLERANCE
         return dict(leader) if is_kept else {**leader, "lower": np.inf}
 
@@ -242,7 +256,7 @@ def _held_values(
     mimic_of: Mapping[str, Mimic],
     locked: Mapping[str, float],
 ) -> dict[str, float]:
-    """Value of every joint that is neither actuated nor follows an actuated one."""
+    """Return the value of every joint that is neither actuated nor follows an actuated one [rad or m]."""
     values: dict[str, float] = {}
     for joint, joint_limits in limits.items():
         value = locked.get(joint, min(max(0.0, joint_limits["lower"]), joint_limits["upper"]))
@@ -259,9 +273,9 @@ def _held_values(
 
 
 def _last_link(name: str, tree: Tree, actuated: tuple[str, ...]) -> str:
-    """The leaf with the most actuated joints above it; among equals the longest branch, then the last described.
+    """Return the leaf with the most actuated joints above it; among equals the longest branch, then the last described.
 
-    A warning says which it is where others move too.
+    If actuated joints move other leaves too, a warning says which one was chosen.
     """
     parents = {joint.parent for joint in tree.joints}
 
@@ -280,6 +294,8 @@ def _last_link(name: str, tree: Tree, actuated: tuple[str, ...]) -> str:
     return tip
 
 
+# Return the kinematics of a model as arrays, for our own computations.
+# Each joint of the model moves along or about its axis, by a value that depends linearly on the actuated joints.
 def _chain(model: pin.Model, actuated: tuple[str, ...], mimic_of: Mapping[str, Mimic]) -> Chain:
     count = model.njoints - 1
     column_of = {name: number for number, name in enumerate(actuated)}
@@ -292,7 +308,7 @@ def _chain(model: pin.Model, actuated: tuple[str, ...], mimic_of: Mapping[str, M
     joints = model.joints
 
     for k in range(count):
-        joint_data = joints[k + 1].createData()  # of this joint alone: all joints' data are looked up by copying them
+        joint_data = joints[k + 1].createData()  # model.createData() would copy the data of all joints.
         joints[k + 1].calc(joint_data, neutral)
         subspace = np.asarray(joint_data.S).reshape(-1)  # (linear; angular)
         prismatic[k] = np.linalg.norm(subspace[:3]) > 0.5
@@ -321,9 +337,16 @@ def _periods(
     ties: Mapping[str, Mimic],
     whole_turns_alike: Mask,
 ) -> dict[str, dict[str, float]]:
-    """Limits of actuated joints that have none but whose whole turns are other postures: another follows at a fraction.
+    """Return limits for joints without limits whose whole turns differ, as another joint follows them at a fraction.
 
-    They may turn to either side until all that follows has made whole turns too; a warning says so.
+    Such a joint may turn to either side until everything that follows it has made whole turns too; a warning says so.
+
+    Args:
+        name: Name of the robot.
+        joints: The actuated joints.
+        limits: The limits of all joints.
+        ties: The rule of each joint that follows another.
+        whole_turns_alike: Mask of the actuated joints whose whole turns lead to the same posture, shape (dof,).
     """
     limits_with_period = {}
     for joint, turns_alike in zip(joints, whole_turns_alike, strict=True):
@@ -346,7 +369,7 @@ def _periods(
 
 
 def _turns_of(gains: Iterable[float]) -> int:
-    """The least number of turns that is whole turns, to a part in a thousand, of all that follows by these factors."""
+    """Return the least number of turns after which all followers with these factors have made whole turns, to 0.1 %."""
     factors = np.array([abs(gain) for gain in gains if gain != 0.0])
     for count in range(1, MOST_TURNS):
         turns = count * factors
@@ -355,6 +378,7 @@ def _turns_of(gains: Iterable[float]) -> int:
     return MOST_TURNS
 
 
+# Check the limits of the actuated joints and return them as arrays, by name of the `Robot`'s attribute.
 def _limits(name: str, joints: Iterable[Joint], limits_of_joint: Mapping[str, Mapping[str, float]]) -> dict[str, Any]:
     rows = []
     for joint in joints:
@@ -390,7 +414,7 @@ def _limits(name: str, joints: Iterable[Joint], limits_of_joint: Mapping[str, Ma
 
 
 def _turned_inside(q: Vector, bounds: Mapping[str, Any], whole_turns_alike: Mask) -> Vector:
-    """The same posture with joints that lie outside their limits turned by a full turn, if that brings them inside."""
+    """Turn joints that are outside their limits by a full turn if that brings them inside."""
     for full_turn in (TAU, -TAU):
         turned = q + full_turn
         outside = (q < bounds["lower"]) | (q > bounds["upper"])

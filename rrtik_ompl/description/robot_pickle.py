@@ -1,6 +1,6 @@
-"""Robots for other processes: a compact form of their geometry, and one object for the same robot wherever it arrives.
+"""Send robots to other processes: their geometry in a compact form, and one object per robot wherever it arrives.
 
-Importing this module teaches pickle (and what builds on it: multiprocessing, joblib, Dask) to take robots.
+Importing this module registers robots with pickle (and so with multiprocessing, joblib and Dask).
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ if TYPE_CHECKING:
     import coal
 
 LIMITS = tuple(f"{end}{what}Limit" for what in ("Position", "Velocity", "Effort") for end in ("lower", "upper"))
-MOST_ROBOTS = 16  # that arrived and are kept, so that the next copy of one is the same object
+MOST_ROBOTS = 16  # most received robots that are kept, so that further copies become the same object
 _known: OrderedDict[bytes, Robot] = OrderedDict()
 _lock = threading.Lock()
 
 
 def reduce_robot(robot: Robot) -> tuple[Any, ...]:
-    """What pickle keeps of a robot.
+    """Return what pickle stores of a robot: a function and its arguments.
 
     Raises:
         InputError: If its own inverse kinematics cannot be pickled.
@@ -44,7 +44,7 @@ def reduce_robot(robot: Robot) -> tuple[Any, ...]:
 
 
 def robot_from_bytes(data: bytes) -> Robot:
-    """The robot that :func:`reduce_robot` took apart; the same object for the same bytes, so that tables are shared."""
+    """Return the robot that :func:`reduce_robot` stored; one object for the same bytes, so that tables are shared."""
     key = sha256(data).digest()
     with _lock:
         if key in _known:
@@ -66,7 +66,7 @@ def _remember(key: bytes, robot: Robot) -> Robot:
     return robot
 
 
-@lru_cache(maxsize=2)  # many problems of one robot are sent one after the other
+@lru_cache(maxsize=2)  # Many problems of one robot may be sent in a row.
 def _bytes_of(robot: Robot) -> bytes:
     state = {field.name: packed(getattr(robot, field.name)) for field in fields(robot)}
     state |= {"collision": _items(robot.collision), "looks": _items(robot.visual)}
@@ -80,7 +80,10 @@ def _bytes_of(robot: Robot) -> bytes:
 
 
 def _without_limits(model: pin.Model) -> tuple[pin.Model, dict[str, Vector]]:
-    """A copy of a model without its limits, and these: Pinocchio 4.0 does not read the infinite ones that it writes."""
+    """Return a copy of a model without its limits, and the limits.
+
+    Pinocchio 4.0 cannot read the infinite limits that it writes.
+    """
     limits = {name: np.array(getattr(model, name)) for name in LIMITS}
     return _with_limits(model.copy(), {name: np.zeros_like(row) for name, row in limits.items()}), limits
 
@@ -92,7 +95,7 @@ def _with_limits(model: pin.Model, limits: dict[str, Vector]) -> pin.Model:
 
 
 def _items(geometry: pin.GeometryModel) -> list[tuple[Any, ...]]:
-    """A geometry model as plain values: meshes as arrays, for coal's own text of a hierarchy is ten times as long."""
+    """Return a geometry model as plain values, with meshes as arrays: coal's own format is ten times as long."""
     return [
         (item.name, item.parentJoint, item.parentFrame, item.placement, *_shape(item.geometry), item.meshPath,
          item.meshScale, item.overrideMaterial, item.meshColor)

@@ -1,4 +1,4 @@
-"""Options of a robot as plain values: what a problem file says about it, and what tells two robots apart."""
+"""Convert the options of a robot to plain values, for problem files and to tell robots apart."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ POSE_KEYS = ("xyz", "quat_xyzw", "rpy_deg")
 
 
 def plain(value: object) -> object:
-    """The value with nothing but None, booleans, numbers, text, lists and dictionaries in it; paths become absolute."""
+    """Convert a value to None, booleans, numbers, text, lists and dictionaries; paths become absolute."""
     if isinstance(value, pin.SE3):
         return {"xyz": value.translation.tolist(), "quat_xyzw": quaternion_xyzw(value).tolist()}
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
@@ -37,16 +37,16 @@ def plain(value: object) -> object:
 
 
 def source_entry(options: Mapping[str, Any]) -> dict[str, Any]:
-    """The options that were given, as plain values; those that say nothing are left out."""
+    """Return the given options as plain values, without empty ones."""
     entry = {key: plain(value) for key, value in options.items()}
     return {key: value for key, value in entry.items() if value is not None and value != [] and value != {}}
 
 
 def base_pose(value: BasePose, what: str = "base_pose") -> pin.SE3 | None:
-    """A base pose in any form of `rrtik_ompl.base.poses.rigid`, or as ``{xyz: .., quat_xyzw: .. | rpy_deg: ..}``.
+    """Return a base pose, from a form of `rrtik_ompl.base.poses.rigid` or ``{xyz: .., quat_xyzw: .. | rpy_deg: ..}``.
 
     Raises:
-        InputError: If it is neither, or a key or number in it makes no sense.
+        InputError: If it has neither form, or a key or number in it is not valid.
     """
     if value is None:
         return None

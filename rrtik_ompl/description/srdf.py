@@ -1,4 +1,4 @@
-"""SRDF (MoveIt's semantic description): groups of joints, named states, pairs of links that are never checked."""
+"""Read SRDF (MoveIt's semantic description): groups of joints, named states, pairs of links that are never checked."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from rrtik_ompl.description.faults import nearest_name
 from rrtik_ompl.description.tree import Tree
 from rrtik_ompl.description.urdf_read import attribute, element_lines, numbers, parse_xml
 
-# Where an SRDF names something that must be there: elements, the attribute, what is named by it.
+# Where an SRDF refers to something that must exist: path of the elements, attribute, and kind of what it names.
 MENTIONS = (
     ("disable_collisions", "link1", "link"),
     ("disable_collisions", "link2", "link"),
@@ -35,7 +35,7 @@ MENTIONS = (
 
 @dataclass(frozen=True, slots=True)
 class Mention:
-    """That an element names a link, joint or group: where it stands, its tag, which of the three, and the name."""
+    """A reference of an element to a link, joint or group: file and line, tag, kind of what it names, and the name."""
 
     place: str
     tag: str
@@ -45,7 +45,7 @@ class Mention:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Group:
-    """One planning group: what its joints are collected from."""
+    """A planning group: the chains (base and tip link), joints, links and other groups that its joints come from."""
 
     name: str
     chains: tuple[tuple[str, str], ...] = ()
@@ -56,7 +56,7 @@ class Group:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EndEffector:
-    """What is at the end of a group: the link that holds it, the group of its own joints, the group that it ends."""
+    """An end effector: the link that holds it, the group of its own joints, and the group at whose end it is."""
 
     name: str
     parent_link: str
@@ -66,20 +66,20 @@ class EndEffector:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Srdf:
-    """What an SRDF says.
+    """The contents of an SRDF.
 
     Attributes:
         where: File name for messages.
-        name: Of the robot.
-        groups: By name.
+        name: Name of the robot.
+        groups: The groups by name.
         states: Joint values [rad or m] by (group, state).
-        allowed: Pairs of link names never checked against each other.
-        never: Links that are checked against none, but those that a pair of ``checked`` names.
+        allowed: Pairs of link names that are never checked against each other.
+        never: Links that are checked against no other, except as in ``checked``.
         checked: Pairs that are checked although one of them is in ``never``.
-        end_effectors: In the order of the file.
-        passive: Joints that no motor moves.
+        end_effectors: The end effectors, in the order of the file.
+        passive: Joints without a motor.
         virtual: Joints between the world and the base.
-        mentions: All names of links, joints and groups that must exist.
+        mentions: All references to links, joints and groups, which must exist.
         places: File and line of each state, by (group, state).
     """
 
@@ -97,7 +97,7 @@ class Srdf:
     places: Mapping[tuple[str, str], str] = field(default_factory=dict)
 
     def unknown_names(self, tree: Tree) -> list[str]:
-        """A line for each name that neither the robot nor the file has, with its place and the nearest name."""
+        """Return a line for each name that neither robot nor file defines, with its place and a similar name."""
         known_names = {
             "link": {link.name for link in tree.links},
             "joint": {joint.name for joint in tree.joints} | self.virtual,
@@ -116,7 +116,7 @@ class Srdf:
         return lines
 
     def short_states(self, group: str | None, joints: Iterable[str]) -> list[str]:
-        """A line for each state of a group that lacks a value of one of some joints, and is thus no posture."""
+        """Return a line for each state of a group that lacks a value for one of the joints, and so is no posture."""
         lines = []
         for (owner, state), values in self.states.items():
             lacking = [joint for joint in joints if joint not in values]
@@ -126,13 +126,13 @@ class Srdf:
         return lines
 
     def of_another(self, name: str, where: str) -> list[str]:
-        """A line if the file is of a robot of another name than the one that a URDF describes."""
+        """Return a line if the file is for a robot of another name than the one that a URDF describes."""
         if not self.name or not name or self.name == name:
             return []
         return [f"{self.where}: it is of robot '{self.name}', and {where} describes '{name}'; is it the right file?"]
 
     def moved_passive(self, joints: Iterable[str]) -> list[str]:
-        """A line for each of some joints, which move, that has no motor."""
+        """Return a line for each of the given joints, which are moved, that has no motor."""
         moving = set(joints)
         return [
             f"{mention.place}: <{mention.tag}>: joint '{mention.name}' has no motor and is moved like the others; "
@@ -142,12 +142,12 @@ class Srdf:
         ]
 
     def place_of(self, state: str, group: str | None) -> str:
-        """File and line of a state of a group, or of another group if this one has no such state."""
+        """Return file and line of a group's state, or of a state of that name in another group if this one has none."""
         places = [place for (_, name), place in self.places.items() if name == state]
         return self.places.get((group or "", state), places[-1] if places else self.where)
 
     def group_joints(self, group: str, tree: Tree) -> tuple[str, ...]:
-        """Movable joints of a group, parents before children.
+        """Return the movable joints of a group, parents before children.
 
         Raises:
             InputError: If the group does not exist, is empty, or names a joint or link that the robot does not have.
@@ -158,7 +158,7 @@ class Srdf:
         return chosen
 
     def movable(self, group: str, tree: Tree) -> tuple[str, ...]:
-        """As :meth:`group_joints`, of a group that may have none.
+        """Return the same as :meth:`group_joints`, for a group that may have none.
 
         Raises:
             InputError: If the group does not exist, or names a joint or link that the robot does not have.
@@ -166,6 +166,8 @@ class Srdf:
         members = self._members(group, tree, ()) - self.passive
         return tuple(joint.name for joint in tree.walk() if joint.name in members and joint.moves)
 
+    # Return the names of a group's joints, including those of its subgroups.
+    # ``enclosing`` has the groups that led here, so that a group that contains itself is found.
     def _members(self, name: str, tree: Tree, enclosing: tuple[str, ...]) -> set[str]:
         if name not in self.groups:
             raise UnknownNameError("group", name, self.groups, where=self.where)
@@ -194,12 +196,12 @@ class Srdf:
         return members
 
     def allowed_pairs(self, tree: Tree) -> frozenset[frozenset[str]]:
-        """Pairs of links of a robot that are never checked against each other."""
+        """Return the pairs of links of a robot that are never checked against each other."""
         never_checked = {frozenset((link, other.name)) for link in self.never for other in tree.links}
         return self.allowed | frozenset(pair for pair in never_checked - self.checked if len(pair) == 2)
 
     def group_tip(self, group: str, tree: Tree) -> str:
-        """Link at the end of a group: its chain's, else its end effector's, else the child of its last joint."""
+        """Return the link at the end of a group: that of its last chain, its end effector or its last joint."""
         chains = self.groups[group].chains
         if chains:
             return chains[-1][1]
@@ -213,7 +215,7 @@ class Srdf:
         return next(joint.child for joint in tree.joints if joint.name == last)
 
     def postures(self, group: str | None) -> dict[str, dict[str, float]]:
-        """Named states merged over all groups; those of ``group`` win where two share a name."""
+        """Return the named states merged over all groups; those of ``group`` take precedence."""
         merged: dict[str, dict[str, float]] = {}
         for (_, state), values in sorted(self.states.items(), key=lambda item: item[0][0] == group):
             merged.setdefault(state, {}).update(values)
@@ -221,7 +223,7 @@ class Srdf:
 
 
 def read_srdf(text: str, where: str = "SRDF text") -> Srdf:
-    """Read SRDF text. Names are compared with the robot only when they are used.
+    """Read SRDF text. Its names are compared with the robot only when they are used.
 
     Raises:
         InputError: If the text is not XML, or an element lacks what it must have; the message names it.
@@ -284,11 +286,12 @@ def _group(element: Element, where: str) -> Group:
     return Group(name, chains, names("joint"), names("link"), names("group"))
 
 
+# Return the joint values of a state; joints with several values (planar, floating) are left out.
 def _state(element: Element, where: str) -> dict[str, float]:
     values = {}
     for joint in element.findall("joint"):
         name = attribute(joint, "joint", "name", where)
         words = (joint.get("value") or "").split()
-        if len(words) == 1:  # states of planar and floating joints hold more numbers and are not ours
+        if len(words) == 1:  # Planar and floating joints have more numbers and are not supported.
             values[name] = numbers(joint, "value", 1, None, f"{where}: joint '{name}'")[0]
     return values

@@ -1,7 +1,7 @@
-"""Links and joints as plain values, and the checks that make them a tree.
+"""Define links and joints as plain values, and check that they form a tree.
 
-Every description of a robot (URDF, DH table, a planar arm) becomes links and joints first, so that all of them pass the
-same checks in Python and no C++ parser meets a file that nobody has checked.
+Every description of a robot (URDF, DH table, planar arm) is first converted to links and joints, so that all of them
+pass the same checks in Python, and no C++ parser reads an unchecked file.
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ from rrtik_ompl.base.errors import InputError, UnknownNameError, at_most, name_o
 from rrtik_ompl.base.poses import rigid
 from rrtik_ompl.model.shapes import Shape
 
-MOST_JOINTS = 1001  # those of an arm, and the one that fixes its tip
+MOST_JOINTS = 1001  # most joints of a tree: a thousand of an arm, and one that fixes its tip
 
 
 @dataclass(frozen=True, slots=True)
 class JointKind:
-    """What the type of a joint says of it. How it moves stands in ``tree_model``.
+    """The properties of a type of joint; ``tree_model`` has its kinematics.
 
     Attributes:
         moves: Whether it has a value.
-        slides: Whether that is a way along its axis [m]; else it is a turn about it [rad].
+        slides: Whether the value is a displacement along its axis [m]; otherwise it is an angle about it [rad].
         endless: Whether it has no limits of position.
     """
 
@@ -49,7 +49,7 @@ JOINT_KINDS = {
 
 @dataclass(frozen=True, slots=True)
 class MeshFile:
-    """A mesh in a file, with a scale per axis (URDF allows three numbers, a negative one mirrors)."""
+    """A mesh in a file, with a scale for each axis; a negative scale mirrors."""
 
     path: Path
     scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
@@ -57,9 +57,15 @@ class MeshFile:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Solid:
-    """A shape fixed to a link: ``T_link_solid`` is a ``pinocchio.SE3``, ``colour`` is red, green, blue, opacity.
+    """A shape fixed to a link.
 
-    The shape is one solid for coal, as all that URDF knows are (a polygon that is not convex is several).
+    The shape must be a single solid for coal, as all shapes of URDF are (a polygon that is not convex would be
+    several).
+
+    Attributes:
+        shape: The shape or mesh file.
+        T_link_solid: Pose of the shape in the link's frame, ``pinocchio.SE3``.
+        colour: Red, green, blue and opacity, from 0 to 1; None if not stated.
     """
 
     shape: Shape | MeshFile
@@ -72,7 +78,7 @@ class Solid:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Link:
-    """A rigid body. ``inertia`` is a ``pinocchio.Inertia`` in the link's frame, if known."""
+    """A rigid body with collision and visual solids; ``inertia`` is a ``pinocchio.Inertia`` in its frame, or None."""
 
     name: str
     collision: tuple[Solid, ...] = ()
@@ -82,15 +88,15 @@ class Link:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Joint:
-    """What lets ``child`` move against ``parent``.
+    """A joint by which ``child`` moves relative to ``parent``.
 
     Attributes:
         kind: One of ``JOINT_KINDS``.
-        T_parent_joint: Joint frame (and child frame, at zero) in the parent link, ``pinocchio.SE3``.
+        T_parent_joint: Pose of the joint frame (and of the child, at zero) in the parent link, ``pinocchio.SE3``.
         axis: Unit axis in the joint frame, shape (3,).
         lower, upper: Position limits [rad or m]; without meaning for continuous and fixed joints.
-        velocity: Limit [rad/s or m/s], inf if unknown.
-        effort: Limit [N m or N], inf if unknown.
+        velocity: Velocity limit [rad/s or m/s], inf if unknown.
+        effort: Limit of torque or force [N m or N], inf if unknown.
     """
 
     name: str
@@ -144,27 +150,27 @@ class Joint:
 
     @property
     def moves(self) -> bool:
-        """Whether it has a value."""
+        """Return whether the joint has a value."""
         return JOINT_KINDS[self.kind].moves
 
     @property
     def slides(self) -> bool:
-        """Whether its value is a way [m]; else it is an angle [rad]."""
+        """Return whether the joint's value is a displacement [m]; otherwise it is an angle [rad]."""
         return JOINT_KINDS[self.kind].slides
 
     @property
     def endless(self) -> bool:
-        """Whether it has no limits of position."""
+        """Return whether the joint has no limits of position."""
         return JOINT_KINDS[self.kind].endless
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tree:
-    """Links and joints that are known to form one tree.
+    """Links and joints that were checked to form one tree.
 
     Attributes:
         where: File or name put in front of error messages.
-        links, joints: In the order of the description.
+        links, joints: Links and joints, in the order of the description.
     """
 
     where: str
@@ -181,12 +187,12 @@ class Tree:
 
     @property
     def root(self) -> Link:
-        """The link that is no joint's child."""
+        """Return the link that is no joint's child."""
         children = {joint.child for joint in self.joints}
         return next(link for link in self.links if link.name not in children)
 
     def walk(self) -> Iterator[Joint]:
-        """All joints, parents before children, each branch to its end before the next one begins."""
+        """Yield all joints depth first, parents before children."""
         child_joints: dict[str, list[Joint]] = {link.name: [] for link in self.links}
         for joint in self.joints:
             child_joints[joint.parent].append(joint)
@@ -198,11 +204,11 @@ class Tree:
             stack += child_joints[joint.child][::-1]
 
     def chain(self, tip: str, base: str | None = None) -> tuple[Joint, ...]:
-        """Joints from ``base`` (the root if None) to the link ``tip``, in that order.
+        """Return the joints from ``base`` (the root if None) to the link ``tip``, in that order.
 
         Raises:
             UnknownNameError: If one of the two is no link.
-            InputError: If ``tip`` does not hang on ``base``.
+            InputError: If ``tip`` is not below ``base``.
         """
         names = [link.name for link in self.links]
         joint_above = {joint.child: joint for joint in self.joints}
@@ -222,7 +228,7 @@ class Tree:
         return tuple(reversed(joints))
 
     def hold(self, values: Mapping[str, float]) -> Tree:
-        """The same tree with the named joints fixed at the given values [rad or m]."""
+        """Return the same tree with the named joints fixed at the given values [rad or m]."""
         joints = [_fixed_at(joint, values[joint.name]) if joint.name in values else joint for joint in self.joints]
         return Tree(self.where, self.links, joints)
 
@@ -233,6 +239,7 @@ def _fixed_at(joint: Joint, value: float) -> Joint:
     return Joint(joint.name, "fixed", joint.parent, joint.child, joint.T_parent_joint * motion, axis)
 
 
+# Raise an error if names are missing, duplicate or not valid, or a joint refers to an unknown link.
 def _check_names(tree: Tree) -> None:
     if not tree.links:
         raise InputError(f"{tree.where}: no link; a robot needs at least one")
@@ -250,6 +257,7 @@ def _check_names(tree: Tree) -> None:
                 raise UnknownNameError(f"{role} link", link, link_names, where=f"{tree.where}: joint '{joint.name}'")
 
 
+# Raise an error unless the joints connect all links to one tree.
 def _check_connected(tree: Tree) -> None:
     above: dict[str, Joint] = {}
     for joint in tree.joints:

@@ -1,4 +1,4 @@
-"""Pinocchio's model, collision geometry and visual geometry of a tree of links and joints."""
+"""Build Pinocchio's model, collision geometry and visual geometry from a tree of links and joints."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ GREY = (0.7, 0.7, 0.7, 1.0)
 
 
 class Looks(Once[pin.GeometryModel]):
-    """What is drawn of a robot: most of the bytes of its description, read when somebody looks for the first time.
+    """The visual geometry of a robot, which is most of its data, and is only loaded when it is used for the first time.
 
     Attributes:
-        files: The meshes.
+        files: The mesh files.
     """
 
     def __init__(self, make: Callable[[], pin.GeometryModel], files: tuple[str, ...] = ()) -> None:
@@ -35,7 +35,7 @@ class Looks(Once[pin.GeometryModel]):
 
 
 def build_models(tree: Tree, T_world_base: pin.SE3 | None = None) -> tuple[Any, Any, Looks]:
-    """Pinocchio model, collision geometry and visual geometry of a tree.
+    """Return the Pinocchio model, collision geometry and visual geometry of a tree.
 
     Args:
         tree: Links and joints.
@@ -48,7 +48,7 @@ def build_models(tree: Tree, T_world_base: pin.SE3 | None = None) -> tuple[Any, 
     model.name = tree.where
 
     links = {link.name: link for link in tree.links}
-    # Pinocchio finds frames by name alone in places, so a joint that is called like a link gets no frame.
+    # Parts of Pinocchio find frames by name alone, so a joint with the name of a link gets no frame.
     framed = {joint.name for joint in tree.joints} - set(links)
     places = {tree.root.name: _Place(0, pin.SE3.Identity() if T_world_base is None else T_world_base, 0)}
     _add_link(model, tree.root, places)
@@ -70,13 +70,14 @@ def build_models(tree: Tree, T_world_base: pin.SE3 | None = None) -> tuple[Any, 
 
 @dataclass(slots=True, eq=False)
 class _Place:
-    """Where a link hangs: on which Pinocchio joint, with which offset, and its frame number."""
+    """Where a link is attached: number of its Pinocchio joint, pose in that joint's frame, and number of its frame."""
 
     joint: int
     T_joint_link: Any
     frame: int
 
 
+# Add a joint to a model and return where its child link is attached; a fixed joint adds nothing.
 def _add_joint(model: pin.Model, joint: Joint, parent: _Place) -> _Place:
     placement = parent.T_joint_link * joint.T_parent_joint
     if not joint.moves:
@@ -100,10 +101,11 @@ def _add_joint(model: pin.Model, joint: Joint, parent: _Place) -> _Place:
 
 
 def _letter(joint: Joint) -> str:
-    """The axis of its frame that a joint turns about or slides along; "" if it is none of them."""
+    """Return the axis of its frame about or along which a joint moves: "X", "Y" or "Z"; "" if it is another one."""
     return next((name for name, unit in zip("XYZ", np.eye(3), strict=True) if np.array_equal(unit, joint.axis)), "")
 
 
+# Return Pinocchio's joint model for a joint with limits, and the rotation of its frame.
 def _along_axis(short: str, long: str, joint: Joint) -> tuple[Any, Any]:
     letter = _letter(joint)
     if letter:
@@ -111,16 +113,17 @@ def _along_axis(short: str, long: str, joint: Joint) -> tuple[Any, Any]:
     return getattr(pin, f"JointModel{long}Unaligned")(np.array(joint.axis)), np.eye(3)
 
 
+# Return Pinocchio's joint model for a continuous joint, and the rotation of its frame.
 def _unbounded(joint: Joint) -> tuple[Any, Any]:
     letter = _letter(joint)
     if letter:
         return getattr(pin, f"JointModelRUB{letter}")(), np.eye(3)
-    # Pinocchio offers no way to give its unaligned unbounded joint an axis from Python.
+    # From Python, the axis of Pinocchio's unaligned unbounded joint cannot be set, so the frame is rotated instead.
     x_axis = np.eye(3)[0]
     return pin.JointModelRUBX(), pin.Quaternion.FromTwoVectors(x_axis, np.array(joint.axis)).matrix()
 
 
-# Of each kind that moves Pinocchio's joint, and the rotation of its frame.
+# For each kind of joint that moves, the function that returns Pinocchio's joint model and the rotation of its frame.
 JOINT_MODELS: dict[str, Callable[[Joint], tuple[Any, Any]]] = {
     "revolute": partial(_along_axis, "R", "Revolute"),
     "continuous": _unbounded,
@@ -135,6 +138,7 @@ def _add_link(model: pin.Model, link: Link, places: dict[str, _Place]) -> None:
         model.appendBodyToJoint(place.joint, link.inertia, place.T_joint_link)
 
 
+# Return the collision or visual geometry of a tree (``which``); meshes that were loaded before are shared.
 def _geometry(tree: Tree, places: dict[str, _Place], meshes: dict[MeshFile, Any], which: str) -> coal.CollisionGeometry:
     geometry = pin.GeometryModel()
     for link in tree.links:
@@ -157,6 +161,7 @@ def _geometry(tree: Tree, places: dict[str, _Place], meshes: dict[MeshFile, Any]
     return geometry
 
 
+# Load a mesh file as a coal geometry, checked; each file is loaded once.
 def _load(mesh: MeshFile, meshes: dict[MeshFile, Any], where: str) -> coal.CollisionGeometry:
     if mesh in meshes:
         return meshes[mesh]

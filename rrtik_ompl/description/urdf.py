@@ -1,4 +1,4 @@
-"""Robots from URDF files or text, with SRDF (groups, postures, allowed collisions) and ``joint_limits.yaml``."""
+"""Load robots from URDF files or text, with SRDF (groups, postures, allowed collisions) and ``joint_limits.yaml``."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def robot_from_urdf(
         path: The URDF; one named ``.xacro`` is expanded by the package xacro.
         name: Name for messages; the URDF's own if None.
         xacro_args: Arguments of its macros by name.
-        **options: As for `robot_from_urdf_text`.
+        **options: Options of `robot_from_urdf_text`.
 
     Raises:
         InputError: If anything in the files or options cannot be used; one line names file, element and remedy.
@@ -85,31 +85,31 @@ def robot_from_urdf_text(
     """Load a robot from URDF text.
 
     The actuated joints are, in this order of precedence: ``joints``; those of ``group``; those between the base and
-    ``tip``; all that do not mimic another. Every other joint is held still. Soft limits (``safety_controller``) are
-    not used: put the limits you want into ``joint_limits``.
+    ``tip``; all that do not mimic another. Every other joint is held fixed. Soft limits (``safety_controller``) are not
+    used: put the limits you want into ``joint_limits``.
 
     Args:
         text: The XML.
         name: Name for messages; the URDF's own if None.
         where: What error messages call the text (its file name).
         folder: Folder relative to which meshes are named.
-        srdf: SRDF file; one named ``.xacro`` is expanded. It also describes the robot's gripper, an
-            end effector whose group has states called open and closed.
+        srdf: SRDF file; one named ``.xacro`` is expanded. It also describes the robot's gripper: an end effector whose
+            group has states called open and closed.
         group: Group of the SRDF whose joints are actuated; its end is the default tip.
         joints: Actuated joints, in the order wanted.
         tip: Link that goals refer to.
         joint_limits: File in the format of MoveIt's ``joint_limits.yaml``.
         packages: Folders in which ``package://`` names are sought first.
-        locked: Values [rad or m] of joints that are held still; 0, moved into the limits, if absent.
+        locked: Values of joints that are held fixed [rad or m]; by default 0, moved into the limits.
         base_pose: ``pinocchio.SE3`` T_world_base.
         limits: Limits that replace those of the URDF and of ``joint_limits``, by joint name.
         postures: Further named postures.
-        allowed_collisions: Pairs of links never checked, besides those of the SRDF.
+        allowed_collisions: Pairs of links that are never checked, in addition to those of the SRDF.
         self_collision: Whether links are checked against each other.
         closed_form: The robot's own inverse kinematics.
-        source: What a problem file says under ``robot``.
-        strict: Whether an error is made of what is otherwise a warning: names in the SRDF that the robot does not have,
-            postures outside the limits, and what is said about shapes, joints or limits but not read.
+        source: The entry ``robot`` of a problem file for this robot.
+        strict: Whether what is otherwise a warning becomes an error: names in the SRDF that the robot does not have,
+            postures outside the limits, and statements about shapes, joints or limits that are not read.
 
     Raises:
         InputError: If anything in the text, the files or the options cannot be used.
@@ -165,10 +165,11 @@ def robot_from_urdf_text(
 
 
 def package_roots(packages: FilePath | Iterable[FilePath]) -> list[Path]:
-    """Folders that hold packages, given as one or several."""
+    """Return the folders of packages, given as one or several, as a list."""
     return [Path(each) for each in ([packages] if isinstance(packages, (str, os.PathLike)) else packages)]
 
 
+# Return the names of the actuated joints; see :func:`robot_from_urdf_text` for the order of precedence.
 def _actuated(
     description: UrdfDescription, semantics: Srdf, group: str | None, joints: Iterable[str] | None, tip: str | None
 ) -> tuple[str, ...]:
@@ -193,21 +194,21 @@ def _actuated(
 
 
 def _limits_of_file(file: FilePath, tree: Tree) -> tuple[dict[str, JointLimits], list[str]]:
-    """Limits by joint, and what the file says about limits besides."""
-    from rrtik_ompl.description.joint_limits import read_joint_limits, unread_limits  # most need no YAML
+    """Return the limits in a file by joint, and the statements about limits in it that are not used."""
+    from rrtik_ompl.description.joint_limits import read_joint_limits, unread_limits  # Most robots need no YAML.
 
     return read_joint_limits(file, [joint.name for joint in tree.joints]), unread_limits(file)
 
 
 def _outside(robot: Robot, others: Collection[str], semantics: Srdf, group: str | None) -> Iterator[str]:
-    """A line for each state of an SRDF that is a posture, but not one of some others, outside the robot's limits."""
+    """Yield a line for each posture of an SRDF, except those in ``others``, that is outside the robot's limits."""
     own_postures = {name: values for name, values in semantics.postures(group).items() if name not in others}
     for name, fault in postures_outside(robot, own_postures):
         yield f"{semantics.place_of(name, group)}: posture '{name}': {fault}"
 
 
 def _hand_outside(gripper: GripperJoints | None, tree: Tree, semantics: Srdf) -> Iterator[str]:
-    """A line for each joint of a gripper that its states bring outside its limits."""
+    """Yield a line for each joint of a gripper that one of its states puts outside its limits."""
     if gripper is None:
         return
     ranges = {joint.name: (joint.lower, joint.upper) for joint in tree.joints if not joint.endless}

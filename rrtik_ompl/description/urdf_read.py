@@ -1,4 +1,4 @@
-"""URDF text to links and joints: every element is checked here, every error names file, element and remedy."""
+"""Read links and joints from URDF text; every element is checked, and every error names file, element and remedy."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ _TENSOR = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class UrdfDescription:
-    """What a URDF says: its name, its tree, and which joints follow others (followers of followers resolved).
+    """The contents of a URDF: its name, its tree, and which joints follow others, with chains of followers resolved.
 
-    What it says besides about shapes, joints and limits is in ``unread``.
+    ``unread`` lists things in it about shapes, joints and limits that are not used.
     """
 
     name: str
@@ -47,7 +47,7 @@ def read_urdf(
         text: The XML.
         where: File name, put in front of every error message.
         folder: Folder of the file, for meshes; None if meshes can only be found by absolute path or ``packages``.
-        packages: Folders that hold packages (``package://NAME/...``), or are packages themselves.
+        packages: Folders that contain packages (``package://NAME/...``), or are packages themselves.
 
     Raises:
         InputError: If anything in the text cannot be used.
@@ -72,7 +72,7 @@ def read_urdf(
 
 
 def parse_xml(text: str, root: str | None, where: str) -> Element:
-    """Top element of XML text, of any name if ``root`` is None.
+    """Parse XML text and return its top element, which may have any name if ``root`` is None.
 
     Raises:
         InputError: If the text is not XML (with the line) or its top element is not ``root``.
@@ -88,11 +88,11 @@ def parse_xml(text: str, root: str | None, where: str) -> Element:
 
 
 def element_lines(root: Element, text: str, where: str) -> dict[Element, str]:
-    """File and line of each element of XML text that :func:`parse_xml` has read.
+    """Return file and line of each element of XML text that :func:`parse_xml` has read.
 
-    The file alone if macros have made the text, for they move its lines.
+    If macros have produced the text, only the file is returned, as they shift the lines.
     """
-    # ElementTree forgets the lines, so the parser below it is asked once more.
+    # ElementTree does not keep line numbers, so the text is parsed once more by the parser that it uses.
     lines: list[int] = []
     if not where.lower().endswith(".xacro"):
         parser = expat.ParserCreate()
@@ -106,7 +106,14 @@ def element_lines(root: Element, text: str, where: str) -> dict[Element, str]:
 
 
 def numbers(element: Element, key: str, count: int, default: Sequence[float] | None, where: str) -> list[float]:
-    """The ``count`` finite numbers of an attribute.
+    """Return the finite numbers of an attribute, ``count`` of them.
+
+    Args:
+        element: The element.
+        key: Name of the attribute.
+        count: How many numbers there must be.
+        default: The numbers if the attribute is missing; None if it must be there.
+        where: File and element, put in front of error messages.
 
     Raises:
         InputError: If the attribute is missing without a default, or does not hold that many finite numbers.
@@ -129,7 +136,7 @@ def numbers(element: Element, key: str, count: int, default: Sequence[float] | N
 
 
 def attribute(element: Element | None, tag: str, key: str, where: str) -> str:
-    """A word that must be there, such as the link of ``<parent link="..."/>``.
+    """Return an attribute that must be there, such as the link of ``<parent link="..."/>``.
 
     Raises:
         InputError: If the element or the attribute is missing.
@@ -142,7 +149,7 @@ def attribute(element: Element | None, tag: str, key: str, where: str) -> str:
 
 @contextmanager
 def located(where: str) -> Iterator[None]:
-    """Put the file and the element in front of an error that does not begin with them yet; its class and data stay."""
+    """Put file and element in front of an error's message if it does not begin with them; its class and data stay."""
     try:
         yield
     except RrtikError as error:
@@ -151,14 +158,16 @@ def located(where: str) -> Iterator[None]:
         raise
 
 
+# Reads the elements of a URDF; materials and missing meshes are collected on the way.
 @dataclass(slots=True, eq=False)
 class _Reader:
     where: str
     folder: Path | None
     packages: tuple[Path, ...]
     materials: dict[str, Colour]
-    undrawn: list[str] = field(default_factory=list)  # links with a visual mesh that does not exist
+    undrawn: list[str] = field(default_factory=list)  # links whose visual mesh does not exist
 
+    # Store the colour of a named material; the first definition counts.
     def learn_material(self, material: Element) -> None:
         colour = material.find("color")
         if colour is not None:
@@ -166,6 +175,7 @@ class _Reader:
             red, green, blue, opacity = numbers(colour, "rgba", 4, None, where)
             self.materials.setdefault(material.get("name", ""), (red, green, blue, opacity))
 
+    # Read a link. A cylinder that ``<collision_checking>`` names as a capsule becomes one.
     def link(self, element: Element) -> Link:
         name = attribute(element, "link", "name", self.where)
         where = f"{self.where}: link '{name}'"
@@ -176,7 +186,7 @@ class _Reader:
             return Link(name, collision, visual or collision, _inertia(element.find("inertial"), where))
 
     def visuals(self, element: Element, link: str, where: str) -> Iterator[Solid]:
-        """What is drawn. A missing visual mesh is no reason to refuse a robot: planning does not need it."""
+        """Yield the visual solids. A missing visual mesh is noted, not refused, as planning does not need it."""
         for item in element.findall("visual"):
             try:
                 yield self.solid(item, where, set())
@@ -193,6 +203,7 @@ class _Reader:
             shape = shape.capped()
         return Solid(shape, _origin(element, where), self.colour(element.find("material"), where))
 
+    # Read a shape or the reference to a mesh file.
     def shape(self, element: Element, where: str) -> Shape | MeshFile:
         kind = SHAPES.get(element.tag)
         if kind is not None and kind.in_urdf:
@@ -217,6 +228,7 @@ class _Reader:
         red, green, blue, opacity = numbers(colour, "rgba", 4, None, where)
         return red, green, blue, opacity
 
+    # Read a joint with its limits.
     def joint(self, element: Element) -> Joint:
         name = attribute(element, "joint", "name", self.where)
         where = f"{self.where}: joint '{name}'"
@@ -231,7 +243,7 @@ class _Reader:
         axis = [1.0, 0.0, 0.0] if axis_element is None else numbers(axis_element, "xyz", 3, (1.0, 0.0, 0.0), where)
         bounds = _limits(element.find("limit"), kind, where)
         if not JOINT_KINDS[kind].moves:
-            axis = [1.0, 0.0, 0.0]  # that of a fixed joint says nothing, and may be zero
+            axis = [1.0, 0.0, 0.0]  # The axis of a fixed joint means nothing, and may be zero.
 
         with located(self.where):
             return Joint(name, kind, parent, child, _origin(element, where), axis, **bounds)
@@ -252,7 +264,7 @@ def _measured(element: Element, measure: Measure, where: str) -> float | list[fl
 
 
 def _limits(limit: Element | None, kind: str, where: str) -> dict[str, float]:
-    """Limits of position, velocity and effort; infinite where the kind of joint has none, or the file says none."""
+    """Return the limits of position, velocity and effort; inf where the joint has none, or the file gives none."""
     moves = JOINT_KINDS[kind].moves
     endless = JOINT_KINDS[kind].endless
     has_range = moves and not endless
@@ -288,6 +300,7 @@ def _origin(element: Element, where: str) -> pin.SE3:
     return pose_from_rpy(numbers(origin, "xyz", 3, zero, where), numbers(origin, "rpy", 3, zero, where), where)
 
 
+# Return the inertia of a link in the link's frame; None if it is missing or physically impossible.
 def _inertia(inertial: Element | None, where: str) -> pin.Inertia | None:
     mass = None if inertial is None else inertial.find("mass")
     tensor = None if inertial is None else inertial.find("inertia")
@@ -301,12 +314,18 @@ def _inertia(inertial: Element | None, where: str) -> pin.Inertia | None:
 
     mass_value = numbers(mass, "value", 1, None, where)[0]
     if mass_value < 0.0 or np.linalg.eigvalsh(in_link)[0] < 0.0:
-        return None  # impossible, but common in the files of real robots, and without effect on planning
+        return None  # Such files are common, and planning does not need inertias.
     return pin.Inertia(mass_value, placement.translation, in_link)
 
 
 def flattened(where: str, joints: Sequence[Joint], mimics: Sequence[Mimic]) -> tuple[Mimic, ...]:
-    """Make every follower follow a joint that follows nothing."""
+    """Make every follower follow a joint that follows nothing itself.
+
+    Args:
+        where: File name, put in front of error messages.
+        joints: All joints.
+        mimics: Which joints follow which.
+    """
     mimic_of = {tie.joint: tie for tie in mimics}
     movable = [joint.name for joint in joints if joint.moves]
     resolved = []
@@ -324,7 +343,7 @@ def flattened(where: str, joints: Sequence[Joint], mimics: Sequence[Mimic]) -> t
             if source not in mimic_of:
                 break
 
-            # What follows a follower: m (m' x + o') + o.
+            # Substitute the leader's own rule: m (m' x + o') + o.
             leader = mimic_of[source]
             visited.add(source)
             source = leader.source
@@ -335,7 +354,7 @@ def flattened(where: str, joints: Sequence[Joint], mimics: Sequence[Mimic]) -> t
     return tuple(resolved)
 
 
-# Elements that are read, or that say nothing about shapes, joints and limits.
+# Elements that are read, or that do not concern shapes, joints and limits.
 OF_ROBOT = {"gazebo", "joint", "link", "material", "mujoco", "plugin", "ros2_control", "sensor", "transmission"}
 OF_LINK = {
     "collision",
@@ -365,11 +384,11 @@ OF_JOINT = {
 OF_LIMIT = {"effort", "lower", "upper", "velocity"}
 OF_MIMIC = {"joint", "multiplier", "offset"}
 SOFT = (("soft_lower_limit", "lower", 1.0), ("soft_upper_limit", "upper", -1.0))
-NARROWER = 1e-6  # [rad or m] from which a soft limit is another one
+NARROWER = 1e-6  # [rad or m] difference above which a soft limit is narrower than the limit
 
 
 def unread_of_urdf(robot: Element) -> list[str]:
-    """What is not read of a URDF, each thing once: "<capsule_chain>", "<limit jerk> of joints 'a', 'b'"."""
+    """Return what is not read of a URDF, each thing once: "<capsule_chain>", "<limit jerk> of joints 'a', 'b'"."""
     found = [f"<{tag}>" for tag in _others(robot, OF_ROBOT)]
     if robot.find("gazebo/joint") is not None:
         found.append("joints within <gazebo>")
@@ -384,11 +403,12 @@ def unread_of_urdf(robot: Element) -> list[str]:
 
 
 def _others(element: Element, known: set[str]) -> list[str]:
-    """Tags of the parts of an element that are not known; each once, without the address of its namespace."""
+    """Return the tags of an element's parts that are not known, each once, without their namespace."""
     tags = (part.tag for part in element if isinstance(part.tag, str) and part.tag not in known)
     return list(dict.fromkeys(tag.rpartition("}")[2] for tag in tags))
 
 
+# Yield the attributes of a joint's limit and mimic that are not read, and its soft limits if they are narrower.
 def _of_joint(joint: Element) -> Iterator[str]:
     for tag, known in (("limit", OF_LIMIT), ("mimic", OF_MIMIC)):
         part = joint.find(tag)
@@ -401,7 +421,7 @@ def _of_joint(joint: Element) -> Iterator[str]:
 
 
 def _narrower(soft: Element, hard: Element, own: str, other: str, way: float) -> bool:
-    """Whether a soft limit leaves less than the limit that is read."""
+    """Check whether a soft limit leaves less than the limit that is read."""
     try:
         gap = float(soft.get(own, "nan")) - float(hard.get(other, "0"))
     except ValueError:

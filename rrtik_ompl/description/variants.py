@@ -1,6 +1,6 @@
-"""A robot made of another one: with larger or thicker links, narrower ranges or weights of its joints.
+"""Derive a robot from another one: with larger or thicker links, narrower joint ranges or joint weights.
 
-These are what `rrtik_ompl.load_robot` takes as options of any robot.
+`rrtik_ompl.load_robot` takes these as options of any robot.
 """
 
 from __future__ import annotations
@@ -20,22 +20,22 @@ from rrtik_ompl.geometry.collision.solids import bvh, hull, is_mesh, mesh_arrays
 from rrtik_ompl.model.robot import Robot
 
 Padding: TypeAlias = float | Mapping[str, float]
-LIGHTEST = 1e-3  # weight of a joint
+LIGHTEST = 1e-3  # least weight of a joint
 HEAVIEST = 1e3
 
 
 def scaled(robot: Robot, scale: Mapping[str, float]) -> Robot:
-    """The robot whose links have collision solids of another size, for whatever they are checked against.
+    """Return the robot with collision solids of another size, in checks against everything.
 
-    Each solid of a link grows or shrinks about its own middle, a mesh about the mean of its corners, as those of
-    MoveIt's ``link_scale`` do. What is drawn stays as it is.
+    Each solid of a link grows or shrinks about its own centre, a mesh about the mean of its vertices, as with MoveIt's
+    ``link_scale``. The visual geometry stays as it is.
 
     Args:
-        robot: The robot. Factors multiply with those that it has already.
+        robot: The robot. Factors multiply with those that it already has.
         scale: Factors by name of link, greater than 0; links that are not named stay as they are.
 
     Raises:
-        UnknownNameError: If the robot has no link of a name.
+        UnknownNameError: If the robot has no link of that name.
         InputError: If a factor is not greater than 0, or a link has a solid that cannot be scaled.
 
     Example:
@@ -74,18 +74,18 @@ def scaled(robot: Robot, scale: Mapping[str, float]) -> Robot:
 
 
 def padded(robot: Robot, padding: Padding) -> Robot:
-    """The robot with thicker links, to obstacles and to each other.
+    """Return the robot with thicker links, in checks against obstacles and each other.
 
-    All checks and proofs keep the padding on top of the margins of obstacles and of :class:`rrtik_ompl.World`'s
-    ``self_margin``; between two links that both have one, the sum. What an obstacle or link that no joint moves must
-    keep from another such one stays 0. MoveIt's ``link_padding`` counts for obstacles alone.
+    All checks and proofs keep the padding in addition to the margins of obstacles and to the ``self_margin`` of
+    :class:`rrtik_ompl.World`; between two links with paddings, the sum of both. Between two bodies that do not move,
+    the required distance stays 0. MoveIt's ``link_padding``, in contrast, applies to obstacles only.
 
     Args:
-        robot: The robot; a padding that it has already is replaced.
-        padding: By name of link [m], at least 0; or one number for all links.
+        robot: The robot; padding that it already has is replaced.
+        padding: Padding by name of link [m], at least 0; or one number for all links.
 
     Raises:
-        UnknownNameError: If the robot has no link of a name.
+        UnknownNameError: If the robot has no link of that name.
         InputError: If a number is negative or not finite.
 
     Example:
@@ -104,16 +104,15 @@ def padded(robot: Robot, padding: Padding) -> Robot:
 
 
 def narrowed(robot: Robot, ranges: Mapping[str, Sequence[float]]) -> Robot:
-    """The robot whose joints keep to ranges inside their limits, on whole motions.
+    """Return the robot with joint ranges narrower than its limits, which hold on whole motions.
 
     Args:
         robot: The robot.
-        ranges: Lowest and highest value by name of joint [rad or m]; what lies outside the limits of the joint is cut
-            off.
+        ranges: Lowest and highest value by name of joint [rad or m]; parts outside the joint's limits are cut off.
 
     Raises:
-        UnknownNameError: If the robot has no actuated joint of a name.
-        InputError: If a range is upside down, empty within the limits, or of a joint that turns without limits.
+        UnknownNameError: If the robot has no actuated joint of that name.
+        InputError: If a range is reversed, empty within the limits, or for a joint that turns without limits.
 
     Example:
         >>> import rrtik_ompl as rrtik
@@ -151,20 +150,21 @@ def narrowed(robot: Robot, ranges: Mapping[str, Sequence[float]]) -> Robot:
 
 
 def weighted(robot: Robot, weights: Mapping[str, float]) -> Robot:
-    """The robot with joints that count more or less than others in the length of a path.
+    """Return the robot with joints that count more or less than others in the length of a path.
 
-    A joint of weight w counts w times as much as one without: :func:`rrtik_ompl.plan`, ``plan(improve=)``,
-    :func:`rrtik_ompl.shorten` and :class:`rrtik_ompl.Task` make the length small in which each joint's way is
-    multiplied by its weight, also under path constraints, and planners measure distances so. Of several solutions
-    of inverse kinematics the nearest is the one whose weighted way is shortest. For paths of single-joint moves the
-    weights are the ``joint_costs``, unless these are given. Only proportions matter. ``JointPath.length`` is without.
+    A joint of weight w counts w times as much as one without. :func:`rrtik_ompl.plan`, ``plan(improve=)``,
+    :func:`rrtik_ompl.shorten` and :class:`rrtik_ompl.Task` minimise the length in which each joint's motion is
+    multiplied by its weight, also under path constraints, and planners measure distances in this way. Of several
+    solutions of inverse kinematics, the nearest is the one with the least weighted distance. For paths of single-joint
+    moves the weights are the ``joint_costs``, unless these are given. Only the proportions of weights matter.
+    ``JointPath.length`` is without weights.
 
     Args:
-        robot: The robot; weights that it has already are replaced.
-        weights: By name of joint, from 0.001 to 1000; a joint without one counts 1.
+        robot: The robot; weights that it already has are replaced.
+        weights: Weights by name of joint, from 0.001 to 1000; a joint without one counts 1.
 
     Raises:
-        UnknownNameError: If no actuated joint has a name.
+        UnknownNameError: If no actuated joint has that name.
         InputError: If a weight is out of range.
 
     Example:
@@ -190,19 +190,19 @@ def _by_name(
     given: Mapping[str, float],
     checked: Callable[[float, str], float],
 ) -> dict[str, float]:
-    """The numbers of an option, checked.
+    """Check the numbers of an option that are given by name, and return them.
 
     Args:
         robot: The robot.
-        option: What they are for, for messages.
-        kind: What has the names: "link" or "joint".
-        names: All there are.
-        given: By name.
-        checked: Takes a number and what it is; returns it, or says why not.
+        option: Name of the option, for messages.
+        kind: What the names refer to: "link" or "joint".
+        names: All known names.
+        given: The numbers by name.
+        checked: Function of a number and its description that returns the number, or raises an error.
 
     Raises:
-        UnknownNameError: If there is no such name.
-        InputError: If a value is no number, or as ``checked`` says.
+        UnknownNameError: If a name is not known.
+        InputError: If a value is not a number, or ``checked`` raises it.
     """
     known = tuple(names)
     found = {}
@@ -215,7 +215,7 @@ def _by_name(
 
 
 def _scaled(geometry: coal.CollisionGeometry, factor: float, what: str) -> coal.CollisionGeometry:
-    """A coal solid of another size, in the same place."""
+    """Return a coal solid of another size, in the same place."""
     simple_solid = resized(geometry, factor)
     if simple_solid is not None:
         return simple_solid

@@ -1,6 +1,6 @@
-"""The process in which macros are expanded: it evaluates nothing that is not on a list, and reads few files.
+"""Expand macros in a separate process, which evaluates only what is on a list and reads only certain files.
 
-It is started as a script, gets its work as JSON on its standard input, and answers in JSON on its standard output.
+It is started as a script, reads its job as JSON from standard input, and writes its answer as JSON to standard output.
 """
 
 from __future__ import annotations
@@ -17,19 +17,30 @@ from typing import Any, TypeAlias
 
 TRUST = "if you trust whoever wrote it, give trust_xacro=True (--trust-xacro)"
 Package: TypeAlias = Any  # xacro, which has no types
-Value: TypeAlias = Any  # of an expression
-READABLE = (".xacro", ".urdf", ".srdf", ".xml", ".yaml", ".yml")  # of folders around that do not say they are packages
+Value: TypeAlias = Any  # value of an expression
+READABLE = (
+    ".xacro",
+    ".urdf",
+    ".srdf",
+    ".xml",
+    ".yaml",
+    ".yml",
+)  # files that are read in folders above that are no packages
 MACRO_FUNCTIONS = (
     "abs_filename", "arg", "dotify", "error", "fatal", "load_yaml", "message", "print_location", "tokenize", "warning",
 )  # fmt: skip
 FORBIDDEN = re.compile(
     r"os\.(exec|fork|forkpty|posix_spawn|spawn|startfile|system|kill|remove|rename|rmdir|mkdir|link|symlink|truncate"
     r"|chmod|chown|putenv)|subprocess\.|shutil\.|socket\.|ctypes\.|pty\.|webbrowser\.|urllib\.|ftplib\."
-)  # what Python reports of itself
+)  # audit events of Python that are not allowed
 
 
 class Places:
-    """Which files macros may read, where packages are, and where in the files an expression stands."""
+    """Knows which files macros may read, where packages are, and where in the files an expression is.
+
+    Macros may read files in the robot's package, in the packages given or found, and visible ones below the file's
+    folder; and descriptions (``READABLE``) up to two folders above, but not in all of the user's home or disk.
+    """
 
     def __init__(self, file: str, packages: Iterable[str]) -> None:
         resolved = Path(file).resolve()
@@ -40,14 +51,14 @@ class Places:
         self.folders_of_file = [self.folder, Path(file).absolute().parent]
 
         home = own_package or self.folder
-        home_folder = Path.home()  # neither all that the user has nor the whole disk is a robot's
+        home_folder = Path.home()  # A folder that contains the home folder is too wide to be a robot's.
         self.folders_above = [
             folder for folder in (home, *list(home.parents)[:2]) if not home_folder.is_relative_to(folder)
         ]
         self.read: list[str] = []
 
     def find(self, name: str, usual: Callable[[str], Any]) -> str:
-        """The folder of a package, as ``$(find NAME)`` asks for it."""
+        """Return the folder of a package, for ``$(find NAME)``; ``usual`` is xacro's own search, the last resort."""
         from rrtik_ompl.description.package_path import package_folder
 
         plain = re.fullmatch(r"\w[\w.-]*", name) is not None
@@ -64,13 +75,14 @@ class Places:
         return str(found)
 
     def check(self, path: str) -> None:
-        """Refuse a file outside the folders in play; one that does not exist is not the matter here."""
+        """Raise an error for a file outside the allowed folders; missing files are left to whoever opens them."""
         from rrtik_ompl.description.xacro_expression import Refused
 
         if not os.path.exists(path) or self._is_readable(path):
             return
         raise Refused(f"'{path}' is outside the folders of the robot; give packages=[its package], or {TRUST}")
 
+    # Check whether a file is in a folder that macros may read.
     def _is_readable(self, path: str) -> bool:
         resolved = Path(path).resolve()
         if any(resolved.is_relative_to(root.resolve()) for root in self.roots):
@@ -82,13 +94,13 @@ class Places:
         ):
             return True
 
-        # installed packages of ROS may be links to their sources, which are packages as well
+        # Installed packages of ROS may be symbolic links to their sources, which are packages as well.
         written = Path(os.path.abspath(path))
         in_written_root = any(written.is_relative_to(root.absolute()) for root in [*self.roots, *self.folders_of_file])
         return in_written_root and _package_of(resolved) is not None
 
     def line_of(self, text: str, files: Iterable[str | None]) -> str:
-        """``FILE:LINE`` of a text in the first of the files that holds it; the first file if none does."""
+        """Return ``FILE:LINE`` of a text in the first file that contains it; just the first file if none does."""
         pattern = re.compile(r"\s+".join(re.escape(word) for word in text.split()))
         candidates = [file for file in dict.fromkeys([*files, *self.read]) if file]
         for file in candidates:
@@ -102,7 +114,7 @@ class Places:
 
 
 def _visible_below(file: Path, folder: Path) -> bool:
-    """Whether a file lies below a folder, and nothing on the way is hidden."""
+    """Check whether a file lies below a folder, with no hidden folder or file on the way."""
     if not file.is_relative_to(folder):
         return False
     return not any(part.startswith(".") for part in file.relative_to(folder).parts)
@@ -113,7 +125,7 @@ def _package_of(file: Path) -> Path | None:
 
 
 def expand(job: Mapping[str, Any]) -> dict[str, Any]:
-    """Do the work: ``{"text": .., "files": [..]}``, or ``{"error": .., "where": ..}``."""
+    """Do the job: return ``{"text": .., "files": [..]}``, or ``{"error": .., "where": ..}``."""
     import xacro
     from xacro import substitution_args
 
@@ -127,7 +139,7 @@ def expand(job: Mapping[str, Any]) -> dict[str, Any]:
 
     try:
         text = xacro.process_file(job["file"], mappings=dict(job["arguments"])).toxml()
-    except (Exception, SystemExit) as error:  # of anything that a macro may do
+    except (Exception, SystemExit) as error:  # Macros may raise anything.
         return _error_answer(error, job)
 
     if len(text) > job["longest"]:
@@ -136,7 +148,10 @@ def expand(job: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _restrict(xacro: Package, substitution_args: Package, places: Places) -> None:
-    """Let xacro evaluate by our list alone, and open only files in play."""
+    """Make xacro evaluate expressions by our evaluator only, and open only allowed files.
+
+    Functions of xacro's modules are replaced, and Python's eval, exec and compile are blocked in them.
+    """
     from rrtik_ompl.description.xacro_expression import FUNCTIONS, MATHEMATICS, Evaluator, Refused
 
     symbols = xacro._global_symbols
@@ -188,14 +203,14 @@ def _restrict(xacro: Package, substitution_args: Package, places: Places) -> Non
 
 
 def _forbid(event: str, arguments: tuple[Any, ...]) -> None:
-    """The last wall: should anything get through the list, it starts, sends and writes nothing."""
+    """Block, as an audit hook, what starts programs, sends or writes: the last defence behind the evaluator."""
     writes = event == "open" and isinstance(arguments[2], int) and arguments[2] & (os.O_WRONLY | os.O_RDWR | os.O_CREAT)
     if writes or FORBIDDEN.match(event):
         raise PermissionError(f"macros may not do this: {event}")
 
 
 def _note_places(xacro: Package, places: Places) -> None:
-    """Let errors know where the expression stands that made them."""
+    """Wrap functions of xacro so that errors carry the expression, and the place in the file, that caused them."""
 
     def noting(function: Callable[..., Any], text_of: Callable[[Any], str]) -> Callable[..., Any]:
         def noted(subject: Value, *others: Value) -> Value:
@@ -217,7 +232,7 @@ def _note_places(xacro: Package, places: Places) -> None:
 
 
 def _error_answer(error: BaseException, job: Mapping[str, Any]) -> dict[str, Any]:
-    """What is said of an error: by the innermost one, and where that happened."""
+    """Return the answer for an error: the message of the innermost error, and where it happened."""
     from rrtik_ompl.description.xacro_expression import Refused, shown
 
     chain = [error]
@@ -240,11 +255,14 @@ def _error_answer(error: BaseException, job: Mapping[str, Any]) -> dict[str, Any
         return {"where": location, "error": message}
 
     message = " ".join(str(error).split()) or type(error).__name__
-    return {"where": location, "error": message.removeprefix("<class 'LookupError'>: ")}  # how xacro passes that on
+    return {
+        "where": location,
+        "error": message.removeprefix("<class 'LookupError'>: "),
+    }  # Xacro puts this in front of a LookupError.
 
 
 def _limit(seconds: float, memory: float) -> None:
-    """Let the system end this process when it takes too long or too much; Windows has no such limits."""
+    """Limit the processor time and the memory of this process by the operating system; Windows has no such limits."""
     try:
         import resource
     except ImportError:
@@ -260,19 +278,19 @@ def _limit(seconds: float, memory: float) -> None:
         granted = wanted if highest == resource.RLIM_INFINITY else min(wanted, highest)
         try:
             resource.setrlimit(kind, (granted, highest))
-        except (OSError, ValueError):  # macOS takes none of memory
+        except (OSError, ValueError):  # macOS supports no limit of memory.
             continue
 
 
 def main() -> None:
-    """Read the work, do it, and answer."""
+    """Read the job, do it, and write the answer."""
     job = json.load(sys.stdin)
     sys.path[:] = job["path"]
     _limit(job["seconds"], job["bytes"])
 
     answer_to = os.fdopen(os.dup(1), "w")
     nowhere = os.open(os.devnull, os.O_WRONLY)
-    for number in (1, 2):  # what macros print is not an answer
+    for number in (1, 2):  # Output of macros must not mix with the answer.
         os.dup2(nowhere, number)
 
     try:

@@ -1,8 +1,8 @@
-"""Expressions of macros, evaluated by walking their syntax trees: what is not written here cannot happen.
+"""Evaluate expressions of macros by walking their syntax trees: what is not implemented here cannot be executed.
 
-Known are arithmetic, comparisons, conditions, text, lists, tuples, dictionaries, sets, indices, slices, comprehensions,
-and calls of functions and methods that are named here or handed over. Nothing is compiled or run by Python itself.
-Numbers, texts and lists have bounds, so that a short expression cannot fill the memory.
+Supported are arithmetic, comparisons, conditions, text, lists, tuples, dictionaries, sets, indices, slices,
+comprehensions, and calls of functions and methods that are listed here or passed in. Nothing is compiled or run by
+Python itself. Numbers, texts and lists are bounded, so that a short expression cannot fill the memory.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from string import Formatter
 from types import BuiltinMethodType
 from typing import Any, TypeAlias
 
-MOST_ITEMS = 1_000_000  # of a list or a range, and letters of a text made by one operation
-MOST_BITS = 10_000  # of a whole number
-MOST_WIDTH = 1_000  # letters that a number is filled up to
-MOST_SHOWN = 120  # letters of an expression in a message
+MOST_ITEMS = 1_000_000  # most items of a list or a range, and letters of a text made by one operation
+MOST_BITS = 10_000  # most bits of a whole number
+MOST_WIDTH = 1_000  # largest width to which a number is padded
+MOST_SHOWN = 120  # most letters of an expression in a message
 
-Value: TypeAlias = Any  # of an expression: a number, text, list, function, ..
+Value: TypeAlias = Any  # value of an expression: a number, text, list, function, ..
 Lookup: TypeAlias = Callable[[str], Value]
 
 METHODS: Mapping[type, frozenset[str]] = {
@@ -78,23 +78,23 @@ COMPARISONS: Mapping[type[ast.cmpop], Callable[[Any, Any], Any]] = {
 
 
 class Refused(Exception):
-    """An expression holds something that is not on the list."""
+    """An expression contains something that is not on the list."""
 
 
 def bounded_range(*ends: int) -> range:
-    """A ``range`` of at most a million numbers.
+    """Return a ``range`` of at most a million numbers.
 
     Raises:
         Refused: If it has more.
     """
     numbers = range(*ends)
-    if len(numbers[: MOST_ITEMS + 1]) > MOST_ITEMS:  # for the length itself may be too large to be told
+    if len(numbers[: MOST_ITEMS + 1]) > MOST_ITEMS:  # len() of a huge range would overflow.
         raise Refused(f"a range of more than {MOST_ITEMS} numbers")
     return numbers
 
 
 def type_of(value: object) -> type:
-    """The type of a value: ``type`` without its other form, which makes new ones."""
+    """Return the type of a value: ``type`` without its other form, which makes new types."""
     return type(value)
 
 
@@ -118,9 +118,9 @@ class Evaluator:
     """Evaluates expressions.
 
     Args:
-        functions: What may be called besides `FUNCTIONS`, `MATHEMATICS` and the methods of values.
+        functions: Functions that may be called besides `FUNCTIONS`, `MATHEMATICS` and the methods of values.
         spaces: Types whose attributes are their entries and nothing else: ``math.pi`` is ``math["pi"]``.
-        records: Dictionaries whose attributes are their entries too, besides the methods of dictionaries.
+        records: Dictionaries whose attributes are their entries too, in addition to the methods of dictionaries.
     """
 
     def __init__(
@@ -132,23 +132,24 @@ class Evaluator:
         callables = [*FUNCTIONS.values(), *(value for value in MATHEMATICS.values() if callable(value)), *functions]
         self._callable_by_id = {
             id(function): function for function in callables
-        }  # kept, so that no other gets the number
+        }  # The functions are kept alive, so that no other object can get the same id.
         self._spaces = spaces
         self._records = records
 
     def value(self, expression: str, lookup: Lookup) -> Value:
-        """The value of an expression.
+        """Return the value of an expression.
 
         Args:
-            expression: One line of the syntax of Python.
-            lookup: Gives the value of a name, or raises KeyError.
+            expression: One line in the syntax of Python.
+            lookup: Returns the value of a name, or raises KeyError.
 
         Raises:
-            Refused: If it holds something that is not on the list.
+            Refused: If it contains something that is not on the list.
             Exception: Whatever the operations raise: NameError, SyntaxError, ZeroDivisionError, ..
         """
         return self._evaluate(ast.parse(expression.strip(), "<expression>", "eval").body, lookup)
 
+    # Evaluate a node by the method for its kind; refuse forbidden functions and values that are too large.
     def _evaluate(self, node: ast.expr, lookup: Lookup) -> Value:
         evaluate = getattr(self, f"_{type(node).__name__}", None)
         if evaluate is None:
@@ -160,6 +161,7 @@ class Evaluator:
             _check_size(len(value))
         return value
 
+    # Check whether a function is allowed: a checked or listed method of a value, or a listed function.
     def _may_be_called(self, function: Value) -> bool:
         if isinstance(function, partial):
             return function.func in CHECKED.values()
@@ -170,7 +172,7 @@ class Evaluator:
                 return called in METHODS[kind]
         return id(function) in self._callable_by_id
 
-    # --- one method for each kind of node; there are no others --------------------------------------------------
+    # --- One method for each kind of node; all other kinds are refused. ------------------------------------------
 
     def _Constant(self, node: ast.Constant, lookup: Lookup) -> Value:
         if not isinstance(node.value, (str, int, float, complex, type(None))):
@@ -184,6 +186,7 @@ class Evaluator:
         except KeyError:
             raise NameError(f"name '{node.id}' is not defined") from None
 
+    # Return an attribute: an entry of a namespace, a listed method of a value, or an entry of a record.
     def _Attribute(self, node: ast.Attribute, lookup: Lookup) -> Value:
         _check_name(node.attr)
         holder: Any = self._evaluate(node.value, lookup)
@@ -288,7 +291,7 @@ class Evaluator:
         return {self._evaluate(node.key, scope): self._evaluate(node.value, scope) for scope in scopes}
 
     def _scopes(self, loops: list[ast.comprehension], lookup: Lookup) -> Iterable[Lookup]:
-        """The names at each turn of the loops of a comprehension."""
+        """Yield the names at each iteration of the loops of a comprehension."""
         if not loops:
             yield lookup
             return
@@ -314,7 +317,7 @@ def _inner(names: Mapping[str, Any], outer: Lookup) -> Lookup:
 
 
 def _bound(target: ast.expr, item: Value) -> Iterable[tuple[str, Any]]:
-    """The names of a loop with their values."""
+    """Yield the names of a loop's target with their values for an item."""
     if isinstance(target, ast.Name):
         _check_name(target.id)
         yield target.id, item
@@ -334,7 +337,7 @@ def _check_name(name: str) -> None:
 
 
 def _check_growth(operation: ast.operator, left: Value, right: Value) -> None:
-    """Refuse numbers, texts and lists that an operation would make too large."""
+    """Raise an error if an operation would make a number, text or list too large."""
     if isinstance(left, int) and isinstance(right, int):
         if _bits_after(operation, left, right) > MOST_BITS:
             raise Refused(f"a whole number of more than {MOST_BITS} bits")
@@ -347,6 +350,7 @@ def _check_growth(operation: ast.operator, left: Value, right: Value) -> None:
             _check_widths(width)
 
 
+# Return an upper bound on the bits of a result; 0 for operations that do not make numbers much larger.
 def _bits_after(operation: ast.operator, left: int, right: int) -> int:
     if isinstance(operation, ast.Pow):
         return left.bit_length() * max(right, 0) if abs(left) > 1 else 0
@@ -362,6 +366,7 @@ def _check_size(size: int) -> None:
         raise Refused(f"a text or list of more than {MOST_ITEMS} letters or items")
 
 
+# Raise an error if a format specification contains a large width, or one that is not written as a number.
 def _check_widths(specification: str) -> None:
     if "{" in specification or "*" in specification:
         raise Refused(f"a width '{specification}' that is not written out")
@@ -370,7 +375,7 @@ def _check_widths(specification: str) -> None:
 
 
 def _format(text: str, *values: Value, **named: Value) -> str:
-    """``str.format`` of plain fields: ``{}``, ``{0}``, ``{name:.3f}``; none looks into its value."""
+    """Format text like ``str.format``, but only with plain fields: ``{}``, ``{0}``, ``{name:.3f}``."""
     for _, field, specification, _ in Formatter().parse(text):
         if field is not None and not re.fullmatch(r"\w*", field):
             raise Refused(f"the field '{field}' of a format looks into its value; only plain fields are on the list")
@@ -399,13 +404,13 @@ CHECKED: Mapping[str, Callable[..., str]] = {"format": _format, "join": _join, "
 
 
 def shown(expression: str) -> str:
-    """An expression as messages show it: not longer than a line."""
+    """Return an expression as messages show it, shortened to about a line."""
     text = " ".join(expression.split())
     return text if len(text) <= MOST_SHOWN else f"{text[:MOST_SHOWN]}.."
 
 
 def _named(node: ast.AST) -> str:
-    """A part of an expression in words."""
+    """Return a description of a node of an expression."""
     words = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", type(node).__name__).lower()
     if words in ("lambda", "yield", "await"):
         return f"a {words}"

@@ -1,4 +1,4 @@
-"""Xacro: macros of XML, expanded by the package xacro, which need not be installed, in a process with limits."""
+"""Expand xacro (macros of XML) by the package xacro, which is optional, in a process with limits."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ from rrtik_ompl.files.text import MAX_BYTES, read_text
 
 CHILD = Path(__file__).with_name("xacro_child.py")
 MORE = 'give xacro_limits={"seconds": .., "gigabytes": ..}'
-MAX_CACHED = 32  # expanded texts
+MAX_CACHED = 32  # most expanded texts that are kept
 
 
 @dataclass(frozen=True, slots=True)
 class Expansion:
-    """How macros are expanded.
+    """Settings for the expansion of macros.
 
     Attributes:
-        trusted: Whether their expressions go to xacro's own evaluator, which can run anything.
-        seconds: The most time that an expansion may take, of the processor and by the clock [s].
-        gigabytes: The most memory that it may take [1e9 bytes].
+        trusted: Whether expressions are evaluated by xacro's own evaluator, which can run any code.
+        seconds: Time limit of an expansion, for both processor and wall time [s].
+        gigabytes: Memory limit of an expansion [1e9 bytes].
     """
 
     trusted: bool = False
@@ -57,16 +57,16 @@ _cached_texts: OrderedDict[str, _CachedText] = OrderedDict()
 
 @contextmanager
 def expanding(*, trusted: bool = False, limits: Mapping[str, float] | None = None) -> Iterator[None]:
-    """How macros are expanded inside the ``with`` block, in this thread: by trust, and with limits of the caller's own.
+    """Set how macros are expanded inside the ``with`` block, in this thread.
 
-    Only a caller says so, never a file. What an outer block says holds inside as well.
+    Only a caller can set this, never a file. Settings of an outer block apply inside as well.
 
     Args:
-        trusted: Whether expressions go to xacro's own evaluator, and files anywhere are read.
+        trusted: Whether expressions are evaluated by xacro's own evaluator, and files anywhere may be read.
         limits: ``{"seconds": 60, "gigabytes": 4}`` or one of these.
 
     Raises:
-        InputError: If a value makes no sense.
+        InputError: If a value is not valid.
     """
     outer = _expansion.get()
     if not isinstance(trusted, bool):
@@ -86,32 +86,31 @@ def expanding(*, trusted: bool = False, limits: Mapping[str, float] | None = Non
 
 
 def is_xacro(path: Path) -> bool:
-    """Whether a file's name says that it holds macros."""
+    """Check whether a file contains macros, by its name."""
     return path.suffix.lower() == ".xacro"
 
 
 def robot_text(path: Path, packages: Iterable[Path] = (), arguments: Mapping[str, object] | None = None) -> str:
-    """Text of a URDF or SRDF file, its macros expanded if it is named ``.xacro``.
+    """Return the text of a URDF or SRDF file, with its macros expanded if it is named ``.xacro``.
 
-    ``$(find NAME)`` is a folder of that name in ``packages``, or in a folder above the file; else what ROS finds.
-    A file is expanded in a process of its own, as `expanding` says; where nothing has changed since, that is not
-    done again.
+    ``$(find NAME)`` is a folder of that name in ``packages``, or in a folder above the file, or what ROS finds. A file
+    is expanded in a separate process, with the settings of `expanding`; the result is reused until a file changes.
 
     Args:
         path: The file.
-        packages: Folders that hold packages, or are packages.
-        arguments: Of the macros, as behind the command xacro: ``{"ur_type": "ur5e"}``.
+        packages: Folders that contain packages, or are packages.
+        arguments: Arguments of the macros, as for the command xacro: ``{"ur_type": "ur5e"}``.
 
     Raises:
-        InputError: If the file cannot be read or expanded, holds an expression that is not on the list, reads a file
-            elsewhere, takes too long or too much, or the package xacro is not installed.
+        InputError: If the file cannot be read or expanded, contains an expression that is not on the list, reads a file
+            elsewhere, takes too long or too much memory, or the package xacro is not installed.
     """
     if not is_xacro(path):
         if arguments:
             raise InputError(f"{path}: xacro_args are for files named .xacro; leave them out")
         return read_text(path)
 
-    read_text(path)  # which says what is wrong with the file itself
+    read_text(path)  # This reports faults of the file itself.
 
     argument_texts = {str(key): str(value) for key, value in (arguments or {}).items()}
     roots = [str(each) for each in packages]
@@ -122,7 +121,7 @@ def robot_text(path: Path, packages: Iterable[Path] = (), arguments: Mapping[str
         return cached.text
 
     if find_spec("xacro") is None:
-        expanded = f"{path.stem.removesuffix('.urdf')}.urdf"  # by this ending it is read
+        expanded = f"{path.stem.removesuffix('.urdf')}.urdf"  # A file with this ending can be read.
         raise InputError(
             f"{path}: holds macros, and the package xacro is not installed: pip install xacro, "
             f"or expand it by hand: xacro {path.name} > {expanded}"
@@ -141,7 +140,7 @@ def robot_text(path: Path, packages: Iterable[Path] = (), arguments: Mapping[str
 def _expand_in_child(
     path: Path, packages: list[str], argument_texts: Mapping[str, str], expansion: Expansion
 ) -> dict[str, Any]:
-    """What the process answers that expands the macros: ``{"text": .., "files": [..]}``."""
+    """Expand macros in a child process and return its answer: ``{"text": .., "files": [..]}``."""
     job = {
         "path": [*filter(None, sys.path), str(Path(__file__).parents[2])],
         "file": str(path),
@@ -154,7 +153,7 @@ def _expand_in_child(
         "more": MORE,
     }
 
-    environment = os.environ | {"PYTHONHASHSEED": "0"}  # sets are in the same order each time
+    environment = os.environ | {"PYTHONHASHSEED": "0"}  # This makes the order of sets the same in each run.
     too_slow = f"{path}: xacro: takes more than {expansion.seconds:g} s; does a macro call itself? else {MORE}"
 
     try:
@@ -187,7 +186,7 @@ def _expand_in_child(
 
 
 def _stamps(files: Iterable[str]) -> tuple[tuple[int, int] | None, ...]:
-    """Time and size of each file; None for one that is gone."""
+    """Return modification time [ns] and size of each file; None for a missing one."""
     return tuple(_stamp(file) for file in files)
 
 

@@ -1,4 +1,4 @@
-"""Robots from MuJoCo's MJCF files: bodies, hinges and slides, collision geometry, limits, sites, excluded pairs."""
+"""Load robots from MuJoCo's MJCF: bodies, hinges and slides, collision geometry, limits, sites, excluded pairs."""
 
 from __future__ import annotations
 
@@ -17,16 +17,26 @@ from rrtik_ompl.files.text import read_text
 from rrtik_ompl.model.robot import Robot
 
 MJCF_OPTIONS = ("base_pose", "joint_limits", "joints", "locked", "strict", "tip")
-TIP_SITES = ("attachment_site", "tip", "tcp", "ee", "ee_site", "end_effector", "eef", "grip_site", "pinch")  # by custom
-BEGINNING = 65536  # characters in which the top element of a file stands
+TIP_SITES = (
+    "attachment_site",
+    "tip",
+    "tcp",
+    "ee",
+    "ee_site",
+    "end_effector",
+    "eef",
+    "grip_site",
+    "pinch",
+)  # usual names
+BEGINNING = 65536  # characters at the beginning of a file among which the top element is sought
 
 
 def is_mjcf(path: Path) -> bool:
-    """Whether a file is named ``.mjcf``, or is an ``.xml`` whose top element is ``<mujoco>``."""
+    """Check whether a file is named ``.mjcf``, or is an ``.xml`` whose top element is ``<mujoco>``."""
     if path.suffix.lower() == ".xml":
         try:
             return "<mujoco" in read_text(path)[:BEGINNING]
-        except InputError:  # which whoever reads it says
+        except InputError:  # Reading the file later reports this.
             return False
     return path.suffix.lower() == ".mjcf"
 
@@ -43,19 +53,19 @@ def robot_from_mjcf(
 ) -> Robot:
     """Load a robot from an MJCF file.
 
-    Bodies and sites become links. Geoms that may collide (``contype``, ``conaffinity``) are collision geometry, meshes
-    as they are and not their hulls; planes and height fields belong to the scene and are left out. ``<exclude>`` gives
-    pairs of links that are never checked, the masks pairs of solids; what is welded to the world is checked against all
-    that moves, as in MuJoCo. ``<equality><joint>`` gives joints that follow others, keyframes postures. Free joints are
-    held where the file puts them. One warning names what is left out. MJCF knows no limits of velocity: give
-    ``joint_limits``.
+    Bodies and sites become links. Geoms that may collide (``contype``, ``conaffinity``) are collision geometry; meshes
+    are used themselves, not their hulls; planes and height fields belong to the scene and are left out. ``<exclude>``
+    gives pairs of links that are never checked, the masks give such pairs of solids; what is welded to the world is
+    checked against everything that moves, as in MuJoCo. ``<equality><joint>`` gives joints that follow others,
+    keyframes give postures. Free joints are held where the file puts them. One warning names what is left out. MJCF has
+    no limits of velocity: give ``joint_limits``.
 
     Args:
-        path: The file; what it includes is read too.
+        path: The file; files that it includes are read too.
         joints: Actuated joints, in order; those up to ``tip``, or all, if None.
-        tip: A body or site; if None a site with a usual name, such as ``attachment_site`` or ``tcp``.
+        tip: A body or site; if None, a site with a usual name, such as ``attachment_site`` or ``tcp``.
         joint_limits: File in the format of MoveIt's ``joint_limits.yaml``.
-        locked: Values [rad or m] of joints that are held still.
+        locked: Values of joints that are held fixed [rad or m].
         base_pose: ``pinocchio.SE3`` T_world_base.
         strict: Whether it is an error if anything is left out, or a keyframe is outside the limits.
 
@@ -105,9 +115,9 @@ def _actuated(mjcf: Mjcf, joints: Iterable[str] | None, tip: str | None) -> tupl
 
 
 def _other_trees(mjcf: Mjcf, actuated: Sequence[str], locked: Mapping[str, float]) -> list[str]:
-    """What stands beside the robot and could move by itself: joints that are held in trees without an actuated one."""
+    """Return a line about held joints in trees without an actuated joint, which stand beside the robot, if any."""
     joint_above = {joint.child: joint for joint in mjcf.tree.joints}
-    roots: dict[str, str] = {}  # for each joint the body on the world that carries it
+    roots: dict[str, str] = {}  # for each joint, the body on the world that carries it
     for joint in mjcf.tree.walk():
         link = joint.child
         while joint_above[link].parent != WORLD:

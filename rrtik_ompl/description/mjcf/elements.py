@@ -1,4 +1,4 @@
-"""Elements of MJCF: defaults of classes, angles, orientations in MuJoCo's five ways; geoms and meshes as solids."""
+"""Read elements of MJCF: default classes, angles, orientations in MuJoCo's five forms; geoms and meshes as solids."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ from rrtik_ompl.description.tree import MeshFile, Solid
 from rrtik_ompl.description.urdf_read import attribute, numbers
 from rrtik_ompl.model.shapes import Box, Capsule, Cylinder, Shape, Sphere
 
-MAIN = "main"  # the class that all others build on
+MAIN = "main"  # the default class from which all others inherit
 OF_THE_SCENE = ("plane", "hfield")
 KINDS = ("box", "capsule", "cylinder", "mesh", "sphere")
-_COUNTS = {"sphere": 1, "capsule": 2, "cylinder": 2, "box": 3}  # numbers of size
+_COUNTS = {"sphere": 1, "capsule": 2, "cylinder": 2, "box": 3}  # how many numbers a size has
 Attributes = Mapping[str, str]
 _UNITS = dict(zip("xyz", np.eye(3), strict=True))
 _ORIENTATIONS = ("quat", "axisangle", "euler", "xyaxes", "zaxis")
@@ -33,14 +33,14 @@ _ORIENTATIONS = ("quat", "axisangle", "euler", "xyaxes", "zaxis")
 
 @dataclass(slots=True, eq=False)
 class Settings:
-    """What holds in a whole file.
+    """Settings that apply to a whole file.
 
     Attributes:
         degrees: Whether angles are in degrees.
-        sequence: Of Euler angles; capital letters are axes that stay.
+        sequence: Sequence of Euler angles; capital letters are fixed axes.
         limited: Whether a joint with a range has limits.
         meshes: Folder of meshes, as the file names it.
-        classes: Defaults by class and tag.
+        classes: Default attributes by class and tag.
     """
 
     degrees: bool = True
@@ -50,10 +50,10 @@ class Settings:
     classes: dict[str, dict[str, Attributes]] = field(default_factory=lambda: {MAIN: {}})
 
     def read(self, root: Element, where: str) -> None:
-        """Take over what ``<compiler>`` and ``<default>`` say.
+        """Take over the settings of ``<compiler>`` and ``<default>``, in place.
 
         Raises:
-            InputError: If a value makes no sense.
+            InputError: If a value is not valid.
         """
         for compiler in root.findall("compiler"):
             self.degrees = compiler.get("angle", "degree" if self.degrees else "radian") == "degree"
@@ -76,28 +76,28 @@ class Settings:
             stack += [(item, name) for item in element.findall("default")]
 
     def filled(self, element: Element, parent_class: str, where: str) -> Element:
-        """The element with the defaults of its class, or of the class of the body that it is in.
+        """Return the element with the defaults of its class, or of the class of the body that it is in.
 
         Raises:
-            UnknownNameError: If there is no such class.
+            UnknownNameError: If the class does not exist.
         """
         name = element.get("class", parent_class)
         if name not in self.classes:
             raise UnknownNameError("default class", name, self.classes, where=where)
 
         filled = ElementTree.Element(element.tag, {**self.classes[name].get(element.tag, {}), **element.attrib})
-        for key in _ORIENTATIONS:  # an orientation of its own takes the place of any other
+        for key in _ORIENTATIONS:  # The element's own orientation replaces a default one of another form.
             if key in element.attrib:
                 for orientation in (orientation for orientation in _ORIENTATIONS if orientation not in element.attrib):
                     filled.attrib.pop(orientation, None)
         return filled
 
     def angle(self, value: float) -> float:
-        """An angle of the file [rad]."""
+        """Convert an angle of the file to radians."""
         return float(np.radians(value)) if self.degrees else value
 
     def placement(self, element: Element, where: str) -> pin.SE3:
-        """``pinocchio.SE3`` of an element with pos and one of the five orientations."""
+        """Return the pose (``pinocchio.SE3``) of an element with a position and one of five forms of orientation."""
         position = numbers(element, "pos", 3, (0.0, 0.0, 0.0), where)
         written = [key for key in _ORIENTATIONS if element.get(key) is not None]
         if len(written) > 1:
@@ -135,6 +135,7 @@ class Settings:
         return turned_z(_unit(numbers(element, "zaxis", 3, None, where), element, where))
 
 
+# Return a direction as a unit vector, shape (3,); raise an error if its length is 0.
 def _unit(values: ArrayLike, element: Element, where: str) -> Vector:
     length = float(np.linalg.norm(values))
     if length < 1e-9:
@@ -144,16 +145,22 @@ def _unit(values: ArrayLike, element: Element, where: str) -> Vector:
 
 
 def masks(geom: Element, where: str) -> tuple[int, int]:
-    """``contype`` and ``conaffinity``, by which geoms may collide."""
+    """Return ``contype`` and ``conaffinity`` of a geom, which determine the geoms that it may collide with."""
     kind, affinity = (int(numbers(geom, key, 1, (1.0,), where)[0]) for key in ("contype", "conaffinity"))
     return kind, affinity
 
 
 def solid_of(geom: Element, settings: Settings, meshes: Mapping[str, tuple[MeshFile, Any]], where: str) -> Solid:
-    """The solid of a geom that is no plane and no height field.
+    """Return the solid of a geom that is neither a plane nor a height field.
+
+    Args:
+        geom: The element, with defaults filled in.
+        settings: Settings of the file.
+        meshes: Mesh files by name, with the pose of each in its geom.
+        where: File and body, put in front of error messages.
 
     Raises:
-        InputError: If it is of a kind that cannot be read, or its numbers make no sense.
+        InputError: If its kind cannot be read, or its numbers are not valid.
     """
     kind = geom.get("type", "sphere")
     colour = numbers(geom, "rgba", 4, None, where) if geom.get("rgba") is not None else None
@@ -183,11 +190,14 @@ def solid_of(geom: Element, settings: Settings, meshes: Mapping[str, tuple[MeshF
     return Solid(_shape(kind, geom, length, where), place, rgba)
 
 
+# Return the shape of a geom; ``length`` is the distance between the ends of `fromto` [m], None without.
 def _shape(kind: str, geom: Element, length: float | None, where: str) -> Shape:
-    # `fromto` gives the length in the place of a size; a box between two points has one width for both other axes.
+    # With `fromto`, the length replaces one number of the size; a box then has the same width along both other axes.
     count = _COUNTS[kind] - (length is not None) - (length is not None and kind == "box")
     written = (geom.get("size") or "").split()
-    size = numbers(Element("geom", {"size": " ".join(written[:count])}), "size", count, None, where)  # more are unused
+    size = numbers(
+        Element("geom", {"size": " ".join(written[:count])}), "size", count, None, where
+    )  # Further numbers are ignored.
 
     if kind == "sphere":
         return Sphere(size[0])
@@ -198,7 +208,7 @@ def _shape(kind: str, geom: Element, length: float | None, where: str) -> Shape:
 
 
 def meshes_of(root: Element, settings: Settings, folder: Path, where: str) -> dict[str, tuple[MeshFile, Any]]:
-    """Meshes of ``<asset>`` by name, and the pose of each in its geom.
+    """Return the meshes of ``<asset>`` by name, with the pose of each in its geom.
 
     Raises:
         InputError: If one cannot be read; a file is looked for only if a geom may use it.

@@ -1,4 +1,4 @@
-"""MJCF text to links and joints; every element is checked here, every error names file, element and remedy."""
+"""Read links and joints from MJCF text; every element is checked, and every error names file, element and remedy."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from rrtik_ompl.description.tree import Joint, Link, MeshFile, Solid, Tree
 from rrtik_ompl.description.urdf_read import attribute, flattened, located, numbers, parse_xml
 from rrtik_ompl.files.text import read_text
 
-MOST_FILES = 100  # that include each other
-UNREAD = ("composite", "flexcomp", "replicate", "attach", "frame")  # what makes bodies out of other bodies
-SIZES = {"hinge": 1, "slide": 1, "ball": 4, "free": 7}  # numbers of a joint in a keyframe
+MOST_FILES = 100  # most files that are included
+UNREAD = ("composite", "flexcomp", "replicate", "attach", "frame")  # elements that make bodies from other bodies
+SIZES = {"hinge": 1, "slide": 1, "ball": 4, "free": 7}  # how many numbers a joint has in a keyframe
 WORLD = "world"
-HELD = ("free",)  # kinds of joints that are held still
+HELD = ("free",)  # kinds of joints that are held fixed
 DEFORMABLE = ("flex", "flexcomp", "skin", "composite")
 OF_JOINTS = ("joint", "jointinparent")  # attributes of an actuator that name a joint
 
@@ -31,18 +31,18 @@ Mask = tuple[int, int]  # contype and conaffinity
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Mjcf:
-    """What a file says.
+    """The contents of an MJCF file.
 
     Attributes:
-        name: Of the model.
-        tree: Bodies and sites as links, hinges and slides as joints.
+        name: Name of the model.
+        tree: The tree in which bodies and sites are links, hinges and slides are joints.
         sites: Names of the sites.
         mimics: Joints that follow others.
         excluded: Pairs of links that never collide.
-        apart: Pairs of solids that never collide, by links and numbers: "hand_0".
-        touchable: Pairs of links that may collide though a joint joins them, as one is welded to the world.
-        unread: What the file says besides about shapes, joints and limits.
-        postures: Keyframes: joint values [rad or m] by name.
+        apart: Pairs of solids that never collide, named by link and number, such as "hand_0".
+        touchable: Pairs of links that may collide although a joint joins them, as one of them is welded to the world.
+        unread: Things in the file about shapes, joints and limits that are not used.
+        postures: The keyframes: joint values [rad or m] by name of the joint, for each name.
     """
 
     name: str
@@ -57,7 +57,7 @@ class Mjcf:
 
 
 def read_mjcf(path: Path) -> Mjcf:
-    """Read a file and what it includes.
+    """Read a file and the files that it includes.
 
     Raises:
         InputError: If anything in it cannot be used.
@@ -91,7 +91,7 @@ def read_mjcf(path: Path) -> Mjcf:
 
 
 def _include(root: Element, folder: Path) -> None:
-    """Put the contents of included files in the places of ``<include>``; their top elements have any name."""
+    """Replace each ``<include>`` by the contents of its file, in place; the top elements of these may have any name."""
     stack = [root]
     count = 0
     while stack:
@@ -115,7 +115,7 @@ def _include(root: Element, folder: Path) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Body:
-    """A body: the one that it hangs on, and the kinds of the joints between the two."""
+    """A body: the name of its parent, and the kinds of the joints between the two."""
 
     parent: str
     joints: tuple[str, ...]
@@ -130,13 +130,13 @@ class _Reader:
     joints: list[Joint] = field(default_factory=list)
     sites: list[str] = field(default_factory=list)
     masks: dict[str, list[tuple[int, int]]] = field(default_factory=dict)
-    moving: list[tuple[str, str]] = field(default_factory=list)  # joints and their kinds, in the order of keyframes
+    moving: list[tuple[str, str]] = field(default_factory=list)  # names and kinds of joints, in the order of keyframes
     bodies: dict[str, Body] = field(default_factory=lambda: {WORLD: Body("", ())})
-    scenery: list[str] = field(default_factory=list)  # geoms that are left out
-    zeros: dict[str, float] = field(default_factory=dict)  # joints' values where the file draws the bodies
+    scenery: list[str] = field(default_factory=list)  # geoms of the scene, which are left out
+    zeros: dict[str, float] = field(default_factory=dict)  # values of the joints in the pose that the file describes
 
     def read(self, world: Element) -> None:
-        """Bodies, each branch to its end before the next one begins, which is the order of keyframes."""
+        """Read all bodies depth first, which is the order of joints in keyframes."""
         self.contents(world, WORLD, MAIN)
         stack = _below(world, WORLD, MAIN)
         while stack:
@@ -146,7 +146,7 @@ class _Reader:
             stack += _below(body, name, style)
 
     def contents(self, element: Element, link: str, style: str) -> None:
-        """Geoms and sites of a body."""
+        """Read the geoms and sites of a body; each site becomes a link that is fixed to the body's."""
         place = f"{self.where}: body '{link}'"
         for item in element:
             if item.tag in UNREAD:
@@ -173,7 +173,7 @@ class _Reader:
                 self.fix(link, name, self.settings.placement(site, place))
 
     def mount(self, body: Element, parent: str, name: str, style: str) -> None:
-        """The joints between a body and its parent; a link without solids between any two of them."""
+        """Add the joints between a body and its parent, with a link without solids after each of them."""
         place = f"{self.where}: body '{name}'"
         if name in self.solids:
             raise InputError(f"{place}: its name stands there twice; rename one body or site")
@@ -198,7 +198,18 @@ class _Reader:
         self.fix(link, name, offset)
 
     def turned(self, joint: Element, kind: str, name: str, link: str, offset: pin.SE3) -> tuple[str, pin.SE3]:
-        """Add a joint; the link behind it, and where the body is in that one."""
+        """Add a hinge or slide.
+
+        Args:
+            joint: The element, with defaults filled in.
+            kind: "hinge" or "slide".
+            name: Name of the joint.
+            link: Link before the joint.
+            offset: Pose of the body in that link, in the pose that the file describes.
+
+        Returns:
+            The name of the link after the joint, and the pose of the body in that link.
+        """
         place = f"{self.where}: joint '{name}'"
         joint_placement = pin.SE3(np.eye(3), np.array(numbers(joint, "pos", 3, (0.0, 0.0, 0.0), place)))
         axis = np.array(numbers(joint, "axis", 3, (0.0, 0.0, 1.0), place))
@@ -224,16 +235,16 @@ class _Reader:
         return child, from_zero * joint_placement.inverse()
 
     def fix(self, parent: str, child: str, placement: pin.SE3) -> None:
-        """A link that is fixed to another one."""
+        """Add a joint that fixes a link to another one at a pose."""
         self.joints.append(Joint(f"{child}/mount", "fixed", parent, child, placement))
 
     def finished(self) -> list[Link]:
-        """All links; what is not drawn otherwise is drawn by its collision geometry."""
+        """Return all links; a link without visual solids is drawn by its collision geometry."""
         return [Link(name, tuple(hard), tuple(drawn or hard)) for name, (hard, drawn) in self.solids.items()]
 
 
 def _below(body: Element, name: str, style: str) -> list[tuple[Element, str, str, str]]:
-    """The bodies in a body, the last one first: element, parent, name, class of defaults."""
+    """Return the bodies in a body, the last one first: element, parent, name, class of defaults."""
     children = [
         (element, name, element.get("name") or f"{name}/body{number + 1}", element.get("childclass", style))
         for number, element in enumerate(body.findall("body"))
@@ -242,7 +253,10 @@ def _below(body: Element, name: str, style: str) -> list[tuple[Element, str, str
 
 
 def _followers(root: Element, reader: _Reader) -> tuple[Mimic, ...]:
-    """Joints that follow others: by how much from where the file draws them."""
+    """Return the joints that follow others, from the equalities of two joints.
+
+    Offsets are converted, as MuJoCo counts both joints from the pose that the file describes.
+    """
     where = reader.where
     mimics = []
 
@@ -263,7 +277,7 @@ def _followers(root: Element, reader: _Reader) -> tuple[Mimic, ...]:
 
 
 def _excluded(root: Element, reader: _Reader) -> frozenset[frozenset[str]]:
-    """Pairs that ``<exclude>`` names, and those of which no two geoms have masks that meet."""
+    """Return the pairs of links that ``<exclude>`` names, and those without two geoms whose masks allow a collision."""
     pairs = {frozenset((item.get("body1", ""), item.get("body2", ""))) for item in root.findall("contact/exclude")}
     for (first, first_masks), (second, second_masks) in combinations(reader.masks.items(), 2):
         if not any(meet(a, b) for a in first_masks for b in second_masks):
@@ -272,7 +286,7 @@ def _excluded(root: Element, reader: _Reader) -> frozenset[frozenset[str]]:
 
 
 def _never_colliding_solids(reader: _Reader) -> frozenset[frozenset[str]]:
-    """Pairs of solids that never collide: by their masks, or as neighbours."""
+    """Return the pairs of solids that never collide: because of their masks, or as parts of neighbouring bodies."""
     pairs = set(solids_apart(reader.masks))
     for first, second in joined_bodies(reader.bodies):
         solid_names = ([f"{name}_{k}" for k in range(len(reader.masks.get(name, ())))] for name in (first, second))
@@ -280,6 +294,7 @@ def _never_colliding_solids(reader: _Reader) -> frozenset[frozenset[str]]:
     return frozenset(pairs)
 
 
+# Return the keyframes that have joint positions, as joint values by name of the joint.
 def _keys(root: Element, reader: _Reader) -> dict[str, dict[str, float]]:
     postures = {}
     sizes = [SIZES[kind] for _, kind in reader.moving]
@@ -296,15 +311,15 @@ def _keys(root: Element, reader: _Reader) -> dict[str, dict[str, float]]:
 
 
 def meet(first: Mask, second: Mask) -> bool:
-    """Whether geoms with these masks may collide."""
+    """Check whether geoms with these masks may collide."""
     return bool(first[0] & second[1] or second[0] & first[1])
 
 
 def solids_apart(masks: Mapping[str, Sequence[Mask]]) -> frozenset[frozenset[str]]:
-    """Pairs of solids whose masks do not meet.
+    """Return the pairs of solids whose masks exclude a collision, each named by body and number.
 
     Args:
-        masks: Of the solids of each body, in their order.
+        masks: Masks of the solids of each body, in their order.
     """
     return frozenset(
         frozenset((f"{first_body}_{i}", f"{second_body}_{j}"))
@@ -315,9 +330,10 @@ def solids_apart(masks: Mapping[str, Sequence[Mask]]) -> frozenset[frozenset[str
 
 
 def joined_bodies(bodies: Mapping[str, Body]) -> frozenset[frozenset[str]]:
-    """Pairs of bodies that joints join, and what is welded to one of the two: neighbours, to MuJoCo.
+    """Return the pairs of bodies that are neighbours to MuJoCo: joined by joints, or welded to one of such two.
 
-    Here each of several joints has a link of its own behind it, and what is welded to a link is another link.
+    This differs from the tree, in which each of several joints has its own link behind it, and each welded body is a
+    link.
     """
     rigid_parts: dict[str, list[str]] = {}
     for name in bodies:
@@ -333,9 +349,10 @@ def joined_bodies(bodies: Mapping[str, Body]) -> frozenset[frozenset[str]]:
 
 
 def touchable(bodies: Mapping[str, Body]) -> frozenset[frozenset[str]]:
-    """Pairs of bodies that may collide though one joint joins them: one stands still, the other moves.
+    """Return the pairs of bodies that may collide although one joint joins them: one stands still, the other moves.
 
-    Bodies that are welded to the world are no neighbours of others to MuJoCo. What is rigidly part of a free body is.
+    To MuJoCo, bodies that are welded to the world are no neighbours of others; bodies that are rigidly part of a free
+    body are.
     """
     standing = [name for name in bodies if _carrier(name, bodies) == WORLD]
     pairs = set()
@@ -352,36 +369,36 @@ def touchable(bodies: Mapping[str, Body]) -> frozenset[frozenset[str]]:
 
 
 def _moving_joint_kinds(body: Body) -> tuple[str, ...]:
-    """Kinds of the joints that move a body against the one that it hangs on."""
+    """Return the kinds of joints that move a body relative to its parent; free joints, which are held, do not count."""
     return tuple(kind for kind in body.joints if kind not in HELD)
 
 
 def _ancestry(name: str, bodies: Mapping[str, Body]) -> Iterator[str]:
-    """A body, the one that it hangs on, and so on to the world."""
+    """Yield a body, its parent, and so on up to the world."""
     while name:
         yield name
         name = bodies[name].parent
 
 
 def _carrier(name: str, bodies: Mapping[str, Body]) -> str:
-    """The nearest body towards the world, itself among them, that a joint moves; the world if there is none."""
+    """Return the nearest body towards the world, or the body itself, that a joint moves; the world if there is none."""
     return next((ancestor for ancestor in _ancestry(name, bodies) if _moving_joint_kinds(bodies[ancestor])), WORLD)
 
 
 def _welded(name: str, bodies: Mapping[str, Body]) -> str:
-    """As `_carrier`, where a free joint counts as one that moves."""
+    """Return the same as `_carrier`, except that free joints count as joints that move."""
     return next((ancestor for ancestor in _ancestry(name, bodies) if bodies[ancestor].joints), WORLD)
 
 
 def unread_of_mjcf(
     root: Element, bodies: Mapping[str, Body], scenery: Sequence[str], joints: Collection[str]
 ) -> Iterator[str]:
-    """What is left out, each kind of thing once, with the names of the first few.
+    """Yield a line for each kind of thing that is left out, with the names of the first few.
 
     Args:
-        root: Of the file.
-        bodies: By name.
-        scenery: Geoms that are left out.
+        root: Top element of the file.
+        bodies: The bodies by name.
+        scenery: Geoms of the scene, which are left out.
         joints: Names of all joints.
     """
     free = [name for name, body in bodies.items() if "free" in body.joints]
@@ -406,7 +423,7 @@ def unread_of_mjcf(
 
 
 def _flags(root: Element) -> list[str]:
-    """Switches of what MuJoCo compares, where they do not have their usual position."""
+    """Return the names of the switches of collision checking that are not at their default."""
     flags = [flag for flag in root.findall("option/flag") if flag.get("filterparent") == "disable"]
     return ["filterparent"] if flags else []
 
@@ -416,12 +433,12 @@ def _quoted(names: Sequence[str]) -> list[str]:
 
 
 def _names(elements: Iterable[Element]) -> list[str]:
-    """How elements are called: by name, else by their tag."""
+    """Return the quoted names of elements, or their tags if they have no name."""
     return [f"'{item.get('name') or item.tag}'" for item in elements]
 
 
 def _loops(root: Element) -> list[str]:
-    """Equalities that are in force, other than those of two joints, by kind and by what they tie together."""
+    """Return the active equalities that are not between two joints, by kind and by what they connect."""
     found = []
     for item in root.findall("equality/*"):
         if item.tag == "joint" or item.get("active", "true") != "true":
@@ -432,6 +449,6 @@ def _loops(root: Element) -> list[str]:
 
 
 def _held(root: Element) -> list[str]:
-    """Joints that an equality in force holds at a value."""
+    """Return the joints that an active equality holds at a value."""
     ties = (item for item in root.findall("equality/joint") if item.get("active", "true") == "true")
     return [f"'{item.get('joint1', '')}'" for item in ties if item.get("joint2") is None]

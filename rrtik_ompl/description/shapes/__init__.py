@@ -1,1 +1,1 @@
-"""Files of solids: meshes, clouds of points, grids of heights, octrees; each gives a shape."""
+"""Read files of solids as shapes: meshes, clouds of points, grids of heights, octrees."""

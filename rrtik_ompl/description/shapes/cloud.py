@@ -1,4 +1,4 @@
-"""Files of points -> `shapes.PointCloud`, and back."""
+"""Read files of points as `shapes.PointCloud`, and write them."""
 
 from __future__ import annotations
 
@@ -34,20 +34,20 @@ def load_cloud(
 ) -> PointCloud:
     """Read a cloud of points: ``.npy`` (an array of shape (n, 3)), ``.ply``, ``.pcd``, ``.bt``, ``.xyz`` (text).
 
-    Of a map of OctoMap (``.bt``) it has the middle of each occupied cell; unless a radius is given, balls of half the
-    diagonal of the cells cover them.
+    From a map of OctoMap (``.bt``) the centre of each occupied cell is taken; unless a radius is given, the points have
+    balls that cover the cells, of half the cells' diagonal.
 
     Args:
         path: The file.
-        radius: Of the ball that each point is [m]; if None, 0.01, or what covers the cells of a map.
+        radius: Radius of the ball at each point [m]; if None, 0.01, or what covers the cells of a map.
         scale: Metres per unit of the file; 0.001 for millimetres.
         invalid: Whether points that are not finite are refused or dropped.
 
     Raises:
-        InputError: If the file cannot be read, is broken, or holds no point that can be used; one line.
+        InputError: If the file cannot be read, is broken, or has no usable point; one line.
 
     Warns:
-        CloudWarning: If the cloud is so wide that it is rather in millimetres.
+        CloudWarning: If the cloud is so large that it is probably in millimetres.
 
     Example:
         >>> cloud = load_cloud("scan.ply", radius=0.01).voxel(0.01)  # doctest: +SKIP
@@ -66,7 +66,9 @@ def load_cloud(
 
     if radius is None and suffix == ".bt":
         radius = factor * 0.5 * np.sqrt(3.0) * octree_resolution(data, str(path))
-        radius += float(np.finfo(np.float32).eps) * float(np.abs(points).max(initial=0.0))  # they are kept in float32
+        radius += float(np.finfo(np.float32).eps) * float(
+            np.abs(points).max(initial=0.0)
+        )  # for the rounding of points, which are stored in float32
     elif radius is None:
         radius = RADIUS
 
@@ -77,10 +79,10 @@ def save_cloud(cloud: PointCloud, path: str | os.PathLike[str]) -> PointCloud:
     """Write the points of a cloud as ``.npy`` or ``.ply``, whole or not at all.
 
     Returns:
-        The cloud as that file has it, so that a scene with it can be written.
+        The cloud with that file as its source, so that a scene with it can be written.
 
     Raises:
-        InputError: If the name ends otherwise, or the file cannot be written.
+        InputError: If the name has another ending, or the file cannot be written.
 
     Example:
         >>> cloud = rrtik.PointCloud(np.eye(3), radius=0.01)

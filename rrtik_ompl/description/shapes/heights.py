@@ -1,4 +1,4 @@
-"""Files of heights -> `shapes.HeightField`: arrays, tables of numbers, pictures."""
+"""Read files of heights as `shapes.HeightField`: arrays, tables of numbers, pictures."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from rrtik_ompl.model.shapes.point_cloud import Invalid, known_choice
 
 TABLES = (".csv", ".txt", ".xyz")
 PICTURES = (".png", ".tif", ".tiff", ".pgm")
-USUAL = (-9999.0, -99999.0, -32768.0, -32767.0)  # numbers that stand for no data in files that do not say so
+USUAL = (-9999.0, -99999.0, -32768.0, -32767.0)  # numbers that often mean "no data" without the file saying so
 MAX_BYTES = 256 * 1024 * 1024
 
 
@@ -34,17 +34,17 @@ def load_height_field(
 ) -> HeightField:
     """Read a grid of heights: ``.npy``, rows of numbers (``.csv``, ``.txt``), or a grey picture of up to 32 bits.
 
-    Rows of arrays and tables go along y, the first one first; a picture lies as it is seen from above, its upper edge
-    at the far end of y. A value of 0 in a picture is a height of 0.
+    Rows of arrays and tables go along y, from the lowest y on; a picture is a view from above, with its upper edge at
+    the largest y. A value of 0 in a picture is a height of 0.
 
     Args:
         path: The file.
         cell: Side of a cell [m].
-        floor: Where the solid ends below [m]; one cell below the lowest height if None.
+        floor: Height of the solid's lower face [m]; one cell below the lowest height if None.
         scale: Metres per unit of the file's heights; 0.001 for millimetres.
-        invalid: Whether heights that are not finite, or stand for no data, are refused or dropped.
-        nodata: The number of the file that stands for no data. Without it the one that a TIFF names (GDAL_NODATA)
-            counts, and the usual ones (-9999, -32768...) are refused where they lie far below all heights.
+        invalid: Whether heights that are not finite, or mean "no data", are refused or dropped.
+        nodata: The number in the file that means "no data". If None, the one that a TIFF states (GDAL_NODATA) is used,
+            and the usual ones (-9999, -32768...) are refused where they lie far below all heights.
 
     Raises:
         InputError: If the file cannot be read, is broken, has cells without data, or makes no height field; one line.
@@ -93,17 +93,17 @@ def load_height_field(
 def _with_missing_as_nan(
     rows: NDArray[Any], no_data_value: float | None, invalid: Invalid, what: str, *, from_above: bool
 ) -> NDArray[Any]:
-    """The heights, NaN where a number stands for no data.
+    """Return the heights with NaN where there is no data.
 
     Args:
-        rows: The heights of the file.
-        no_data_value: The number; one that usually does, and lies far below all heights, is refused if None.
+        rows: The heights of the file, shape (m, n).
+        no_data_value: The number that means "no data"; if None, a usual one that lies far below all heights is refused.
         invalid: Whether such heights, and those that are not finite, are refused.
         what: The file, for messages.
         from_above: Whether the last row is the first one of the file.
 
     Raises:
-        InputError: If there is such a height, with the place of the first one in the file.
+        InputError: If there is such a height and it is refused, with the place of the first one in the file.
     """
     guess = (
         next((usual for usual in USUAL if _stands_for_no_data(rows, usual)), None) if no_data_value is None else None
@@ -132,7 +132,7 @@ def _with_missing_as_nan(
 
 
 def _stands_for_no_data(rows: NDArray[Any], usual: float) -> bool:
-    """Whether a number that usually stands for no data is in a grid, far below all heights."""
+    """Check whether a usual "no data" number occurs in a grid, far below all other heights."""
     finite = rows[np.isfinite(rows)].astype(np.float64)
     others = finite[finite != usual]
     if len(others) == len(finite):
@@ -141,7 +141,7 @@ def _stands_for_no_data(rows: NDArray[Any], usual: float) -> bool:
 
 
 def _picture(data: bytes, what: str) -> NDArray[Any]:
-    """A grey picture, its lowest row first."""
+    """Return a grey picture as an array, its lowest row first."""
     try:
         import cv2
     except ImportError:
@@ -150,7 +150,7 @@ def _picture(data: bytes, what: str) -> NDArray[Any]:
 
     try:
         picture = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), cv2.IMREAD_UNCHANGED) if data else None
-    except cv2.error:  # a header with a size larger than memory
+    except cv2.error:  # The header may state a size larger than the memory.
         picture = None
 
     if picture is None:

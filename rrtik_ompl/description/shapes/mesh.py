@@ -1,4 +1,4 @@
-"""Mesh files (STL text and binary, OBJ, DAE) -> `shapes.Mesh`, read by assimp through coal."""
+"""Read mesh files (STL text and binary, OBJ, DAE) as `shapes.Mesh`, by assimp through coal."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ from rrtik_ompl.model.shapes import Mesh
 
 SUFFIXES = (".stl", ".obj", ".dae")
 MAX_BYTES = 256 * 1024 * 1024
-LONG_BYTES = 20e6  # of a file that somebody has to wait for
-# In a text: nan, inf, and what overflows float32, in which assimp reads.
+LONG_BYTES = 20e6  # size of a file above which the user is told to wait
+# Matches nan, inf, and numbers that overflow float32 (in which assimp reads), in a text file.
 _NOT_FINITE = re.compile(
     rb"[\s>][-+]?(?:(?:nan|inf)(?:inity)?|[0-9.]+e\+?0*(?:[0-9]{3,}|[4-9][0-9]|39)|[0-9]{39,}[0-9.]*)(?=[\s<]|$)",
     re.IGNORECASE,
@@ -33,8 +33,8 @@ _NOT_FINITE = re.compile(
 def load_mesh(path: str | os.PathLike[str], scale: float = 1.0) -> Mesh:
     """Read a triangle mesh.
 
-    Polygons are cut into triangles, equal vertices merged, triangles without area dropped. A closed mesh whose
-    triangles all face inwards is turned inside out. The unit that a DAE file states is honoured, its up axis is not.
+    Polygons are divided into triangles, equal vertices merged, and triangles without area dropped. A closed mesh whose
+    triangles all face inwards is turned inside out. The unit that a DAE file states is used, its up axis is not.
 
     Args:
         path: File whose name ends in .stl, .obj or .dae.
@@ -85,7 +85,7 @@ def _read(path: str | os.PathLike[str], scale: float) -> tuple[Matrix, NDArray[n
 
 
 def _reason(error: Exception) -> str:
-    """What assimp says, without paths, hints and places in its source."""
+    """Return assimp's message without paths, hints and places in its source."""
     lines = [line.strip().removeprefix("message: ") for line in str(error).splitlines() if line.strip()]
     noise = ("From file:", "in function:", "at line:", "Could not load resource", "Hint:")
     said = [line for line in lines if not line.startswith(noise)]
@@ -95,14 +95,16 @@ def _reason(error: Exception) -> str:
 
 
 def stated_unit(path: str | os.PathLike[str], data: bytes) -> float:
-    """Metres per unit as a COLLADA file states it, which coal ignores and RViz and Gazebo do not; 1 for other formats.
+    """Return the metres per unit that a COLLADA file states; 1 for other formats.
+
+    Coal ignores this unit, but RViz and Gazebo do not.
 
     Args:
-        path: Of the file.
-        data: What it holds.
+        path: Name of the file.
+        data: Contents of the file.
 
     Raises:
-        InputError: If it is no XML, or states no number greater than 0.
+        InputError: If the file is not XML, or its unit is not a number greater than 0.
     """
     if Path(path).suffix.lower() != ".dae":
         return 1.0
@@ -120,7 +122,10 @@ def stated_unit(path: str | os.PathLike[str], data: bytes) -> float:
 
 
 def _asset(data: bytes) -> ElementTree.Element | None:
-    """What a COLLADA file says of itself, as a rule at its beginning: the megabytes behind it are not parsed."""
+    """Return the element <asset> of a COLLADA file; None if there is none.
+
+    It is usually at the beginning, and the megabytes after it are not parsed.
+    """
     depth = 0
     element: ElementTree.Element
     for event, element in ElementTree.iterparse(BytesIO(data), ("start", "end")):
@@ -131,18 +136,18 @@ def _asset(data: bytes) -> ElementTree.Element | None:
 
 
 def _volume(mesh: Mesh) -> float:
-    """Signed volume [m^3] by the divergence theorem: positive if the triangles face outwards."""
+    """Return the signed volume [m^3], by the divergence theorem: positive if the triangles face outwards."""
     a, b, c = (mesh.vertices[mesh.triangles[:, k]] for k in range(3))
     return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0)
 
 
 def finite_numbers(data: bytes) -> bool:
-    """Whether a mesh file is free of NaN and infinity, about which the C++ library would write to the terminal.
+    """Check whether a mesh file is free of NaN and infinity, which would make the C++ library write to the terminal.
 
-    Normals of a binary STL are not read: those of triangles without area are NaN in the files of some programs.
+    Normals of a binary STL are ignored: some programs write NaN for triangles without area.
     """
     count = int.from_bytes(data[80:84], "little")
-    if len(data) == 84 + 50 * count:  # binary STL: per triangle twelve floats and two bytes
+    if len(data) == 84 + 50 * count:  # A binary STL has twelve floats and two bytes per triangle.
         rows = np.frombuffer(data, dtype=[("normal", "<f4", 3), ("corners", "<f4", 9), ("rest", "<u2")], offset=84)
         return bool(np.isfinite(rows["corners"]).all())
     return _NOT_FINITE.search(data) is None

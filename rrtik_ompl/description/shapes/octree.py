@@ -1,7 +1,8 @@
-"""Maps of OctoMap (.bt): the occupied cells of their octree.
+"""Read maps of OctoMap (.bt): the occupied cells of their octree.
 
-Each node is two bytes, two bits for each of its eight children, the lowest first: unknown, free, occupied, or a node of
-its own, which follows. The lowest bit of a child's number says on which side along x it lies, the next ones y and z.
+Each node has two bytes, with two bits for each of its eight children, the lowest bits first: unknown, free, occupied,
+or an inner node, which follows later. The lowest bit of a child's number says on which side along x it lies, the next
+ones along y and z.
 """
 
 from __future__ import annotations
@@ -18,8 +19,8 @@ from rrtik_ompl.model.shapes.octree import Octree
 from rrtik_ompl.model.shapes.point_cloud import MOST_POINTS
 
 FIRST_LINE = b"# Octomap OcTree binary file"
-OCCUPIED = 2  # two bits of a child; 3 is a node of its own
-DEPTH = 16  # levels of cells below the root
+OCCUPIED = 2  # value of a child's two bits; 3 is an inner node
+DEPTH = 16  # number of levels below the root
 MAX_BYTES = 256 * 1024 * 1024
 
 
@@ -42,17 +43,17 @@ def load_octree(path: str | os.PathLike[str], *, scale: float = 1.0) -> Octree:
 
 
 def octree_cells(data: bytes, what: str) -> tuple[Matrix, Vector]:
-    """Centres, shape (n, 3), and side lengths, shape (n,), of the occupied cells of a ``.bt`` file.
+    """Return the centres, shape (n, 3), and side lengths, shape (n,), of the occupied cells of a ``.bt`` file.
 
     Raises:
-        InputError: If it is none, or ends too early.
+        InputError: If it is not such a file, or ends too early.
     """
     places, levels, resolution, _ = _occupied(data, what)
     return _cells(places, levels, resolution)
 
 
 def cells_of_tree(body: bytes, resolution: float, kind: str, what: str) -> tuple[Matrix, Vector]:
-    """As :func:`octree_cells`, of the tree alone, as ROS sends it: without the header of a file.
+    """Return the same as :func:`octree_cells` for a tree without the header of a file, as ROS sends it.
 
     Args:
         body: The tree.
@@ -61,7 +62,7 @@ def cells_of_tree(body: bytes, resolution: float, kind: str, what: str) -> tuple
         what: Its name, for messages.
 
     Raises:
-        InputError: If it is none, or ends too early.
+        InputError: If it is not a tree, or ends too early.
     """
     places, levels, side, end = _cells_in(body, {"id": kind or "OcTree", "res": str(resolution)}, what)
     if end != len(body):
@@ -70,17 +71,23 @@ def cells_of_tree(body: bytes, resolution: float, kind: str, what: str) -> tuple
 
 
 def _cells(places: NDArray[np.float64], levels: NDArray[np.float64], resolution: float) -> tuple[Matrix, Vector]:
-    """Centres and side lengths of cells."""
+    """Return centres, shape (n, 3), and side lengths, shape (n,), of cells.
+
+    Args:
+        places: Lowest corners, in finest cells from the lowest corner of the map, shape (n, 3).
+        levels: Level of each cell below the root, shape (n,).
+        resolution: Side of the finest cells.
+    """
     sides = resolution * np.exp2(DEPTH - levels)
     lows = resolution * (places - float(1 << (DEPTH - 1)))
     return lows + 0.5 * sides[:, None], sides
 
 
 def octree_points(data: bytes, what: str) -> Matrix:
-    """Centres of all occupied cells of the finest resolution, shape (n, 3), of a ``.bt`` file.
+    """Return the centres of all occupied cells of a ``.bt`` file at the finest resolution, shape (n, 3).
 
     Raises:
-        InputError: If it is none, ends too early, or has too many.
+        InputError: If it is not such a file, ends too early, or has too many cells.
     """
     places, levels, resolution, _ = _occupied(data, what)
     widths = np.exp2(DEPTH - levels)
@@ -97,16 +104,16 @@ def octree_points(data: bytes, what: str) -> Matrix:
 
 
 def octree_resolution(data: bytes, what: str) -> float:
-    """Side of the finest cells of a ``.bt`` file [unit of the file].
+    """Return the side of the finest cells of a ``.bt`` file [unit of the file].
 
     Raises:
-        InputError: If it is none.
+        InputError: If it is not such a file.
     """
     return _resolution(_header(data, what)[0], what)
 
 
 def _header(data: bytes, what: str) -> tuple[dict[str, str], bytes]:
-    """What the header of a file says, and the tree after it."""
+    """Return the entries of a file's header, and the tree after it."""
     head, separator, body = data.partition(b"\ndata\n")
     if not data.startswith(FIRST_LINE) or not separator:
         raise InputError(f"{what}: not a map of OctoMap: expected '{FIRST_LINE.decode()}' and a line 'data'")
@@ -115,7 +122,7 @@ def _header(data: bytes, what: str) -> tuple[dict[str, str], bytes]:
 
 
 def _resolution(header: dict[str, str], what: str) -> float:
-    """Side of the finest cells [unit of the file]."""
+    """Return the side of the finest cells [unit of the file]."""
     try:
         return positive(float(header["res"]), f"{what}: res")
     except (KeyError, ValueError):
@@ -123,7 +130,7 @@ def _resolution(header: dict[str, str], what: str) -> float:
 
 
 def _occupied(data: bytes, what: str) -> tuple[NDArray[np.float64], NDArray[np.float64], float, int]:
-    """Lowest corners of the occupied cells in finest cells, their levels, the size of the finest, the tree's end."""
+    """Return the occupied cells of a file, as :func:`_cells_in` does."""
     header, body = _header(data, what)
     return _cells_in(body, header, what)
 
@@ -131,7 +138,19 @@ def _occupied(data: bytes, what: str) -> tuple[NDArray[np.float64], NDArray[np.f
 def _cells_in(
     body: bytes, header: dict[str, str], what: str
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], float, int]:
-    """The same, of a tree and what its header says."""
+    """Return the occupied cells of a tree.
+
+    The nodes are stored depth first, so a stack of unvisited inner nodes is kept.
+
+    Args:
+        body: The tree.
+        header: The entries of its header.
+        what: Its name, for messages.
+
+    Returns:
+        Lowest corners in finest cells, shape (n, 3); levels below the root, shape (n,); the side of the finest cells;
+        and the number of bytes read.
+    """
     if header.get("id", "OcTree") != "OcTree":
         raise InputError(f"{what}: a tree of type '{header['id'][:20]}' is unknown; write it as OcTree")
     resolution = _resolution(header, what)
@@ -153,7 +172,7 @@ def _cells_in(
             if kind >= OCCUPIED:
                 child_node = (x + half * (child & 1), y + half * (child >> 1 & 1), z + half * (child >> 2), level + 1)
                 (occupied if kind == OCCUPIED else inner_nodes).append(child_node)
-        unvisited += inner_nodes[::-1]  # the first one follows first
+        unvisited += inner_nodes[::-1]  # The first inner node is stored next.
 
     rows = np.array(occupied, dtype=np.float64).reshape(-1, 4)
     return rows[:, :3], rows[:, 3], resolution, position
