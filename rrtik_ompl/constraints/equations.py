@@ -47,7 +47,16 @@ def _coordinates(region: HeldRegion) -> NDArray[np.int64]:
 
 
 def _of_region(robot: Robot, region: HeldRegion, q: Matrix) -> tuple[Vector, Matrix]:
-    """Compute the values and derivatives of the equations of one region, shapes (k,) and (k, dof)."""
+    """Compute the values and derivatives of the equations of one region.
+
+    Args:
+        robot: The arm.
+        region: The region.
+        q: A configuration as a row, shape (1, dof).
+
+    Returns:
+        Values without unit, shape (k,), and their derivatives with respect to q, shape (k, dof).
+    """
     displacement = region.displacements(q)[0]
     twist = twists(robot, region, q)[0]
     task = region.region

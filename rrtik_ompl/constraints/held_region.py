@@ -230,6 +230,12 @@ def _curvature(pitch: float) -> float:
 def held_region(robot: Robot, scene: Scene, region: TaskRegion, label: str) -> HeldRegion:
     """Prepare a region for a robot in a scene.
 
+    Args:
+        robot: The arm.
+        scene: The scene, whose attached objects may carry the frame.
+        region: The region, placed in the world.
+        label: Name of the region in messages.
+
     Raises:
         InputError: If its ranges of angles cannot be held because the pitch comes too near to a quarter turn.
         UnknownNameError: If its frame is neither a link nor an attached object.
@@ -253,11 +259,20 @@ def held_region(robot: Robot, scene: Scene, region: TaskRegion, label: str) -> H
 
 
 def frame_place(robot: Robot, scene: Scene, frame: str | None, label: str) -> tuple[str, int, Any]:
-    """Locate a frame on the robot; ``label`` names the region in errors.
+    """Locate a frame on the robot.
+
+    Args:
+        robot: The arm.
+        scene: The scene, whose attached objects may carry the frame.
+        frame: Name of a link or an attached object; None for the tip.
+        label: Name of the region in messages.
 
     Returns:
-        Name of the robot's frame that carries it (the tip if ``frame`` is None), index of the joint that carries that,
-        and the pose of the frame in the joint's frame, a ``pinocchio.SE3``.
+        Name of the robot's frame that carries it, index of the joint that carries that, and the pose of the frame in
+        the joint's frame, a ``pinocchio.SE3``.
+
+    Raises:
+        UnknownNameError: If the frame is neither a link nor an attached object.
     """
     held = next((each for each in scene.attached if each.name == frame), None)
     name = robot.tip if frame is None else frame if held is None else held.link

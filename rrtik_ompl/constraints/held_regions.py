@@ -109,7 +109,15 @@ def held_regions(robot: Robot, scene: Scene, regions: Iterable[TaskRegion], star
 
 
 def _placed(robot: Robot, scene: Scene, region: TaskRegion, label: str, start: Vector | None) -> HeldRegion:
-    """Prepare one region, placed in the world and with its inset."""
+    """Prepare one region, placed in the world and with its inset.
+
+    Args:
+        robot: The arm.
+        scene: The scene, whose attached objects may carry the frame.
+        region: The region.
+        label: Name of the region in messages.
+        start: Configuration at which a region ``from_start`` is placed, shape (dof,); None if it has been already.
+    """
     if region.from_start and start is not None:
         _, joint, T_joint_frame = frame_place(robot, scene, region.frame, label)
         region = region.started_at(pin.SE3(robot.joint_frames(start)[0, joint]) * T_joint_frame)
@@ -189,9 +197,14 @@ def _keeps(region: HeldRegion, A: Matrix, B: Matrix, ends: NDArray[np.float64]) 
 def _highest(
     first: NDArray[np.float64], last: NDArray[np.float64], deviation: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return upper bounds of the measures on motions, from those at both ends; arrays of one shape.
+    """Return upper bounds of the measures on motions, the maximum of a parabola above those at both ends.
 
     The bound is the maximum of ``first + t (last - first) + 4 t (1 - t) deviation`` for t in [0, 1].
+
+    Args:
+        first: Measures at the start of each motion.
+        last: Measures at its end.
+        deviation: Bounds of :meth:`HeldRegion.deviations`; the shapes of all three broadcast.
     """
     way = last - first
     inner = np.abs(way) < 4.0 * deviation

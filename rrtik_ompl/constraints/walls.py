@@ -89,7 +89,19 @@ def _between(region: HeldRegion, start: Vector, goal: Vector) -> str:
 
 
 def _walls(region: HeldRegion, turns: list[Turn], end: Rotations, place: int, low: float, high: float) -> Vector:
-    """Return the walls [rad] between two values of one turn's angle, those a whole turn apart only once."""
+    """Return the walls of one turn's angle between two values, those a whole turn apart only once.
+
+    Args:
+        region: The region.
+        turns: All turns, see :func:`_turns`.
+        end: The fixed rotation behind the last turn, shape (3, 3).
+        place: Index of the turn.
+        low: Lower angle [rad].
+        high: Upper angle [rad].
+
+    Returns:
+        The walls [rad], shape (n,).
+    """
     values = GRID * np.arange(np.floor(low / GRID) + 1, np.ceil(high / GRID))
     values = values[np.unique(np.round((values % TAU) / GRID) % round(TAU / GRID), return_index=True)[1]]
     walls: Vector = values[_blocked(region, turns, end, place, values)]
@@ -151,6 +163,14 @@ def _without_idle_turns(region: HeldRegion, turns: list[Turn], end: Rotations) -
     """Remove turns that cannot change the direction of the constrained axis.
 
     These are a last turn about the constrained axis itself, and a first turn about the direction where it has to point.
+
+    Args:
+        region: The region, whose constraint is AXIS.
+        turns: The turns from base to frame.
+        end: The fixed rotation behind the last turn, shape (3, 3).
+
+    Returns:
+        The remaining turns and the fixed rotation behind the last one, shape (3, 3).
     """
     if turns and np.linalg.norm(np.cross(turns[-1].axis, end[:, 2])) < PARALLEL:
         end = turns[-1].before @ end
@@ -168,11 +188,21 @@ def _without_idle_turns(region: HeldRegion, turns: list[Turn], end: Rotations) -
 
 
 def _blocked(region: HeldRegion, turns: list[Turn], end: Rotations, place: int, values: Vector) -> Mask:
-    """Test which values [rad] of one turn's angle are walls, shape (k,).
+    """Test which values of one turn's angle are walls.
 
     The box of all other angles is halved in all directions as long as it is undecided: a box whose middle is in the
     region shows that the value is no wall; a box whose frames are all outside is dropped. A value is a wall if all its
-    boxes are dropped.
+    boxes are dropped. If there are too many boxes, no value is.
+
+    Args:
+        region: The region.
+        turns: All turns, see :func:`_turns`.
+        end: The fixed rotation behind the last turn, shape (3, 3).
+        place: Index of the turn.
+        values: Angles of the turn [rad], shape (k,).
+
+    Returns:
+        Which are walls, shape (k,).
     """
     others = [number for number in range(len(turns)) if number != place]
     blocked = np.zeros(len(values), dtype=bool)
@@ -229,7 +259,17 @@ def _span(region: HeldRegion, turn: Turn) -> tuple[float, float]:
 
 
 def _angles(region: HeldRegion, turns: list[Turn], end: Rotations, angles: Matrix) -> Vector:
-    """Compute how far the frame is from the held orientation [rad] for angles of all turns, (m, turns) -> (m,)."""
+    """Compute how far the frame is from the held orientation.
+
+    Args:
+        region: The region.
+        turns: All turns, see :func:`_turns`.
+        end: The fixed rotation behind the last turn, shape (3, 3).
+        angles: Angles of all turns [rad], shape (m, turns).
+
+    Returns:
+        Angles [rad], shape (m,).
+    """
     R = np.broadcast_to(region.T_w_world[:3, :3], (len(angles), 3, 3))
     for turn, values in zip(turns, angles.T, strict=True):
         R = R @ turn.before @ _rotations(turn.axis, values)

@@ -52,7 +52,15 @@ def records(data: bytes, offset: int, kind: np.dtype[Any], count: int, what: str
 
 
 def npy_rows(data: bytes, what: str, columns: int | None = None) -> NDArray[Any]:
-    """Read the array of a .npy file of numpy, shape (n, columns); any number of columns if None.
+    """Read the array of a .npy file of numpy.
+
+    Args:
+        data: The bytes of the file.
+        what: Name of the file, for messages.
+        columns: Required number of columns; None for any.
+
+    Returns:
+        The array, shape (n, columns), without copying.
 
     Raises:
         InputError: If it is not such a file, its shape is another one, or it is shorter than its header claims.
@@ -228,7 +236,17 @@ def _record(header: dict[str, list[str]], names: list[str], what: str) -> np.dty
 
 
 def _columns(body: bytes, kind: np.dtype[Any], count: int, what: str) -> NDArray[Any]:
-    """Read the points of compressed data, which contain all x, then all y and so on, shape (n, 3)."""
+    """Read the points of compressed data, which contain all x, then all y and so on.
+
+    Args:
+        body: The bytes behind the header: two sizes of four bytes each, then the compressed data.
+        kind: Type of one point, see :func:`_record`.
+        count: Number of points that the header claims.
+        what: Name of the file, for messages.
+
+    Returns:
+        The points, shape (n, 3).
+    """
     if len(body) < 8:
         raise InputError(f"{what}: the compressed points are missing; save it again")
     packed, size = (int.from_bytes(body[k : k + 4], "little") for k in (0, 4))
@@ -251,6 +269,11 @@ def _columns(body: bytes, kind: np.dtype[Any], count: int, what: str) -> NDArray
 
 def unpacked(packed: bytes, size: int, what: str) -> bytes:
     """Decompress data of Lehmann's LZF format: literal runs of bytes, and copies of earlier output.
+
+    Args:
+        packed: The compressed bytes.
+        size: Number of bytes after decompression.
+        what: Name of the file, for messages.
 
     Raises:
         InputError: If the data are damaged.

@@ -181,7 +181,15 @@ class Builder:
         return place
 
     def _add(self, value: object, size: int, height: int, anchor: str | None, event: yaml.Event) -> None:
-        """Store a finished value in its parent and update the size and height with aliases expanded."""
+        """Store a finished value in its parent and update the parent's size and height with aliases expanded.
+
+        Args:
+            value: The value.
+            size: Number of values in it.
+            height: Number of levels in it.
+            anchor: Its name for aliases, or None.
+            event: The event that ended it, for the line in errors.
+        """
         if anchor is not None:
             self._anchors[anchor] = (value, size, height)
 

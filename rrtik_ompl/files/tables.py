@@ -47,7 +47,12 @@ def _from_table(text: str, separator: str | None) -> dict[str, Any]:
 
 
 def json_object(text: str, kind: str, key: str) -> dict[str, Any]:
-    """Parse the JSON object of a file of version 1 and of a kind that has a key; names and units are checked.
+    """Parse the JSON object of a file of version 1; names and units of joints are checked if there are any.
+
+    Args:
+        text: The text of the file.
+        kind: The required value of the key "kind" if that is present, such as "joint_path".
+        key: A key that must be present.
 
     Raises:
         InputError: If the text is something else; the message names the line or the key.

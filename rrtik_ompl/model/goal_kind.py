@@ -443,9 +443,17 @@ def roll_pitch_yaw(R: NDArray[np.float64]) -> Matrix:
 
 
 def _best_angle(R: NDArray[np.float64], angles: Matrix, k: int) -> Vector:
-    """Compute the k-th angle that brings the rotation nearest to R with the other two held, shape (m,).
+    """Compute the angle that brings the rotation nearest to R with the other two angles held.
 
     The trace of R^T Rz Ry Rx, which is to be maximised, is a cosine of each angle.
+
+    Args:
+        R: Rotations, shape (m, 3, 3).
+        angles: Roll, pitch and yaw [rad], shape (m, 3).
+        k: Index of the angle, 0 for roll, 1 for pitch, 2 for yaw.
+
+    Returns:
+        The k-th angle [rad], shape (m,).
     """
     first, second = (rpy_matrices(angles * np.eye(3)[other]) for other in range(3) if other != k)
     C = np.swapaxes(R, 1, 2)

@@ -280,7 +280,11 @@ class Robot:
         return jacobians(self, rows, frame)
 
     def fk_jacobian_batch(self, Q: ArrayLike, frame: str | None = None) -> tuple[Matrix, Matrix]:
-        """Compute :meth:`fk_batch` and :meth:`jacobian_batch` at once, shapes (m, 4, 4) and (m, 6, dof)."""
+        """Compute :meth:`fk_batch` and :meth:`jacobian_batch` at once, for Q of shape (m, dof).
+
+        Returns:
+            Poses, shape (m, 4, 4), and Jacobians, shape (m, 6, dof).
+        """
         rows = self._rows(Q)
         self._require_frame(frame)
         return poses_and_jacobians(self, rows, frame)
@@ -328,7 +332,11 @@ def jacobians(robot: Robot, rows: Matrix, frame: str | None = None) -> NDArray[n
 
 
 def poses_and_jacobians(robot: Robot, rows: Matrix, frame: str | None = None) -> tuple[Matrix, Matrix]:
-    """Compute :func:`poses` and :func:`jacobians` at once, shapes (m, 4, 4) and (m, 6, dof)."""
+    """Compute :func:`poses` and :func:`jacobians` at once.
+
+    Returns:
+        Poses, shape (m, 4, 4), and Jacobians in world axes, rows (linear; angular), shape (m, 6, dof).
+    """
     number = _frame_number(robot, frame)
     chain = robot.chain
     frames = chain.joint_frames(rows)
@@ -351,9 +359,16 @@ def poses_and_jacobians(robot: Robot, rows: Matrix, frame: str | None = None) ->
 def _poses(
     robot: Robot, number: int, rows: Matrix, joint_frames: NDArray[np.float64] | None = None
 ) -> NDArray[np.float64]:
-    """Compute the poses of a frame, given by its number, for configurations: (m, dof) -> (m, 4, 4).
+    """Compute the poses of a frame for configurations, a few by Pinocchio, many by numpy.
 
-    A few configurations are computed by Pinocchio, many by numpy. ``joint_frames`` are those of ``rows`` if known.
+    Args:
+        robot: The arm.
+        number: Pinocchio's index of the frame.
+        rows: Configurations, shape (m, dof).
+        joint_frames: Frames of all joints there, shape (m, joints + 1, 4, 4), if known.
+
+    Returns:
+        The poses, shape (m, 4, 4).
     """
     if robot.model.nv > MOST_MOVING or not 0 < len(rows) <= FEW:
         target = robot.model.frames[number]

@@ -132,7 +132,12 @@ def arrangement_of(settings: WorldSettings) -> Arrangement:
 
 
 def arranged(robot: Robot, scene: Scene, self_margin: float) -> Arrangement:
-    """Arrange the solids of a robot in a scene and sort their pairs; ``self_margin`` is in metres.
+    """Arrange the solids of a robot in a scene and sort their pairs.
+
+    Args:
+        robot: The arm.
+        scene: Its surroundings; moving obstacles are taken at time 0.
+        self_margin: Distance that links and attached objects must keep from each other [m].
 
     Raises:
         InputError: If the scene does not fit the robot.
@@ -180,7 +185,13 @@ class Numbers:
 
     @classmethod
     def of(cls, obstacles: Sequence[Obstacle], bodies: Sequence[Body], standing: Pairs) -> Numbers:
-        """Collect the indices of a scene; ``standing`` are the pairs whose bodies never move."""
+        """Collect the indices of a scene.
+
+        Args:
+            obstacles: The obstacles, in the order of the scene.
+            bodies: All bodies of the world.
+            standing: Pairs of indices of bodies that must not touch and never move.
+        """
         body_numbers: dict[str, list[int]] = {}
         for k, body in enumerate(bodies):
             if body.kind == "obstacle":

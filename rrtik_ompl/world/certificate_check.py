@@ -69,6 +69,12 @@ class Entry(NamedTuple):
 def certificate_fault(certificate: Certificate, world: World, waypoints: ArrayLike, *, clearance: float = 0.0) -> str:
     """Verify a certificate, as :func:`rrtik_ompl.verify_certificate` but without checking the types of arguments.
 
+    Args:
+        certificate: The certificate.
+        world: The robot and the scene.
+        waypoints: Waypoints of the path, shape (k, dof).
+        clearance: Least distance that the path has to keep from obstacles on top of their margins [m].
+
     Returns:
         The first fault in one line; "" if the certificate proves the path free.
     """

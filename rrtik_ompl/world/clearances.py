@@ -50,10 +50,15 @@ def clearances_between(world: World, ends: Matrix, clearance: float | None) -> C
 
 
 def clearances_of_pairs(world: World, ends: NDArray[np.float64], clearance: float | None) -> list[Clearances | None]:
-    """Apply :func:`clearances_between` to several pairs of configurations, shape (m, 2, dof), in a few calls.
+    """Apply :func:`clearances_between` to several pairs of configurations in a few calls.
+
+    Args:
+        world: The world.
+        ends: Pairs of configurations, shape (m, 2, dof).
+        clearance: As of :func:`clearances_between`.
 
     Returns:
-        The clearances of each pair, or None.
+        The clearances of each pair, None where not even the ends are proven free.
     """
     found: list[Clearances | None] = [None] * len(ends)
     undecided = np.arange(len(ends))

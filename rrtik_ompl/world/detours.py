@@ -89,7 +89,17 @@ def _repaired(world: World, rows: Matrix, motion: int, clearance: float, rng: np
 
 
 def _sidestepped(world: World, rows: Matrix, motion: int, clearance: float) -> Repair | None:
-    """Make one single-joint move while another joint is displaced: it moves away before, and back afterwards."""
+    """Make one single-joint move while another joint is displaced: it moves away before, and back afterwards.
+
+    Args:
+        world: The world.
+        rows: Waypoints of a path of single-joint moves, shape (k, dof).
+        motion: Index of the move.
+        clearance: Distance kept from obstacles on top of their margins [m].
+
+    Returns:
+        The path with the nearest sidestep whose three moves are proven; None if there is none.
+    """
     a = rows[motion]
     b = rows[motion + 1]
     others = np.flatnonzero(a == b)
@@ -113,8 +123,14 @@ def _sidestepped(world: World, rows: Matrix, motion: int, clearance: float) -> R
 def _waypoints_around(world: World, stretch: Matrix, clearance: float, rng: np.random.Generator) -> Matrix | None:
     """Find what replaces the inner waypoints of a stretch so that its motions are proven; None if nothing is found.
 
-    The straight motion between its ends is tried first, then random points from small to large distances, of which the
-    one with the shortest way is taken.
+    The straight motion between its ends is tried first, then random points from small to large distances. Of the points
+    of the first distance that succeeds, the one with the shortest way is taken.
+
+    Args:
+        world: The world.
+        stretch: Waypoints, shape (k, dof).
+        clearance: Distance kept from obstacles on top of their margins [m].
+        rng: Source of the random points.
 
     Returns:
         Inner waypoints, shape (0, dof) or (1, dof).

@@ -176,10 +176,15 @@ class ExactChecker:
         return free
 
     def _motion_free_by_coal(self, start: Vector, end: Vector, steps: int) -> bool:
-        """Check by coal whether a motion that the kernels leave undecided is free at 0..steps.
+        """Check by coal whether a motion that the kernels leave undecided is free at all k / steps, k = 0..steps.
 
         Configurations are visited from coarse to fine. The distance of a pair at one of them, divided by a bound on the
         approach of its bodies, gives a number of neighbouring steps at which the pair cannot touch and is skipped.
+
+        Args:
+            start: Start configuration, shape (dof,).
+            end: End configuration, shape (dof,).
+            steps: Number of steps.
         """
         # The configurations that the kernels leave undecided, from coarse to fine.
         order = spread_order(steps)
@@ -250,6 +255,13 @@ def distance(
 
     For solids coal returns the lower bound together with the answer whether they touch. A check of meshes takes much
     longer, so their hulls are checked first: where these are apart, so are the meshes.
+
+    Args:
+        first: A geometry of coal.
+        first_pose: Its pose in the world.
+        second: Another geometry.
+        second_pose: Its pose in the world.
+        margin: Distance that they must keep [m]; a negative one is a depth to which they may overlap.
     """
     ends, margin = solids_of((first, first_pose, second, second_pose), margin)
     if is_ours(ends):

@@ -82,7 +82,16 @@ def judged_course(
 
 
 def _with_ends(checks: RowChecks, course: Course, at: Vector) -> Vector:
-    """Add to places on a course, shape (m,), those where the arm becomes blocked or free, located by bisection."""
+    """Add the places on a course where the arm becomes blocked or free, located by bisection.
+
+    Args:
+        checks: The checks of the world.
+        course: The course.
+        at: Places as index of a piece plus share, ascending, shape (m,).
+
+    Returns:
+        All places, ascending, shape (m or more,).
+    """
     free = checks.free(_configurations(course, at))
     changes = np.flatnonzero(free[:-1] != free[1:])
 
@@ -142,9 +151,14 @@ def contacts_along(checks: RowChecks, waypoints: Matrix) -> tuple[PathContact, .
 
 
 def contacts_at(checks: RowChecks, at: Vector, places: Matrix) -> tuple[PathContact, ...]:
-    """Return the contacts at configurations, shape (m, dof), that lie in order at places, shape (m,).
+    """Return the contacts at places along a motion.
 
     Consecutive places at which the same bodies touch form one contact, which is described by its deepest pair.
+
+    Args:
+        checks: The checks of the world.
+        at: The places as index of a piece plus share, ascending, shape (m,).
+        places: The configurations there, shape (m, dof).
     """
     blocked = np.flatnonzero(~checks.free(places))
     contacts_of_place = {int(k): found for k in blocked if (found := checks.contacts(places[k]))}

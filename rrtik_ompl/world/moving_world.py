@@ -319,6 +319,12 @@ def _with_copies(
 ) -> tuple[list[Body], list[tuple[int, int]], dict[int, int]]:
     """Add copies of some obstacles to the bodies and pairs of a world.
 
+    Args:
+        first_bodies: The bodies of the world.
+        pairs_of_first: Pairs of their indices that must not touch.
+        names: Names of the obstacles that are copied.
+        copies: Number of poses of each of these, the first one included.
+
     Returns:
         All bodies, the copies behind the original ones; all pairs of their indices; and the copy number of each body,
         by its index, 0 for the original ones.

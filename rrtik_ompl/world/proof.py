@@ -557,9 +557,13 @@ def _groups(packed: ProofPairs) -> Mask:
 
 
 def suggest_planes(robot: Robot, bodies: Sequence[Body], packed: ProofPairs, ends: Matrix) -> None:
-    """Let the kernels try the contact normals at the ends of a motion, shape (2, dof), as first planes.
+    """Let the kernels try the contact normals at the ends of a motion as first planes.
 
-    The normals are written into ``packed``, in the frame of each pair.
+    Args:
+        robot: The arm.
+        bodies: All bodies of the world.
+        packed: The table. The normals are written into ``packed.table.ways``, in the frame of each pair.
+        ends: Start and end configuration, shape (2, dof).
     """
     frames = robot.chain.joint_frames(ends)
     normals_of_rows = packed.table.ways.reshape(-1, 3)

@@ -122,7 +122,11 @@ def _with_unproven(
 ) -> Iterator[Violation]:
     """Yield the violations found, and one for each other motion that is not proven to keep the required clearance.
 
-    ``unproven`` holds the indices of the motions to consider.
+    Args:
+        checks: The checks of the world.
+        rows: The waypoints, shape (k, dof).
+        unproven: Indices of the motions to consider, ascending.
+        violations: The violations found among these.
     """
     violation_of_edge = {violation.edge: violation for violation in violations}
     clearance = checks.settings.proving or 0.0

@@ -215,7 +215,16 @@ def known_choice(invalid: Invalid, what: str) -> None:
 
 
 def _usable(points: ArrayLike, invalid: Invalid, what: str) -> tuple[Points, int]:
-    """Validate points, shape (n, 3), and return them as read-only float32, with the number of dropped points."""
+    """Validate the points of a cloud.
+
+    Args:
+        points: Shape (n, 3) [m].
+        invalid: Whether points that are not finite are refused or dropped.
+        what: Name of the cloud, for messages.
+
+    Returns:
+        The points as read-only float32, shape (m, 3), and the number of dropped points.
+    """
     given = points if isinstance(points, np.ndarray) and points.dtype == np.float32 else number_rows(points, what)
     if given.ndim != 2 or given.shape[1] != 3:
         raise InputError(f"{what}: expected points of shape (any, 3), got shape {given.shape}")
