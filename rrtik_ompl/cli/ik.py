@@ -124,6 +124,7 @@ def inverse_kinematics(
     return _one(given, goal, everything, common, output)
 
 
+# Load robot, world, goal and preferred configuration from a robot or a problem, after a check of the options.
 def _setting(
     robot: str | None, problem: str | None, scene: Path | None, near: str | None, near_deg: str | None
 ) -> Setting:
@@ -215,6 +216,7 @@ def _refuse_orientation(tolerances: dict[str, float], remedy: str) -> None:
         raise InputError(f"--tolerance-deg is of an orientation, and a point has none: {remedy}")
 
 
+# Solve inverse kinematics of one goal, and print the solutions in the chosen form; return the exit code.
 def _one(given: Setting, goal: TipGoal, everything: bool, common: dict[str, Any], output: Output) -> int:
     from rrtik_ompl import solve_ik
     from rrtik_ompl.cli import ik_report
@@ -253,6 +255,7 @@ def _one(given: Setting, goal: TipGoal, everything: bool, common: dict[str, Any]
 # --- many poses ------------------------------------------------------------------------------------------------------
 
 
+# Solve inverse kinematics of all poses in a file, and print the results; return the exit code.
 def _many(
     given: Setting,
     file: Path,

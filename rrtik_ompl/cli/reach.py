@@ -95,6 +95,7 @@ def _effective(robot: str, plot: Path | None) -> int:
     return FOUND
 
 
+# Draw slices of the map to a file, and its cells in the 3-D page, as far as these are requested.
 def _draw(shown: Robot | World, found: ReachMap, plot: Path | None, html: Path | None) -> None:
     title = f"{found.robot}: {LABELS[found.measure]}"
     if plot is not None:
@@ -110,6 +111,7 @@ def _draw(shown: Robot | World, found: ReachMap, plot: Path | None, html: Path |
             view(shown, html=html, marks=reach_marks(found), title=f"{found.robot}: {found.measure} in reach")
 
 
+# Return the figures of the map as plain values in SI units.
 def _document(found: ReachMap) -> dict[str, Any]:
     values = found.values[found.reached]
     return {
@@ -126,6 +128,7 @@ def _document(found: ReachMap) -> dict[str, Any]:
     }
 
 
+# Return two lines about the map, for a person.
 def _summary(found: ReachMap) -> list[str]:
     told = _document(found)
     if told["cells"] == 0:

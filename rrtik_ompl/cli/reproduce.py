@@ -128,6 +128,7 @@ def _fitted(table: Table) -> list[str]:
     return [*fitted, *([f"bars: {table.bars}"] if table.bars else [])]
 
 
+# Draw all figures of the given tables to a folder, and return the exit code.
 def _draw(tables: Iterable[Table], quick: bool, folder: Path) -> int:
     from rrtik_ompl.files.text import make_folder
 

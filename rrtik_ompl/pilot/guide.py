@@ -37,6 +37,7 @@ def plan(_: Means, state: State) -> State:
     return state.do(Stop(), Read(_search))
 
 
+# Request a route to the chosen grasp, or to the problem's goal, from the configuration that was just read.
 def _search(means: Means, state: State, q: Vector) -> State:
     at_reading = replace(state, q=frozen(q))
     surroundings = state.around
@@ -45,6 +46,7 @@ def _search(means: Means, state: State, q: Vector) -> State:
     return at_reading.do(FindRoute(search, _planned))
 
 
+# Propose the route that was found, or say why there is none and what the pilot can do.
 def _planned(means: Means, state: State, found: Route | NoRoute) -> State:
     if isinstance(found, NoRoute):
         without_route = leave(state)

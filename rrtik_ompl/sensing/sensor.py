@@ -177,6 +177,7 @@ class Sensor:
             )
         return f"{source}: no marker in view; go nearer, add light, or check that the white rim of the marker is whole"
 
+    # Return a sighting with its pose smoothed and its ambiguity resolved by the tracker of the object.
     def _tracked(self, sight: Sighting, time: float) -> Sighting:
         tracker = self._trackers.get(sight.object.name)
         if tracker is None or sight.refused:
@@ -196,6 +197,7 @@ class Sensor:
         return replace(sight, pose=pose, refused=refused)
 
 
+# Return one line about a sighting, for a person; the pose is in the base frame if it is known there.
 def _line(sight: Sighting, place: SeenObject | None) -> str:
     if sight.refused:
         return f"{sight.object.name}: refused: {sight.refused}"
@@ -213,6 +215,7 @@ def _line(sight: Sighting, place: SeenObject | None) -> str:
     )
 
 
+# Return a sighting as plain values; the pose is in the base frame if it is known there.
 def _data(sight: Sighting, place: SeenObject | None) -> dict[str, Any]:
     pose, frame = _pose_and_frame(sight, place)
     doubt = sight.pose if place is None else place

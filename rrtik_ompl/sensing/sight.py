@@ -208,6 +208,7 @@ def _side_shifts(markers: Sequence[MountedMarker]) -> list[Matrix]:
     return shifts
 
 
+# Return why a pose must not be used, with a remedy; "" if it may.
 def _refusal(pose: CornerPose, markers: Sequence[SeenMarker]) -> str:
     side = max(marker.side for marker in markers)
     if side < MIN_SIDE_PIXELS:

@@ -45,6 +45,7 @@ def standing_parts(world: World) -> list[dict[str, Any]] | None:
     return found
 
 
+# Return the convex solids around a body in the world frame; None if there are none of that kind.
 def _solids(body: Body) -> list[dict[str, Any]] | None:
     around = convex_solids(body.geometry).around
     placement = body.placement

@@ -155,6 +155,8 @@ class SimulatedCamera:
             if (corners_in_camera[:, 2] > 0.05).all():
                 self._draw_marker(drawn, depths, sheet, self.camera.project(corners_in_camera), T)
 
+    # Draw one marker into the picture in place. The image of the marker is warped at three times the resolution,
+    # averaged, and blended where nothing is in front.
     def _draw_marker(
         self,
         drawn: NDArray[np.uint8],

@@ -55,6 +55,7 @@ class Watchdog:
         self._ended.set()
         self._thread.join(timeout=5.0)
 
+    # Check the reports at regular intervals; stop the arm and publish a fault when a thread falls silent.
     def _watch(self) -> None:
         reported_silent: set[str] = set()
         begin = time.monotonic()

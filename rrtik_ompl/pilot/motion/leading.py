@@ -95,6 +95,7 @@ def servo(means: Means, state: State, press: float) -> State:
     return replace(pressed, servoed_at=state.time).do(request)
 
 
+# Send the arm along the computed rates, slowed down to what the pilot can follow; report the remaining distance.
 def _stepped(means: Means, state: State, step: ServoStep) -> State:
     remaining = f"{1e3 * step.away:.1f} mm and {np.rad2deg(step.turned):.1f} deg"
 
@@ -120,6 +121,7 @@ def _begin_lead(means: Means, state: State, master: Vector) -> State:
     return _go_on_leading(means, state, master)
 
 
+# Move towards the master's joints, as far as one step allows; refuse a step that is not free.
 def _go_on_leading(means: Means, state: State, master: Vector) -> State:
     to_go = means.robot.clamp(master) - state.q
     max_lead = means.rates * pace(means, state) * LEASH_SECONDS

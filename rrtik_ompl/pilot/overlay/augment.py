@@ -206,6 +206,7 @@ class Augmenter:
         """
         return self._last.depths.copy()
 
+    # Draw a ghost, the whole arm or only the gripper, with its outline.
     def _draw_ghost(
         self,
         drawn: NDArray[np.uint8],

@@ -116,6 +116,7 @@ class CameraLostError(InputError):
     """A camera that delivered pictures before no longer does."""
 
 
+# Yield the pictures of a video file, with times by its frame rate.
 def _video(path: Path) -> Iterator[Picture]:
     if not os.path.isfile(path):
         raise InputError(f"{path}: no such file; check the name")

@@ -247,6 +247,8 @@ def _table(dictionary: str) -> cv2.aruco.Dictionary:
     return cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, DICTIONARIES[dictionary]))
 
 
+# Return OpenCV's detector for a dictionary. outline_share is the least perimeter of a marker as a share of the
+# picture's longer side; a thorough detector tries larger threshold windows and corrects more bits.
 @lru_cache
 def _detector(
     dictionary: str, outline_share: float = MIN_OUTLINE_SHARE, thorough: bool = False

@@ -121,6 +121,7 @@ def draw_marks(vis: Node, marks: Iterable[Mark]) -> None:
         vis["marks"][f"{number}"].set_object(look_of_triangles(mark.vertices, mark.faces).geometry, material)
 
 
+# Join triangle meshes to one mark.
 def _joined(name: str, color: str, bodies: Iterable[tuple[Matrix, Faces]], options: MarkOptions) -> Mark:
     vertices = [np.empty((0, 3))]
     faces = [np.empty((0, 3), dtype=np.int64)]

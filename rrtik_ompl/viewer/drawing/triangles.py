@@ -93,6 +93,7 @@ def thin_out(vertices: Matrix, faces: Faces, limit: int) -> tuple[Matrix, Faces]
     return thin_vertices, thin_faces
 
 
+# Merge all vertices in the same cell of a grid to their mean, and drop triangles that become degenerate.
 def _cluster(vertices: Matrix, faces: Faces, cell: float) -> tuple[Matrix, Faces]:
     grid = np.floor((vertices - vertices.min(axis=0)) / cell).astype(np.int64)
     size = grid.max(axis=0) + 1
