@@ -234,11 +234,13 @@ def truths(values: ArrayLike, what: str) -> Mask:
     """Convert booleans given by a user, or 0 and 1, to a mask, shape (n,).
 
     Raises:
-        InputError: If they are not numbers.
+        InputError: If they are anything else.
     """
     array = np.asarray(values) if isinstance(values, list | tuple | np.ndarray) and dimensions(values) else None
     if array is None or array.dtype != np.bool_:
         array = number_rows(values, what)
+        if not np.isin(array, (0.0, 1.0)).all():
+            raise InputError(f"{what}: must be true or false, or 1 or 0, each")
     mask: Mask = array.reshape(-1).astype(bool)
     return mask
 

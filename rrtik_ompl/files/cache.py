@@ -79,9 +79,10 @@ def write_whole(file: Path, write: Callable[[IO[bytes]], object]) -> None:
             with os.fdopen(handle, "wb") as stream:
                 write(stream)
             os.replace(aside, file)
-        except OSError:
+        except BaseException:  # Ctrl-C too: nothing half written stays behind
             with contextlib.suppress(OSError):
                 os.unlink(aside)
+            raise
 
 
 def _make_closed(folder: Path) -> None:

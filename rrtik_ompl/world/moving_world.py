@@ -211,9 +211,10 @@ class MovingWorld:
         inflations = [inflation.get(b.name, usual) for b, usual in zip(self._bodies, self._inflation, strict=True)]
         blocked = bool(self.blocked)
         self._prover.place(self._bodies, inflations, always_colliding=blocked)
-        proven = self._prover.proven(A, B, clearance=-less)
-        self._prover.place(self._bodies, self._inflation, always_colliding=blocked)
-        return proven
+        try:
+            return self._prover.proven(A, B, clearance=-less)
+        finally:
+            self._prover.place(self._bodies, self._inflation, always_colliding=blocked)
 
     def _with_clearance(self, body: Body, margin: float) -> Body:
         """Return a body with a given margin [m], to which the clearance of the world is added if it is an obstacle."""

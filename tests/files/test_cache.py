@@ -135,3 +135,14 @@ def test_processes_that_start_cold_at_once_leave_one_whole_file(tmp_path):
     assert [process.returncode for process in started] == [0, 0]
     assert found | {file.read_bytes()} <= {b"a" * 10_000, b"b" * 10_000}
     assert os.listdir(file.parent) == ["a"]
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, ValueError])
+def test_what_is_interrupted_while_it_is_written_leaves_nothing_behind(tmp_path, error):
+    def half(stream):
+        stream.write(b"half")
+        raise error
+
+    with pytest.raises(error):
+        write_whole(tmp_path / "cache" / "code.bin", half)
+    assert list((tmp_path / "cache").iterdir()) == []
