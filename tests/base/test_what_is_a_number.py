@@ -89,7 +89,7 @@ def test_masks_are_truths():
     with pytest.raises(rrtik.InputError, match="expected numbers"):
         rrtik.JointPath([[0, 0]], prismatic=["yes", "no"])
     for wrong in ([7, 0], [0.5], [float("nan")], [-1]):
-        with pytest.raises(InputError, match="x: must be true or false"):
+        with pytest.raises(rrtik.InputError, match="x: must be true or false"):
             truths(wrong, "x")
 
 
