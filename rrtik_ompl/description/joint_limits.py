@@ -59,9 +59,8 @@ def _joint(document: YamlDocument, location: Location, values: Mapping[str, Any]
             raise UnknownNameError("key", key, _KEYS, where=document.place((*location, key)))
         if key.startswith("has_") and not isinstance(value, bool):
             raise document.error((*location, key), f"expected true or false, found {describe(value)}")
-        if (
-            key in _NUMBERS and values.get(f"has_{key.partition('_')[2]}_limits") is not False
-        ):  # For limits that do not apply, MoveIt writes 0.
+        # Limits that do not apply are skipped, as MoveIt writes 0 for them.
+        if key in _NUMBERS and values.get(f"has_{key.partition('_')[2]}_limits") is not False:
             _number(document, (*location, key), value, positive=not key.endswith("position"))
 
     limits: dict[str, float | None] = {}

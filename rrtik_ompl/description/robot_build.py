@@ -308,7 +308,8 @@ def _chain(model: pin.Model, actuated: tuple[str, ...], mimic_of: Mapping[str, M
     joints = model.joints
 
     for k in range(count):
-        joint_data = joints[k + 1].createData()  # model.createData() would copy the data of all joints.
+        # Data are made for this joint alone, as looking it up in the data of a model copies those of all joints.
+        joint_data = joints[k + 1].createData()
         joints[k + 1].calc(joint_data, neutral)
         subspace = np.asarray(joint_data.S).reshape(-1)  # (linear; angular)
         prismatic[k] = np.linalg.norm(subspace[:3]) > 0.5

@@ -18,14 +18,8 @@ from typing import Any, TypeAlias
 TRUST = "if you trust whoever wrote it, give trust_xacro=True (--trust-xacro)"
 Package: TypeAlias = Any  # xacro, which has no types
 Value: TypeAlias = Any  # value of an expression
-READABLE = (
-    ".xacro",
-    ".urdf",
-    ".srdf",
-    ".xml",
-    ".yaml",
-    ".yml",
-)  # files that are read in folders above that are no packages
+# Kinds of files that may be read in folders above the robot's that are not packages.
+READABLE = (".xacro", ".urdf", ".srdf", ".xml", ".yaml", ".yml")
 MACRO_FUNCTIONS = (
     "abs_filename", "arg", "dotify", "error", "fatal", "load_yaml", "message", "print_location", "tokenize", "warning",
 )  # fmt: skip
@@ -255,10 +249,8 @@ def _error_answer(error: BaseException, job: Mapping[str, Any]) -> dict[str, Any
         return {"where": location, "error": message}
 
     message = " ".join(str(error).split()) or type(error).__name__
-    return {
-        "where": location,
-        "error": message.removeprefix("<class 'LookupError'>: "),
-    }  # Xacro puts this in front of a LookupError.
+    # Xacro puts this prefix in front of the message of a LookupError.
+    return {"where": location, "error": message.removeprefix("<class 'LookupError'>: ")}
 
 
 def _limit(seconds: float, memory: float) -> None:

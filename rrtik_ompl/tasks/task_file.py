@@ -59,7 +59,7 @@ class MoveToEntry(Section):
     )
 
     def build(self, robot: Robot) -> MoveTo:
-        """The stage."""
+        """Build the stage."""
         return _move_to(self.move_to, robot, [section.build(robot) for section in self.path_constraints])
 
 
@@ -88,7 +88,7 @@ class StraightEntry(Section):
     straight: LineEntry
 
     def build(self, robot: Robot) -> Straight:
-        """The stage."""
+        """Build the stage."""
         del robot
         line = self.straight
         return Straight(line.by, None if line.to is None else line.to.build(), line.frame)
@@ -112,7 +112,7 @@ class AttachEntry(Section):
     attach: HoldEntry
 
     def build(self, robot: Robot) -> Attach:
-        """The stage."""
+        """Build the stage."""
         del robot
         return Attach(self.attach.object, self.attach.link, tuple(self.attach.allow), self.attach.padding)
 
@@ -123,7 +123,7 @@ class DetachEntry(Section):
     detach: Name
 
     def build(self, robot: Robot) -> Detach:
-        """The stage."""
+        """Build the stage."""
         del robot
         return Detach(self.detach)
 
@@ -135,7 +135,7 @@ class GripperEntry(Section):
     width: NotNegative | None = Field(None, description="how far apart the fingers are afterwards [m]")
 
     def build(self, robot: Robot) -> Gripper:
-        """The stage."""
+        """Build the stage."""
         del robot
         return Gripper(self.gripper, self.width)
 
@@ -146,7 +146,7 @@ class AlternativesEntry(Section):
     alternatives: Annotated[list[Annotated[list[StageEntry], Field(min_length=1)]], Field(min_length=1)]
 
     def build(self, robot: Robot) -> Alternatives:
-        """The stage."""
+        """Build the stage."""
         return Alternatives([[stage.build(robot) for stage in row] for row in self.alternatives])
 
 

@@ -87,7 +87,7 @@ def time_task(
     begins: list[float] = []
     pauses: list[tuple[float, float]] = []
     now = 0.0
-    rest_so_far = 0.0  # since the last part that moves
+    rest_so_far = 0.0  # [s] rest since the last part that moves
 
     for number, (path, world, stage) in enumerate(zip(plan.paths, plan.worlds, plan.stages, strict=True)):
         if number and rest and _changed(plan.worlds[number - 1], world):

@@ -17,17 +17,8 @@ from rrtik_ompl.files.text import read_text
 from rrtik_ompl.model.robot import Robot
 
 MJCF_OPTIONS = ("base_pose", "joint_limits", "joints", "locked", "strict", "tip")
-TIP_SITES = (
-    "attachment_site",
-    "tip",
-    "tcp",
-    "ee",
-    "ee_site",
-    "end_effector",
-    "eef",
-    "grip_site",
-    "pinch",
-)  # usual names
+# Usual names of the site at the tip.
+TIP_SITES = ("attachment_site", "tip", "tcp", "ee", "ee_site", "end_effector", "eef", "grip_site", "pinch")
 BEGINNING = 65536  # characters at the beginning of a file among which the top element is sought
 
 

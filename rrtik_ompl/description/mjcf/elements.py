@@ -195,9 +195,8 @@ def _shape(kind: str, geom: Element, length: float | None, where: str) -> Shape:
     # With `fromto`, the length replaces one number of the size; a box then has the same width along both other axes.
     count = _COUNTS[kind] - (length is not None) - (length is not None and kind == "box")
     written = (geom.get("size") or "").split()
-    size = numbers(
-        Element("geom", {"size": " ".join(written[:count])}), "size", count, None, where
-    )  # Further numbers are ignored.
+    # Further numbers are ignored.
+    size = numbers(Element("geom", {"size": " ".join(written[:count])}), "size", count, None, where)
 
     if kind == "sphere":
         return Sphere(size[0])

@@ -66,9 +66,8 @@ def load_cloud(
 
     if radius is None and suffix == ".bt":
         radius = factor * 0.5 * np.sqrt(3.0) * octree_resolution(data, str(path))
-        radius += float(np.finfo(np.float32).eps) * float(
-            np.abs(points).max(initial=0.0)
-        )  # for the rounding of points, which are stored in float32
+        # Points are stored in float32, so their rounding is added.
+        radius += float(np.finfo(np.float32).eps) * float(np.abs(points).max(initial=0.0))
     elif radius is None:
         radius = RADIUS
 

@@ -429,7 +429,7 @@ def _carrying_parents(robot: Robot, bodies: Iterable[Body]) -> dict[int, int]:
 
 
 def _adjacent(first: int, second: int, parents: Mapping[int, int]) -> bool:
-    """Whether one of two joints is the parent of the other."""
+    """Check whether one of two joints is the parent of the other; ``parents`` has the parent of each."""
     return bool(parents[first] == second or parents[second] == first)
 
 

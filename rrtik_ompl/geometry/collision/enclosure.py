@@ -78,9 +78,8 @@ def _cut_small(triangles: NDArray[np.float64]) -> list[NDArray[np.float64]]:
         small_triangles.append(triangles[~is_large])
         triangles = triangles[is_large]
 
-        edges = np.linalg.norm(
-            np.roll(triangles, -1, axis=1) - triangles, axis=2
-        )  # lengths, from each corner to the next
+        # Lengths of the edges, from each corner to the next.
+        edges = np.linalg.norm(np.roll(triangles, -1, axis=1) - triangles, axis=2)
         longest_edge = edges.argmax(axis=1)
         rows = np.arange(len(triangles))
         a, b, c = (triangles[rows, (longest_edge + k) % 3] for k in range(3))

@@ -22,10 +22,8 @@ Found = TypeVar("Found")
 # Two placed geometries: the first geometry, its coal.Transform3s, the second geometry, its coal.Transform3s.
 Ends: TypeAlias = tuple[Any, Any, Any, Any]
 
-# contains the mesh, so no collision with the mesh is missed. Volumes are compared first, as that is quick.
 # A mesh counts as convex, and is replaced by its convex hull, if no triangle lies deeper below the hull than this [m].
 # The hull contains the mesh, so no collision is missed. Volumes are compared first, as that is quick.
-# contains the mesh, so no collision with the mesh is missed. Volumes are compared first, as that is quick.
 DEEPEST_DENT = 1e-6
 CONVEX_VOLUME_RATIO = 0.999
 COMPARED_AT_ONCE = 20_000  # pairs of a triangle and a face of the hull that are compared in one step

@@ -49,8 +49,8 @@ SMALLEST = 1e-12  # [m] A mesh of smaller extent counts as a point.
 ROD_PROTRUSION = 0.06  # usual protrusion of the balls of a capsule, as a share of its radius
 INNER_CENTRES = 300  # points inside from which inner balls start
 FEWEST_INSIDE = 200  # lattice points inside a solid that are asked for
-INNER_SAMPLES = 400  # points of the surface
-CLIMBS = 4  # steps of the centre of an inner ball away from the surface
+INNER_SAMPLES = 400  # points of the surface by which inner balls are chosen
+CLIMBS = 4  # steps by which the centre of an inner ball is moved away from the surface
 
 
 def outer_cover(geometry: coal.CollisionGeometry, *, protrusion: float | None = None) -> Matrix:

@@ -234,7 +234,7 @@ class Pace:
 
         for number, change in enumerate(self._changes):
             if change.moment >= target_time:
-                break  # it has not begun then
+                break  # The change begins after that time.
             moment = float(change.moment)
             if moment > time:
                 place += pace_now * (moment - time)
