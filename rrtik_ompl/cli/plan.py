@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from rrtik_ompl.model.path import JointPath
     from rrtik_ompl.world.problem import Problem
 
-RULES = ("joint_costs", "frozen_joints", "last_joints", "smallest_move")  # of single-joint moves, see MoveRules
+RULES = ("joint_costs", "frozen_joints", "last_joints", "smallest_move")  # options of single-joint moves, see MoveRules
 SHORTEN: tuple[CommandShortening, ...] = get_args(CommandShortening)
 PROOF_MODES: tuple[ProofMode, ...] = get_args(ProofMode)
 

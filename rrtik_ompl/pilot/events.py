@@ -261,8 +261,8 @@ class Answer:
     """A line for the pilot.
 
     Attributes:
-        level: Of the line.
-        text: The line.
+        level: Level of the line.
+        text: Text of the line.
 
     Example:
         >>> refused("no object is chosen; choose one that is in view").level.value

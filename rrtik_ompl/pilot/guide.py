@@ -65,7 +65,7 @@ def proposed(means: Means, state: State, route: Route, aimed: SeenObject | None 
     """Return the state in which a route that begins at the present configuration is proposed.
 
     Args:
-        means: Of the session.
+        means: What the session works with.
         state: Present state.
         route: The route.
         aimed: The object that the route leads to. The route is withdrawn when this object has moved; None for no

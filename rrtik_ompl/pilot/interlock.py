@@ -26,8 +26,8 @@ CHOOSING = "choosing"
 PROPOSED = "proposed"
 FOLLOWING = "following"
 MODES: Final = (MANOEUVRE, CHOOSING, PROPOSED, FOLLOWING)
-STALE_SECONDS = 0.5  # a picture older than that does not show the present
-UNSEEN_SECONDS = 2.0  # what has been out of view for longer is no basis of a route, where the vehicle moves
+STALE_SECONDS = 0.5  # an older picture does not show the present
+UNSEEN_SECONDS = 2.0  # if the vehicle moves, routes must not depend on objects out of view for longer
 LATE_SECONDS = 0.3  # a pilot who sees the motion of the arm with a larger delay must not drive it
 
 ACKNOWLEDGE: Final = "STOP acknowledges that"
@@ -171,7 +171,7 @@ def fitting(act: Callable[..., object], name: str, arguments: Mapping[str, objec
         act: The function. Its first two parameters are not arguments of the command; the others are annotated ``str``
             for words, and anything else for numbers.
         name: Name of the command, for messages.
-        arguments: By their names.
+        arguments: Values by name of the argument.
 
     Raises:
         InputError: If an argument is missing, unknown, or of another kind.

@@ -109,7 +109,7 @@ class RecordedPerception:
             self._arm.q = self._arm.robot.configuration(entry["q"], "q")
             session.tick(time)
         elif entry["kind"] == "command":
-            session.tick(time)  # as before every command that was given
+            session.tick(time)  # the live session also ticked before every command
             session.command(entry["name"], time, **entry["arguments"])
         elif entry["kind"] == "seen":
             seen = [_seen(self._world.marker_map, each) for each in entry["objects"]]

@@ -99,7 +99,7 @@ class OutsideView:
         reach = float(np.linalg.norm(session.robot.fk(session.q).translation))
         self.centre: Vector = np.array([0.6 * reach, 0.0, 0.0])
         self.distance, self.azimuth, self.elevation = 1.9 * max(reach, 0.3), *np.radians(PRESETS["corner"])
-        self.share: float | None = None  # of the route that is played, None to show the arm as it is
+        self.share: float | None = None  # share of the route in a preview; None shows the arm as it is
 
     def turn(self, right: float, up: float) -> None:
         """Turn the view by two angles [rad]."""
@@ -149,7 +149,7 @@ def ghosts(session: Session) -> list[Ghost]:
     if lamp is None:
         return []
 
-    if np.isnan(lamp.q[1]).any():  # no configuration holds the object: the gripper alone at the grasp
+    if np.isnan(lamp.q[1]).any():  # no configuration reaches the grasp: show only the gripper there
         return [Ghost(None, LAMP_COLORS[lamp.color], 0.55, at, OUTLINE) for at in _chosen(session)]
     return [Ghost(lamp.q[1], LAMP_COLORS[lamp.color], 0.45, outline=OUTLINE)]
 

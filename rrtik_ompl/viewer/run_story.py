@@ -54,7 +54,8 @@ def _groups(ticks: Iterable[Tick]) -> list[dict[str, Any]]:
     for (event, reason), members in groupby(ticks, lambda tick: (tick.event, tick.reason)):
         rows = list(members)
         first = found[-1]["first"] + found[-1]["count"] if found else 0
-        spent = [1e3 * tick.seconds[event] for tick in rows if event in tick.seconds]  # of a plan or a repair
+        # Only plans and repairs have times.
+        spent = [1e3 * tick.seconds[event] for tick in rows if event in tick.seconds]
         text = event + (f" ({reason})" if reason else "")
         text += f", {max(spent):.1f} ms" if spent else ""
         found.append({"first": first, "count": len(rows), "event": event, "reason": reason, "text": text})

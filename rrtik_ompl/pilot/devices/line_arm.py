@@ -51,7 +51,7 @@ RENEW_SECONDS = 0.1
 # Longest motion between the last reading that was judged and the end of the validity of a set point.
 UNSEEN_SECONDS = 0.09
 SHORTEST_SECONDS = 0.005  # least validity of a set point
-TIMEOUT_SECONDS = 0.5  # for a complete answer
+TIMEOUT_SECONDS = 0.5  # time limit for a complete answer
 LIMIT_SLACK = 0.2  # [rad or m]; by how much a reading may exceed the limits
 RETRY_SECONDS = 1.0
 MAX_LINE_BYTES = 64 * 1024

@@ -27,7 +27,7 @@ from rrtik_ompl.sensing.cameras.pictures import Picture
 from rrtik_ompl.sensing.markers.detection import marker_cells
 from rrtik_ompl.sensing.markers.marker_map import MarkedObject, MarkerMap
 
-PIXELS_PER_CELL = 24  # of a marker's image
+PIXELS_PER_CELL = 24  # resolution of a marker's image
 WATER = ((96, 84, 60), (60, 52, 40))  # blue, green, red above and below
 NOISE = 2.0  # grey levels
 NOISE_PICTURES = 4  # number of noise pictures, which are used in turn

@@ -69,6 +69,6 @@ class Watchdog:
             message = f"{', '.join(sorted(silent))}: no report for {self._patience:g} s; the arm was stopped"
             self.fault = message if silent else ""  # one assignment, because another thread reads it
             if self._tell is not None and silent - reported_silent:
-                with suppress(Exception):  # a terminal that has gone must not end the watch
+                with suppress(Exception):  # a closed terminal must not end the watch
                     self._tell(self.fault)
             reported_silent = silent

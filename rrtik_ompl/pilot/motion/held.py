@@ -57,7 +57,7 @@ def jog(means: Means, state: State, direction: float, press: float) -> State:
     free.
 
     Args:
-        means: Of the session.
+        means: What the session works with.
         state: Present state.
         direction: Share of the speed from -1 to 1; 0 ends the drive.
         press: Number of the press that this command belongs to.
@@ -206,7 +206,7 @@ def watch(means: Means, state: State, standing: tuple[int, float, float] | None)
     """End a press whose joint does not move.
 
     Args:
-        means: Of the session.
+        means: What the session works with.
         state: Present state.
         standing: The joint that does not move; see `Judged`.
     """
@@ -270,7 +270,7 @@ def lead_to(means: Means, state: State, point: Vector, share: float) -> State:
     """Send all joints towards a set point, which may be at most `LEASH_SECONDS` of motion ahead of the arm.
 
     Args:
-        means: Of the session.
+        means: What the session works with.
         state: Present state.
         point: Set point, shape (dof,) [rad or m].
         share: Share of the joints' rates, above 0 and up to 1.
@@ -284,7 +284,7 @@ def _drive(means: Means, state: State, joint: int, goal: float, share: float, at
     """Move one joint a step towards a goal; at the goal, stop it and give the answer ``at_goal``.
 
     Args:
-        means: Of the session.
+        means: What the session works with.
         state: Present state.
         joint: Number of the joint.
         goal: Value at which the drive ends [rad or m].

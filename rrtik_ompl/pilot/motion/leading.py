@@ -30,7 +30,7 @@ TURNED = np.deg2rad(30.0)  # largest angle between the tool and the grasp, for t
 ALIGNED = np.deg2rad(5.0)
 ALIGNED_SLIDING = 0.01  # [m]; the same for a sliding joint
 MAX_STEP_SECONDS = 0.2  # longest time step between two renewals
-WHY_NOT = {  # by the state of a `ServoStep`
+WHY_NOT = {  # reasons by the state of a `ServoStep`
     "lost": "{} is not in view",
     "jumped": "{} has jumped",
     "blocked": "a limit or an obstacle is in the way; back off, or plan a route",

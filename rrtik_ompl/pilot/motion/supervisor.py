@@ -84,13 +84,13 @@ class Supervisor:
         self._rates = rates
         self._slack = slack_of(robot)
         self._q: Vector | None = None
-        self._time = -np.inf  # of the last reading
-        self._last_change_time = -np.inf  # of the last reading that differed from the one before it
+        self._time = -np.inf  # time of the last reading
+        self._last_change_time = -np.inf  # time of the last reading that differed from its predecessor
         self._watch_until = -np.inf  # end of the watch after a stop
         self._active = False  # whether it is driven
 
         zeros = np.zeros(robot.dof)
-        self._direction = zeros.copy()  # of each driven joint: 1 up, -1 down; 0 if it must stand still
+        self._direction = zeros.copy()  # direction of each driven joint: 1 up, -1 down; 0 if it must stand still
         self._set_point = zeros.copy()  # where each joint shall be
         self._max_lead = zeros.copy()  # largest lead of the set point over the arm
         self._wrong_way_travel = zeros.copy()  # how far each joint has moved against its direction

@@ -139,7 +139,7 @@ def _link_surface(body: object, limit: int) -> Surface | None:
 
     try:
         shape = shape_of(geometry)
-    except InputError:  # a mesh without area: nothing to see
+    except InputError:  # the mesh has no area: nothing to draw
         return None
     if shape is None or not shape.bounded:
         return None

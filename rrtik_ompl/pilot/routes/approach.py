@@ -22,7 +22,7 @@ MAX_JOINTS = 3  # largest number of joints that move between such a configuratio
 MAX_OFFSET = 0.02  # [m] from the pose before the object
 MAX_TILT = np.deg2rad(20.0)  # largest angle from the orientation of that pose
 STANDOFF_FACTORS = (1.0, 1.5, 2.0)  # distances from the grasp that are tried, as multiples of that of the approach pose
-ITERATIONS = 8  # of the inverse kinematics for such configurations
+ITERATIONS = 8  # steps of inverse kinematics for such configurations
 DAMPING = 1e-4  # damping of its least-squares steps [m^2]
 ERROR_SAMPLES = 40  # random errors by which the robustness of such a configuration is measured
 

@@ -238,7 +238,7 @@ def all_at_once(route: Route, world: World, rates: Vector, seed: int) -> Route |
     """Replan a route with all joints at once; its last moves to the object stay moves of single joints.
 
     Args:
-        route: Of single-joint moves.
+        route: A route of single-joint moves.
         world: World in which nothing may be touched.
         rates: Rates of the joints, shape (dof,) [rad/s or m/s].
         seed: Seed of the random numbers.

@@ -43,16 +43,17 @@ from rrtik_ompl.files.messages import message_in
 from rrtik_ompl.pilot.web.clients import Client, Clients, Message
 
 LOOPBACK = "127.0.0.1"
-MAX_MESSAGE_BYTES = 16 * 1024  # from a page
+MAX_MESSAGE_BYTES = 16 * 1024  # largest message of a page
 MAX_QUEUED_COMMANDS = 200
 MAX_STAMP = 1e12  # [s]
 MIN_TOKEN_LENGTH = 16
 GOING_AWAY = 1001  # code of a WebSocket that is closed
 FAREWELL_SECONDS = 0.1  # time for this message to arrive
-PING_SECONDS = 10.0  # so that a page over a line of some seconds sees, although it drives nothing
+# Long enough that a page with a delay of several seconds can still watch, although it cannot drive.
+PING_SECONDS = 10.0
 PONG_SECONDS = 10.0
 REPORT_SECONDS = 0.25
-REQUEST_SECONDS = 20.0  # for a whole request, and between two on one connection
+REQUEST_SECONDS = 20.0  # time limit for a whole request, and between two requests on one connection
 
 PAGE = Path(__file__).parent / "page"
 MAX_NAME_LENGTH = 40
@@ -130,7 +131,7 @@ class PilotServer:
 
     @property
     def url(self) -> str:
-        """Where a browser finds the page; with the token, if there is one."""
+        """The address of the page for a browser, with the token if there is one."""
         return f"{self._scheme}://{self._name}:{self.port}/" + (f"?token={self.token}" if self.token else "")
 
     def __enter__(self) -> PilotServer:
@@ -281,7 +282,7 @@ class Guarded(tornado.web.RequestHandler):
     server: PilotServer
 
     def prepare(self) -> None:
-        """Refuse what comes under another name, or from another page."""
+        """Refuse requests under another host name, or from another page."""
         if not self.server.may(self.request):
             raise tornado.web.HTTPError(403, reason=WRONG_ORIGIN)
 
@@ -320,16 +321,16 @@ class PageHandler(Guarded):
 
 
 class SocketHandler(Guarded, tornado.websocket.WebSocketHandler):
-    """The line to a page."""
+    """The WebSocket of one page."""
 
     def initialize(self, server: PilotServer) -> None:
-        """As tornado calls it in place of a constructor."""
+        """Store the server; tornado calls this instead of a constructor."""
         self.server = server
         self._client: Client | None = None
         self._unsent = 0
 
     def prepare(self) -> None:
-        """Refuse who has no token, and who is too much."""
+        """Refuse a page without the token, or if too many pages are open."""
         super().prepare()
         if not self.server.knows_token(self.get_argument("token", "")):
             raise tornado.web.HTTPError(403, reason=NO_TOKEN)
@@ -338,7 +339,7 @@ class SocketHandler(Guarded, tornado.websocket.WebSocketHandler):
             raise tornado.web.HTTPError(503, reason=TOO_MANY)
 
     def check_origin(self, origin: str) -> bool:
-        """Whether the request comes from the page."""
+        """Check whether the request comes from the server's own page."""
         return self.server.may(self.request)
 
     def open(self, *_: str, **__: str) -> None:
@@ -356,7 +357,7 @@ class SocketHandler(Guarded, tornado.websocket.WebSocketHandler):
             self.server.receive(self._client, message)
 
     def on_close(self) -> None:
-        """Let the page go; if it was the pilot, the arm stops."""
+        """Remove the page; if it was the pilot, the arm stops."""
         self.server.open_sockets.discard(self)
         if self._client is not None:
             self.server.clients.leave(self._client)

@@ -319,9 +319,7 @@ def _covariance(
     residuals = (camera.project(in_camera_axes + pose.translation) - pixels).ravel()
 
     weighted = np.linalg.solve(of_pixels + of_points, np.c_[residuals, jacobian])
-    normal_rows = (
-        jacobian.T @ weighted
-    )  # of a pose near this one that explains the pixels best by what is known of them
+    normal_rows = jacobian.T @ weighted  # normal equations of the weighted least-squares pose near this one
     squares = float(
         residuals @ weighted[:, 0] - normal_rows[:, 0] @ np.linalg.solve(normal_rows[:, 1:], normal_rows[:, 0])
     )
@@ -345,9 +343,8 @@ def _strain(camera: Camera, points: Matrix, pixels: Matrix, pose: pin.SE3, covar
 
     weighted = np.linalg.solve(covariances[0] + covariances[1], np.c_[residuals, jacobian, lens_slopes])
     normal_rows = jacobian.T @ weighted
-    without_pose = weighted - weighted[:, 1:7] @ np.linalg.solve(
-        normal_rows[:, 1:7], normal_rows
-    )  # of what another pose explains
+    # Remove the part that a change of the pose would explain.
+    without_pose = weighted - weighted[:, 1:7] @ np.linalg.solve(normal_rows[:, 1:7], normal_rows)
 
     score = lens_slopes.T @ without_pose[:, 0]
     information = np.einsum("ij,ij->j", lens_slopes, without_pose[:, 7:])

@@ -62,12 +62,10 @@ def corner_spread(model: Pixels, seen: Pixels, square: Matrix, corners: Matrix) 
     variance = samples_per_pixel * float(residuals @ residuals) / max(len(values) - len(normal), 1)
 
     jackknife = _jackknife_covariance(shape, columns, residuals, normal)
-    bend_variance = (
-        float(solution[_BENDS] @ solution[_BENDS]) * _area(corners) / _area(square)
-    )  # by as much corners may lie off
-    cut_off_shift = CUT_SHIFT * float(
-        (values >= CUT_OFF).mean()
-    )  # blocks err alike there, which the jackknife does not see
+    # Bends may displace the corners by their own size.
+    bend_variance = float(solution[_BENDS] @ solution[_BENDS]) * _area(corners) / _area(square)
+    # Clipping shifts all blocks alike, which the jackknife cannot detect.
+    cut_off_shift = CUT_SHIFT * float((values >= CUT_OFF).mean())
     spread = jackknife + variance * inverse[:8, :8] + (bend_variance + FLOOR**2) * np.eye(8) + cut_off_shift**2 * _ALIKE
 
     return corners + solution[:8].reshape(4, 2), frozen(spread)

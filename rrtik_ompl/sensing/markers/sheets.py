@@ -71,7 +71,7 @@ def print_markers(
         raise InputError(f"side of a marker must be between 0.002 and 1 m, got {side:g}")
 
     cell = side / len(cells[0])
-    outer = side + 2.0 * cell  # with its white rim
+    outer = side + 2.0 * cell  # side with the white rim
     columns = int((width - 2 * EDGE + GAP) // (outer + GAP))
     rows = int((height - 2 * EDGE - 2 * CAPTION + GAP) // (outer + CAPTION + GAP))
     if columns < 1 or rows < 1:

@@ -19,7 +19,7 @@ SURROUNDINGS_RATIO = 3.0
 EMPTY_BOX = np.array([[-0.5] * 3, [0.5] * 3])  # [m]; shown if there is nothing else
 SURROUNDINGS_MARGIN = 0.5  # how far around the arm's box such an obstacle is shown, as a share of the box
 
-DEFAULT_AZIMUTH = np.deg2rad(-50.0)  # from in front of the arm (x), on its right
+DEFAULT_AZIMUTH = np.deg2rad(-50.0)  # the viewer stands in front of the arm (x), on its right
 ELEVATIONS = np.deg2rad([27.0, 42.0])
 TURNS = np.deg2rad([0, 30, -30, 60, -60, 90, -90, 120, -120, 150, -150, 180])  # tried in this order
 # A turn by 90 degrees from the default azimuth must reduce the share of hidden points by this much.

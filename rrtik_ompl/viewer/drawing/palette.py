@@ -20,7 +20,7 @@ AXES = ("#d55e00", "#009e73", "#0072b2")  # x, y, z
 BACKGROUND_TOP = "#fbfcfd"
 BACKGROUND_BOTTOM = "#e3e9ef"
 GRID_MIDDLE, GRID = "#bcc6d0", "#d2d9e0"
-BACKGROUND_TOP_DARK, BACKGROUND_BOTTOM_DARK = "#2b3541", "#171d24"  # where the system prefers dark pages
+BACKGROUND_TOP_DARK, BACKGROUND_BOTTOM_DARK = "#2b3541", "#171d24"  # used if the system prefers dark pages
 GRID_MIDDLE_DARK, GRID_DARK = "#4d5965", "#38434f"
 
 
