@@ -272,6 +272,7 @@ def _pairs(robot: Element, tag: str) -> frozenset[frozenset[str]]:
     return frozenset(pair for pair in pairs if len(pair) == 2)
 
 
+# Read a planning group; every part of it must have a name.
 def _group(element: Element, where: str) -> Group:
     name = attribute(element, "group", "name", where)
     place = f"{where}: group '{name}'"

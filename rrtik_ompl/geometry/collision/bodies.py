@@ -484,10 +484,8 @@ def far_apart(first: Body, second: Body, distance: float) -> bool:
     """Check whether the bounding balls of two bodies that stand still are farther apart than a distance [m]."""
     first_centre, second_centre = (body.placement.act(body.geometry.aabb_center).tolist() for body in (first, second))
     centre_distance_limit = first.geometry.aabb_radius + second.geometry.aabb_radius + distance
-    return bool(
-        math.dist(first_centre, second_centre) > centre_distance_limit
-        # An unbounded body gives NaN or infinity here, and then the answer is False.
-    )
+    # An unbounded body makes these NaN or infinite, and then the answer is False.
+    return bool(math.dist(first_centre, second_centre) > centre_distance_limit)
 
 
 def kept_apart(first: Body, second: Body) -> float:

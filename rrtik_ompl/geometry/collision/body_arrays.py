@@ -93,6 +93,7 @@ def body_arrays(bodies: Sequence[Body]) -> BodyArrays:
     return arrays
 
 
+# Collect the data of bodies; a half-space gets a box that is practically endless.
 def _body_arrays(bodies: tuple[Body, ...]) -> BodyArrays:
     boxes = [body.geometry.aabb_local for body in bodies]
     half_spaces = np.array([isinstance(body.geometry, coal.Halfspace) for body in bodies], dtype=bool)

@@ -315,7 +315,7 @@ def measured(geometry: coal.CollisionGeometry) -> coal.CollisionGeometry:
 
 
 def inside_mesh(vertices: Matrix, triangles: NDArray[np.int64], point: Vector) -> bool:
-    """Check whether a point is inside a mesh: whether its generalised winding number is beyond one half in size.
+    """Check whether a point is inside a mesh: whether its generalised winding number exceeds one half in size.
 
     This works for slightly open meshes too. The solid angle of each triangle is van Oosterom and Strackee's formula
     [37]; their sum over 4 pi is the winding number [38].

@@ -200,10 +200,8 @@ class VisualServo:
             interaction_matrix(corners[:, :2] / corners[:, 2:], corners[:, 2])
             for corners in (tip_corners, goal_corners)
         )
-        camera_twist = (
-            self._gain * np.linalg.lstsq(0.5 * (matrix_at_tip + matrix_at_goal), error, rcond=None)[0]
-            # A twist of the gripper moves its points by -L, so the error is not negated.
-        )
+        # A twist of the gripper moves its points by -L, so the error is not negated.
+        camera_twist = self._gain * np.linalg.lstsq(0.5 * (matrix_at_tip + matrix_at_goal), error, rcond=None)[0]
 
         angular = camera_twist[3:]
         velocity = camera_twist[:3] + np.cross(angular, camera.actInv(tip).translation)
