@@ -17,11 +17,11 @@ from rrtik_planners.one_joint_planner import OneJointPlanner
 
 
 class BiCRDT(OneJointPlanner):
-    """One tree from the start and one from the goal, grown in turn; no step length, no bias, no goal tolerance.
+    """Grows one tree from the start and one from the goal in turn, without step length, goal bias or goal tolerance.
 
-    Axis moves end exactly on their target, so the trees meet exactly and every edge of the path moves one joint.
+    Moves of one axis end exactly on their target, so the trees meet exactly and every edge of the path moves one joint.
 
-    In a world with kernels the whole search runs there; it finds the same path as the search in Python.
+    In a world with kernels the whole search runs there and finds the same path as the search in Python.
     """
 
     ompl_name: ClassVar[str] = "BiCRDT"
@@ -52,11 +52,11 @@ class BiCRDT(OneJointPlanner):
 
 
 class TwoTreeSearch:
-    """The search in Python, for any checker, step by step as `rrtik_ompl.kernels.search.crdt.search.CrdtSearch`.
+    """The search in Python, for any checker; each step is that of `rrtik_ompl.kernels.search.crdt.search.CrdtSearch`.
 
     Attributes:
-        iterations: Samples drawn so far.
-        motions: Edges checked without the checker's knowledge: none.
+        iterations: Number of samples drawn so far.
+        motions: Number of edges that were checked but not counted by the checker: 0.
     """
 
     motions = 0
@@ -75,11 +75,11 @@ class TwoTreeSearch:
 
     @property
     def vertices(self) -> int:
-        """Vertices of both trees."""
+        """Number of vertices of both trees."""
         return sum(tree.size for tree in self._trees)
 
     def advance(self, stop: Stop) -> bool:
-        """Go on to the next solution; False if ``stop()`` or the limit of iterations came first."""
+        """Search for the next solution; return False if ``stop()`` or the limit of iterations came first."""
         while self.iterations != self._limit and not stop():
             self.iterations += 1
             if self._step():
@@ -87,15 +87,18 @@ class TwoTreeSearch:
         return False
 
     def meeting(self) -> tuple[Matrix, Matrix]:
-        """From the root of each tree the branch to the vertex at which they met, shapes (k, n)."""
+        """Return the branch of each tree from its root to the vertex at which the trees met, shapes (k, n)."""
         return self._trees[0].branch(self._met[0]), self._trees[1].branch(self._met[1])
 
     def grown(self, number: int) -> tuple[Matrix, NDArray[np.int64]]:
-        """The vertices of a tree, shape (size, n), and their parents, shape (size,)."""
+        """Return the vertices of a tree, shape (size, n), and their parents, shape (size,)."""
         return self._trees[number].grown()
 
     def _step(self) -> bool:
-        """One iteration; whether the trees have met."""
+        """Do one iteration and return whether the trees have met.
+
+        One tree is extended towards a sample, then the other one towards the new vertex; they swap roles each time.
+        """
         number = self._growing
         self._growing = 1 - self._growing
         growing = self._trees[number]
@@ -113,12 +116,12 @@ class TwoTreeSearch:
 
 
 def _join(one: Matrix, two: Matrix) -> Matrix:
-    """The branch ``one`` from its root to the meeting point, then ``two`` from there to its own root."""
+    """Join two branches, shapes (k, n), that end at the same point: the first one, then the second one reversed."""
     return np.vstack([one, two[-2::-1]]) if len(two) > 1 else one
 
 
 def _common_row(starts: Matrix, goals: Matrix) -> Matrix | None:
-    """The path of a single row if a start is itself a goal."""
+    """Return a path of a single row, shape (1, n), if a start is itself a goal; else None."""
     for start in starts:
         if (goals == start).all(axis=1).any():
             return np.array([start])

@@ -22,16 +22,17 @@ GOAL_TOLERANCE_SHARE = 0.2  # default goal tolerance as a share of the diagonal 
 
 
 class CRDT(OneJointPlanner):
-    """Single tree from the start; no step length, no goal bias.
+    """Grows a single tree from the start, without step length or goal bias.
 
     The basic algorithm ends when a vertex is close enough to the goal. Here every vertex that is close enough tries to
     reach the goal exactly, one axis at a time, so that an exact solution ends in the goal itself. If time runs out
     first, the path to the vertex nearest to a goal is reported as an approximate solution.
 
-    A small goal tolerance needs very many iterations for an arm of six joints, since nothing draws the tree towards the
-    goal; the default is meant to be met soon. The comparison with RRT in [1, ch. 6.3] used the step length of the RRT.
+    With a small goal tolerance an arm of six joints needs very many iterations, since nothing draws the tree towards
+    the goal; the default is so large that it is met soon. The comparison with RRT in [1, ch. 6.3] used the step length
+    of the RRT as tolerance.
 
-    In a world with kernels the whole search runs there; it finds the same path as the search in Python.
+    In a world with kernels the whole search runs there and finds the same path as the search in Python.
     """
 
     ompl_name: ClassVar[str] = "CRDT"
@@ -50,10 +51,10 @@ class CRDT(OneJointPlanner):
         frozen_joints: Joints = (),
         smallest_move: PerJoint = 0.0,
     ) -> None:
-        """Make a planner with an option beside those of :class:`~rrtik_planners.one_joint_planner.OneJointPlanner`.
+        """Make a planner with an additional option to :class:`~rrtik_planners.one_joint_planner.OneJointPlanner`.
 
         Args:
-            goal_tolerance: Euclidean distance to a goal below which a vertex tries to reach it [unit of the space];
+            goal_tolerance: Euclidean distance to a goal up to which a vertex tries to reach it [unit of the space];
                 a fifth of the diagonal of the space if None.
 
         Raises:
@@ -101,11 +102,11 @@ class CRDT(OneJointPlanner):
 
 
 class OneTreeSearch:
-    """The search in Python, for any checker, step by step as `rrtik_ompl.kernels.search.crdt.search.CrdtSearch`.
+    """The search in Python, for any checker; each step is that of `rrtik_ompl.kernels.search.crdt.search.CrdtSearch`.
 
     Attributes:
-        iterations: Samples drawn so far.
-        motions: Edges checked without the checker's knowledge: none.
+        iterations: Number of samples drawn so far.
+        motions: Number of edges that were checked but not counted by the checker: 0.
     """
 
     motions = 0
@@ -133,11 +134,11 @@ class OneTreeSearch:
 
     @property
     def vertices(self) -> int:
-        """Vertices of the tree."""
+        """Number of vertices of the tree."""
         return self._tree.size
 
     def advance(self, stop: Stop) -> bool:
-        """Go on to the next solution; False if ``stop()`` or the limit of iterations came first."""
+        """Search for the next solution; return False if ``stop()`` or the limit of iterations came first."""
         while not stop():
             while self._waiting:
                 vertex, goal = self._waiting.pop(0)
@@ -156,23 +157,23 @@ class OneTreeSearch:
         return False
 
     def ending(self) -> Matrix:
-        """The path from the root to the goal that was reached, shape (k, n)."""
+        """Return the path from the root to the goal that was reached, shape (k, n)."""
         return self._tree.branch(self._ending)
 
     def branch(self, number: int, vertex: int) -> Matrix:
-        """The path from the root to a vertex, shape (k, n); there is only one tree, number 0."""
+        """Return the path from the root to a vertex, shape (k, n); ``number`` is that of the only tree, 0."""
         return self._tree.branch(vertex)
 
     def tree(self, number: int) -> Matrix:
-        """The vertices of the only tree, shape (size, n)."""
+        """Return the vertices of the only tree, shape (size, n)."""
         return np.array([self._tree.vertex(i) for i in range(self._tree.size)])
 
     def grown(self, number: int) -> tuple[Matrix, NDArray[np.int64]]:
-        """The vertices of the only tree, shape (size, n), and their parents, shape (size,)."""
+        """Return the vertices of the only tree, shape (size, n), and their parents, shape (size,)."""
         return self._tree.grown()
 
     def _near_goals(self, known: int) -> list[tuple[int, int]]:
-        """Vertices added since there were ``known`` and goals within the tolerance around them."""
+        """Return pairs of a vertex, from number ``known`` on, and a goal within the tolerance around it."""
         found = []
         for vertex in range(known, self._tree.size):
             distances = np.linalg.norm(self._goals - self._tree.vertex(vertex), axis=1)
@@ -181,7 +182,7 @@ class OneTreeSearch:
 
 
 def _nearest_to_goal(vertices: Matrix, goals: Matrix) -> tuple[int, float]:
-    """The vertex nearest to any of the goals and its distance."""
+    """Return the vertex nearest to any of the goals, and its distance from that goal."""
     distances = np.array([np.linalg.norm(vertices - goal, axis=1) for goal in goals])
     best = int(distances.min(axis=0).argmin())
     return best, float(distances[:, best].min())

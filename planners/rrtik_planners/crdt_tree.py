@@ -1,4 +1,4 @@
-"""The tree of C-RDT in Python, every edge of which moves one coordinate, and its random numbers.
+"""The tree of C-RDT in Python, whose edges move one coordinate each, and its random numbers.
 
 Source: [1, ch. 6.3, EXTEND and REWRITE].
 """
@@ -20,7 +20,8 @@ from rrtik_ompl.ompl_bridge import MotionChecker
 ROOT = -1
 FIRST_CAPACITY = 256
 WORD = 2**64 - 1
-GOLDEN, FIRST_FACTOR, SECOND_FACTOR = 0x9E3779B97F4A7C15, 0xBF58476D1CE4E5B9, 0x94D049BB133111EB  # of splitmix64 [46]
+# The constants of splitmix64 [46].
+GOLDEN, FIRST_FACTOR, SECOND_FACTOR = 0x9E3779B97F4A7C15, 0xBF58476D1CE4E5B9, 0x94D049BB133111EB
 
 
 class Outcome(Enum):
@@ -32,12 +33,15 @@ class Outcome(Enum):
 
 
 class Turn(Enum):
-    """How the first leg of an extension goes on after the edge that led to its vertex."""
+    """How the first leg of an extension continues the edge that led to its vertex.
 
-    ONWARD = auto()
-    BETWEEN = auto()  # back into that edge
-    BEYOND = auto()  # back beyond its beginning
-    BACK = auto()  # exactly to its beginning
+    Any turn other than ONWARD goes back along the edge's axis, so that parents are rewritten.
+    """
+
+    ONWARD = auto()  # onward along the axis, or along another one
+    BETWEEN = auto()  # back to a point inside the edge
+    BEYOND = auto()  # back to a point beyond the beginning of the edge
+    BACK = auto()  # back exactly to the beginning of the edge
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +55,7 @@ class Extension:
 class CrdtTree:
     """A growing tree (or forest, if there are several roots) in preallocated arrays.
 
-    Every edge has itself been found free, those that come from rewriting parents included.
+    Every edge has been checked as a whole, and so have those that come from rewriting parents.
 
     Attributes:
         size: Number of vertices.
@@ -61,8 +65,8 @@ class CrdtTree:
         """Plant a tree.
 
         Args:
-            roots: Shape (r, n).
-            rules: How it grows.
+            roots: Configurations of the roots, shape (r, n).
+            rules: How the tree grows.
         """
         capacity = max(FIRST_CAPACITY, len(roots))
         self._coordinates = np.empty((roots.shape[1], capacity))
@@ -73,27 +77,36 @@ class CrdtTree:
         self.size = len(roots)
 
     def vertex(self, i: int) -> Vector:
-        """Coordinates of vertex i, shape (n,)."""
+        """Return the coordinates of vertex i, shape (n,)."""
         return self._coordinates[:, i].copy()
 
     def grown(self) -> tuple[Matrix, NDArray[np.int64]]:
-        """The vertices, shape (size, n), and their parents, shape (size,), below 0 for a root."""
+        """Return copies of the vertices, shape (size, n), and their parents, shape (size,), below 0 for a root."""
         return self._coordinates[:, : self.size].T.copy(), self._parents[: self.size].copy()
 
     def nearest(self, q: Vector) -> int:
-        """The vertex nearest to q, shape (n,), in the scaled Euclidean metric; among equals the oldest."""
+        """Return the vertex nearest to q, shape (n,), in the scaled Euclidean metric; among equals the oldest."""
         difference = (self._coordinates[:, : self.size] - q[:, None]) * self._rules.scale[:, None]
-        return int(np.add.reduce(difference * difference, axis=0).argmin())  # adds up in the order of the kernels
+        # This reduction adds in the same order as the kernels, so that both choose the same vertex.
+        return int(np.add.reduce(difference * difference, axis=0).argmin())
 
     def branch(self, i: int) -> Matrix:
-        """The path from the root to vertex i, shape (k, n)."""
+        """Return the path from the root to vertex i, shape (k, n)."""
         vertices = [i]
         while self._parents[vertices[-1]] != ROOT:
             vertices.append(int(self._parents[vertices[-1]]))
         return np.ascontiguousarray(self._coordinates[:, vertices[::-1]].T)
 
     def extend(self, target: Vector, checker: MotionChecker, rng: Random, *, exactly: bool = True) -> Extension:
-        """Grow from the vertex nearest to ``target`` towards it, one axis after the other (algorithm 10)."""
+        """Grow from the vertex nearest to ``target`` towards it, one axis after the other (algorithm 10).
+
+        Args:
+            target: Configuration to go to, shape (n,).
+            checker: Checks motions.
+            rng: Gives the order of the axes, and the axes that take part if ``exactly`` is False.
+            exactly: Whether the target itself has to be reached, see :meth:`extend_from`; if not, costly joints take
+                part only by chance.
+        """
         near = self.nearest(target)
         target = target if exactly else self._held(near, target, rng)
         return self.extend_from(near, target, checker, rng, exactly=exactly)
@@ -103,16 +116,16 @@ class CrdtTree:
     ) -> Extension:
         """Grow from vertex ``near`` towards ``target``, shape (n,).
 
-        The axis that led to ``near`` goes first, which lengthens straight runs and so saves transitions; the others
-        follow in random order. The leading part that is free is kept.
+        The axis that led to ``near`` goes first, which lengthens straight runs and so saves moves; the others follow in
+        random order. The legs before the first blocked one are kept.
 
         Args:
             near: Number of a vertex.
-            target: Where to go.
+            target: Configuration to go to, shape (n,).
             checker: Checks motions.
             rng: Gives the order of the axes.
-            exactly: Whether a leg shorter than the smallest move ends the extension, for the target would be missed;
-                otherwise it is left out.
+            exactly: What happens at a leg that is shorter than the smallest move: if True the extension ends, since the
+                target would be missed; if False the leg is left out.
         """
         current = near
         known = self.size
@@ -120,7 +133,8 @@ class CrdtTree:
             here = self.vertex(current)
             start = float(here[axis])
             end = float(target[axis])
-            came_from = self._came_from(near, axis) if current == near else start  # only the first leg can turn back
+            # Only the first leg can turn back along the edge that led to the vertex.
+            came_from = self._came_from(near, axis) if current == near else start
             turn = _turn(came_from, start, end)
             if start == end:
                 continue
@@ -136,7 +150,7 @@ class CrdtTree:
         return Extension(Outcome.REACHED, current)
 
     def _held(self, near: int, target: Vector, rng: Random) -> Vector:
-        """The target, but as at a vertex in the coordinates that do not take part this time."""
+        """Return the target with the coordinates of costly joints, by chance, replaced by those of a vertex."""
         chance = self._rules.chance
         stays = np.array([c < 1.0 and rng.random() >= c for c in chance.tolist()])
         held: Vector = np.where(stays, self._coordinates[:, near], target)
@@ -145,19 +159,25 @@ class CrdtTree:
     def _axis_order(self, near: int, rng: Random) -> list[int]:
         order = [int(axis) for axis in rng.permutation(self._axes)]
         parent = self._parents[near]
-        if parent != ROOT:  # a root has no direction to remember
+        if parent != ROOT:  # No edge leads to a root.
             memory = int((self._coordinates[:, near] != self._coordinates[:, parent]).argmax())
             order.remove(memory)
             order.insert(0, memory)
         return order
 
     def _came_from(self, vertex: int, axis: int) -> float:
-        """Where the edge to a vertex began, along an axis; the vertex itself if it is a root."""
+        """Return the coordinate, along an axis, at which the edge to a vertex begins; for a root its own coordinate."""
         parent = int(self._parents[vertex])
         return float(self._coordinates[axis, vertex if parent == ROOT else parent])
 
     def _attach(self, step: Vector, turn: Turn, current: int) -> int:
-        """Add the end of a leg; where it turns back along the edge to its vertex, rewrite parents."""
+        """Add the end of a leg and return its vertex; if the leg turns back along an edge, rewrite parents.
+
+        Args:
+            step: Configuration at the end of the leg, shape (n,).
+            turn: How the leg continues the edge to ``current``.
+            current: Vertex where the leg begins.
+        """
         if turn is Turn.ONWARD:
             return self._add(step, current)
 
@@ -180,7 +200,7 @@ class CrdtTree:
 
 
 def _turn(came_from: float, start: float, end: float) -> Turn:
-    """How a leg goes on after a move that came from ``came_from``."""
+    """Return how a leg from ``start`` to ``end`` continues an edge from ``came_from`` to ``start`` on the same axis."""
     if start == came_from or (start - came_from) * (end - start) > 0.0:
         return Turn.ONWARD
     beyond = end - came_from
@@ -190,13 +210,21 @@ def _turn(came_from: float, start: float, end: float) -> Turn:
 
 
 def _shortest_piece(turn: Turn, came_from: float, start: float, end: float) -> float:
-    """Length of the shortest edge that a leg would leave in the tree."""
+    """Return the length of the shortest edge that a leg would leave in the tree."""
     length = abs(end - start)
     return min(length, abs(end - came_from)) if turn in (Turn.BETWEEN, Turn.BEYOND) else length
 
 
 def _free(turn: Turn, parent: Vector, here: Vector, step: Vector, checker: MotionChecker) -> bool:
-    """Whether the edges are free that a leg leaves in the tree."""
+    """Check whether the new edges that a leg leaves in the tree are free.
+
+    Args:
+        turn: How the leg continues the edge to its vertex.
+        parent: Configuration where that edge begins, shape (n,).
+        here: Configuration where the leg begins, shape (n,).
+        step: Configuration where the leg ends, shape (n,).
+        checker: Checks motions.
+    """
     onward = turn not in (Turn.ONWARD, Turn.BETWEEN) or checker.motion_valid(here, step)
     return onward and (turn not in (Turn.BETWEEN, Turn.BEYOND) or checker.motion_valid(parent, step))
 
@@ -208,7 +236,7 @@ def _moved(q: Vector, axis: int, value: float) -> Vector:
 
 
 class Random(Protocol):
-    """What a tree needs of a random generator; numpy's will do too."""
+    """The methods of a random generator that a tree needs; numpy's generator has them too."""
 
     def random(self) -> float:
         """A number from 0 to 1, less than 1."""
@@ -218,10 +246,10 @@ class Random(Protocol):
 
 
 class CrdtStream:
-    """Random configurations and orders of axes, number for number those of the kernels: both find the same path.
+    """A source of random numbers that gives the same numbers as the kernels, so that both find the same path.
 
     Args:
-        seed: 0 to 2^64 - 1.
+        seed: A whole number from 0 to 2^64 - 1.
     """
 
     def __init__(self, seed: int) -> None:
@@ -235,13 +263,13 @@ class CrdtStream:
         return ((z ^ (z >> 31)) >> 11) * 2.0**-53
 
     def uniform(self, lower: Vector, upper: Vector) -> Vector:
-        """A configuration between the bounds, shapes (n,)."""
+        """Return a random configuration between bounds, shapes (n,)."""
         shares = np.array([self.random() for _ in range(len(lower))])
         q: Vector = np.minimum(lower + shares * (upper - lower), upper)
         return q
 
     def permutation(self, axes: Sequence[int]) -> list[int]:
-        """The axes in random order (Fisher and Yates)."""
+        """Return the axes in random order (Fisher and Yates)."""
         order = [int(axis) for axis in axes]
         for k in range(len(order) - 1, 0, -1):
             other = int(self.random() * (k + 1))

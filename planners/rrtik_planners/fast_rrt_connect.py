@@ -1,4 +1,4 @@
-"""RRT-Connect at the speed of its collision checks: the whole search runs in a kernel where the world has kernels."""
+"""RRT-Connect whose whole search runs in a kernel where the world has kernels, so that checks take most of its time."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ from rrtik_ompl.world.motion_queries import KernelWorld, decider, has_kernels
 class FastRRTConnect(SafePlanner):
     """RRT-Connect with dynamic domain and balanced trees; the straight motion is tried first.
 
-    With a world that has kernels (``world.motions``) the search runs in them and a path comes back in microseconds.
-    Motions that they cannot decide are checked by the world once they are part of a path, and never in a
-    conservative world. With any other world, or none, a plain loop does the same on one motion at a time.
+    With a world that has kernels (``world.motions``) the search runs in them and takes microseconds. Motions that the
+    kernels cannot decide are checked by the world once they are part of a path; a conservative world counts them as
+    blocked. With any other world, or none, a plain loop in Python does the same, one motion at a time.
     """
 
     kernels: ClassVar[tuple[str, ...]] = (KERNELS,)
@@ -46,14 +46,15 @@ class FastRRTConnect(SafePlanner):
         max_iterations: int | None = None,
         bound: float | None = None,
     ) -> None:
-        """Make a planner with options beside those of :class:`~rrtik_ompl.ompl_bridge.SafePlanner`.
+        """Make a planner with options in addition to those of :class:`~rrtik_ompl.ompl_bridge.SafePlanner`.
 
         Args:
-            range: Length of a motion of the trees, at most [unit of the space]; what suits the bounds if None.
-            domain: Radius in which a vertex is extended once it was blocked [unit of the space]; as with ``range``.
-            max_iterations: Samples at most; without limit if None.
-            bound: Length that the path has to stay below, unless it is a straight motion [unit of the space]; then the
-                search is one of AORRTC [15]. For worlds with kernels; any length elsewhere, and if None.
+            range: Longest motion of the trees [unit of the space]; a length that suits the bounds if None.
+            domain: Radius within which a vertex is still extended after it was blocked [unit of the space]; a radius
+                that suits the bounds if None.
+            max_iterations: Largest number of samples; without limit if None.
+            bound: Length below which the path has to stay, unless it is a straight motion [unit of the space]; the
+                search is then that of AORRTC [15]. Only worlds with kernels heed it. No bound if None.
 
         Raises:
             InputError: If an option is out of range or the space is of another kind.
@@ -78,7 +79,16 @@ class FastRRTConnect(SafePlanner):
         bound: float | None = None,
         max_iterations: int | None = None,
     ) -> SearchResult:
-        """One search; see the options of the planner."""
+        """Run one search.
+
+        Args:
+            starts: Free start configurations, shape (s, n).
+            goals: Free goal configurations, shape (g, n).
+            checker: Checks motions and counts them.
+            ptc: Returns True when it is time to stop.
+            bound: See the options of the planner.
+            max_iterations: See the options of the planner.
+        """
         world = self._world
         if not has_kernels(world, KERNELS):
             rules = python_rules(self.bounds(), *self._lengths, max_iterations, turning=self.turning())
@@ -96,7 +106,7 @@ class FastRRTConnect(SafePlanner):
             )
             counts = kernels.statistics()
             graph = self.grown(lambda: sound_tree(kernels.trees[0]), lambda: sound_tree(kernels.trees[1]))
-        checker.checked_motions += int(counts["motions"] - counts["questions"])  # the questions it has counted
+        checker.checked_motions += int(counts["motions"] - counts["questions"])  # It has counted the questions itself.
         return SearchResult(path, {**counts, "edges": counts["vertices"] - len(starts) - len(goals)}, graph=graph)
 
     def solve_each(
@@ -112,7 +122,7 @@ class FastRRTConnect(SafePlanner):
             return [_result_of(found) for found in solve_each(kernels, ends, drawn, self.max_iterations)]
 
     def ends_free(self, rows: Matrix, checker: MotionChecker) -> Mask:
-        """See :meth:`rrtik_ompl.ompl_bridge.SafePlanner.ends_free`; the kernels know in a few microseconds."""
+        """Check starts or goals, see :meth:`rrtik_ompl.ompl_bridge.SafePlanner.ends_free`; first in a kernel."""
         if has_kernels(self._world, KERNELS):
             with self._kernels(self._world) as kernels:
                 proven = kernels.proven_free(rows)
@@ -126,20 +136,20 @@ class FastRRTConnect(SafePlanner):
         return self.range, self.domain
 
     def _kernels(self, world: KernelWorld) -> AbstractContextManager[ConnectSearch]:
-        """The search in kernels for a world and the bounds of this solve."""
+        """Return the search in kernels for a world and the bounds of this solve, which is kept for the next one."""
         lower, upper = self.bounds()
         key = (lower.tobytes(), upper.tobytes(), *self._lengths)
         return kept_search(world.motions, key, lambda: self._made(world, lower, upper))
 
     def _made(self, world: KernelWorld, lower: Vector, upper: Vector) -> ConnectSearch:
         range_, domain = connect_lengths(lower, upper, *self._lengths, turning=self.turning())
-        lower = np.maximum(lower, world.robot.lower)  # kernels know no place beyond the limits
+        lower = np.maximum(lower, world.robot.lower)  # Kernels prove nothing beyond the limits.
         upper = np.minimum(upper, world.robot.upper)
         return ConnectSearch(world.motions, lower, upper, range_=range_, domain=domain)
 
 
 def _result_of(found: Searched | None) -> SearchResult | None:
-    """One search of several, with the counts of a search of its own."""
+    """Return one search of several as a result, with the counts that a single search would have."""
     if found is None:
         return None
     names = ("iterations", "vertices", "motions", "questions", "rejected")
@@ -155,21 +165,30 @@ def python_rules(
     *,
     turning: Mask | None,
 ) -> ConnectRules:
-    """How the trees grow in Python; see `FastRRTConnect` and `connect_lengths` for the arguments."""
+    """Return the rules by which trees grow in Python; see `FastRRTConnect` and `connect_lengths` for the arguments."""
     lower, upper = bounds
     lengths = connect_lengths(lower, upper, range_, domain, turning=turning)
     return ConnectRules(lower, upper, *lengths, balanced=True, max_iterations=max_iterations)
 
 
 def sound_tree(tree: TreeTable) -> Tree:
-    """The vertices of a tree in kernels to which certain motions lead, and their parents."""
+    """Return the vertices of a tree in kernels that proven motions lead to, and their parents."""
     return without(*certain_tree(tree))
 
 
 def search_in_python(
     planner: SafePlanner, starts: Matrix, goals: Matrix, rules: ConnectRules, checker: MotionChecker, ptc: Stop
 ) -> SearchResult:
-    """The search of a planner without kernels, where every motion is decided at once."""
+    """Run RRT-Connect in Python for a planner without kernels, where every motion is decided when it is made.
+
+    Args:
+        planner: Gives the random numbers and takes the trees.
+        starts: Free start configurations, shape (s, n).
+        goals: Free goal configurations, shape (g, n).
+        rules: How the trees grow.
+        checker: Checks motions.
+        ptc: Returns True when it is time to stop.
+    """
     search = RrtConnect(starts, goals, rules, checker.motion_valid, planner.rng)
     path = straight_path(starts, goals, checker.motion_valid, ptc)
     path = search.run(ptc) if path is None else path

@@ -1,4 +1,4 @@
-"""FewestMoves: paths that move one joint at a time, as few times as possible, and how far from possible they are."""
+"""FewestMoves: paths of single-joint moves with as few moves as possible, and a lower bound on their number."""
 
 from __future__ import annotations
 
@@ -29,38 +29,47 @@ from rrtik_planners.bicrdt import BiCRDT
 from rrtik_planners.fast_rrt_connect import FastRRTConnect
 from rrtik_planners.one_joint_planner import OneJointPlanner
 
-SEARCHES = 5  # of BiCRDT, the best of which is improved
+SEARCHES = 5  # number of runs of BiCRDT, the best of which is improved
 MAX_IMPROVEMENT_ROUNDS = 10
-BRIEF_ITERATIONS = 1000  # of BiCRDT, before it is started anew
-SAMPLED_ITERATIONS = 20_000  # of RRT-Connect
-FEW_NODES = 256  # of a lattice, where each motion is checked by itself
+BRIEF_ITERATIONS = 1000  # iterations of one of these runs
+SAMPLED_ITERATIONS = 20_000  # iterations of RRT-Connect
+FEW_NODES = 256  # largest number of nodes of a lattice if there is no world, so that each motion is checked by itself
 
 
 class _Question(NamedTuple):
-    """Between which configurations to search, shapes (s, n) and (g, n), in which form of the world, until when."""
+    """The arguments of one search.
+
+    Attributes:
+        starts: Start configurations, shape (s, n).
+        goals: Goal configurations, shape (g, n).
+        checker: Checks motions, with the clearance of the level if there is one.
+        stop: Returns True when it is time to stop.
+        level: The clearance to keep; None for that of the world.
+        known: A route that keeps the level, shape (k, n), to start from instead of quick ones; or None.
+    """
 
     starts: Matrix
     goals: Matrix
     checker: MotionChecker
     stop: Stop
     level: Level | None = None
-    known: Matrix | None = None  # a route that keeps the level, to start from instead of quick ones
+    known: Matrix | None = None
 
     @property
     def ends(self) -> tuple[Matrix, Matrix, MotionChecker, Stop]:
-        """What a search is given."""
+        """The arguments of a planner's ``search``: starts, goals, checker and stop."""
         return self.starts, self.goals, self.checker, self.stop
 
 
 class FewestMoves(OneJointPlanner):
-    """Fewest moves first, least joint travel second; goes on until the bound is met, its rounds are over or time is up.
+    """Minimises the number of moves first and joint travel second.
 
-    It starts from the best of several quick runs of BiCRDT and looks for better routes on lattices of joint values.
-    Where BiCRDT hardly gets anywhere it starts from RRT-Connect's route, turned into single-joint moves.
-    ``statistics`` has the lower bound of the moves and the gap: how many moves more than that the path has. Where more
-    than 12 joints differ, the bound is their number.
+    The search starts from the best of several quick runs of BiCRDT and looks for better routes on lattices of joint
+    values. Where BiCRDT finds nothing, it starts from a path of RRT-Connect turned into single-joint moves. It ends
+    when the lower bound is met, its rounds are over or time is up. ``statistics`` has the lower bound of the number of
+    moves, and the gap, by which the path exceeds it. If more than 12 joints differ, the bound is their number.
 
-    It keeps a clearance from obstacles where that costs no move.
+    The path keeps a clearance from obstacles where that costs no move.
     """
 
     ompl_name: ClassVar[str] = "FewestMoves"
@@ -87,11 +96,12 @@ class FewestMoves(OneJointPlanner):
         """Make a planner with options beside those of :class:`~rrtik_planners.one_joint_planner.OneJointPlanner`.
 
         Args:
-            world: A ``rrtik_ompl.World`` also lets the bound be sharpened by proofs.
-            searches: Runs of BiCRDT at the beginning, at least 1.
-            rounds: Of improvement, at least 0, after the first. With time enough they alone decide what comes out.
-            last_joints: The bound counts their moves too.
-            clearance: Wanted from obstacles, on top of their margins [m]; None for a centimetre. Needs a
+            world: With a ``rrtik_ompl.World`` the bound can be raised by proofs.
+            searches: Number of runs of BiCRDT at the beginning, at least 1.
+            rounds: Number of rounds of improvement after the first, at least 0. If there is enough time, the result
+                depends on this number only, not on the time.
+            last_joints: Joints that move last; the bound counts their moves too.
+            clearance: Wanted distance to obstacles in addition to their margins [m]; None for a centimetre. Needs a
                 ``rrtik_ompl.World``.
 
         Raises:
@@ -112,13 +122,17 @@ class FewestMoves(OneJointPlanner):
         self.clearance = None if clearance is None else not_negative(clearance, "clearance")
 
     def completed(self, found: SearchResult, path: Matrix) -> SearchResult:
-        """See :meth:`OneJointPlanner.completed`."""
+        """Return the result with the last moves added to path and bound, see :meth:`OneJointPlanner.completed`."""
         assert found.path is not None
         bound = found.statistics["lower_bound"] + transitions(path) - transitions(found.path)
         return replace(found, path=path, statistics={**found.statistics, "lower_bound": bound})
 
     def between(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Stop) -> SearchResult:
-        """See :meth:`OneJointPlanner.between`."""
+        """Look for a path, see :meth:`OneJointPlanner.between`.
+
+        In a ``World`` one search is made for each level of clearance, the largest first, until one meets its lower
+        bound. If none does, fine grids follow.
+        """
         world = self._world
         if not isinstance(world, World):
             return self._found(_Question(starts, goals, checker, ptc))
@@ -140,7 +154,10 @@ class FewestMoves(OneJointPlanner):
         return self._finer(best, levels, starts, goals, checker, ptc)
 
     def _asked(self, starts: Matrix, goals: Matrix, levels: list[Level], number: int, ptc: Stop) -> _Question:
-        """The question at a level: with the goals that keep it, at the last level with all of them."""
+        """Return the arguments of the search on a level, with the goals that keep its clearance.
+
+        The last level, with the least clearance, has all goals.
+        """
         proving = levels[number].proving
         aims = goals if number == len(levels) - 1 else goals[proving.motion_valid_batch(goals, goals)]
         return _Question(starts, aims, WorldChecker(proving), ptc, levels[number])
@@ -154,7 +171,16 @@ class FewestMoves(OneJointPlanner):
         checker: MotionChecker,
         ptc: Stop,
     ) -> SearchResult:
-        """A better bound of the best so far, and what fine grids add to it."""
+        """Raise the lower bound of the best result, and look for a route with fewer moves on fine grids.
+
+        Args:
+            best: The best result so far, which has a path.
+            levels: All levels of clearance.
+            starts: Start configurations, shape (s, n).
+            goals: Goal configurations, shape (g, n).
+            checker: Checks motions and counts them.
+            ptc: Returns True when it is time to stop.
+        """
         path = best.path
         assert path is not None
         assert isinstance(self._world, World)
@@ -185,7 +211,15 @@ class FewestMoves(OneJointPlanner):
     def _bounded(
         self, asked: _Question, starts: Matrix, goals: Matrix, checker: MotionChecker, *, patient: bool = True
     ) -> SearchResult:
-        """What is found on a level, its motions counted, with a bound that holds for the goals left out there too."""
+        """Search on a level, count its motions, and lower the bound so that it holds for all goals.
+
+        Args:
+            asked: Arguments of the search, perhaps without goals that do not keep the level's clearance.
+            starts: Start configurations, shape (s, n).
+            goals: All goal configurations, shape (g, n).
+            checker: Counts the motions.
+            patient: See :meth:`_found`.
+        """
         found = self._found(asked, patient=patient)
         checker.checked_motions += asked.checker.checked_motions
         if found.path is None or len(asked.goals) == len(goals):
@@ -200,7 +234,12 @@ class FewestMoves(OneJointPlanner):
         return [joint for joint in range(starts.shape[1]) if joint not in self.options.staying]
 
     def _found(self, asked: _Question, *, patient: bool = True) -> SearchResult:
-        """What is found; without patience it is given up if quick routes are not found."""
+        """Run one search: find first routes, then improve them on lattices.
+
+        Args:
+            asked: Arguments of the search.
+            patient: Whether to run BiCRDT without a limit of iterations if the quick runs find no route.
+        """
         world = self._world
         moves = MoveSearch(
             asked.starts,
@@ -232,7 +271,16 @@ class FewestMoves(OneJointPlanner):
         return SearchResult(moves.route, {**counts, "gap": moves.moves - moves.bound})
 
     def _quick_routes(self, moves: MoveSearch, asked: _Question, *, patient: bool) -> int:
-        """Offer the routes of several runs of BiCRDT, or others if it finds none; returns its iterations."""
+        """Offer the routes of several quick runs of BiCRDT, or of RRT-Connect where these find none.
+
+        Args:
+            moves: The search that takes the routes.
+            asked: Arguments of the search.
+            patient: Whether BiCRDT is run without a limit of iterations if there is still no route.
+
+        Returns:
+            Number of iterations of BiCRDT.
+        """
         level = asked.level
         world = self._world if level is None else level.searched
         iterations = 0
@@ -269,7 +317,10 @@ class FewestMoves(OneJointPlanner):
         )
 
     def _converted(self, world: MotionQueries | None, seed: int, asked: _Question) -> Matrix | None:
-        """RRT-Connect's route, made shorter and turned into single-joint moves; None if there is none."""
+        """Return RRT-Connect's path, shortened and turned into single-joint moves, shape (k, n); None if there is none.
+
+        Joints that must stay are not supported, and the world must be a ``World``.
+        """
         if not isinstance(world, World) or self.options.staying:
             return None
         sampled = FastRRTConnect(
@@ -280,18 +331,18 @@ class FewestMoves(OneJointPlanner):
         short = shortcut(sampled.path, Task(world, Wishes(Budget(seed, stop=asked.stop))))
         try:
             return one_joint_moves(JointPath.of(world.robot, short), world).waypoints
-        except InputError:  # it comes so close to something that no single-joint moves follow it
+        except InputError:  # The path is so close to an obstacle that no single-joint moves can follow it.
             return None
 
 
 def _offer(moves: MoveSearch, route: Matrix, level: Level | None) -> None:
-    """Offer a route that has been checked in steps; on a level of clearance only if it keeps that."""
+    """Offer a route, shape (k, n), that was checked in steps; on a level only if it is proven to keep its clearance."""
     if level is None or level.proving.motion_valid_batch(route[:-1], route[1:]).all():
         moves.offer(route)
 
 
 def _fewer(one: SearchResult, other: SearchResult) -> SearchResult:
-    """The result with fewer moves, the first of equal ones; with the work and the bound of both."""
+    """Return the result with fewer moves (the first of equal ones), with the sum of their work and the larger bound."""
     if one.path is None or other.path is None:
         return other if one.path is None else one
     best = other if transitions(other.path) < transitions(one.path) else one

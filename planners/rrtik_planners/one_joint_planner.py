@@ -1,4 +1,4 @@
-"""What the planners that move one joint at a time have in common: their options, what comes first, what comes last."""
+"""Base of the planners that move one joint at a time: their options, frozen joints, and joints that move last."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ NO_ENDING = "last_joints: they cannot go straight to the goal after all others, 
 
 
 class OneJointPlanner(SafePlanner):
-    """Base class: a subclass implements :meth:`between`, which need not know of joints that stay or move last.
+    """Base class; a subclass implements :meth:`between`, which need not handle joints that stay or move last.
 
     Attributes:
-        ompl_name: For the class: its name in OMPL's reports.
-        options: The options, checked.
+        ompl_name: Name of the class in OMPL's reports.
+        options: The checked options.
     """
 
     ompl_name: ClassVar[str]
@@ -44,20 +44,20 @@ class OneJointPlanner(SafePlanner):
         smallest_move: PerJoint = 0.0,
         last_joints: Joints = (),
     ) -> None:
-        """Make a planner. These are the options of all that move one joint at a time, beside those of `SafePlanner`.
+        """Make a planner; these options, in addition to those of `SafePlanner`, hold for all that move single joints.
 
         Args:
-            scale_by_range: Divide each coordinate by its range in the metric of the nearest neighbour.
-            max_iterations: K of [1, ch. 6.3, algorithms 9 to 11]; without limit if None.
-            joint_costs: Cost of a joint's motion, greater than 0, shape (n,): a slow or risky joint costs more. The
-                metric multiplies its coordinate by it, and of the samples it takes part only in the share lowest cost /
-                its cost, so that it moves less often; where it has to, it still does. All equal if None.
+            scale_by_range: Whether the metric of the nearest neighbour divides each coordinate by its range.
+            max_iterations: Largest number of iterations, K of [1, ch. 6.3, algorithms 9 to 11]; without limit if None.
+            joint_costs: Cost of each joint's motion, greater than 0, shape (n,); a slow or risky joint costs more. The
+                metric multiplies a joint's coordinate by its cost, and the joint moves only for a share of the samples,
+                the lowest cost divided by its own, so that it moves less often. All equal if None.
             frozen_joints: Joints that must not move, by number (from 0) or, with a world, by name. Starts and goals
                 have to agree in them exactly; those that do not are left out.
-            smallest_move: No move of a path is shorter [unit of the joint: rad or m], one number or one for each joint.
+            smallest_move: Least length of each move of a path [rad or m], one number or one for each joint.
             last_joints: Joints that stay until all others have arrived, by number or name, such as the gripper's
-                rotation; then they go straight to the goal, one after the other in this order. Goals to which that is
-                not free are left out.
+                rotation; then they go straight to the goal, one after the other in this order. Goals for which these
+                motions are not free are left out.
 
         Raises:
             InputError: If an option is out of range or the space is of another kind.
@@ -76,11 +76,21 @@ class OneJointPlanner(SafePlanner):
         )
 
     def between(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Stop) -> SearchResult:
-        """Look for a path between starts and goals, shapes (s, n) and (g, n), that agree in the joints that stay."""
+        """Look for a path from one of the starts to one of the goals; for subclasses.
+
+        Args:
+            starts: Start configurations, shape (s, n), that agree with the goals in the joints that stay.
+            goals: Goal configurations, shape (g, n).
+            checker: Checks motions.
+            ptc: Returns True when it is time to stop.
+        """
         raise NotImplementedError(f"{type(self).__name__} has no between()")
 
     def completed(self, found: SearchResult, path: Matrix) -> SearchResult:
-        """The result with the last moves: its path goes on to ``path``. For subclasses whose statistics count moves."""
+        """Return a result whose path is extended by the last moves to ``path``, shape (k, n).
+
+        A subclass whose statistics count moves overrides this.
+        """
         return replace(found, path=path)
 
     def search(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Stop) -> SearchResult:
@@ -96,15 +106,14 @@ class OneJointPlanner(SafePlanner):
 
 
 class OneJointOptions(MoveRules):
-    """The options, checked: what moves have to keep to, and how the trees grow.
+    """The checked options: rules for moves, and how the trees grow.
 
     Args:
         names: The joints' names, empty if they are not known.
         dof: Number of joints.
-        scale_by_range: This option and the others are those of
-            :class:`~rrtik_planners.one_joint_planner.OneJointPlanner`.
-        max_iterations: As there.
-        rules: As there, and as of MoveRules.
+        scale_by_range: See :class:`~rrtik_planners.one_joint_planner.OneJointPlanner`.
+        max_iterations: See :class:`~rrtik_planners.one_joint_planner.OneJointPlanner`.
+        rules: Options of `MoveRules`.
 
     Raises:
         InputError: If an option is out of range.
@@ -120,10 +129,10 @@ class OneJointOptions(MoveRules):
         self._names = names or [str(k) for k in range(dof)]
 
     def agreeing(self, starts: Matrix, goals: Matrix) -> tuple[Matrix, Matrix]:
-        """The first start that a goal agrees with in the frozen joints, and all starts and goals that do so too.
+        """Return the starts and goals that agree in the frozen joints with the first start that fits a goal.
 
         Raises:
-            InputError: If there is none.
+            InputError: If no start agrees with a goal.
         """
         frozen = self.frozen_joints
         if not frozen:
@@ -142,11 +151,17 @@ class OneJointOptions(MoveRules):
 
     @property
     def staying(self) -> list[int]:
-        """Joints that do not move before the last moves."""
+        """Indices of the joints that do not move before the last moves."""
         return [*self.frozen_joints, *self.last_joints]
 
     def growth(self, lower: Vector, upper: Vector, start: Vector) -> CrdtRules:
-        """How trees grow within bounds, shapes (n,), if the joints that stay are where they are at a start."""
+        """Return the rules by which trees grow, with the joints that stay fixed at their values in ``start``.
+
+        Args:
+            lower: Lower bounds, shape (n,).
+            upper: Upper bounds, shape (n,).
+            start: Start configuration, shape (n,).
+        """
         scale = self.joint_costs / (upper - lower) if self.scale_by_range else self.joint_costs
         lower = lower.copy()
         upper = upper.copy()
@@ -154,12 +169,12 @@ class OneJointOptions(MoveRules):
         return CrdtRules(lower, upper, scale, self.smallest_move, self.joint_costs.min() / self.joint_costs)
 
     def accepts(self, path: Matrix) -> bool:
-        """Whether no move of a path, shape (k, n), is too short, once those of the same joint in a row are joined."""
+        """Check that no move of a path, shape (k, n), is too short after joining successive moves of the same joint."""
         return long_enough(path, self.smallest_move)
 
 
 def joint_names(world: object) -> Sequence[str]:
-    """Names of the joints of a world's robot, none if it has no robot."""
+    """Return the joint names of a world's robot; none if it has no robot."""
     names: Sequence[str] = getattr(getattr(world, "robot", None), "joint_names", ())
     return names
 
@@ -168,14 +183,15 @@ class Endings:
     """The last moves to each goal: the joints that move last go straight to it, one after the other.
 
     Attributes:
-        aims: Where the last moves begin, shape (k, n): goals whose last moves are free, with those joints as at the
-            start. Without joints that move last these are the goals themselves.
+        aims: Configurations where the last moves begin, shape (k, n): the goals whose last moves are free, with the
+            last joints as at the start. Without joints that move last these are the goals themselves.
 
     Args:
-        start: The last joints are here until all others have arrived, shape (n,).
-        goals: Shape (g, n).
-        joints: Those that move last, in this order.
-        smallest_move: Goals that need a shorter last move are left out, shape (n,).
+        start: Start configuration, whose values the last joints keep until all others have arrived, shape (n,).
+        goals: Goal configurations, shape (g, n).
+        joints: Indices of the joints that move last, in this order.
+        smallest_move: Least length of a move of each joint, shape (n,); goals that need a shorter last move are left
+            out.
         checker: Checks the last moves.
     """
 
@@ -189,13 +205,16 @@ class Endings:
         self.aims: Matrix = np.array([ending[0] for ending in endings]).reshape(-1, goals.shape[1])
 
     def completed(self, path: Matrix) -> Matrix:
-        """A path to one of the aims, shape (k, n), and the last moves after it."""
+        """Return a path to one of the aims, shape (k, n), extended by the last moves to its goal."""
         reached = int((self.aims == path[-1]).all(axis=1).argmax())
         return np.vstack([path, self._endings[reached][1:]])
 
 
 def _last_moves(start: Vector, goal: Vector, joints: Sequence[int]) -> Matrix:
-    """Rows from where the last moves begin to the goal; joints that are there already do not move."""
+    """Return the waypoints of the last moves, from where they begin to the goal, shape (k, n).
+
+    Joints that are at their goal values already make no move.
+    """
     row = goal.copy()
     row[list(joints)] = start[list(joints)]
     rows = [row]
