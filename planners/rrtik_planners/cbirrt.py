@@ -1,4 +1,4 @@
-"""CBiRRT2: two trees that grow along path constraints, by projection, whole in kernels."""
+"""CBiRRT2: two trees that grow along path constraints by projection; the whole search runs in kernels."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SafePlanner, Se
 from rrtik_ompl.world.motion_queries import decider, has_kernels, keeps_constraints
 from rrtik_planners.fast_rrt_connect import python_rules, search_in_python, sound_tree
 
-PLAIN_SAMPLES = 200  # before it is asked whether the constraints alone separate start and goal
+PLAIN_SAMPLES = 200  # number of samples after which it is checked whether the constraints separate start and goal
 
 
 class CBiRRT(SafePlanner):
-    """CBiRRT2: each tree walks towards samples, and to the other tree, in short steps that are projected.
+    """CBiRRT2: each tree grows towards samples, and towards the other tree, in short steps that are projected.
 
-    In a world with path constraints it keeps them, by the bound of
-    :class:`rrtik_ompl.constraints.held_regions.HeldRegions`; in any other it is an RRT-Connect. If no path is found
-    after a while, it looks for a proof that the constraints alone keep start and goal apart
-    (:mod:`rrtik_ompl.constraints.walls`), and ends with that reason.
+    In a world with path constraints, paths keep these by the bound of
+    :class:`rrtik_ompl.constraints.held_regions.HeldRegions`; in any other world it is an RRT-Connect. If no path is
+    found after `PLAIN_SAMPLES` samples, the planner looks for a proof that the constraints alone keep start and goal
+    apart (:mod:`rrtik_ompl.constraints.walls`), and if there is one, ends with that reason.
     """
 
     kernels: ClassVar[tuple[str, ...]] = (KERNELS,)
@@ -45,11 +45,11 @@ class CBiRRT(SafePlanner):
         range: float | None = None,
         max_iterations: int | None = None,
     ) -> None:
-        """Make a planner with options beside those of :class:`~rrtik_ompl.ompl_bridge.SafePlanner`.
+        """Make a planner with options in addition to those of :class:`~rrtik_ompl.ompl_bridge.SafePlanner`.
 
         Args:
-            range: Length of a step, at most [unit of the space]; what suits the bounds if None.
-            max_iterations: Samples at most; without limit if None.
+            range: Longest step [unit of the space]; a length that suits the bounds if None.
+            max_iterations: Largest number of samples; without limit if None.
 
         Raises:
             InputError: If an option is out of range or the space is of another kind.
@@ -70,7 +70,7 @@ class CBiRRT(SafePlanner):
                 raise InputError("path constraints need searches in kernels: install numba")
         elif has_kernels(world, KERNELS):
             motions = world.motions
-            tables = held_tables(world.robot, HeldRegions(()))  # of no regions: an RRT-Connect
+            tables = held_tables(world.robot, HeldRegions(()))  # Without regions the search is an RRT-Connect.
 
         if motions is None or tables is None:
             rules = python_rules(self.bounds(), self.range, None, self.max_iterations, turning=self.turning())
@@ -116,7 +116,7 @@ class CBiRRT(SafePlanner):
 
 
 def _separation(world: object, starts: Matrix, goals: Matrix) -> str:
-    """Why the path constraints of a world keep all starts and goals apart, in a line; "" where that is not proven."""
+    """Return a line that says why path constraints keep all starts and goals apart; "" if that is not proven."""
     if not keeps_constraints(world):
         return ""
     said = [separation(world.constraints, start, goals) for start in starts]

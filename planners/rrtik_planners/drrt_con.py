@@ -20,13 +20,13 @@ from rrtik_ompl.world.motion_queries import has_kernels, is_conservative
 
 
 class DRRTCon(SafePlanner):
-    """RRT-Connect whose two trees outlive ``solve``: the pieces of the last path on both sides of what blocks it.
+    """RRT-Connect that keeps its path between calls of ``solve`` and repairs it.
 
-    The first ``solve`` is RRT-Connect and the sequential cut. A later one starts from the kept path: what lies behind
-    the start is dropped, the rest is checked in one call, cut at the first blocked motion seen from either end and
-    reconnected; while none is found it stays. The start may move along the path or near it, the goal may move, and
-    the answers of the validity checker may change. ``clear()`` forgets. Source: [1, ch. 5.2, algorithms 6 to 8]; the
-    search: :mod:`rrtik_ompl.replanning`.
+    The first ``solve`` is RRT-Connect and the sequential cut. A later one starts from the kept path: the part behind
+    the start is dropped, the rest is checked in one call, cut at its first and last blocked motion, and the two free
+    pieces are reconnected. If no connection is found, the path is kept. Between calls the start may move along the path
+    or near it, the goal may move, and the answers of the validity checker may change. ``clear()`` forgets the path.
+    Source: [1, ch. 5.2, algorithms 6 to 8]; the search is that of :mod:`rrtik_ompl.replanning`.
     """
 
     kernels: ClassVar[tuple[str, ...]] = (KERNELS,)
@@ -39,10 +39,10 @@ class DRRTCon(SafePlanner):
         seed: int | None = None,
         range: float | None = None,
     ) -> None:
-        """Make a planner with options beside those of :class:`~rrtik_ompl.ompl_bridge.SafePlanner`.
+        """Make a planner with options in addition to those of :class:`~rrtik_ompl.ompl_bridge.SafePlanner`.
 
         Args:
-            range: Longest motion of the trees [unit of the space]; what suits the bounds if None.
+            range: Longest motion of the trees [unit of the space]; a length that suits the bounds if None.
 
         Raises:
             InputError: If an option is out of range or the space is of another kind.
@@ -65,7 +65,8 @@ class DRRTCon(SafePlanner):
             fresh = self._new()
             found = fresh.begin(starts, goals, checker, ptc)
             graph = self._trees(fresh)
-            if core is None or found:  # a path that is blocked now is of more use to the next call than none
+            # If nothing new was found, the old path is kept: though blocked now, it may serve the next call.
+            if core is None or found:
                 core = self._core = fresh
 
         path = self._asked(core, checker, ptc)
@@ -73,14 +74,15 @@ class DRRTCon(SafePlanner):
         return SearchResult(path, statistics, graph=graph if path is None else None)
 
     def _trees(self, core: DrrtCon) -> PlannerGraph | None:
-        """What the search for a first path has grown; without it a solve in vain has no nearest approach."""
+        """Return the trees of the search for a first path, from which a failed solve reports its nearest approach."""
         trees = core.connect.trees if isinstance(core.connect, PythonConnect) else None
         return None if trees is None else self.grown(trees[0].grown, trees[1].grown)
 
     def _asked(self, core: DrrtCon, checker: MotionChecker, ptc: Stop) -> Matrix | None:
-        """A path whose edges, made by cuts and joins, were asked as a whole; None if it is blocked.
+        """Return the path once all its edges were checked as a whole, shape (k, n); None if it is blocked.
 
-        A checker that looks at single configurations may refuse an edge whose parts it has found free.
+        Cuts and joins make edges of parts that were checked separately, and a checker that samples single
+        configurations may refuse the whole edge. Such edges are divided by further points and repaired if need be.
         """
         while core.free and core.path is not None:
             path = core.path
@@ -94,7 +96,7 @@ class DRRTCon(SafePlanner):
         return None
 
     def _from_kept(self, core: DrrtCon, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Stop) -> bool:
-        """Whether the kept path could be made to lead from a start to a goal."""
+        """Lead the kept path from a start to a goal, by repairs if need be; return whether that succeeded."""
         assert core.path is not None
         start, passed = _nearest_place(core.path, starts, 0.5 * core.max_edge)
         core.rejoin(start, passed)
@@ -113,7 +115,13 @@ class DRRTCon(SafePlanner):
 
 
 def _with_points(path: Matrix, edges: Mask, step: float) -> Matrix:
-    """A path with further points on some of its edges, at most ``step`` apart and at least one on each."""
+    """Return a path with further points on some of its edges.
+
+    Args:
+        path: Waypoints, shape (k, n).
+        edges: Whether each edge gets points, shape (k - 1,).
+        step: Largest distance between points; every chosen edge gets at least one.
+    """
     pieces = [path[:1]]
     for a, b, refused in zip(path[:-1], path[1:], edges, strict=True):
         length = float(np.linalg.norm(b - a))
@@ -122,7 +130,13 @@ def _with_points(path: Matrix, edges: Mask, step: float) -> Matrix:
 
 
 def _nearest_place(path: Matrix, starts: Matrix, step: float) -> tuple[Vector, int]:
-    """The start that is nearest to a path, and how many of its waypoints lie behind that place."""
+    """Return the start that is nearest to a path, shape (n,), and how many waypoints lie behind that place.
+
+    Args:
+        path: Waypoints, shape (k, n).
+        starts: Start configurations, shape (s, n).
+        step: Largest distance between the points of the path that are compared.
+    """
     points = points_along(path, step)
     gaps = np.linalg.norm(starts[:, None] - points[None], axis=2)
     which, point = (int(k) for k in np.unravel_index(gaps.argmin(), gaps.shape))

@@ -1,4 +1,4 @@
-"""AORRTC in kernels: RRT-Connect in the space of configurations and costs, below an ever lower bound. Source: [15]."""
+"""AORRTC in kernels: RRT-Connect in the space of configurations and costs, with a falling bound. Source: [15]."""
 
 from __future__ import annotations
 
@@ -11,12 +11,11 @@ from rrtik_planners.restart_shorten import RestartShorten
 
 
 class FastAORRTC(RestartShorten):
-    """As :class:`RestartShorten`, but each further path has to stay below a length before it is shortened.
+    """Works like :class:`RestartShorten`, but each further path has to stay below a length before it is shortened.
 
-    The trees take only what a path below that length can lead through, by the costs of AORRTC [15]. The bound begins at
-    one and a half times the best length and comes nearer to it as long as nothing is gained; the number of samples
-    grows meanwhile. Where there are no kernels, further paths are as long as they come. OMPL's own planner of that kind
-    is called AORRTC.
+    By the costs of AORRTC [15], the trees take only vertices through which a path below that length can lead. The bound
+    begins at one and a half times the best length and approaches it as long as nothing is gained; meanwhile the number
+    of samples grows. Without kernels there is no bound. OMPL's own planner of that kind is called AORRTC.
     """
 
     ompl_name: ClassVar[str] = "FastAORRTC"

@@ -1,4 +1,4 @@
-"""IKURT: from a posture to a pose of the tip whose joint values nobody knows, and the path to it, by one tree."""
+"""IKURT: finds a goal configuration for a goal of the tip and the path to it at once, by a tree in joint space."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SearchResult, S
 from rrtik_ompl.world.world import World
 from rrtik_planners.tip_seeker import TipSeeker, misses
 
-STEP = 0.15  # [rad] of CONNECT, the first one
-STRIDE = 0.6  # [rad] of the exploration, the longest one
+STEP = 0.15  # first step of CONNECT [rad]
+STRIDE = 0.6  # longest step of the exploration [rad]
 
 
 class IKURT(TipSeeker):
-    """Extended inverse kinematics: a tree in joint space, drawn to the goal by the distance of the tip from it.
+    """Extended inverse kinematics: a tree in joint space that grows towards lower distance of the tip from its goal.
 
     Source: [1, ch. 5.1], made faster and more robust (:mod:`rrtik_ompl.ik.ikurt.search`);
-    :class:`rrtik_planners.ikurt_published.IKURTPublished` is the algorithm to the letter. Where the goals are
+    :class:`rrtik_planners.ikurt_published.IKURTPublished` is the algorithm as published. If the goals are
     configurations, as in plain OMPL, the distance is that in joint space.
 
     ``statistics`` says how far from the goal the tip ends: ``position_error`` [m], ``orientation_error`` [rad].
@@ -42,17 +42,16 @@ class IKURT(TipSeeker):
         stride: float | None = None,
         most_vertices: int = 10_000,
     ) -> None:
-        """Make a planner with options beside those of :class:`~rrtik_ompl.ompl_bridge.SafePlanner`.
+        """Make a planner with options in addition to those of :class:`~rrtik_ompl.ompl_bridge.SafePlanner`.
 
         Args:
-            goal: What the tip has to reach; needs a world. If None, the configurations of the problem definition are
-                the goals.
-            jacobian: Look for goal configurations by Levenberg-Marquardt from the vertices; they are met to 1e-9 of
-                the reach. If False the tree alone gets there, to the tolerances of the goal.
+            goal: Goal of the tip; needs a world. If None, the configurations of the problem definition are the goals.
+            jacobian: Whether Levenberg-Marquardt from the vertices looks for goal configurations, accurate to 1e-9 of
+                the reach. If False the tree alone has to get there, to the tolerances of the goal.
             metres_per_radian: Weight of the angle in the metric; if None a full turn counts as much as the reach.
             step: First step of CONNECT [unit of the space]; if None 0.15 rad, or 1 % of a space that is not an arm's.
             stride: Longest step of the exploration [unit of the space]; if None 0.6 rad, or 4 %.
-            most_vertices: With more the tree is dropped and another one begun.
+            most_vertices: Number of vertices above which the trees are dropped and begun again.
 
         Raises:
             InputError: If an option is out of range or the space is of another kind.
@@ -91,7 +90,7 @@ class IKURT(TipSeeker):
         return ConfigurationMetric(goals, JOINT_RADIUS * self.radian())
 
     def _why(self, metric: TipMetric, search: BatchedSearch) -> str:
-        """Why the goal was not reached, as far as the search can tell."""
+        """Return why the goal was not reached, as far as the search can tell."""
         if len(search.goals):
             return f"no path to any of {len(search.goals)} free configurations at the goal"
         if len(search.blocked) and isinstance(self._world, World):

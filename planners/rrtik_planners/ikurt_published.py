@@ -1,4 +1,4 @@
-"""IKURT to the letter, beside which the improved one is measured. Source: [1, ch. 5.1, algorithms 4 and 5]."""
+"""IKURT exactly as published, for comparison with the improved one. Source: [1, ch. 5.1, algorithms 4 and 5]."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from rrtik_planners.tip_seeker import TipSeeker, misses
 
 STEP = 0.15  # [rad]
 THRESHOLD_ANGLE = 0.5  # [rad] in the metric of poses
-THRESHOLD_REACH = 0.13  # of the reach, for positions
+THRESHOLD_REACH = 0.13  # share of the reach, for positions
 
 
 class IKURTPublished(TipSeeker):
-    """Extended inverse kinematics as published: one sample at a time, no Jacobian; slow where goals lie on limits.
+    """Extended inverse kinematics as published: one sample at a time, no Jacobian; slow if goals lie on joint limits.
 
-    [1] gives no numbers; the defaults are a proposal. ``statistics`` as of :class:`rrtik_planners.ikurt.IKURT`.
+    [1] gives no numbers; the defaults are a proposal. ``statistics`` are those of :class:`rrtik_planners.ikurt.IKURT`.
     """
 
     def __init__(
@@ -37,17 +37,17 @@ class IKURTPublished(TipSeeker):
         threshold: float | None = None,
         accuracy: float | None = None,
     ) -> None:
-        """Make a planner with options beside those of :class:`~rrtik_ompl.ompl_bridge.SafePlanner`.
+        """Make a planner with options in addition to those of :class:`~rrtik_ompl.ompl_bridge.SafePlanner`.
 
         Args:
             goal: See :class:`rrtik_planners.ikurt.IKURT`.
             mu: Weight of the distance in the metric of poses [1/m]; if None the distance at the start counts as much
                 as the largest angle.
             step: Growth step delta0 [unit of the space]; if None 0.15 rad, or 1 % of a space that is not an arm's.
-            threshold: Distance in the metric at which the step begins to shrink; if None 0.5 rad, or 13 % of the
-                reach, or 4 % of a space that is not an arm's.
+            threshold: Distance in the metric below which the step shrinks; if None 0.5 rad, or 13 % of the reach, or
+                4 % of a space that is not an arm's.
             accuracy: Distance in the metric at which the goal counts as reached, the published min_threshold; if None
-                as the tolerances of the goal demand.
+                it follows from the tolerances of the goal.
 
         Raises:
             InputError: If an option is out of range or the space is of another kind.

@@ -19,10 +19,10 @@ from rrtik_planners.bicrdt import BiCRDT
 
 
 class MBRRT(BiCRDT):
-    """Reaches a pose, a position or a region: its configurations by MB-RRT, the path to one of them by BiCRDT.
+    """Plans to a pose, a position or a region: MB-RRT finds goal configurations, BiCRDT the path to one of them.
 
-    Source: [3], which names this use and leaves the path to a planner. In plain OMPL give the problem
-    definition a :class:`rrtik_ompl.GoalSampler`, or any goal of configurations; these are taken as they are.
+    Source: [3], which names this use and leaves the path to a planner. In plain OMPL, give the problem definition a
+    :class:`rrtik_ompl.GoalSampler`, or any goal that consists of configurations; these are used as they are.
     """
 
     ompl_name: ClassVar[str] = "MBRRT"
@@ -39,12 +39,12 @@ class MBRRT(BiCRDT):
         scale_by_range: bool = False,
         max_iterations: int | None = None,
     ) -> None:
-        """Make a planner with options beside those of :class:`~rrtik_planners.one_joint_planner.OneJointPlanner`.
+        """Make a planner with options in addition to :class:`~rrtik_planners.one_joint_planner.OneJointPlanner`.
 
         Args:
-            goal: What the tip has to reach; needs a world. If None, or where the tree finds nothing, the
-                configurations of the problem definition are the goals.
-            ik_seconds: Time that the tree in the workspace may take [s].
+            goal: Goal of the tip; needs a world. If None, or if the tree finds nothing, the configurations of the
+                problem definition are the goals.
+            ik_seconds: Time limit of the tree in the workspace [s].
 
         Raises:
             InputError: If an option is out of range, the space is of another kind, or the robot does not fit.
@@ -64,7 +64,7 @@ class MBRRT(BiCRDT):
         return replace(result, statistics={**result.statistics, "tree_goals": len(aims)})
 
     def _aims(self, starts: Matrix) -> Matrix:
-        """Free configurations at the goal of the tip inside the bounds of the space, shape (k, n)."""
+        """Return free configurations at the goal of the tip inside the bounds of the space, shape (k, n)."""
         if self.goal is None or not isinstance(self._world, World):
             return np.zeros((0, starts.shape[1]))
         rows = tree_aims(self._world, self.goal, starts[0], self.rng, seconds=self.ik_seconds)

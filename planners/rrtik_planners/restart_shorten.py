@@ -1,4 +1,4 @@
-"""Plan again and again by RRT-Connect, shorten each path, keep the best: other seeds lead past obstacles elsewhere."""
+"""Plan repeatedly by RRT-Connect, shorten each path and keep the best; other seeds pass obstacles on other sides."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ from rrtik_planners.fast_rrt_connect import FastRRTConnect
 
 
 class RestartShorten(FastRRTConnect):
-    """RRT-Connect anew with other random numbers, each path shortened, until the time is up or nothing is gained.
+    """Repeats RRT-Connect with other random numbers and shortens each path, until time is up or nothing is gained.
 
-    `plan(improve=)` does the same for any planner and proves what it finds; this is for those who name a planner, in
-    OMPL's Benchmark for instance. ``progress`` has the length over time.
+    `plan(improve=)` does the same for any planner and proves its paths; this class is for uses that need a planner,
+    such as OMPL's Benchmark. ``progress`` has the length of the best path over time.
     """
 
     kernels: ClassVar[tuple[str, ...]] = (KERNELS, SHORTCUTS, TAUT)
@@ -48,11 +48,11 @@ class RestartShorten(FastRRTConnect):
         domain: float | None = None,
         patience: int = PATIENCE,
     ) -> None:
-        """Make a planner with an option beside those of :class:`FastRRTConnect`.
+        """Make a planner with an option in addition to those of :class:`FastRRTConnect`.
 
         Args:
-            patience: Plans in a row of which nothing is gained, after which the search ends; 0 ends it at the first
-                path, shortened.
+            patience: Number of plans in a row without a gain after which the search ends; with 0 it ends after the
+                first path is shortened.
 
         Raises:
             InputError: If an option is out of range or the space is of another kind.
@@ -65,13 +65,13 @@ class RestartShorten(FastRRTConnect):
 
     def search(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Stop) -> SearchResult:
         """See :meth:`rrtik_ompl.ompl_bridge.SafePlanner.search`."""
-        course: list[tuple[float, float]] = []  # seconds, and the length of the best path from then on
+        course: list[tuple[float, float]] = []  # times [s], and the length of the best path from then on
         begun = time.perf_counter()
         best = np.inf
         found = last = self._first(starts, goals, checker, ptc)
-        least = np.linalg.norm(starts[:, None] - goals[None], axis=2).min()  # no path is shorter
+        least = np.linalg.norm(starts[:, None] - goals[None], axis=2).min()  # lower bound on the length of a path
         plans = 1
-        idle = 0  # plans in a row that gained nothing
+        idle = 0  # number of plans in a row without a gain
         iterations = int(last.statistics["iterations"])
 
         while found.path is not None:
@@ -102,27 +102,35 @@ class RestartShorten(FastRRTConnect):
     def another(
         self, starts: Matrix, goals: Matrix, best: float, idle: int, checker: MotionChecker, ptc: Stop
     ) -> SearchResult:
-        """Another path. For subclasses.
+        """Search for another path; subclasses may override this.
 
         Args:
-            starts: Free configurations, shape (s, n).
-            goals: Likewise, shape (g, n).
+            starts: Free start configurations, shape (s, n).
+            goals: Free goal configurations, shape (g, n).
             best: Length of the shortest path so far.
-            idle: Plans since it was found, this one counted.
+            idle: Number of plans since it was found, this one included.
             checker: Checks motions.
-            ptc: True when it is time to stop.
+            ptc: Returns True when it is time to stop.
         """
         return self.between(starts, goals, checker, ptc)
 
     def _first(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Stop) -> SearchResult:
-        """The first path that stands; one that does not if the time is up."""
+        """Search until a path passes the final check of :meth:`stands`; if time is up first, return one that fails."""
         found = self.between(starts, goals, checker, ptc)
         while found.path is not None and not self.stands(found.path, checker) and not ptc():
             found = self.between(starts, goals, checker, ptc)
         return found
 
     def _shortened(self, path: Matrix, best: float, number: int, checker: MotionChecker, ptc: Stop) -> Matrix:
-        """A path after a few checks, and after more as long as they gain something, if it may become the best."""
+        """Shorten a path by a few checks, then by more as long as it gains from them and may become the best.
+
+        Args:
+            path: Waypoints of a free path, shape (k, n).
+            best: Length of the shortest path so far.
+            number: Number of the plan, from which the seeds follow.
+            checker: Checks motions and counts them.
+            ptc: Returns True when it is time to stop.
+        """
         motions = self._world if has_kernels(self._world, SHORTCUTS) else checker
         assert motions is not None
         before = np.inf
@@ -131,7 +139,8 @@ class RestartShorten(FastRRTConnect):
             task = Task(motions, Wishes(budget))
             found = best_in_time(path, task)
             checker.checked_motions += task.asked if motions is self._world else 0
-            if not self.stands(found, checker):  # parts of free motions, asked otherwise
+            # Parts of free motions, checked as edges of their own, may be refused.
+            if not self.stands(found, checker):
                 break
 
             path = found

@@ -1,4 +1,4 @@
-"""Probabilistic roadmaps [63] whose motions are checked when a query comes to them [64]."""
+"""Probabilistic roadmaps [63] whose motions are checked only when a query needs them [64]."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ FIRST_VERTICES = 100  # of a roadmap that is made for one query
 
 
 class RoadmapPlanner(SafePlanner):
-    """The shortest path on a roadmap; where it has none, one of RRT-Connect becomes part of it, as in [66].
+    """Returns the shortest path on a roadmap; if there is none, a path of RRT-Connect is added to it, as in [66].
 
-    With the option ``roadmap`` it is one that was made before, so that many queries in a world share it and what it
-    learns. Without, every solve makes a small one of its own.
+    With the option ``roadmap`` many queries in a world share one roadmap and what it learns. Without it every solve
+    makes a small roadmap of its own.
     """
 
     kernels: ClassVar[tuple[str, ...]] = (KERNELS, connect_layout.KERNELS)
@@ -40,11 +40,11 @@ class RoadmapPlanner(SafePlanner):
         roadmap: Roadmap | str | os.PathLike[str] | None = None,
         near: int = NEAR,
     ) -> None:
-        """Make a planner with options beside those of :class:`~rrtik_ompl.ompl_bridge.SafePlanner`.
+        """Make a planner with options in addition to those of :class:`~rrtik_ompl.ompl_bridge.SafePlanner`.
 
         Args:
             roadmap: A :class:`~rrtik_ompl.planning.search.roadmap.Roadmap` of the world, or the file of one.
-            near: With how many of the vertices near it a new one is joined, if there is no ``roadmap``.
+            near: Number of nearest vertices that a new vertex is joined with, if there is no ``roadmap``.
 
         Raises:
             InputError: If an option is out of range, the roadmap is of another world, or the space of another kind.
@@ -72,14 +72,14 @@ class RoadmapPlanner(SafePlanner):
 
         counts = graph.statistics()
         if known is not None:
-            counts["motions"] -= before["motions"]  # of queries before
+            counts["motions"] -= before["motions"]  # Leave out the motions of earlier queries.
         if isinstance(graph, KernelGraph):
             checker.checked_motions += int(counts["motions"])
         checker.checked_motions += asked
         return SearchResult(None if path is None else _without_repeats(path), counts)
 
     def _connected(self, starts: Matrix, goals: Matrix, ptc: Stop) -> tuple[Matrix | None, int]:
-        """A path of RRT-Connect, shape (k, n), or None; and how many motions that took."""
+        """Run RRT-Connect; return its path, shape (k, n), or None, and the number of motions checked."""
         seed = int(self.rng.integers(2**31))
         planner = FastRRTConnect(self.getSpaceInformation(), world=self._world, seed=seed)
         _, rows = planner.solve_rows(starts, goals, self.bounds(), ptc, checked=True)
@@ -95,16 +95,19 @@ class RoadmapPlanner(SafePlanner):
 
 
 def _without_repeats(path: Matrix) -> Matrix:
-    """A path, shape (k, n), without rows that are as the one before, as where a start is a vertex or the goal."""
+    """Return a path, shape (k, n), without repeated rows, which occur where a start is a vertex or the goal."""
     kept: Matrix = path[np.append(True, (path[1:] != path[:-1]).any(axis=1))]
     return kept
 
 
 def _roadmap_in(world: MotionQueries | None, roadmap: Roadmap | str | os.PathLike[str]) -> Roadmap:
-    """A roadmap for a world, or for a form of it with a clearance or other steps, where all is checked again.
+    """Return a roadmap for a world.
+
+    A roadmap of the same bodies with another clearance or resolution is moved to this world, where all its motions are
+    checked again.
 
     Raises:
-        InputError: If it is of another world, or its file cannot be used.
+        InputError: If the roadmap is of another world, or its file cannot be used.
     """
     if not isinstance(world, World):
         raise InputError("roadmap: it needs the world that it is of; use plan(), or give the planner world=")

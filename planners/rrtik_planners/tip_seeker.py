@@ -1,4 +1,4 @@
-"""What the two forms of IKURT share: a goal of the tip is enough for them, and they say how near they came."""
+"""Base of the two forms of IKURT, which need only a goal of the tip and report how near the tip came to it."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from rrtik_ompl.model.goal import Goal, Target, TipGoal
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SafePlanner, SearchResult
 from rrtik_ompl.world.world import World
 
-DRAWS = 16  # targets of a goal that leaves freedom
-ARM_DIAGONAL = 14.0  # [rad] of the limits of an arm with seven joints
-LEAST_DIFFERENCE = 1e-12  # to the goal, of a path that OMPL is to take for approximate
+DRAWS = 16  # number of targets drawn from a goal that leaves freedom
+ARM_DIAGONAL = 14.0  # diagonal of the box of limits of an arm with seven joints [rad]
+LEAST_DIFFERENCE = 1e-12  # least difference to the goal with which OMPL takes a path for approximate
 
 
 class TipSeeker(SafePlanner):
-    """Base class: knows the goal of the tip, or takes configurations of the problem definition for goals."""
+    """Base class: holds the goal of the tip; without one the configurations of the problem definition are the goals."""
 
     finds_goals: ClassVar[bool] = True
     path_statistics: ClassVar[tuple[str, ...]] = ("position_error", "orientation_error")
@@ -41,11 +41,11 @@ class TipSeeker(SafePlanner):
         return self.goal is None
 
     def targets(self) -> list[Target]:
-        """The goal of the tip without freedom: itself, or draws from a region; none if the goals are configurations."""
+        """Return targets without freedom: the goal itself, or draws from a region; none without a goal of the tip."""
         return [] if self.goal is None else targets(self.goal, DRAWS, self.rng)
 
     def radian(self) -> float:
-        """What counts as a radian in this space: one where it is that of an arm, else a share of its diagonal."""
+        """Return the length that counts as a radian: 1 in the space of an arm, otherwise a share of the diagonal."""
         if self.turning() is not None:
             return 1.0
         lower, upper = self.bounds()
@@ -59,7 +59,15 @@ class TipSeeker(SafePlanner):
         counts: dict[str, int],
         checker: MotionChecker,
     ) -> SearchResult:
-        """The path found, else that to the vertex nearest to the goal; with the error of the tip at its end."""
+        """Make the result: the path found, or else the path to the vertex nearest to the goal as an approximate one.
+
+        Args:
+            metric: Distance from the goal; counts its evaluations.
+            tree: The tree from the start.
+            found: The path found, shape (k, n), or None.
+            counts: Statistics of the search.
+            checker: Checks the last motion to a goal configuration.
+        """
         nearest = int(tree.distance.argmin())
         path = tree.branch(nearest) if found is None else found
         exact = found is not None
@@ -78,14 +86,14 @@ class TipSeeker(SafePlanner):
 
 
 def misses(metric: TipMetric, q: Vector, what: str) -> str:
-    """A line that says by how much a configuration misses the goal."""
+    """Return a line that says by how much a configuration, shape (n,), misses the goal; ``what`` is its subject."""
     away, angle = metric.errors(q)
     turned = f" and {np.degrees(angle):.3g} deg" if any(t.oriented for t in metric.targets) else ""
     return f"{what} misses it by {away:.4g} m{turned}"
 
 
 def _ended(path: Matrix, goals: Matrix, checker: MotionChecker) -> tuple[Matrix, bool]:
-    """The path to exactly the goal configuration that it comes near to, and whether that is free."""
+    """Extend a path to the nearest goal configuration, and return it with whether its last motion is free."""
     goal = goals[np.linalg.norm(goals - path[-1], axis=1).argmin()]
     if (goal == path[-1]).all():
         return path, True
