@@ -1,7 +1,7 @@
 """Inverse kinematics of the PUMA 560 in closed form: eight branches of the six-joint arm, four of the cut ones.
 
-The wrist centre gives the shoulder (front or back of it) and a triangle (elbow up or down); the orientation that is
-left gives the three wrist angles in two ways. Arrays are kept as (shoulder, elbow, wrist, m).
+The wrist centre determines the azimuth (front or back) and a triangle (elbow up or down); the remaining rotation
+determines the three wrist angles in two ways. Arrays have the axes (shoulder, elbow, wrist, m).
 """
 
 from __future__ import annotations
@@ -19,19 +19,19 @@ from rrtik_ompl.ik.analytic.analytic_solver import AnalyticSolver, Branches, two
 from rrtik_ompl.kernels.ik.branch_layout import REACH_TOLERANCE, SHOULDER_ROOT, SINGULAR
 
 Numbers = NDArray[np.float64]
-MISFIT = 1e-9  # sine of the angle between axis 5 and where a pose wants it; more is out of reach for five joints
+MISFIT = 1e-9  # largest sine of the angle between axis 5 and its wanted direction that five joints count as in reach
 ARM_BRANCHES = tuple(" ".join(tag) for tag in product(("front", "back"), ("up", "down")))
 BRANCHES = tuple(" ".join(tag) for tag in product(("front", "back"), ("up", "down"), ("near", "flip")))
 
 
 @dataclass(frozen=True, slots=True)
 class PumaGeometry:
-    """Lengths [m] in the standard Denavit-Hartenberg sense, z of the shoulder's axis to the right of the arm.
+    """Lengths [m] in the standard Denavit-Hartenberg convention, with z of the shoulder's axis to the right of the arm.
 
     Attributes:
         base: Height of the shoulder.
-        a2: Upper arm.
-        a3, d4: Forearm, across and along.
+        a2: Length of the upper arm.
+        a3, d4: Offset across the forearm, and length along it.
         d3: Sideways offset of the arm plane.
     """
 
@@ -43,12 +43,12 @@ class PumaGeometry:
 
     @property
     def forearm(self) -> float:
-        """Elbow axis to wrist centre."""
+        """Distance from the elbow axis to the wrist centre [m]."""
         return float(np.hypot(self.a3, self.d4))
 
 
 def pose_form(geometry: PumaGeometry) -> AnalyticSolver:
-    """The six-joint arm. With the wrist straight (family ``wrist``) theta4 is free, and theta6 follows it."""
+    """Return the closed form of the six-joint arm; with a straight wrist (family ``wrist``) theta4 is free."""
     solve = partial(puma_branches, geometry)
     near = partial(nearness, geometry)
     numbers = (geometry.base, geometry.a2, geometry.d3, geometry.forearm, float(np.arctan2(geometry.d4, geometry.a3)))
@@ -56,13 +56,13 @@ def pose_form(geometry: PumaGeometry) -> AnalyticSolver:
 
 
 def position_form(geometry: PumaGeometry) -> AnalyticSolver:
-    """The first three joints in the modified Denavit-Hartenberg sense (theta2, theta3 turn downwards)."""
+    """Return the closed form of the first three joints, modified Denavit-Hartenberg (theta2, theta3 turn downwards)."""
     solve = partial(arm_branches, geometry)
     return AnalyticSolver("tip", "position", ARM_BRANCHES, (), (), solve, partial(nearness, geometry))
 
 
 def five_joint_form(geometry: PumaGeometry, tool: float) -> AnalyticSolver:
-    """Five joints and a segment of length ``tool`` [m] along the last axis, for poses; points leave two joints free."""
+    """Return the closed form of five joints with a segment of length ``tool`` [m] along the last axis, for poses."""
     solve = partial(five_joint_branches, geometry, tool)
     return AnalyticSolver("tip", "pose", ARM_BRANCHES, (), (), solve, partial(nearness, geometry))
 
@@ -70,14 +70,15 @@ def five_joint_form(geometry: PumaGeometry, tool: float) -> AnalyticSolver:
 def puma_branches(
     g: PumaGeometry, poses: Numbers, near: Matrix | None = None, slack: float = 0.0, *_: object
 ) -> Branches:
-    """All eight branches for T_base_tip, shape (m, 4, 4), labelled as in ``BRANCHES``.
+    """Return all eight branches, labelled as in ``BRANCHES``.
 
     Args:
         g: Lengths of the arm.
-        poses: Targets; their origin is the wrist centre.
-        near: Configurations, shape (m, 6), whose theta4 a straight wrist takes; zeros if None.
-        slack: Sine of theta5 up to which the wrist counts as straight, if more than rounding.
-        _: Limits are not used: theta6 can take every direction, so that no theta4 inside its limits is lost.
+        poses: Targets T_base_tip, shape (m, 4, 4); their origin is the wrist centre.
+        near: Configurations whose theta4 a straight wrist takes, shape (m, 6); zeros if None.
+        slack: Sine of theta5 up to which the wrist counts as straight, if that is more than rounding.
+        _: The joint limits, which are not used: theta6 reaches every direction, so any theta4 inside its limits will
+            do.
     """
     numbers = np.ascontiguousarray(poses.transpose(1, 2, 0))
     count = len(poses)
@@ -87,7 +88,7 @@ def puma_branches(
     q = np.empty((6, 2, 2, 2, count))
     q[:3] = arm[:, :, :, None]
 
-    # the tip's axis w in the frame of the forearm: theta4 turns axis 5 normal to it, theta5 is its tilt
+    # The tip's axis w in the frame of the forearm: theta4 turns axis 5 normal to it, and theta5 is its tilt.
     c1 = np.cos(arm[0])
     s1 = np.sin(arm[0])
     c23 = np.cos(arm[1] + arm[2])
@@ -102,7 +103,7 @@ def puma_branches(
     theta4 = np.where(straight, 0.0 if near is None else near[:, 3], np.arctan2(-y, -x))
     theta5 = np.arctan2(sine, z)
 
-    # the axis of joint 5, backwards
+    # The reversed axis of joint 5 and the tip's u and v determine theta6.
     c4 = np.cos(theta4)
     s4 = np.sin(theta4)
     ax = -s4 * c23 * c1 - c4 * s1
@@ -113,7 +114,7 @@ def puma_branches(
     q[3, :, :, 0] = theta4
     q[4, :, :, 0] = theta5
     q[5, :, :, 0] = theta6
-    q[3, :, :, 1] = _opposite(theta4)  # the wrist flipped
+    q[3, :, :, 1] = _opposite(theta4)  # The second way has the wrist flipped.
     q[4, :, :, 1] = -theta5
     q[5, :, :, 1] = _opposite(theta6)
 
@@ -123,7 +124,10 @@ def puma_branches(
 
 
 def arm_branches(g: PumaGeometry, poses: Numbers, *_: object) -> Branches:
-    """All four branches that bring the wrist centre to the origins of poses, shape (m, 4, 4); none is singular."""
+    """Return all four branches that bring the wrist centre to the origins of poses, shape (m, 4, 4).
+
+    No pose is treated as singular.
+    """
     x, y, z = np.ascontiguousarray(poses[:, :3, 3].T)
     q, real = _arm(g, x, y, g.base - z)
     return Branches(
@@ -132,10 +136,10 @@ def arm_branches(g: PumaGeometry, poses: Numbers, *_: object) -> Branches:
 
 
 def five_joint_branches(g: PumaGeometry, tool: float, poses: Numbers, *_: object) -> Branches:
-    """All four branches for T_base_tip, shape (m, 4, 4); none is singular, for the wrist has no roll to give away.
+    """Return all four branches for T_base_tip, shape (m, 4, 4).
 
-    Five joints reach a set of poses with five dimensions: a branch whose axis 5 cannot point as the pose wants is not
-    real, and its residual says how far off it is.
+    No pose is singular, since the wrist has no second roll joint. Five joints reach only a five-dimensional set of
+    poses: a branch whose axis 5 cannot point as the pose demands is not real, and its residual says how far off it is.
     """
     arm = arm_branches(g, poses @ np.array([[1.0, 0, 0, 0], [0, 1.0, 0, 0], [0, 0, 1.0, -tool], [0, 0, 0, 1.0]]))
     theta1 = arm.q[..., 0]
@@ -146,7 +150,7 @@ def five_joint_branches(g: PumaGeometry, tool: float, poses: Numbers, *_: object
     s = np.sin(forearm)
     (ux, uy, uz), (vx, vy, vz), (wx, wy, wz) = poses[:, :3, :3].transpose(2, 1, 0)[..., None]
 
-    # the columns in the frame of the forearm, turned so that they are Rz(theta4) Ry(-theta5)
+    # The columns of the rotation in the frame of the forearm, turned so that they form Rz(theta4) Ry(-theta5).
     v_ahead = vx * c1 + vy * s1
     v_aside = vy * c1 - vx * s1
     u_down, v_down, w_down = (-s * (x * c1 + y * s1) - c * z for x, y, z in ((ux, uy, uz), (vx, vy, vz), (wx, wy, wz)))
@@ -158,7 +162,12 @@ def five_joint_branches(g: PumaGeometry, tool: float, poses: Numbers, *_: object
 
 
 def _arm(g: PumaGeometry, x: Vector, y: Vector, z: Vector) -> tuple[Numbers, NDArray[np.bool_]]:
-    """Joints 1 to 3 for a wrist centre seen from the shoulder: shapes (3, 2, 2, m) and (2, 2, m)."""
+    """Solve joints 1 to 3 for a wrist centre x, y, z seen from the shoulder [m], shape (m,) each.
+
+    Returns:
+        Joint angles [rad], shape (3, 2, 2, m) with the axes (joint, shoulder, elbow, m), and whether the point is in
+        reach, shape (2, 2, m).
+    """
     square = x * x + y * y - g.d3 * g.d3
     radius = np.sqrt(np.where(square < SHOULDER_ROOT, 0.0, square))
     side = np.arctan2(g.d3, radius)
@@ -175,10 +184,11 @@ def _arm(g: PumaGeometry, x: Vector, y: Vector, z: Vector) -> tuple[Numbers, NDA
 
 
 def nearness(g: PumaGeometry, Q: Matrix) -> Mapping[str, Vector]:
-    """Zero at the singularity, for Q of shape (m, dof): sines, for ``shoulder`` metres.
+    """Return for each singular case a value that is 0 at the singularity, for Q, shape (m, dof); shape (m,) each.
 
-    ``elbow``: stretched or folded. ``shoulder``: wrist centre above or below the shoulder, in the plane through the
-    azimuth axis. ``wrist``: axes 4 and 6 in line (six joints). The signs of theta2 and theta3 do not matter here.
+    ``elbow``: sine that vanishes if the elbow is stretched or folded. ``shoulder``: distance [m] of the wrist centre
+    from the plane through the azimuth axis, above or below the shoulder. ``wrist``: sine that vanishes if axes 4 and 6
+    are in line (six joints only). The signs of theta2 and theta3 do not matter here.
     """
     forearm = Q[:, 1] + Q[:, 2]
     radius = g.a2 * np.cos(Q[:, 1]) + g.a3 * np.cos(forearm) - g.d4 * np.sin(forearm)
@@ -187,5 +197,5 @@ def nearness(g: PumaGeometry, Q: Matrix) -> Mapping[str, Vector]:
 
 
 def _opposite(angle: Numbers) -> Numbers:
-    """The angle half a turn away, in (-pi, pi], for angles that are there too."""
+    """Return the angle half a turn away, in (-pi, pi], for angles in (-pi, pi]."""
     return np.where(angle > 0.0, angle - np.pi, angle + np.pi)

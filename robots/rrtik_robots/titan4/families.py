@@ -1,8 +1,8 @@
-"""The curves of solutions that singular poses of the TITAN 4 have: which values of the free angle the arm can reach.
+"""The curves of solutions at singular poses of the TITAN 4: the values of the free angle that the arm can reach.
 
-The intervals have a closed form, so that no scan is needed (poses: [1, ch. 3, app. A to C]). With K the wrist
-point seen from the shoulder axis, the elbow triangle closes where |a2 - a3| <= |K - a4 (cos psi, sin psi)| <= a2 + a3,
-which bounds cos(psi - angle of K) from both sides.
+These are intervals in closed form, so no scan is needed (poses: [1, ch. 3, app. A to C]). Let psi be the sum of the
+three pitch angles and K the wrist point seen from the shoulder axis, in the arm plane. The elbow triangle closes where
+|a2 - a3| <= |K - a4 (cos psi, sin psi)| <= a2 + a3, which bounds cos(psi - angle of K) from both sides.
 """
 
 from __future__ import annotations
@@ -21,15 +21,17 @@ Numbers = NDArray[np.float64]
 def psi_interval(
     g: TitanGeometry, radius: Numbers, height: Numbers
 ) -> tuple[Numbers, Numbers, Numbers, NDArray[np.bool_]]:
-    """Values of psi for which the arm reaches a wrist point: centre - high .. centre - low and centre + low .. + high.
+    """Return the values of psi for which the arm reaches a wrist point.
+
+    They are the two intervals centre - high .. centre - low and centre + low .. centre + high.
 
     Args:
         g: Lengths of the arm.
-        radius: Of the wrist point in the arm plane, from the azimuth axis [m].
-        height: Above the shoulder axis [m], same shape.
+        radius: Distance of the wrist point from the azimuth axis in the arm plane [m], any shape.
+        height: Its height above the shoulder axis [m], same shape.
 
     Returns:
-        ``centre, low, high`` [rad], 0 <= low <= high <= pi, and whether there is any such psi.
+        ``centre, low, high`` [rad], where 0 <= low <= high <= pi, and whether there is any such psi; same shape.
     """
     x = radius - g.a1
     square = x * x + height * height
@@ -46,21 +48,21 @@ def psi_interval(
 def nearest_psi(
     g: TitanGeometry, radius: Numbers, height: Numbers, wanted: Numbers
 ) -> tuple[Numbers, NDArray[np.bool_]]:
-    """The reachable psi nearest to the wanted one, and whether any is reachable; shapes as given."""
+    """Return the reachable psi nearest to the wanted one [rad], and whether any is reachable; shapes as given."""
     centre, low, high, exists = psi_interval(g, radius, height)
     away = wrapped(wanted - centre)
     return centre + np.copysign(np.clip(np.abs(away), low, high), away), exists
 
 
 def psi_at(g: TitanGeometry, radius: Numbers, height: Numbers, limits: Limits) -> Numbers:
-    """Values of psi at which theta2, theta3 or theta4 is at a limit, or the elbow stretched or folded.
+    """Return the values of psi at which theta2, theta3 or theta4 is at a limit, or the elbow is stretched or folded.
 
-    Where a joint is nowhere at its limit, the psi that brings it nearest to it.
+    If a joint reaches its limit nowhere, the value is the psi that brings it nearest to that limit.
 
     Args:
         g: Lengths of the arm.
-        radius: Of the wrist point in the arm plane, from the azimuth axis [m].
-        height: Above the shoulder axis [m], same shape.
+        radius: Distance of the wrist point from the azimuth axis in the arm plane [m].
+        height: Its height above the shoulder axis [m], same shape.
         limits: Lowest and highest joint values [rad], shape (6,) each.
 
     Returns:
@@ -74,15 +76,23 @@ def psi_at(g: TitanGeometry, radius: Numbers, height: Numbers, limits: Limits) -
     for theta3 in (low[2], high[2], 0.0, np.pi):
         values.append(_directions(wrist, g.a4, abs(g.a2 + g.a3 * np.exp(1j * theta3))))
     for theta4 in (low[3], high[3]):
-        bent = g.a3 * np.exp(-1j * theta4) + g.a4  # links 3 and 4 as one, seen from link 4
+        bent = g.a3 * np.exp(-1j * theta4) + g.a4  # links 3 and 4 as one rigid link, in the frame of link 4
         values.append(_directions(wrist, abs(bent), g.a2) - np.angle(bent))
     return np.concatenate(values)
 
 
 def _directions(point: NDArray[np.complex128], near: float, far: float) -> Numbers:
-    """Both directions of a link of length ``near`` that ends at a point, ``far`` from the origin where it begins.
+    """Return both directions of a link that ends at a point and begins at a given distance from the origin.
 
-    Out of reach, the one that comes nearest. Shape (2, ...).
+    If the point is out of reach, both are the direction that comes nearest.
+
+    Args:
+        point: End of the link in the complex plane [m], any shape.
+        near: Length of the link [m].
+        far: Distance of its begin from the origin [m].
+
+    Returns:
+        Angles [rad], shape (2, ...).
     """
     away = np.abs(point)
     cosine = (away * away + near * near - far * far) / np.maximum(2.0 * near * away, 1e-300)
@@ -94,27 +104,28 @@ def _directions(point: NDArray[np.complex128], near: float, far: float) -> Numbe
 def psi_within_rounding(
     g: TitanGeometry, radius: Numbers, height: Numbers, x: Numbers, z: Numbers, room: Numbers
 ) -> tuple[Numbers, Numbers, NDArray[np.bool_]]:
-    """A reachable psi for a gripper axis so nearly normal to the arm plane that rounding decides its psi, atan2(z, x).
+    """Find a reachable psi for a gripper axis so nearly normal to the arm plane that rounding decides atan2(z, x).
 
-    Beside the azimuth axis the arm plane can be turned at hardly any cost to the wrist point: that moves x.
+    The axis is changed as little as possible: z within rounding, and x by turning the arm plane, which hardly moves a
+    wrist point near the azimuth axis.
 
     Args:
         g: Lengths of the arm.
-        radius: Of the wrist point in the arm plane [m].
-        height: Above the shoulder axis [m].
-        x: Part of the gripper axis along the arm plane's horizontal, same shape.
-        z: Vertical part.
-        room: By how much x may change; z may by ``SINGULAR``.
+        radius: Distance of the wrist point from the azimuth axis in the arm plane [m].
+        height: Its height above the shoulder axis [m].
+        x: Component of the gripper axis along the arm plane's horizontal, same shape.
+        z: Its vertical component.
+        room: Largest change of x; z may change by ``SINGULAR``.
 
     Returns:
-        psi at an end of its intervals, the x that belongs to it, and whether both changes are allowed.
+        psi at an end of its intervals [rad], the x that belongs to it, and whether both changes are allowed.
     """
     centre, low, high, exists = psi_interval(g, radius, height)
     psi = centre + np.stack([low, -low, high, -high])
     c = np.cos(psi)
     s = np.sin(psi)
 
-    # for each psi the length of the axis in the plane that changes x and z least, each by its own measure
+    # For each psi, the length of the axis in the plane that changes x and z least, each in units of its allowed change.
     weight = (SINGULAR / room) ** 2
     length = np.maximum((weight * x * c + z * s) / (weight * c * c + s * s), 0.0)
     cost = np.maximum(np.abs(length * c - x) / room, np.abs(length * s - z) / SINGULAR)
@@ -125,16 +136,16 @@ def psi_within_rounding(
 
 
 def nearest_azimuth(g: TitanGeometry, w: Matrix, height: Vector, wanted: Numbers) -> Numbers:
-    """With the wrist point on the azimuth axis: the theta1 nearest to the wanted one that the arm can reach.
+    """Return the reachable theta1 nearest to the wanted one, for a wrist point on the azimuth axis.
 
-    It is the wanted one, or an end of an interval of reachable psi, or the one that turns the arm plane normal to the
-    gripper axis (where psi is free). If none is reachable, the wanted one.
+    It is the wanted one, or the one at an end of an interval of reachable psi, or the one that turns the arm plane
+    normal to the gripper axis (where psi is free). If none of these is reachable, it is the wanted one.
 
     Args:
         g: Lengths of the arm.
         w: Gripper axis, shape (3, m).
-        height: Of the wrist point above the shoulder axis [m], shape (m,).
-        wanted: Shape (2, 2, m); the second axis is the way of the wrist, sigma = 1, -1.
+        height: Height of the wrist point above the shoulder axis [m], shape (m,).
+        wanted: Wanted theta1 [rad], shape (2, 2, m); the second axis is the wrist's branch, sigma = 1, -1.
     """
     sigma = np.array([1.0, -1.0])[:, None]
     choices = np.concatenate([wanted[None], _ends(g, w, height, wanted.shape)])
@@ -149,7 +160,7 @@ def nearest_azimuth(g: TitanGeometry, w: Matrix, height: Vector, wanted: Numbers
 
 
 def _ends(g: TitanGeometry, w: Matrix, height: Vector, shape: tuple[int, ...]) -> Numbers:
-    """Values of theta1 at which psi is at an end of its intervals, or is free; shape (10, 2, 2, m)."""
+    """Return the values of theta1 [rad] at which psi is at an end of its intervals, or is free; shape (10, 2, 2, m)."""
     centre, low, high, _ = psi_interval(g, np.zeros_like(height), height)
     psi = centre + np.stack([low, -low, high, -high])
     flat = np.hypot(w[0], w[1])

@@ -1,4 +1,4 @@
-"""Measures and joint limits of the TITAN 4 manipulator; the README beside this file has all sources."""
+"""Lengths and joint limits of the TITAN 4 manipulator; the README in this folder names all sources."""
 
 from __future__ import annotations
 
@@ -32,8 +32,9 @@ class TitanGeometry:
         shoulder_height: Shoulder axis above the mounting face.
         base_rear: Azimuth axis to the rear edge of the base.
         knee_along, knee_above: Knee of the upper arm, along and above the line from shoulder to elbow.
-        base_radius, base_height: Base cylinder, standing on the mounting face.
-        shoulder_radius, upper_arm_radius, knee_radius, forearm_radius, wrist_radius, gripper_radius: Of the capsules.
+        base_radius, base_height: Radius and height of the base cylinder, which stands on the mounting face.
+        shoulder_radius, upper_arm_radius, knee_radius, forearm_radius, wrist_radius, gripper_radius: Radii of the
+            capsules.
     """
 
     a1: float = 0.122
@@ -67,10 +68,10 @@ class TitanGeometry:
 
 
 def geometry_from(lengths: Mapping[str, float] | TitanGeometry | None) -> TitanGeometry:
-    """The default geometry with the given lengths [m] in it.
+    """Return the default geometry with the given lengths [m] replaced, or the geometry itself.
 
     Raises:
-        InputError: If they are no mapping, or a length has a name that `TitanGeometry` does not know.
+        InputError: If the argument is no mapping, or a length has a name that `TitanGeometry` does not know.
     """
     if isinstance(lengths, TitanGeometry):
         return lengths
@@ -86,7 +87,7 @@ def geometry_from(lengths: Mapping[str, float] | TitanGeometry | None) -> TitanG
 
 
 def limits_rad(which: str) -> dict[str, tuple[float, float]]:
-    """Limit set ``"planning"`` or ``"envelope"`` [rad] by joint.
+    """Return the lower and upper limit [rad] of each joint in the set ``"planning"`` or ``"envelope"``, by name.
 
     Raises:
         InputError: If there is no set of that name.

@@ -1,8 +1,9 @@
-"""Inverse kinematics of the TITAN 4 in closed form: eight branches, and a representative of every singular family.
+"""Inverse kinematics of the TITAN 4 in closed form: eight branches, and representatives of every singular family.
 
-Source: [1, ch. 3, app. A to C]. Axes 2, 3, 4 are parallel, axes 5 and 6 meet in the wrist point
-P = E - d6 w. The azimuth follows from P (front or back), the wrist yaw and the sum psi of the three pitch angles from
-w (two ways), and what is left is a triangle (elbow up or down). Arrays are kept as (shoulder, wrist, elbow, m).
+Source: [1, ch. 3, app. A to C]. Axes 2, 3 and 4 are parallel, axes 5 and 6 meet in the wrist point P = E - d6 w, where
+E is the grip point and w the gripper axis. The azimuth follows from P (front or back); the wrist yaw and the sum psi of
+the three pitch angles follow from w (two ways); the rest is a triangle (elbow up or down). Arrays have the axes
+(shoulder, wrist, elbow, m).
 """
 
 from __future__ import annotations
@@ -24,15 +25,15 @@ from rrtik_robots.titan4.singularities import nearness
 
 FAMILIES = ("wrist", "shoulder")
 BRANCHES = tuple(" ".join(tag) for tag in product(("front", "back"), ("near", "far"), ("up", "down")))
-MAX_SHIFT = 0.5  # of the part of the gripper axis in the arm plane: how far rounding may move it at most
+MAX_SHIFT = 0.5  # largest change that rounding may cause in the component of the gripper axis in the arm plane
 
 
 def closed_form(geometry: TitanGeometry) -> AnalyticSolver:
-    """The arm's own inverse kinematics for frame ``grip_point``.
+    """Return the closed form of the arm for the frame ``grip_point``.
 
-    Where the gripper axis is normal to the arm plane (family ``wrist``) psi is free, and where P lies on the azimuth
-    axis (family ``shoulder``) theta1 is: the representatives have the nearest values that the arm can reach, inside
-    its limits wherever it can do so there.
+    Where the gripper axis is normal to the arm plane (family ``wrist``), psi is free; where P lies on the azimuth axis
+    (family ``shoulder``), theta1 is free. The representatives have the nearest values that the arm can reach, inside
+    its limits wherever that is possible.
     """
     solve = partial(titan_branches, geometry)
     near = partial(nearness, geometry)
@@ -49,14 +50,14 @@ def titan_branches(
     slack: float = 0.0,
     limits: Limits | None = None,
 ) -> Branches:
-    """All eight branches for T_base_E, shape (m, 4, 4), labelled as in ``BRANCHES``; angles are physical ones.
+    """Return all eight branches, labelled as in ``BRANCHES``, with the physical joint angles.
 
     Args:
         g: Lengths of the arm.
-        poses: Targets.
-        near: Configurations, shape (m, 6), that say which member of a singular family is wanted; zeros if None.
-        slack: How near to singular counts as singular [m, sine], if more than rounding.
-        limits: Of the joints; representatives outside are replaced by members inside, if there are any.
+        poses: Targets T_base_E, shape (m, 4, 4).
+        near: Configurations near which members of a singular family are wanted, shape (m, 6); zeros if None.
+        slack: How near to a singular pose a pose counts as singular [m, sine], if that is more than rounding.
+        limits: Joint limits; representatives outside are replaced by members inside, if there are any.
     """
     numbers = np.ascontiguousarray(poses.transpose(1, 2, 0))
     w = numbers[:3, 2]
@@ -68,7 +69,8 @@ def titan_branches(
     x, h = in_plane(target, c1, s1)
     normal = h < np.maximum(np.minimum(SINGULAR + ROUNDING / np.maximum(distance, SINGULAR), NORMAL), slack)
 
-    direction = SIGMA * np.stack([x, w[2]])[:, None] / np.where(normal, 1.0, h)  # cosine and sine of psi, (2, 2, m)
+    # Cosine and sine of psi for both ways of the wrist, shape (2, 2, m).
+    direction = SIGMA * np.stack([x, w[2]])[:, None] / np.where(normal, 1.0, h)
     cosines = np.stack([direction[0], -direction[0]])
     sines = np.stack([direction[1], direction[1]])
     front = np.arctan2(target.p[1], target.p[0])
@@ -76,7 +78,8 @@ def titan_branches(
     turn = np.stack([np.stack([c1, -c1]), np.stack([s1, -s1])])[:, :, None]
     q, real = completed(g, target, theta1, turn, cosines, sines)
     odd = np.flatnonzero(on_axis | normal | ((h < UNSURE) & ~real.all(axis=(0, 1, 2))))
-    horizontal = np.abs(w[2]) < max(SINGULAR, slack)  # then the arm plane can be turned normal to the gripper axis
+    # If the gripper axis is horizontal too, the arm plane can be turned normal to it, where psi is free.
+    horizontal = np.abs(w[2]) < max(SINGULAR, slack)
     any_psi = normal | (on_axis & horizontal)
     singular = (any_psi * np.uint8(1) + on_axis * np.uint8(2)).astype(np.uint8)
 
@@ -94,10 +97,20 @@ def titan_branches(
 def _representatives(
     g: TitanGeometry, target: Target, on_axis: NDArray[np.bool_], normal: NDArray[np.bool_], near: Matrix
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Branches of singular poses: what is free takes the value nearest to that of ``near`` that the arm can reach.
+    """Return the branches of singular poses, whose free angle takes the reachable value nearest to that in ``near``.
 
-    Where psi is not free but poorly known, it moves into reach if that turns the gripper, or the wrist point about the
-    azimuth axis, by no more than rounding.
+    Where psi is not free but poorly determined, it is moved into reach if that turns the gripper, or the wrist point
+    about the azimuth axis, by no more than rounding.
+
+    Args:
+        g: Lengths of the arm.
+        target: m poses.
+        on_axis: Whether the wrist point is on the azimuth axis, shape (m,).
+        normal: Whether the gripper axis is normal to the arm plane, shape (m,).
+        near: Wanted configurations, shape (m, 6).
+
+    Returns:
+        Joint angles [rad], shape (6, 2, 2, 2, m), and whether they reach the pose, shape (2, 2, 2, m).
     """
     front = np.where(on_axis, near[:, 0], np.arctan2(target.p[1], target.p[0]))
     theta1 = np.broadcast_to((front + np.array([0.0, np.pi])[:, None])[:, None], (2, 2, len(near))).copy()
@@ -125,7 +138,7 @@ def _representatives(
 
 
 def _turned_to(target: Target, theta1: NDArray[np.float64], x: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The azimuth nearest to ``theta1`` at which the gripper axis has the part x along the arm plane."""
+    """Return the azimuth nearest to ``theta1`` at which the gripper axis has the component x along the arm plane."""
     flat = np.hypot(*target.w[:2])
     heading = np.arctan2(target.w[1], target.w[0])
     away = np.arccos(np.clip(x / np.maximum(flat, SINGULAR), -1.0, 1.0))

@@ -1,8 +1,8 @@
-"""Members inside the joint limits of the curves of solutions that singular poses of the TITAN 4 have.
+"""The solution curves of singular poses of the TITAN 4: finding their members inside the joint limits.
 
-A curve enters and leaves the limits where one joint is at a limit, and all these places have a closed form. Between two
-neighbours of them either all members are inside or none is, so that the places and one member between each two of them
-hold a member inside whenever there is one.
+A curve enters and leaves the limits only where a joint is at a limit, and all these places have a closed form. Between
+two neighbouring places either all members are inside or none is. So it is enough to check the places themselves and one
+member between each two of them.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from rrtik_robots.titan4.geometry import TitanGeometry
 from rrtik_robots.titan4.postures import SIGMA, Target, completed
 
 Numbers = NDArray[np.float64]
-AT_LIMIT = 1e-8  # [rad] that rounding may put a member beyond the limit that it was computed for
-ROWS = 256  # poses at a time: their members stay in the cache
+AT_LIMIT = 1e-8  # [rad]: rounding may put a member this far beyond the limit that it was computed for
+ROWS = 256  # number of poses whose members fit into the cache
 SIDES = np.array([0.0, np.pi])[:, None]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Singular:
-    """What is singular about m poses.
+    """How each of m poses is singular.
 
     Attributes:
         on_axis: Whether the wrist point is on the azimuth axis, so that theta1 is free, shape (m,).
@@ -40,7 +40,7 @@ class Singular:
     near: Matrix
 
     def rows(self, which: NDArray[np.int64]) -> Singular:
-        """The same of the poses of these numbers."""
+        """Return the rows of the poses with these indices."""
         return Singular(self.on_axis[which], self.any_psi[which], self.near[which])
 
 
@@ -52,13 +52,13 @@ def moved_inside(
     Args:
         g: Lengths of the arm.
         target: m poses.
-        where: What is singular about them.
-        limits: Lowest and highest joint values, shape (6,) each.
-        q: Representatives, shape (6, 2, 2, 2, m).
+        where: How they are singular.
+        limits: Lowest and highest joint values [rad], shape (6,) each.
+        q: Representatives [rad], shape (6, 2, 2, 2, m).
         real: Whether they reach their poses, shape (2, 2, 2, m).
 
     Returns:
-        The same two, as far as there are such members.
+        Copies of q and real, in which representatives are replaced where there are members inside.
     """
     bounds = _turns(limits)
     moved = q.copy()
@@ -75,21 +75,21 @@ def moved_inside(
 
 
 def _turns(limits: Limits) -> Limits:
-    """The same limits, half a turn to both sides for joints that have a full turn or more."""
+    """Return the limits, replaced by half a turn to both sides for joints that have a full turn or more."""
     low, high = limits
     whole = ~(high - low < TAU)
     return np.where(whole, -np.pi, low), np.where(whole, np.pi, high)
 
 
 def _inside(q: Numbers, limits: Limits) -> Mask:
-    """Which configurations, shape (6, ...), are inside the limits up to full turns."""
+    """Check which configurations, shape (6, ...), are inside the limits up to full turns; shape (...)."""
     low, width = (each.reshape(6, *[1] * (q.ndim - 1)) for each in (limits[0] - AT_LIMIT, limits[1] - limits[0]))
     inside: Mask = np.asarray((np.mod(q - low, TAU) <= width + 2.0 * AT_LIMIT).all(axis=0))
     return inside
 
 
 def _nearest(g: TitanGeometry, target: Target, where: Singular, limits: Limits) -> tuple[Numbers, Mask]:
-    """Of each branch the nearest member inside the limits, shape (6, 2, 2, 2, m), and whether there is any."""
+    """Return the nearest member inside the limits for each branch, shape (6, 2, 2, 2, m), and whether there is any."""
     count = len(where.near)
     q = np.zeros((6, 2, 2, 2, count))
     cost = np.full((2, 2, 2, count), np.inf)
@@ -119,11 +119,11 @@ def _nearest(g: TitanGeometry, target: Target, where: Singular, limits: Limits) 
 def _turned_members(
     g: TitanGeometry, target: Target, where: Singular, limits: Limits
 ) -> tuple[Numbers, Numbers, Numbers]:
-    """With the wrist point on the azimuth axis: theta1 is free, and psi follows it.
+    """Return members for a wrist point on the azimuth axis, where theta1 is free and psi follows from it.
 
     Returns:
-        theta1 and psi of k members, shape (k, 2, m), the second axis the way of the wrist; and how far they are from
-        what front and back are wanted to be [rad], shape (2, k, 2, m).
+        theta1 and psi of k members [rad], shape (k, 2, m), where the second axis is the wrist's branch; and their
+        distances from the wanted theta1 of the front and the back branch [rad], shape (2, k, 2, m).
     """
     wx, wy, wz = target.w
     height = target.p[2]
@@ -151,7 +151,11 @@ def _turned_members(
 def _pitched_members(
     g: TitanGeometry, target: Target, where: Singular, limits: Limits
 ) -> tuple[Numbers, Numbers, Numbers]:
-    """With the gripper axis normal to the arm plane: psi is free, and theta1 has two values. As `_turned_members`."""
+    """Return members for a gripper axis normal to the arm plane, where psi is free and theta1 has two values.
+
+    Returns:
+        The same as `_turned_members`; the distances include those from the wanted psi.
+    """
     px, py, height = target.p
     wx, wy, _ = target.w
     first = np.where(where.on_axis, np.arctan2(wy, wx) + np.pi / 2, np.arctan2(py, px))
@@ -172,18 +176,22 @@ def _pitched_members(
 
     front = np.where(where.on_axis, where.near[:, 0], first)
     turned = np.abs(wrapped(both - (front + SIDES)[:, None, None]))
-    other_side = ~where.on_axis & (turned > np.pi / 2)  # theta1 is not free: the members of the other branch
+    # Off the azimuth axis theta1 is not free, so members with the other value belong to the other branch.
+    other_side = ~where.on_axis & (turned > np.pi / 2)
     distance = np.where(other_side, np.inf, turned + np.abs(wrapped(psi - wanted)))
     return both, psi, distance
 
 
 def _pair(limits: Limits, joint: int) -> Matrix:
-    """Both limits of a joint, shape (2, 1)."""
+    """Return both limits of a joint [rad], shape (2, 1)."""
     return np.array([[limits[0][joint]], [limits[1][joint]]])
 
 
 def _yaw_axes(target: Target, limits: Limits) -> Numbers:
-    """Axis 5 where theta6 is at a limit, for theta6 is its angle from u about the gripper axis; shape (3, 2, m)."""
+    """Return the directions of axis 5 with theta6 at either limit, shape (3, 2, m).
+
+    theta6 is the angle of axis 5 from the pose's u column about the gripper axis.
+    """
     theta6 = _pair(limits, 5)
     across = np.cross(target.w, target.u, axis=0)
     axis: Numbers = np.cos(theta6) * target.u[:, None] - np.sin(theta6) * across[:, None]
@@ -191,7 +199,7 @@ def _yaw_axes(target: Target, limits: Limits) -> Numbers:
 
 
 def _with_middles(angles: Numbers) -> Numbers:
-    """Angles in order, then the middle between each and the next on the circle, shape (2 k, ...)."""
+    """Return k angles in order, then the middle between each and the next one on the circle; shape (2 k, ...)."""
     ordered: Vector = np.sort(wrapped(angles), axis=0)
     after = np.concatenate([ordered[1:], ordered[:1] + TAU])
     return np.concatenate([ordered, 0.5 * (ordered + after)])

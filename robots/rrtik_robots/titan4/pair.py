@@ -27,13 +27,13 @@ NAMED = ("link", "parent", "child", "joint", "collision", "capsule")  # elements
 
 
 def two_titan4(*, apart: float = APART, tip: str = "left_grip_point", base_pose: BasePose = None) -> Robot:
-    """Two arms that look along x, the left one at positive y; the world's origin is in the middle between them.
+    """Make a robot of two arms that face along x, the left one at positive y, with the origin midway between them.
 
     Names of links and joints are those of the single arm after ``left_`` and ``right_``. A
     :class:`rrtik_ompl.MultiGoal` has a goal for ``left_grip_point`` and one for ``right_grip_point``.
 
     Args:
-        apart: Between the azimuth axes [m].
+        apart: Distance between the azimuth axes [m].
         tip: Link that goals of a single tip refer to.
         base_pose: ``pinocchio.SE3`` T_world_base.
 
@@ -61,7 +61,7 @@ def two_titan4(*, apart: float = APART, tip: str = "left_grip_point", base_pose:
 
 
 def two_titan4_urdf(apart: float = APART) -> str:
-    """URDF text of both arms, ``apart`` [m] from each other."""
+    """Return the URDF text of both arms, whose azimuth axes are ``apart`` [m]."""
     pair = Element("robot", name="two_titan4")
     SubElement(pair, "link", name="frame")
     for side, y in zip(SIDES, (0.5 * apart, -0.5 * apart), strict=True):
@@ -69,7 +69,7 @@ def two_titan4_urdf(apart: float = APART) -> str:
             if element.tag != "material":
                 _rename(element, side)
                 pair.append(element)
-            elif side == SIDES[0]:  # both arms share them
+            elif side == SIDES[0]:  # Both arms share the materials.
                 pair.append(element)
 
         mount = SubElement(pair, "joint", name=f"{side}mount", type="fixed")
@@ -80,7 +80,7 @@ def two_titan4_urdf(apart: float = APART) -> str:
 
 
 def _rename(element: Element, side: str) -> None:
-    """Put the side before every name of a link, a joint or a collision body."""
+    """Put the side before every name of a link, a joint or a collision body, in place."""
     for each in element.iter():
         if each.tag in NAMED:
             for key in ("name", "link"):

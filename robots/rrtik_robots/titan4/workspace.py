@@ -1,7 +1,7 @@
-"""Where the TITAN 4 can be used on its vehicle: in reach with a margin, seen by a camera, clear of the vehicle.
+"""Effective workspace of the TITAN 4 on its vehicle: in reach with a margin, seen by a camera and clear of the vehicle.
 
-Source: [1, ch. 3]. The published figures with numbers are lost: poses and sizes of cameras and vehicle are **chosen**
-here; everything can be set.
+Source: [1, ch. 3]. The published figures with numbers are lost, so poses and sizes of cameras and vehicle are
+**chosen** here; all of them can be set.
 """
 
 from __future__ import annotations
@@ -23,23 +23,23 @@ from rrtik_ompl.model.robot import Robot
 PITCHES_DEG = tuple(range(-90, 91, 15))  # of the gripper in the arm plane, with a straight wrist
 CELL = 0.025  # [m]
 GRID = ((-1.4, 2.2), (-2.1, 2.2), (-1.7, 2.0))  # x, y, z in the base frame [m]
-FAR_VEHICLE = frozen([[98.0, 98.0, 98.0], [99.0, 99.0, 99.0]])  # a vehicle that is in nobody's way
+FAR_VEHICLE = frozen([[98.0, 98.0, 98.0], [99.0, 99.0, 99.0]])  # a vehicle so far away that it has no effect
 JOINTS_OF_POINTS = ("forearm", "wrist", "yaw_housing")  # links whose origins are elbow, wrist pitch and wrist yaw axis
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Camera:
-    """A camera that can be turned. It sees what lies inside its picture for one of the ways it can look.
+    """A camera on a pan-tilt unit. It sees a point that lies inside its picture for some pan and tilt.
 
     Attributes:
-        position: In the arm's base frame [m], shape (3,).
-        target: Point it looks at in its middle position [m], shape (3,).
+        position: Position in the arm's base frame [m], shape (3,).
+        target: Point that it looks at in its middle position [m], shape (3,).
         diagonal_deg: Field of view over the diagonal [deg].
         aspect: Width over height of the picture.
-        pan_deg: How far it can be turned to either side about the vertical [deg].
-        tilt_deg: How far it can be turned up and down [deg].
-        nearest: Distance from which on it is sharp [m].
-        farthest: Distance up to which the water is clear enough [m].
+        pan_deg: Largest pan to either side about the vertical [deg].
+        tilt_deg: Largest tilt up and down [deg].
+        nearest: Least distance at which the picture is sharp [m].
+        farthest: Largest distance at which the water is clear enough [m].
     """
 
     position: Vector
@@ -58,7 +58,7 @@ class Camera:
             raise InputError("camera: it looks straight up or down, where pan has no meaning; move its target aside")
 
     def sees(self, points: ArrayLike) -> Mask:
-        """Which points, shape (m, 3) in the base frame, it can bring into its picture. Shape (m,)."""
+        """Check which points, shape (m, 3) in the base frame [m], it can bring into its picture; shape (m,)."""
         half = np.tan(np.radians(self.diagonal_deg) / 2.0) / np.hypot(self.aspect, 1.0)
         middle = self.target - self.position
         to_points = np.asarray(points, dtype=np.float64) - self.position
@@ -90,10 +90,10 @@ class EffectiveWorkspace:
     """The operating space of an arm on its vehicle.
 
     Attributes:
-        robot: A TITAN 4; take ``limits="envelope"`` for statements about reach.
-        cameras: One of them must see the grip point.
-        vehicle: Corners of the vehicle's box in the base frame [m], shape (2, 3): it must not hold the elbow, the wrist
-            or the grip point. 3 m long, 2 m high, behind and above the base.
+        robot: A TITAN 4; use ``limits="envelope"`` for statements about reach.
+        cameras: Cameras, one of which has to see the grip point.
+        vehicle: Low and high corner of the vehicle's box in the base frame [m], shape (2, 3). Elbow, wrist and grip
+            point must be outside. The default is 3 m long and 2 m high, behind and above the base.
         margin: Distance that every joint keeps from its limits [rad].
     """
 
@@ -103,7 +103,7 @@ class EffectiveWorkspace:
     margin: float = float(np.radians(5.0))
 
     def contains(self, poses: ArrayLike) -> Mask:
-        """Which poses T_world_tip, shape (m, 4, 4), belong to it. Shape (m,).
+        """Check which poses T_world_tip, shape (m, 4, 4), belong to the workspace; shape (m,).
 
         Raises:
             InputError: If a target is no pose.
@@ -119,17 +119,34 @@ class EffectiveWorkspace:
         return np.asarray(fits.any(axis=1) & seen, dtype=np.bool_)
 
     def side_view(self, x: ArrayLike, z: ArrayLike) -> NDArray[np.bool_]:
-        """The slice through the azimuth axis and straight ahead, for a grid in the base frame [m]. Shape (z, x)."""
+        """Return the upright slice through the azimuth axis and straight ahead, on a grid in the base frame.
+
+        Args:
+            x: Coordinates of the grid along x [m].
+            z: Coordinates of the grid along z [m].
+
+        Returns:
+            Whether each point belongs to the workspace, shape (len(z), len(x)).
+        """
         across, up = np.meshgrid(np.asarray(x, dtype=np.float64), np.asarray(z, dtype=np.float64))
         return self._slice(np.stack([across, np.zeros_like(across), up], axis=-1))
 
     def top_view(self, x: ArrayLike, y: ArrayLike, height: float = 0.0) -> NDArray[np.bool_]:
-        """The horizontal slice at a height above the shoulder axis, for a grid in the base frame [m]. Shape (y, x)."""
+        """Return the horizontal slice at a height above the shoulder axis, on a grid in the base frame.
+
+        Args:
+            x: Coordinates of the grid along x [m].
+            y: Coordinates of the grid along y [m].
+            height: Height of the slice [m].
+
+        Returns:
+            Whether each point belongs to the workspace, shape (len(y), len(x)).
+        """
         along, across = np.meshgrid(np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64))
         return self._slice(np.stack([along, across, np.full_like(along, height)], axis=-1))
 
     def _slice(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Points at which the gripper can be used straight ahead in the arm plane at one of ``PITCHES_DEG``."""
+        """Check at which points, shape (..., 3), the gripper can be used straight ahead at one of ``PITCHES_DEG``."""
         flat = points.reshape(-1, 3)
         heading = np.arctan2(flat[:, 1], flat[:, 0])[:, None]
         pitch = np.radians(PITCHES_DEG)[None]
@@ -138,7 +155,7 @@ class EffectiveWorkspace:
         return np.asarray(inside.any(axis=-1), dtype=np.bool_)
 
     def _clear(self, Q: Matrix) -> Mask:
-        """Which postures keep elbow, wrist and grip point out of the vehicle's box."""
+        """Check which configurations, shape (m, 6), keep elbow, wrist and grip point out of the vehicle's box."""
         if len(Q) == 0:
             return np.zeros(0, dtype=bool)
         points = [self._in_base(self.robot.fk_batch(Q, frame)[:, :3, 3]) for frame in (*JOINTS_OF_POINTS, "grip_point")]
@@ -147,7 +164,7 @@ class EffectiveWorkspace:
         return np.asarray(~inside.any(axis=0), dtype=np.bool_)
 
     def _base(self) -> NDArray[np.float64]:
-        """T_world_base."""
+        """Return T_world_base, shape (4, 4)."""
         base: NDArray[np.float64] = self.robot.fk_batch(np.zeros(self.robot.dof), self.robot.link_names[0])[0]
         return base
 
@@ -158,11 +175,11 @@ class EffectiveWorkspace:
 
 
 def effective_slices(space: EffectiveWorkspace | None = None, *, cell: float = CELL) -> list[Slice]:
-    """Side and top view: 1 where the gripper reaches, 3 where it can be used (seen, clear, away from the limits).
+    """Return side and top view: 1 where the gripper reaches, 3 where it can be used (seen, clear, away from limits).
 
     Args:
-        space: Of a robot with its cameras and vehicle; the defaults with the envelope limits if None.
-        cell: Of the grid [m].
+        space: The workspace of a robot with its cameras and vehicle; the defaults with the envelope limits if None.
+        cell: Distance between points of the grid [m].
     """
     used = EffectiveWorkspace(load_robot("titan4", limits="envelope")) if space is None else space
     reach = replace(used, cameras=[ALL_SEEING], vehicle=FAR_VEHICLE, margin=0.0)
@@ -189,15 +206,15 @@ def effective_slices(space: EffectiveWorkspace | None = None, *, cell: float = C
 
 
 def gripper_poses(points: ArrayLike, heading: ArrayLike, pitch: ArrayLike) -> NDArray[np.float64]:
-    """Poses of the grip point whose approach axis has a heading and a pitch [rad], without roll; shapes broadcast.
+    """Return poses of the grip point whose approach axis has a heading and a pitch, without roll; shapes broadcast.
 
     Args:
-        points: Shape (..., 3) [m].
-        heading: Of the approach axis about the vertical, 0 along x, shape (...).
-        pitch: Above the horizontal, shape (...).
+        points: Positions of the grip point [m], shape (..., 3).
+        heading: Angle of the approach axis about the vertical, 0 along x [rad], shape (...).
+        pitch: Angle of the approach axis above the horizontal [rad], shape (...).
 
     Returns:
-        Shape (..., 4, 4).
+        Poses, shape (..., 4, 4).
     """
     c, s, cp, sp = (f(np.asarray(a, dtype=np.float64)) for a in (heading, pitch) for f in (np.cos, np.sin))
     shape = np.broadcast_shapes(np.shape(points)[:-1], np.shape(c), np.shape(cp))
