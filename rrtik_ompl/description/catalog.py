@@ -14,18 +14,21 @@ import inspect
 import json
 import os
 import threading
+import warnings
 from collections import OrderedDict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from importlib import import_module
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from rrtik_ompl.base.choices import one_of
 from rrtik_ompl.base.errors import InputError, RrtikError, UnknownNameError, listed, name_of, require
 from rrtik_ompl.description.robot_source import base_pose, plain, source_entry
 from rrtik_ompl.description.urdf import URDF_OPTIONS, robot_from_urdf
@@ -42,6 +45,7 @@ RobotOption: TypeAlias = (
     str | float | os.PathLike[str] | Mapping[str, object] | Sequence[object] | NDArray[np.float64] | pin.SE3 | None
 )
 
+SOLVED_KINDS = ("any goal", "goal of the tip", "path constraints")  # what planners of "auto" say that they solve
 FILE_OPTIONS = ("urdf", "srdf", "joint_limits", "dh", "moveit", "mjcf")
 FILE_KINDS = (".urdf", ".xml", ".mjcf", ".xacro", ".yaml", ".yml")
 PARAMETRIC = ("planar", "point2d")  # robots that a problem file describes by their own group of keys
@@ -78,17 +82,28 @@ def find_planner(name: str) -> type[Any]:
 
 
 @cache
-def portfolio() -> dict[str, str]:
+def portfolio() -> Mapping[str, str]:
     """Return the planners that "auto" uses, in the order of their turns, each with the kind of goal that it solves.
 
     A package that offers planners lists them in ``PORTFOLIO`` of its top-level module, by name: "any goal", "goal of
     the tip" (the planner finds the configurations itself) or "path constraints". No planner is imported for this.
     """
-    packages = sorted({entry.module.partition(".")[0] for entry in _offers("planners").values()})
+    offered = _offers("planners")
+    packages = sorted({entry.module.partition(".")[0] for entry in offered.values()})
     found: dict[str, str] = {}
+
     for package in packages:
-        found |= getattr(import_module(package), "PORTFOLIO", {})
-    return found
+        try:
+            listed: Mapping[str, str] = getattr(import_module(package), "PORTFOLIO", {})
+        except Exception as error:
+            # The default planner does without the planners of a package that is broken.
+            warnings.warn(f"planners of '{package}' are left out of \"auto\": {error}; reinstall it", stacklevel=2)
+            continue
+        for name, solves in listed.items():
+            kind = one_of(SOLVED_KINDS, solves, f"kind of goals of '{name}' in PORTFOLIO of '{package}'")
+            if name in offered:
+                found.setdefault(name, kind)
+    return MappingProxyType(found)
 
 
 def find_workspace(robot: str) -> Callable[[], Any]:

@@ -94,8 +94,15 @@ class TimedPoses:
         return pin.SE3(rotation, (1.0 - share) * a.translation + share * b.translation)
 
     def seen_from(self, time: float) -> TimedPoses:
-        """Return the motion with ``time`` [s] as its new time 0."""
-        return changed(self, times=frozen(self.times - time))
+        """Return the motion with ``time`` [s] as its new time 0.
+
+        Raises:
+            InputError: If the time is not finite, or so large that the times of the motion are rounded to equal ones.
+        """
+        times = self.times - finite_number(time, "time of a motion")
+        if not (np.diff(times) > 0.0).all():
+            raise InputError(f"motion times must increase, got {times.tolist()} as seen from {time:g} s")
+        return changed(self, times=frozen(times))
 
 
 Motion: TypeAlias = ConstantVelocity | TimedPoses

@@ -54,8 +54,8 @@ class Loop:
         clock: Clock = time.perf_counter,
         patience: float = SILENCE_SECONDS,
     ) -> None:
-        finite_number(clock(), "clock: what it gives")
-        self._clock = clock
+        # Each reading is checked: a time that is no number would end no repair, and its record could not be read.
+        self._clock = lambda: finite_number(clock(), "clock: what it gives")
         self._problem = problem
         self._feed = feed
         self._settings = settings

@@ -1,10 +1,12 @@
 """The planner "auto": who tries, in what order, what becomes of the path; and the planner that a problem names."""
 
 import time
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+import rrtik_planners
 from rrtik_ompl import Problem, load_problem, plan, plan_batch, save_problem
 from rrtik_ompl.base.errors import InputError, PlannerError, UnknownNameError
 from rrtik_ompl.description import catalog
@@ -53,6 +55,46 @@ def test_planners_that_seek_the_tip_try_goals_of_the_tip_alone(boxes, pose):
     joints, tip = members(boxes), members(pose)
     assert joints[:2] == ("fastrrtconnect", "bicrdt")
     assert set(tip) > set(joints)
+
+
+@pytest.fixture
+def other_package(monkeypatch):
+    """A further package that offers the planner "other", and what stands in its top-level module."""
+    usual, loaded = catalog._offers, catalog.import_module
+    module = SimpleNamespace()
+
+    def load(name):
+        if name != "other_planners":
+            return loaded(name)
+        if isinstance(module.PORTFOLIO, Exception):
+            raise module.PORTFOLIO
+        return module
+
+    offer = SimpleNamespace(module="other_planners.one")
+    monkeypatch.setattr(catalog, "_offers", lambda group: usual(group) | {"other": offer})
+    monkeypatch.setattr(catalog, "import_module", load)
+    catalog.portfolio.cache_clear()
+    yield module
+    catalog.portfolio.cache_clear()
+
+
+def test_another_package_adds_planners_to_auto(other_package):
+    other_package.PORTFOLIO = {"other": "path constraints", "cbirrt": "any goal", "not installed": "any goal"}
+    assert catalog.portfolio()["other"] == "path constraints"
+    assert "not installed" not in catalog.portfolio()
+
+
+def test_a_kind_of_goals_that_nobody_knows_is_refused(other_package):
+    other_package.PORTFOLIO = {"other": "any goals"}
+    with pytest.raises(InputError, match=r"PORTFOLIO of 'other_planners'.*any goals.*any goal"):
+        catalog.portfolio()
+
+
+def test_a_package_that_is_broken_is_left_out_with_a_warning(other_package, boxes):
+    other_package.PORTFOLIO = ImportError("libfoo missing")
+    with pytest.warns(UserWarning, match="'other_planners' are left out.*libfoo missing"):
+        assert dict(catalog.portfolio()) == rrtik_planners.PORTFOLIO
+    assert plan(boxes, seed=0).found
 
 
 def test_planners_of_the_portfolio_solve_what_is_said_of_them():

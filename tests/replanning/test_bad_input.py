@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from itertools import chain, repeat
 
 import numpy as np
 import pinocchio as pin
@@ -41,6 +42,13 @@ def test_a_number_that_makes_no_sense_is_named(changes, words):
     with pytest.raises(InputError, match=words) as caught:
         replan(crossing(), **{**OPTIONS, **changes})
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("later", [float("nan"), "x", None])
+def test_a_clock_that_goes_wrong_later_is_named(later):
+    readings = chain([0.001 * k for k in range(20)], repeat(later))
+    with pytest.raises(InputError, match="clock: what it gives"):
+        replan(crossing(), **{**OPTIONS, "clock": lambda: next(readings)})
 
 
 def test_an_unknown_planner_is_answered_with_those_there_are():

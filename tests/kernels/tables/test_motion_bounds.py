@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rrtik_ompl.kernels import layout
-from rrtik_ompl.kernels.checks import reference
+from rrtik_ompl.kernels.reference import checks as reference
 from rrtik_ompl.kernels.tables.motion_bounds import bounds_table
 from rrtik_tests.random_cases import ARMS, Case, joint_values
 

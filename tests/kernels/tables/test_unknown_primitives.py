@@ -9,7 +9,7 @@ import rrtik_ompl as rrtik
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.geometry.collision.bodies import scene_bodies
 from rrtik_ompl.kernels import FastWorld, layout
-from rrtik_ompl.kernels.checks import reference
+from rrtik_ompl.kernels.reference import checks as reference
 from rrtik_ompl.kernels.tables.primitive_tables import primitive_table
 from rrtik_ompl.kernels.tables.scene_tables import outer_primitives
 
