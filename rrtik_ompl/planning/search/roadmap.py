@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.base.arrays import TAU, Matrix, Vector, filled_rows, finite_array, positive, whole_number
 from rrtik_ompl.base.budget import Stop
-from rrtik_ompl.base.errors import InputError, called, require
+from rrtik_ompl.base.errors import InputError, called, in_file, require
 from rrtik_ompl.files.named_arrays import NamedArrays
 from rrtik_ompl.files.text import known_ending, write_bytes
 from rrtik_ompl.geometry.collision.digests import robot_digest, world_digest
@@ -293,6 +293,8 @@ def load_roadmap(path: str | os.PathLike[str], world: World, *, moved: bool = Fa
     try:
         if (version := data.count("format")) != FORMAT:
             raise InputError(f"its format is {version}, not {FORMAT}")
+        if (name := str(data["robot"])) != world.robot.name:
+            raise InputError(f"it is of robot '{name}'")
         digest = str(data["digest"])
         seed = data.count("seed")
         near = data.count("near")
@@ -311,11 +313,13 @@ def load_roadmap(path: str | os.PathLike[str], world: World, *, moved: bool = Fa
     # The states of the edges only hold in the same world with the same checks; otherwise they are checked again.
     known = edges.astype(np.int32), states.astype(np.int32)
     found = world_digest(world.robot, world.bodies, world.pairs)
-    if digest == found and same_checks:
-        return _restored(world, rows, *known, seed=seed, near=near)
     if moved is not True and digest != found:
         raise InputError(f"{path}: is the roadmap of another world; load it with moved=True, or make a new one")
-    return _restored(world, rows, *known, seed=seed, near=near).moved_to(world)
+    try:
+        roadmap = _restored(world, rows, *known, seed=seed, near=near)
+    except InputError as error:
+        raise in_file(path, error) from error
+    return roadmap if digest == found and same_checks else roadmap.moved_to(world)
 
 
 def _fit(edges: NDArray[np.int64], states: NDArray[np.int64], count: int) -> bool:

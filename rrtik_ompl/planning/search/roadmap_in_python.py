@@ -10,10 +10,12 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.base.budget import Stop
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.kernels.search.roadmap.layout import BLOCKED, SURE, UNKNOWN
 from rrtik_ompl.world.motion_queries import MotionFree
 
 ROOT = -1  # stands for the edge by which a start was reached
+BOX_TOLERANCE = 1e-6  # by which a vertex may lie outside the box, as in kernels (search/sample_kernels.py)
 
 
 class PythonGraph:
@@ -69,7 +71,15 @@ class PythonGraph:
         return np.array(self._states, dtype=np.int32)
 
     def restore(self, rows: Matrix, edges: NDArray[np.int32], states: NDArray[np.int32]) -> None:
-        """Fill an empty graph with the vertices, edges and states of another one."""
+        """Fill an empty graph with the vertices, edges and states of another one.
+
+        Raises:
+            InputError: If a vertex is not in the box.
+        """
+        inside = self._count_inside(rows)
+        if inside < len(rows):
+            raise InputError(f"roadmap: vertex {inside} is not in the box of configurations")
+
         for row in rows:
             self._add(row)
         for (first, second), state in zip(edges.tolist(), states.tolist(), strict=True):
@@ -88,13 +98,17 @@ class PythonGraph:
         return added
 
     def learn(self, path: Matrix) -> int:
-        """Add the waypoints of a free path, shape (k, n), as vertices joined in a row, and return how many."""
-        for k, row in enumerate(path):
+        """Add the waypoints of a free path, shape (k, n), as vertices joined in a row, and return how many.
+
+        The first waypoint outside the box ends it.
+        """
+        count = self._count_inside(path)
+        for k, row in enumerate(path[:count]):
             before = self.size
             self._add_near(row, before)
             if k > 0:
                 self._join(before - 1, before)
-        return len(path)
+        return count
 
     def check(self, stop: Stop) -> None:
         """Check all edges whose state is unknown, until it is time to stop."""
@@ -183,6 +197,12 @@ class PythonGraph:
             first, second = self._edges[edge]
             self._states[edge] = SURE if self._motion_free(self._rows[first], self._rows[second]) else BLOCKED
         return self._states[edge] == BLOCKED
+
+    def _count_inside(self, rows: Matrix) -> int:
+        """Return how many rows come before the first one outside the box."""
+        lower, upper = self._box
+        inside = ((rows >= lower - BOX_TOLERANCE) & (rows <= upper + BOX_TOLERANCE)).all(axis=1)
+        return len(rows) if inside.all() else int(inside.argmin())
 
     def _add(self, row: Vector) -> int:
         """Add a vertex without edges, and return its number."""

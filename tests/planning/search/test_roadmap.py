@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -11,11 +12,12 @@ from scipy.sparse.csgraph import dijkstra
 
 import rrtik_ompl as rrtik
 from rrtik_ompl.base.errors import InputError, PlannerError, ProblemError
+from rrtik_ompl.kernels.search import sample_kernels
 from rrtik_ompl.kernels.search.roadmap.graph import KernelGraph
 from rrtik_ompl.kernels.search.roadmap.layout import BLOCKED, SURE
 from rrtik_ompl.model.transitions import route_length
 from rrtik_ompl.planning.search.roadmap import NEAR
-from rrtik_ompl.planning.search.roadmap_in_python import PythonGraph
+from rrtik_ompl.planning.search.roadmap_in_python import BOX_TOLERANCE, PythonGraph
 
 pytestmark = pytest.mark.kernels
 
@@ -163,6 +165,10 @@ def test_a_roadmap_of_another_world_is_refused_in_one_line(tmp_path):
     assert len(rrtik.load_roadmap(file, wall(1.8), moved=True).vertices) == 50
     with pytest.raises(InputError, match="roadmap"):
         rrtik.load_roadmap(file, problem().world)
+    other = rrtik.World(replace(wall(0.5).robot, name="other"), wall(0.5).scene)
+    told = r"wall\.npz: is no roadmap of robot 'other': it is of robot 'planar3'$"
+    with pytest.raises(InputError, match=told):
+        rrtik.load_roadmap(file, other, moved=True)
     with pytest.raises(InputError, match="another robot"):
         roadmap().moved_to(wall(0.5))
     with pytest.raises(InputError, match=r"roadmap\.moved_to"):
@@ -245,3 +251,53 @@ def test_rows_outside_the_box_are_refused():
         graph.route(far[None], problem().start[None], NEVER)
     with pytest.raises(InputError, match="goal 0 is not in the box"):
         graph.route(problem().start[None], far[None], NEVER)
+
+
+def graph_of(kind, *, near=3):
+    """An empty graph in the box of the world."""
+    world = problem().world
+    box = np.array(world.robot.lower), np.array(world.robot.upper)
+    if kind is KernelGraph:
+        return KernelGraph(world.motions, *box, near=near, seed=0, ask=None)
+    return PythonGraph(*box, near=near, seed=0, valid=world.valid, motion_free=world.motion_valid)
+
+
+def test_python_and_kernels_tolerate_the_same():
+    assert BOX_TOLERANCE == sample_kernels.BOX_TOLERANCE
+
+
+@pytest.mark.parametrize("kind", [KernelGraph, PythonGraph])
+@pytest.mark.parametrize("beyond", [0, 2])
+def test_a_path_is_learnt_up_to_the_first_row_outside_the_box(kind, beyond):
+    graph, rows = graph_of(kind), free_rows(problem().world, 5, 11)
+    rows[beyond] = problem().world.robot.upper + 1e-3
+    assert graph.learn(rows) == beyond
+    assert np.array_equal(graph.rows, rows[:beyond])
+    rows[beyond] = problem().world.robot.upper + 1e-7
+    assert graph_of(kind).learn(rows) == 5
+
+
+@pytest.mark.parametrize("kind", [KernelGraph, PythonGraph])
+def test_vertices_outside_the_box_are_refused_and_nothing_of_them_stays(kind):
+    graph, rows = graph_of(kind), free_rows(problem().world, 5, 12)
+    edges, states = np.array([[0, 4]], dtype=np.int32), np.array([SURE], dtype=np.int32)
+    spoilt = rows.copy()
+    spoilt[3, 1] = problem().world.robot.upper[1] + 1e-3
+    with pytest.raises(InputError, match="roadmap: vertex 3 is not in the box of configurations"):
+        graph.restore(spoilt, edges, states)
+    assert graph.size == 0
+    graph.restore(rows, edges, states)
+    assert np.array_equal(graph.rows, rows)
+    assert np.array_equal(graph.edges, edges)
+
+
+def test_a_file_with_a_vertex_outside_the_box_is_named(tmp_path):
+    file = tmp_path / "cell.npz"
+    roadmap().save(file)
+    with np.load(file) as data:
+        stored = dict(data)
+    stored["rows"][7] = problem().world.robot.upper + 1e-3
+    np.savez_compressed(file, **stored)
+    for moved in (False, True):
+        with pytest.raises(InputError, match=r"cell\.npz: roadmap: vertex 7 is not in the box of configurations$"):
+            rrtik.load_roadmap(file, problem().world, moved=moved)

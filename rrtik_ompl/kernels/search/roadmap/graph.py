@@ -97,12 +97,15 @@ class KernelGraph:
         """Fill an empty roadmap with what another one gave; for states None nothing is known of the edges.
 
         Raises:
-            InputError: If it is not empty, or numbers of vertices do not fit.
+            InputError: If it is not empty, numbers of vertices do not fit, or a vertex is not in the box.
         """
         if self.size or len(edges) != len(states) or (len(edges) and not 0 <= edges.min() <= edges.max() < len(rows)):
             raise InputError("roadmap: its edges do not fit its vertices")
+        self._kernels.forget_query(self._table.address)
         make_room(self._table, len(rows), 2 * len(edges))
-        self._kernels.insert(self._table.address, self._place_of(rows), len(rows))
+        outside = self._kernels.insert(self._table.address, self._place_of(rows), len(rows))
+        if outside >= 0:
+            raise InputError(f"roadmap: vertex {outside} is not in the box of configurations")
         pairs = aligned(np.ascontiguousarray(edges, dtype=np.int32))
         self._kernels.connect(self._table.address, pairs.ctypes.data, len(edges))
         self._table.states[: len(edges)] = states

@@ -73,13 +73,17 @@ def grow(roadmap: RoadmapTable, wanted: int, samples: int) -> int:
 
 @entry
 def insert(roadmap: RoadmapTable, rows: Configuration, count: int) -> int:
-    """Make rows vertices without edges; there must be room. Returns how many there are."""
+    """Make rows vertices without edges; there must be room, and no query in the roadmap.
+
+    Returns -1, or the number of a row that is outside the box; then none of them is a vertex.
+    """
     for k in range(count):
-        load(roadmap, rows, k)
+        if not load(roadmap, rows, k):
+            forget_query(roadmap)
+            return k
         add_row(roadmap)
-    total: int = roadmap.vertices.size
-    roadmap.mapped = total
-    return total
+    roadmap.mapped = roadmap.vertices.size
+    return -1
 
 
 @entry
