@@ -178,7 +178,8 @@ class FastWorld:
     def intact(self) -> bool:
         """Whether no kernel has written beyond its own memory; tests check it after each call."""
         arm = self._arm
-        tables: list[Record] = [arm.arm, *arm.balls, *self._primitives]
+        outer, inner = self._primitives
+        tables: list[Record] = [arm.arm, *arm.balls, outer, inner, *outer.clouds, *inner.clouds]
         tables += [arm.solids, arm.wider_solids, arm.bounds]
         if self._kernels is not None:
             tables += [self._scratch, self._solids, self.table]

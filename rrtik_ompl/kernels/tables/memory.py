@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
@@ -238,9 +239,9 @@ class PlannedTable:
         return self._words[self._plan.spans[place]]
 
     @property
-    def arrays(self) -> dict[int, NDArray[Any]]:
-        """The arrays that have words, by the places of their addresses."""
-        return {place: self[place] for place in self._plan.spans if self._plan.pointing[place]}
+    def arrays(self) -> Mapping[int, NDArray[Any]]:
+        """The arrays that have words, by the places of their addresses; no other array can take their places."""
+        return MappingProxyType({place: self[place] for place in self._plan.spans if self._plan.pointing[place]})
 
     def intact(self) -> bool:
         """Whether nothing has been written beyond an array or the fields."""

@@ -6,12 +6,13 @@ import pytest
 
 import rrtik_ompl as rrtik
 from rrtik_ompl.kernels import layout
+from rrtik_ompl.kernels.record import Doubles, Record
 from rrtik_ompl.kernels.simd.compiled import kernel
 from rrtik_ompl.kernels.simd.lanes import set_double
 from rrtik_ompl.kernels.simd.library import library
 from rrtik_ompl.kernels.simd.processor import WIDTH
 from rrtik_ompl.kernels.tables import memory
-from rrtik_ompl.kernels.tables.memory import PlannedTable, Table, TablePlan, aligned, is_intact, table
+from rrtik_ompl.kernels.tables.memory import PlannedTable, Table, TablePlan, aligned, is_intact, sizes_of, table
 from rrtik_ompl.kernels.tables.scratch import probe_table
 from rrtik_ompl.world.moving_world import MovingWorld
 
@@ -111,6 +112,31 @@ def test_arrays_of_a_planned_table_are_where_its_fields_say():
         assert own.header[place] % layout.DOUBLE_BYTES == 0
     assert own[0].ctypes.data % layout.ALIGNMENT == 0
     assert own.address == own.header.ctypes.data
+
+
+def test_an_array_of_a_planned_table_cannot_be_replaced():
+    class Curve(Record):
+        along: Doubles
+        count: int
+
+    own = Curve(PlannedTable(sizes_of(Curve, along=5, count=2)))
+    before = own.memory.header.copy()
+    with pytest.raises(TypeError):
+        own.put(along=aligned(np.zeros(9)))
+    assert (own.memory.header == before).all()
+    own.put(count=3)
+    assert own.count == 3
+
+
+def test_a_write_beside_the_points_of_a_cloud_is_seen():
+    robot = robot_of("panda")
+    cloud = rrtik.PointCloud(np.random.default_rng(4).uniform(0.6, 0.9, (50, 3)), 0.01)
+    fast = rrtik.World(robot, rrtik.Scene([rrtik.Obstacle("cloud", cloud)])).fast
+    clouds = [each for primitives in fast._primitives for each in primitives.clouds]
+    assert clouds
+    assert fast.intact()
+    write(clouds[0].address, -1, 8.0)
+    assert not fast.intact()
 
 
 @pytest.mark.parametrize(("name", "reach"), ARMS.items())
