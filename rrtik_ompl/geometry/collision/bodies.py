@@ -519,7 +519,7 @@ def contact_distance(first: Body, second: Body) -> float | None:
     return min((distance for name, distance in first.contacts if name == second.name), default=None)
 
 
-def request(margin: float) -> coal.DistanceRequest:
+def request(margin: float) -> coal.CollisionRequest:
     """Return a new coal request that reports two geometries as colliding if they are at most ``margin`` [m] apart."""
     collision_request = coal.CollisionRequest()
     collision_request.security_margin = margin

@@ -10,7 +10,7 @@ import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import coal
 import numpy as np
@@ -45,9 +45,6 @@ from rrtik_ompl.model.shapes import (
 )
 from rrtik_ompl.model.shapes.box_pile import BoxPile
 from rrtik_ompl.model.shapes.polygons import convex_parts
-
-if TYPE_CHECKING:
-    pass
 
 BOX_CORNERS = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import weakref
 from collections.abc import Callable, Iterable
 from functools import lru_cache, wraps
-from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar, cast
+from typing import Any, TypeAlias, TypeVar, cast
 
 import coal
 import numpy as np
@@ -14,9 +14,6 @@ from numpy.typing import NDArray
 from rrtik_ompl.base.arrays import LARGEST, Matrix, Vector, distinct
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.model.robot import Robot
-
-if TYPE_CHECKING:
-    pass
 
 Found = TypeVar("Found")
 # Two placed geometries: the first geometry, its coal.Transform3s, the second geometry, its coal.Transform3s.
