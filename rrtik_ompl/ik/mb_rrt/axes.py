@@ -1,7 +1,7 @@
-"""A real arm as the tree models it: joints that each turn about one axis, and the lengths that are left after each.
+"""A real arm as the workspace tree models it: joints with one axis each, and the reach that is left after each.
 
-A node carries the frame of a joint, an edge is a turn about its axis, and the joint angles come for
-free.
+A node holds the frame of a joint, and an edge is a rotation about its axis, so the joint angles need no extra inverse
+kinematics.
 """
 
 from __future__ import annotations
@@ -17,31 +17,31 @@ from rrtik_ompl.ik.mb_rrt.links import ROUNDING, smallest_spans
 from rrtik_ompl.ik.tip_columns import tip_columns
 from rrtik_ompl.model.robot import Robot
 
-REWEIGHTINGS = 60  # rounds, to find the shortest polygon through the axes
+REWEIGHTINGS = 60  # number of reweighted least-squares rounds to find the shortest polygon through the axes
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Axes:
-    """The chain of turning joints that moves a point, base first.
+    """The chain of turning joints that moves the aimed point, base first.
 
-    Each joint k has a point on its axis, so chosen that the polygon through all of them up to the aimed point is
-    short; a turn of joint k moves the point of joint k + 1 on a circle, and the aimed point is never farther from
-    that than the rest of the polygon is long. Of a pose the tree aims at the point of the last joint, which the pose
-    fixes; of a position at the tip.
+    Each joint k has a point on its axis, chosen such that the polygon through all points up to the aimed point is
+    short. A rotation of joint k moves the point of joint k + 1 on a circle, and the aimed point is never farther from
+    that point than the rest of the polygon is long. For a pose the aimed point is that of the last joint, which the
+    pose determines; for a position it is the tip.
 
     Attributes:
-        joints: Which entry of q each joint is, shape (n,).
-        offset: Angle of each joint = q + offset [rad], shape (n,).
-        lower, upper: Limits of the angles [rad], shape (n,); a full turn where there is none.
-        fixed: Transform before each turn about z, and the one to the tip after all, shape (n + 1, 4, 4).
+        joints: Index of the entry of q for each joint, shape (n,).
+        offset: Offset of each joint [rad], whose angle is q + offset; shape (n,).
+        lower, upper: Limits of the angles [rad], shape (n,); a full turn where there are none.
+        fixed: Fixed transform before each rotation about z, and one to the tip after the last, shape (n + 1, 4, 4).
         first: Point of the first joint in its frame [m], shape (3,).
-        points: The point after each joint in its turned frame [m], shape (n, 3).
-        max_span: Longest distance from that point to the aimed point [m], shape (n,).
-        min_span: Shortest [m], shape (n,).
-        reach: Longest and shortest distance from the first joint's point to the aimed point [m].
+        points: The next point after each joint, in the joint's turned frame [m], shape (n, 3).
+        max_span: Largest distance from that point to the aimed point [m], shape (n,).
+        min_span: Least distance from that point to the aimed point [m], shape (n,).
+        reach: Largest and least distance from the first joint's point to the aimed point [m].
         aim: The aimed point in the frame of the tip [m], shape (3,).
-        idle: Which joints leave a position where it is, as all after them do; none if the aim is a pose. Shape (n,).
-        exact: Whether all axes are parallel, so that the distances that remain are the whole truth.
+        idle: Whether each joint, like all after it, leaves a position where it is, shape (n,); all False for a pose.
+        exact: Whether all axes are parallel, so that the distances are sufficient conditions too.
     """
 
     joints: NDArray[np.int64]
@@ -64,10 +64,10 @@ class Axes:
         return len(self.joints)
 
     def nearest_in_reach(self, point: Vector) -> Vector:
-        """The point nearest to one in the world, shape (3,), that is not certainly out of reach."""
+        """Return the point nearest to a given one [m], shape (3,), that is not certainly out of reach."""
         base = self.fixed[0][:3, :3] @ self.first + self.fixed[0][:3, 3]
         offset = point - base
-        if self.exact:  # in the plane of the arm
+        if self.exact:  # Only the component in the plane of the arm counts.
             axis = self.fixed[0][:3, 2]
             offset = offset - (axis @ offset) * axis
         distance = float(np.linalg.norm(offset))
@@ -76,13 +76,13 @@ class Axes:
         return nearest
 
     def shortfall(self, point: Vector) -> float:
-        """How far a point in the world, shape (3,), is certainly out of reach [m]; 0 if it may be in reach."""
+        """Return how far a point [m], shape (3,), is certainly out of reach [m]; 0 if it may be in reach."""
         outside = float(np.linalg.norm(self.nearest_in_reach(point) - point))
         return outside if outside > ROUNDING * self.reach[0] else 0.0
 
 
 def misfit(robot: Robot) -> str:
-    """Why the tree cannot grow along an arm: a line, or ""."""
+    """Return why the tree cannot model an arm, as a line; "" if it can."""
     tip = tip_columns(robot)
     if tip.prismatic.any():
         return "its edges are links, and a joint of the robot slides"
@@ -94,7 +94,7 @@ def misfit(robot: Robot) -> str:
 
 @lru_cache(maxsize=64)
 def axes_of(robot: Robot, oriented: bool) -> Axes:
-    """The axes of an arm that `misfit` accepts, for positions or, if ``oriented``, for poses."""
+    """Return the axes of an arm that `misfit` accepts, for positions or, if ``oriented``, for poses."""
     tip = tip_columns(robot)
     joints = np.argmax(tip.gain, axis=1)
 
@@ -125,10 +125,17 @@ def axes_of(robot: Robot, oriented: bool) -> Axes:
 
 
 def _heights(fixed: NDArray[np.float64], oriented: bool) -> Vector:
-    """Where on each joint's axis its point lies [m], so that the polygon through the points is shortest; (n + 1,).
+    """Return the height of each joint's point on its axis that makes the polygon through the points shortest [m].
 
-    The last entry belongs to the tip and is 0. Each side is the length of a vector that is linear in the heights:
-    least squares, reweighted by the inverse lengths.
+    Each side is the length of a vector that is linear in the heights, so the sum of lengths is minimised by least
+    squares that are repeatedly reweighted by the inverse lengths.
+
+    Args:
+        fixed: Transforms of the chain, shape (n + 1, 4, 4).
+        oriented: Whether the target is a pose, for which the polygon ends at the last joint.
+
+    Returns:
+        Shape (n + 1,); the last entry belongs to the tip and is 0.
     """
     count = len(fixed) - 1
     sides = count - 1 if oriented else count
@@ -154,6 +161,6 @@ def _heights(fixed: NDArray[np.float64], oriented: bool) -> Vector:
 
 
 def _points(fixed: NDArray[np.float64], heights: Vector) -> Matrix:
-    """The point after each joint in its turned frame, shape (n, 3)."""
+    """Return the point after each joint in its turned frame [m], shape (n, 3)."""
     points: Matrix = fixed[1:, :3, 3] + heights[1:, None] * fixed[1:, :3, 2]
     return points

@@ -1,12 +1,12 @@
-"""Trees of free links that end exactly on the goal: grown on arcs of intersection, or the last two links closed.
+"""Trees of free links that end exactly on the goal: grown on arcs of intersection, or closed by the last two links.
 
-[3] proposes the arcs and leaves them open. A node is useful if and only if the rest of the chain can span its distance
-from the goal, ``min_span[i] <= |x - g| <= max_span[i]``. By the law of cosines that is an interval of the cosine of the
-angle between the edge and the direction to the goal, in the plane and in space alike: every node is inside its
-solution region, every pass ends at the goal.
+[3] proposes the arcs without working them out. A node is useful if and only if the rest of the chain can span its
+distance from the goal, ``min_span[i] <= |x - g| <= max_span[i]``. By the law of cosines this is an interval of the
+cosine of the angle between the edge and the direction to the goal, in the plane and in space alike. So every node is
+inside its solution region, and every pass ends at the goal.
 
-Or a tree in the plane grows by surface sampling and rule B up to index n - 2, and the elbow of the last two links is
-where the two circles about node and goal meet.
+The alternative is a planar tree that grows by surface sampling and rule B up to index n - 2; the elbow of the last two
+links is then where the circles about node and goal intersect.
 """
 
 from __future__ import annotations
@@ -19,20 +19,20 @@ from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.ik.mb_rrt.links import Links, directions
 from rrtik_ompl.ik.mb_rrt.published import PASSES, TreeSearch, best_parents, one_link, one_link_away, surface
 
-MIN_DISTANCE = 1e-150  # a direction over a shorter distance loses digits: squares smaller than 1e-300 vanish
+MIN_DISTANCE = 1e-150  # A direction over a shorter distance is inaccurate, since squares below 1e-300 lose digits.
 
 
 def grow_on_arcs(links: Links, goal: ArrayLike, *, rng: np.random.Generator, passes: int = 1) -> TreeSearch:
-    """Passes that each start at the base and end at the goal.
+    """Grow passes on arcs of intersection; each starts at the base and ends at the goal.
 
     Args:
         links: The chain, base at the origin.
-        goal: Shape (dimension,).
-        rng: Random numbers.
-        passes: Solutions wanted.
+        goal: Position of the goal, shape (dimension,).
+        rng: Source of random numbers.
+        passes: Number of solutions wanted.
 
     Raises:
-        InputError: If the goal is out of reach; it says by how much.
+        InputError: If the goal is out of reach; the message says by how much.
     """
     target = links.reachable(goal)
     chains = arc_chains(links, np.tile(target, (passes, 1)), rng)
@@ -43,7 +43,10 @@ def grow_on_arcs(links: Links, goal: ArrayLike, *, rng: np.random.Generator, pas
 
 
 def arc_chains(links: Links, goals: Matrix, rng: np.random.Generator) -> NDArray[np.float64]:
-    """A random solution for each of many goals within reach, shape (m, dimension): nodes, (m, n + 1, dimension)."""
+    """Return a random solution for each of many goals in reach, shape (m, dimension).
+
+    Nodes from base to goal, shape (m, n + 1, dimension).
+    """
     node = np.zeros((len(goals), links.dimension))
     nodes = [node]
     for index in range(1, links.count + 1):
@@ -53,16 +56,16 @@ def arc_chains(links: Links, goals: Matrix, rng: np.random.Generator) -> NDArray
 
 
 def cosine_interval(distance: Vector, length: float, min_distance: float, max_distance: float) -> tuple[Vector, Vector]:
-    """Cosines of the angle between an edge and the direction to the goal that lead to a useful distance.
+    """Return the interval of the cosine between an edge and the direction to the goal that gives a useful distance.
 
     Args:
-        distance: Of the parents from the goal, shape (m,).
-        length: Of the edge.
-        min_distance: Distance from the goal that the new node must have at least.
-        max_distance: At most.
+        distance: Distances of the parents from the goal, shape (m,).
+        length: Length of the edge.
+        min_distance: Least distance of the new node from the goal.
+        max_distance: Largest distance of the new node from the goal.
 
     Returns:
-        Lower and upper ends, shapes (m,), not clipped: the interval is empty where it lies beyond -1 or 1.
+        Lower and upper ends, shape (m,) each, not clipped: the interval is empty if it lies outside -1..1.
     """
     squares = distance**2 + length**2
     twice_the_product = 2.0 * np.maximum(distance, MIN_DISTANCE) * length
@@ -70,12 +73,13 @@ def cosine_interval(distance: Vector, length: float, min_distance: float, max_di
 
 
 def _edge_directions(links: Links, goals: Matrix, parents: Matrix, index: int, rng: np.random.Generator) -> Matrix:
-    """Unit vectors from the parents to useful nodes of an index, shape (m, dimension)."""
+    """Draw unit vectors from the parents, shape (m, dimension), to useful nodes of an index; same shape."""
     towards = goals - parents
     distance = np.linalg.norm(towards, axis=1)
     arbitrary = directions(len(parents), links.dimension, rng)
     axis = np.where(distance[:, None] > MIN_DISTANCE, towards / np.maximum(distance, MIN_DISTANCE)[:, None], arbitrary)
-    if index == links.count:  # the law of cosines says the same, to the square root of the rounding
+    # The last edge points at the goal; the law of cosines would give this only to the square root of rounding.
+    if index == links.count:
         return axis
 
     length = float(links.lengths[index - 1])
@@ -83,21 +87,21 @@ def _edge_directions(links: Links, goals: Matrix, parents: Matrix, index: int, r
     low, high = (np.clip(end, -1.0, 1.0) for end in cosines)
     share = rng.uniform(size=len(parents))
 
-    if links.dimension == 2:  # uniform in the angle, on either side
+    if links.dimension == 2:  # In the plane, draw uniformly in the angle, on a random side.
         angle = np.arccos(low) + share * (np.arccos(high) - np.arccos(low))
         sign = rng.choice([-1.0, 1.0], len(parents))
         across = np.column_stack([-axis[:, 1], axis[:, 0]])
         turned: Matrix = np.cos(angle)[:, None] * axis + (sign * np.sin(angle))[:, None] * across
         return turned
 
-    cosine = low + share * (high - low)  # uniform on the band of the sphere
+    cosine = low + share * (high - low)  # A uniform cosine is uniform on the band of the sphere.
     across = _perpendicular(axis, rng)
     tilted: Matrix = cosine[:, None] * axis + np.sqrt((1.0 - cosine) * (1.0 + cosine))[:, None] * across
     return tilted
 
 
 def _perpendicular(axis: Matrix, rng: np.random.Generator) -> Matrix:
-    """A random unit vector at right angles to each row, shape (m, 3)."""
+    """Draw a random unit vector perpendicular to each row, shape (m, 3)."""
     first = np.cross(axis, np.eye(3)[np.abs(axis).argmin(axis=1)])
     first /= np.linalg.norm(first, axis=1, keepdims=True)
     second = np.cross(axis, first)
@@ -109,13 +113,13 @@ def _perpendicular(axis: Matrix, rng: np.random.Generator) -> Matrix:
 def grow_and_close(
     links: Links, goal: ArrayLike, *, rng: np.random.Generator, passes: int = PASSES
 ) -> tuple[Matrix | None, int]:
-    """Grow until the last two links reach from a new node to the goal.
+    """Grow a planar tree until the last two links reach from a new node to the goal.
 
     Args:
         links: A planar chain of at least two links.
-        goal: Shape (2,).
-        rng: Random numbers.
-        passes: Limit.
+        goal: Position of the goal, shape (2,).
+        rng: Source of random numbers.
+        passes: Largest number of passes.
 
     Returns:
         The chain of nodes, shape (n + 1, 2), or None; and the number of passes done.
@@ -147,7 +151,10 @@ def grow_and_close(
 
 
 def _elbow(node: Vector, goal: Vector, first: float, second: float, rng: np.random.Generator) -> Vector | None:
-    """A point ``first`` away from the node and ``second`` from the goal, on a random side; None if there is none."""
+    """Return a point at distance ``first`` from the node and ``second`` from the goal, on a random side.
+
+    None if the two circles do not intersect.
+    """
     towards = goal - node
     distance = float(np.linalg.norm(towards))
     if not abs(first - second) <= distance <= first + second or distance == 0.0:
@@ -161,7 +168,7 @@ def _elbow(node: Vector, goal: Vector, first: float, second: float, rng: np.rand
 
 
 def _walk(levels: list[list[Vector]], parents: list[list[int]]) -> list[Vector]:
-    """Nodes from the base to the newest of the last level."""
+    """Return the nodes from the base to the newest one of the last level."""
     row = len(levels[-1]) - 1
     found = []
     for index in range(len(levels) - 1, 0, -1):

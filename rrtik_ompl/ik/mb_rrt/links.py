@@ -1,4 +1,4 @@
-"""A chain of links with free joints, as MB-RRT [3] models an arm, and where its joints can usefully be."""
+"""A chain of links with free joints, as MB-RRT [3] models an arm, and the regions in which its joints are useful."""
 
 from __future__ import annotations
 
@@ -11,19 +11,18 @@ from rrtik_ompl.base.arrays import Matrix, Vector, finite_array, frozen
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.base.units import wrapped
 
-ROUNDING = 1e-12  # of the reach: a goal this far outside counts as reachable
+ROUNDING = 1e-12  # share of the reach; a goal this far outside counts as reachable
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Links:
-    """Links from the origin on, joined so that each may point anywhere in the plane or in space.
+    """A chain of links from the origin on, each of which may point anywhere in the plane or in space.
 
-    After the joint of index i, i = 0..n, the links still to come span every distance from ``min_span[i]`` to
-    ``max_span[i]`` and no other, in the plane and in space: joint i of any solution lies in that ring or
-    shell about the goal [3].
+    The links after the joint of index i, i = 0..n, span exactly the distances from ``min_span[i]`` to ``max_span[i]``,
+    in the plane and in space. So joint i of any solution lies in that ring or shell about the goal [3].
 
     Attributes:
-        lengths: Base first, shape (n,); one unit of length for all numbers.
+        lengths: Lengths of the links, base first, shape (n,); all numbers share one unit of length.
         dimension: 2 for the plane, 3 for space.
         max_span: Total length of the links after index i, shape (n + 1,).
         min_span: The smallest distance that these links can span, shape (n + 1,).
@@ -62,17 +61,20 @@ class Links:
         return float(self.max_span[0])
 
     def shortfall(self, goals: ArrayLike) -> Vector:
-        """How far goals, shape (m, dimension), lie beyond the reach or inside the hole around the base; (m,)."""
+        """Return how far goals, shape (m, dimension), lie beyond the reach or inside the hole around the base.
+
+        Shape (m,); 0 for a goal in reach.
+        """
         distance = np.linalg.norm(finite_array(goals, (None, self.dimension), "goals"), axis=1)
         outside = np.maximum(distance - self.max_span[0], self.min_span[0] - distance)
         short: Vector = np.where(outside > ROUNDING * self.reach, outside, 0.0)
         return short
 
     def reachable(self, goal: ArrayLike) -> Vector:
-        """The goal as an array, shape (dimension,).
+        """Check that a goal is in reach and return it as an array, shape (dimension,).
 
         Raises:
-            InputError: If the chain cannot reach it; says by how much.
+            InputError: If the chain cannot reach it; the message says by how much.
         """
         point = finite_array(goal, (self.dimension,), "goal")
         short = float(self.shortfall(point[None])[0])
@@ -85,24 +87,27 @@ class Links:
 
 
 def smallest_spans(lengths: Vector, max_span: Vector) -> Vector:
-    """max(0, 2 max d_j - sum d_j) over the links after each index, shape (n + 1,): the longest must be folded back."""
+    """Return the smallest distance that the links after each index can span, shape (n + 1,).
+
+    It is max(0, 2 max d_j - sum d_j): the longest link, with all others folded back along it.
+    """
     longest = np.append(np.maximum.accumulate(lengths[::-1])[::-1], 0.0)
     spans: Vector = np.maximum(0.0, 2.0 * longest - max_span)
     return spans
 
 
 def directions(count: int, dimension: int, rng: np.random.Generator) -> Matrix:
-    """Unit vectors, uniform on the circle or the sphere, shape (count, dimension)."""
+    """Draw unit vectors, uniform on the circle or the sphere, shape (count, dimension)."""
     vectors = rng.normal(size=(count, dimension))
     units: Matrix = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
     return units
 
 
 def sunflower(links: Links, count: int) -> Matrix:
-    """Goals spread evenly over the disc or the ball that the chain reaches, the same at every call.
+    """Return goals spread evenly over the disc or ball that the chain reaches, the same at every call.
 
-    Radii L ((k + 1/2) / N)^(1/dimension) at golden angles, in space around heights that are spread
-    evenly too. Shape (count, dimension).
+    The radii are L ((k + 1/2) / N)^(1/dimension) at golden angles; in space the heights are spread evenly too. Shape
+    (count, dimension).
     """
     k = np.arange(count)
     radius = links.reach * ((k + 0.5) / count) ** (1.0 / links.dimension)
@@ -113,14 +118,17 @@ def sunflower(links: Links, count: int) -> Matrix:
         disc: Matrix = radius[:, None] * flat
         return disc
 
-    height = 2.0 * ((k * 0.7548776662466927 + 0.5) % 1.0) - 1.0  # the plastic number keeps it apart from the angle
+    height = 2.0 * ((k * 0.7548776662466927 + 0.5) % 1.0) - 1.0  # The plastic number makes it independent of the angle.
     sphere = np.column_stack([np.sqrt(1.0 - height**2)[:, None] * flat, height])
     spread: Matrix = radius[:, None] * sphere
     return spread
 
 
 def headings_to_joints(chains: Matrix) -> Matrix:
-    """Joint angles of planar chains of nodes, shape (..., n + 1, 2): each link against the last, in [-pi, pi)."""
+    """Return the joint angles of planar chains of nodes, shape (..., n + 1, 2): each link relative to the one before.
+
+    Angles in [-pi, pi), shape (..., n).
+    """
     edges = np.diff(chains, axis=-2)
     heading = np.arctan2(edges[..., 1], edges[..., 0])
     turns = np.diff(heading, axis=-1, prepend=0.0)
@@ -129,7 +137,7 @@ def headings_to_joints(chains: Matrix) -> Matrix:
 
 
 def joints_to_chain(lengths: Vector, joints: Matrix) -> Matrix:
-    """Nodes of planar arms, base first, for joint angles of shape (..., n); shape (..., n + 1, 2)."""
+    """Return the nodes of planar arms, base first, for joint angles, shape (..., n); shape (..., n + 1, 2)."""
     heading = np.cumsum(joints, axis=-1)
     edges = lengths[..., None] * np.stack([np.cos(heading), np.sin(heading)], axis=-1)
     chain: Matrix = np.concatenate([np.zeros_like(edges[..., :1, :]), np.cumsum(edges, axis=-2)], axis=-2)

@@ -1,8 +1,8 @@
-"""Configurations of a real arm at a position or a pose: the tree's branches, polished where that alone is not exact.
+"""Configurations of a real arm at a position or a pose: branches of the workspace tree, polished where need be.
 
-An arm whose axes are all parallel ends exactly on the goal. Elsewhere a sphere about the goal is not all that a joint
-with one axis can keep to; the newest branches, which are near the goal and free as far as the links know, are then
-polished by Levenberg-Marquardt.
+For an arm whose axes are all parallel, the branches of the tree end exactly on the goal. For other arms the distances
+that the tree considers are not the whole constraint, so the newest branches only come near the goal. They are free as
+far as their links were checked, and are polished by Levenberg-Marquardt.
 """
 
 from __future__ import annotations
@@ -29,18 +29,18 @@ from rrtik_ompl.model.robot import Robot, inside_limits, poses
 from rrtik_ompl.model.scene import Scene
 from rrtik_ompl.world.world import World
 
-WIDTH = 16  # passes at a time
-MAX_ROUNDS = 64  # after which it gives up
-FIRST_STEPS = 12  # of the polish, after which most branches that get to the goal at all are there
-POLISHED = 0.1  # of the tolerances, within which few steps have brought a branch to the goal
-POSTURE_ONLY_ROUNDS = 2  # that check whole postures alone; where free ones are common, that is faster
-ROUNDS_FOR_ALL = 8  # of the workspace tree if every solution is requested
-DRAWS = 16  # targets of a planner's goal that leaves freedom
-MAX_CONFIGURATIONS = 16  # that a planner gets
+WIDTH = 16  # number of passes that are done at once
+MAX_ROUNDS = 64  # number of rounds after which the search gives up
+FIRST_STEPS = 12  # steps of a first polish, after which most branches that reach the goal at all are there
+POLISHED = 0.1  # share of the tolerances within which a branch counts as polished after these steps
+POSTURE_ONLY_ROUNDS = 2  # first rounds, which check only whole configurations; faster where free ones are common
+ROUNDS_FOR_ALL = 8  # number of rounds if every solution is requested
+DRAWS = 16  # number of targets drawn from a planner's goal that leaves freedom
+MAX_CONFIGURATIONS = 16  # largest number of configurations that a planner gets
 
 
 def mb_rrt(request: IkRequest) -> IkResponse:
-    """A tree in the workspace for one target after the other, until a solution will do."""
+    """Solve a request by a tree in the workspace for one target after the other, until a solution is accepted."""
     robot = request.robot
     count = len(request.targets)
     rows = np.zeros((0, robot.dof))
@@ -65,14 +65,14 @@ def mb_rrt(request: IkRequest) -> IkResponse:
 
 
 def tree_aims(world: World, goal: TipGoal, near: Vector, rng: np.random.Generator, *, seconds: float) -> Matrix:
-    """Free configurations at a goal, nearest to a posture first.
+    """Return free configurations at a goal, nearest to a given configuration first.
 
     Args:
         world: The robot, which `rrtik_ompl.ik.mb_rrt.axes.misfit` accepts, and its scene.
         goal: A goal of the tip.
-        near: Shape (dof,).
-        rng: Random numbers.
-        seconds: Time limit.
+        near: The given configuration, shape (dof,).
+        rng: Source of random numbers.
+        seconds: Time limit [s].
 
     Returns:
         Shape (k, dof), k <= `MAX_CONFIGURATIONS`, none if none was found in time.
@@ -99,7 +99,13 @@ def tree_aims(world: World, goal: TipGoal, near: Vector, rng: np.random.Generato
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Found:
-    """Configurations at the goal, shape (k, dof), inside the limits; passes done; whether the time was up."""
+    """Result of a search.
+
+    Attributes:
+        q: Configurations at the goal inside the limits, shape (k, dof).
+        passes: Number of passes done.
+        timed_out: Whether the time was up.
+    """
 
     q: Matrix
     passes: int
@@ -119,20 +125,20 @@ def search(
     width: int = WIDTH,
     rounds: int = MAX_ROUNDS,
 ) -> Found:
-    """Grow the tree until a configuration at the goal will do.
+    """Grow the tree until a configuration at the goal is accepted.
 
     Args:
         robot: An arm that `rrtik_ompl.ik.mb_rrt.axes.misfit` accepts.
         target: The goal.
-        near: Values of joints that the tree does not move, shape (dof,).
-        accept: Which configurations, shape (k, dof), at the goal will do.
-        rng: Random numbers.
-        budget: How long it may take.
-        world: If given, and if the first rounds end in collision, every further edge of the tree is held clear of
-            its obstacles, link by link.
+        near: Configuration that gives the values of joints that the tree does not move, shape (dof,).
+        accept: Checks which configurations at the goal, shape (k, dof), are acceptable; returns shape (k,).
+        rng: Source of random numbers.
+        budget: Time limit, read between rounds.
+        world: If given, and if the first `POSTURE_ONLY_ROUNDS` rounds find no accepted configuration, the links of all
+            further edges are checked for collision too.
         collect_all: Whether to go on for all ``rounds`` and collect every solution.
-        width: Passes at a time.
-        rounds: Limit.
+        width: Number of passes in one round.
+        rounds: Largest number of rounds.
     """
     solutions = np.zeros((0, robot.dof))
     if out_of_reach(robot, target):
@@ -154,7 +160,7 @@ def search(
 
 
 def out_of_reach(robot: Robot, target: Target) -> bool:
-    """Whether the lengths of an arm do not allow a target, for certain; nothing is known of arms with a `misfit`."""
+    """Check whether a target is certainly out of reach by the arm's lengths; False for an arm with a `misfit`."""
     if misfit(robot):
         return False
     axes = axes_of(robot, target.oriented)
@@ -162,7 +168,7 @@ def out_of_reach(robot: Robot, target: Target) -> bool:
 
 
 def aimed_point(axes: Axes, target: Target) -> Vector:
-    """The point in the world that the tree aims at, shape (3,)."""
+    """Return the point in the world that the tree aims at [m], shape (3,)."""
     if not target.oriented:
         return target.point
     point: Vector = target.pose.rotation @ axes.aim + target.point
@@ -170,14 +176,15 @@ def aimed_point(axes: Axes, target: Target) -> Vector:
 
 
 def polished(robot: Robot, axes: Axes, target: Target, ends: Matrix, *, wait_for_all: bool = True) -> Matrix:
-    """Those of the tree's ends that are at the goal or get there, shape (k, dof).
+    """Polish the ends of the tree's branches and return those that are at the goal then, shape (k, dof).
 
     Args:
         robot: The arm.
-        axes: Of the arm, for this kind of target.
+        axes: The axes of the arm for this kind of target.
         target: The goal.
-        ends: Configurations, shape (m, dof).
-        wait_for_all: Whether to wait for the slowest; if not, the first few that get there are enough.
+        ends: Configurations at the ends of branches, shape (m, dof).
+        wait_for_all: Whether to polish until the slowest has arrived; if not, those that arrive after `FIRST_STEPS`
+            are enough.
     """
     if len(ends) == 0:
         return ends
@@ -198,26 +205,30 @@ def polished(robot: Robot, axes: Axes, target: Target, ends: Matrix, *, wait_for
 
 
 def _last_turned(robot: Robot, axes: Axes, target: Target, ends: Matrix) -> Matrix:
-    """The last joint, which leaves the aimed point where it is, turned as near to the orientation as it gets."""
+    """Turn the last joint of configurations, shape (m, dof), as near to the target's orientation as possible.
+
+    The joint's axis goes through the aimed point, which therefore stays where it is.
+    """
     joint = int(axes.joints[-1])
     angles = np.array(ends)
     angles[:, joint] = -axes.offset[-1]
     frames = poses(robot, angles)[:, :3, :3] @ axes.fixed[-1][:3, :3].T
     wanted = target.pose.rotation @ axes.fixed[-1][:3, :3].T
 
-    off = np.swapaxes(frames, 1, 2) @ wanted  # the turn about z nearest to it
+    # The rotation about z that is nearest to the remaining rotation.
+    off = np.swapaxes(frames, 1, 2) @ wanted
     turn = np.arctan2(off[:, 1, 0] - off[:, 0, 1], off[:, 0, 0] + off[:, 1, 1])
-    turn += TAU * np.ceil((axes.lower[-1] - turn) / TAU - 1e-9)  # the first full turn inside the limits
+    turn += TAU * np.ceil((axes.lower[-1] - turn) / TAU - 1e-9)  # Move it to the lowest full turn inside the limits.
     angles[:, joint] = np.clip(turn, axes.lower[-1], axes.upper[-1]) - axes.offset[-1]
     return angles
 
 
 class LinkWorlds:
-    """Checks by World the links up to one joint, with all that they hold.
+    """Checks for collision only the links up to a given joint, with the objects that they hold.
 
     Args:
         world: The whole arm and its scene.
-        axes: Its joints, base first.
+        axes: The joints of the arm, base first.
     """
 
     def __init__(self, world: World, axes: Axes) -> None:
@@ -226,12 +237,12 @@ class LinkWorlds:
         self._worlds = [_first_links(world, set(order[level + 1 :])) for level in range(len(order) - 1)] + [world]
 
     def free(self, level: int, q: Matrix) -> Mask:
-        """Which rows, shape (m, dof), are free as far as the link of a level."""
+        """Check which configurations, shape (m, dof), are free up to the link of a level; shape (m,)."""
         return self._worlds[level].valid_batch(self._world.robot.clamp(q))
 
 
 def _joint_order(robot: Robot, axes: Axes) -> list[int]:
-    """Pinocchio's numbers of the joints that move the tip, base first."""
+    """Return Pinocchio's numbers of the joints that move the tip, base first."""
     number = int(robot.model.frames[robot.model.getFrameId(robot.tip)].parentJoint)
     numbers: list[int] = []
     while number > 0:
@@ -241,7 +252,7 @@ def _joint_order(robot: Robot, axes: Axes) -> list[int]:
 
 
 def _first_links(world: World, later: set[int]) -> World:
-    """The world without the bodies that one of the ``later`` joints moves."""
+    """Return the world without the bodies that any of the ``later`` joints (Pinocchio's numbers) moves."""
     robot = world.robot
     scene = world.scene
     early_geometry: Any = pin.GeometryModel()
@@ -255,12 +266,12 @@ def _first_links(world: World, later: set[int]) -> World:
     early_scene = Scene(scene.obstacles, attached=early_attached, allowed_collisions=allowed)
 
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DescriptionWarning)  # said where the whole world was made
+        warnings.simplefilter("ignore", DescriptionWarning)  # The whole world has warned already.
         return world.unheld.with_settings(robot=replace(robot, collision=early_geometry), scene=early_scene)
 
 
 def _moves(robot: Robot, joint: int, later: set[int]) -> bool:
-    """Whether a joint is one of the ``later`` ones, by Pinocchio's numbers, or hangs on one of them."""
+    """Check whether a joint is one of the ``later`` ones or a descendant of one, by Pinocchio's numbers."""
     while joint > 0:
         if joint in later:
             return True

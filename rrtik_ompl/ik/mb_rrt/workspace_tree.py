@@ -1,7 +1,7 @@
-"""The tree of a real arm: nodes are frames of joints, edges are links held to limits and free of obstacles.
+"""The workspace tree of a real arm: nodes are frames of joints, edges are links inside joint limits and free.
 
-A joint is drawn from its useful angles: those that keep the goal in reach of the links still to come, inside the joint
-limits. That is arc-of-intersection sampling on the circle that a real joint can move the next one on.
+The angle of a joint is drawn from its useful angles: those inside the limits that keep the goal in reach of the
+remaining links. That is sampling on arcs of intersection, on the circle on which a real joint moves the next one.
 """
 
 from __future__ import annotations
@@ -18,22 +18,23 @@ from rrtik_ompl.ik.mb_rrt.axes import Axes
 from rrtik_ompl.ik.mb_rrt.links import directions
 from rrtik_ompl.ik.mb_rrt.published import first_hit
 
-TRIES = 24  # other nodes of the same index that are tried where an edge cannot be
-SLACK = 1e-12  # in cosines and angles: what rounding may add where an interval is a single value
-FLAT = 1e-24  # [m^2] a circle this small is a point
+TRIES = 24  # number of other nodes of the same level that are tried where an edge is not possible
+SLACK = 1e-12  # allowance for rounding in cosines and angles, where an interval can be a single value
+FLAT = 1e-24  # [m^2]: a circle this small counts as a point
 
-LinkFree = Callable[[int, Matrix], Mask]  # from level and rows of q, of which joints 0..level count
+# A function of a level and configurations, shape (m, dof), of which joints 0..level count; returns which are free.
+LinkFree = Callable[[int, Matrix], Mask]
 
 
 class WorkspaceTree:
     """Grows branches towards a point, several passes at a time.
 
-    A pass goes on from its own node; where that has no useful angle, or the link would touch something, from other
-    nodes of the same index, drawn at random.
+    A pass goes on from its own last node. If that has no useful angle, or the link would collide, it goes on from
+    random other nodes of the same level.
 
     Attributes:
-        passes: Done so far.
-        edges: Links tried so far.
+        passes: Number of passes so far.
+        edges: Number of links tried so far.
     """
 
     def __init__(
@@ -43,10 +44,10 @@ class WorkspaceTree:
 
         Args:
             axes: The arm.
-            goal: The point in the world that it aims at, shape (3,).
-            start: Values of joints that need not move, shape (dof,).
-            rng: Random numbers.
-            link_is_free: Which rows are free of collision as far as the link of a level; everything if None.
+            goal: The aimed point in the world [m], shape (3,).
+            start: Configuration that gives the values of joints that need not move, shape (dof,).
+            rng: Source of random numbers.
+            link_is_free: Checks which configurations are free up to the link of a level; all are if None.
         """
         self._axes = axes
         self._goal = goal
@@ -57,20 +58,20 @@ class WorkspaceTree:
         self.check_links(link_is_free)
 
     def check_links(self, link_is_free: LinkFree | None) -> None:
-        """Plant the tree anew: its further edges are held free, and no earlier one is built on."""
+        """Clear the tree and check the links of all further edges; earlier edges were not checked."""
         self._link_is_free = link_is_free
         self._q: list[Matrix] = [self._start, *(np.zeros((0, self._start.shape[1])),) * self._axes.count]
         self._frames: list[NDArray[np.float64]] = [self._axes.fixed[:1], *(np.zeros((0, 4, 4)),) * self._axes.count]
 
     def nodes(self, level: int) -> Matrix:
-        """Configurations up to a level's joint, in the order in which they were added, shape (k, dof)."""
+        """Return the configurations of a level, of which the joints before it count, in order; shape (k, dof)."""
         return self._q[level]
 
     def grow(self, width: int = 1) -> Matrix:
-        """Do some passes at a time.
+        """Do ``width`` passes at once.
 
         Returns:
-            Configurations of those that came to the end of the arm, shape (k, dof), k <= width.
+            Configurations of the passes that reached the end of the arm, shape (k, dof), k <= width.
         """
         self.passes += width
         q = np.repeat(self._q[0], width, axis=0)
@@ -84,7 +85,16 @@ class WorkspaceTree:
         return q
 
     def _add_link(self, level: int, q: Matrix, frames: NDArray[np.float64]) -> tuple[Matrix, NDArray[np.float64]]:
-        """Add a link to each branch, or to another of the same index in its place; those that succeed."""
+        """Add a link to each branch, or to a random other node of the same level in its place.
+
+        Args:
+            level: Number of the joint, from 0.
+            q: Configurations of the branches, shape (m, dof).
+            frames: Frames of the joint, T_world_joint, shape (m, 4, 4).
+
+        Returns:
+            Configurations and frames of the next joint, for those that succeeded, shapes (k, dof) and (k, 4, 4).
+        """
         done_q = []
         done_frames = []
         num_missing = len(q)
@@ -104,13 +114,20 @@ class WorkspaceTree:
     def _turn_joint(
         self, level: int, q: Matrix, frames: NDArray[np.float64], *, keep_idle_joints: bool
     ) -> tuple[Matrix, Mask]:
-        """Rows with the level's joint turned to a useful angle, and which of them will do.
+        """Turn the level's joint to a random useful angle.
 
-        With ``keep_idle_joints`` a joint that cannot bring the goal nearer keeps its value.
+        Args:
+            level: Number of the joint, from 0.
+            q: Configurations, shape (m, dof).
+            frames: Frames of the joint, shape (m, 4, 4).
+            keep_idle_joints: Whether a joint that cannot bring the tip nearer to the goal keeps its start value.
+
+        Returns:
+            Configurations with the joint turned, shape (m, dof), and whether each is usable, shape (m,).
         """
         axes = self._axes
         angle, useful = draw_turns(axes, level, frames, self._goal, self._rng)
-        # Where the regions are not exact, "useful" is a hint: what counts is whether the polish gets to the goal.
+        # If the regions are not exact, "useful" is only a hint; the polish decides whether a branch gets to the goal.
         usable = useful if axes.exact else np.ones(len(q), dtype=bool)
 
         if keep_idle_joints and axes.idle[level]:
@@ -125,7 +142,7 @@ class WorkspaceTree:
         return turned, usable
 
     def _next_frames(self, level: int, frames: NDArray[np.float64], q: Matrix) -> NDArray[np.float64]:
-        """Frames of the next joint."""
+        """Return the frames of the next joint, shape (m, 4, 4), from those of a level and the configurations."""
         angle = q[:, self._axes.joints[level]] + self._axes.offset[level]
         turn = np.tile(np.eye(4), (len(q), 1, 1))
         cosine = np.cos(angle)
@@ -142,21 +159,22 @@ class WorkspaceTree:
 def draw_turns(
     axes: Axes, level: int, frames: NDArray[np.float64], goal: Vector, rng: np.random.Generator
 ) -> tuple[Vector, Mask]:
-    """Draw an angle for a joint of each of several branches.
+    """Draw a useful angle of a joint for each of several branches.
 
-    The squared distance of the next point from the goal is a constant less an amplitude times the cosine of the
-    angle from the direction of the goal, hence the useful angles are two mirrored arcs.
+    The squared distance of the next point from the goal is a constant minus an amplitude times the cosine of the angle
+    from the direction of the goal. So the angles that keep this distance within the span of the remaining links form
+    two mirrored arcs.
 
     Args:
         axes: The arm.
         level: Number of the joint, from 0.
-        frames: Of the joint in each branch before it turns, T_world_joint, shape (m, 4, 4).
-        goal: The aimed point in the world, shape (3,).
-        rng: Random numbers.
+        frames: Frames of the joint in each branch before it turns, T_world_joint, shape (m, 4, 4).
+        goal: The aimed point in the world [m], shape (3,).
+        rng: Source of random numbers.
 
     Returns:
-        Angles inside the limits, shape (m,), uniform on the useful arcs; and which of them are useful. Where no angle
-        is, it is the one that comes nearest to being it.
+        Angles inside the limits [rad], shape (m,), uniform on the useful arcs, and whether they are useful, shape (m,).
+        If no angle is useful, it is the one that comes nearest to it.
     """
     local = np.einsum("mji,mj->mi", frames[:, :3, :3], goal - frames[:, :3, 3])
     point = axes.points[level]
@@ -167,21 +185,22 @@ def draw_turns(
     amplitude = 2.0 * np.hypot(local[:, 0], local[:, 1]) * np.hypot(point[0], point[1])
     centre = np.arctan2(local[:, 1], local[:, 0]) - np.arctan2(point[1], point[0])
 
-    # a point on the axis, or a goal on it: every turn leaves them as far apart
+    # If the point or the goal is on the axis, turning does not change their distance.
     turn_changes_nothing = amplitude < FLAT
     divisor = np.where(turn_changes_nothing, 1.0, amplitude)
     min_cosine = (constant - max_distance**2) / divisor
     max_cosine = (constant - min_distance**2) / divisor
     rounding = SLACK * (1.0 + np.abs(constant) / divisor)
 
-    # without an amplitude these are no cosines: the squared distance is within its bounds where they enclose 0
+    # Without an amplitude these are no cosines; the squared distance is within its bounds if they enclose 0.
     any_turn_is_useful = (min_cosine <= rounding) & (max_cosine >= -rounding)
     some_turn_is_useful = (min_cosine <= 1.0 + rounding) & (max_cosine >= -1.0 - rounding)
     useful = np.where(turn_changes_nothing, any_turn_is_useful, some_turn_is_useful)
     outer = np.where(turn_changes_nothing, np.pi, np.arccos(np.clip(min_cosine, -1.0, 1.0)))
     inner = np.where(turn_changes_nothing, 0.0, np.arccos(np.clip(max_cosine, -1.0, 1.0)))
 
-    if max_distance == 0.0 and bool(axes.exact):  # pointing at the goal, without the square root of the rounding
+    # The last link has to point exactly at the goal; arccos would return the square root of rounding.
+    if max_distance == 0.0 and bool(axes.exact):
         outer = np.where(turn_changes_nothing, outer, 0.0)
         inner = np.where(turn_changes_nothing, inner, 0.0)
 
@@ -192,7 +211,20 @@ def draw_turns(
 def _draw(
     centre: Vector, inner: Vector, outer: Vector, lower: float, upper: float, rng: np.random.Generator
 ) -> tuple[Vector, Mask]:
-    """Uniform angles on centre +- inner..outer inside the limits, shape (m,); where there are none the nearest."""
+    """Draw uniform angles on the arcs centre + inner..outer and centre - outer..-inner, inside the limits.
+
+    Args:
+        centre: Centres of the arcs [rad], shape (m,).
+        inner: Inner ends of the arcs relative to the centre [rad], shape (m,).
+        outer: Outer ends of the arcs relative to the centre [rad], shape (m,).
+        lower: Lower limit [rad].
+        upper: Upper limit [rad].
+        rng: Source of random numbers.
+
+    Returns:
+        Angles [rad], shape (m,), or the limits nearest to an arc where no part of one is inside; and whether the arcs
+        reach into the limits, shape (m,).
+    """
     turns = TAU * np.arange(np.floor((lower - np.pi) / TAU) - 1.0, np.ceil((upper + np.pi) / TAU) + 2.0)
     centre = wrapped(centre)
     begins = np.stack([centre + inner, centre - outer], axis=1)[:, :, None] + turns
@@ -201,11 +233,11 @@ def _draw(
     ends = np.clip(begins + widths, lower, upper).reshape(len(centre), -1)
     miss = np.maximum(np.maximum(lower - begins - widths, begins - upper), 0.0).reshape(len(centre), -1)
 
-    # arcs inside the limits count by their lengths; where there are none, those that miss them least
+    # Arcs inside the limits are weighted by their lengths; if there are none, those that miss the limits least count.
     is_inside = miss.min(axis=1) <= SLACK
     weight = np.where(miss <= np.minimum(miss.min(axis=1), np.pi)[:, None] + SLACK, ends - starts + SLACK, 0.0)
 
-    # one of them, then an angle on it
+    # Choose one of them, then an angle on it.
     total = np.cumsum(weight, axis=1)
     pick = (total > (rng.uniform(size=len(centre)) * total[:, -1])[:, None]).argmax(axis=1)
     rows = np.arange(len(centre))
@@ -216,10 +248,11 @@ def _draw(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AxisRun:
-    """What `grow_by_rule_b` brought.
+    """Result of `grow_by_rule_b`.
 
     Attributes:
-        q: Joint angles less their offsets of each pass's end, in the order of the axes, shape (passes, n).
+        q: Entries of q (joint angles minus offsets) at the end of each pass, in the order of the axes, shape
+            (passes, n).
         misses: Distance of each end from the goal [m], shape (passes,).
         solved_in: The first pass, counted from 1, within the tolerance; 0 if there is none.
     """
@@ -230,11 +263,17 @@ class AxisRun:
 
 
 def grow_by_rule_b(axes: Axes, goal: Vector, *, tolerance: float, passes: int, rng: np.random.Generator) -> AxisRun:
-    """Grow a tree of frames pass by pass until an end is within the tolerance [m] of a point, shape (3,).
+    """Grow a tree of frames pass by pass, by surface sampling and rule B for joints with one axis.
 
-    Surface sampling and rule B for joints with one axis, without looking ahead: the direct transfer of [3] to real
-    arms, which shows what the arcs and the polish add. The parent is the node whose circle of next points passes
-    closest to the sample; joint limits are not regarded.
+    This is the direct transfer of [3] to real arms, without looking ahead; it shows what the arcs and the polish add.
+    The parent of a node is the one whose circle of next points passes closest to the sample. Joint limits are ignored.
+
+    Args:
+        axes: The arm.
+        goal: The aimed point in the world [m], shape (3,).
+        tolerance: Distance of an end from the goal that ends the search [m].
+        passes: Largest number of passes.
+        rng: Source of random numbers.
     """
     frames = [np.zeros((passes if level else 1, 4, 4)) for level in range(axes.count + 1)]
     q = [np.zeros((passes if level else 1, axes.count)) for level in range(axes.count + 1)]
@@ -260,7 +299,16 @@ def grow_by_rule_b(axes: Axes, goal: Vector, *, tolerance: float, passes: int, r
 
 
 def _closest_circle(frames: NDArray[np.float64], point: Vector, sample: Vector) -> tuple[int, float]:
-    """The frame whose circle, on which a turn about z moves a point, passes closest to a sample, and that turn."""
+    """Find the frame whose rotation about z brings a point closest to a sample.
+
+    Args:
+        frames: Frames, shape (k, 4, 4).
+        point: The point in each frame [m], shape (3,).
+        sample: The sample in the world [m], shape (3,).
+
+    Returns:
+        Index of the frame, and the rotation [rad].
+    """
     local = np.einsum("mji,mj->mi", frames[:, :3, :3], sample - frames[:, :3, 3])
     off = (np.hypot(local[:, 0], local[:, 1]) - np.hypot(point[0], point[1])) ** 2 + (local[:, 2] - point[2]) ** 2
     best = int(np.argmin(off))
@@ -269,7 +317,7 @@ def _closest_circle(frames: NDArray[np.float64], point: Vector, sample: Vector) 
 
 
 def _about_z(angle: float) -> NDArray[np.float64]:
-    """The turn about z by an angle [rad], shape (4, 4)."""
+    """Return the rotation about z by an angle [rad], shape (4, 4)."""
     turn = np.eye(4)
     turn[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
     return turn
