@@ -1,4 +1,4 @@
-"""Boxes, cylinders, capsules and spheres as URDF text: what the shipped robots are drawn from."""
+"""Boxes, cylinders, capsules and spheres as URDF text, from which shipped robots are built."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Part:
 
 
 def tube(start: Point, end: Point, radius: float, colour: str = "", *, capsule: bool = False) -> Part:
-    """A cylinder from ``start`` to ``end`` [m], or the capsule with its cap centres there."""
+    """Return a cylinder from ``start`` to ``end`` [m], or the capsule with its cap centres there."""
     a = np.array(start)
     b = np.array(end)
     x, y, z = b - a
@@ -40,12 +40,12 @@ def tube(start: Point, end: Point, radius: float, colour: str = "", *, capsule: 
 
 
 def upright(bottom: Point, top: Point, radius: float, colour: str = "") -> Part:
-    """A cylinder along z."""
+    """Return a cylinder along z, from ``bottom`` to ``top`` [m]."""
     return tube(bottom, top, radius, colour)
 
 
 def box(size: Point, centre: Point, colour: str = "", pitch: float = 0.0) -> Part:
-    """A box [m], turned about y by ``pitch`` [rad]."""
+    """Return a box [m], turned about y by ``pitch`` [rad]."""
     return Part(f'<box size="{" ".join(map(number, size))}"/>', _point(centre), _point((0.0, pitch, 0.0)), colour)
 
 
@@ -76,7 +76,7 @@ def materials_text(colours: Mapping[str, tuple[float, float, float]]) -> str:
 
 
 def number(value: float) -> str:
-    """A length or an angle, rounded to a nanometre or a nanoradian."""
+    """Return a length or an angle as text, rounded to a nanometre or a nanoradian."""
     return f"{round(float(value), 9) + 0.0:.9g}"
 
 

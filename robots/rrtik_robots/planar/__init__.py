@@ -30,12 +30,12 @@ def planar(
     tip: str = "tip",
     base_pose: BasePose = None,
 ) -> Robot:
-    """A planar arm, stretched along x at zero; its links do not collide with each other.
+    """Make a planar arm, stretched along x at zero, whose links do not collide with each other.
 
     Args:
-        lengths: Of the links, base first [m], all above 0.
-        limits_deg: Lower and upper limit per joint, shape (dof, 2) [deg]; -180 .. 180 if None.
-        radius: Of the links, which are capsules [m]; 0 stands for 1e-4.
+        lengths: Lengths of the links, base first [m], all above 0.
+        limits_deg: Lower and upper limit of each joint [deg], shape (dof, 2); -180 .. 180 if None.
+        radius: Radius of the links, which are capsules [m]; 0 stands for 1e-4.
         tip: Link that goals refer to.
         base_pose: ``pinocchio.SE3`` T_world_base.
 
@@ -46,17 +46,17 @@ def planar(
 
 
 def planar3(*, radius: float = 0.0, tip: str = "tip", base_pose: BasePose = None) -> Robot:
-    """Three links of 1 m with the limits of the planar test of [1, ch. 6.3]."""
+    """Make an arm of three links of 1 m with the limits of the planar test of [1, ch. 6.3]."""
     return _arm("planar3", (1.0,) * 3, LIMITS_PLANAR3_DEG, radius, tip, base_pose)
 
 
 def planar6(*, radius: float = 0.0, tip: str = "tip", base_pose: BasePose = None) -> Robot:
-    """Six links of 0.7 m, joints turn by 150 degrees to either side."""
+    """Make an arm of six links of 0.7 m, whose joints turn by 150 degrees to either side."""
     return _arm("planar6", (0.7,) * 6, [(-150.0, 150.0)] * 6, radius, tip, base_pose)
 
 
 def planar10(*, radius: float = 0.0, tip: str = "tip", base_pose: BasePose = None) -> Robot:
-    """Ten links of 0.1 m, joints turn by 180 degrees to either side."""
+    """Make an arm of ten links of 0.1 m, whose joints turn by 180 degrees to either side."""
     return _arm("planar10", (0.1,) * 10, None, radius, tip, base_pose)
 
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from rrtik_ompl.description.robot_source import BasePose
 
 
-SMALLEST_RADIUS = 1e-4  # [m], stands for a radius of 0
+SMALLEST_RADIUS = 1e-4  # radius that is used in place of 0 [m]
 SLATE = (0.36, 0.42, 0.49, 1.0)  # unlike the colours of start, goal and obstacles
 
 
@@ -29,14 +29,14 @@ def point2d(
     tip: str = "disc",
     base_pose: BasePose = None,
 ) -> Robot:
-    """A disc with the two sliding joints x and y.
+    """Make a disc with the two sliding joints x and y.
 
-    It is checked as a ball about z = 0, which touches an extruded polygon of at least its height exactly when the
+    It is checked as a ball centred at z = 0, which touches an extruded polygon of at least its height exactly when the
     disc touches the polygon.
 
     Args:
-        radius: Of the disc [m]; 0 stands for 1e-4.
-        bounds: Lower and upper limit of x and of y, shape (2, 2) [m].
+        radius: Radius of the disc [m]; 0 stands for 1e-4.
+        bounds: Lower and upper limit of x and of y [m], shape (2, 2).
         tip: Link that goals refer to.
         base_pose: ``pinocchio.SE3`` T_world_base.
 

@@ -45,7 +45,7 @@ START_CUT_DEG = (15.3319, 7.1738, 24.5756, 0.0, 0.0)  # wrist at (7, 7, -17) in,
 
 
 def puma560(*, base_height: float = 0.672, tip: str = "tip", base_pose: BasePose = None) -> Robot:
-    """The six-joint arm, standard DH; its tip is the wrist centre with the axes of the last DH frame.
+    """Make the six-joint arm, standard DH; its tip is the wrist centre with the axes of the last DH frame.
 
     Args:
         base_height: Height of the shoulder above the base [m]; 0 puts the base at the shoulder.
@@ -73,7 +73,7 @@ def puma560(*, base_height: float = 0.672, tip: str = "tip", base_pose: BasePose
 
 
 def puma560_3dof(*, lengths: Mapping[str, float] | None = None, tip: str = "tip", base_pose: BasePose = None) -> Robot:
-    """The first three joints; the tip is the wrist centre. Modified DH.
+    """Make the arm of the first three joints, modified DH; its tip is the wrist centre.
 
     Args:
         lengths: Lengths [m] that differ from the defaults: a2, a3, d3, d4.
@@ -84,7 +84,7 @@ def puma560_3dof(*, lengths: Mapping[str, float] | None = None, tip: str = "tip"
 
 
 def puma560_5dof(*, lengths: Mapping[str, float] | None = None, tip: str = "tip", base_pose: BasePose = None) -> Robot:
-    """Five joints; the tip is the end of a segment of length d7 beyond the wrist. Modified DH.
+    """Make the arm of five joints, modified DH; its tip is the end of a segment of length d7 beyond the wrist.
 
     Args:
         lengths: Lengths [m] that differ from the defaults: a2, a3, d3, d4, d7.

@@ -14,9 +14,9 @@ CASES = ("generic", "elbow", "wrist", "shoulder", "elbow wrist", "shoulder wrist
 
 
 def singular_configurations(robot: Robot, case: str, count: int, rng: np.random.Generator) -> Matrix:
-    """Random postures, shape (count, 6) [rad], of one of ``CASES`` (combinations of families).
+    """Draw random configurations of one of ``CASES`` (combinations of families) inside the limits.
 
-    The elbow is stretched: folded it would stand outside its limits.
+    In the elbow cases the elbow is stretched, since a folded one would be outside its limits. Shape (count, 6) [rad].
 
     Raises:
         UnknownNameError: If there is no such case.
@@ -40,6 +40,6 @@ def singular_configurations(robot: Robot, case: str, count: int, rng: np.random.
             Q = Q[np.abs(cosine) <= 1.0]
             cosine = cosine[np.abs(cosine) <= 1.0]
             Q[:, 2] = wrapped(np.arccos(cosine) * rng.choice([-1.0, 1.0], len(Q)) - bend - Q[:, 1])
-            Q = Q[np.abs(np.sin(Q[:, 2] + bend)) > 0.1]  # folded, the wrist centre would stand in the shoulder
+            Q = Q[np.abs(np.sin(Q[:, 2] + bend)) > 0.1]  # With a folded elbow the wrist centre is in the shoulder.
         found = np.vstack([found, Q[robot.within_limits(Q, 0.0)]])
     return found[:count]

@@ -45,13 +45,13 @@ def titan4(
     tip: str = "grip_point",
     base_pose: BasePose = None,
 ) -> Robot:
-    """The arm, its world origin on the azimuth axis at the height of the shoulder, x forward, z up.
+    """Make the arm, with the world's origin on the azimuth axis at the height of the shoulder, x forward and z up.
 
-    All angles are physical ones: 0 is the arm stretched along x, wrist yaw 0 the straight wrist.
+    All angles are the physical ones: at 0 the arm is stretched along x with a straight wrist.
 
     Args:
-        limits: ``"planning"`` (of the tests in [1, ch. 6.3]) or ``"envelope"`` (measured from the
-            shoulder-elbow line: for everything about reach); they differ in the shoulder's stroke by 7.81 degrees.
+        limits: ``"planning"`` (of the tests in [1, ch. 6.3]) or ``"envelope"`` (measured from the shoulder-elbow line;
+            for all questions of reach). The range of the shoulder differs between them by 7.81 degrees.
         lengths: Lengths [m] that differ from `TitanGeometry`'s, by name.
         tip: Link that goals refer to.
         base_pose: ``pinocchio.SE3`` T_world_base.

@@ -1,4 +1,4 @@
-"""What the TITAN 4 looks like: every link drawn from boxes and tubes that stay inside its collision body or near it."""
+"""The visual model of the TITAN 4: each link consists of boxes and tubes inside its collision body or near it."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from rrtik_robots.urdf_parts import Part, Point, ball, box, tube, upright
 
 
 def link_visuals(g: TitanGeometry) -> dict[str, list[Part]]:
-    """Drawn parts by link, base first, each in its link's frame."""
+    """Return the visual parts of each link, base first, each in its link's frame."""
     return {
         "base": _base(g),
         "shoulder": _shoulder(g),

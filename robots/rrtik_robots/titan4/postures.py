@@ -19,19 +19,29 @@ SIGMA = np.array([1.0, -1.0])[:, None]  # the two ways of the wrist: theta5 and 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Target:
-    """Poses of E as rows of numbers: columns u and w of the rotation, and the wrist point P; each of shape (3, m)."""
+    """Poses of the grip point E, column by column; all arrays have shape (3, m).
+
+    Attributes:
+        u: First column of the rotation.
+        w: Third column of the rotation, the gripper axis.
+        p: Wrist point [m].
+    """
 
     u: Matrix
     w: Matrix
     p: Matrix
 
     def rows(self, which: NDArray[np.int64]) -> Target:
-        """The targets of these numbers."""
+        """Return the targets with these indices."""
         return Target(self.u[:, which], self.w[:, which], self.p[:, which])
 
 
 def in_plane(target: Target, c1: NDArray[np.float64], s1: NDArray[np.float64]) -> tuple[Vector, Vector]:
-    """Of the gripper axis: its part along the arm in the arm plane, and the length of its part in that plane."""
+    """Return two components of the gripper axis for arm planes with the given cosine and sine of theta1.
+
+    Returns:
+        The component along the arm plane's horizontal, and the length of the projection onto the arm plane.
+    """
     x = target.w[0] * c1 + target.w[1] * s1
     return x, np.hypot(x, target.w[2])
 
@@ -44,19 +54,19 @@ def completed(
     cosines: NDArray[np.float64],
     sines: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """The other five joints, once theta1 and psi are known.
+    """Compute the other five joints from theta1 and psi, the sum of the three pitch angles.
 
     Args:
         g: Lengths of the arm.
         target: m poses.
-        theta1: Shape (k, 1 or 2, m); the second axis is the way of the wrist.
+        theta1: Azimuths [rad], shape (k, 1 or 2, m); the second axis is the wrist's branch.
         turn: Cosine and sine of theta1, shape (2, k, 1 or 2, m).
-        cosines: Of psi, shape (k, 2, m).
-        sines: Of psi, shape (k, 2, m).
+        cosines: Cosines of psi, shape (k, 2, m).
+        sines: Sines of psi, shape (k, 2, m).
 
     Returns:
-        Joint values, shape (6, k, 2, 2, m), elbow up and down in the last axis but one, and whether each is real,
-        shape (k, 2, 2, m).
+        Joint angles [rad], shape (6, k, 2, 2, m), with elbow up and down in the last axis but one, and whether each
+        posture reaches its pose, shape (k, 2, 2, m).
     """
     ux, uy, uz = target.u
     px, py, pz = target.p

@@ -1,4 +1,4 @@
-"""Random singular postures of the TITAN 4, for tests and benchmarks: joint limits aside, or inside them."""
+"""Random singular configurations of the TITAN 4 for tests and benchmarks, with or without regard to joint limits."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from rrtik_ompl.ik.analytic.analytic_solver import Limits, wrapped
 from rrtik_robots.titan4.geometry import TitanGeometry
 
 RIGHT = np.pi / 2
-AT_LIMIT = 1e-12  # [rad], rounding
-FEWEST = 1_000  # postures that are drawn at a time
-ROUNDS = 10_000  # of drawing, before giving up
+AT_LIMIT = 1e-12  # allowance for rounding at a limit [rad]
+FEWEST = 1_000  # least number of configurations that are drawn at once
+ROUNDS = 10_000  # number of draws before giving up
 CASES = ("generic", "elbow", "wrist", "shoulder", "elbow wrist", "shoulder wrist", "case 1", "case 2", "all psi")
 
 
 def singular_configurations(case: str, count: int, rng: np.random.Generator, g: TitanGeometry | None = None) -> Matrix:
-    """Random postures, shape (count, 6) [rad], of one of ``CASES``, joint limits aside.
+    """Draw random configurations of one of ``CASES``, regardless of joint limits, shape (count, 6) [rad].
 
-    The names are those of the families; ``case 1`` and ``case 2`` have axis 5 or axis 6 on axis 1; ``all psi`` has the
-    wrist point on axis 1 and the gripper axis normal to the arm plane while link 4 is upright.
+    The names are those of the families. In ``case 1`` and ``case 2``, axis 5 or axis 6 is on axis 1; in ``all psi`` the
+    wrist point is on axis 1 and the gripper axis is normal to the arm plane while link 4 is upright.
 
     Raises:
         UnknownNameError: If there is no such case.
@@ -47,13 +47,20 @@ def singular_configurations(case: str, count: int, rng: np.random.Generator, g: 
 def configurations_inside(
     case: str, count: int, rng: np.random.Generator, limits: Limits, g: TitanGeometry | None = None
 ) -> Matrix:
-    """The same, only those inside the limits: lowest and highest joint values [rad], shape (6,) each.
+    """Draw random configurations of a case, see `singular_configurations`, that are inside joint limits.
 
     A wrist yaw of 90 degrees counts as inside limits of 90 degrees.
 
+    Args:
+        case: One of ``CASES``.
+        count: Number of configurations.
+        rng: Source of random numbers.
+        limits: Lowest and highest joint values [rad], shape (6,) each.
+        g: Lengths of the arm; the defaults if None.
+
     Raises:
         UnknownNameError: If there is no such case.
-        InputError: If hardly any posture of the case is inside the limits.
+        InputError: If hardly any configuration of the case is inside the limits.
     """
     low = limits[0] - AT_LIMIT
     high = limits[1] + AT_LIMIT
@@ -67,7 +74,17 @@ def configurations_inside(
 
 
 def _on_axis(g: TitanGeometry, Q: Matrix, psi: np.ndarray | None, rng: np.random.Generator) -> Matrix:
-    """The wrist point on axis 1: theta2 and theta3 drawn until theta4 (or, for a wanted psi, the rest) can do that."""
+    """Return configurations changed in joints 2 to 4 so that the wrist point is on axis 1.
+
+    theta2 and theta3 are drawn until theta4 can bring the point there. If psi is given, theta2 is drawn until theta3
+    and theta4 can do so with that psi.
+
+    Args:
+        g: Lengths of the arm.
+        Q: Configurations, shape (m, 6).
+        psi: Wanted sums of the three pitch angles [rad], shape (m,), or None.
+        rng: Source of random numbers.
+    """
     placed = Q.copy()
     todo = np.arange(len(Q))
     while len(todo):

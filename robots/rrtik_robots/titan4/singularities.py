@@ -1,7 +1,7 @@
 """How near the TITAN 4 is to its singularities: three families and the three published cases of self-motion.
 
-Source: [1, ch. 3, app. A to C]. The determinant of the Jacobian is
--a2 a3 r sin(theta3) cos(theta5) with r the signed distance of the wrist point from the azimuth axis.
+Source: [1, ch. 3, app. A to C]. The determinant of the Jacobian is -a2 a3 r sin(theta3) cos(theta5), where r is the
+signed distance of the wrist point from the azimuth axis.
 """
 
 from __future__ import annotations
@@ -13,10 +13,11 @@ from rrtik_robots.titan4.geometry import TitanGeometry
 
 
 def nearness(g: TitanGeometry, Q: Matrix) -> dict[str, Vector]:
-    """Zero at the singularity, for Q of shape (m, 6): sines and cosines, for ``shoulder`` metres.
+    """Return for each singular case a value that is 0 at the singularity, for Q, shape (m, 6); shape (m,) each.
 
-    ``elbow``: stretched or folded, the border of the workspace. ``wrist``: gripper axis normal to the arm plane, which
-    is case 3. ``shoulder``: wrist point on the azimuth axis. ``case 1``: axis 5 on axis 1. ``case 2``: axis 6 on it.
+    The values are sines and cosines, and metres for ``shoulder``. ``elbow``: the elbow is stretched or folded, at the
+    border of the workspace. ``wrist`` and ``case 3``: the gripper axis is normal to the arm plane. ``shoulder``: the
+    wrist point is on the azimuth axis. ``case 1``: axis 5 is on axis 1. ``case 2``: axis 6 is on axis 1.
     """
     radius = np.abs(wrist_radius(g, Q))
     psi = Q[:, 1:4].sum(axis=1)
@@ -33,7 +34,7 @@ def nearness(g: TitanGeometry, Q: Matrix) -> dict[str, Vector]:
 
 
 def wrist_radius(g: TitanGeometry, Q: Matrix) -> Vector:
-    """Signed distance of the wrist point from the azimuth axis, in the arm plane [m], shape (m,)."""
+    """Return the signed distance of the wrist point from the azimuth axis in the arm plane [m], shape (m,)."""
     shoulder = Q[:, 1]
     elbow = Q[:, 1] + Q[:, 2]
     psi = Q[:, 1:4].sum(axis=1)
@@ -42,6 +43,6 @@ def wrist_radius(g: TitanGeometry, Q: Matrix) -> Vector:
 
 
 def determinant(g: TitanGeometry, Q: Matrix) -> Vector:
-    """Determinant of the Jacobian, rows (angular; linear), for Q of shape (m, 6). Shape (m,)."""
+    """Return the determinant of the Jacobian, with rows (angular; linear), for Q, shape (m, 6); shape (m,)."""
     value: Vector = -g.a2 * g.a3 * wrist_radius(g, Q) * np.sin(Q[:, 2]) * np.cos(Q[:, 4])
     return value

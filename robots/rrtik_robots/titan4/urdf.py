@@ -1,4 +1,4 @@
-"""The URDF of the TITAN 4, written from its measures. Run as a module to write ``titan4.urdf`` again."""
+"""The URDF of the TITAN 4, generated from its lengths. Run as a module to write ``titan4.urdf`` again."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ COLOURS = {
 
 
 def titan4_urdf(geometry: TitanGeometry | None = None) -> str:
-    """URDF text of the arm.
+    """Return the URDF text of the arm.
 
-    Link frames are parallel to the world at zero, x forward; the base frame is on the azimuth axis at the height of
-    the shoulder, the frame of ``grip_point`` has its columns (u, v, w) along (z, -y, x).
+    With all joints at zero, link frames are parallel to the world, x forward. The base frame is on the azimuth axis at
+    the height of the shoulder. The columns (u, v, w) of the frame ``grip_point`` are along (z, -y, x).
 
     Args:
-        geometry: Measures; the defaults if None.
+        geometry: Lengths of the arm; the defaults if None.
     """
     g = TitanGeometry() if geometry is None else geometry
     looks = link_visuals(g)
@@ -48,7 +48,7 @@ def titan4_urdf(geometry: TitanGeometry | None = None) -> str:
 
 
 def link_capsules(g: TitanGeometry) -> dict[str, list[Part]]:
-    """Collision bodies by link: capsules (and the base cylinder), each in its link's frame."""
+    """Return the collision bodies of each link, capsules and the base cylinder, each in its link's frame."""
     knee = (g.knee_along, 0.0, g.knee_above)
     bottom = -g.shoulder_height
     return {
@@ -69,7 +69,7 @@ def _capsule(start: Point, end: Point, radius: float) -> Part:
 
 
 def _joints(g: TitanGeometry) -> list[tuple[str, str, str, float, str]]:
-    """Name, parent, child, distance along x, axis."""
+    """Return for each joint its name, parent, child, distance along the parent's x [m], and axis as URDF text."""
     return [
         ("azimuth", "base", "shoulder", 0.0, "0 0 1"),
         ("shoulder_pitch", "shoulder", "upper_arm", g.a1, "0 -1 0"),

@@ -1,9 +1,9 @@
-"""The trees in the workspace as published [3], grown index by index for many passes at a time, and their baseline.
+"""The workspace trees as published [3], grown level by level for many passes at once, and a baseline in joint space.
 
-A pass adds one node of each index, joined to a node of the index before. What is sampled does not depend on the tree,
-and a level depends on the level before it alone. So a whole block of passes can be added to one level before the next
-one is begun, as long as a node chooses among those that its pass could know: the same tree, without a loop over
-passes. The baseline is an RRT in the space of joint angles whose every vertex is tried at the goal.
+A pass adds one node to each level, joined to a node of the level before. Samples do not depend on the tree, and a level
+depends only on the level before it. So a whole block of passes can be added to one level before the next, provided that
+a node chooses its parent only among nodes of earlier passes and its own. The tree is the same, without a loop over
+passes. The baseline is an RRT in the space of joint angles, where every vertex is compared with the goal.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from rrtik_ompl.base.errors import InputError, UnknownNameError
 from rrtik_ompl.ik.mb_rrt.links import Links, directions, joints_to_chain
 
 PASSES = 10_000
-FIRST_BLOCK = 32  # passes; later blocks are as large as all before them
-SCORES = 1 << 15  # of candidates at a time: they stay in the cache
-MARGIN = 0.01  # of the reach: how far outside its region a node must lie to be counted
-STEP = np.radians(3.0)  # of the joint-space tree: "3 units" of the published demonstration
-VERTICES_AT_A_TIME = 500  # of the joint-space tree, between two tests of the goal
+FIRST_BLOCK = 32  # passes of the first block; each later block is as large as all before it
+SCORES = 1 << 15  # number of scores that are computed at once, so that they stay in the cache
+MARGIN = 0.01  # share of the reach by which a node must lie outside its region to be counted
+STEP = np.radians(3.0)  # step of the joint-space tree, the "3 units" of the published demonstration
+VERTICES_AT_A_TIME = 500  # vertices of the joint-space tree between two comparisons with the goal
 
 Draw = Callable[[Links, Vector, int, int, np.random.Generator], Matrix]
 Rule = Callable[[Matrix, float], Matrix]
@@ -35,10 +35,12 @@ class Variant:
     """One configuration of the method.
 
     Attributes:
-        name: By which it is chosen.
-        title: As [3] calls it.
-        draw: Samples for the joint of an index, from (links, goal, index, count, rng), shape (count, dimension).
-        rule: What the parent must have least of, from squared distances to the sample and the link's length.
+        name: Name by which it is chosen.
+        title: Name that [3] uses.
+        draw: Function of (links, goal, index, count, rng) that returns samples for the joint of an index, shape
+            (count, dimension).
+        rule: Function of squared distances to the sample and the link's length that returns the scores which the parent
+            minimises.
     """
 
     name: str
@@ -48,25 +50,25 @@ class Variant:
 
 
 def square(links: Links, goal: Vector, index: int, count: int, rng: np.random.Generator) -> Matrix:
-    """Uniform in the square, or cube, around the base that holds the whole reach."""
+    """Draw samples uniformly in the square, or cube, around the base that holds the whole reach."""
     return rng.uniform(-links.reach, links.reach, (count, links.dimension))
 
 
 def square_then_goal(links: Links, goal: Vector, index: int, count: int, rng: np.random.Generator) -> Matrix:
-    """As `square`, and the goal itself for the last index: the "*" option."""
+    """Draw samples as `square` does, but take the goal itself for the last index: the "*" option."""
     if index < links.count:
         return square(links, goal, index, count, rng)
     return np.broadcast_to(goal, (count, links.dimension))
 
 
 def surface(links: Links, goal: Vector, index: int, count: int, rng: np.random.Generator) -> Matrix:
-    """On the circle, or sphere, around the goal whose radius is the length still to come."""
+    """Draw samples on the circle, or sphere, around the goal whose radius is the length of the remaining links."""
     circle: Matrix = goal + links.max_span[index] * directions(count, links.dimension, rng)
     return circle
 
 
 def projected(links: Links, goal: Vector, index: int, count: int, rng: np.random.Generator) -> Matrix:
-    """As `square`, then moved straight to or from the goal onto the circle of `surface` [3, section 4.3]."""
+    """Draw samples as `square` does, then project them radially onto the circle of `surface` [3, section 4.3]."""
     from_goal = square(links, goal, index, count, rng) - goal
     distance = np.linalg.norm(from_goal, axis=1, keepdims=True)
     on_circle: Matrix = goal + links.max_span[index] * from_goal / np.maximum(distance, np.finfo(float).tiny)
@@ -74,12 +76,12 @@ def projected(links: Links, goal: Vector, index: int, count: int, rng: np.random
 
 
 def nearest(squared: Matrix, length: float) -> Matrix:
-    """Rule A: the nearest node."""
+    """Return the scores of rule A, which prefers the node nearest to the sample."""
     return squared
 
 
 def one_link_away(squared: Matrix, length: float) -> Matrix:
-    """Rule B: the node whose distance from the sample is closest to the link's length."""
+    """Return the scores of rule B, which prefers a distance from the sample close to the link's length; in place."""
     off = np.sqrt(squared, out=squared)
     off -= length
     return np.abs(off, out=off)
@@ -115,13 +117,14 @@ def variant(name: str) -> Variant:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TreeSearch:
-    """A grown tree. Level i holds the nodes of index i, one for each pass; level 0 is the base alone.
+    """A grown tree. Level i holds the nodes of index i, one for each pass; level 0 holds only the base.
 
     Attributes:
         links: The chain.
-        goal: Shape (dimension,).
-        nodes: For each level the positions, shapes (1, dimension) and n times (passes, dimension).
-        parents: For each level but the first: rows of the level before, shape (passes,).
+        goal: Position of the goal, shape (dimension,).
+        nodes: Positions of the nodes of each level, shape (1, dimension) for the first and (passes, dimension) for the
+            n others.
+        parents: For each level but the first, the rows of the parents in the level before, shape (passes,).
         misses: Distance of the end from the goal in each pass, shape (passes,).
         solved_in: The first pass, counted from 1, whose end is within the tolerance; 0 if there is none.
     """
@@ -152,10 +155,10 @@ class TreeSearch:
         return np.array([level[k] for level, k in zip(self.nodes, reversed(rows), strict=True)])
 
     def outside(self, margin: float = MARGIN) -> int:
-        """Nodes of index 1..n-1 farther from the goal than the length still to come.
+        """Count the nodes of index 1..n-1 that are farther from the goal than the length of the remaining links.
 
         Args:
-            margin: By how much at least, as a share of the reach; 0 counts strictly.
+            margin: Least excess that counts, as a share of the reach.
         """
         margin_distance = margin * self.links.reach
         beyond = (
@@ -165,19 +168,19 @@ class TreeSearch:
         return int(sum(np.count_nonzero(mask) for mask in beyond))
 
     def rho(self, margin: float = MARGIN) -> float:
-        """The share of nodes of index 1..n-1 that are outside; see :meth:`outside`."""
+        """Return the share of nodes of index 1..n-1 that are outside, see :meth:`outside`."""
         counted = self.passes * (self.links.count - 1)
         return self.outside(margin) / counted if counted else 0.0
 
     def until(self, passes: int) -> TreeSearch:
-        """The tree as it was after some of its passes."""
+        """Return the tree as it was after the given number of passes."""
         parents_until = tuple(rows[:passes] for rows in self.parents)
         solved = self.solved_in if self.solved_in <= passes else 0
         nodes = (self.nodes[0], *(level[:passes] for level in self.nodes[1:]))
         return TreeSearch(self.links, self.goal, nodes, parents_until, self.misses[:passes], solved)
 
     def edge_error(self) -> float:
-        """The largest difference between an edge and its link."""
+        """Return the largest difference between the length of an edge and that of its link."""
         worst = 0.0
         for level, before, parents, length in zip(
             self.nodes[1:], self.nodes, self.parents, self.links.lengths, strict=False
@@ -188,7 +191,7 @@ class TreeSearch:
 
 
 def first_hit(misses: Vector, tolerance: float) -> int:
-    """The first pass, counted from 1, that misses by less than the tolerance; 0 if there is none."""
+    """Return the first pass, counted from 1, that misses by less than the tolerance; 0 if there is none."""
     hits = np.flatnonzero(misses < tolerance)
     return int(hits[0]) + 1 if len(hits) else 0
 
@@ -207,15 +210,15 @@ def grow(
 
     Args:
         links: The chain, base at the origin.
-        goal: Shape (dimension,).
+        goal: Position of the goal, shape (dimension,).
         kind: One of ``VARIANTS``, or its name.
-        tolerance: Unit of the lengths; a miss must be smaller.
-        rng: Random numbers.
-        passes: Limit.
-        stop: Whether to stop at the first success; if not, all passes are done (the published rho at 10,000).
+        tolerance: Distance from the goal that a miss must be below, in the unit of the lengths.
+        rng: Source of random numbers.
+        passes: Largest number of passes.
+        stop: Whether to stop at the first success; if not, all passes are done (10,000 for the published rho).
 
     Raises:
-        InputError: If the goal is out of reach; it says by how much.
+        InputError: If the goal is out of reach; the message says by how much.
         UnknownNameError: If there is no such variant.
     """
     target = links.reachable(goal)
@@ -248,7 +251,7 @@ def _add_passes(
     count: int,
     rng: np.random.Generator,
 ) -> None:
-    """Append ``count`` passes to every level of a tree."""
+    """Append ``count`` passes to every level of a tree; the lists ``nodes`` and ``parents`` are changed in place."""
     for index in range(1, links.count + 1):
         length = float(links.lengths[index - 1])
         samples = kind.draw(links, goal, index, count, rng)
@@ -259,13 +262,13 @@ def _add_passes(
 
 
 def best_parents(nodes: Matrix, samples: Matrix, length: float, rule: Rule) -> NDArray[np.int64]:
-    """For each sample the node that a rule likes best, among those that were there in the sample's pass.
+    """Return for each sample the node with the best score, among those up to the sample's own pass.
 
     Args:
-        nodes: Of the index before, in the order of their passes, shape (k, d), k >= m; or the base alone, (1, d).
-        samples: Of the last m passes, shape (m, d).
-        length: Of the link.
-        rule: See `Variant`.
+        nodes: Nodes of the index before, in the order of their passes, shape (k, d), k >= m; or only the base, (1, d).
+        samples: Samples of the last m passes, shape (m, d).
+        length: Length of the link.
+        rule: Rule for the scores, see `Variant`.
 
     Returns:
         Rows of ``nodes``, shape (m,).
@@ -282,13 +285,13 @@ def best_parents(nodes: Matrix, samples: Matrix, length: float, rule: Rule) -> N
         num_known = num_before + begin + len(block)
         score = rule(_squared_distances(block, columns[:, :num_known]), length)
         later = np.triu_indices(len(block), 1)
-        score[later[0], num_before + begin + later[1]] = np.inf  # nodes of later passes
+        score[later[0], num_before + begin + later[1]] = np.inf  # Nodes of later passes cannot be parents.
         best[begin : begin + rows] = score.argmin(axis=1)
     return best
 
 
 def _squared_distances(samples: Matrix, columns: Matrix) -> Matrix:
-    """Between samples, shape (m, d), and nodes, shape (d, k): (m, k)."""
+    """Return the squared distances between samples, shape (m, d), and nodes, shape (d, k); shape (m, k)."""
     total: Matrix = samples[:, :1] - columns[0]
     total *= total
     for axis in range(1, len(columns)):
@@ -299,7 +302,10 @@ def _squared_distances(samples: Matrix, columns: Matrix) -> Matrix:
 
 
 def one_link(parents: Matrix, samples: Matrix, length: float, rng: np.random.Generator) -> Matrix:
-    """The points a link's length from each parent towards its sample; anywhere if the sample lies on the parent."""
+    """Return the points at a link's length from each parent towards its sample, shapes (m, d).
+
+    The direction is random if the sample lies on the parent.
+    """
     towards = samples - parents
     distance = np.linalg.norm(towards, axis=1)
     if not distance.all():
@@ -320,14 +326,14 @@ def grow_in_joint_space(
     stop: bool = True,
     step: float = STEP,
 ) -> TreeSearch:
-    """Grow a classical RRT in [-pi, pi]^n from the stretched arm; uniform samples, no bias, no wrapping round.
+    """Grow a classical RRT in [-pi, pi]^n from the stretched arm, with uniform samples, no goal bias and no wrapping.
 
     Args:
         links: A planar chain.
-        goal: Shape (2,).
-        tolerance: Unit of the lengths; a miss must be smaller.
-        rng: Random numbers.
-        passes: Limit; one vertex is one published iteration.
+        goal: Position of the goal, shape (2,).
+        tolerance: Distance from the goal that a miss must be below, in the unit of the lengths.
+        rng: Source of random numbers.
+        passes: Largest number of vertices; one vertex is one published iteration.
         stop: Whether to stop at the first success.
         step: Longest edge [rad, Euclidean].
 
@@ -359,7 +365,7 @@ def grow_in_joint_space(
 
 
 def _extend(Q: Matrix, begin: int, end: int, step: float, rng: np.random.Generator) -> None:
-    """Add the vertices begin..end-1 to the rows of a tree."""
+    """Extend a tree by the vertices begin..end-1, which are written to the rows of Q in place."""
     samples = rng.uniform(-np.pi, np.pi, (end - begin, Q.shape[1]))
     squares = np.einsum("ij,ij->i", Q[:end], Q[:end])
     for row, sample in zip(range(begin, end), samples, strict=True):
