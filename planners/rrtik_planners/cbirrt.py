@@ -93,6 +93,7 @@ class CBiRRT(SafePlanner):
         limit = NO_LIMIT if self.max_iterations is None else self.max_iterations
         seed = self.rng.bit_generator.random_raw()
 
+        # After a first part of the samples, look for a proof of separation, and go on only if there is none.
         first = min(limit, PLAIN_SAMPLES)
         path = search.solve(starts, goals, seed, ask=ask, stop=ptc, max_iterations=first)
         reason = "" if path is not None or first == limit or ptc() else _separation(self._world, starts, goals)

@@ -239,10 +239,10 @@ class Random(Protocol):
     """The methods of a random generator that a tree needs; numpy's generator has them too."""
 
     def random(self) -> float:
-        """A number from 0 to 1, less than 1."""
+        """Return a number in [0, 1)."""
 
     def permutation(self, axes: Sequence[int]) -> Sequence[int]:
-        """The axes in random order."""
+        """Return the axes in random order."""
 
 
 class CrdtStream:
@@ -256,7 +256,7 @@ class CrdtStream:
         self._state = seed
 
     def random(self) -> float:
-        """A number from 0 to 1, less than 1."""
+        """Return a number in [0, 1)."""
         self._state = (self._state + GOLDEN) & WORD
         z = ((self._state ^ (self._state >> 30)) * FIRST_FACTOR) & WORD
         z = ((z ^ (z >> 27)) * SECOND_FACTOR) & WORD

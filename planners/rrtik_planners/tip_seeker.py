@@ -30,7 +30,7 @@ class TipSeeker(SafePlanner):
     def __init__(
         self, si: ob.SpaceInformation, name: str, *, world: MotionQueries | None, seed: int | None, goal: Goal | None
     ) -> None:
-        """See :class:`rrtik_planners.ikurt.IKURT`."""
+        """Make a planner with a name in OMPL's reports; for the other options see `rrtik_planners.ikurt.IKURT`."""
         super().__init__(si, name, world=world, seed=seed)
         self.goal = goal if isinstance(goal, TipGoal) else None
         if self.goal is not None and not isinstance(world, World):

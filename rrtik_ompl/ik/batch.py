@@ -31,7 +31,7 @@ LEAST_SHARE = 256  # least number of poses of a thread: fewer take less time tha
 
 @dataclass(frozen=True, slots=True, eq=False)
 class IkBatch:
-    """One answer per pose.
+    """The solutions for an array of m poses, one row for each.
 
     Attributes:
         q: Solutions, shape (m, dof): by a closed form the nearest to the given configuration, by another method the

@@ -56,7 +56,7 @@ class IkRequest:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class IkResponse:
-    """What a method found.
+    """The response of a method to a request.
 
     Attributes:
         q: Configurations at one of the targets, inside the limits, in collision or not, shape (k, dof).
@@ -94,7 +94,7 @@ def fits_all(robot: Robot, target: Target) -> str:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class IkResult:
-    """What inverse kinematics found.
+    """The result of inverse kinematics.
 
     Attributes:
         solutions: Configurations at the goal, inside the limits, free if a world was given, nearest first; shape

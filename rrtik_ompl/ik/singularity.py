@@ -25,7 +25,7 @@ DAMPING = 0.05  # damping at a singular value of 0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SingularityReport:
-    """What a configuration can and cannot do.
+    """How singular a configuration is, and which motions its limits leave.
 
     Attributes:
         singular_values: Singular values of the Jacobian at the tip, largest first, shape (min(6, dof),); metres and

@@ -104,6 +104,7 @@ def pose_rows(poses: NDArray[np.float64]) -> Matrix:
 def _row(goal: TipGoal) -> NDArray[np.float64]:
     if not isinstance(goal, Target):
         raise InputError("goal: no row holds a task-space region; use projection, or targets drawn from it")
+    # A row holds the rotation, the position, the tolerances and the kind of free rotation.
     near, turned = goal.tolerances
     row = np.zeros(AIM_FLOATS)
     row[9:12] = goal.point

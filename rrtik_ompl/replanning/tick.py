@@ -1,4 +1,4 @@
-"""What a record says of one tick."""
+"""The record of one tick of a run."""
 
 from __future__ import annotations
 

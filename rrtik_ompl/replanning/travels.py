@@ -113,6 +113,8 @@ class MotionTracker:
         return dict.fromkeys(self._reshaped, (self._bound or 0.0) * seconds)
 
     def _measure(self, obstacle: Obstacle, old_pose: pin.SE3, last_time: float, now: float) -> None:
+        # Store the velocity and the largest speed of an obstacle that moved between two sightings, and warn once if it
+        # is faster than the bound.
         name = obstacle.name
         seconds = now - last_time
         shift = obstacle.pose.translation - old_pose.translation

@@ -67,6 +67,7 @@ def _one_start(robot: Robot, goal: Target, q: Vector) -> tuple[Vector, int]:
     frame = model.getFrameId(robot.tip)
     steps = 0
 
+    # Errors and Jacobian are in the frame of the tip, as in Pinocchio's example.
     while steps < STEPS:
         full = pinocchio_rows(robot, q[None])[0]
         pin.framesForwardKinematics(model, data, full)

@@ -143,6 +143,7 @@ def fabrik(
 
 
 def _pass(robot: Robot, goal: Target, Q: Matrix, joints: tuple[Joint, ...]) -> Matrix:
+    # The backward pass pulls the joints' origins and the tip to the goal.
     frames = robot.chain.joint_frames(Q)
     rows = [joint.row + 1 for joint in joints]
     tips = poses(robot, Q)
@@ -150,6 +151,7 @@ def _pass(robot: Robot, goal: Target, Q: Matrix, joints: tuple[Joint, ...]) -> M
     axes = np.einsum("mkij,kj->mki", frames[:, rows][..., :3, :3], robot.chain.axis[[joint.row for joint in joints]])
     pulled = _pulled(points, goal)
 
+    # The forward pass turns each joint, base first, to bring the points after it nearest to the pulled ones.
     for k, joint in enumerate(joints):
         axis = axes[:, k]
         origin = points[:, k, None]

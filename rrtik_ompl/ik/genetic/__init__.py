@@ -1,1 +1,1 @@
-"""A genetic algorithm that searches near the point before: GA-REB (progressive reduction of the search space) [2]."""
+"""A genetic algorithm that searches near the previous point: GA-REB (progressive reduction of the search space) [2]."""

@@ -2,7 +2,7 @@
 
 A chromosome has 16 bits for each joint, in Gray code or natural binary. Source: [2], equation 1. Every chromosome is a
 configuration inside its window, so that limits need no penalty. The steps are a tournament, uniform crossover of bits,
-and mutation; no individual is carried over unchanged on purpose.
+and mutation; there is no elitism.
 """
 
 from __future__ import annotations
