@@ -98,7 +98,7 @@ class Loop:
         # The start is checked against present places only, since it may lie where an obstacle is merely predicted:
         # all copies of an obstacle are put where it is now.
         self._world.move(scene, inflation=self._required_distances)
-        check_start(self.q, scene, first_world, self._world)
+        check_start(self.q, first_world, self._world)
 
         self._box = sampling_box(robot, np.vstack([self.q, self._goals]))
         self._planner = make_planner(settings, self._world, *self._box)

@@ -33,13 +33,12 @@ def refuse_constraints(problem: Problem, verb: str) -> None:
         raise InputError(f"{verb}: path constraints are not kept there; leave them out, or use plan()")
 
 
-def check_start(q: Vector, scene: Scene, world: World, moving: MovingWorld) -> None:
+def check_start(q: Vector, world: World, moving: MovingWorld) -> None:
     """Refuse a run that begins in contact, or nearer to contact than the margin.
 
     Args:
         q: The start configuration, shape (n,).
-        scene: The scene at the begin of the run.
-        world: The world that checks for contact.
+        world: The world at the begin of the run, which checks for contact.
         moving: The world that checks for the margins of the run too.
 
     Raises:
