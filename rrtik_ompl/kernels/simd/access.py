@@ -1,9 +1,9 @@
-"""Named access to memory in kernels: functions that read one number, or find one address, at a fixed place.
+"""Named access to records in kernels: functions that read numbers, or find a record or row, at a fixed place.
 
-``field``, ``int_at`` and their like in :mod:`rrtik_ompl.kernels.simd.lanes` take the place as a number. What is made
+``float_at``, ``int_at`` and their like in :mod:`rrtik_ompl.kernels.simd.lanes` take the place as a number. What is made
 here has the place built in, so that a kernel names what it reads, and Python gives it a type where it is named; see
 :mod:`rrtik_ompl.kernels.tables.accessors`. Each is compiled to the one load or sum that the number would be compiled
-to.
+to. Fields of tables have names of their own (:mod:`rrtik_ompl.kernels.record`).
 """
 
 from __future__ import annotations
@@ -19,8 +19,6 @@ from rrtik_ompl.kernels.layout import ALIGNMENT, INT_BYTES
 from rrtik_ompl.kernels.record import Ints
 from rrtik_ompl.kernels.simd.compiled import WIDTH, inlined
 from rrtik_ompl.kernels.simd.lanes import DOUBLE, INDEX, LANES, SINGLE, WHOLE, pointer
-
-_FIELD_BYTES = 8
 
 
 def _constant(number: int) -> Any:
@@ -48,11 +46,6 @@ def _column_reader(element: Any, result: Any, width: int, place: int) -> Any:
         return builder.sext(value, WHOLE) if element == INDEX else value
 
     return intrinsic(lambda typingctx, array, number: (result(types.int64, types.int64), emit))
-
-
-def field_reader(place: int) -> Any:
-    """Function (table) that reads a field: a number, or the address of an array or of another table."""
-    return _number_reader(WHOLE, types.int64, _FIELD_BYTES, place)
 
 
 def int_reader(place: int) -> Any:
