@@ -345,7 +345,7 @@ def _checked(key: str, value: object, where: str) -> object:
 
 def _file(value: object, what: str) -> Path:
     require(value, str | os.PathLike, what, "give the name of a file")
-    path = Path(str(value))
+    path = file_name(value)
     if "\0" in str(path):
         raise InputError(f"{what}: no file can have the name {str(path)!r}")
     return path.absolute()

@@ -206,7 +206,7 @@ def file_name(path: object) -> Path:
     Raises:
         InputError: If it is something else.
     """
-    if not isinstance(path, (str, os.PathLike)):
+    if not isinstance(path, (str, os.PathLike)) or not isinstance(os.fspath(path), str):  # which may be bytes
         raise InputError(f"expected the name of a file, got {type(path).__name__} {path!r}")
     return Path(path)
 

@@ -188,6 +188,17 @@ class _SceneFile(Section):
     robot: Any = None
     start: Any = None
     goal: Any = None
+    planner: Any = None
+    path_constraints: Any = None
+    run: Any = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _no_scene(cls, data: object) -> object:
+        """A problem may leave its scene out: nothing surrounds the arm then."""
+        if isinstance(data, dict) and data.keys() >= {"robot", "start", "goal"}:
+            return {"scene": {}, **data}
+        return data
 
 
 _KEYS_OF_WORLDS: dict[str, Any] = {each.name: (Any, None) for each in SETTINGS_IN_FILES}

@@ -50,13 +50,13 @@ def cloud_from_depth(
     require(camera, Camera, "camera", "use load_camera(file)")
     try:
         picture = np.asarray(depth, dtype=np.float64)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise InputError("depth picture: expected numbers") from error
     if picture.shape != (camera.height, camera.width):
         size = f"{camera.height} rows of {camera.width}"
         raise InputError(f"depth picture: the camera has {size} pixels, got an array of shape {picture.shape}")
 
-    step = whole_number(every, "every", 1)
+    step = min(whole_number(every, "every", 1), max(picture.shape))
     nearest_depth = not_negative(nearest, "nearest")
     z = positive(scale, "scale") * picture[::step, ::step]
     is_measured = np.isfinite(z) & (z >= nearest_depth) & (z <= positive(farthest, "farthest")) & (z > 0.0)

@@ -12,7 +12,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Matrix, Vector
-from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.errors import InputError, listed, require
 from rrtik_ompl.sensing.calibration import MIN_CORNERS, Board, Calibration, calibrate_by_corners, seen_boards
 from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.markers.chessboard import Chessboard
@@ -70,6 +70,9 @@ def calibrate_rig(pictures: Sequence[Sequence[NDArray[np.uint8]]], board: Board)
         InputError: If there are fewer than two cameras, the numbers of pictures differ, too few of them show the board,
             or the cameras moved relative to each other.
     """
+    require(board, cv2.aruco.CharucoBoard | Chessboard, "board", "use charuco_board(...) or Chessboard(...)")
+    pictures = [listed(each, "pictures of a camera") for each in listed(pictures, "pictures of a rig")]
+
     if len(pictures) < 2 or len({len(camera_pictures) for camera_pictures in pictures}) > 1:
         counts = ", ".join(str(len(camera_pictures)) for camera_pictures in pictures)
         raise InputError(

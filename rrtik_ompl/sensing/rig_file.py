@@ -12,7 +12,7 @@ import numpy as np
 import pinocchio as pin
 from pydantic import Field
 
-from rrtik_ompl.base.errors import InputError, require
+from rrtik_ompl.base.errors import InputError, listed, require
 from rrtik_ompl.files.sections import Name, NotNegative, Section, Version, parse
 from rrtik_ompl.files.strict_yaml import read_yaml, write_yaml
 from rrtik_ompl.files.text import file_name
@@ -93,15 +93,16 @@ def save_rig(rig: Rig, path: str | os.PathLike[str]) -> list[Path]:
     return files
 
 
-def pictures_together(sources: Sequence[str]) -> Iterator[tuple[Picture, ...]]:
+def pictures_together(sources: Sequence[str | os.PathLike[str] | int]) -> Iterator[tuple[Picture, ...]]:
     """Yield one picture of each source at a time; folders are matched by order, films by time.
 
     Camera devices are read one after the other; only cameras with a common trigger see the same moment.
 
     Raises:
-        InputError: If a source ends before the others, or its pictures are of other times.
+        InputError: If a source cannot be read or ends before the others, or its pictures are of other times.
     """
-    films = not any(source.isdecimal() for source in sources)
+    sources = listed(sources, "sources of pictures")
+    films = not any(str(source).isdecimal() for source in sources)
     for taken in zip_longest(*(pictures_from(source) for source in sources)):
         if None in taken:
             number = taken.index(None)

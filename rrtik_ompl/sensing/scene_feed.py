@@ -32,6 +32,11 @@ def scene_feed(pictures: Iterable[Picture], sensor: Sensor, scene: Scene | None 
     Raises:
         InputError: If the pictures end before everything was seen; it names what was not. If a picture cannot be used.
     """
+    try:
+        stream = iter(pictures)
+    except TypeError:
+        kind = type(pictures).__name__
+        raise InputError(f"pictures of a scene feed must be a list, got {kind}; use pictures_from(source)") from None
     require(sensor, Sensor, "sensor of a scene feed", "use Sensor(camera, marker_map)")
     require(scene, Scene | None, "scene of a scene feed", "use load_scene(file)")
     given_scene = Scene(()) if scene is None else scene
@@ -47,7 +52,8 @@ def scene_feed(pictures: Iterable[Picture], sensor: Sensor, scene: Scene | None 
     why = ""
     last = dict[str, float]()  # time at which each was seen last
 
-    for picture in pictures:
+    for picture in stream:
+        require(picture, Picture, "picture of a scene feed", "use pictures_from(source)")
         view = sensor.view(picture)
         now = {solid.name: solid for each in view.placed for solid in each.solids()}
         seen |= now

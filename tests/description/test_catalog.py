@@ -34,6 +34,35 @@ def urdf(tmp_path):
     return path
 
 
+class OnlyFspath:
+    """A path that is nothing else."""
+
+    def __init__(self, path):
+        self._path = path
+
+    def __fspath__(self):
+        return self._path if isinstance(self._path, bytes) else str(self._path)
+
+
+def entry_of(path):
+    """The path as a folder lists it."""
+    return next(each for each in os.scandir(path.parent) if each.name == path.name)
+
+
+@pytest.mark.parametrize("kind", [str, Path, entry_of, OnlyFspath])
+def test_files_are_named_by_every_kind_of_path(urdf, kind):
+    srdf = urdf.with_suffix(".srdf")
+    srdf.write_text('<robot name="arm"><group name="all"><joint name="j"/></group></robot>')
+    robot = load_robot(kind(urdf), srdf=kind(srdf), group="all", packages=kind(urdf.parent))
+    assert robot is load_robot(urdf, srdf=srdf, group="all", packages=urdf.parent)
+
+
+@pytest.mark.parametrize("option", ["srdf", "packages"])
+def test_a_path_of_bytes_is_refused(urdf, option):
+    with pytest.raises(InputError, match="name of a file"):
+        load_robot(urdf, **{option: OnlyFspath(b"arm.srdf")})
+
+
 def test_the_same_call_gives_the_same_object():
     options = {"lengths": [1.0, 2.0], "base_pose": {"xyz": [0, 0, 1]}}
     assert load_robot("planar", **options) is load_robot("planar", **options)

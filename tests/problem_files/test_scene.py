@@ -5,10 +5,12 @@ import pinocchio as pin
 import pytest
 
 from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.description.catalog import find_problem, list_problems
 from rrtik_ompl.files.strict_yaml import read_yaml
 from rrtik_ompl.model.scene import AttachedObject, ConstantVelocity, Obstacle, Scene, TimedPoses
 from rrtik_ompl.model.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, Prism, Sphere
-from rrtik_ompl.problem_files.scene import load_scene, save_scene
+from rrtik_ompl.problem_files.problem_values import ProblemFile, load_unchecked
+from rrtik_ompl.problem_files.scene import SceneFile, load_scene, save_scene
 
 EVERY_KEY = """version: 1
 scene:
@@ -230,3 +232,18 @@ def test_a_wrong_scene_is_one_line(tmp_path, text, message):
     (tmp_path / "bad.yaml").write_text(text)
     with pytest.raises(InputError, match=message):
         load_scene(tmp_path / "bad.yaml")
+
+
+@pytest.mark.parametrize("name", list_problems())
+def test_the_scene_of_a_shipped_problem_is_read_from_its_file(name):
+    settings, _, _ = load_unchecked(name)
+    scene = load_scene(find_problem(name))
+    assert [each.name for each in scene.obstacles] == [each.name for each in settings.scene.obstacles]
+    assert [each.name for each in scene.attached] == [each.name for each in settings.scene.attached]
+
+
+def test_a_scene_is_read_from_a_file_with_every_key_of_a_problem(tmp_path):
+    assert ProblemFile.model_fields.keys() <= SceneFile.model_fields.keys()
+    keys = "planner: rrt\npath_constraints: [{}]\nrun: {}\nstart: {}\ngoal: {}\nrobot: 5\n"
+    (tmp_path / "whole.yaml").write_text(f"version: 1\nscene: {{obstacles: [{{name: a, sphere: 1}}]}}\n{keys}")
+    assert [each.name for each in load_scene(tmp_path / "whole.yaml").obstacles] == ["a"]

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.base.arrays import LARGEST, Matrix, frozen
+from rrtik_ompl.base.arrays import LARGEST, Matrix, finite_number, frozen, whole_number
 from rrtik_ompl.base.errors import InputError
 
 SMALLEST_SIDE = 1e-6  # [m]; smallest side of a square or a marker
@@ -24,7 +24,7 @@ class Chessboard:
     is unique: the square after the first corner is a black one. The calibration of a single camera does not need this.
 
     Raises:
-        InputError: If it has fewer than 4 x 4 squares, or the side is not positive.
+        InputError: If the numbers are not whole, or less than 4, or the side is not positive.
 
     Example:
         >>> Chessboard(10, 7, 0.025).points.shape
@@ -36,6 +36,10 @@ class Chessboard:
     square: float
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "columns", whole_number(self.columns, "columns of a chessboard"))
+        object.__setattr__(self, "rows", whole_number(self.rows, "rows of a chessboard"))
+        object.__setattr__(self, "square", finite_number(self.square, "side of a square"))
+
         if self.columns < 4 or self.rows < 4 or not SMALLEST_SIDE <= self.square <= LARGEST:
             raise InputError(
                 f"a chessboard has at least 4 x 4 squares of a positive side, got {self.columns} x {self.rows} "

@@ -14,8 +14,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.base.arrays import LARGEST, Matrix, frozen
-from rrtik_ompl.base.errors import InputError, UnknownNameError
+from rrtik_ompl.base.arrays import LARGEST, Matrix, finite_number, frozen, whole_number
+from rrtik_ompl.base.errors import InputError, UnknownNameError, require
 from rrtik_ompl.sensing.markers.alignment import Look, aligned_corners, mean_side
 from rrtik_ompl.sensing.markers.chessboard import SMALLEST_SIDE
 
@@ -78,6 +78,9 @@ def marker_cells(dictionary: str, number: int) -> NDArray[np.uint8]:
     Raises:
         InputError: If there is no such marker.
     """
+    require(dictionary, str, "dictionary of markers")
+    number = whole_number(number, "number of a marker")
+
     table = _table(dictionary)
     count = len(table.bytesList)
     if not 0 <= number < count:
@@ -210,8 +213,15 @@ def charuco_board(columns: int, rows: int, square: float, marker: float, diction
     """Return a chessboard with markers in its white squares; sides of squares and markers in metres.
 
     Raises:
-        InputError: If a side is not positive, a marker does not fit its square, or the dictionary is too small.
+        InputError: If a number is none, a side is not positive, a marker does not fit its square, or the dictionary is
+            unknown or too small.
     """
+    columns = whole_number(columns, "columns of a board")
+    rows = whole_number(rows, "rows of a board")
+    square = finite_number(square, "side of a square")
+    marker = finite_number(marker, "side of a marker")
+    require(dictionary, str, "dictionary of markers")
+
     if columns < 3 or rows < 3 or not SMALLEST_SIDE <= marker < square <= LARGEST:
         raise InputError("a board needs at least 3 x 3 squares, and markers of 1 um and more, smaller than the squares")
     if columns * rows // 2 > len(_table(dictionary).bytesList):

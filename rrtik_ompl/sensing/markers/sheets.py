@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.base.errors import InputError
-from rrtik_ompl.files.text import check_target, write_bytes
+from rrtik_ompl.base.arrays import finite_number, whole_number
+from rrtik_ompl.base.errors import InputError, at_most, listed, require
+from rrtik_ompl.files.text import check_target, file_name, write_bytes
 from rrtik_ompl.sensing.markers.detection import charuco_board, marker_cells
 
 if TYPE_CHECKING:
@@ -23,6 +24,7 @@ EDGE, GAP, CAPTION = 0.010, 0.008, 0.006  # [m]
 RULE = 0.100  # length of the printed rule [m]
 UP = "\u25b2 up"  # the y axis of the marker
 SHEET_FORMATS = (".pdf", ".png")
+LEAST_DOTS, MOST_DOTS = 20, 2400  # resolution of a PNG [dots per inch]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,6 +65,9 @@ def print_markers(
     Raises:
         InputError: If a marker does not exist or does not fit the paper, or the file cannot be written.
     """
+    numbers = listed(numbers, "numbers of markers")
+    side = finite_number(side, "side of a marker")
+
     width, height = _paper(paper)
     cells = [marker_cells(dictionary, number) for number in numbers]
     if not cells:
@@ -122,6 +127,7 @@ def print_board(
 
 
 def _paper(name: str) -> tuple[float, float]:
+    require(name, str, "paper")
     if name.lower() not in PAPERS:
         raise InputError(f"no paper '{name}'; have {', '.join(PAPERS)}")
     return PAPERS[name.lower()]
@@ -131,12 +137,12 @@ def _paper(name: str) -> tuple[float, float]:
 def _write(
     path: str | os.PathLike[str], pages: list[list[_Tile]], size: tuple[float, float], dots_per_inch: int
 ) -> None:
-    from pathlib import Path
-
     from matplotlib.backends.backend_pdf import PdfPages
 
-    file = Path(path)
+    file = file_name(path)
     check_target(file, SHEET_FORMATS)
+    dots_per_inch = whole_number(dots_per_inch, "dots_per_inch", least=LEAST_DOTS)
+    at_most(dots_per_inch, MOST_DOTS, "dots_per_inch")
 
     figures = [_page(page, size) for page in pages]
     if file.suffix.lower() == ".pdf":
