@@ -44,6 +44,7 @@ BY_NAME: tuple[str, ...] = (
     "replanning/scenario.py",
     "planning/plan.py",
     "planning/improving.py",
+    "planning/outcome.py",
     "kernels/wasm/page_kernels.py",
     "viewer/page_planner.py",
 )
