@@ -55,7 +55,7 @@ class Loop:
         patience: float = SILENCE_SECONDS,
     ) -> None:
         # Each reading is checked: a time that is no number would end no repair, and its record could not be read.
-        self._clock = lambda: finite_number(clock(), "clock: what it gives")
+        self._clock: Clock = lambda: finite_number(clock(), "clock: what it gives")
         self._problem = problem
         self._feed = feed
         self._settings = settings
