@@ -141,8 +141,8 @@ def rigid(T: PoseLike, what: str) -> pin.SE3:
     return pin.SE3(matrix)
 
 
-# Convert a pose that is written as 3, 6 or 7 numbers, see rigid.
 def _written_pose(numbers: ArrayLike, what: str) -> pin.SE3:
+    """Convert a pose that is written as 3, 6 or 7 numbers, see rigid."""
     values = finite_array(numbers, (None,), what)
     if len(values) == 3:
         return pin.SE3(np.eye(3), bounded_array(values, (3,), what))

@@ -65,8 +65,8 @@ class Guard:
             self._process.kill()
             self._process.wait()
 
-    # Return the process, started if there is none.
     def _started(self) -> subprocess.Popen[str]:
+        """Return the process, started if there is none."""
         if self._closed:
             raise Closed("the guard was closed")
         if self._process is None:
@@ -81,8 +81,8 @@ class Guard:
             )
         return self._process
 
-    # Return the record of a job whose process was lost, with the cause by exit code and output.
     def _lost(self, process: subprocess.Popen[str], job: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the record of a job whose process was lost, with the cause by exit code and output."""
         code = self._end(process)
         said = self._last_words()
 

@@ -147,8 +147,8 @@ def log_text(results: Sequence[Result], head: Mapping[str, Any]) -> str:
     return "\n".join([*lines, ""])
 
 
-# Return the lines of one planner: its settings, the names of the columns, and one row for each run.
 def _planner(result: Result, entrant: Mapping[str, Any]) -> list[str]:
+    """Return the lines of one planner: its settings, the names of the columns, and one row for each run."""
     common = {"planner": entrant.get("name", result.planner), "shorten": entrant.get("shorten", "")}
     common |= entrant.get("parameters", {})
 

@@ -103,8 +103,8 @@ def _panels(
     return figure
 
 
-# Draw the share of runs that are solved by a time, one step curve for each planner.
 def _solved(panel: Axes, results: Sequence[Result], styles: Mapping[str, Any]) -> None:
+    """Draw the share of runs that are solved by a time, one step curve for each planner."""
     latest = max((value for result in results for value in result.values("plan_seconds")), default=1.0)
     for result in results:
         times = np.sort(result.values("plan_seconds"))
@@ -116,8 +116,9 @@ def _solved(panel: Axes, results: Sequence[Result], styles: Mapping[str, Any]) -
     panel.set_ylim(-3.0, 103.0)
 
 
-# Return a function that draws box plots of a quantity, one box for each planner; whiskers are at 5 and 95 %.
 def _boxes(quantity: str) -> Draw:
+    """Return a function that draws box plots of a quantity, one box for each planner; whiskers are at 5 and 95 %."""
+
     def draw(panel: Axes, results: Sequence[Result], styles: Mapping[str, Any]) -> None:
         values = [result.values(quantity) for result in results]
         boxes = panel.boxplot(values, whis=(5, 95), patch_artist=True, showfliers=False, widths=0.6)
@@ -134,8 +135,8 @@ def _boxes(quantity: str) -> Draw:
     return draw
 
 
-# Draw the median planning time with its quartiles over the quantity that grows, one line for each planner.
 def _scaling(panel: Axes, results: Sequence[Result], styles: Mapping[str, Any]) -> None:
+    """Draw the median planning time with its quartiles over the quantity that grows, one line for each planner."""
     lines: dict[str, list[tuple[float, float, float, float]]] = {}
     for result in results:
         spread = result.spread("plan_seconds")

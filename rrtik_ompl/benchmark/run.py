@@ -54,8 +54,8 @@ def execute(job: Mapping[str, Any]) -> dict[str, Any]:
         return {"status": ERROR, "reason": f"{type(error).__name__}: {error}"}
 
 
-# Plan, shorten and check a path, and return the record of the run.
 def _measured(job: Mapping[str, Any], problem: Problem) -> dict[str, Any]:
+    """Plan, shorten and check a path, and return the record of the run."""
     found = plan(problem, job["planner"], seconds=job["seconds"], seed=job["seed"], parameters=job["parameters"])
     record: dict[str, Any] = {
         "status": SOLVED if found.found else NOT_FOUND,

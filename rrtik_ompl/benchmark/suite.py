@@ -115,10 +115,10 @@ def load_suite(name_or_file: str | os.PathLike[str], *, folder: Path | None = No
     )  # fmt: skip
 
 
-# Return the sources of one entry under problems.
 def _sources(
     document: YamlDocument, place: Location, item: str | Generated | Obstacles | Joints | Resolution
 ) -> list[Source]:
+    """Return the sources of one entry under problems."""
     with document.at(place):
         if isinstance(item, str):
             return [file_source(item, document.path.parent)]
@@ -143,8 +143,8 @@ def _sources(
         return scaling_sources("resolution", item.resolution.metres, base.arguments[0], group=group)
 
 
-# Return the planner of one entry under planners, after a check of its name, parameters and shortening method.
 def _entrant(document: YamlDocument, place: Location, item: str | PlannerGroup, shorten: str) -> Entrant:
+    """Return the planner of one entry under planners, after a check of its name, parameters and shortening method."""
     group = PlannerGroup.model_validate({"name": item}) if isinstance(item, str) else item
     at = place if isinstance(item, str) else (*place, "name")
     name = planner_in_folder(group.name, document.path.parent) if is_planner_file(group.name) else group.name

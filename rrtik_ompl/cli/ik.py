@@ -124,10 +124,10 @@ def inverse_kinematics(
     return _one(given, goal, everything, common, output)
 
 
-# Load robot, world, goal and preferred configuration from a robot or a problem, after a check of the options.
 def _setting(
     robot: str | None, problem: str | None, scene: Path | None, near: str | None, near_deg: str | None
 ) -> Setting:
+    """Load robot, world, goal and preferred configuration from a robot or a problem, after a check of the options."""
     from rrtik_ompl import World, load_problem, load_robot, load_scene
 
     if (robot is None) == (problem is None):
@@ -216,8 +216,8 @@ def _refuse_orientation(tolerances: dict[str, float], remedy: str) -> None:
         raise InputError(f"--tolerance-deg is of an orientation, and a point has none: {remedy}")
 
 
-# Solve inverse kinematics of one goal, and print the solutions in the chosen form; return the exit code.
 def _one(given: Setting, goal: TipGoal, everything: bool, common: dict[str, Any], output: Output) -> int:
+    """Solve inverse kinematics of one goal, and print the solutions in the chosen form; return the exit code."""
     from rrtik_ompl import solve_ik
     from rrtik_ompl.cli import ik_report
 
@@ -255,7 +255,6 @@ def _one(given: Setting, goal: TipGoal, everything: bool, common: dict[str, Any]
 # --- many poses ------------------------------------------------------------------------------------------------------
 
 
-# Solve inverse kinematics of all poses in a file, and print the results; return the exit code.
 def _many(
     given: Setting,
     file: Path,
@@ -264,6 +263,7 @@ def _many(
     common: dict[str, Any],
     output: Output,
 ) -> int:
+    """Solve inverse kinematics of all poses in a file, and print the results; return the exit code."""
     import numpy as np
 
     from rrtik_ompl.cli import ik_report

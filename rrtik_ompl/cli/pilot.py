@@ -110,8 +110,8 @@ def _second(given: str | None) -> int | Path | None:
     return int(given) if given.isdecimal() else Path(given)
 
 
-# Serve the page and run the session until Ctrl-C, watched by a watchdog.
 def _serve(server: PilotServer, opened: OpenSession, *, browser: bool) -> None:
+    """Serve the page and run the session until Ctrl-C, watched by a watchdog."""
     from rrtik_ompl.pilot.devices.watchdog import Watchdog
     from rrtik_ompl.pilot.run import Loop
 

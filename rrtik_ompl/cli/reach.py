@@ -95,8 +95,8 @@ def _effective(robot: str, plot: Path | None) -> int:
     return FOUND
 
 
-# Draw slices of the map to a file, and its cells in the 3-D page, as far as these are requested.
 def _draw(shown: Robot | World, found: ReachMap, plot: Path | None, html: Path | None) -> None:
+    """Draw slices of the map to a file, and its cells in the 3-D page, as far as these are requested."""
     title = f"{found.robot}: {LABELS[found.measure]}"
     if plot is not None:
         from rrtik_ompl.viewer.plots.reach import plot_slices
@@ -111,8 +111,8 @@ def _draw(shown: Robot | World, found: ReachMap, plot: Path | None, html: Path |
             view(shown, html=html, marks=reach_marks(found), title=f"{found.robot}: {found.measure} in reach")
 
 
-# Return the figures of the map as plain values in SI units.
 def _document(found: ReachMap) -> dict[str, Any]:
+    """Return the figures of the map as plain values in SI units."""
     values = found.values[found.reached]
     return {
         "robot": found.robot,
@@ -128,8 +128,8 @@ def _document(found: ReachMap) -> dict[str, Any]:
     }
 
 
-# Return two lines about the map, for a person.
 def _summary(found: ReachMap) -> list[str]:
+    """Return two lines about the map, for a person."""
     told = _document(found)
     if told["cells"] == 0:
         return [f"{found.robot}: no posture counted: all of them collide"]

@@ -128,8 +128,8 @@ def _fitted(table: Table) -> list[str]:
     return [*fitted, *([f"bars: {table.bars}"] if table.bars else [])]
 
 
-# Draw all figures of the given tables to a folder, and return the exit code.
 def _draw(tables: Iterable[Table], quick: bool, folder: Path) -> int:
+    """Draw all figures of the given tables to a folder, and return the exit code."""
     from rrtik_ompl.files.text import make_folder
 
     drawn = [(table, figure) for table in tables for figure in table.figures]

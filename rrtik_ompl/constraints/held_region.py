@@ -200,8 +200,8 @@ class HeldRegion:
         region = self.region
         return max(metres - region.position_tolerance, 0.0), max(float(angle) - region.orientation_tolerance, 0.0)
 
-    # The measure of the orientation for rotations of shape (m, 3, 3), shape (m,); see measures.
     def _turned(self, R: NDArray[np.float64]) -> Vector:
+        """The measure of the orientation for rotations of shape (m, 3, 3), shape (m,); see measures."""
         if self.turning == Turning.AXIS:
             z = R[:, :, 2]
             sine = np.linalg.norm(np.cross(z, self.direction), axis=1)

@@ -232,8 +232,8 @@ class _Recipe:
     # Further files on which the robot depends, besides the target and the options.
     further_files: tuple[str, ...] = ()
 
-    # Return the entry that a problem file has for the robot, from the given options.
     def source(self, values: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the entry that a problem file has for the robot, from the given options."""
         options = source_entry(values)
         if self.target not in PARAMETRIC:
             return {self.kind: self.target} | options
@@ -241,9 +241,11 @@ class _Recipe:
         return {self.target: options} | mounting
 
 
-# Return the recipe for a name, a file or a folder.
-# The modules that read a kind of file are imported only when it occurs, as they load slowly.
 def _recipe(name: str | os.PathLike[str]) -> _Recipe:
+    """Return the recipe for a name, a file or a folder.
+
+    The modules that read a kind of file are imported only when it occurs, as they load slowly.
+    """
     text = os.fspath(name)
     path = Path(text)
     if isinstance(name, str) and text in _offers("robots"):
@@ -410,8 +412,8 @@ def _refuse_caller_options(entry: Mapping[str, object]) -> None:
             raise InputError(f"robot: {key} is for whoever opens the file to give, not for the file; take it out")
 
 
-# Return the value of an option with file names resolved relative to a folder.
 def _resolved(key: str, value: object, folder: str | os.PathLike[str]) -> object:
+    """Return the value of an option with file names resolved relative to a folder."""
     if key in FILE_OPTIONS and isinstance(value, str):
         return _in_folder(value, folder)
     if key == "packages" and isinstance(value, str):
@@ -425,9 +427,9 @@ def _in_folder(path: str, folder: str | os.PathLike[str]) -> Path:
     return Path(folder) / path
 
 
-# Return the entry points of a group by name.
 @cache
 def _offers(group: str) -> dict[str, EntryPoint]:
+    """Return the entry points of a group by name."""
     return {entry.name: entry for entry in _entry_points().select(group=f"rrtik_ompl.{group}")}
 
 
@@ -441,9 +443,9 @@ def _entry_points() -> EntryPoints:
     return found
 
 
-# Load what a package offers under a name of a group; ``what`` describes it in error messages.
 @cache
 def _load(what: str, group: str, name: str) -> Any:  # noqa: ANN401 - what another package offers
+    """Load what a package offers under a name of a group; ``what`` describes it in error messages."""
     offers = _offers(group)
     if name not in offers:
         raise UnknownNameError(what, name, offers)

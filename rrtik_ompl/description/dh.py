@@ -135,8 +135,8 @@ def robot_from_dh(
     )
 
 
-# Check the rows of a table and return them with names for all joints.
 def _checked(name: str, rows: Iterable[DhRow]) -> list[DhRow]:
+    """Check the rows of a table and return them with names for all joints."""
     given = list(rows)
     at_most(len(given) + 1, MOST_JOINTS, f"robot '{name}': joints")
 
@@ -218,8 +218,8 @@ def _corners(table: Sequence[DhRow], convention: DhConvention, tool: pin.SE3) ->
     return corners
 
 
-# Return capsules along the segments between successive points; segments of no length are left out.
 def _capsules(points: Sequence[Vector], radius: float, colour: tuple[float, float, float, float]) -> tuple[Solid, ...]:
+    """Return capsules along the segments between successive points; segments of no length are left out."""
     solids = []
     for start, end in pairwise(points):
         length = float(np.linalg.norm(end - start))

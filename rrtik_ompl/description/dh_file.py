@@ -115,8 +115,8 @@ def robot_from_dh_file(path: str | os.PathLike[str], *, tip: str = "tip", base_p
         )
 
 
-# Convert a row of the file, in degrees and metres, to a `DhRow`, in radians and metres.
 def _row(document: YamlDocument, number: int, row: RowEntry) -> DhRow:
+    """Convert a row of the file, in degrees and metres, to a `DhRow`, in radians and metres."""
     place = ("dh", "rows", number)
     slides = JOINT_KINDS[row.type].slides
     given, wrong = ("limits", "limits_deg") if slides else ("limits_deg", "limits")

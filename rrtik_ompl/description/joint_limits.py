@@ -52,8 +52,8 @@ def read_joint_limits(path: str | os.PathLike[str], joints: Iterable[str]) -> di
     return limits
 
 
-# Check the keys of one joint and return its limits.
 def _joint(document: YamlDocument, location: Location, values: Mapping[str, Any]) -> JointLimits:
+    """Check the keys of one joint and return its limits."""
     for key, value in values.items():
         if key not in _KEYS:
             raise UnknownNameError("key", key, _KEYS, where=document.place((*location, key)))

@@ -93,8 +93,8 @@ def _assistant(home: Path, config: Path) -> Mapping[str, Any]:
     return {str(key).lower(): value for key, value in top.items() if isinstance(value, Mapping)}
 
 
-# Return the SRDF that the setup assistant names, or the only one in the folder.
 def _srdf(home: Path, config: Path, assistant: Mapping[str, Any]) -> Path:
+    """Return the SRDF that the setup assistant names, or the only one in the folder."""
     relative = assistant.get("srdf", {}).get("relative_path")
     if isinstance(relative, str) and os.path.isfile(home / relative):
         return home / relative
@@ -123,10 +123,12 @@ def _missing(config: Path, kind: str, option: str) -> Path:
     raise InputError(f"{config}: no {kind} in this folder; is it of MoveIt? give {option}=FILE")
 
 
-# Return the URDF of a folder.
-# Candidates are, in this order: a URDF in the folder, the one of the package that the setup assistant names, one with
-# macros in the folder, and one for Gazebo.
 def _urdf(home: Path, config: Path, assistant: Mapping[str, Any], packages: Iterable[Path]) -> Path:
+    """Return the URDF of a folder.
+
+    Candidates are, in this order: a URDF in the folder, the one of the package that the setup assistant names, one
+    with macros in the folder, and one for Gazebo.
+    """
     urdf = _only(config, ("*.urdf",), "URDF", "urdf")
     if urdf is not None:
         return urdf

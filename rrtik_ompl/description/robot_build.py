@@ -155,10 +155,10 @@ def build_robot(
     )
 
 
-# Raise an error unless the actuated, following and locked joints exist and do not contradict each other.
 def _check_joints(
     name: str, known: tuple[str, ...], actuated: tuple[str, ...], ties: Mapping[str, Mimic], locked: Mapping[str, float]
 ) -> None:
+    """Raise an error unless the actuated, following and locked joints exist and do not contradict each other."""
     if not actuated:
         raise InputError(f"robot '{name}': no movable joint; its description holds only fixed joints")
 
@@ -294,9 +294,11 @@ def _last_link(name: str, tree: Tree, actuated: tuple[str, ...]) -> str:
     return tip
 
 
-# Return the kinematics of a model as arrays, for our own computations.
-# Each joint of the model moves along or about its axis, by a value that depends linearly on the actuated joints.
 def _chain(model: pin.Model, actuated: tuple[str, ...], mimic_of: Mapping[str, Mimic]) -> Chain:
+    """Return the kinematics of a model as arrays, for our own computations.
+
+    Each joint of the model moves along or about its axis, by a value that depends linearly on the actuated joints.
+    """
     count = model.njoints - 1
     column_of = {name: number for number, name in enumerate(actuated)}
     axis = np.zeros((count, 3))
@@ -379,8 +381,8 @@ def _turns_of(gains: Iterable[float]) -> int:
     return MOST_TURNS
 
 
-# Check the limits of the actuated joints and return them as arrays, by name of the `Robot`'s attribute.
 def _limits(name: str, joints: Iterable[Joint], limits_of_joint: Mapping[str, Mapping[str, float]]) -> dict[str, Any]:
+    """Check the limits of the actuated joints and return them as arrays, by name of the `Robot`'s attribute."""
     rows = []
     for joint in joints:
         limits = limits_of_joint[joint.name]

@@ -166,9 +166,11 @@ class Srdf:
         members = self._members(group, tree, ()) - self.passive
         return tuple(joint.name for joint in tree.walk() if joint.name in members and joint.moves)
 
-    # Return the names of a group's joints, including those of its subgroups.
-    # ``enclosing`` has the groups that led here, so that a group that contains itself is found.
     def _members(self, name: str, tree: Tree, enclosing: tuple[str, ...]) -> set[str]:
+        """Return the names of a group's joints, including those of its subgroups.
+
+        ``enclosing`` has the groups that led here, so that a group that contains itself is found.
+        """
         if name not in self.groups:
             raise UnknownNameError("group", name, self.groups, where=self.where)
         if name in enclosing:
@@ -272,8 +274,8 @@ def _pairs(robot: Element, tag: str) -> frozenset[frozenset[str]]:
     return frozenset(pair for pair in pairs if len(pair) == 2)
 
 
-# Read a planning group; every part of it must have a name.
 def _group(element: Element, where: str) -> Group:
+    """Read a planning group; every part of it must have a name."""
     name = attribute(element, "group", "name", where)
     place = f"{where}: group '{name}'"
 
@@ -287,8 +289,8 @@ def _group(element: Element, where: str) -> Group:
     return Group(name, chains, names("joint"), names("link"), names("group"))
 
 
-# Return the joint values of a state; joints with several values (planar, floating) are left out.
 def _state(element: Element, where: str) -> dict[str, float]:
+    """Return the joint values of a state; joints with several values (planar, floating) are left out."""
     values = {}
     for joint in element.findall("joint"):
         name = attribute(joint, "joint", "name", where)

@@ -239,8 +239,8 @@ def _fixed_at(joint: Joint, value: float) -> Joint:
     return Joint(joint.name, "fixed", joint.parent, joint.child, joint.T_parent_joint * motion, axis)
 
 
-# Raise an error if names are missing, duplicate or not valid, or a joint refers to an unknown link.
 def _check_names(tree: Tree) -> None:
+    """Raise an error if names are missing, duplicate or not valid, or a joint refers to an unknown link."""
     if not tree.links:
         raise InputError(f"{tree.where}: no link; a robot needs at least one")
     for what, names in (("link", [x.name for x in tree.links]), ("joint", [x.name for x in tree.joints])):
@@ -257,8 +257,8 @@ def _check_names(tree: Tree) -> None:
                 raise UnknownNameError(f"{role} link", link, link_names, where=f"{tree.where}: joint '{joint.name}'")
 
 
-# Raise an error unless the joints connect all links to one tree.
 def _check_connected(tree: Tree) -> None:
+    """Raise an error unless the joints connect all links to one tree."""
     above: dict[str, Joint] = {}
     for joint in tree.joints:
         if joint.child in above:

@@ -77,8 +77,8 @@ class _Place:
     frame: int
 
 
-# Add a joint to a model and return where its child link is attached; a fixed joint adds nothing.
 def _add_joint(model: pin.Model, joint: Joint, parent: _Place) -> _Place:
+    """Add a joint to a model and return where its child link is attached; a fixed joint adds nothing."""
     placement = parent.T_joint_link * joint.T_parent_joint
     if not joint.moves:
         return _Place(parent.joint, placement, parent.frame)
@@ -105,16 +105,16 @@ def _letter(joint: Joint) -> str:
     return next((name for name, unit in zip("XYZ", np.eye(3), strict=True) if np.array_equal(unit, joint.axis)), "")
 
 
-# Return Pinocchio's joint model for a joint with limits, and the rotation of its frame.
 def _along_axis(short: str, long: str, joint: Joint) -> tuple[Any, Any]:
+    """Return Pinocchio's joint model for a joint with limits, and the rotation of its frame."""
     letter = _letter(joint)
     if letter:
         return getattr(pin, f"JointModel{short}{letter}")(), np.eye(3)
     return getattr(pin, f"JointModel{long}Unaligned")(np.array(joint.axis)), np.eye(3)
 
 
-# Return Pinocchio's joint model for a continuous joint, and the rotation of its frame.
 def _unbounded(joint: Joint) -> tuple[Any, Any]:
+    """Return Pinocchio's joint model for a continuous joint, and the rotation of its frame."""
     letter = _letter(joint)
     if letter:
         return getattr(pin, f"JointModelRUB{letter}")(), np.eye(3)
@@ -138,8 +138,8 @@ def _add_link(model: pin.Model, link: Link, places: dict[str, _Place]) -> None:
         model.appendBodyToJoint(place.joint, link.inertia, place.T_joint_link)
 
 
-# Return the collision or visual geometry of a tree (``which``); meshes that were loaded before are shared.
 def _geometry(tree: Tree, places: dict[str, _Place], meshes: dict[MeshFile, Any], which: str) -> coal.CollisionGeometry:
+    """Return the collision or visual geometry of a tree (``which``); meshes that were loaded before are shared."""
     geometry = pin.GeometryModel()
     for link in tree.links:
         place = places[link.name]
@@ -161,8 +161,8 @@ def _geometry(tree: Tree, places: dict[str, _Place], meshes: dict[MeshFile, Any]
     return geometry
 
 
-# Load a mesh file as a coal geometry, checked; each file is loaded once.
 def _load(mesh: MeshFile, meshes: dict[MeshFile, Any], where: str) -> coal.CollisionGeometry:
+    """Load a mesh file as a coal geometry, checked; each file is loaded once."""
     if mesh in meshes:
         return meshes[mesh]
 

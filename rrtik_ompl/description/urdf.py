@@ -169,10 +169,10 @@ def package_roots(packages: FilePath | Iterable[FilePath]) -> list[Path]:
     return [Path(each) for each in ([packages] if isinstance(packages, (str, os.PathLike)) else packages)]
 
 
-# Return the names of the actuated joints; see :func:`robot_from_urdf_text` for the order of precedence.
 def _actuated(
     description: UrdfDescription, semantics: Srdf, group: str | None, joints: Iterable[str] | None, tip: str | None
 ) -> tuple[str, ...]:
+    """Return the names of the actuated joints; see :func:`robot_from_urdf_text` for the order of precedence."""
     tree = description.tree
     followers = {tie.joint for tie in description.mimics}
     movable = tuple(j.name for j in tree.walk() if j.moves and j.name not in followers)

@@ -167,16 +167,19 @@ class _Reader:
     materials: dict[str, Colour]
     undrawn: list[str] = field(default_factory=list)  # links whose visual mesh does not exist
 
-    # Store the colour of a named material; the first definition counts.
     def learn_material(self, material: Element) -> None:
+        """Store the colour of a named material; the first definition counts."""
         colour = material.find("color")
         if colour is not None:
             where = f"{self.where}: material '{material.get('name', '')}'"
             red, green, blue, opacity = numbers(colour, "rgba", 4, None, where)
             self.materials.setdefault(material.get("name", ""), (red, green, blue, opacity))
 
-    # Read a link. A cylinder that ``<collision_checking>`` names as a capsule becomes one.
     def link(self, element: Element) -> Link:
+        """Read a link.
+
+        A cylinder that ``<collision_checking>`` names as a capsule becomes one.
+        """
         name = attribute(element, "link", "name", self.where)
         where = f"{self.where}: link '{name}'"
         capsules = {c.get("name", "") for c in element.findall("collision_checking/capsule")}
@@ -203,8 +206,8 @@ class _Reader:
             shape = shape.capped()
         return Solid(shape, _origin(element, where), self.colour(element.find("material"), where))
 
-    # Read a shape or the reference to a mesh file.
     def shape(self, element: Element, where: str) -> Shape | MeshFile:
+        """Read a shape or the reference to a mesh file."""
         kind = SHAPES.get(element.tag)
         if kind is not None and kind.in_urdf:
             return kind(**{measure.name: _measured(element, measure, where) for measure in kind.measures})
@@ -228,8 +231,8 @@ class _Reader:
         red, green, blue, opacity = numbers(colour, "rgba", 4, None, where)
         return red, green, blue, opacity
 
-    # Read a joint with its limits.
     def joint(self, element: Element) -> Joint:
+        """Read a joint with its limits."""
         name = attribute(element, "joint", "name", self.where)
         where = f"{self.where}: joint '{name}'"
         kind = attribute(element, "joint", "type", where)
@@ -300,8 +303,8 @@ def _origin(element: Element, where: str) -> pin.SE3:
     return pose_from_rpy(numbers(origin, "xyz", 3, zero, where), numbers(origin, "rpy", 3, zero, where), where)
 
 
-# Return the inertia of a link in the link's frame; None if it is missing or physically impossible.
 def _inertia(inertial: Element | None, where: str) -> pin.Inertia | None:
+    """Return the inertia of a link in the link's frame; None if it is missing or physically impossible."""
     mass = None if inertial is None else inertial.find("mass")
     tensor = None if inertial is None else inertial.find("inertia")
     if inertial is None or mass is None or tensor is None:
@@ -408,8 +411,8 @@ def _others(element: Element, known: set[str]) -> list[str]:
     return list(dict.fromkeys(tag.rpartition("}")[2] for tag in tags))
 
 
-# Yield the attributes of a joint's limit and mimic that are not read, and its soft limits if they are narrower.
 def _of_joint(joint: Element) -> Iterator[str]:
+    """Yield the attributes of a joint's limit and mimic that are not read, and its soft limits if they are narrower."""
     for tag, known in (("limit", OF_LIMIT), ("mimic", OF_MIMIC)):
         part = joint.find(tag)
         yield from (f"{tag} {key}" for key in (() if part is None else part.keys()) if key not in known)

@@ -76,8 +76,8 @@ class Places:
             return
         raise Refused(f"'{path}' is outside the folders of the robot; give packages=[its package], or {TRUST}")
 
-    # Check whether a file is in a folder that macros may read.
     def _is_readable(self, path: str) -> bool:
+        """Check whether a file is in a folder that macros may read."""
         resolved = Path(path).resolve()
         if any(resolved.is_relative_to(root.resolve()) for root in self.roots):
             return True

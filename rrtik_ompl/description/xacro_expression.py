@@ -149,8 +149,8 @@ class Evaluator:
         """
         return self._evaluate(ast.parse(expression.strip(), "<expression>", "eval").body, lookup)
 
-    # Evaluate a node by the method for its kind; refuse forbidden functions and values that are too large.
     def _evaluate(self, node: ast.expr, lookup: Lookup) -> Value:
+        """Evaluate a node by the method for its kind; refuse forbidden functions and values that are too large."""
         evaluate = getattr(self, f"_{type(node).__name__}", None)
         if evaluate is None:
             raise Refused(f"{_named(node)} is not on the list")
@@ -161,8 +161,8 @@ class Evaluator:
             _check_size(len(value))
         return value
 
-    # Check whether a function is allowed: a checked or listed method of a value, or a listed function.
     def _may_be_called(self, function: Value) -> bool:
+        """Check whether a function is allowed: a checked or listed method of a value, or a listed function."""
         if isinstance(function, partial):
             return function.func in CHECKED.values()
         if isinstance(function, BuiltinMethodType):
@@ -186,8 +186,8 @@ class Evaluator:
         except KeyError:
             raise NameError(f"name '{node.id}' is not defined") from None
 
-    # Return an attribute: an entry of a namespace, a listed method of a value, or an entry of a record.
     def _Attribute(self, node: ast.Attribute, lookup: Lookup) -> Value:
+        """Return an attribute: an entry of a namespace, a listed method of a value, or an entry of a record."""
         _check_name(node.attr)
         holder: Any = self._evaluate(node.value, lookup)
         if type(holder) in self._spaces:
@@ -350,8 +350,8 @@ def _check_growth(operation: ast.operator, left: Value, right: Value) -> None:
             _check_widths(width)
 
 
-# Return an upper bound on the bits of a result; 0 for operations that do not make numbers much larger.
 def _bits_after(operation: ast.operator, left: int, right: int) -> int:
+    """Return an upper bound on the bits of a result; 0 for operations that do not make numbers much larger."""
     if isinstance(operation, ast.Pow):
         return left.bit_length() * max(right, 0) if abs(left) > 1 else 0
     if isinstance(operation, ast.LShift):
@@ -366,8 +366,8 @@ def _check_size(size: int) -> None:
         raise Refused(f"a text or list of more than {MOST_ITEMS} letters or items")
 
 
-# Raise an error if a format specification contains a large width, or one that is not written as a number.
 def _check_widths(specification: str) -> None:
+    """Raise an error if a format specification contains a large width, or one that is not written as a number."""
     if "{" in specification or "*" in specification:
         raise Refused(f"a width '{specification}' that is not written out")
     if any(len(number) > 9 or int(number) > MOST_WIDTH for number in re.findall(r"\d+", specification)):

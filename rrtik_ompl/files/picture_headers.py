@@ -65,8 +65,8 @@ def unstretched(rows: Matrix, header: PictureHeader) -> Matrix:
     return np.round(rows * (header.most / 255.0))
 
 
-# Read the header of a TIFF file; refuse values that readers would change.
 def _tiff_header(data: bytes, what: str) -> PictureHeader:
+    """Read the header of a TIFF file; refuse values that readers would change."""
     tags = dict(_tags(data))
     bits = min(_numbers(tags.get(BITS)), default=1)
     if bits < 8:

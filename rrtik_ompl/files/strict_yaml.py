@@ -325,8 +325,8 @@ def describe(value: object) -> str:
     return repr(value)
 
 
-# Describe a syntax error with the line where it is, or where an unclosed quote or bracket begins.
 def _syntax(path: Path, text: str, error: yaml.MarkedYAMLError) -> str:
+    """Describe a syntax error with the line where it is, or where an unclosed quote or bracket begins."""
     unclosed = "end of stream" in (error.problem or "") and error.context_mark is not None
     mark = error.context_mark if unclosed else error.problem_mark or error.context_mark
 

@@ -87,8 +87,8 @@ def _asked(kind: str) -> str:
     return f"is this a {kind.partition('_')[2]} file?"
 
 
-# Validate the entries of a file that describe the waypoints: version, kind, units and names.
 def _check_heads(document: dict[str, Any], kind: str) -> None:
+    """Validate the entries of a file that describe the waypoints: version, kind, units and names."""
     for key, expected in (("version", 1), ("kind", kind)):
         found = document.get(key, expected)
         if found is True or found != expected:  # True equals 1 in Python, but is not valid in a file

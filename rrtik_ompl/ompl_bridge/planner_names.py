@@ -138,9 +138,12 @@ def _is_planner(value: object) -> bool:
     return isinstance(value, type) and issubclass(value, ob.Planner)
 
 
-# Runs a Python file and returns its module, once per process and path. A failed module is not kept in sys.modules.
 @lru_cache(maxsize=32)
 def _module(path: Path) -> ModuleType:
+    """Runs a Python file and returns its module, once per process and path.
+
+    A failed module is not kept in sys.modules.
+    """
     # Several files may have the same name, so the name of the module depends on the whole path.
     name = f"planner_file_{path.stem}_{sha256(str(path).encode()).hexdigest()[:8]}"
     spec = importlib.util.spec_from_file_location(name, path)

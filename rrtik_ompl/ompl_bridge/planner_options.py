@@ -128,8 +128,8 @@ def _why_not_made(factory: PlannerFactory, error: TypeError) -> str:
     return f"it cannot be made from an ompl.base.SpaceInformation: {str(error).splitlines()[0]}"
 
 
-# Calls the setter of an option, and turns the errors of the bindings into an InputError.
 def _set(planner: ob.Planner, name: str, key: str, value: object) -> None:
+    """Calls the setter of an option, and turns the errors of the bindings into an InputError."""
     setter = next(s for s in dir(planner) if s.startswith("set") and _snake(s) == key)
     if isinstance(value, float):
         finite_array(value, (), f"planner {name}: parameter {key}")

@@ -275,8 +275,8 @@ def _predecessors(graph: PlannerGraph) -> dict[int, int]:
     return predecessors
 
 
-# Yields the lines of a graph as GraphML.
 def _graph_ml(graph: PlannerGraph) -> Iterator[str]:
+    """Yields the lines of a graph as GraphML."""
     yield '<?xml version="1.0" encoding="UTF-8"?>'
     yield '<graphml xmlns="http://graphml.graphdrawing.org/xmlns">'
     yield '  <key id="coords" for="node" attr.name="coords" attr.type="string"/>'

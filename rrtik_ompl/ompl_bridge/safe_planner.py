@@ -494,8 +494,8 @@ def change(planner: ob.Planner, name: str, value: object) -> None:
     planner.__dict__[GIVEN] = given
 
 
-# Returns a text as the value that it spells: None, a boolean, or anything in JSON; other values stay as they are.
 def _read(value: object) -> object:
+    """Return the value that a text spells: None, a boolean or anything in JSON; keep other values."""
     if not isinstance(value, str):
         return value
     words = {"none": None, "true": True, "false": False}

@@ -232,8 +232,11 @@ def coordinates_of(si: ob.SpaceInformation, *, constrained: bool = False) -> Coo
     return found
 
 
-# Returns the coordinates of a space and, recursively, of its subspaces. `inside` completes the text of an error.
 def _coordinates(space: ob.StateSpace, inside: str) -> Coordinates:
+    """Returns the coordinates of a space and, recursively, of its subspaces.
+
+    `inside` completes the text of an error.
+    """
     # OMPL's own class, even if the space is of a class derived from it in Python.
     kind = next(each for each in type(space).__mro__ if each.__module__.startswith("ompl"))
     if kind is ob.RealVectorStateSpace:

@@ -51,8 +51,8 @@ def state_document(session: Session) -> dict[str, Any]:
     }
 
 
-# Return name, value, desired value, unit and limits of each joint; the limits of a joint without them are None.
 def _joints(session: Session) -> list[dict[str, Any]]:
+    """Return name, value, desired value, unit and limits of each joint; the limits of a joint without them are None."""
     robot = session.robot
     joints = []
     for k, name in enumerate(robot.joint_names):
@@ -127,9 +127,12 @@ def _aim(session: Session) -> dict[str, Any]:
     }
 
 
-# Return the route with its figures, its moves and the progress along it; None without a route. A route that moves all
-# joints at once is shown as a single move, whose value is the share of the route that is done.
 def _route(session: Session) -> dict[str, Any] | None:
+    """Return the route with its figures, its moves and the progress along it; None without a route.
+
+    A route that moves all joints at once is shown as a single move, whose value is the share of the route that is
+    done.
+    """
     route = session.route
     follower = session.follower
     if route is None or follower is None:
@@ -167,8 +170,8 @@ def _route(session: Session) -> dict[str, Any] | None:
     }
 
 
-# Return the moves of a route with their status, and the share `at` of the total travel at which each ends.
 def _moves(follower: Follower | Track) -> list[dict[str, Any]]:
+    """Return the moves of a route with their status, and the share `at` of the total travel at which each ends."""
     words = spoken_moves(follower.path)
     ends = np.cumsum([abs(move.change) for move in follower.moves])
     moves: list[dict[str, Any]] = []

@@ -203,8 +203,8 @@ class Engine:
         if self.session.mode != PROPOSED or self.session.driving:
             self.outside.share = None
 
-    # Advance the simulated devices to a time [s] and update the session; time never runs backwards.
     def _advance(self, time: float) -> None:
+        """Advance the simulated devices to a time [s] and update the session; time never runs backwards."""
         for each in self._simulated:
             each.advance(max(time - self._advanced, 0.0))
 

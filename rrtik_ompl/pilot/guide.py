@@ -37,8 +37,8 @@ def plan(_: Means, state: State) -> State:
     return state.do(Stop(), Read(_search))
 
 
-# Request a route to the chosen grasp, or to the problem's goal, from the configuration that was just read.
 def _search(means: Means, state: State, q: Vector) -> State:
+    """Request a route to the chosen grasp, or to the problem's goal, from the configuration that was just read."""
     at_reading = replace(state, q=frozen(q))
     surroundings = state.around
     lamp = means.feasibility.patient_lamp(surroundings, state.target, state.choice, at_reading.q)
@@ -46,8 +46,8 @@ def _search(means: Means, state: State, q: Vector) -> State:
     return at_reading.do(FindRoute(search, _planned))
 
 
-# Propose the route that was found, or say why there is none and what the pilot can do.
 def _planned(means: Means, state: State, found: Route | NoRoute) -> State:
+    """Propose the route that was found, or say why there is none and what the pilot can do."""
     if isinstance(found, NoRoute):
         without_route = leave(state)
         otherwise = "choose another grasp" if without_route.choice else "drive the arm elsewhere, or choose an object"

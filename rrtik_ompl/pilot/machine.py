@@ -113,9 +113,12 @@ def _command(means: Means, state: State, event: Command) -> State:
     return after if renewed else after.do(WriteAnswer(event.time))
 
 
-# Check the command, its arguments and its preconditions, then call its function. Any command that is not held ends the
-# present motion, except release, whose own message reports what remains of the move.
 def _executed(means: Means, state: State, event: Command, renewed: bool) -> State:
+    """Check the command, its arguments and its preconditions, then call its function.
+
+    Any command that is not held ends the present motion, except release, whose own message reports what remains of
+    the move.
+    """
     verb = event.verb
     try:
         if verb not in VERBS:

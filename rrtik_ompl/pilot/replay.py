@@ -102,8 +102,8 @@ class RecordedPerception:
             self._world.T_start_base = self._structure.T_base_object * fixed.T_base_object.inverse()
         self._world.places = {each.object.name: self._world.T_start_base * each.T_base_object for each in seen}
 
-    # Apply one entry to the arm, the session or the picture, by its kind.
     def _apply(self, entry: Entry, session: Session) -> None:
+        """Apply one entry to the arm, the session or the picture, by its kind."""
         time = entry["time"]
         if entry["kind"] == "joints":
             self._arm.q = self._arm.robot.configuration(entry["q"], "q")
@@ -159,8 +159,8 @@ def _begin(entries: list[Entry]) -> Entry:
     return next((entry for entry in entries if entry["kind"] == "begin"), {})
 
 
-# Check that an entry has the values of its kind; raises KeyError, TypeError, ValueError or InputError if not.
 def _check(entry: Entry, robot: Robot, marker_map: MarkerMap) -> None:
+    """Check that an entry has the values of its kind; raises KeyError, TypeError, ValueError or InputError if not."""
     float(entry["time"])
     if entry["kind"] in ("begin", "joints"):
         robot.configuration(entry["q"], "q")

@@ -73,8 +73,8 @@ class Loop:
             while not until() and (left := begin + PERIOD_SECONDS - clock.monotonic()) > 0.0:
                 self._execute_one(left)
 
-    # Process one picture, and show the state and both pictures; waiting commands are executed between these stages.
     def _step(self) -> None:
+        """Process one picture, and show state and pictures; execute waiting commands between these stages."""
         engine = self._engine
         server = self._server
         self.reported = clock.monotonic()

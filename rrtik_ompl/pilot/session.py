@@ -171,8 +171,8 @@ class Session:
             if following is not None:
                 self._take(following)
 
-    # Carry out one effect; return the event that results from it, None for none.
     def _carry_out(self, effect: events.Effect) -> events.Event | None:
+        """Carry out one effect; return the event that results from it, None for none."""
         match effect:
             case events.Stop():
                 self.supervisor.stopped(self._arms_time())

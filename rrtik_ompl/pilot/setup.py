@@ -175,10 +175,10 @@ def _patience(vehicle: SimulatedVehicle | None) -> float | None:
     return None if vehicle is None else vehicle.patience
 
 
-# Open the camera and its sensor: simulated, a single camera, or a rig of two.
 def _perception(
     options: SessionOptions, vehicle: SimulatedVehicle | None, simulated: SimulatedSource | None
 ) -> LivePerception:
+    """Open the camera and its sensor: simulated, a single camera, or a rig of two."""
     if vehicle is not None and simulated is not None:
         sensor = Sensor(vehicle.camera, vehicle.marker_map, sigmas=options.sigmas)
         return LivePerception(sensor, simulated, arm_in_picture=True)
@@ -259,8 +259,8 @@ def _line_arm(problem: Problem, address: str, option: str = "--arm") -> LineArm:
     return LineArm(problem.robot, host.strip("[]"), int(port))
 
 
-# Open the replay of a record, with its own pictures if they were recorded.
 def _replay(options: SessionOptions, problem: Problem, file: Path) -> OpenSession:
+    """Open the replay of a record, with its own pictures if they were recorded."""
     vehicle = _recorded(options, problem)
     entries = entries_for(file, problem.name, problem.robot, vehicle.marker_map)
 

@@ -368,8 +368,8 @@ def _configuration(robot: Robot, values: Mapping[str, float], what: str) -> Vect
     return np.array([values[joint] for joint in robot.joint_names])
 
 
-# Returns the goal of a request: joint values for every joint of the arm, or a goal of a link.
 def _goal(robot: Robot, request: RequestMessage, states: Mapping[str, float], frames: Frames) -> Goal:
+    """Returns the goal of a request: joint values for every joint of the arm, or a goal of a link."""
     wanted = request.goal_constraints[0]
     if not wanted.joint_constraints or wanted.links:
         return tip_goal(wanted, frames)

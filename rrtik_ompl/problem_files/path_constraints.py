@@ -215,8 +215,8 @@ def _region_data(region: TaskRegion) -> dict[str, Any]:
     return data
 
 
-# Returns the entry of an `upright` constraint, after a check that the region is one.
 def _upright_data(region: TaskRegion) -> dict[str, Any]:
+    """Returns the entry of an `upright` constraint, after a check that the region is one."""
     seen = region.T_world_w.rotation[:, 2]
     free = region.bounds
     axis = int(np.argmax(seen))

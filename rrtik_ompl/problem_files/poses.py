@@ -61,8 +61,8 @@ def load_poses(path: str | os.PathLike[str]) -> NDArray[np.float64]:
     return np.array(rows)
 
 
-# Reads poses, shape (m, 4, 4), or points, shape (m, 3), from a CSV file; its columns may be in any order.
 def _from_csv(path: str | os.PathLike[str]) -> NDArray[np.float64]:
+    """Reads poses, shape (m, 4, 4), or points, shape (m, 3), from a CSV file; its columns may be in any order."""
     try:
         lines = [row for row in csv.reader(io.StringIO(read_text(path))) if any(cell.strip() for cell in row)]
     except csv.Error as error:

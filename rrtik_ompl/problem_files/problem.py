@@ -57,8 +57,11 @@ def load_problem(
         return _problem(name_or_file, robot)
 
 
-# Loads a problem as `load_problem` does. Errors of the problem name the line of the part that is at fault.
 def _problem(name_or_file: FilePath, robot: Robot | FilePath | None) -> Problem:
+    """Loads a problem as `load_problem` does.
+
+    Errors of the problem name the line of the part that is at fault.
+    """
     path = problem_path(name_or_file)
     document = problem_document(path)
     if _is_motion_bench_maker(document.data):

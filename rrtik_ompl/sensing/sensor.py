@@ -177,8 +177,8 @@ class Sensor:
             )
         return f"{source}: no marker in view; go nearer, add light, or check that the white rim of the marker is whole"
 
-    # Return a sighting with its pose smoothed and its ambiguity resolved by the tracker of the object.
     def _tracked(self, sight: Sighting, time: float) -> Sighting:
+        """Return a sighting with its pose smoothed and its ambiguity resolved by the tracker of the object."""
         tracker = self._trackers.get(sight.object.name)
         if tracker is None or sight.refused:
             return sight
@@ -197,8 +197,8 @@ class Sensor:
         return replace(sight, pose=pose, refused=refused)
 
 
-# Return one line about a sighting, for a person; the pose is in the base frame if it is known there.
 def _line(sight: Sighting, place: SeenObject | None) -> str:
+    """Return one line about a sighting, for a person; the pose is in the base frame if it is known there."""
     if sight.refused:
         return f"{sight.object.name}: refused: {sight.refused}"
 
@@ -215,8 +215,8 @@ def _line(sight: Sighting, place: SeenObject | None) -> str:
     )
 
 
-# Return a sighting as plain values; the pose is in the base frame if it is known there.
 def _data(sight: Sighting, place: SeenObject | None) -> dict[str, Any]:
+    """Return a sighting as plain values; the pose is in the base frame if it is known there."""
     pose, frame = _pose_and_frame(sight, place)
     doubt = sight.pose if place is None else place
     return {

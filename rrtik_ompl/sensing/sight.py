@@ -208,8 +208,8 @@ def _side_shifts(markers: Sequence[MountedMarker]) -> list[Matrix]:
     return shifts
 
 
-# Return why a pose must not be used, with a remedy; "" if it may.
 def _refusal(pose: CornerPose, markers: Sequence[SeenMarker]) -> str:
+    """Return why a pose must not be used, with a remedy; "" if it may."""
     side = max(marker.side for marker in markers)
     if side < MIN_SIDE_PIXELS:
         return f"too far away or too small: {side:.0f} pixels a side, {MIN_SIDE_PIXELS:.0f} are needed"

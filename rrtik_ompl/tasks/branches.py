@@ -201,8 +201,8 @@ class Expander:
                 self.choices.append(choices)
             yield from self._branches_of_choices(choices)
 
-    # Start the search for configurations of a stage's goal in a setting.
     def _choices(self, branch: Branch, setting: Setting, stage: MoveTo) -> Choices:
+        """Start the search for configurations of a stage's goal in a setting."""
         problem = Problem(setting.world, branch.q, stage.goal, constraints=stage.constraints)
         # A plan may reach the goal in either direction of a continuous joint, so whole turns need not be tried.
         search = GoalSearch(problem, self.rng, all_turns=False)
@@ -288,8 +288,8 @@ class Expander:
             attempted = self._attempt(branch, line, setting.world)
         return setting, arriving, attempted, attempted.reason
 
-    # Follow a line in a world: thoroughly, in all ways of a redundant arm, in later rounds of the search.
     def _attempt(self, branch: Branch, line: Way, world: World) -> Attempt:
+        """Follow a line in a world: thoroughly, in all ways of a redundant arm, in later rounds of the search."""
         if branch.effort >= THOROUGH:
             return farthest(world, line, branch.q[None])
         return attempt(world, line, branch.q, centred(world.robot))
@@ -306,9 +306,6 @@ def _line_of(branch: Branch, stage: Straight, seed: int) -> Way:
     return Way((straight_rail(tip, stage.goal(tip)),), TOLERANCE, None, seed)
 
 
-# Return the branch that continues another one by a step.
-# It takes over the rest of the steps, the choices and the effort, and adds the length of the path (or of the straight
-# motion to ``q``) to the cost.
 def _following_branch(
     branch: Branch,
     step: Step,
@@ -320,6 +317,11 @@ def _following_branch(
     arriving: tuple[Touching, ...] = (),
     contacts: tuple[MotionContact, ...] = (),
 ) -> Branch:
+    """Return the branch that continues another one by a step.
+
+    It takes over the rest of the steps, the choices and the effort, and adds the length of the path (or of the
+    straight motion to ``q``) to the cost.
+    """
     rows = [branch.q, q] if path is None else path.waypoints
     cost = branch.cost + sum(weighted_length(setting.robot, a, b) for a, b in pairwise(rows))
 

@@ -154,8 +154,11 @@ def load_task_plan(file: str | os.PathLike[str], *, trust_xacro: bool = False) -
         return _task_plan(file)
 
 
-# Read a plan; see :func:`load_task_plan`. Each motion must begin where the one before ends.
 def _task_plan(file: str | os.PathLike[str]) -> TaskPlan:
+    """Read a plan; see :func:`load_task_plan`.
+
+    Each motion must begin where the one before ends.
+    """
     document = read_yaml(file_name(file))
     entry = parse(document, TaskPlanFile)
 
@@ -186,8 +189,8 @@ def _contact_data(contacts: tuple[MotionContact, ...]) -> dict[str, Any]:
     return {"contacts": entries} if entries else {}
 
 
-# Build the world and the path of the motion with this index.
 def _motion(document: YamlDocument, entry: TaskPlanFile, number: int) -> tuple[World, JointPath]:
+    """Build the world and the path of the motion with this index."""
     motion = entry.motions[number]
     place = ("motions", number)
     world = _world(document, entry, motion, place)
@@ -201,8 +204,8 @@ def _motion(document: YamlDocument, entry: TaskPlanFile, number: int) -> tuple[W
         return world, JointPath.of(world.robot, rows)
 
 
-# Build the world of an entry; ``place`` is where the entry is in the document, for error messages.
 def _world(document: YamlDocument, entry: TaskPlanFile, part: WorldEntry, place: tuple[str | int, ...]) -> World:
+    """Build the world of an entry; ``place`` is where the entry is in the document, for error messages."""
     data: Any = document.data
     for key in (*place, "robot"):
         data = data[key]

@@ -100,8 +100,8 @@ def _holds_after_detach(stage: Detach, names_held: Held, world: World) -> Held:
     return names_held - {stage.object}
 
 
-# Raise an error unless each constraint's frame is a frame of the robot or an object that is held for every choice.
 def _check_frames(stage: MoveTo, possible_holds: set[Held], world: World) -> None:
+    """Raise an error unless each constraint's frame is one of the robot, or of an object always held."""
     model = world.robot.model
     for region in stage.constraints:
         name = region.frame

@@ -94,8 +94,8 @@ class Setting:
             return Setting(self._first_world, with_gripper(self.robot, stage), self.scene, self.grasp_pairs)
         return self._attached(stage, q) if isinstance(stage, Attach) else self._detached(stage, q)
 
-    # Return the setting after an obstacle is attached, with contacts for what it touches and for what it may touch.
     def _attached(self, stage: Attach, q: Vector) -> Setting:
+        """Return the setting after an obstacle is attached, with its contacts and permitted contacts."""
         pose = self.robot.fk(q, stage.link).actInv(self.scene.obstacle(stage.object).pose)
         links = tuple(name for name in stage.allow if name in self.robot.link_names)
         scene = self.scene.attaching(stage.object, stage.link, links, pose=pose, padding=stage.padding)
@@ -114,8 +114,8 @@ class Setting:
         }
         return setting.with_contacts(contacts.values())
 
-    # Return the setting after an object is detached, with contacts for what it touches.
     def _detached(self, stage: Detach, q: Vector) -> Setting:
+        """Return the setting after an object is detached, with contacts for what it touches."""
         obstacle_names = frozenset(self.scene.names)
         for near in touching_at(self.world, q, stage.object):
             if near.second in obstacle_names and near.too_deep:

@@ -63,8 +63,8 @@ class MoveToEntry(Section):
         return _move_to(self.move_to, robot, [section.build(robot) for section in self.path_constraints])
 
 
-# Return the stage for a goal of a file; postures are kept by name.
 def _move_to(section: GoalSection, robot: Robot, constraints: Iterable[TaskRegion]) -> MoveTo:
+    """Return the stage for a goal of a file; postures are kept by name."""
     goal = section.posture if isinstance(section, Posture) else build_goal(section, robot)
     return MoveTo(goal, tuple(constraints))
 
@@ -225,9 +225,11 @@ def load_task(name_or_file: str | os.PathLike[str], *, trust_xacro: bool = False
         return _task(name_or_file)
 
 
-# Load a task; see :func:`load_task`.
-# The robot, the scene, the start and the stages are built in this order, so that errors name the line of their key.
 def _task(name_or_file: str | os.PathLike[str]) -> LoadedTask:
+    """Load a task; see :func:`load_task`.
+
+    The robot, the scene, the start and the stages are built in this order, so that errors name the line of their key.
+    """
     path = file_name(name_or_file)
     if isinstance(name_or_file, str) and not path.suffix and len(path.parts) == 1:
         shipped = task_files()
@@ -313,8 +315,8 @@ def stage_data(stage: Stage) -> dict[str, Any]:
     return {"gripper": stage.state} | ({} if stage.width is None else {"width": stage.width})
 
 
-# Return the entry of a task file for the goal of a stage.
 def _goal_data(goal: Goal | Vector | str) -> dict[str, Any]:
+    """Return the entry of a task file for the goal of a stage."""
     if isinstance(goal, str):
         return {"posture": goal}
     return {"joints": goal.tolist()} if isinstance(goal, np.ndarray) else goal_data(goal)

@@ -45,8 +45,8 @@ def standing_parts(world: World) -> list[dict[str, Any]] | None:
     return found
 
 
-# Return the convex solids around a body in the world frame; None if there are none of that kind.
 def _solids(body: Body) -> list[dict[str, Any]] | None:
+    """Return the convex solids around a body in the world frame; None if there are none of that kind."""
     around = convex_solids(body.geometry).around
     placement = body.placement
     if not around or any(solid.kind != CONVEX_SOLID for solid in around):

@@ -67,8 +67,8 @@ def story_of(subject: Subject, frame: Frame, title: str) -> dict[str, Any]:
     }
 
 
-# Return the kinematic chain in the form of the page's forward kinematics, and the joints with units and limits.
 def _robot(robot: Robot, tips: Sequence[str]) -> dict[str, Any]:
+    """Return the kinematic chain in the form of the page's forward kinematics, and the joints with units and limits."""
     chain = robot.chain
     return {
         "name": robot.name,
@@ -228,8 +228,8 @@ def grid_cell(size: float) -> float:
     return float(power * max(step for step in (1.0, 2.0, 5.0) if step * power <= size / 15.0))
 
 
-# Return the colours of the palette that the page uses, by their names in lower case.
 def _colors() -> dict[str, str]:
+    """Return the colours of the palette that the page uses, by their names in lower case."""
     names = (
         "ROBOT",
         "START",

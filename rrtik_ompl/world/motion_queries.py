@@ -198,8 +198,8 @@ class BatchedMotionQueries:
         """Return which motions, shapes (m, n), are free, shape (m,), even if the search has to end."""
         return self._answers(tails, heads, no_stop)
 
-    # Check motions batch by batch; raise OutOfTime when ``stop`` says so between two batches.
     def _answers(self, tails: Matrix, heads: Matrix, stop: Stop) -> Mask:
+        """Check motions batch by batch; raise OutOfTime when ``stop`` says so between two batches."""
         parts = [np.zeros(0, dtype=bool)]
         first = 0
         while first < len(tails):

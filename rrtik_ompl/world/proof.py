@@ -211,8 +211,8 @@ class Prover:
         """Return which motions starts[k] -> ends[k], shapes (m, dof), are proven free, shape (m,)."""
         return in_blocks(partial(self._proven, clearance), starts, ends)
 
-    # As proven, for one block of motions.
     def _proven(self, clearance: float, starts: Matrix, ends: Matrix) -> Mask:
+        """As proven, for one block of motions."""
         if len(mask := np.ones(len(starts), dtype=bool)) == 0:
             return mask
 

@@ -31,8 +31,11 @@ from rrtik_ompl.world.exact_checks import ExactChecker, one_way
 from rrtik_ompl.world.proof import Prover
 
 
-# Make the prover of an arrangement. With path constraints it shares the tables of the one without them.
 def _prover_of(solids: Arrangement, constraints: HeldRegions | None) -> Prover:
+    """Make the prover of an arrangement.
+
+    With path constraints it shares the tables of the one without them.
+    """
     if constraints is not None:
         return PROVERS.of(solids, None).holding(constraints)
     always_colliding = solids.always_colliding
@@ -183,8 +186,8 @@ class RowChecks:
     def _exact(self) -> bool:
         return self.settings.accuracy == "exact"
 
-    # As free, for one block of rows.
     def _free(self, rows: Matrix) -> Mask:
+        """As free, for one block of rows."""
         mask = inside_limits(self.settings.robot, rows) & (not self.solids.always_colliding)
         if mask.all():
             mask = self.checker.free(rows, exact=self._exact)
@@ -194,8 +197,8 @@ class RowChecks:
             mask[mask] = self.constraints.held(rows[mask])
         return mask
 
-    # As motions_free, for one block of motions.
     def _motions_free(self, starts: Matrix, ends: Matrix) -> Mask:
+        """As motions_free, for one block of motions."""
         robot = self.settings.robot
         mask = inside_limits(robot, starts) & inside_limits(robot, ends) & (not self.solids.always_colliding)
 

@@ -135,8 +135,8 @@ class Settings:
         return turned_z(_unit(numbers(element, "zaxis", 3, None, where), element, where))
 
 
-# Return a direction as a unit vector, shape (3,); raise an error if its length is 0.
 def _unit(values: ArrayLike, element: Element, where: str) -> Vector:
+    """Return a direction as a unit vector, shape (3,); raise an error if its length is 0."""
     length = float(np.linalg.norm(values))
     if length < 1e-9:
         raise InputError(f"{where}: <{element.tag}> has an axis of length 0; give a direction such as 0 0 1")
@@ -190,8 +190,8 @@ def solid_of(geom: Element, settings: Settings, meshes: Mapping[str, tuple[MeshF
     return Solid(_shape(kind, geom, length, where), place, rgba)
 
 
-# Return the shape of a geom; ``length`` is the distance between the ends of `fromto` [m], None without.
 def _shape(kind: str, geom: Element, length: float | None, where: str) -> Shape:
+    """Return the shape of a geom; ``length`` is the distance between the ends of `fromto` [m], None without."""
     # With `fromto`, the length replaces one number of the size; a box then has the same width along both other axes.
     count = _COUNTS[kind] - (length is not None) - (length is not None and kind == "box")
     written = (geom.get("size") or "").split()

@@ -294,8 +294,8 @@ def _never_colliding_solids(reader: _Reader) -> frozenset[frozenset[str]]:
     return frozenset(pairs)
 
 
-# Return the keyframes that have joint positions, as joint values by name of the joint.
 def _keys(root: Element, reader: _Reader) -> dict[str, dict[str, float]]:
+    """Return the keyframes that have joint positions, as joint values by name of the joint."""
     postures = {}
     sizes = [SIZES[kind] for _, kind in reader.moving]
     starts = np.cumsum([0, *sizes]).tolist()

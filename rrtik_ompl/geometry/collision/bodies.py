@@ -164,8 +164,8 @@ def scene_bodies(robot: Robot, scene: Scene, margin: float = 0.0) -> tuple[Body,
     return tuple(bodies)
 
 
-# Return the coal geometries of an object's shape; an error names the object.
 def _pieces(item: Obstacle | AttachedObject) -> tuple[Piece, ...]:
+    """Return the coal geometries of an object's shape; an error names the object."""
     try:
         return pieces(item.shape)
     except InputError as error:
@@ -265,10 +265,12 @@ def colliding_pairs(robot: Robot, scene: Scene, bodies: tuple[Body, ...]) -> tup
     return tuple(sorted(pairs))
 
 
-# Return the pairs of names that the scene allows to touch, checked for unknown names.
-# They include, for each attached object, the link that holds it and those of its ``allow``. Pairs that the robot itself
-# allows are not included.
 def _allowed(robot: Robot, scene: Scene) -> set[frozenset[str]]:
+    """Return the pairs of names that the scene allows to touch, checked for unknown names.
+
+    They include, for each attached object, the link that holds it and those of its ``allow``. Pairs that the robot
+    itself allows are not included.
+    """
     known_names = {*robot.link_names, *scene.names}
     for pair in scene.allowed_collisions:
         for name in pair:

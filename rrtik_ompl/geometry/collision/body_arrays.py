@@ -93,8 +93,8 @@ def body_arrays(bodies: Sequence[Body]) -> BodyArrays:
     return arrays
 
 
-# Collect the data of bodies; a half-space gets a box that is practically endless.
 def _body_arrays(bodies: tuple[Body, ...]) -> BodyArrays:
+    """Collect the data of bodies; a half-space gets a box that is practically endless."""
     boxes = [body.geometry.aabb_local for body in bodies]
     half_spaces = np.array([isinstance(body.geometry, coal.Halfspace) for body in bodies], dtype=bool)
     low, high = (np.array(ends).reshape(-1, 3) for ends in ([b.min_ for b in boxes], [b.max_ for b in boxes]))

@@ -47,9 +47,11 @@ class OverlapDepth:
         pin.forwardKinematics(self._robot.model, self._data, self._robot.pinocchio_configuration(q[None])[0])
         return max((self._pair_travel(*pair) for pair in self._pairs), default=0.0)
 
-    # Return the distance that each point of two bodies may move while they surely stay in collision [m].
-    # If both bodies move, each may cover half of the penetration depth.
     def _pair_travel(self, i: int, j: int) -> float:
+        """Return the distance that each point of two bodies may move while they surely stay in collision [m].
+
+        If both bodies move, each may cover half of the penetration depth.
+        """
         first = self._bodies[i]
         second = self._bodies[j]
         ends = (first.geometry, self._transform(first), second.geometry, self._transform(second))

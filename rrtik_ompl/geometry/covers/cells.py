@@ -123,9 +123,11 @@ def lattice_inside(solid: Solid, fewest: int) -> Matrix:
     return lattice_points
 
 
-# Choose a grid around triangles such that their surface crosses about ``crossed`` cells.
-# The number of cells is bounded, and the grid is shifted by ``MARGINS`` against the bounding box.
 def _grid(triangles: Triangles, crossed: int, min_cells: int = 1) -> Grid:
+    """Choose a grid around triangles such that their surface crosses about ``crossed`` cells.
+
+    The number of cells is bounded, and the grid is shifted by ``MARGINS`` against the bounding box.
+    """
     low = triangles.min(axis=(0, 1))
     high = triangles.max(axis=(0, 1))
     extent = np.maximum(high - low, 1e-9)

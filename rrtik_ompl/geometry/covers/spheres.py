@@ -226,9 +226,11 @@ def _solid(geometry: coal.CollisionGeometry) -> tuple[Solid, Frame] | None:
         return None
 
 
-# Return a mesh as a solid and its frame, or its bounding box if it has too many triangles or open edges.
-# The answer is None for a mesh without triangles, with vertices that are not finite, or of no extent.
 def _mesh(geometry: coal.CollisionGeometry) -> tuple[Solid, Frame] | None:
+    """Return a mesh as a solid and its frame, or its bounding box if it has too many triangles or open edges.
+
+    The answer is None for a mesh without triangles, with vertices that are not finite, or of no extent.
+    """
     vertices, triangles = mesh_arrays(geometry)
     used_vertices = vertices[np.unique(triangles)]
     if (
@@ -253,8 +255,8 @@ def _mesh(geometry: coal.CollisionGeometry) -> tuple[Solid, Frame] | None:
     return convex_solid(box_corners(half_sides) + 0.5 * (low + high))
 
 
-# Return one ball around a geometry of any kind, shape (1, 4); of infinite radius if it has no finite bounds.
 def _bounding_ball(geometry: coal.CollisionGeometry, swept_radius: float) -> Matrix:
+    """Return one ball around a geometry of any kind, shape (1, 4); of infinite radius if it has no finite bounds."""
     geometry.computeLocalAABB()
     centre = np.array(geometry.aabb_center)
     radius = float(geometry.aabb_radius)
@@ -326,10 +328,12 @@ def regular_cover(core: Core, limit: int, protrusion: float | None) -> Matrix | 
     return None
 
 
-# Return the smallest grid whose protrusion is small enough or, if there is none, the grid of least protrusion.
-# ``grids``, shape (k, 3), has the numbers of balls along each axis; ``protrusions``, shape (k,), how far the balls of
-# each grid reach beyond the solid [m]; ``protrusion`` is what is small enough, or None.
 def _chosen(grids: NDArray[np.int64], protrusions: Vector, protrusion: float | None) -> NDArray[np.int64]:
+    """Return the smallest grid whose protrusion is small enough or, if there is none, the grid of least protrusion.
+
+    ``grids``, shape (k, 3), has the numbers of balls along each axis; ``protrusions``, shape (k,), how far the balls
+    of each grid reach beyond the solid [m]; ``protrusion`` is what is small enough, or None.
+    """
     small_enough = np.flatnonzero(protrusions <= protrusion) if protrusion is not None else np.empty(0, dtype=np.int64)
     if len(small_enough):
         return np.asarray(grids[small_enough[grids[small_enough].prod(axis=1).argmin()]])

@@ -137,8 +137,8 @@ class Servo:
         secondary = self._secondary_rates(q)
         return rates, secondary - Vt.T @ (Vt @ secondary)
 
-    # Return the Jacobian of the tip in the axes of the world, shape (6, dof).
     def _jacobian(self, q: Vector) -> Matrix:
+        """Return the Jacobian of the tip in the axes of the world, shape (6, dof)."""
         robot = self._robot
         pin.computeJointJacobians(robot.model, self._data, robot.pinocchio_configuration(q)[0])
         model_jacobian = pin.getFrameJacobian(
@@ -169,8 +169,8 @@ class Servo:
             self._volume_slope_at = (q.copy(), slope)
         return self._volume_slope_at[1]
 
-    # Return the volume of the Jacobian's ellipsoid at a configuration: the product of its singular values.
     def _volume(self, q: Vector) -> float:
+        """Return the volume of the Jacobian's ellipsoid at a configuration: the product of its singular values."""
         jacobian = self._jacobian(q)
         rows = jacobian @ jacobian.T if len(self._joint_steps) >= 6 else jacobian.T @ jacobian
         return float(np.sqrt(max(np.linalg.det(rows), 0.0)))

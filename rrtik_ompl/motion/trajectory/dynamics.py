@@ -152,8 +152,8 @@ class DynamicLimits:
         rows = list(self._states(positions, velocities, accelerations))
         return Measured(*(np.array(column) for column in zip(*rows, strict=True)))
 
-    # Yield for each state the tip's velocity and acceleration, the torques, and the torques that hold the arm still.
     def _states(self, *states: Matrix) -> Iterator[tuple[Vector, Vector, Vector, Vector]]:
+        """Yield the tip's velocity and acceleration, the torques and the holding torques for each state."""
         model = self.model
         gain = self.robot.chain.gain
         data = working_memory(model)
@@ -198,8 +198,8 @@ class DynamicLimits:
         cap = self.tip_acceleration / np.maximum(np.where(slope_norms < LEAST_SPEED, across_bend, 0.0), 1e-200)
         return Bounds(Rows(first, second, -limit, limit), np.minimum(cap, MOST))
 
-    # Return the torque limits as constraints; ``along`` has the torques per path acceleration, shape (m, n).
     def _torque_rows(self, unit: Measured, along: Matrix) -> Bounds:
+        """Return the torque limits as constraints; ``along`` has the torques per path acceleration, shape (m, n)."""
         high = self.torque - unit.holding
         low = -self.torque - unit.holding
         if (high <= 0.0).any() or (low >= 0.0).any():
@@ -230,8 +230,8 @@ def _of_tip(given: float | None, what: str, unit: str, most: float) -> float:
     return number
 
 
-# Return the torque limits as one number per joint, shape (dof,), checked.
 def _torques(robot: Robot, torque: ArrayLike | bool) -> Vector:
+    """Return the torque limits as one number per joint, shape (dof,), checked."""
     if sum(inertia.mass for inertia in robot.model.inertias) <= 0.0:
         raise InputError(f"torque limits: robot '{robot.name}' has no inertias; its description must give them")
     if torque is True:

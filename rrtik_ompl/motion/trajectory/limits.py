@@ -180,8 +180,8 @@ def _row(values: ArrayLike, name: str) -> Vector:
     return row
 
 
-# Return the given limits or, for None, those of the robot with defaults where it has none, shape (dof,).
 def _of_robot(robot: Robot, given: ArrayLike | None, name: str, own: Vector, default: Vector) -> Vector:
+    """Return the given limits or, for None, those of the robot with defaults where it has none, shape (dof,)."""
     if given is None:
         return np.where(np.isfinite(own), own, default)
     row = _row(given, name)

@@ -66,10 +66,12 @@ def load_motion_or_path(file: str | os.PathLike[str], robot: Robot) -> Trajector
     return load_trajectory(file, robot) if is_motion else load_path(file, robot)
 
 
-# Make a trajectory of the columns of a file; see :func:`.text.loads`.
-# Accelerations are used if they lead to the next point; otherwise three cubics per interval are. Points at a control
-# rate become set points of the motion.
 def _from_document(document: dict[str, Any], robot: Robot | None) -> Trajectory:
+    """Make a trajectory of the columns of a file; see :func:`.text.loads`.
+
+    Accelerations are used if they lead to the next point; otherwise three cubics per interval are. Points at a
+    control rate become set points of the motion.
+    """
     units = document["units"]
     sliding = None if units is None else [unit == "m" for unit in units]
     if sliding is None and robot is not None and document["joint_names"] == list(robot.joint_names):

@@ -101,8 +101,8 @@ def loads(text: str, ending: str) -> dict[str, Any]:
     return _from_message(json_object(text, KIND, "points") if ending == ".json" else from_yaml(text))
 
 
-# Read the columns of a CSV file; see :func:`loads`.
 def _from_csv(text: str) -> dict[str, Any]:
+    """Read the columns of a CSV file; see :func:`loads`."""
     names, rows = table_rows(text, ",")
     count = (len(names or ()) - 1) // 3
     joints = (names or [])[1 : 1 + count]
@@ -115,9 +115,11 @@ def _from_csv(text: str) -> dict[str, Any]:
     return document
 
 
-# Check the points of a JointTrajectory message and return its columns; see :func:`loads`.
-# Accelerations are only used if all points have them.
 def _from_message(document: dict[str, Any]) -> dict[str, Any]:
+    """Check the points of a JointTrajectory message and return its columns; see :func:`loads`.
+
+    Accelerations are only used if all points have them.
+    """
     points = document["points"]
     if not isinstance(points, list) or not all(isinstance(point, dict) for point in points):
         raise InputError("points: expected a list of objects with positions, velocities and time_from_start")

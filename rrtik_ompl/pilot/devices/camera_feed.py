@@ -81,8 +81,8 @@ class Feed:
         self._ended.set()
         self._thread.join(timeout=5.0)
 
-    # Read pictures until the feed is closed; reopen a live camera whenever it is lost.
     def _read(self, pictures: Iterator[Picture]) -> None:
+        """Read pictures until the feed is closed; reopen a live camera whenever it is lost."""
         while not self._ended.is_set():
             self._lose(self._read_until_lost(pictures))
             self._report()

@@ -345,8 +345,11 @@ class LineServer:
         self._thread.join(timeout=5.0)
         self._listening.close()
 
-    # Accept one client after the other. The arm stops when a client leaves, falls silent or sends no valid request.
     def _serve(self) -> None:
+        """Accept one client after the other.
+
+        The arm stops when a client leaves, falls silent or sends no valid request.
+        """
         while not self._ended.is_set():
             try:
                 connection, _ = self._listening.accept()
@@ -365,9 +368,11 @@ class LineServer:
             self.arm.stop()
             line.close()
 
-    # Answer requests of one client. The simulated arm advances in real time, and stops when a set point's validity
-    # ends.
     def _answer(self, line: Line) -> None:
+        """Answer requests of one client.
+
+        The simulated arm advances in real time, and stops when a set point's validity ends.
+        """
         last_time = time.monotonic()
         expiry_time = np.inf
         while not self._ended.is_set():

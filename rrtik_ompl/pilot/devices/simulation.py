@@ -155,8 +155,6 @@ class SimulatedCamera:
             if (corners_in_camera[:, 2] > 0.05).all():
                 self._draw_marker(drawn, depths, sheet, self.camera.project(corners_in_camera), T)
 
-    # Draw one marker into the picture in place. The image of the marker is warped at three times the resolution,
-    # averaged, and blended where nothing is in front.
     def _draw_marker(
         self,
         drawn: NDArray[np.uint8],
@@ -165,6 +163,11 @@ class SimulatedCamera:
         pixels: Matrix,
         T: pin.SE3,
     ) -> None:
+        """Draw one marker into the picture in place.
+
+        The image of the marker is warped at three times the resolution, averaged, and blended where nothing is in
+        front.
+        """
         grey = 30 + (sheet // 255) * 190
         cell = np.ones((PIXELS_PER_CELL, PIXELS_PER_CELL), dtype=np.uint8)
         fine = np.kron(grey, cell).astype(np.uint8)

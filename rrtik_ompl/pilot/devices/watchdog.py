@@ -55,8 +55,8 @@ class Watchdog:
         self._ended.set()
         self._thread.join(timeout=5.0)
 
-    # Check the reports at regular intervals; stop the arm and publish a fault when a thread falls silent.
     def _watch(self) -> None:
+        """Check the reports at regular intervals; stop the arm and publish a fault when a thread falls silent."""
         reported_silent: set[str] = set()
         begin = time.monotonic()
         while not self._ended.wait(self._patience / LOOKS_PER_PATIENCE):

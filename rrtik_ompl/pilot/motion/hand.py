@@ -47,9 +47,12 @@ def close(_: Means, state: State) -> State:
     return state.do(Stop(), Grip(True, _closed))
 
 
-# Hold the object at the nearest grasp within `REACH` and `TURN` of the tip. A loose object becomes part of the arm. An
-# object that cannot be carried only locks the arm until the gripper opens.
 def _closed(means: Means, state: State, q: Vector) -> State:
+    """Hold the object at the nearest grasp within `REACH` and `TURN` of the tip.
+
+    A loose object becomes part of the arm. An object that cannot be carried only locks the arm until the gripper
+    opens.
+    """
     after = replace(state, q=frozen(q), gripper=replace(state.gripper, closed=True))
 
     tip = means.robot.fk(after.q)
@@ -92,8 +95,8 @@ def open_hand(_: Means, state: State) -> State:
     return state.do(Stop(), Grip(False, _opened))
 
 
-# Release the held object at its present pose, and warn if it is left deep inside an obstacle.
 def _opened(means: Means, state: State, q: Vector) -> State:
+    """Release the held object at its present pose, and warn if it is left deep inside an obstacle."""
     after = replace(state, q=frozen(q), gripper=replace(state.gripper, closed=False, fixed=""))
 
     name = after.holds

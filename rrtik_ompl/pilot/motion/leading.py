@@ -95,8 +95,8 @@ def servo(means: Means, state: State, press: float) -> State:
     return replace(pressed, servoed_at=state.time).do(request)
 
 
-# Send the arm along the computed rates, slowed down to what the pilot can follow; report the remaining distance.
 def _stepped(means: Means, state: State, step: ServoStep) -> State:
+    """Send the arm along the computed rates, as slowly as the pilot needs; report the distance left."""
     remaining = f"{1e3 * step.away:.1f} mm and {np.rad2deg(step.turned):.1f} deg"
 
     if step.state == "done":
@@ -121,8 +121,8 @@ def _begin_lead(means: Means, state: State, master: Vector) -> State:
     return _go_on_leading(means, state, master)
 
 
-# Move towards the master's joints, as far as one step allows; refuse a step that is not free.
 def _go_on_leading(means: Means, state: State, master: Vector) -> State:
+    """Move towards the master's joints, as far as one step allows; refuse a step that is not free."""
     to_go = means.robot.clamp(master) - state.q
     max_lead = means.rates * pace(means, state) * LEASH_SECONDS
     point = state.q + np.clip(to_go, -max_lead, max_lead)

@@ -206,7 +206,6 @@ class Augmenter:
         """
         return self._last.depths.copy()
 
-    # Draw a ghost, the whole arm or only the gripper, with its outline.
     def _draw_ghost(
         self,
         drawn: NDArray[np.uint8],
@@ -214,6 +213,7 @@ class Augmenter:
         T_camera_base: NDArray[np.float64],
         hidden_by: NDArray[np.float32] | None,
     ) -> None:
+        """Draw a ghost, the whole arm or only the gripper, with its outline."""
         style = T_camera_base, hidden_by, ghost.opacity, ghost.color
         if ghost.q is not None:
             mask = self._draw_arm(drawn, self._ghost, ghost.q, *style)

@@ -127,8 +127,8 @@ def _link_surfaces(bodies: Sequence[object], triangles: int) -> tuple[Surface, .
     return tuple(surfaces)
 
 
-# Return the surface of a body of Pinocchio's geometry model in the frame of its joint; None if nothing can be drawn.
 def _link_surface(body: object, limit: int) -> Surface | None:
+    """Return a body's surface in the frame of its joint; None if nothing can be drawn."""
     geometry = body.geometry  # type: ignore[attr-defined]
     joint = body.parentJoint  # type: ignore[attr-defined]
     placement = body.placement  # type: ignore[attr-defined]

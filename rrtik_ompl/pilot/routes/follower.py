@@ -166,8 +166,8 @@ class Follower:
             rows.append(row)
         return self.path.with_waypoints(np.array(rows if len(rows) > 1 else [*rows, *rows]))
 
-    # Return a progress "lost" if a joint other than the moving one deviates from its planned value; None if none does.
     def _lost(self, q: Vector, planned: Vector, moving: int | None) -> Progress | None:
+        """Return a progress "lost" if a joint other than the moving one deviates from its plan, or None."""
         errors = np.abs(q - planned)
         if moving is not None:
             errors[moving] = 0.0

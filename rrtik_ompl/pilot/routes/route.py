@@ -207,8 +207,8 @@ def _without_tiny_moves(world: World, goal: Vector, q: Vector) -> Vector:
     return goal_with_fewer_moves
 
 
-# Search for the best route over the given last parts, and compute its figures.
 def _route(world: World, holding: World, q: Vector, tails: Sequence[Tail], rates: Vector, seed: int) -> Route | NoRoute:
+    """Search for the best route over the given last parts, and compute its figures."""
     search = RouteSearch(world, holding, q, seed)
     try:
         route = search.find(tails)

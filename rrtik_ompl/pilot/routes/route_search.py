@@ -160,9 +160,11 @@ class RouteSearch:
         joints = np.random.default_rng(self._seed).permutation(len(self._q)).tolist()
         return joints if len(last) < 2 else sorted(joints, key=lambda joint: last[0, joint] == last[1, joint])
 
-    # Return the best proven route, or else the best that a second check accepts; None if there is none. All routes are
-    # ranked by few executions, and the best of them again by many.
     def _best(self, routes: Iterable[GraspRoute]) -> GraspRoute | None:
+        """Return the best proven route, or else the best that a second check accepts; None if there is none.
+
+        All routes are ranked by few executions, and the best of them again by many.
+        """
         finalists = sorted(routes, key=lambda route: self._rank(route, TRIALS))[:FINALISTS]
 
         ranked = sorted(finalists, key=lambda route: self._rank(route, EXECUTIONS))

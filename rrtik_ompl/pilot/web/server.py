@@ -242,8 +242,8 @@ class PilotServer:
         if len(self.clients):
             self._loop.call_soon_threadsafe(act)
 
-    # Run tornado's event loop in the server's thread, until `_end` stops it.
     def _run(self) -> None:
+        """Run tornado's event loop in the server's thread, until `_end` stops it."""
         asyncio.set_event_loop(self._loop)
         logging.getLogger("tornado").addHandler(logging.NullHandler())  # errors are shown on the page
 

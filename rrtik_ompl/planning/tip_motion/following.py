@@ -168,9 +168,9 @@ def packed_rail(robot: Robot, rail: Rail, q: Vector, tolerance: Tolerance, leani
     return table
 
 
-# Sizes of the arrays in the table of a kernel call, for an arm with so many joints.
 @lru_cache(maxsize=64)
 def _plan(dof: int, joints: int) -> TablePlan:
+    """Sizes of the arrays in the table of a kernel call, for an arm with so many joints."""
     return sizes_of(
         RailTable,
         rail=rail_layout.RAIL_NUMBERS,

@@ -116,8 +116,8 @@ class CameraLostError(InputError):
     """A camera that delivered pictures before no longer does."""
 
 
-# Yield the pictures of a video file, with times by its frame rate.
 def _video(path: Path) -> Iterator[Picture]:
+    """Yield the pictures of a video file, with times by its frame rate."""
     if not os.path.isfile(path):
         raise InputError(f"{path}: no such file; check the name")
     with _opened(str(path)) as capture:

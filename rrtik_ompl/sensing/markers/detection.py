@@ -257,12 +257,15 @@ def _table(dictionary: str) -> cv2.aruco.Dictionary:
     return cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, DICTIONARIES[dictionary]))
 
 
-# Return OpenCV's detector for a dictionary. outline_share is the least perimeter of a marker as a share of the
-# picture's longer side; a thorough detector tries larger threshold windows and corrects more bits.
 @lru_cache
 def _detector(
     dictionary: str, outline_share: float = MIN_OUTLINE_SHARE, thorough: bool = False
 ) -> cv2.aruco.ArucoDetector:
+    """Return OpenCV's detector for a dictionary.
+
+    outline_share is the least perimeter of a marker as a share of the picture's longer side; a thorough detector
+    tries larger threshold windows and corrects more bits.
+    """
     parameters = cv2.aruco.DetectorParameters()
     parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
     parameters.minMarkerPerimeterRate = outline_share

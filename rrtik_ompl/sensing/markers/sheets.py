@@ -133,10 +133,10 @@ def _paper(name: str) -> tuple[float, float]:
     return PAPERS[name.lower()]
 
 
-# Write pages of tiles to a PDF, or to one PNG for each page.
 def _write(
     path: str | os.PathLike[str], pages: list[list[_Tile]], size: tuple[float, float], dots_per_inch: int
 ) -> None:
+    """Write pages of tiles to a PDF, or to one PNG for each page."""
     from matplotlib.backends.backend_pdf import PdfPages
 
     file = file_name(path)
@@ -160,8 +160,8 @@ def _write(
         write_bytes(target, made.getvalue())
 
 
-# Draw the tiles of one page and the scale for checking the printer; all sizes are in metres.
 def _page(tiles: list[_Tile], size: tuple[float, float]) -> Figure:
+    """Draw the tiles of one page and the scale for checking the printer; all sizes are in metres."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 

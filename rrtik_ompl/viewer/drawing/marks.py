@@ -121,8 +121,8 @@ def draw_marks(vis: Node, marks: Iterable[Mark]) -> None:
         vis["marks"][f"{number}"].set_object(look_of_triangles(mark.vertices, mark.faces).geometry, material)
 
 
-# Join triangle meshes to one mark.
 def _joined(name: str, color: str, bodies: Iterable[tuple[Matrix, Faces]], options: MarkOptions) -> Mark:
+    """Join triangle meshes to one mark."""
     vertices = [np.empty((0, 3))]
     faces = [np.empty((0, 3), dtype=np.int64)]
     count = 0

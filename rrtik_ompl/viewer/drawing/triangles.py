@@ -93,8 +93,8 @@ def thin_out(vertices: Matrix, faces: Faces, limit: int) -> tuple[Matrix, Faces]
     return thin_vertices, thin_faces
 
 
-# Merge all vertices in the same cell of a grid to their mean, and drop triangles that become degenerate.
 def _cluster(vertices: Matrix, faces: Faces, cell: float) -> tuple[Matrix, Faces]:
+    """Merge all vertices in the same cell of a grid to their mean, and drop triangles that become degenerate."""
     grid = np.floor((vertices - vertices.min(axis=0)) / cell).astype(np.int64)
     size = grid.max(axis=0) + 1
     _, label = np.unique((grid[:, 0] * size[1] + grid[:, 1]) * size[2] + grid[:, 2], return_inverse=True)
