@@ -123,7 +123,7 @@ def on_line(
         >>> rail = rrtik.on_line([0.5, 0, 0.3], [0, 1, 0])
     """
     bounds = _anywhere()
-    bounds[:2] = 0.0
+    bounds[:2] = 0.0  # x and y: the line is the z axis of the region
     placed = _placed(point, direction, "on_line", "direction")
     return TaskRegion(placed, bounds, position_tolerance=tolerance, frame=frame, position_allowance=allowance)
 

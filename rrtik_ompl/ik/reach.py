@@ -145,11 +145,13 @@ def _first_turn(robot: Robot) -> Callable[[Matrix, Matrix, Vector], tuple[Matrix
     turned points and directions. None if the first joint does not turn the whole arm as one body.
     """
     chain = robot.chain
-    alone = np.count_nonzero(chain.gain[:, 0]) == 1 and chain.gain[0, 0] == 1.0
-    if robot.prismatic[0] or not alone or np.count_nonzero(chain.parent == -1) != 1:
+    moves_only_itself = np.count_nonzero(chain.gain[:, 0]) == 1 and chain.gain[0, 0] == 1.0
+    joints_on_base = np.count_nonzero(chain.parent == -1)
+    if robot.prismatic[0] or not moves_only_itself or joints_on_base != 1:
         return None
 
-    frame = robot.chain.joint_frames(np.zeros((1, robot.dof)))[0, 1]
+    # The frame of the first joint; index 0 is the world.
+    frame = chain.joint_frames(np.zeros((1, robot.dof)))[0, 1]
     axis = frame[:3, :3] @ chain.axis[0]
     origin = frame[:3, 3]
 

@@ -75,7 +75,9 @@ def clearance_on(checks: RowChecks, course: Course) -> ClearanceCurve:
     # Index of the last level below the required clearance, or -1.
     level_of_unproven = int(np.searchsorted(LEVELS, proof.clearance)) - 1
     gaps = [(gap, level_of_unproven) for gap in proof.unproven]
-    gaps += _nearest_of_proven(course, int(levels_of_proven.min()), set(unproven)) if levels_of_proven.size else []
+    gaps += (
+        _gaps_above_proven_level(course, int(levels_of_proven.min()), set(unproven)) if levels_of_proven.size else []
+    )
     gaps = [(gap, level) for gap, level in gaps if np.isfinite(gap.share)]
 
     # Add the places where proofs fail to the samples, in order along the course.
@@ -98,14 +100,14 @@ def clearance_on(checks: RowChecks, course: Course) -> ClearanceCurve:
     return ClearanceCurve(course.motions, frozen(course.shares), frozen(distances), pairs, unproven)
 
 
-def _nearest_of_proven(course: Course, level_of_places: int, unproven: set[int]) -> list[tuple[Gap, int]]:
+def _gaps_above_proven_level(course: Course, level_of_samples: int, unproven: set[int]) -> list[tuple[Gap, int]]:
     """Find the largest level that all proven pieces keep, and the places where the next one fails.
 
     The level is found by bisection over ``LEVELS`` between 0 and the level of the samples.
 
     Args:
         course: The course.
-        level_of_places: Index of the level that all samples on proven pieces keep.
+        level_of_samples: Index of the level that all samples on proven pieces keep.
         unproven: Indices of the pieces that are not proven free.
 
     Returns:
@@ -114,8 +116,8 @@ def _nearest_of_proven(course: Course, level_of_places: int, unproven: set[int])
     """
     gaps: list[Gap] = []
     proven_level = 0
-    refused_level = level_of_places + 1
-    tried_level = level_of_places
+    refused_level = level_of_samples + 1
+    tried_level = level_of_samples
 
     while refused_level - proven_level > 1:
         proof = course.prove(float(LEVELS[tried_level]))

@@ -457,7 +457,9 @@ def _greedy_choice(centres: Matrix, radii: Vector, samples: Matrix, count: int) 
         Indices of the chosen balls, in the order of the choice.
     """
     gap_to_ball = np.linalg.norm(samples[:, None] - centres, axis=2).astype(np.float32) - radii.astype(np.float32)
-    gap = np.full(len(samples), 2.0 * float(gap_to_ball.max()) + 1.0, dtype=np.float32)
+    # Distances are negative inside a ball. The first value exceeds all of them, so that some ball is an improvement.
+    farthest = float(gap_to_ball.max())
+    gap = np.full(len(samples), farthest + abs(farthest) + 1.0, dtype=np.float32)
     chosen: list[int] = []
 
     while len(chosen) < count:

@@ -167,6 +167,7 @@ class PointCloud(_Kept, Shape):
         size = length(size, "voxel size")
         low, high = (end.astype(np.float64) for end in extremes(self.points))
         extent = float((high - low).max())
+        # A coordinate has 21 bits in a key; one is left, as the last cube may be reached by rounding.
         if extent / size >= 1 << 20:
             raise InputError(f"voxel size {size:g} m is too small for a cloud {extent:.4g} m wide")
 

@@ -126,15 +126,16 @@ def _from_message(document: dict[str, Any]) -> dict[str, Any]:
 
     for number, point in enumerate(points, start=1):
         for key in ("positions", "velocities", "time_from_start"):
-            if not point.get(key) and point.get(key) != 0:
+            # The time of a point may be 0; a list may not be empty.
+            if point.get(key) in (None, [], {}, ""):
                 raise InputError(f"point {number}: no {key}; a motion needs positions, velocities and time_from_start")
 
-    bends = [point.get("accelerations") for point in points]
+    accelerations = [point.get("accelerations") for point in points]
     return {
         "times": [_seconds(point["time_from_start"]) for point in points],
         "positions": [point["positions"] for point in points],
         "velocities": [point["velocities"] for point in points],
-        "accelerations": bends if all(bends) else None,
+        "accelerations": accelerations if all(accelerations) else None,
         "joint_names": document.get("joint_names"),
         "units": document.get("units"),
         "robot": str(document.get("robot", "")),

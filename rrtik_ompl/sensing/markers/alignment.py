@@ -260,14 +260,17 @@ def _spot_and_tone(
     def blurred(spot: float) -> Pixels:
         return _blurred(ideal, spot**2 * spread)[::step, ::step]
 
-    peak = _peak(likenesses([blurred(each) for each in spots], samples, [look.tone]))
-    spot = float(spots[0] * (spots[1] / spots[0]) ** peak)
+    # The peak is a fractional index into the blurs.
+    spot_index = _peak(likenesses([blurred(each) for each in spots], samples, [look.tone]))
+    spot = float(spots[0] * (spots[1] / spots[0]) ** spot_index)
 
     if len(tones) == 1:
         return Look(spot, tones[0])
 
-    peak = _peak(likenesses([blurred(spot)], samples, list(tones)))
-    return Look(spot, float(np.clip(tones[0] + (tones[1] - tones[0]) * peak, tones[0], tones[-1])))
+    # The peak is a fractional index into the tones; only they have known limits.
+    tone_index = _peak(likenesses([blurred(spot)], samples, list(tones)))
+    tone = tones[0] + (tones[1] - tones[0]) * tone_index
+    return Look(spot, float(np.clip(tone, tones[0], tones[-1])))
 
 
 def _peak(values: Vector) -> float:
