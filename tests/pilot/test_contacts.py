@@ -207,7 +207,7 @@ def test_the_pilot_leaves_pairs_out_in_one_place_and_to_count_errors():
             if isinstance(node, ast.Call):
                 words = {word.arg for word in node.keywords} & {"allowed_collisions", "allow", "allowed"}
                 found += [(file.name, word) for word in words]
-    assert sorted(found) == [("clearance.py", "allowed_collisions"), ("surroundings.py", "allowed_collisions")]
+    assert sorted(found) == [("route_search.py", "allowed_collisions"), ("surroundings.py", "allowed_collisions")]
 
 
 def test_a_route_to_what_is_buried_in_the_gripper_says_that_it_is_not_compared():
