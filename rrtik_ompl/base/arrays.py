@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from itertools import chain
-from typing import Any, TypeAlias
+from typing import Any, SupportsIndex, TypeAlias, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
@@ -21,6 +21,42 @@ BLOCK_ROWS = 16_384  # number of rows that are computed at a time
 MOST_ROWS = 1_000_000  # largest number of waypoints of a path, or of times of a motion
 _LISTS = frozenset((list, tuple))
 LARGEST = 1e6  # [m] or [rad]; larger numbers are mistakes, and too large for the kernels' float32
+
+
+class Rows:
+    """A value that is used like the array of its rows: by ``np.asarray``, ``len``, an index, a slice and a loop.
+
+    It has at least one row, so it is always true. The rows are read-only.
+    """
+
+    __slots__ = ()
+
+    @property
+    def _rows(self) -> Matrix:
+        """The rows, shape (k, n)."""
+        raise NotImplementedError
+
+    def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
+        return np.array(self._rows, dtype=dtype, copy=copy)
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    @overload
+    def __getitem__(self, number: SupportsIndex) -> Vector: ...
+    @overload
+    def __getitem__(self, number: slice) -> Matrix: ...
+    def __getitem__(self, number: SupportsIndex | slice) -> NDArray[np.float64]:
+        if not isinstance(number, SupportsIndex | slice):
+            raise TypeError(
+                f"index of a {type(self).__name__}: expected a whole number or a slice, got {type(number).__name__}; "
+                "np.asarray(...) of it takes every index of numpy"
+            )
+        row: NDArray[np.float64] = self._rows[number]
+        return row
+
+    def __iter__(self) -> Iterator[Vector]:
+        return iter(self._rows)
 
 
 def in_blocks(work: Callable[..., NDArray[Any]], *rows: NDArray[Any]) -> NDArray[Any]:

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from rrtik_ompl.base.arrays import (
     Mask,
     Matrix,
+    Rows,
     Vector,
     finite_array,
     frozen,
@@ -43,8 +44,11 @@ from rrtik_ompl.model.transitions import (
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class JointPath:
+class JointPath(Rows):
     """Waypoints joined by straight lines in configuration space.
+
+    A path is used like the array of its waypoints: ``np.asarray(path)``, ``len(path)``, ``path[0]``, ``path[1:]``,
+    ``for q in path``. Whatever takes waypoints takes a path.
 
     Attributes:
         waypoints: Configurations, start first, shape (k, n) [rad, m for prismatic joints], read-only.
@@ -53,6 +57,11 @@ class JointPath:
         robot_name: Name of the robot, or "".
         continuous: Which joints are revolute without limits, shape (n,).
         proof: The proof of its motions, see :meth:`proved`; None if there is none. Changing the waypoints drops it.
+
+    Example:
+        >>> path = rrtik.JointPath([[0.0, 0.5], [1.0, 0.5]])
+        >>> len(path), path[-1], np.asarray(path).shape
+        (2, array([1. , 0.5]), (2, 2))
     """
 
     waypoints: Matrix
@@ -98,6 +107,10 @@ class JointPath:
         k, n = self.waypoints.shape
         size = f"{k} waypoints of {n} joints, {self.transitions} transitions"
         return f"JointPath({size}, length {self.length:.3g} {self.unit})"
+
+    @property
+    def _rows(self) -> Matrix:
+        return self.waypoints
 
     @staticmethod
     def of(robot: Robot, waypoints: ArrayLike) -> JointPath:

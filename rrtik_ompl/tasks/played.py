@@ -69,13 +69,13 @@ def _ticks(plan: TaskPlan) -> tuple[NDArray[np.int64], Matrix, Vector]:
         return numbers, starts, np.zeros(len(numbers))
 
     timed = time_task(plan)
-    clock, states = timed.trajectory.sampled(RATE)
-    motions = np.searchsorted(timed.begins, clock, side="right") - 1
-    rests = np.array([_share_of_rest(timed.pauses, time) for time in clock.tolist()])
+    samples = timed.trajectory.sample(RATE)
+    motions = np.searchsorted(timed.begins, samples.times, side="right") - 1
+    rests = np.array([_share_of_rest(timed.pauses, time) for time in samples.times.tolist()])
 
     motions_without_tick = np.setdiff1d(numbers, motions)
     motions = np.append(motions, motions_without_tick)
-    rows = np.vstack([states.positions, starts[motions_without_tick]])
+    rows = np.vstack([samples, starts[motions_without_tick]])
     rests = np.append(rests, np.zeros(len(motions_without_tick)))
     order = np.argsort(motions, kind="stable")
     return motions[order], rows[order], rests[order]

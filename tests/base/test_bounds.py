@@ -63,7 +63,7 @@ TOO_MANY = {
         "samples: 1000000000000000 .* 1000000000",
     ),
     "times of a motion": (
-        lambda: rrtik.Trajectory([0.0, 1.0], [[0.0], [0.5]], [[0.0], [0.0]]).sampled(1e12),
+        lambda: rrtik.Trajectory([0.0, 1.0], [[0.0], [0.5]], [[0.0], [0.0]]).sample(1e12),
         "at that rate: 1000000000000 ",
     ),
 }

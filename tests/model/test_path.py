@@ -53,6 +53,47 @@ def test_waypoints_are_a_private_read_only_copy():
         path.waypoints[0, 0] = 1.0
 
 
+def test_a_path_is_the_array_of_its_waypoints():
+    path = JointPath([[0.0, 1.0], [2.0, 3.0], [4.0, 5.0]])
+    assert np.asarray(path) is path.waypoints
+    assert np.array(path).flags.writeable
+    assert np.asarray(path, dtype=np.float32).dtype == np.float32
+    assert np.array(path, copy=False) is path.waypoints
+    with pytest.raises(ValueError, match="copy"):
+        np.array(path, dtype=np.float32, copy=False)
+
+    assert len(path) == 3
+    assert path[0].tolist() == [0.0, 1.0]
+    assert path[-1].tolist() == [4.0, 5.0]
+    assert path[np.int64(1)].tolist() == [2.0, 3.0]
+    assert path[1:].tolist() == [[2.0, 3.0], [4.0, 5.0]]
+    assert [q.tolist() for q in path] == path.waypoints.tolist()
+    assert np.diff(path, axis=0).shape == (2, 2)
+    assert np.linalg.norm(path) > 0.0
+    with pytest.raises(IndexError, match="3"):
+        path[3]
+    with pytest.raises(TypeError, match="index of a JointPath: expected a whole number or a slice, got str"):
+        path["joint1"]
+
+
+def test_a_path_is_always_true():
+    assert JointPath([[0.0]])
+
+
+def test_a_path_stands_for_waypoints_wherever_they_are_taken():
+    robot = load_robot("planar3")
+    world = World(robot)
+    path = JointPath.of(robot, [[0.0, 0.0, 0.0], [0.5, 0.2, 0.1]])
+    assert (JointPath(path).waypoints == path.waypoints).all()
+    assert (JointPath.of(robot, path).waypoints == path.waypoints).all()
+    assert (path.with_waypoints(path).waypoints == path.waypoints).all()
+    assert robot.fk_batch(path).shape == (2, 4, 4)
+    assert world.valid_batch(path).all()
+    assert world.prove(path).proven
+    assert world.violations(path) == ()
+    assert len(path.resample(0.1)[:-1]) > 2
+
+
 matrices = st.integers(1, 6).flatmap(
     lambda n: st.lists(st.lists(st.floats(-7, 7, allow_subnormal=True), min_size=n, max_size=n), min_size=1, max_size=8)
 )

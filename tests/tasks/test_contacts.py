@@ -489,8 +489,9 @@ def test_plans_keep_their_contacts_in_files_copies_and_times(tmp_path, panda):
     with pytest.raises(rrtik.InputError, match="distance"):
         rrtik.load_task_plan(tmp_path / "bad.json")
     timed = rrtik.time_task(plan, pause=0.0)
-    rows = timed.trajectory.sampled(500.0)[1].positions
-    clock = timed.trajectory.sampled(500.0)[0]
+    samples = timed.trajectory.sample(500.0)
+    rows = samples.positions
+    clock = samples.times
     grasp = plan.worlds[2].scene.attached[0].pose
     judge = Judge(plan.worlds[2].robot, "panda_hand", (0.05, 0.05, 0.1), [(TABLE.shape, TABLE.pose)])
     carrying = rows[(clock >= timed.begins[2]) & (clock < timed.begins[4])]

@@ -5,12 +5,13 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, NoReturn
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.base.arrays import MOST_ROWS, Mask, Matrix, Vector, finite_array, frozen, not_negative, positive
-from rrtik_ompl.base.copies import as_value, changed, in_notebook
+from rrtik_ompl.base.arrays import MOST_ROWS, Mask, Matrix, Rows, Vector, finite_array, frozen, not_negative, positive
+from rrtik_ompl.base.copies import as_value, changed, in_notebook, in_one_line
 from rrtik_ompl.base.errors import InputError, at_most, require
 from rrtik_ompl.base.units import joint_units
 from rrtik_ompl.files.text import write_text
@@ -36,8 +37,34 @@ FIT_TOLERANCE = 1e-8  # [rad] or [m] largest distance between a knot and the end
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Samples(Rows):
+    """A motion at a control rate, used like the array of its positions, see :meth:`Trajectory.sample`.
+
+    Attributes:
+        times: Times [s], shape (k,), from 0 to the end of the motion.
+        positions: Joint positions, shape (k, n) [rad; m for sliding joints].
+        velocities: Joint velocities, shape (k, n) [rad/s or m/s].
+        accelerations: Joint accelerations, shape (k, n) [rad/s^2 or m/s^2]; at a jump, the value just after it.
+    """
+
+    times: Vector
+    positions: Matrix
+    velocities: Matrix
+    accelerations: Matrix
+
+    __reduce__ = as_value
+    __repr__ = in_one_line
+
+    @property
+    def _rows(self) -> Matrix:
+        return self.positions
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Trajectory:
     """Joint positions over time: between two knots every joint follows a cubic.
+
+    ``trajectory(t)`` is its state at a time, ``trajectory.sample(rate=500)`` its positions at a control rate.
 
     Attributes:
         times: Times of the knots [s], shape (m,), increasing from 0.
@@ -241,22 +268,34 @@ class Trajectory:
         jump_sizes: Matrix = np.abs(after - before)
         return jump_sizes
 
-    def sampled(self, rate: float) -> tuple[Vector, State]:
-        """Return the times at a control rate, from 0 to the end, and the states at these times.
+    def sample(self, rate: float) -> Samples:
+        """Return the motion at a control rate, from its beginning to its end.
 
         Args:
             rate: The control rate [1/s].
 
         Returns:
-            Times [s], shape (k,), the last of which is the end of the motion, and states of shape (k, n) each.
+            The times, the last of which is the end of the motion, and positions, velocities and accelerations then;
+            used like the array of positions, shape (k, n).
 
         Raises:
             InputError: If the rate is no number greater than 0.
+
+        Example:
+            >>> motion = rrtik.Trajectory([0.0, 1.0], [[0.0], [0.5]], [[0.0], [0.0]])
+            >>> samples = motion.sample(rate=100)
+            >>> len(samples), samples[-1], samples.velocities.max()
+            (101, array([0.5]), 0.75)
         """
         step = 1.0 / positive(rate, "control rate of a trajectory")
         at_most(self.duration / step, MOST_ROWS, "times of a trajectory at that rate")
         clock = np.append(np.arange(0.0, self.duration - min(END_ERROR, 1e-3 * step), step), self.duration)
-        return clock, self(clock)
+        return Samples(*(frozen(column) for column in (clock, *self(clock))))
+
+    if not TYPE_CHECKING:  # so that a type checker does not take a trajectory for an array
+
+        def __array__(self, dtype=None, copy=None) -> NoReturn:
+            raise InputError("a trajectory is an array only at a rate: write np.asarray(trajectory.sample(rate=500))")
 
     def save(self, file: str | os.PathLike[str], *, rate: float | None = None, accelerations: bool = True) -> None:
         """Write the motion to a file.
@@ -281,7 +320,9 @@ class Trajectory:
             clock = self.times[at]
             state = State(self.positions[at], self.velocities[at], self.accelerations[at])
         else:
-            clock, state = self.sampled(rate)
+            found = self.sample(rate)
+            clock = found.times
+            state = State(found.positions, found.velocities, found.accelerations)
 
         # Adding 0.0 turns -0.0 into 0.0.
         columns = [(column + 0.0).tolist() for column in (clock, *state)]

@@ -30,14 +30,33 @@ def motion(robot):
 
 
 def test_samples_come_at_the_control_rate_and_end_at_the_end(motion):
-    clock, state = motion.sampled(125.0)
+    samples = motion.sample(125.0)
+    clock = samples.times
     assert np.allclose(np.diff(clock)[:-1], 0.008)
     assert 0.0 < clock[-1] - clock[-2] <= 0.008 * (1 + 1e-6)
     assert clock[-1] == motion.duration
-    assert (state.positions == motion(clock).positions).all()
+    assert (samples.positions == motion(clock).positions).all()
     for rate in (0.0, -1.0, np.nan, "fast"):
         with pytest.raises(InputError, match="control rate"):
-            motion.sampled(rate)
+            motion.sample(rate)
+
+
+def test_samples_are_the_array_of_their_positions(motion):
+    samples = motion.sample(rate=125)
+    assert np.asarray(samples) is samples.positions
+    assert len(samples) == len(samples.times) == len(samples.velocities) == len(samples.accelerations)
+    assert (samples[-1] == motion(motion.duration).positions).all()
+    assert samples[2:5].shape == (3, 3)
+    assert (np.array(list(samples)) == samples.positions).all()
+    assert not samples.times.flags.writeable
+
+
+def test_a_trajectory_is_an_array_at_a_rate_only_and_says_so(motion):
+    for taken in (np.asarray, np.array, JointPath):
+        with pytest.raises(InputError, match=r"at a rate: write .*sample\(rate=500\)"):
+            taken(motion)
+    with pytest.raises(TypeError, match="no len"):
+        len(motion)
 
 
 @pytest.mark.parametrize(("ending", "accelerations"), [("yaml", True), ("yaml", False), ("ros.json", True)])
@@ -74,11 +93,11 @@ def test_mcap_holds_joint_states_at_their_times(tmp_path, motion):
     reader = pytest.importorskip("mcap.reader")
     file = tmp_path / "motion.mcap"
     motion.save(file, rate=50.0)
-    clock, state = motion.sampled(50.0)
+    samples = motion.sample(50.0)
     with file.open("rb") as source:
         messages = [(m.log_time, json.loads(m.data)) for _, _, m in reader.make_reader(source).iter_messages()]
-    assert [stamp for stamp, _ in messages] == [round(t * 1e9) for t in clock]
-    assert np.allclose([found["position"] for _, found in messages], state.positions)
+    assert [stamp for stamp, _ in messages] == [round(t * 1e9) for t in samples.times]
+    assert np.allclose([found["position"] for _, found in messages], samples)
     assert messages[0][1]["name"] == list(motion.joint_names)
 
 
@@ -137,12 +156,14 @@ def test_set_points_stay_what_they_are_and_keep_the_limits_of_their_motion(tmp_p
     file, again = tmp_path / f"motion{ending}", tmp_path / f"again{ending}"
     motion.save(file, rate=rate)
     found = load_trajectory(file, robot)
-    clock, state = motion.sampled(rate)
+    samples = motion.sample(rate)
+    clock = samples.times
+    state = (samples.positions, samples.velocities, samples.accelerations)
     at = found.set_points
     np.testing.assert_allclose(found.times[at], clock, rtol=0.0, atol=1e-9)
     for rows, wanted in zip((found.positions, found.velocities, found.accelerations), state, strict=True):
         np.testing.assert_array_equal(rows[at], wanted)
-    np.testing.assert_allclose(found(clock).positions, state.positions, rtol=0.0, atol=2e-9)
+    np.testing.assert_allclose(found(clock).positions, samples, rtol=0.0, atol=2e-9)
     dense = np.linspace(0.0, motion.duration, 5000)
     assert np.abs(found(dense).positions - motion(dense).positions).max() < 20.0 / rate**3
     report = motion_report(found, ODD)
@@ -158,9 +179,10 @@ def test_points_that_are_far_from_each_other_are_no_set_points(tmp_path, robot):
     motion = time_parameterize(JointPath.of(robot, ROWS), ODD)
     motion.save(tmp_path / "sparse.json", rate=10.0)
     sparse = load_trajectory(tmp_path / "sparse.json")
-    clock, state = motion.sampled(10.0)
+    samples = motion.sample(10.0)
+    state = (samples.positions, samples.velocities, samples.accelerations)
     assert sparse.set_points is None
-    for found, wanted in zip(sparse(clock), state, strict=True):
+    for found, wanted in zip(sparse(samples.times), state, strict=True):
         np.testing.assert_allclose(found, wanted, rtol=0.0, atol=1e-9)
     assert not sparse.jumps().max() > 1e-6
     assert not motion_report(sparse, ODD).kept
@@ -178,6 +200,6 @@ def test_set_points_of_a_motion_that_jumps_exceed_a_jerk_limit(tmp_path, robot):
 def test_a_tick_just_before_the_end_is_the_end(tmp_path, robot):
     motion = time_parameterize(JointPath.of(robot, ROWS), LIMITS)
     assert 3.1 < motion.duration < 3.1 + 1e-9
-    assert np.diff(motion.sampled(1000.0)[0]).min() > 0.9e-3
+    assert np.diff(motion.sample(1000.0).times).min() > 0.9e-3
     motion.save(tmp_path / "motion.yaml", rate=1000.0)
     assert load_trajectory(tmp_path / "motion.yaml").duration == pytest.approx(3.1)
