@@ -28,7 +28,7 @@ def ik_case(name: str, method: Any, kind: str, scene: bool = False, **options: A
 def batch_case(name: str, scene: bool) -> Result:
     robot = robot_of(name)
     world = problem_of(f"made_{name}").world if scene else None
-    found = rrtik.solve_ik_batch(robot, robot.fk_batch(draws(robot, 40, 6)), world=world, seconds=LONG, seed=1)
+    found = rrtik.solve_ik_many(robot, robot.fk_batch(draws(robot, 40, 6)), world=world, seconds=LONG, seed=1)
     return f"{found.found.sum()} {sorted(set(found.reasons))}", [found.q, found.found, found.residuals]
 
 
@@ -37,14 +37,14 @@ def track_case(name: str, method: Any, points: bool = False, **options: Any) -> 
     start = 0.5 * draws(robot, 1, 9)[0]
     poses = robot.fk_batch(start + np.linspace(0.0, 0.4, 20)[:, None])
     poses = poses[:, :3, 3] if points else poses
-    found = rrtik.solve_ik_trajectory(robot, poses, method=method, near=start, seconds=LONG, seed=1, **options)
+    found = rrtik.ik.solve_trajectory(robot, poses, method=method, near=start, seconds=LONG, seed=1, **options)
     return f"{sorted(set(found.reasons))} {found.jumps} {found.iterations}", [found.q, found.residuals]
 
 
 def inverse_kinematics() -> Cases:
     method: Any
     calls: list[tuple[Any, ...]] = [("titan4", "closed-form", "position", {})]  # an error
-    for method in rrtik.list_ik_methods():
+    for method in rrtik.ik.list_methods():
         kinds = ("pose",) if method == "closed-form" else ("position",) if method == "fabrik" else ("pose", "position")
         arms = ("titan4", "puma560", "planar3") if method == "closed-form" else ("titan4", "puma560", "ur5", "panda")
         calls += [(name, method, kind, {}) for name in arms for kind in kinds]
@@ -82,9 +82,9 @@ def feed_case(kind: str) -> Result:
     first, *others = scene.obstacles
     there = rrtik.pose(first.pose.translation + np.array([0.1, 0.1, 0.0]))
     motion = (
-        rrtik.TimedPoses([0.0, 2.0], [first.pose, there])
+        rrtik.replanning.TimedPoses([0.0, 2.0], [first.pose, there])
         if kind == "poses"
-        else rrtik.ConstantVelocity([0.05, 0.02, 0.0])
+        else rrtik.replanning.ConstantVelocity([0.05, 0.02, 0.0])
     )
     moved = rrtik.Scene((rrtik.Obstacle(first.name, first.shape, first.pose, motion), *others))
     feed: Any = (lambda t: moved.at(min(t, 1.0))) if kind in ("function", "goal") else moved
@@ -121,7 +121,7 @@ def check_case(name: str) -> Result:
 
 
 def reach_case(name: str, **options: Any) -> Result:
-    found = rrtik.reach_map(robot_of(name), samples=20000, seed=1, **options)
+    found = rrtik.ik.reach_map(robot_of(name), samples=20000, seed=1, **options)
     return f"{int(found.reached.sum())}", [found.values]
 
 

@@ -9,7 +9,7 @@ post = rrtik.Obstacle("post", rrtik.Box([0.1, 0.1, 0.9]), [0.5, 0.0, 0.45])
 world = rrtik.World(robot, rrtik.Scene([post]))
 start = [-0.91, -1.19, 1.98, -2.36, -1.57, -0.91]
 goal = [0.42, -1.19, 1.98, -2.36, -1.57, 0.42]
-problem = rrtik.Problem(world, start, goal, constraints=[rrtik.upright(robot, tolerance_deg=5.0)])
+problem = rrtik.Problem(world, start, goal, constraints=[rrtik.constraints.upright(robot, tolerance_deg=5.0)])
 
 plan = rrtik.plan(problem, seed=1)
 assert plan.found, plan.reason

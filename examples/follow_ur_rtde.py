@@ -85,7 +85,7 @@ def main() -> int:
     limits = rrtik.RateLimits.of(robot, share=0.3)
     motion = rrtik.time_parameterize(path, limits, blend=0.1, world=world, tip_speed=0.25)
     print(rrtik.motion_report(motion, limits))
-    found = rrtik.Follower(motion, link, limits=limits, rate=RATE).run()
+    found = rrtik.following.Follower(motion, link, limits=limits, rate=RATE).run()
     link.close()
     print("arrived" if found.arrived else f"stopped: {found.reason}")
     return 0 if found.arrived else 1

@@ -15,7 +15,7 @@ print(len(every.solutions), "solutions within the limits")
 
 panda = rrtik.load_robot("panda")
 poses = panda.fk_batch(np.random.default_rng(1).uniform(*panda.finite_range(), (1000, 7)))
-batch = rrtik.solve_ik_batch(panda, poses)
+batch = rrtik.solve_ik_many(panda, poses)
 print(f"{np.mean(batch.found):.1%} of {len(poses)} poses solved")
 
 far = rrtik.solve_ik(panda, rrtik.PoseGoal([2.0, 0.0, 0.5]))

@@ -7,7 +7,7 @@ from rrtik_planners import FastRRTConnect
 
 problem = rrtik.load_problem("titan4_prisms")
 for kind in (og.RRTConnect, FastRRTConnect):
-    setup = rrtik.simple_setup(problem)
+    setup = rrtik.ompl.simple_setup(problem)
     setup.setPlanner(kind(setup.getSpaceInformation()))
     solved = setup.solve(2.0)
     path = setup.getSolutionPath()

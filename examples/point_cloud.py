@@ -11,7 +11,7 @@ wall = rng.uniform([0.45, 0.15, 0.0], [0.47, 0.25, 0.9], (20_000, 3))  # what a 
 own = robot.fk(start).translation + rng.normal(0.0, 0.01, (500, 3))  # and of the arm itself
 
 cloud = rrtik.PointCloud(np.vstack([wall, own]), radius=0.01).voxel(0.005)
-cloud = rrtik.without_robot(cloud, robot, start, margin=0.02)
+cloud = rrtik.sensing.without_robot(cloud, robot, start, margin=0.02)
 print(f"{len(cloud.points)} points are left")
 world = rrtik.World(robot, rrtik.Scene([rrtik.Obstacle("scan", cloud, margin=0.005)]))
 goal = rrtik.PositionGoal([0.3, 0.5, 0.4], tolerance=0.01)

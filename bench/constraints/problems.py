@@ -80,7 +80,7 @@ def _start(robot: Robot, world: rrtik.World, kind: str, rng: np.random.Generator
     rows = rng.uniform(*_span(robot), (DRAWN, robot.dof))
     if kind == "upright":
         down = pin.SE3(pin.exp3(np.array([np.pi, 0.0, 0.0])), np.zeros(3))
-        region = rrtik.upright(robot, tolerance_deg=1.0).started_at(down)
+        region = rrtik.constraints.upright(robot, tolerance_deg=1.0).started_at(down)
         rows, there = projected_rows(robot, held_regions(robot, world.scene, [region], None), rows)
         rows = rows[there]
     rows = rows[world.valid_batch(rows)]
@@ -92,9 +92,9 @@ def _region(robot: Robot, kind: str, start: Vector) -> TaskRegion:
     """A constraint that the start keeps."""
     tip = robot.fk(start)
     if kind == "upright":
-        return rrtik.upright(robot, tolerance_deg=5.0)
+        return rrtik.constraints.upright(robot, tolerance_deg=5.0)
     if kind == "plane":
-        return rrtik.on_plane(tip.translation, [0.0, 0.0, 1.0])
+        return rrtik.constraints.on_plane(tip.translation, [0.0, 0.0, 1.0])
     if kind == "line":
-        return rrtik.on_line(tip.translation, [0.0, 1.0, 0.0])
-    return rrtik.orientation_of(tip, 3.0)
+        return rrtik.constraints.on_line(tip.translation, [0.0, 1.0, 0.0])
+    return rrtik.constraints.orientation_of(tip, 3.0)

@@ -28,7 +28,7 @@ from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.ik.kernel_tables import KernelCall, seeded_limb_of
 from rrtik_ompl.ik.method_interface import mid_range_configuration
 from rrtik_ompl.ik.numeric.descent import PATIENCE, STEPS
-from rrtik_ompl.ik.solve import list_ik_methods
+from rrtik_ompl.ik.solve import list_methods
 from rrtik_ompl.ik.targets import pose_rows
 from rrtik_ompl.kernels.ik.ik_layout import KERNELS
 from rrtik_ompl.kernels.simd.library import library
@@ -143,7 +143,7 @@ def single(robot: Robot, poses: np.ndarray, budget: float, methods: Sequence[str
 def batches(robot: Robot, poses: np.ndarray, repeats: int = 5) -> dict[str, tuple[float, float]]:
     """Of all poses in one call: share solved (NaN: not judged) and processor time per pose [us], median of repeats."""
     work: dict[str, Callable[[], float]] = {
-        f"solve_ik_batch, {method}": partial(_batch_share, robot, poses, method) for method in ("auto", "numeric")
+        f"solve_ik_many, {method}": partial(_batch_share, robot, poses, method) for method in ("auto", "numeric")
     }
     try:
         other, at_zero = eaik_robot(robot)
@@ -162,16 +162,16 @@ def batches(robot: Robot, poses: np.ndarray, repeats: int = 5) -> dict[str, tupl
 
 
 def _batch_share(robot: Robot, poses: np.ndarray, method: IkMethod) -> float:
-    return float(rrtik.solve_ik_batch(robot, poses, method=method).found.mean())
+    return float(rrtik.solve_ik_many(robot, poses, method=method).found.mean())
 
 
 def compare(report: Report, name: str, runs: dict[str, Runs], batch: dict[str, tuple[float, float]]) -> None:
     """The acceptance rows of one arm."""
     auto, kernel = runs["auto"], runs[KERNEL]
-    share = batch["solve_ik_batch, auto"][0]
+    share = batch["solve_ik_many, auto"][0]
     least = min(auto.share, share)
     report.bar(f"{name}: `auto` solves, one by one and in a batch", ">= 99.9 %", f"{least:.2%}", least >= 0.999)
-    in_batch = batch["solve_ik_batch, auto"][1]
+    in_batch = batch["solve_ik_many, auto"][1]
     fastest = min((key for key in runs if key in OTHERS), key=lambda key: runs[key].median)
     for other, beside in (
         (fastest, "the fastest numeric method of others"),
@@ -211,7 +211,7 @@ def main(
         robot = rrtik.load_robot(name)
         rng = np.random.default_rng(2)
         wanted = robot.fk_batch(rng.uniform(*robot.finite_range(), (poses, robot.dof)))
-        runs, absent = single(robot, wanted, budget, (KERNEL, "auto", *list_ik_methods()))
+        runs, absent = single(robot, wanted, budget, (KERNEL, "auto", *list_methods()))
         batch = batches(robot, wanted)
         missing += absent
         compare(report, name, runs, batch)

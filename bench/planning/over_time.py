@@ -61,7 +61,7 @@ def ours(problem: rrtik.Problem, seed: int) -> Vector:
 def of_ompl(name: str, problem: rrtik.Problem, seed: int, seconds: float) -> Matrix | None:
     """What a planner of OMPL has found after so many seconds of the processor."""
     ou.RNG.setSeed(1 + seed)
-    setup = rrtik.simple_setup(problem)
+    setup = rrtik.ompl.simple_setup(problem)
     si = setup.getSpaceInformation()
     setup.setPlanner(getattr(og, name)(si))
     setup.setup()

@@ -22,9 +22,10 @@ from bench.shared.run import Run
 from rrtik_bench.contact_check import check_contacts
 from rrtik_bench.report.page import Report
 from rrtik_bench.shortening.plane_worlds import Plane
-from rrtik_ompl.replanning import ReplanRun, replan
 from rrtik_ompl.replanning.connecting import PythonConnect, TreeOptions
 from rrtik_ompl.replanning.drrt_con import DrrtCon
+from rrtik_ompl.replanning.record import ReplanRun
+from rrtik_ompl.replanning.replanner import replan
 from rrtik_ompl.world.moving_world import MovingWorld
 
 PLANNERS = ("drrt-con", "rrt-connect", "drrt")

@@ -14,11 +14,12 @@ from rrtik_bench.contact_check import ContactReport, check_contacts
 from rrtik_bench.moving_scenes import moving_problem
 from rrtik_ompl.model.scene import Scene
 from rrtik_ompl.planning.plan import plan
-from rrtik_ompl.replanning import ReplanRun, replan
 from rrtik_ompl.replanning.connecting import PythonConnect, TreeOptions
 from rrtik_ompl.replanning.drrt_con import DrrtCon, FromScratch, KernelDrrtCon
 from rrtik_ompl.replanning.feed import feed_of
 from rrtik_ompl.replanning.loop import Loop
+from rrtik_ompl.replanning.record import ReplanRun
+from rrtik_ompl.replanning.replanner import replan
 from rrtik_ompl.replanning.settings import ReplanSettings
 from rrtik_ompl.world.motion_queries import MotionQueries
 

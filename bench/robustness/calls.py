@@ -14,6 +14,7 @@ import numpy as np
 import rrtik_ompl as rrtik
 from bench.robustness import values
 from bench.robustness.spoilt_files import Drawn
+from rrtik_ompl.base.lazy import public_values
 
 Function = Callable[..., Any]
 RARE = {"plan_batch": 0.1, "replan": 0.3, "plan_many": 0.5, "reach_map": 0.3}  # processes, or many searches, each call
@@ -30,7 +31,7 @@ STAND_INS = {"view": viewed}
 @cache
 def functions() -> tuple[tuple[str, Function, tuple[inspect.Parameter, ...]], ...]:
     """Public functions and classes, and the public methods of what values are; with their parameters."""
-    found: dict[str, Function] = {name: getattr(rrtik, name) for name in vars(rrtik)["__all__"]}
+    found: dict[str, Function] = dict(public_values(rrtik))
     for thing in values.good():
         if type(thing).__module__.startswith("rrtik_ompl"):
             names = [name for name in dir(thing) if not name.startswith("_")]  # of Python 3.10 some others raise

@@ -23,7 +23,7 @@ from rrtik_ompl.pilot.record import read_record
 from rrtik_ompl.pilot.run import Loop
 from rrtik_ompl.pilot.setup import SessionOptions, open_session
 from rrtik_ompl.pilot.web.server import PilotServer
-from rrtik_ompl.replanning import load_run
+from rrtik_ompl.replanning.record import load_run
 from rrtik_ompl.tasks.plan_file import load_task_plan
 
 SUITE = "version: 1\nproblems: [planar3_a]\nplanners: [bicrdt, fastrrtconnect]\nruns: 3\nseconds: 0.5\n"

@@ -32,7 +32,7 @@ def good() -> tuple[Any, ...]:
     limits = rrtik.RateLimits([1, 1, 1], [2, 2, 2], [20, 20, 20])
     motion, position = rrtik.time_parameterize(path, limits), rrtik.PositionGoal([1, 1, 0])
     task = rrtik.Task([rrtik.MoveTo([0.2, 0.1, 0])])
-    scenario = rrtik.Scenario(problem, ReplanSettings(step=0.1, rate=5.0, seconds=2.0))
+    scenario = rrtik.replanning.Scenario(problem, ReplanSettings(step=0.1, rate=5.0, seconds=2.0))
     points = np.array([[2.0, 2.0, 0.0], [2.1, 2.0, 0.0]])
     return (
         *(robot, world, problem, path, world.scene, ball, rrtik.pose([1, 0, 0]), position, limits, motion, task),
@@ -41,8 +41,9 @@ def good() -> tuple[Any, ...]:
         *(scenario, rrtik.Sphere(0.1), rrtik.Box([0.1, 0.1, 0.1]), rrtik.Capsule(0.1, 0.2), rrtik.HalfSpace([0, 0, 1])),
         *(rrtik.PointCloud(points), rrtik.HeightField(np.zeros((3, 3)), 0.1), rrtik.Octree(points, [0.1, 0.1])),
         *(rrtik.plan(problem, "bicrdt", seed=1), task.plan(world, [0, 0, 0]), rrtik.certificate_of(world, path)),
-        *(rrtik.SimulatedLink(robot, [0, 0, 0]), rrtik.Servo(world), rrtik.ConstantVelocity([0, 0, 0.1])),
-        *(rrtik.Roadmap(world, vertices=20), rrtik.reach_map(robot, samples=100), rrtik.MoveTo([0.2, 0.1, 0])),
+        *(rrtik.following.SimulatedLink(robot, [0, 0, 0]), rrtik.following.Servo(world)),
+        rrtik.replanning.ConstantVelocity([0, 0, 0.1]),
+        *(rrtik.Roadmap(world, vertices=20), rrtik.ik.reach_map(robot, samples=100), rrtik.MoveTo([0.2, 0.1, 0])),
         *(rrtik.Attach("far", robot.tip), rrtik.Detach("far"), rrtik.Gripper("open"), rrtik.Straight([0.1, 0, 0])),
         *("planar3", "planar3_a", "joint1", "auto", "RRTConnect", "far", "z", robot.tip, ["planar3_a"], ["joint1"]),
         *([0, 0, 0], [1.0, 0.5, 0.1], np.zeros((2, 3)), np.eye(4), np.zeros((6, 2)), [rrtik.pose([1, 1, 0])] * 2),

@@ -11,9 +11,9 @@ from rrtik_bench.report.rows import Bar, Row, all_of, judged
 from rrtik_bench.tables import Table
 from rrtik_ompl.model.goal import JointGoal
 from rrtik_ompl.model.transitions import route_length
-from rrtik_ompl.replanning import ReplanRun
 from rrtik_ompl.replanning.connecting import PythonConnect, TreeOptions
 from rrtik_ompl.replanning.drrt_con import DrrtCon
+from rrtik_ompl.replanning.record import ReplanRun
 from rrtik_ompl.replanning.scenario import Scenario, load_scenario
 from rrtik_ompl.world.moving_world import MovingWorld
 

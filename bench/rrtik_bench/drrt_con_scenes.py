@@ -13,7 +13,7 @@ from rrtik_bench.tables import Table
 from rrtik_ompl.base.arrays import Vector
 from rrtik_ompl.model.scene import Obstacle, TimedPoses
 from rrtik_ompl.model.shapes import Box
-from rrtik_ompl.replanning import ReplanRun
+from rrtik_ompl.replanning.record import ReplanRun
 from rrtik_ompl.replanning.scenario import Scenario, load_scenario
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World

@@ -17,8 +17,9 @@ from rrtik_bench.drrt_con import FASTEST, REPAIR_SECONDS
 from rrtik_bench.moving_scenes import moving_problem
 from rrtik_bench.report.rows import Bar, Row, all_of, judged
 from rrtik_bench.tables import Table
-from rrtik_ompl.replanning import ReplanRun, replan_with
 from rrtik_ompl.replanning.in_time import plan_in_time
+from rrtik_ompl.replanning.record import ReplanRun
+from rrtik_ompl.replanning.replanner import replan_with
 from rrtik_ompl.replanning.scenario import load_scenario
 from rrtik_ompl.replanning.settings import ReplanSettings
 from rrtik_ompl.world.problem import Problem

@@ -21,10 +21,10 @@ from rrtik_bench.report.rows import Bar, Row, all_of, judged
 from rrtik_bench.tables import Table
 from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.model.transitions import route_length
-from rrtik_ompl.replanning import ReplanRun
 from rrtik_ompl.replanning.drrt_con import points_along, without_points_between
 from rrtik_ompl.replanning.feed import feed_of
 from rrtik_ompl.replanning.loop import Loop
+from rrtik_ompl.replanning.record import ReplanRun
 from rrtik_ompl.replanning.scenario import Scenario, load_scenario
 from rrtik_ompl.replanning.settings import ReplanSettings
 from rrtik_ompl.world.motion_queries import MotionQueries

@@ -106,7 +106,7 @@ def threads(report: Report, plans: Spread, poses: Spread) -> None:
     """One thread beside two."""
     heads = ["work", "number", "found", "two threads beside one: median, best", "alike", "best rate [1/s]", "load"]
     rows = []
-    for what, s in (("`plan_many`, Panda, bookshelf", plans), ("`solve_ik_batch`, UR5", poses)):
+    for what, s in (("`plan_many`, Panda, bookshelf", plans), ("`solve_ik_many`, UR5", poses)):
         ratios = f"{np.median(s.ratios):.2f}, {max(s.ratios):.2f}"
         alike = "yes" if s.alike else "NO"
         rows.append([what, f"{s.count:,}", f"{s.found:,}", ratios, alike, f"{s.rate:,.0f}", f"{s.load:.1f}"])

@@ -14,7 +14,7 @@ import numpy as np
 from bench.scale.boxes import PLANNER
 from bench.scale.clouds import _panda
 from bench.shared.problems import goal_joints
-from rrtik_ompl import JointPath, plan_many, solve_ik_batch
+from rrtik_ompl import JointPath, plan_many, solve_ik_many
 from rrtik_ompl.problem_files.motion_bench_maker import load_motion_bench_maker
 
 ROUNDS = 5
@@ -75,7 +75,7 @@ def poses_in_threads(count: int) -> Spread:
 
     robot = load_robot("ur5")
     rows = np.random.default_rng(1).uniform(*robot.finite_range(), (count, robot.dof))
-    ask = partial(solve_ik_batch, robot, robot.fk_batch(rows))
+    ask = partial(solve_ik_many, robot, robot.fk_batch(rows))
     ratios, rate, alike, found = [], 0.0, True, 0
     for _ in range(ROUNDS):
         (alone, one), (together, two) = (_wall(partial(ask, threads=n)) for n in (1, 2))

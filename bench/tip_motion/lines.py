@@ -61,7 +61,7 @@ def line_of(arm: str, number: int, brute: bool) -> Line:
         if world.valid_batch(np.stack([q, other])).all() and world.certify(np.stack([q, other])).all():
             break
     begin, end = robot.fk(q), robot.fk(other)
-    seconds, made = least(lambda: rrtik.straight(world, q, end), ROUNDS)
+    seconds, made = least(lambda: rrtik.tip.straight(world, q, end), ROUNDS)
     judge = Judge(world)
     off = turned = jump = cut = 0.0
     if made.path is not None:

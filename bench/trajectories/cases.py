@@ -8,8 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from rrtik_ompl import RateLimits, load_robot, plan, solve_ik_trajectory
+from rrtik_ompl import RateLimits, load_robot, plan
 from rrtik_ompl.base.arrays import Matrix
+from rrtik_ompl.ik import solve_trajectory
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.problem_files.motion_bench_maker import load_motion_bench_maker
@@ -78,7 +79,7 @@ def _line(robot: Robot, start: Matrix, rng: np.random.Generator, points: int) ->
     poses = np.repeat(robot.fk_batch(start[None]), points, axis=0)
     way = rng.normal(size=3)
     poses[:, :3, 3] += np.linspace(0.0, rng.uniform(0.1, 0.3), points)[:, None] * way / np.linalg.norm(way)
-    found = solve_ik_trajectory(robot, poses, near=start, position_tolerance=1e-6, orientation_tolerance=1e-5)
+    found = solve_trajectory(robot, poses, near=start, position_tolerance=1e-6, orientation_tolerance=1e-5)
     return found.q if found.found and not found.jumps else None
 
 

@@ -36,13 +36,15 @@ import pinocchio as pin
 import rrtik_ompl as rrtik
 import rrtik_planners
 from bench.truth.shape_kinds import kinds
-from rrtik_ompl import AttachedObject, Obstacle, Problem, Roadmap, Robot, Scene, TimedPoses, World
+from rrtik_ompl import AttachedObject, Obstacle, Problem, Roadmap, Robot, Scene, World
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector
 from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.lazy import public_values
 from rrtik_ompl.geometry.collision.certificate import Certificate
 from rrtik_ompl.model.goal_kind import TaskRegion
 from rrtik_ompl.model.shapes import HeightField, Mesh, PointCloud, Shape
 from rrtik_ompl.ompl_bridge.motion_checker import SpaceChecker, WorldChecker
+from rrtik_ompl.replanning import TimedPoses
 from rrtik_ompl.replanning.in_time.foreseen import ForeseenWorlds
 from rrtik_ompl.viewer.page_planner import page_planner
 from rrtik_ompl.world.moving_world import MovingWorld
@@ -409,7 +411,7 @@ def _world_checker(case: Case) -> Judged:
 
 def _space_checker(case: Case) -> Judged:
     """Of OMPL's space, which takes the beginning of a motion to be free."""
-    checker = SpaceChecker(rrtik.space_information(case.fresh()))
+    checker = SpaceChecker(rrtik.ompl.space_information(case.fresh()))
     given = checker.valid_batch(case.Q)
     free = case.truth.valid_batch(case.Q)
     found = _sided(given, free, "valid")
@@ -583,8 +585,8 @@ def found_ways() -> Iterator[str]:
                 yield f"{kind.__name__}.{name}"
     for package in (rrtik, rrtik_planners):
         yield from _classes(Path(str(package.__file__)).parent)
-    for name in vars(rrtik)["__all__"]:
-        if name.startswith("load_") and _makes(getattr(rrtik, name)) in (
+    for name, value in public_values(rrtik).items():
+        if name.split(".")[-1].startswith("load_") and _makes(value) in (
             *("Problem", "Roadmap", "World", "TaskPlan", "LoadedTask", "Scenario"),
         ):
             yield name

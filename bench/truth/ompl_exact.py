@@ -18,10 +18,11 @@ from bench.shared.judge import Contacts
 from bench.shared.parts import Parts
 from bench.truth import own_planners
 from rrtik_bench.report.page import Report
-from rrtik_ompl import JointPath, PoseGoal, Problem, load_problem, load_robot, simple_setup
+from rrtik_ompl import JointPath, PoseGoal, Problem, load_problem, load_robot
 from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.description import catalog
 from rrtik_ompl.model.transitions import subdivided
+from rrtik_ompl.ompl import simple_setup
 from rrtik_ompl.ompl_bridge import GoalSampler, StateIO
 from rrtik_ompl.ompl_bridge.planner_traits import ompl_planners
 from rrtik_ompl.world.world import World

@@ -22,7 +22,6 @@ from rrtik_bench.report.page import Report
 from rrtik_ompl import (
     Box,
     Capsule,
-    ConstantVelocity,
     Cylinder,
     HalfSpace,
     HeightField,
@@ -35,16 +34,15 @@ from rrtik_ompl import (
     Robot,
     Scene,
     Sphere,
-    TimedPoses,
     World,
     load_robot,
-    plan_in_time,
     replan,
 )
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.model.shapes import Shape
-from rrtik_ompl.replanning import ReplanRun, Snapshot
-from rrtik_ompl.replanning.feed import Source
+from rrtik_ompl.replanning import ConstantVelocity, TimedPoses, plan_in_time
+from rrtik_ompl.replanning.feed import Snapshot, Source
+from rrtik_ompl.replanning.record import ReplanRun
 
 RUNS, OF_A_PART = 2000, 10
 ROBOTS = ("planar3", "ur5", "titan4")

@@ -22,10 +22,12 @@ import rrtik_ompl as rrtik
 from bench.shared.parts import Parts
 from bench.truth.matrix_cells import found_ways
 from rrtik_bench.report.page import Report
-from rrtik_ompl import AttachedObject, ConstantVelocity, Obstacle, Problem, Robot, Scene, World
+from rrtik_ompl import AttachedObject, Obstacle, Problem, Robot, Scene, World
 from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.description.variants import padded, weighted
 from rrtik_ompl.model.goal_kind import TaskRegion
 from rrtik_ompl.model.world_settings import WorldSettings
+from rrtik_ompl.replanning import ConstantVelocity
 from rrtik_ompl.tasks.setting import Setting
 from rrtik_ompl.tasks.stages import Attach, Detach
 
@@ -94,10 +96,10 @@ SETTINGS: dict[str, Set] = {
         lambda world: [each.bounds.tolist() for each in world.settings.constraints],
     ),
     "robot: padding of a link": Set(
-        lambda: World(rrtik.padded(_robot(), {LINK: 0.1}), _scene()), lambda world: dict(world.robot.padding)
+        lambda: World(padded(_robot(), {LINK: 0.1}), _scene()), lambda world: dict(world.robot.padding)
     ),
     "robot: joint weights": Set(
-        lambda: World(rrtik.weighted(_robot(), {"joint2": 3.0}), _scene()),
+        lambda: World(weighted(_robot(), {"joint2": 3.0}), _scene()),
         lambda world: dict(world.robot.joint_weights),
     ),
     "scene: margin of an obstacle": Set(

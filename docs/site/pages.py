@@ -10,6 +10,7 @@ from typing import Any
 from mkdocs.structure.files import File, Files
 
 import rrtik_ompl
+from rrtik_ompl.base.lazy import public_values
 
 ROOT = Path(__file__).resolve().parents[2]
 LINK = re.compile(r"\]\((\.\./[^)\s#]+)(#[^)\s]*)?\)")
@@ -83,8 +84,8 @@ def _groups() -> dict[str, list[str]]:
         ValueError: If a public name has no page.
     """
     groups: dict[str, list[str]] = {title: [] for title in REFERENCE}
-    for name in rrtik_ompl.__all__:
-        value = getattr(rrtik_ompl, name)
+    for public_name, value in public_values(rrtik_ompl).items():
+        name = public_name.split(".")[-1]
         home = value.__module__ if hasattr(value, "__module__") else value.__name__.rpartition(".")[0]
         full = f"{home}.{name}"
         assert getattr(import_module(home), name) is value

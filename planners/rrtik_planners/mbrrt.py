@@ -22,7 +22,7 @@ class MBRRT(BiCRDT):
     """Plans to a pose, a position or a region: MB-RRT finds goal configurations, BiCRDT the path to one of them.
 
     Source: [3], which names this use and leaves the path to a planner. In plain OMPL, give the problem definition a
-    :class:`rrtik_ompl.GoalSampler`, or any goal that consists of configurations; these are used as they are.
+    :class:`rrtik_ompl.ompl.GoalSampler`, or any goal that consists of configurations; these are used as they are.
     """
 
     ompl_name: ClassVar[str] = "MBRRT"

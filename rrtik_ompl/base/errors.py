@@ -7,7 +7,7 @@ from difflib import get_close_matches
 from inspect import signature
 from itertools import islice
 from types import UnionType
-from typing import Any, NoReturn, get_args
+from typing import Any, get_args
 
 MOST_MEMBERS = 1_000_000  # largest number of members of a list given by a user
 
@@ -221,25 +221,3 @@ class SceneWarning(UserWarning):
 
 class PathWarning(UserWarning):
     """A request does not apply to a path, which stays unchanged."""
-
-
-class Renamed:
-    """An attribute that was renamed; access raises an error that names the new attribute.
-
-    Example:
-        >>> class Arm:
-        ...     joints = Renamed("joint_names")
-        >>> Arm().joints
-        Traceback (most recent call last):
-        AttributeError: 'Arm' has no attribute 'joints': it is now 'joint_names'
-    """
-
-    def __init__(self, new: str) -> None:
-        self._new = new
-        self._old = ""
-
-    def __set_name__(self, owner: type, name: str) -> None:
-        self._old = name
-
-    def __get__(self, instance: object, owner: type) -> NoReturn:
-        raise AttributeError(f"'{owner.__name__}' has no attribute '{self._old}': it is now '{self._new}'")

@@ -64,15 +64,16 @@ def _options(
 
 def list_names(kind: Annotated[Kind | None, typer.Argument(help="All kinds if left out.")] = None) -> int:
     """List names of robots, planners, problems and others."""
-    from rrtik_ompl import list_ik_methods, list_planners, list_problems, list_robots
+    from rrtik_ompl import list_planners, list_problems, list_robots
     from rrtik_ompl.description.catalog import list_suites
+    from rrtik_ompl.ik import list_methods
     from rrtik_ompl.tasks.task_file import list_tasks
 
     sources = {
         Kind.robots: list_robots,
         Kind.planners: list_planners,
         Kind.problems: list_problems,
-        Kind.ik: list_ik_methods,
+        Kind.ik: list_methods,
         Kind.suites: list_suites,
         Kind.tasks: list_tasks,
     }

@@ -322,10 +322,10 @@ def _each(robot: Robot, rows: NDArray[np.float64], tolerances: dict[str, float],
     """Solve each pose by itself: as one batch, or one after the other if points or tolerances are given."""
     import numpy as np
 
-    from rrtik_ompl import PoseGoal, solve_ik, solve_ik_batch
+    from rrtik_ompl import PoseGoal, solve_ik, solve_ik_many
 
     if rows.ndim == 3 and not tolerances:
-        batch = solve_ik_batch(robot, rows, **common)
+        batch = solve_ik_many(robot, rows, **common)
         return Solved(batch.q, batch.residuals, list(batch.reasons), list(batch.details), [""] * len(rows))
 
     q = np.full((len(rows), robot.dof), np.nan)
@@ -347,10 +347,10 @@ def _each(robot: Robot, rows: NDArray[np.float64], tolerances: dict[str, float],
 
 def _followed(robot: Robot, rows: NDArray[np.float64], tolerances: dict[str, float], common: dict[str, Any]) -> Solved:
     """Solve the poses as a trajectory, with notes on jumps and collisions; only the first failure has details."""
-    from rrtik_ompl import solve_ik_trajectory
+    from rrtik_ompl.ik import solve_trajectory
 
     options: dict[str, Any] = dict(tolerances)
-    done = solve_ik_trajectory(robot, rows, **common, **options)
+    done = solve_trajectory(robot, rows, **common, **options)
 
     notes = [""] * len(rows)
     details = [""] * len(rows)

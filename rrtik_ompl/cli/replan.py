@@ -16,7 +16,7 @@ from rrtik_ompl.cli.terminal import PAGE_FORMATS, note, progress, say
 from rrtik_ompl.files.text import check_target
 
 if TYPE_CHECKING:
-    from rrtik_ompl.replanning import ReplanRun
+    from rrtik_ompl.replanning.record import ReplanRun
     from rrtik_ompl.replanning.scenario import Scenario as Chosen
 
 PLANNER = "drrt-con"
@@ -34,7 +34,6 @@ def replan_scenario(
     ] = None,
     seed: Annotated[int, typer.Option(help="The same seed gives the same run.")] = 0,
     lookahead_ticks: Annotated[int | None, typer.Option(help="Predict obstacle motion this many ticks ahead.")] = None,
-    predict: Annotated[int | None, typer.Option(hidden=True)] = None,
     foreseen: Annotated[
         bool, typer.Option("--foreseen", help="Plan in configuration and time: obstacles move as stated.")
     ] = False,
@@ -53,9 +52,6 @@ def replan_scenario(
 
     In each tick: check the path, repair it, go a step. Exit code 1 if the goal was not reached.
     """
-    if predict is not None:
-        raise InputError("--predict is now called --lookahead-ticks; use that")
-
     check_target(html, PAGE_FORMATS)
     check_target(record, (".json",))
 
@@ -159,7 +155,7 @@ def _recorded(file: Path, problem: str) -> ReplanRun:
     Raises:
         InputError: If it is not, or is no record.
     """
-    from rrtik_ompl.replanning import load_run
+    from rrtik_ompl.replanning.record import load_run
 
     run = load_run(file)
     if run.problem != problem:

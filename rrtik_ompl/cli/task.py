@@ -46,9 +46,9 @@ def straight(
 
     import numpy as np
 
-    from rrtik_ompl import arc, load_problem
-    from rrtik_ompl import straight as follow
+    from rrtik_ompl import load_problem
     from rrtik_ompl.base.poses import pose_from_rpy
+    from rrtik_ompl.tip import arc, straight
     from rrtik_ompl.world.route_check import as_it_stands
 
     question = load_problem(problem)
@@ -59,7 +59,7 @@ def straight(
 
     with progress(f"following a line in {question.name}"):
         if through is None:
-            made = follow(question.world, question.start, goal, **kept)
+            made = straight(question.world, question.start, goal, **kept)
         else:
             made = arc(question.world, question.start, goal, through, **kept)
 

@@ -45,7 +45,7 @@ def upright(
         >>> import rrtik_ompl as rrtik
         >>> robot = rrtik.load_robot("ur5")
         >>> start, goal = [0.0, -1.5, 1.5, -1.57, -1.57, 0.0], [1.0, -1.5, 1.5, -1.57, -1.57, 0.0]
-        >>> problem = rrtik.Problem(rrtik.World(robot), start, goal, constraints=[rrtik.upright(robot)])
+        >>> problem = rrtik.Problem(rrtik.World(robot), start, goal, constraints=[rrtik.constraints.upright(robot)])
         >>> rrtik.plan(problem, seed=1).found
         True
     """
@@ -91,7 +91,7 @@ def on_plane(
         InputError: If the normal is not of length 1, or the tolerance is not positive.
 
     Example:
-        >>> table = rrtik.on_plane([0, 0, 0.3], [0, 0, 1], tolerance=0.002)
+        >>> table = rrtik.constraints.on_plane([0, 0, 0.3], [0, 0, 1], tolerance=0.002)
     """
     bounds = _anywhere()
     bounds[2] = 0.0
@@ -120,7 +120,7 @@ def on_line(
         InputError: If the direction is not of length 1, or the tolerance is not positive.
 
     Example:
-        >>> rail = rrtik.on_line([0.5, 0, 0.3], [0, 1, 0])
+        >>> rail = rrtik.constraints.on_line([0.5, 0, 0.3], [0, 1, 0])
     """
     bounds = _anywhere()
     bounds[:2] = 0.0  # x and y: the line is the z axis of the region
@@ -145,7 +145,7 @@ def orientation_of(
 
     Example:
         >>> robot = rrtik.load_robot("ur5")
-        >>> level = rrtik.orientation_of(robot.fk([0.0, -1.5, 1.5, -1.57, -1.57, 0.0]), 2.0)
+        >>> level = rrtik.constraints.orientation_of(robot.fk([0.0, -1.5, 1.5, -1.57, -1.57, 0.0]), 2.0)
     """
     number_rows(tolerances_deg, "orientation_of: tolerances_deg")
     bounds = _anywhere()
@@ -186,7 +186,7 @@ def inside(
         InputError: If ``pose`` is not a pose, a side is negative, or the tolerance is not positive.
 
     Example:
-        >>> fence = rrtik.inside(rrtik.pose([0.4, 0, 0.4]), [0.4, 0.8, 0.6])
+        >>> fence = rrtik.constraints.inside(rrtik.pose([0.4, 0, 0.4]), [0.4, 0.8, 0.6])
     """
     lengths = finite_array(sides, (3,), "inside: sides")
     if (lengths < 0.0).any():

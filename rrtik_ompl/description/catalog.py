@@ -184,8 +184,8 @@ def load_robot(
         trust_xacro: Whether macros are evaluated by xacro's own evaluator, which can run any code, and may read files
             anywhere. Otherwise expressions that are not on a list of allowed ones are refused.
         xacro_limits: Limits for the expansion of macros: ``{"seconds": 10, "gigabytes": 1}``, or one of these.
-        **options: Options of the robot. Every robot takes ``scale`` (see `rrtik_ompl.scaled`), ``padding`` (`padded`),
-            ``joint_ranges`` (`narrowed`) and ``joint_weights`` (`weighted`), and ``base_pose``, ``tip`` and ``locked``
+        **options: Options of the robot. Every robot takes ``scale``, ``padding``, ``joint_ranges``
+            and ``joint_weights`` (by name of link or joint), and ``base_pose``, ``tip`` and ``locked``
             where they apply; a URDF ``srdf, group, joints, joint_limits, packages, xacro_args``, a folder also
             ``urdf``; a shipped robot its own, such as ``limits="envelope"``. ``base_pose`` is a ``pinocchio.SE3`` or
             ``{"xyz": [..], "quat_xyzw": [..]}``. With ``strict=True`` a URDF, folder or MJCF is refused if it would

@@ -40,7 +40,7 @@ def scaled(robot: Robot, scale: Mapping[str, float]) -> Robot:
 
     Example:
         >>> import rrtik_ompl as rrtik
-        >>> arm = rrtik.scaled(rrtik.load_robot("panda"), {"panda_hand": 1.1})
+        >>> arm = rrtik.load_robot("panda", scale={"panda_hand": 1.1})
         >>> dict(arm.source["scale"])
         {'panda_hand': 1.1}
     """
@@ -90,7 +90,7 @@ def padded(robot: Robot, padding: Padding) -> Robot:
 
     Example:
         >>> import rrtik_ompl as rrtik
-        >>> arm = rrtik.padded(rrtik.load_robot("panda"), {"panda_hand": 0.01})
+        >>> arm = rrtik.load_robot("panda", padding={"panda_hand": 0.01})
         >>> arm.padding["panda_hand"]
         0.01
     """
@@ -116,7 +116,7 @@ def narrowed(robot: Robot, ranges: Mapping[str, Sequence[float]]) -> Robot:
 
     Example:
         >>> import rrtik_ompl as rrtik
-        >>> arm = rrtik.narrowed(rrtik.load_robot("panda"), {"panda_joint1": (-0.5, 0.5)})
+        >>> arm = rrtik.load_robot("panda", joint_ranges={"panda_joint1": (-0.5, 0.5)})
         >>> float(arm.upper[0])
         0.5
     """
@@ -169,7 +169,7 @@ def weighted(robot: Robot, weights: Mapping[str, float]) -> Robot:
 
     Example:
         >>> import rrtik_ompl as rrtik
-        >>> arm = rrtik.weighted(rrtik.load_robot("ur5"), {"shoulder_pan_joint": 5.0})
+        >>> arm = rrtik.load_robot("ur5", joint_weights={"shoulder_pan_joint": 5.0})
         >>> arm.joint_weights["shoulder_pan_joint"]
         5.0
     """

@@ -45,7 +45,7 @@ class IkBatch:
     Example:
         >>> robot = rrtik.load_robot("ur5")
         >>> poses = robot.fk_batch(np.full((3, 6), 0.4) + np.linspace(0.0, 0.2, 3)[:, None])
-        >>> rrtik.solve_ik_batch(robot, poses).found
+        >>> rrtik.solve_ik_many(robot, poses).found
         array([ True,  True,  True])
     """
 
@@ -59,7 +59,7 @@ class IkBatch:
     __repr__ = in_one_line
 
 
-def solve_ik_batch(
+def solve_ik_many(
     robot: Robot,
     poses: ArrayLike,
     *,
@@ -89,11 +89,11 @@ def solve_ik_batch(
     Example:
         >>> robot = rrtik.load_robot("panda")
         >>> rows = robot.posture("default") + np.linspace(0.0, 0.3, 50)[:, None]
-        >>> rrtik.solve_ik_batch(robot, robot.fk_batch(rows)).q.shape
+        >>> rrtik.solve_ik_many(robot, robot.fk_batch(rows)).q.shape
         (50, 7)
     """
     check_world(world, robot)
-    require(method, str, "method of inverse kinematics", "see list_ik_methods()")
+    require(method, str, "method of inverse kinematics", "see list_methods()")
     load_kernels(robot)
     targets = finite_array(poses, (None, 4, 4), "poses")
     posture = mid_range_configuration(robot) if near is None else robot.configuration(near, "near")

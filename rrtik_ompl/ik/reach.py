@@ -71,7 +71,7 @@ def reach_map(
         InputError: If an argument makes no sense, or the grid would be too large.
 
     Example:
-        >>> reach = rrtik.reach_map(rrtik.load_robot("planar3"), samples=2000, seed=1)
+        >>> reach = rrtik.ik.reach_map(rrtik.load_robot("planar3"), samples=2000, seed=1)
         >>> reach.measure, reach.values.ndim
         ('orientations', 3)
     """
@@ -217,7 +217,7 @@ class ReachMap:
         base: Position of the arm's base, shape (3,) [m].
 
     Example:
-        >>> reach = rrtik.reach_map(rrtik.load_robot("planar3"), samples=2000, seed=1)
+        >>> reach = rrtik.ik.reach_map(rrtik.load_robot("planar3"), samples=2000, seed=1)
         >>> reach.measure, reach.values.ndim
         ('orientations', 3)
     """
@@ -349,8 +349,8 @@ def load_reach_map(path: str | os.PathLike[str]) -> ReachMap:
         InputError: If the file cannot be used.
 
     Example:
-        >>> rrtik.reach_map(rrtik.load_robot("planar3"), samples=2000, seed=1).save("reach.npz")
-        >>> rrtik.load_reach_map("reach.npz").robot
+        >>> rrtik.ik.reach_map(rrtik.load_robot("planar3"), samples=2000, seed=1).save("reach.npz")
+        >>> rrtik.ik.load_reach_map("reach.npz").robot
         'planar3'
     """
     if known_ending(path, FORMATS, "map of reach") != ".npz":

@@ -38,7 +38,7 @@ COMPARED = 1_000_000  # rows times parts of a goal that are compared at once, wh
 DIGITS = 9  # digits of metres and degrees in a message; further ones are rounding
 
 
-def list_ik_methods() -> tuple[IkMethod, ...]:
+def list_methods() -> tuple[IkMethod, ...]:
     """Return the names that `solve_ik` takes as a method, apart from "auto"."""
     return tuple(METHODS)
 
@@ -60,7 +60,7 @@ def solve_ik(
         robot: The arm.
         goal: A pose, a position, or a region with some freedom (from which targets are drawn); or a pose in any form
             that `PoseGoal` takes; or a `MultiGoal`, for several tips at once.
-        method: A name from `list_ik_methods`, or "auto": the closed form where it fits, otherwise "numeric", or
+        method: A name from `list_methods`, or "auto": the closed form where it fits, otherwise "numeric", or
             "projection" for task-space regions. "auto" also takes one of these two if the closed form finds nothing
             for the targets drawn from a region or for a singular pose. For several tips it is projection. The other
             methods are there for comparison.

@@ -73,7 +73,7 @@ class IkTrajectory:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Task:
-    """The checked arguments of `solve_ik_trajectory`, as the methods that follow a trajectory get them."""
+    """The checked arguments of `solve_trajectory`, as the methods that follow a trajectory get them."""
 
     robot: Robot
     poses: Matrix
@@ -92,11 +92,11 @@ class Task:
 
 
 def list_ik_trajectory_methods() -> tuple[str, ...]:
-    """Return the names that `solve_ik_trajectory` takes as a method, apart from "auto"."""
+    """Return the names that `solve_trajectory` takes as a method, apart from "auto"."""
     return tuple(FOLLOWERS)
 
 
-def solve_ik_trajectory(
+def solve_trajectory(
     robot: Robot,
     poses: ArrayLike,
     *,

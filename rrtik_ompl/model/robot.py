@@ -93,7 +93,7 @@ class Robot:
         looks: Loads ``visual``.
         closed_form: The robot's own inverse kinematics, if it has one.
         gripper: The joints that open and close its gripper, `rrtik_ompl.description.gripper.GripperJoints`, or None.
-        padding, joint_weights: By name; see :func:`rrtik_ompl.padded` and :func:`rrtik_ompl.weighted`.
+        padding, joint_weights: By name; options of :func:`rrtik_ompl.load_robot`.
     """
 
     name: str

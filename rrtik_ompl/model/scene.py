@@ -143,7 +143,7 @@ class AttachedObject:
         pose: T_link_object.
         allow: Names of links and obstacles that it may touch, in addition to ``link``.
         padding: Distance of the grasp [m]: kept from everything that it must not touch, in addition to margins. That of
-            the holding link (:func:`rrtik_ompl.padded`) if None.
+            the holding link (``padding`` of :func:`rrtik_ompl.load_robot`) if None.
         margin: Its own margin [m], kept likewise; it becomes the margin of the obstacle again when it is detached.
     """
 

@@ -30,7 +30,7 @@ class BenchmarkNotes:
         InputError: If ``benchmark`` is not an ``ompl.tools.Benchmark``.
 
     Example:
-        >>> notes = rrtik.BenchmarkNotes(benchmark)  # doctest: +SKIP
+        >>> notes = rrtik.ompl.BenchmarkNotes(benchmark)  # doctest: +SKIP
         >>> benchmark.benchmark(request)  # doctest: +SKIP
         >>> notes.write()  # doctest: +SKIP
         >>> benchmark.saveResultsToFile("mine.log")  # doctest: +SKIP

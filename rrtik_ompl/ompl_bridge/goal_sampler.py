@@ -23,7 +23,7 @@ class GoalSampler(ob.GoalSampleableRegion):  # type: ignore[misc]  # OMPL has no
     space information refuses, because they are out of its bounds or invalid, are left out.
 
     Four planners of OMPL need a single goal that is not written in Python: :meth:`states` without a number. The
-    ``solve`` of :func:`rrtik_ompl.simple_setup` gives it to them automatically. Elsewhere (OMPL's Benchmark, a
+    ``solve`` of :func:`rrtik_ompl.ompl.simple_setup` gives it to them automatically. Elsewhere (OMPL's Benchmark, a
     ProblemDefinition of your own) PRM and PRMstar hang with this goal, and with several of its states: they collect
     further goals in a second thread, which waits for the interpreter forever, because the checks run in Python and the
     first thread holds the interpreter. BFMT can take a goal out of its queue twice, which ends the process. AORRTC
@@ -31,7 +31,7 @@ class GoalSampler(ob.GoalSampleableRegion):  # type: ignore[misc]  # OMPL has no
 
     Example:
         >>> problem = rrtik.load_problem("titan4_sdu")
-        >>> sampler = rrtik.GoalSampler(problem, seed=1)  # an OMPL goal, for ProblemDefinition.setGoal
+        >>> sampler = rrtik.ompl.GoalSampler(problem, seed=1)  # an OMPL goal, for ProblemDefinition.setGoal
     """
 
     def __init__(
@@ -108,7 +108,8 @@ class GoalSampler(ob.GoalSampleableRegion):  # type: ignore[misc]  # OMPL has no
     def states(self, most: int = 1) -> ob.GoalStates:
         """Return the first configurations as ``ompl.base.GoalStates``, which OMPL samples without the interpreter.
 
-        More than one must not be given to PRM, PRMstar and BFMT outside :func:`rrtik_ompl.simple_setup`; see the class.
+        More than one must not be given to PRM, PRMstar and BFMT outside
+        :func:`rrtik_ompl.ompl.simple_setup`; see the class.
         """
         si = self.getSpaceInformation()
         states = ob.GoalStates(si)

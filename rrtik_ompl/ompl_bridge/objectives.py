@@ -25,8 +25,8 @@ def path_length(si: ob.SpaceInformation) -> ob.OptimizationObjective:
 
     Example:
         >>> import rrtik_ompl as rrtik
-        >>> si = rrtik.space_information(rrtik.World(rrtik.load_robot("titan4")))
-        >>> objective = rrtik.objectives.path_length(si)
+        >>> si = rrtik.ompl.space_information(rrtik.World(rrtik.load_robot("titan4")))
+        >>> objective = rrtik.ompl.objectives.path_length(si)
     """
     return ob.PathLengthOptimizationObjective(si)
 

@@ -149,7 +149,7 @@ def space_information(world_or_problem: World | Problem, *, so2: bool = False) -
 
     Example:
         >>> import rrtik_ompl as rrtik
-        >>> si = rrtik.space_information(rrtik.World(rrtik.load_robot("titan4")))
+        >>> si = rrtik.ompl.space_information(rrtik.World(rrtik.load_robot("titan4")))
         >>> si.getStateDimension()
         6
     """
@@ -187,7 +187,7 @@ def simple_setup(problem: Problem, *, seed: int = 0, so2: bool = False) -> og.Si
     Example:
         >>> import rrtik_ompl as rrtik
         >>> from ompl import geometric as og
-        >>> setup = rrtik.simple_setup(rrtik.load_problem("titan4_sdu"))
+        >>> setup = rrtik.ompl.simple_setup(rrtik.load_problem("titan4_sdu"))
         >>> setup.setPlanner(og.RRTConnect(setup.getSpaceInformation()))
     """
     if not isinstance(problem, Problem):

@@ -13,8 +13,6 @@ from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.files.sections import NotNegative, Numbers, Positive, Section
 from rrtik_ompl.model.robot import Robot
 
-RENAMED = {"eps": "max_edge", "slot": "repair_budget", "predict": "lookahead_ticks"}  # old names of settings
-
 
 class GoalWaypoint(Section):
     """Where a moving goal is at a time [s], in joint values."""
@@ -61,15 +59,6 @@ class RunSection(Section):
     seconds: Positive = Field(60.0, description="simulated time at most [s]")
     velocity: Numbers | None = Field(None, description="joint speeds, one or one a joint [rad/s or m/s]")
     goal: Annotated[list[GoalWaypoint], Field(min_length=1)] | None = Field(None, description="a goal that moves")
-
-    @model_validator(mode="before")
-    @classmethod
-    def _no_renamed_key(cls, data: object) -> object:
-        for key in data if isinstance(data, dict) else ():
-            if key in RENAMED:
-                message = "'{key}' is now called '{name}'; rename the key"
-                raise PydanticCustomError("renamed_key", message, {"key": key, "name": RENAMED[key]})
-        return data
 
     def goal_motion(self, robot: Robot) -> GoalMotion | None:
         """Return the motion of the goal, or None if it does not move.

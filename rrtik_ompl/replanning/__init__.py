@@ -1,174 +1,29 @@
 """Replanning: a robot moves to a goal while obstacles move, by DRRT-Con or, to compare with, by two other planners."""
 
-from __future__ import annotations
+from typing import TYPE_CHECKING
 
-import os
-import time
-from contextlib import ExitStack
-from functools import partial
-from typing import NoReturn
+from rrtik_ompl.base.lazy import lazy_names
 
-from rrtik_ompl.base.arrays import positive
-from rrtik_ompl.base.choices import Replanner
-from rrtik_ompl.base.errors import called, require
-from rrtik_ompl.files.text import check_target, file_name
-from rrtik_ompl.model.scene import Scene
-from rrtik_ompl.motion.trajectory.limits import RateLimits
-from rrtik_ompl.replanning.drrt_con import DrrtCon
-from rrtik_ompl.replanning.feed import PATIENCE_SECONDS, SILENCE_SECONDS, PatientFeed, Snapshot, Source, Watch, feed_of
-from rrtik_ompl.replanning.loop import Clock, Loop
-from rrtik_ompl.replanning.record import ReplanRun, load_run
-from rrtik_ompl.replanning.settings import PLANNERS, ReplanSettings, refuse_renamed
-from rrtik_ompl.replanning.start_and_goals import GoalFeed, refuse_constraints
-from rrtik_ompl.replanning.tick import Tick
-from rrtik_ompl.replanning.travels import SpeedWarning
-from rrtik_ompl.world.problem import Problem
-
-__all__ = [
-    "PLANNERS",
-    "ReplanRun",
-    "ReplanSettings",
-    "Snapshot",
-    "SpeedWarning",
-    "Tick",
-    "load_run",
-    "replan",
-    "replan_with",
-]
-
-
-def replan(  # noqa: D417 - the settings are described in one place
-    problem: Problem,
-    scene_feed: Source | None = None,
-    *,
-    step: float,
-    rate: float,
-    planner: Replanner = DrrtCon.name,
-    max_edge: float | None = None,
-    margin: float = 0.0,
-    clearance: float | None = None,
-    speed_bound: float | None = None,
-    limits: RateLimits | None = None,
-    lookahead_ticks: int = 0,
-    seconds: float = 60.0,
-    repair_budget: float | None = None,
-    seed: int = 0,
-    goal_feed: GoalFeed | None = None,
-    record: str | os.PathLike[str] | None = None,
-    clock: Clock = time.perf_counter,
-    feed_patience: float | None = None,
-    **renamed: NoReturn,
-) -> ReplanRun:
-    """Move a robot to its goal while obstacles move: DRRT-Con [1, ch. 5.2, algorithms 6 to 8].
-
-    Each tick reads the scene, checks the path again in one call if anything has moved, repairs the path if it is
-    blocked, and then moves the robot by one step, provided that this step is free now. Nothing is assumed about the
-    future motion of obstacles unless ``lookahead_ticks`` is set. Where there is no path, the robot waits; where an
-    obstacle comes nearer than allowed, it evades. The motion of a point cloud cannot be predicted, so a cloud is
-    evaded as soon as it closes in.
-
-    A scene has an age. The robot keeps the distance ``margin`` to every obstacle; to a moving one it also keeps the
-    distance which that obstacle can have travelled since it was seen and can travel within the tick. An obstacle
-    counts as moving if it states a motion or was seen to move. While the last scene is older than a tick, the robot
-    makes only proven steps.
-
-    A step is proven if the arm keeps ``margin`` and ``clearance`` at every time of it, whatever the obstacles did since
-    they were seen and do in the tick (they may even begin to move just now), as long as none is faster than
-    ``speed_bound``. The record says which steps are not proven (:attr:`Tick.proven`). Without a ``speed_bound`` no step
-    is proven while there is an obstacle that may move and does not state its motion.
-    Contact cannot be avoided where the arm waits or evades and every escape is blocked, or where an obstacle reaches
-    the fixed base. :meth:`ReplanRun.violations` judges a record.
-
-    Args:
-        problem: Robot, scene at the begin, start and goal. If the goal is a pose, position or region, all
-            configurations that reach it are goals: if one is blocked, another one is tried.
-        scene_feed: The scene over time: a scene whose obstacles state their motion, a function of time [s], or
-            pairs of a time and a scene (or a :class:`Snapshot`); the problem's scene if None. Names and shapes of the
-            obstacles must stay the same, and so must the attached objects, which are those of the problem; each scene
-            brings its own pairs that may touch. The times of pairs are counted from the first pair [s].
-        step: This and all arguments that are not explained here: see :class:`ReplanSettings`.
-        goal_feed: A goal that moves: the configuration at a time [s], in place of the problem's goal.
-            It counts as reached when the robot is where the goal was at the begin of the last tick.
-        record: A ``.json`` file for the record. Once there is a tick, it is written on Ctrl-C and on errors too.
-        clock: Measures the times of the ticks and the ``repair_budget`` [s]. ``time.process_time`` counts processor
-            time, which suits a machine that does other work too.
-        feed_patience: Two limits [s]; 2 s and 30 s if None. The first is how long a stream of pairs may bring nothing
-            new, in the time of the run; after that the run ends with the outcome "no scene". The second is how long a
-            feed may take to answer, in wall time; after that the run ends with an error, and the record holds all
-            ticks before it.
-        renamed: Must be empty. An old name of a setting is refused with a message that gives the new one.
-
-    Raises:
-        InputError: If a number is out of range, the feed's times are impossible, a half-space turns, an obstacle begins
-            in contact with the robot, no configuration reaches the goal, a feed does not answer, or the problem has
-            path constraints.
-        UnknownNameError: If there is no planner of that name.
-
-    Example:
-        >>> scenario = rrtik.load_scenario("replan_walls")
-        >>> run = rrtik.replan(scenario.problem, step=0.05, rate=20.0, seconds=2.0, seed=1)
-        >>> run.problem
-        'replan_walls'
-    """
-    refuse_renamed(renamed)
-    settings = ReplanSettings(
-        step=step, rate=rate, planner=planner, max_edge=max_edge, margin=margin, clearance=clearance,
-        speed_bound=speed_bound, limits=limits, lookahead_ticks=lookahead_ticks, seconds=seconds,
-        repair_budget=repair_budget, seed=seed,
-    )  # fmt: skip
-    return replan_with(
-        settings, problem, scene_feed, goal_feed=goal_feed, record=record, clock=clock, feed_patience=feed_patience
-    )
-
-
-def replan_with(
-    settings: ReplanSettings,
-    problem: Problem,
-    scene_feed: Source | None = None,
-    *,
-    goal_feed: GoalFeed | None = None,
-    record: str | os.PathLike[str] | None = None,
-    clock: Clock = time.perf_counter,
-    feed_patience: float | None = None,
-) -> ReplanRun:
-    """Replan like :func:`replan`, with the settings given as one object.
-
-    Raises:
-        InputError: See :func:`replan`.
-    """
-    require(settings, ReplanSettings, "settings", "use ReplanSettings(step=..., rate=...)")
-    require(problem, Problem, "problem to replan", "use Problem(world, start, goal) or load_scenario(name)")
-    refuse_constraints(problem, "replan")
-    if goal_feed is not None:
-        called(goal_feed, "goal_feed", "time [s]")
-    called(clock, "clock")
-    if record is not None:
-        check_target(file_name(record), (".json",))
-
-    source = problem.world.scene if scene_feed is None else scene_feed
-    answer_seconds = PATIENCE_SECONDS if feed_patience is None else positive(feed_patience, "feed_patience")
-    silence_seconds = SILENCE_SECONDS if feed_patience is None else answer_seconds
-
-    with ExitStack() as open_feeds:
-        if isinstance(source, Scene):
-            watch: Watch = feed_of(source)
-        else:
-            make_feed = partial(feed_of, source, silence_seconds)
-            watch = open_feeds.enter_context(PatientFeed(make_feed, answer_seconds, "scene feed"))
-        if (given_goal_feed := goal_feed) is not None:
-            goal_feed = open_feeds.enter_context(PatientFeed(lambda: given_goal_feed, answer_seconds, "goal feed"))
-        return _run(Loop(problem, watch, settings, goal_feed, clock, silence_seconds), settings, record)
-
-
-def _run(loop: Loop, settings: ReplanSettings, record: str | os.PathLike[str] | None) -> ReplanRun:
-    """Run ticks until the goal is reached or the time is up, and write the record even if an error ends the run."""
-    try:
-        for number in range(int(settings.seconds * settings.rate) + 1):
-            if not loop.tick(number):
-                return loop.run
-        loop.run.outcome = "out of time"
-        loop.run.reason = loop.run.ticks[-1].reason or "still on its way"
-        return loop.run
-    finally:
-        if record is not None and loop.run.ticks:
-            loop.run.save(record)
+if TYPE_CHECKING:
+    from rrtik_ompl.model.scene import ConstantVelocity as ConstantVelocity
+    from rrtik_ompl.model.scene import TimedPoses as TimedPoses
+    from rrtik_ompl.replanning.feed import Snapshot as Snapshot
+    from rrtik_ompl.replanning.in_time import TimedPlan as TimedPlan
+    from rrtik_ompl.replanning.in_time import plan_in_time as plan_in_time
+    from rrtik_ompl.replanning.record import ReplanRun as ReplanRun
+    from rrtik_ompl.replanning.scenario import Scenario as Scenario
+else:
+    _HOMES = {
+        "model.scene": (
+            "ConstantVelocity",
+            "TimedPoses",
+        ),
+        "replanning.feed": ("Snapshot",),
+        "replanning.in_time": (
+            "TimedPlan",
+            "plan_in_time",
+        ),
+        "replanning.record": ("ReplanRun",),
+        "replanning.scenario": ("Scenario",),
+    }
+    __getattr__, __dir__, __all__ = lazy_names(__name__, _HOMES)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.files.sections import parse
@@ -14,14 +14,13 @@ from rrtik_ompl.motion.trajectory.limits import RateLimits
 from rrtik_ompl.problem_files.problem import load_problem
 from rrtik_ompl.problem_files.problem_values import ProblemFile, problem_path
 from rrtik_ompl.problem_files.run import RunSection
-from rrtik_ompl.replanning import ReplanRun, ReplanSettings, replan_with
 from rrtik_ompl.replanning.feed import Source
 from rrtik_ompl.replanning.loop import Clock
-from rrtik_ompl.replanning.settings import refuse_renamed
+from rrtik_ompl.replanning.record import ReplanRun
+from rrtik_ompl.replanning.replanner import replan_with
+from rrtik_ompl.replanning.settings import ReplanSettings
 from rrtik_ompl.replanning.start_and_goals import GoalFeed
 from rrtik_ompl.world.problem import Problem
-
-SETTINGS = {field.name for field in fields(ReplanSettings)}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,7 +63,6 @@ class Scenario:
         Raises:
             InputError: See :func:`rrtik_ompl.replanning.replan`.
         """
-        refuse_renamed({name: value for name, value in changes.items() if name not in SETTINGS})
         settings = replace(self.settings, **changes)  # type: ignore[arg-type]
         return replan_with(
             settings, self.problem, scene_feed, goal_feed=self.goal_feed, record=record, clock=clock,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +12,6 @@ from rrtik_ompl.base.errors import InputError, require
 from rrtik_ompl.kernels.search.connect_lengths import connect_lengths
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.motion.trajectory.limits import RateLimits
-from rrtik_ompl.problem_files.run import RENAMED
 from rrtik_ompl.replanning.connecting import KERNELS, KernelCuts, TreeOptions
 from rrtik_ompl.replanning.drrt_con import DrrtCon, FromScratch, KernelDrrtCon
 from rrtik_ompl.replanning.single_tree import SingleTree
@@ -131,19 +129,6 @@ class ReplanSettings:
             fault = f"max_edge must be at least {MIN_EDGE_SHARE * usual:.3g}, got {self.max_edge:g}"
             raise InputError(f"{fault}; {usual:.3g} suits this robot")
         return self.max_edge
-
-
-def refuse_renamed(options: Mapping[str, object]) -> None:
-    """Refuse keyword arguments that are no settings, or are old names of settings; do nothing if there are none.
-
-    Raises:
-        InputError: If a name is the old name of a setting; the message gives the new one.
-        TypeError: If a name never was the name of a setting.
-    """
-    for name in options:
-        if name in RENAMED:
-            raise InputError(f"replan: '{name}' is now called '{RENAMED[name]}'; write {RENAMED[name]}=...")
-        raise TypeError(f"replan() got an unexpected keyword argument '{name}'")
 
 
 def make_planner(settings: ReplanSettings, world: MovingWorld, lower: Vector, upper: Vector) -> DrrtCon:

@@ -5,6 +5,45 @@ full: ``T_camera_marker`` maps points of the marker's frame to the camera's (x r
 """
 
 import os
+from typing import TYPE_CHECKING
+
+from rrtik_ompl.base.lazy import lazy_names
 
 # OpenCV reads this when it is imported. Its warnings are suppressed, because our own errors say what matters.
 os.environ.setdefault("OPENCV_LOG_LEVEL", "ERROR")
+
+if TYPE_CHECKING:
+    from rrtik_ompl.sensing.calibration import calibrate as calibrate
+    from rrtik_ompl.sensing.cameras.camera import Camera as Camera
+    from rrtik_ompl.sensing.cameras.pan_tilt_zoom import PanTiltZoom as PanTiltZoom
+    from rrtik_ompl.sensing.depth import cloud_from_depth as cloud_from_depth
+    from rrtik_ompl.sensing.rig import Rig as Rig
+    from rrtik_ompl.sensing.rig import detect_in_rig as detect_in_rig
+    from rrtik_ompl.sensing.rig_calibration import calibrate_rig as calibrate_rig
+    from rrtik_ompl.sensing.rig_file import load_rig as load_rig
+    from rrtik_ompl.sensing.rig_file import pictures_together as pictures_together
+    from rrtik_ompl.sensing.scene_feed import scenes_of_pictures as scenes_of_pictures
+    from rrtik_ompl.sensing.sensor import Sensor as Sensor
+    from rrtik_ompl.sensing.sight import detect_objects as detect_objects
+    from rrtik_ompl.world.robot_points import without_robot as without_robot
+else:
+    _HOMES = {
+        "sensing.calibration": ("calibrate",),
+        "sensing.cameras.camera": ("Camera",),
+        "sensing.cameras.pan_tilt_zoom": ("PanTiltZoom",),
+        "sensing.depth": ("cloud_from_depth",),
+        "sensing.rig": (
+            "Rig",
+            "detect_in_rig",
+        ),
+        "sensing.rig_calibration": ("calibrate_rig",),
+        "sensing.rig_file": (
+            "load_rig",
+            "pictures_together",
+        ),
+        "sensing.scene_feed": ("scenes_of_pictures",),
+        "sensing.sensor": ("Sensor",),
+        "sensing.sight": ("detect_objects",),
+        "world.robot_points": ("without_robot",),
+    }
+    __getattr__, __dir__, __all__ = lazy_names(__name__, _HOMES)

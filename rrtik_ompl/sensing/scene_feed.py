@@ -15,7 +15,7 @@ from rrtik_ompl.sensing.sensor import Sensor
 REMEDY = "show every object of the marker map, or give the scene that holds it"
 
 
-def scene_feed(pictures: Iterable[Picture], sensor: Sensor, scene: Scene | None = None) -> Iterator[Snapshot]:
+def scenes_of_pictures(pictures: Iterable[Picture], sensor: Sensor, scene: Scene | None = None) -> Iterator[Snapshot]:
     """Yield a snapshot of time and scene for each picture, as :func:`rrtik_ompl.replan` takes them.
 
     Pictures are skipped until every object of the marker map has been seen once, because the places of the others are

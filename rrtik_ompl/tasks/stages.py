@@ -64,7 +64,7 @@ class Straight:
 
     Attributes:
         by: Shift of the tip [m], shape (3,), with constant orientation.
-        to: Pose of the tip at the end, as :func:`rrtik_ompl.straight` takes it.
+        to: Pose of the tip at the end, as :func:`rrtik_ompl.tip.straight` takes it.
         frame: Axes of the shift: "world", or "tip" as it is at the beginning.
 
     Example:
@@ -113,7 +113,7 @@ class Attach:
         link: Name of the link that holds it.
         allow: Names of further links and obstacles that it may touch while it is held.
         padding: Distance that it keeps while it is held from everything that it may not touch, in addition to its
-            margin [m]; None for that of the link (:func:`rrtik_ompl.padded`).
+            margin [m]; None for that of the link (``padding`` of :func:`rrtik_ompl.load_robot`).
 
     Example:
         >>> rrtik.Attach("box", "panda_hand", allow=["table"], padding=0.005).allow

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from rrtik_ompl.base.arrays import TAU, Vector, dimensions, frozen
 from rrtik_ompl.base.choices import Accuracy
 from rrtik_ompl.base.copies import as_value, changed, in_notebook, restored
-from rrtik_ompl.base.errors import InputError, ProblemError, Renamed, listed, require
+from rrtik_ompl.base.errors import InputError, ProblemError, listed, require
 from rrtik_ompl.base.poses import rigid
 from rrtik_ompl.constraints.held_regions import HeldRegions, goal_regions, held_regions
 from rrtik_ompl.constraints.residuals import contradiction
@@ -143,8 +143,6 @@ class Problem:
     def with_resolution(self, motion_resolution: float) -> Problem:
         """Return the same problem with another motion resolution [m], see :meth:`World.with_resolution`."""
         return self.with_world(self.world.with_resolution(motion_resolution))
-
-    refined = Renamed("with_resolution")
 
     def with_accuracy(self, accuracy: Accuracy) -> Problem:
         """Return the same problem with accuracy "exact" or "conservative" (:meth:`rrtik_ompl.World.with_accuracy`)."""

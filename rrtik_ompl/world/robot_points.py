@@ -46,7 +46,7 @@ def without_robot(
         >>> robot = rrtik.load_robot("titan4")
         >>> q = [0.1] * 6
         >>> seen = rrtik.PointCloud([robot.fk(q).translation, [9.0, 0.0, 0.0]], radius=0.01)
-        >>> rrtik.without_robot(seen, robot, q)
+        >>> rrtik.sensing.without_robot(seen, robot, q)
         PointCloud(1 points, radius=0.01 m)
     """
     require(cloud, PointCloud, "cloud")

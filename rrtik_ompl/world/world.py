@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from rrtik_ompl.base.arrays import MOST_NUMBERS, Mask, Matrix, Vector, finite_array, not_negative, positive
 from rrtik_ompl.base.choices import Accuracy
 from rrtik_ompl.base.copies import ThreadOwn, changed, in_notebook, restored
-from rrtik_ompl.base.errors import DescriptionWarning, InputError, MeshWarning, Renamed, require
+from rrtik_ompl.base.errors import DescriptionWarning, InputError, MeshWarning, require
 from rrtik_ompl.constraints.held_regions import HeldRegions
 from rrtik_ompl.geometry.collision.bodies import Body, Pairs
 from rrtik_ompl.kernels import FastWorld
@@ -250,8 +250,6 @@ class World(Judge):
             InputError: If the resolution is not a number, or less than 0.01 mm.
         """
         return self.with_settings(motion_resolution=motion_resolution)
-
-    refined = Renamed("with_resolution")
 
     def with_clearance(self, clearance: float) -> World:
         """Return the same world with a clearance [m] that is kept from obstacles on top of their margins.

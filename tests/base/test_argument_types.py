@@ -57,7 +57,7 @@ def test_names_are_text(call, odd):
     [
         (ROBOT.link_of, "GeometryObject"),
         (PATH.proved, "World"),
-        (lambda robot: rrtik.SimulatedLink(robot, [0, 0, 0]), "Robot"),
+        (lambda robot: rrtik.following.SimulatedLink(robot, [0, 0, 0]), "Robot"),
     ],
 )
 def test_what_is_needed_is_named(call, wanted, odd):
@@ -66,7 +66,7 @@ def test_what_is_needed_is_named(call, wanted, odd):
 
 @pytest.mark.parametrize("given", [("a", 0.0), ([0, 0], 0.0), ([0, 0, np.nan], 0.0), ([0, 0, 0], "now")])
 def test_a_set_point_is_a_row_of_numbers_and_a_time(given):
-    link = rrtik.SimulatedLink(ROBOT, [0, 0, 0])
+    link = rrtik.following.SimulatedLink(ROBOT, [0, 0, 0])
     assert "set point" in refused(link.command, *given)
     assert link.sent == []
 
@@ -100,8 +100,8 @@ def test_rules_are_of_named_joints(names, options, what):
 @pytest.mark.parametrize(
     ("call", "what"),
     [
-        (lambda odd: rrtik.orientation_of(np.eye(4), odd), "tolerances_deg"),
-        (lambda odd: rrtik.upright(ROBOT, odd), "axis"),
+        (lambda odd: rrtik.constraints.orientation_of(np.eye(4), odd), "tolerances_deg"),
+        (lambda odd: rrtik.constraints.upright(ROBOT, odd), "axis"),
         (lambda odd: rrtik.Mesh(np.eye(3), [[0, 1, 2]], odd), "source of a mesh"),
         (lambda odd: rrtik.Mesh(np.eye(3), odd), "triangles"),
         (lambda odd: ROBOT.within_limits([0, 0, 0], odd), "tolerance"),

@@ -59,7 +59,7 @@ TOO_MANY = {
     "waypoints": (lambda: rrtik.JointPath(np.zeros((1_000_001, 1))), "1000001 .* 1000000"),
     "waypoints in small steps": (lambda: straight(1.0).resample(1e-12), "small steps: 1000000000000 .* 1000000"),
     "samples of a map": (
-        lambda: rrtik.reach_map(rrtik.load_robot("planar3"), samples=10**15),
+        lambda: rrtik.ik.reach_map(rrtik.load_robot("planar3"), samples=10**15),
         "samples: 1000000000000000 .* 1000000000",
     ),
     "times of a motion": (

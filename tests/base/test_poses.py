@@ -43,7 +43,7 @@ BAD = {
 PLACES = {
     "obstacle": lambda T: rrtik.Obstacle("ball", BALL, T),
     "attached object": lambda T: rrtik.AttachedObject("ball", "tip", BALL, T),
-    "motion": lambda T: rrtik.TimedPoses([0.0, 1.0], [pin.SE3.Identity(), T]),
+    "motion": lambda T: rrtik.replanning.TimedPoses([0.0, 1.0], [pin.SE3.Identity(), T]),
     "base of a shipped robot": lambda T: rrtik.load_robot("planar3", base_pose=T),
     "tool of a DH table": lambda T: robot_from_dh("arm", [DhRow(a=1.0)], convention="standard", tool=T),
     "joint": lambda T: Joint("turn", "revolute", "base", "hand", T),
@@ -92,7 +92,7 @@ def test_a_pose_that_is_changed_later_does_not_move_the_obstacle():
 
 
 def test_an_obstacle_that_leaves_the_world_is_named():
-    fast = rrtik.Scene([rrtik.Obstacle("ball", BALL, motion=rrtik.ConstantVelocity([1e5, 0.0, 0.0]))])
+    fast = rrtik.Scene([rrtik.Obstacle("ball", BALL, motion=rrtik.replanning.ConstantVelocity([1e5, 0.0, 0.0]))])
     assert fast.at(1.0).obstacle("ball").pose.translation[0] == 1e5
     for time, message in ((1e3, "far away"), (np.nan, "time of a scene.*finite"), (1e308, "far away")):
         with pytest.raises(InputError, match=message):
@@ -107,7 +107,7 @@ HUGE = {
     "half-space": lambda x: rrtik.HalfSpace([0.0, 0.0, 1.0], x),
     "polygon": lambda x: rrtik.Prism([[0, 0], [x, 0], [0, 1]]),
     "mesh": lambda x: rrtik.Mesh([[0, 0, 0], [x, 0, 0], [0, 1, 0]], [[0, 1, 2]]),
-    "velocity": lambda x: rrtik.ConstantVelocity([0.0, x, 0.0]),
+    "velocity": lambda x: rrtik.replanning.ConstantVelocity([0.0, x, 0.0]),
     "margin": lambda x: rrtik.Obstacle("ball", BALL, margin=x),
     "axis": lambda x: Joint("turn", "revolute", "base", "hand", axis=[0.0, 0.0, x]),
 }

@@ -104,8 +104,8 @@ TOO_MANY = {
     "joint_frames": lambda: ROBOT.joint_frames(HUGE),
     "within_limits": lambda: ROBOT.within_limits(HUGE),
     "distance": lambda: rrtik.JointGoal([0, 0, 0]).distance(ROBOT, HUGE),
-    "solve_ik_batch": lambda: rrtik.solve_ik_batch(ROBOT, np.broadcast_to(np.eye(4), (10**8, 4, 4))),
-    "solve_ik_trajectory": lambda: rrtik.solve_ik_trajectory(ROBOT, HUGE),
+    "solve_ik_many": lambda: rrtik.solve_ik_many(ROBOT, np.broadcast_to(np.eye(4), (10**8, 4, 4))),
+    "solve_trajectory": lambda: rrtik.ik.solve_trajectory(ROBOT, HUGE),
     "plan_many": lambda: rrtik.plan_many(WORLD, [0, 0, 0], HUGE),
     "goal set": lambda: rrtik.GoalSet(np.broadcast_to(np.eye(4), (10**8, 4, 4))),
     "path": lambda: rrtik.JointPath(HUGE),
@@ -115,7 +115,7 @@ TOO_MANY = {
     "integers": lambda: WORLD.valid_batch(np.broadcast_to(np.int8(0), (10**9, 3))),
     "an endless list": lambda: rrtik.GoalSet(itertools.repeat(np.eye(4))),
     "obstacles without end": lambda: rrtik.Scene(itertools.repeat(rrtik.Obstacle("a", rrtik.Sphere(1)))),
-    "poses without end": lambda: rrtik.linear(WORLD, [0, 0, 0], itertools.repeat([1.0, 1.0, 0.0])),
+    "poses without end": lambda: rrtik.tip.follow(WORLD, [0, 0, 0], itertools.repeat([1.0, 1.0, 0.0])),
 }
 
 GUARDED = """
@@ -166,8 +166,8 @@ def test_long_batches_are_those_of_their_parts():
 
 
 ODD_CALLS = {
-    "pose of an obstacle": lambda: rrtik.ConstantVelocity([0, 0, 1]).pose_at({}, 0.1),
-    "time of a motion": lambda: rrtik.ConstantVelocity([0, 0, 1]).pose_at(rrtik.pose([0, 0, 0]), "late"),
+    "pose of an obstacle": lambda: rrtik.replanning.ConstantVelocity([0, 0, 1]).pose_at({}, 0.1),
+    "time of a motion": lambda: rrtik.replanning.ConstantVelocity([0, 0, 1]).pose_at(rrtik.pose([0, 0, 0]), "late"),
     "pose of the tip": lambda: rrtik.Straight([0.1, 0, 0]).goal([0, 0, 0]),
     "robot of a goal": lambda: rrtik.JointGoal([0, 0, 0]).distance("planar3", [[0, 0, 0]]),
     "rows of a goal": lambda: rrtik.JointGoal([0, 0, 0]).satisfied(ROBOT, [["a"]]),
@@ -181,19 +181,19 @@ ODD_CALLS = {
     "mask of points": lambda: rrtik.PointCloud([[0, 0, 0]]).only("all"),
     "mask of other points": lambda: rrtik.PointCloud([[0, 0, 0]]).only([True, True]),
     "invalid points": lambda: rrtik.PointCloud([[0, 0, 0]], invalid=np.eye(4)),
-    "axis of a map": lambda: rrtik.reach_map(ROBOT, samples=10).centres(3),
-    "measure of reach": lambda: rrtik.reach_map(ROBOT, measure=["a"], samples=10),
-    "axis of reach": lambda: rrtik.reach_map(ROBOT, axis=np.eye(3), samples=10),
+    "axis of a map": lambda: rrtik.ik.reach_map(ROBOT, samples=10).centres(3),
+    "measure of reach": lambda: rrtik.ik.reach_map(ROBOT, measure=["a"], samples=10),
+    "axis of reach": lambda: rrtik.ik.reach_map(ROBOT, axis=np.eye(3), samples=10),
     "path to learn": lambda: rrtik.Roadmap(WORLD, vertices=5).learn("path"),
     "ends of a route": lambda: rrtik.Roadmap(WORLD, vertices=5).route([[0, 0, 0]], [[0, 0]], lambda: False),
     "no ends of a route": lambda: rrtik.Roadmap(WORLD, vertices=5).route(np.zeros((0, 3)), [[0, 0, 0]], lambda: False),
     "stop of a route": lambda: rrtik.Roadmap(WORLD, vertices=5).route([[0, 0, 0]], [[0, 0, 0]], None),
     "marks": lambda: rrtik.view(ROBOT, marks=0.5, html="page.html"),
     "mark": lambda: rrtik.view(ROBOT, marks=[0.5], html="page.html"),
-    "scene of an arm": lambda: rrtik.without_robot(rrtik.PointCloud([[0, 0, 9]]), ROBOT, [0, 0, 0], scene=[1]),
+    "scene of an arm": lambda: rrtik.sensing.without_robot(rrtik.PointCloud([[0, 0, 9]]), ROBOT, [0, 0, 0], scene=[1]),
     "plan of a task": lambda: rrtik.save_task_plan(PATH, "plan.json"),
     "ragged waypoints": lambda: rrtik.JointPath.of(ROBOT, [[1, 2], [3]]),
-    "so2": lambda: rrtik.space_information(WORLD, so2=np.zeros(3)),
+    "so2": lambda: rrtik.ompl.space_information(WORLD, so2=np.zeros(3)),
     "one_joint": lambda: rrtik.shorten(PATH, PROBLEM, one_joint=np.zeros(3)),
     "stop": lambda: rrtik.shorten(PATH, PROBLEM, stop="soon"),
     "planner of many": lambda: rrtik.plan_many(WORLD, [0, 0, 0], [[1, 0, 0]], ["a"]),
@@ -208,9 +208,9 @@ ODD_CALLS = {
     "method of shortening": lambda: rrtik.shorten(PATH, PROBLEM, method=np.eye(2)),
     "method of inverse kinematics": lambda: rrtik.solve_ik(ROBOT, rrtik.pose([1, 1, 0]), method=np.eye(2)),
     "all solutions": lambda: rrtik.solve_ik(ROBOT, rrtik.pose([1, 1, 0]), all=np.zeros(3)),
-    "method of many": lambda: rrtik.solve_ik_batch(ROBOT, [np.eye(4)], method=np.eye(2)),
+    "method of many": lambda: rrtik.solve_ik_many(ROBOT, [np.eye(4)], method=np.eye(2)),
     "no configuration": lambda: rrtik.GoalSet([rrtik.pose([1, 1, 0])]).member_at(ROBOT, np.zeros((0, 3))),
-    "margin of an arm": lambda: rrtik.without_robot(rrtik.PointCloud([[0, 0, 9]]), ROBOT, [0, 0, 0], 1e300),
+    "margin of an arm": lambda: rrtik.sensing.without_robot(rrtik.PointCloud([[0, 0, 9]]), ROBOT, [0, 0, 0], 1e300),
     "a blend without end": lambda: rrtik.time_parameterize(PATH, LIMITS, blend=1e300, world=WORLD),
     "checks that are a time": lambda: rrtik.shorten(PATH, PROBLEM, checks=np.timedelta64(1)),
     "a seed that is a time": lambda: rrtik.plan(PROBLEM, seed=np.timedelta64(1, "s")),
@@ -224,8 +224,8 @@ ODD_CALLS = {
     "proof in a file": lambda: PATH.save("path.json", proof=np.zeros(3)),
     "accelerations in a file": lambda: rrtik.time_parameterize(PATH, LIMITS).save("a.csv", accelerations=np.zeros(3)),
     "no peaks": lambda: LIMITS.slowing(None, None),
-    "poses of the tip": lambda: rrtik.linear(WORLD, [0, 0, 0], rrtik.pose([1, 0, 0])),
-    "poses of a trajectory": lambda: rrtik.solve_ik_trajectory(ROBOT, [[1, 2], [3]]),
+    "poses of the tip": lambda: rrtik.tip.follow(WORLD, [0, 0, 0], rrtik.pose([1, 0, 0])),
+    "poses of a trajectory": lambda: rrtik.ik.solve_trajectory(ROBOT, [[1, 2], [3]]),
 }
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from rrtik_bench.contact_check import check_contacts
 from rrtik_ompl.model.scene import ConstantVelocity
-from rrtik_ompl.replanning import replan
+from rrtik_ompl.replanning.replanner import replan
 from rrtik_tests.moving_plane import OPTIONS, box, plane
 
 

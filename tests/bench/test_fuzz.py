@@ -12,6 +12,7 @@ from bench import fuzz
 from bench.robustness import calls, commands, spoilt_files
 from bench.robustness.spoilt_files import Drawn
 from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.lazy import public_values
 
 CALLS = 400
 
@@ -96,9 +97,9 @@ def test_every_command_is_drawn():
 
 def test_every_public_name_is_drawn():
     drawn = {name for name, *_ in calls.functions()}
-    named = {name for name in rrtik.__all__ if callable(getattr(rrtik, name))}
+    named = {name for name, value in public_values(rrtik).items() if callable(value)}
     assert named <= drawn
-    assert {"plan_batch", "view", "replan", "GoalSampler"} <= drawn
+    assert {"plan_batch", "view", "replan", "ompl.GoalSampler"} <= drawn
 
 
 def test_spoilt_files_are_most_often_refused(tmp_path):

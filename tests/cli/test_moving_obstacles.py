@@ -24,7 +24,7 @@ def files(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
     """A folder with a problem, a path, a motion and plans of tasks; how often the clause belongs into what is said."""
     folder = tmp_path_factory.mktemp(request.param)
     moves = request.param == "moving"
-    motion = rrtik.ConstantVelocity([0.0, 0.0, -0.5]) if moves else None
+    motion = rrtik.replanning.ConstantVelocity([0.0, 0.0, -0.5]) if moves else None
     robot = rrtik.load_robot("ur5")
     high = robot.fk(np.array([0.8, *START[1:]])).translation + np.array([0.0, 0.0, 1.0])
     ball = rrtik.Obstacle("ball", rrtik.Sphere(0.15), rrtik.pose(high), motion)

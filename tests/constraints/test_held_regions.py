@@ -28,12 +28,12 @@ def regions_of(robot, q):
     """One region of each kind, all of which a configuration is in."""
     T = robot.fk(q)
     return {
-        "axis": rrtik.upright(robot, "y", tolerance_deg=4.0),
-        "ball": rrtik.orientation_of(T, 3.0),
-        "ranges": rrtik.orientation_of(T, [5.0, 10.0, 30.0]),
-        "plane": rrtik.on_plane(T.translation, [0.0, 0.6, 0.8]),
-        "line": rrtik.on_line(T.translation, [0.0, 1.0, 0.0], tolerance=0.002),
-        "box": rrtik.inside(T, [0.2, 0.1, 0.3]),
+        "axis": rrtik.constraints.upright(robot, "y", tolerance_deg=4.0),
+        "ball": rrtik.constraints.orientation_of(T, 3.0),
+        "ranges": rrtik.constraints.orientation_of(T, [5.0, 10.0, 30.0]),
+        "plane": rrtik.constraints.on_plane(T.translation, [0.0, 0.6, 0.8]),
+        "line": rrtik.constraints.on_line(T.translation, [0.0, 1.0, 0.0], tolerance=0.002),
+        "box": rrtik.constraints.inside(T, [0.2, 0.1, 0.3]),
     }
 
 
@@ -50,7 +50,7 @@ def tilt(robot, Q, direction, axis=2):
 
 
 def test_upright_keeps_the_direction_of_the_start_and_leaves_the_turn_about_it_free(ur5):
-    held = held_regions(ur5, Scene(), [rrtik.upright(ur5, tolerance_deg=5.0)], START)
+    held = held_regions(ur5, Scene(), [rrtik.constraints.upright(ur5, tolerance_deg=5.0)], START)
     rng = np.random.default_rng(1)
     Q = np.vstack([START + rng.normal(0.0, 0.06, (300, 6)), START + np.outer([1.0, 2.5], np.eye(6)[5])])
     angles = tilt(ur5, Q, ur5.fk(START).rotation[:, 2])
@@ -61,7 +61,7 @@ def test_upright_keeps_the_direction_of_the_start_and_leaves_the_turn_about_it_f
 
 def test_a_cup_that_starts_upside_down_stays_so(ur5):
     other = np.array(START)
-    region = rrtik.upright(ur5)
+    region = rrtik.constraints.upright(ur5)
     down = region.started_at(ur5.fk(other) * pin.SE3(pin.rpy.rpyToMatrix(np.pi, 0.0, 0.0), np.zeros(3)))
     up = region.started_at(ur5.fk(other))
     np.testing.assert_allclose(down.T_world_w.rotation[:, 2], -up.T_world_w.rotation[:, 2], atol=1e-12)
@@ -130,7 +130,7 @@ def test_the_way_into_a_region_is_the_derivative_of_the_displacement(ur5):
 
 def test_several_regions_hold_all_at_once(ur5):
     T = ur5.fk(START)
-    both = [rrtik.upright(ur5), rrtik.on_plane(T.translation, [0.0, 0.0, 1.0])]
+    both = [rrtik.constraints.upright(ur5), rrtik.constraints.on_plane(T.translation, [0.0, 0.0, 1.0])]
     held = held_regions(ur5, Scene(), both, START)
     rows, there = projected_rows(ur5, held, START + np.random.default_rng(7).normal(0.0, 0.4, (40, 6)))
     tips = ur5.fk_batch(rows[there])
@@ -142,7 +142,7 @@ def test_an_attached_object_may_carry_the_frame(ur5):
     cup = AttachedObject("cup", ur5.tip, rrtik.Cylinder(0.03, 0.1), pin.SE3(np.eye(3), np.array([0.0, 0.0, 0.1])))
     scene = Scene(attached=[cup])
     point = (ur5.fk(START) * cup.pose).translation
-    held = held_regions(ur5, scene, [rrtik.on_plane(point, [0.0, 0.0, 1.0], frame="cup")], START)
+    held = held_regions(ur5, scene, [rrtik.constraints.on_plane(point, [0.0, 0.0, 1.0], frame="cup")], START)
     turned = START + 0.1
     away = (ur5.fk(turned) * cup.pose).translation[2] - point[2]
     assert held.regions[0].measures(turned[None])[0, 0] == pytest.approx(abs(away))
@@ -173,21 +173,23 @@ def test_any_angle_may_be_the_free_one(ur5, free):
 
 def test_a_start_or_goal_outside_is_refused_by_name_and_amount(ur5):
     world, T = rrtik.World(ur5), ur5.fk(START)
-    level = rrtik.on_plane(T.translation - [0.0, 0.0, 0.05], [0.0, 0.0, 1.0])
+    level = rrtik.constraints.on_plane(T.translation - [0.0, 0.0, 0.05], [0.0, 0.0, 1.0])
     with pytest.raises(ProblemError, match=r"start.*constraint 1.*tool0.*49 mm"):
         rrtik.Problem(world, START, START, constraints=[level])
     goal = START + 0.3 * np.eye(6)[3]
     amount = np.degrees(tilt(ur5, goal[None], T.rotation[:, 2])[0]) - 5.0
     with pytest.raises(ProblemError, match=rf"goal.*constraint 2.*{amount:.3g} degrees"):
-        rrtik.Problem(world, START, goal, constraints=[rrtik.inside(T, [9, 9, 9]), rrtik.upright(ur5)])
+        rrtik.Problem(
+            world, START, goal, constraints=[rrtik.constraints.inside(T, [9, 9, 9]), rrtik.constraints.upright(ur5)]
+        )
 
 
 def test_constraints_that_contradict_each_other_or_are_out_of_reach_are_named(ur5):
     world, T = rrtik.World(ur5), ur5.fk(START)
-    low, high = (rrtik.on_plane(T.act(np.array([0.0, 0.0, z])), T.rotation[:, 2]) for z in (0.0, 0.3))
+    low, high = (rrtik.constraints.on_plane(T.act(np.array([0.0, 0.0, z])), T.rotation[:, 2]) for z in (0.0, 0.3))
     with pytest.raises(ProblemError, match=r"constraint 2.*constraint 3.*29\d mm"):
-        rrtik.Problem(world, START, START, constraints=[rrtik.upright(ur5), low, high])
-    far = rrtik.on_plane([0.0, 0.0, 5.0], [0.0, 0.0, 1.0])
+        rrtik.Problem(world, START, START, constraints=[rrtik.constraints.upright(ur5), low, high])
+    far = rrtik.constraints.on_plane([0.0, 0.0, 5.0], [0.0, 0.0, 1.0])
     with pytest.raises(ProblemError, match=r"constraint 1.*region"):
         rrtik.Problem(world, START, START, constraints=[far])
 
@@ -195,27 +197,29 @@ def test_constraints_that_contradict_each_other_or_are_out_of_reach_are_named(ur
 def test_what_makes_no_sense_is_refused_in_a_line(ur5):
     world, T = rrtik.World(ur5), ur5.fk(START)
     with pytest.raises(InputError, match=r"path constraints.*list.*TaskRegion"):
-        rrtik.Problem(world, START, START, constraints=rrtik.upright(ur5))
+        rrtik.Problem(world, START, START, constraints=rrtik.constraints.upright(ur5))
     with pytest.raises(UnknownNameError, match="frame of path constraint 1"):
-        rrtik.Problem(world, START, START, constraints=[rrtik.upright(ur5, frame="mug")])
+        rrtik.Problem(world, START, START, constraints=[rrtik.constraints.upright(ur5, frame="mug")])
     with pytest.raises(InputError, match=r"constraint 1.*TaskRegion.*str"):
         rrtik.Problem(world, START, START, constraints=["upright"])
     with pytest.raises(InputError, match="pitch may reach 80"):
-        rrtik.Problem(world, START, START, constraints=[rrtik.orientation_of(T, [10.0, 80.0, 10.0])])
+        rrtik.Problem(world, START, START, constraints=[rrtik.constraints.orientation_of(T, [10.0, 80.0, 10.0])])
     with pytest.raises(InputError, match=r"frame, from_start.*path constraints"):
-        rrtik.Problem(world, START, rrtik.upright(ur5))
+        rrtik.Problem(world, START, rrtik.constraints.upright(ur5))
     with pytest.raises(InputError, match="axis must be x, y or z"):
-        rrtik.upright(ur5, "w")
+        rrtik.constraints.upright(ur5, "w")
     with pytest.raises(InputError, match="normal must have length 1"):
-        rrtik.on_plane([0, 0, 0], [0, 0, 2])
+        rrtik.constraints.on_plane([0, 0, 0], [0, 0, 2])
     with pytest.raises(InputError, match=r"tolerance_deg.*80"):
-        rrtik.upright(ur5, tolerance_deg=90.0)
+        rrtik.constraints.upright(ur5, tolerance_deg=90.0)
 
 
 def test_the_world_of_a_problem_obeys_in_checks_proofs_and_violations(ur5):
     goal = START + 0.8 * np.eye(6)[0]
     free = rrtik.Problem(rrtik.World(ur5), START, goal)
-    held = rrtik.Problem(rrtik.World(ur5), START, goal, constraints=[rrtik.on_line(*line_of(ur5, START, goal))])
+    held = rrtik.Problem(
+        rrtik.World(ur5), START, goal, constraints=[rrtik.constraints.on_line(*line_of(ur5, START, goal))]
+    )
     path = rrtik.JointPath.of(ur5, np.stack([START, goal]))  # the tip goes along an arc
     assert path.violations(free.world) == ()
     assert path.proved(free.world).proven
@@ -260,7 +264,7 @@ def test_a_proven_path_is_within_the_stated_tolerance_between_its_waypoints_too(
     robot = rrtik.load_robot("panda")
     start = np.array([0.1, -0.5, 0.1, -2.0, 0.1, 1.6, 0.6])
     point, direction = robot.fk(start).translation, np.array([0.0, 1.0, 0.0])
-    line = rrtik.on_line(point, direction, tolerance=tolerance)
+    line = rrtik.constraints.on_line(point, direction, tolerance=tolerance)
     goal = rrtik.PositionGoal(point + 0.25 * direction, tolerance=1e-3)
     plan = rrtik.plan(rrtik.Problem(rrtik.World(robot), start, goal, constraints=[line]), seed=1)
     assert plan.found, plan.reason
@@ -271,11 +275,11 @@ def test_a_proven_path_is_within_the_stated_tolerance_between_its_waypoints_too(
 def test_more_between_waypoints_is_a_matter_of_words(ur5):
     T = ur5.fk(START)
     assert all(not region.position_allowance for region in regions_of(ur5, START).values())
-    wide = rrtik.on_line(T.translation, [0, 1, 0], tolerance=1e-9, allowance=5e-4)
+    wide = rrtik.constraints.on_line(T.translation, [0, 1, 0], tolerance=1e-9, allowance=5e-4)
     assert wide.position_allowance == 5e-4
-    assert rrtik.upright(ur5, allowance_deg=0.2).orientation_allowance == np.radians(0.2)
+    assert rrtik.constraints.upright(ur5, allowance_deg=0.2).orientation_allowance == np.radians(0.2)
     with pytest.raises(InputError, match=r"position_allowance.*negative"):
-        rrtik.on_plane([0, 0, 0], [0, 0, 1], allowance=-1e-3)
+        rrtik.constraints.on_plane([0, 0, 0], [0, 0, 1], allowance=-1e-3)
     with pytest.raises(InputError, match=r"allowances.*constraints"):
         rrtik.Problem(rrtik.World(ur5), START, wide)
 
@@ -283,16 +287,20 @@ def test_more_between_waypoints_is_a_matter_of_words(ur5):
 def test_a_tolerance_too_small_for_any_motion_is_refused_with_the_least_that_can_be_kept(ur5):
     world, T = rrtik.World(ur5), ur5.fk(START)
     with pytest.raises(InputError, match=r"constraint 1.* (\d\.\de-08) m") as caught:
-        rrtik.Problem(world, START, START, constraints=[rrtik.on_line(T.translation, [0, 1, 0], tolerance=1e-12)])
+        rrtik.Problem(
+            world, START, START, constraints=[rrtik.constraints.on_line(T.translation, [0, 1, 0], tolerance=1e-12)]
+        )
     least = float(str(caught.value).split(" m is the least")[0].split()[-1])
-    rrtik.Problem(world, START, START, constraints=[rrtik.on_line(T.translation, [0, 1, 0], tolerance=1.1 * least)])
+    rrtik.Problem(
+        world, START, START, constraints=[rrtik.constraints.on_line(T.translation, [0, 1, 0], tolerance=1.1 * least)]
+    )
     with pytest.raises(InputError, match="degrees is the least that can"):
-        rrtik.Problem(world, START, START, constraints=[rrtik.orientation_of(T, 1e-9)])
+        rrtik.Problem(world, START, START, constraints=[rrtik.constraints.orientation_of(T, 1e-9)])
 
 
 def test_three_angles_are_the_largest_and_no_more(ur5):
     T, angles = ur5.fk(START), np.radians([5.0, 10.0, 30.0])
-    held = held_regions(ur5, Scene(), [rrtik.orientation_of(T, [5.0, 10.0, 30.0])], START)
+    held = held_regions(ur5, Scene(), [rrtik.constraints.orientation_of(T, [5.0, 10.0, 30.0])], START)
     rows = START + np.random.default_rng(9).normal(0.0, 0.1, (2000, 6))
     turned = np.array([np.abs(pin.rpy.matrixToRpy(T.rotation.T @ ur5.fk(q).rotation)) for q in rows])
     inside = held.held(rows)
@@ -303,7 +311,7 @@ def test_three_angles_are_the_largest_and_no_more(ur5):
 
 def test_a_motion_may_begin_at_the_very_rim_of_a_region(ur5):
     T = ur5.fk(START)
-    rim = rrtik.on_plane(T.translation - [0.0, 0.0, 1e-3], [0.0, 0.0, 1.0], tolerance=1e-3)
+    rim = rrtik.constraints.on_plane(T.translation - [0.0, 0.0, 1e-3], [0.0, 0.0, 1.0], tolerance=1e-3)
     held = held_regions(ur5, Scene(), [rim], START)
     down = START - 1e-3 * ur5.fk_jacobian_batch(START[None], ur5.tip)[1][0, 2]
     assert held.motions_held(START[None], down[None]).all()

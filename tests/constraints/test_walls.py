@@ -16,7 +16,7 @@ DOWN = np.array([0.0, -1.5, 1.5, -1.5, -0.5 * np.pi, 0.0])  # the tool of a UR5 
 
 def test_the_wrist_of_a_ur5_cannot_flip_while_its_tool_points_down():
     robot = rrtik.load_robot("ur5")
-    held = held_regions(robot, Scene(), [rrtik.upright(robot)], DOWN)
+    held = held_regions(robot, Scene(), [rrtik.constraints.upright(robot)], DOWN)
     turned = DOWN + np.pi * np.eye(6)[0]
     other = rrtik.solve_ik(robot, rrtik.PoseGoal(robot.fk(DOWN)), all=True).solutions
     flipped = other[np.sin(other[:, 4]) > 0.5]
@@ -29,7 +29,7 @@ def test_the_wrist_of_a_ur5_cannot_flip_while_its_tool_points_down():
 
 def test_a_joint_that_stays_far_from_its_wall_does_not_keep_apart():
     robot = rrtik.load_robot("ur5")
-    held = held_regions(robot, Scene(), [rrtik.upright(robot)], DOWN)
+    held = held_regions(robot, Scene(), [rrtik.constraints.upright(robot)], DOWN)
     swung = DOWN + np.array([0.3, 0.2, -0.2, 0.0, 0.0, 2.0])
     assert separation(held, DOWN, swung[None]) == ""
 
@@ -43,7 +43,9 @@ def test_nothing_is_said_to_be_apart_that_trees_can_connect(name, kind):
     world, rng, box = rrtik.World(robot), np.random.default_rng(21), robot.finite_range()
     for seed in range(8):
         q = rng.uniform(*box)
-        region = rrtik.upright(robot) if kind == "axis" else rrtik.orientation_of(robot.fk(q), 3.0)
+        region = (
+            rrtik.constraints.upright(robot) if kind == "axis" else rrtik.constraints.orientation_of(robot.fk(q), 3.0)
+        )
         held = held_regions(robot, Scene(), [region], q)
         rows, there = projected_rows(robot, held, rng.uniform(*box, (8, robot.dof)))
         tables = held_tables(robot, held)
@@ -60,7 +62,7 @@ def test_the_sum_of_the_joints_of_an_arm_in_a_plane_cannot_turn_while_its_orient
     robot = rrtik.load_robot("planar10")
     start = np.tile([0.3, -0.3], 5)
     turned, swung = start + 0.2 * np.pi, start + np.tile([0.4, -0.4], 5)
-    for region in (rrtik.upright(robot, "x"), rrtik.orientation_of(robot.fk(start), 2.0)):
+    for region in (rrtik.constraints.upright(robot, "x"), rrtik.constraints.orientation_of(robot.fk(start), 2.0)):
         held = held_regions(robot, Scene(), [region], start)
         assert held.held(np.vstack([turned, swung])).all()
         assert "keeps start and goal apart: the sum of joints 'joint1'" in separation(held, start, turned[None])
@@ -82,7 +84,7 @@ def test_a_joint_without_limits_may_go_the_other_way_round(tmp_path):
     (tmp_path / "arm.urdf").write_text(f'<robot name="arm"><link name="l0"/>{text}</robot>')
     robot = rrtik.load_robot(tmp_path / "arm.urdf")
     first = np.array([0.67, -0.704, 1.073])
-    held = held_regions(robot, Scene(), [rrtik.upright(robot, "x", tolerance_deg=59.0)], first)
+    held = held_regions(robot, Scene(), [rrtik.constraints.upright(robot, "x", tolerance_deg=59.0)], first)
     start, goal = np.array([-np.pi, -0.2, -1.2]), np.array([1.99, -0.3125, 1.19])
     nearer = goal - 2.0 * np.pi * np.eye(3)[0]
     assert held.held(np.array([start, goal, nearer])).all()

@@ -53,7 +53,7 @@ BROKEN = {
 def test_a_broken_file_is_named_without_the_advice_of_others(tmp_path, world, arrays, case):
     file = tmp_path / "map.npz"
     file.write_bytes(BROKEN[case](arrays))
-    for load in (lambda: rrtik.load_roadmap(file, world), lambda: rrtik.load_reach_map(file)):
+    for load in (lambda: rrtik.load_roadmap(file, world), lambda: rrtik.ik.load_reach_map(file)):
         with pytest.raises(InputError) as caught:
             load()
         assert str(caught.value).startswith(f"{file}: ")

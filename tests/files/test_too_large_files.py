@@ -24,7 +24,7 @@ LOADERS = {
     "path.csv": rrtik.load_path,
     "problem.yaml": rrtik.load_problem,
     "arm.urdf": rrtik.load_robot,
-    "reach.npz": rrtik.load_reach_map,
+    "reach.npz": rrtik.ik.load_reach_map,
     "motion.csv": rrtik.load_trajectory,
     "run.json": rrtik.load_run,
     "proof.json": rrtik.load_certificate,

@@ -13,8 +13,8 @@ FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
 WITHOUT = {
     *("AttachedObject", "ConstantVelocity", "Obstacle", "Scene", "TimedPoses"),
     *("GoalSet", "IkResult", "IkTrajectory", "JointGoal", "JointPath", "PoseGoal", "PositionGoal", "Robot"),
-    *("Trajectory", "World", "list_ik_methods", "list_problems", "list_robots", "load_path", "load_robot"),
-    *("solve_ik", "solve_ik_trajectory"),
+    *("Trajectory", "World", "list_methods", "list_problems", "list_robots", "load_path", "load_robot"),
+    *("solve_ik", "solve_trajectory"),
 }
 NAMES = [name for name in dir(rrtik) if name[0] != "_" and not inspect.ismodule(getattr(rrtik, name))]
 

@@ -12,6 +12,7 @@ import pytest
 from importlinter import api
 
 import rrtik_ompl
+from rrtik_ompl.base.lazy import public_values
 from rrtik_tests.places import ROOT
 
 PEERS = {
@@ -92,4 +93,4 @@ def test_a_world_is_loaded_without_a_compiler_and_without_what_covers_are_made_w
 
 def test_every_public_name_is_there_and_says_what_it_is():
     assert set(rrtik_ompl.__all__) < set(dir(rrtik_ompl))
-    assert [name for name in rrtik_ompl.__all__ if not inspect.getdoc(getattr(rrtik_ompl, name))] == []
+    assert [name for name, value in public_values(rrtik_ompl).items() if not inspect.getdoc(value)] == []

@@ -10,15 +10,17 @@ import numpy as np
 import pytest
 
 import rrtik_ompl as rrtik
+from rrtik_ompl.base.lazy import public_values
 from rrtik_tests.sizes import how_many
 
+PUBLIC = public_values(rrtik)
 OURS = ("rrtik_ompl", "rrtik_planners", "rrtik_robots")
 KEPT_WITH_ROBOTS = {"Body"}  # of links: caches keep those of some robots; the last test bounds these
 REACH = "robot = rrtik.load_robot('planar3')"
 SHORT_OF_AN_EXAMPLE = {
     "AttachedObject": "rrtik.AttachedObject('tool', 'link3', rrtik.Box([0.1, 0.1, 0.1]))",
-    "ConstantVelocity": "rrtik.Obstacle('b', rrtik.Sphere(0.1), motion=rrtik.ConstantVelocity([0.1, 0.0, 0.0]))",
-    "TimedPoses": "rrtik.TimedPoses([0.0, 1.0], [rrtik.pose([0, 0, 0]), rrtik.pose([1, 0, 0])])",
+    "replanning.ConstantVelocity": "rrtik.replanning.ConstantVelocity([0.1, 0, 0])",
+    "replanning.TimedPoses": "rrtik.replanning.TimedPoses([0.0, 1.0], [rrtik.pose([0, 0, 0]), rrtik.pose([1, 0, 0])])",
     "Obstacle": "rrtik.Obstacle('b', rrtik.Sphere(0.1), rrtik.pose([1, 0, 0]))",
     "Scene": "rrtik.Scene([rrtik.Obstacle('b', rrtik.Sphere(0.1), rrtik.pose([1, 0, 0]))])",
     "World": f"{REACH}\nworld = rrtik.World(robot)\nworld.valid([0, 0, 0])\nworld.clearance([0, 0, 0])",
@@ -27,12 +29,12 @@ SHORT_OF_AN_EXAMPLE = {
     "PoseGoal": "rrtik.PoseGoal(rrtik.pose([1, 0, 0]))",
     "PositionGoal": "rrtik.PositionGoal([1, 0, 0])",
     "GoalSet": "rrtik.GoalSet([rrtik.PositionGoal([1, 0, 0]), rrtik.PositionGoal([0, 1, 0])])",
-    "IkResult": f"{REACH}\nrrtik.solve_ik(robot, rrtik.PositionGoal(robot.fk([0, 1, 0]).translation))",
-    "IkTrajectory": f"{REACH}\nrrtik.solve_ik_trajectory(robot, [robot.fk([0, 1, 0]), robot.fk([0, 1.01, 0])])",
+    "ik.IkResult": f"{REACH}\nrrtik.solve_ik(robot, rrtik.PositionGoal(robot.fk([0, 1, 0]).translation))",
+    "ik.IkTrajectory": f"{REACH}\nrrtik.ik.solve_trajectory(robot, [robot.fk([0, 1, 0]), robot.fk([0, 1.01, 0])])",
     "JointPath": f"{REACH}\nrrtik.JointPath.of(robot, [[0, 0, 0], [0, 1, 0]]).length",
-    "BenchmarkNotes": "from ompl import tools\n"
-    "setup = rrtik.simple_setup(rrtik.load_problem('planar3_boxes'))\n"
-    "rrtik.BenchmarkNotes(tools.Benchmark(setup))",
+    "ompl.BenchmarkNotes": "from ompl import tools\n"
+    "setup = rrtik.ompl.simple_setup(rrtik.load_problem('planar3_boxes'))\n"
+    "rrtik.ompl.BenchmarkNotes(tools.Benchmark(setup))",
     "Trajectory": f"{REACH}\npath = rrtik.JointPath.of(robot, [[0, 0, 0], [0, 1, 0]])\n"
     "rrtik.time_parameterize(path, rrtik.RateLimits(1.0, 2.0, 20.0))",
 }
@@ -40,13 +42,13 @@ SHORT_OF_AN_EXAMPLE = {
 
 def example(name):
     """The statements of a public name's example."""
-    text = inspect.getdoc(getattr(rrtik, name)) or ""
+    text = inspect.getdoc(PUBLIC[name]) or ""
     shown = doctest.DocTestParser().get_examples(text)
     run = (each.source for each in shown if not each.options.get(doctest.SKIP) and each.exc_msg is None)
     return "".join(run) or SHORT_OF_AN_EXAMPLE.get(name, "")
 
 
-TYPES = [name for name in dir(rrtik) if name[0] != "_" and inspect.isclass(getattr(rrtik, name))]
+TYPES = [name for name, value in PUBLIC.items() if inspect.isclass(value)]
 
 
 def living():
@@ -61,7 +63,7 @@ def run(code):
 
 
 def test_every_public_type_has_an_example_to_be_counted_with():
-    errors = {name for name in TYPES if issubclass(getattr(rrtik, name), BaseException)}
+    errors = {name for name in TYPES if issubclass(PUBLIC[name], BaseException)}
     assert {name for name in TYPES if not example(name)} <= errors
 
 

@@ -306,7 +306,8 @@ def test_plan_draws_others_when_what_it_aimed_at_is_out_of_its_reach(name):
 def test_a_sampler_leaves_nothing_behind_for_the_end_of_the_process():
     text = """
 from ompl import geometric as og
-from rrtik_ompl import GoalSampler, load_problem
+from rrtik_ompl import load_problem
+from rrtik_ompl.ompl import GoalSampler
 def main():
     for _ in range(20):
         problem = load_problem("puma_pose")

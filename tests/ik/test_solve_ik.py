@@ -13,7 +13,7 @@ from rrtik_ompl.base.errors import InputError, UnknownNameError
 from rrtik_ompl.base.poses import pose_from_rpy
 from rrtik_ompl.ik.method_interface import IkRequest, RandomStream
 from rrtik_ompl.ik.numeric.restarts import MAX_ROUNDS, restarted
-from rrtik_ompl.ik.solve import list_ik_methods, solve_ik
+from rrtik_ompl.ik.solve import list_methods, solve_ik
 from rrtik_ompl.model.shapes import Box, Sphere
 
 Q_TITAN = np.radians([20, 30, -70, 20, 30, 40])
@@ -258,9 +258,9 @@ def test_bad_arguments_are_refused_in_one_line():
 POSES = np.tile(np.eye(4), (2, 1, 1))
 CALLS = {
     "one": lambda robot, **options: solve_ik(robot, rrtik.PoseGoal(POSES[0]), **options),
-    "batch": lambda robot, **options: rrtik.solve_ik_batch(robot, POSES, **options),
-    "trajectory": lambda robot, **options: rrtik.solve_ik_trajectory(robot, POSES, **options),
-    "map": lambda robot, **options: rrtik.reach_map(robot, **options),
+    "batch": lambda robot, **options: rrtik.solve_ik_many(robot, POSES, **options),
+    "trajectory": lambda robot, **options: rrtik.ik.solve_trajectory(robot, POSES, **options),
+    "map": lambda robot, **options: rrtik.ik.reach_map(robot, **options),
 }
 
 
@@ -301,7 +301,7 @@ def test_with_a_tip_that_the_last_joint_does_not_carry_auto_is_numeric():
 
 
 def test_the_methods_have_names():
-    assert list_ik_methods()[:4] == ("closed-form", "numeric", "genetic", "mb-rrt")
+    assert list_methods()[:4] == ("closed-form", "numeric", "genetic", "mb-rrt")
 
 
 def test_numeric_looks_at_every_grasp_of_a_large_set():

@@ -8,6 +8,7 @@ import pytest
 
 import rrtik_ompl as rrtik
 from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.lazy import public_values
 from rrtik_ompl.description.dh import DhRow, robot_from_dh
 from rrtik_ompl.viewer.subject import subject_of
 
@@ -60,8 +61,7 @@ NO_ANSWER_OF_NAMES = {"JointPath.proven_in"}  # asks who made a proof, which cam
 
 def public():
     """All public functions, and methods of public types' values, by name."""
-    for name in rrtik.__all__:
-        value = getattr(rrtik, name)
+    for name, value in public_values(rrtik).items():
         if not inspect.isclass(value):
             yield name, value
             continue

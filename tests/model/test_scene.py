@@ -75,7 +75,7 @@ def test_what_is_not_there_or_there_twice_is_refused():
 
 @pytest.mark.parametrize("time", [float("nan"), float("inf"), "x", [0, 1], 1e300])
 def test_a_motion_is_not_seen_from_a_time_that_is_none(time):
-    motion = rrtik.TimedPoses([0.0, 1.0], [rrtik.pose([0, 0, 0]), rrtik.pose([1, 0, 0])])
+    motion = rrtik.replanning.TimedPoses([0.0, 1.0], [rrtik.pose([0, 0, 0]), rrtik.pose([1, 0, 0])])
     moving = rrtik.Scene([rrtik.Obstacle("ball", rrtik.Sphere(0.1), rrtik.pose([0, 0, 0]), motion=motion)])
     with pytest.raises(rrtik.InputError):
         motion.seen_from(time)

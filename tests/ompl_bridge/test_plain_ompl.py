@@ -73,7 +73,7 @@ class Careless(SafePlanner):
 
 
 def careless_solve(problem, way, **options):
-    setup = rrtik.simple_setup(problem)
+    setup = rrtik.ompl.simple_setup(problem)
     planner = Careless(setup.getSpaceInformation(), world=problem.world, **options)
     planner.way = way
     setup.setPlanner(planner)
@@ -109,10 +109,10 @@ def main():
     problem = rrtik.load_problem("ur5_table")
     for most in (0, 4):
         for name, make in ompl_planners().items():
-            setup = rrtik.simple_setup(problem)
+            setup = rrtik.ompl.simple_setup(problem)
             si = setup.getSpaceInformation()
             if most:
-                setup.setGoal(rrtik.GoalSampler(problem, si).states(most))
+                setup.setGoal(rrtik.ompl.GoalSampler(problem, si).states(most))
             goal = setup.getGoal()
             setup.setPlanner(make(si))
             print(name, most, flush=True)
@@ -140,9 +140,9 @@ def test_each_planner_of_ompl_ends_with_several_goals():
 
 @pytest.mark.parametrize("name", ["AORRTC", "BFMT", "PRM", "PRMstar"])
 def test_what_several_goals_would_crash_or_stop_searches_for_the_first(problem, name):
-    setup = rrtik.simple_setup(problem)
+    setup = rrtik.ompl.simple_setup(problem)
     si = setup.getSpaceInformation()
-    setup.setGoal(rrtik.GoalSampler(problem, si).states(4))
+    setup.setGoal(rrtik.ompl.GoalSampler(problem, si).states(4))
     check = si.getStateValidityChecker()
     seen = set()
 
@@ -159,7 +159,7 @@ def test_what_several_goals_would_crash_or_stop_searches_for_the_first(problem, 
 
 def test_a_goal_that_gives_nothing_is_left_to_the_planner(problem):
     out_of_reach = rrtik.PositionGoal([99.0, 0.0, 0.0], tolerance=0.01)
-    setup = rrtik.simple_setup(rrtik.Problem(problem.world, problem.start, out_of_reach))
+    setup = rrtik.ompl.simple_setup(rrtik.Problem(problem.world, problem.start, out_of_reach))
     assert isinstance(setup.getGoal(), GoalSampler)
     setup.setPlanner(og.PRM(setup.getSpaceInformation()))
     assert str(setup.solve(SECONDS)) == "Invalid goal"
@@ -167,9 +167,9 @@ def test_a_goal_that_gives_nothing_is_left_to_the_planner(problem):
 
 @pytest.mark.parametrize("make", [og.PRM, og.PRMstar])
 def test_an_objective_in_python_is_refused_where_it_would_be_waited_for(problem, make):
-    setup = rrtik.simple_setup(problem)
+    setup = rrtik.ompl.simple_setup(problem)
     si = setup.getSpaceInformation()
-    setup.setOptimizationObjective(rrtik.objectives.clearance(si, problem.world, weight=0.1))
+    setup.setOptimizationObjective(rrtik.ompl.objectives.clearance(si, problem.world, weight=0.1))
     setup.setPlanner(make(si))
     with pytest.raises(InputError, match=r"for \w+,.*Python; use"):
         setup.solve(SECONDS)
@@ -183,9 +183,9 @@ def test_planners_that_start_threads_are_those_of_prm():
 
 
 def test_a_setup_finds_a_planner_by_itself_and_takes_a_condition(problem):
-    setup = rrtik.simple_setup(problem)
+    setup = rrtik.ompl.simple_setup(problem)
     assert setup.solve(ob.timedPlannerTerminationCondition(5.0))
-    assert rrtik.simple_setup(problem).solve(time=5.0)
+    assert rrtik.ompl.simple_setup(problem).solve(time=5.0)
 
 
 # --- planners of anybody's own ------------------------------------------------------------------------------------

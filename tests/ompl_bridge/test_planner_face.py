@@ -55,7 +55,7 @@ def test_a_planner_without_a_tree_shows_its_path(planner: Any) -> None:
 
 def test_a_graph_in_kernels_has_certain_edges_only() -> None:
     problem = rrtik.load_problem("titan4_prisms")
-    setup = rrtik.simple_setup(problem)
+    setup = rrtik.ompl.simple_setup(problem)
     made = FastRRTConnect(setup.getSpaceInformation(), world=problem.world, seed=2)
     setup.setPlanner(made)
     assert str(setup.solve(5.0)) == "Exact solution"
@@ -129,7 +129,7 @@ def test_options_are_set_by_texts_and_refused_as_by_the_constructor() -> None:
 def test_notes_are_taken_of_a_benchmark_of_ompl_only() -> None:
     for wrong in ("log.txt", None, [[1, 2]]):
         with pytest.raises(InputError, match=r"benchmark.*ompl\.tools\.Benchmark"):
-            rrtik.BenchmarkNotes(wrong)
+            rrtik.ompl.BenchmarkNotes(wrong)
 
 
 def test_the_log_of_a_benchmark_has_options_graphs_and_progress(
@@ -141,7 +141,7 @@ def test_the_log_of_a_benchmark_has_options_graphs_and_progress(
     benchmark = ot.Benchmark(setup, "notes")
     for planner in (FastRRTConnect(si, seed=1, range=0.3), og.RRTConnect(si), BiCRDT(si, seed=2)):
         benchmark.addPlanner(planner)
-    notes = rrtik.BenchmarkNotes(benchmark)
+    notes = rrtik.ompl.BenchmarkNotes(benchmark)
     benchmark.benchmark(ot.Request(2.0, 4096.0, 2, 0.05, False, False, False))
     notes.write()
     log = tmp_path / "notes.log"

@@ -28,7 +28,7 @@ from rrtik_ompl.ompl_bridge.planner_traits import (
     unbound_planners,
 )
 from rrtik_ompl.planning.shortening import METHODS
-from rrtik_ompl.replanning import PLANNERS
+from rrtik_ompl.replanning.settings import PLANNERS
 
 LIBRARY = Path(rrtik_ompl.__file__).parent
 # Replanners, methods of shortening and of improving have names of their own, some of them those of planners; a page has
@@ -140,7 +140,7 @@ def test_the_library_knows_no_planner_by_name(file):
 
 def test_the_names_to_choose_from_stand_once():
     assert set(get_args(choices.ShorteningMethod)) == set(METHODS)
-    assert set(get_args(choices.IkMethod)) == {"auto", *rrtik_ompl.list_ik_methods()}
+    assert set(get_args(choices.IkMethod)) == {"auto", *rrtik_ompl.ik.list_methods()}
     assert set(get_args(choices.TrajectoryIkMethod)) == {"auto", *list_ik_trajectory_methods()}
     assert set(get_args(choices.GeneticPreset)) == set(PRESETS)
     assert get_args(choices.Accuracy) == ACCURACIES
@@ -151,13 +151,3 @@ def test_the_short_name_is_the_same_package():
     assert rrtik.load_robot is rrtik_ompl.load_robot
     assert rrtik.__version__ == rrtik_ompl.__version__
     assert dir(rrtik) == dir(rrtik_ompl)
-
-
-def test_an_old_name_says_the_new_one():
-    for old, new in rrtik_ompl.RENAMED.items():
-        with pytest.raises(ImportError, match=f"^rrtik_ompl.{old} is now rrtik_ompl.{new}$"):
-            exec(f"from rrtik_ompl import {old}")  # an AttributeError would be hidden here
-    problem = rrtik_ompl.load_problem("planar3_a")
-    for kept in (problem, problem.world):
-        with pytest.raises(AttributeError, match="'refined': it is now 'with_resolution'"):
-            kept.refined(0.5)

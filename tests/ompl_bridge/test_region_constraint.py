@@ -23,11 +23,11 @@ def cases():
     robot = rrtik.load_robot("ur5_limited")
     T = robot.fk(START)
     return {
-        "upright": rrtik.upright(robot, "x"),
-        "orientation": rrtik.orientation_of(T, 4.0),
-        "ranges": rrtik.orientation_of(T, [1.0, 2.0, 3.0]),
-        "plane": rrtik.on_plane(T.translation, [0.0, 0.6, 0.8]),
-        "line": rrtik.on_line(T.translation, [0.0, 1.0, 0.0]),
+        "upright": rrtik.constraints.upright(robot, "x"),
+        "orientation": rrtik.constraints.orientation_of(T, 4.0),
+        "ranges": rrtik.constraints.orientation_of(T, [1.0, 2.0, 3.0]),
+        "plane": rrtik.constraints.on_plane(T.translation, [0.0, 0.6, 0.8]),
+        "line": rrtik.constraints.on_line(T.translation, [0.0, 1.0, 0.0]),
     }
 
 
@@ -76,7 +76,7 @@ def test_a_problem_without_constraints_is_refused():
 @pytest.mark.parametrize("turn", [1.7, 3.0, np.pi, -3.0])
 def test_an_orientation_that_is_turned_round_does_not_satisfy_the_equations(turn):
     robot, kept = rrtik.load_robot("ur5"), np.array([0.0, -1.5, 1.5, -1.5, -0.5 * np.pi, 0.0])
-    held = held_regions(robot, Scene(), [rrtik.orientation_of(robot.fk(kept), 2.0)], kept)
+    held = held_regions(robot, Scene(), [rrtik.constraints.orientation_of(robot.fk(kept), 2.0)], kept)
     q, step = kept + turn * np.eye(6)[5], 1e-6 * np.array([1.0, 2.0, -1.0, 3.0, 2.0, -2.0])
     assert not held.held(q[None])[0]
     assert np.linalg.norm(equations(robot, held, q)[0]) > 1.0

@@ -33,7 +33,7 @@ def state_of(si, q):
 
 def test_states_motions_and_clearances_are_those_of_the_world(problem):
     world, rng = problem.world, np.random.default_rng(0)
-    si = rrtik.space_information(world)
+    si = rrtik.ompl.space_information(world)
     rows = rng.uniform(*world.robot.finite_range(), (60, world.robot.dof))
     states = [state_of(si, q) for q in rows]
     assert [si.isValid(s) for s in states] == world.valid_batch(rows).tolist()
@@ -44,14 +44,14 @@ def test_states_motions_and_clearances_are_those_of_the_world(problem):
 
 
 def test_what_no_world_can_judge_is_not_valid(problem):
-    si = rrtik.space_information(problem)
+    si = rrtik.ompl.space_information(problem)
     assert not si.isValid(state_of(si, [np.nan] * 6))
     assert not si.isValid(state_of(si, problem.world.robot.upper + 0.1))
 
 
 @pytest.mark.parametrize("make", [og.RRTConnect, og.KPIECE1])
 def test_a_simple_setup_is_solved_by_planners_of_ompl(problem, make):
-    setup = rrtik.simple_setup(problem)
+    setup = rrtik.ompl.simple_setup(problem)
     planner = make(setup.getSpaceInformation())
     if make is og.KPIECE1:
         planner.setProjectionEvaluator("tip")
@@ -66,7 +66,7 @@ def test_a_simple_setup_is_solved_by_planners_of_ompl(problem, make):
 
 def test_a_goal_of_the_tip_is_sampled(problem):
     T = problem.world.robot.fk(problem.goal.q)
-    setup = rrtik.simple_setup(rrtik.Problem(problem.world, problem.start, rrtik.PoseGoal(T)))
+    setup = rrtik.ompl.simple_setup(rrtik.Problem(problem.world, problem.start, rrtik.PoseGoal(T)))
     setup.setPlanner(og.RRTConnect(setup.getSpaceInformation()))
     assert setup.solve(20.0)
     rows = StateIO(setup.getSpaceInformation()).rows(setup.getSolutionPath())
@@ -76,7 +76,7 @@ def test_a_goal_of_the_tip_is_sampled(problem):
 
 def test_nothing_is_kept_alive(problem):
     def one():
-        setup = rrtik.simple_setup(problem)
+        setup = rrtik.ompl.simple_setup(problem)
         setup.setPlanner(og.RRTConnect(setup.getSpaceInformation()))
         setup.setup()
         return weakref.ref(setup.getStateValidityChecker())
@@ -88,16 +88,16 @@ def test_nothing_is_kept_alive(problem):
 
 def test_wrong_arguments_get_one_line(problem):
     with pytest.raises(InputError, match="a World or a Problem, got str"):
-        rrtik.space_information("titan4")
+        rrtik.ompl.space_information("titan4")
     with pytest.raises(InputError, match="expected a Problem, got World"):
-        rrtik.simple_setup(problem.world)
+        rrtik.ompl.simple_setup(problem.world)
     with pytest.raises(InputError, match=r"path constraints.*SO"):
-        rrtik.simple_setup(rrtik.load_problem("ur5_upright"), so2=True)
+        rrtik.ompl.simple_setup(rrtik.load_problem("ur5_upright"), so2=True)
     si = ob.SpaceInformation(ob.RealVectorStateSpace(3))
     with pytest.raises(InputError, match=r"3 coordinates.*6 joints"):
-        rrtik.objectives.tip_travel(si, problem.world.robot)
+        rrtik.ompl.objectives.tip_travel(si, problem.world.robot)
     with pytest.raises(InputError, match="weight"):
-        rrtik.objectives.clearance(rrtik.space_information(problem), problem.world, weight=0.0)
+        rrtik.ompl.objectives.clearance(rrtik.ompl.space_information(problem), problem.world, weight=0.0)
 
 
 # --- path constraints ---------------------------------------------------------------------------------------------
@@ -111,13 +111,13 @@ def level_problem(thickness=None, goal=None):
     post = [] if thickness is None else [rrtik.Obstacle("post", rrtik.Box([thickness, thickness, 3.0]), halfway)]
     world = rrtik.World(robot, rrtik.Scene(post))
     goal = start + 0.5 * np.eye(6)[0] if goal is None else goal
-    return rrtik.Problem(world, start, goal, constraints=[rrtik.on_plane(tip, [0.0, 0.0, 1.0])])
+    return rrtik.Problem(world, start, goal, constraints=[rrtik.constraints.on_plane(tip, [0.0, 0.0, 1.0])])
 
 
 @pytest.mark.parametrize("make", [og.RRTConnect, og.KPIECE1])
 def test_a_problem_with_path_constraints_gets_a_projected_space(make):
     problem = level_problem(0.02)
-    setup = rrtik.simple_setup(problem)
+    setup = rrtik.ompl.simple_setup(problem)
     si = setup.getSpaceInformation()
     planner = make(si)
     if make is og.KPIECE1:
@@ -137,7 +137,7 @@ def test_a_problem_with_path_constraints_gets_a_projected_space(make):
 def test_motions_along_constraints_are_checked_between_their_steps():
     for thickness, free in ((None, True), (1e-3, False)):
         problem = level_problem(thickness)
-        si = rrtik.space_information(problem)
+        si = rrtik.ompl.space_information(problem)
         ends = [state_of(si, q) for q in (problem.start, problem.goal.q)]
         assert all(si.isValid(state) for state in ends)
         assert si.checkMotion(*ends) is free
@@ -146,7 +146,7 @@ def test_motions_along_constraints_are_checked_between_their_steps():
 def test_a_goal_of_the_tip_is_sampled_along_constraints():
     tip = level_problem().robot.fk(level_problem().goal.q).translation
     problem = level_problem(goal=rrtik.PositionGoal(tip, tolerance=0.01))
-    setup = rrtik.simple_setup(problem, seed=1)
+    setup = rrtik.ompl.simple_setup(problem, seed=1)
     setup.setPlanner(og.RRTConnect(setup.getSpaceInformation()))
     assert setup.solve(30.0)
     end = StateIO(setup.getSpaceInformation()).rows(setup.getSolutionPath())[-1]
@@ -155,7 +155,7 @@ def test_a_goal_of_the_tip_is_sampled_along_constraints():
 
 def test_our_planners_refuse_a_projected_space():
     with pytest.raises(InputError, match="got a ProjectedStateSpace"):
-        FastRRTConnect(rrtik.space_information(level_problem()))
+        FastRRTConnect(rrtik.ompl.space_information(level_problem()))
 
 
 # --- objectives ---------------------------------------------------------------------------------------------------
@@ -167,24 +167,24 @@ def cost(objective, si, rows):
 
 
 def test_costs_of_a_path(problem):
-    world, si = problem.world, rrtik.space_information(problem)
+    world, si = problem.world, rrtik.ompl.space_information(problem)
     rows = np.array([problem.start, problem.start, problem.start])
     rows[1, 0] += 0.2
     rows[2, :2] = rows[1, 0], rows[1, 1] + 0.1
-    assert cost(rrtik.objectives.path_length(si), si, rows) == pytest.approx(0.3)
-    assert cost(rrtik.objectives.single_joint_moves(si), si, rows) == 2.0
+    assert cost(rrtik.ompl.objectives.path_length(si), si, rows) == pytest.approx(0.3)
+    assert cost(rrtik.ompl.objectives.single_joint_moves(si), si, rows) == 2.0
     turn = rows[:2]
     tip = world.robot.fk(turn[0]).translation
     axis = world.robot.fk_batch(turn)[:, :3, 3]
     chord = float(np.linalg.norm(axis[1] - axis[0]))
     radius = chord / (2.0 * np.sin(0.1))  # joint 1 turns the tip by 0.2 rad on a circle
-    assert cost(rrtik.objectives.tip_travel(si, world.robot), si, turn) == pytest.approx(0.2 * radius, rel=1e-3)
+    assert cost(rrtik.ompl.objectives.tip_travel(si, world.robot), si, turn) == pytest.approx(0.2 * radius, rel=1e-3)
     assert radius == pytest.approx(np.hypot(*tip[:2]), rel=0.2)
 
 
 def test_pieces_near_obstacles_cost_more(problem):
-    world, si = problem.world, rrtik.space_information(problem)
-    objective = rrtik.objectives.clearance(si, world, weight=0.05)
+    world, si = problem.world, rrtik.ompl.space_information(problem)
+    objective = rrtik.ompl.objectives.clearance(si, world, weight=0.05)
     rng = np.random.default_rng(1)
     rows = world.robot.lower + rng.random((200, 6)) * (world.robot.upper - world.robot.lower)
     rows = rows[world.valid_batch(rows)]

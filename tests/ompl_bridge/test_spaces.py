@@ -143,7 +143,7 @@ def test_joints_without_limits_are_angles_in_ompl(name: str) -> None:
     start, goal = np.array(robot.posture("arm_up")), np.array(robot.posture("arm_up"))
     start[0], goal[0] = 3.0, -3.0
     assert robot.continuous[0]
-    setup = rrtik.simple_setup(rrtik.Problem(world, start, goal), so2=True)
+    setup = rrtik.ompl.simple_setup(rrtik.Problem(world, start, goal), so2=True)
     si = setup.getSpaceInformation()
     assert type(si.getStateSpace()) is ob.CompoundStateSpace
     setup.setPlanner(MADE[name](si, world))

@@ -53,7 +53,7 @@ def test_paths_in_kernels_are_shorter_than_the_first_one_and_the_same_again(name
     problem = rrtik.load_problem("titan4_prisms")
     lengths = []
     for planner in (FastRRTConnect, PLANNERS[name], PLANNERS[name]):
-        setup = rrtik.simple_setup(problem)
+        setup = rrtik.ompl.simple_setup(problem)
         options = {} if planner is FastRRTConnect else {"patience": 3}
         setup.setPlanner(planner(setup.getSpaceInformation(), world=problem.world, seed=2, **options))
         assert str(setup.solve(20.0)) == "Exact solution"

@@ -9,6 +9,7 @@ import rrtik_ompl as rrtik
 from rrtik_ompl.base.errors import InputError, UnknownNameError
 from rrtik_ompl.constraints.held_regions import held_regions
 from rrtik_ompl.constraints.residuals import projected_rows
+from rrtik_ompl.description.variants import weighted
 from rrtik_ompl.planning import improving
 from rrtik_ompl.planning.improving import least_cost, length
 from rrtik_planners import FastRRTConnect
@@ -38,7 +39,7 @@ def cases(count):
         rows = rng.uniform(*base.finite_range(), (60, base.dof))
         rows = rows[world.valid_batch(rows) & world.certify(rows)]
         if len(rows) > 1 and not world.motion_valid(rows[0], rows[1]):
-            heavy = rrtik.weighted(base, dict(zip(base.joint_names, weights.tolist(), strict=True)))
+            heavy = weighted(base, dict(zip(base.joint_names, weights.tolist(), strict=True)))
             found.append((world, rrtik.World(heavy, world.scene), rows[0], rows[1], weights))
     return found
 
@@ -69,7 +70,7 @@ def test_paths_are_shorter_in_the_weighted_length_and_free():
 @pytest.mark.parametrize("planner", ["auto", "fastrrtconnect", "RRTConnect"])
 def test_only_proportions_count(problem, planner):
     plain = problem[0]
-    even = rrtik.weighted(plain.robot, dict.fromkeys(plain.robot.joint_names, 4.0))
+    even = weighted(plain.robot, dict.fromkeys(plain.robot.joint_names, 4.0))
     same = rrtik.Problem(rrtik.World(even, plain.world.scene), plain.start, plain.goal)
     one, other = rrtik.plan(plain, planner, seed=3), rrtik.plan(same, planner, seed=3)
     assert one.path.waypoints == pytest.approx(other.path.waypoints, abs=1e-9)
@@ -93,7 +94,7 @@ def test_shortening_never_makes_the_weighted_length_longer(problem, method):
 def test_plans_that_shall_be_shorter_than_the_best_path_are_bounded_in_the_weighted_length(monkeypatch):
     monkeypatch.setattr(improving, "PATIENCE", 12)
     post = rrtik.Obstacle("post", rrtik.Box([0.1, 0.1, 1.2]), [0.6, 0.0, 0.6])
-    robot = rrtik.weighted(rrtik.load_robot("ur5"), {"shoulder_pan_joint": 5.0})
+    robot = weighted(rrtik.load_robot("ur5"), {"shoulder_pan_joint": 5.0})
     start, goal = np.array([[-1.2, -0.9, 1.2, -0.3, 1.6, 0.0], [1.2, -0.9, 1.2, -0.3, 1.6, 0.0]])
     problem = rrtik.Problem(rrtik.World(robot, rrtik.Scene([post])), start, goal)
     tried = []
@@ -134,7 +135,7 @@ def test_weights_are_the_costs_of_single_joint_moves_unless_these_are_given(prob
 @pytest.mark.kernels
 def test_paths_under_constraints_are_shortened_by_weighted_length_and_held():
     base, ratios = rrtik.load_robot("panda"), []
-    upright = [rrtik.upright(base, tolerance_deg=10.0)]
+    upright = [rrtik.constraints.upright(base, tolerance_deg=10.0)]
     for k, (world, heavy, start, _, weights) in enumerate(cases(4)):
         rows = np.random.default_rng(k).uniform(*base.finite_range(), (400, base.dof))
         rows, there = projected_rows(base, held_regions(base, world.scene, upright, start), rows)
@@ -153,10 +154,10 @@ def test_paths_under_constraints_are_shortened_by_weighted_length_and_held():
 
 def test_the_nearest_solution_of_inverse_kinematics_is_so_by_the_weighted_way():
     base = rrtik.load_robot("puma560")
-    heavy = rrtik.weighted(base, {base.joint_names[0]: 100.0})
+    heavy = weighted(base, {base.joint_names[0]: 100.0})
     near, scale = base.finite_range()[0] * 0.5, np.array([100.0, *[1.0] * 5])
     poses = base.fk_batch(np.random.default_rng(3).uniform(*base.finite_range(), (12, 6)))
-    best, changed = rrtik.solve_ik_batch(heavy, poses, near=near).q, 0
+    best, changed = rrtik.solve_ik_many(heavy, poses, near=near).q, 0
     for pose, found in zip(poses, best, strict=True):
         goal = rrtik.PoseGoal(pose)
         every = rrtik.solve_ik(heavy, goal, near=near, all=True).solutions
@@ -192,5 +193,5 @@ def test_weights_are_an_option_of_every_robot_and_stand_in_files(tmp_path):
 )
 def test_bad_weights_are_one_line(weights, error, said):
     with pytest.raises(error, match=said) as caught:
-        rrtik.weighted(rrtik.load_robot("planar3", radius=0.01), weights)
+        weighted(rrtik.load_robot("planar3", radius=0.01), weights)
     assert "\n" not in str(caught.value)

@@ -68,8 +68,8 @@ def test_each_arm_may_have_its_own_path_constraint(pair):
             "right_grip_point": rrtik.PositionGoal([1.2, -0.7, 0.0]),
         }
     )
-    level = rrtik.on_plane([0.0, 0.0, heights["left_grip_point"]], [0.0, 0.0, 1.0], frame="left_grip_point")
-    straight = rrtik.upright(pair, axis="z", tolerance_deg=5.0, frame="right_grip_point")
+    level = rrtik.constraints.on_plane([0.0, 0.0, heights["left_grip_point"]], [0.0, 0.0, 1.0], frame="left_grip_point")
+    straight = rrtik.constraints.upright(pair, axis="z", tolerance_deg=5.0, frame="right_grip_point")
     problem = rrtik.Problem(rrtik.World(pair), start, goal, constraints=[level, straight])
     plan = rrtik.plan(problem, seed=1)
     assert plan.found, plan.reason

@@ -11,6 +11,7 @@ import rrtik_ompl as rrtik
 from bench.truth.moveit_pairs import CASES, GANTRY, attached, box, pose
 from bench.truth.scenes import pair
 from rrtik_ompl.base.errors import InputError, SceneWarning
+from rrtik_ompl.description.variants import scaled
 from rrtik_ompl.files.sections import parse
 from rrtik_ompl.files.strict_yaml import read_yaml
 from rrtik_ompl.problem_files import moveit_messages
@@ -175,7 +176,7 @@ def test_scales_and_ranges_of_a_robot_are_written_and_read_again(files):
     problem = rrtik.Problem(rrtik.World(robot), [0, 0, 0], [1, 0, 0])
     rrtik.save_problem(problem, files / "p.yaml")
     assert rrtik.load_problem(files / "p.yaml").robot is robot
-    twice = rrtik.scaled(robot, {"tool": 2.0})
+    twice = scaled(robot, {"tool": 2.0})
     assert twice.source["scale"] == {"tool": 6.0}
     assert twice.collision.geometryObjects[0].geometry.radius == pytest.approx(0.06)
 
@@ -183,7 +184,7 @@ def test_scales_and_ranges_of_a_robot_are_written_and_read_again(files):
 def test_a_scaled_mesh_is_larger_about_the_middle_of_its_corners():
     robot = rrtik.load_robot("ur5")
     link = "forearm_link"
-    larger = rrtik.scaled(robot, {link: 1.5})
+    larger = scaled(robot, {link: 1.5})
 
     def extents(arm):
         solids = [item.geometry for item in arm.collision.geometryObjects if arm.link_of(item) == link]

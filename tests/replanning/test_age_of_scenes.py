@@ -13,9 +13,10 @@ from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.model.scene import AttachedObject, ConstantVelocity, Obstacle, Scene, TimedPoses
 from rrtik_ompl.model.shapes import Box, HalfSpace, Sphere
 from rrtik_ompl.motion.trajectory.limits import RateLimits
-from rrtik_ompl.replanning import SpeedWarning, load_run, replan
 from rrtik_ompl.replanning.feed import Snapshot, Stream
-from rrtik_ompl.replanning.travels import MotionTracker
+from rrtik_ompl.replanning.record import load_run
+from rrtik_ompl.replanning.replanner import replan
+from rrtik_ompl.replanning.travels import MotionTracker, SpeedWarning
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
 from rrtik_tests.run_judge import judged

@@ -15,8 +15,10 @@ from rrtik_ompl.model.goal_kind import TaskRegion
 from rrtik_ompl.model.scene import AttachedObject, Obstacle, Scene, TimedPoses
 from rrtik_ompl.model.shapes import Box, HalfSpace, Sphere
 from rrtik_ompl.motion.trajectory.limits import RateLimits
-from rrtik_ompl.replanning import SpeedWarning, load_run, replan
 from rrtik_ompl.replanning.in_time import plan_in_time
+from rrtik_ompl.replanning.record import load_run
+from rrtik_ompl.replanning.replanner import replan
+from rrtik_ompl.replanning.travels import SpeedWarning
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
 from rrtik_tests.moving_plane import OPTIONS, box, crossing, plane

@@ -16,9 +16,12 @@ from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.model.scene import ConstantVelocity, Obstacle, Scene, TimedPoses, Touching
 from rrtik_ompl.model.shapes import Box, HalfSpace, PointCloud
 from rrtik_ompl.problem_files.problem import load_problem
-from rrtik_ompl.replanning import ReplanRun, Tick, load_run, record, replan
+from rrtik_ompl.replanning import record
 from rrtik_ompl.replanning.feed import Snapshot
+from rrtik_ompl.replanning.record import ReplanRun, load_run
+from rrtik_ompl.replanning.replanner import replan
 from rrtik_ompl.replanning.scenario import load_scenario
+from rrtik_ompl.replanning.tick import Tick
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
 from rrtik_tests.moving_plane import OPTIONS, crossing

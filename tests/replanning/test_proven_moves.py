@@ -8,8 +8,9 @@ from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.model.scene import Obstacle, Scene
 from rrtik_ompl.model.shapes import Box, Capsule, Cylinder, HalfSpace, PointCloud, Prism, Sphere
-from rrtik_ompl.replanning import load_run, replan
 from rrtik_ompl.replanning.feed import Snapshot
+from rrtik_ompl.replanning.record import load_run
+from rrtik_ompl.replanning.replanner import replan
 from rrtik_ompl.replanning.travels import MotionTracker
 from rrtik_ompl.world.moving_world import MovingWorld
 from rrtik_ompl.world.world import World

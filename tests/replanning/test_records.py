@@ -7,7 +7,8 @@ import json
 import pytest
 
 from rrtik_ompl.base.errors import InputError
-from rrtik_ompl.replanning import load_run, replan
+from rrtik_ompl.replanning.record import load_run
+from rrtik_ompl.replanning.replanner import replan
 from rrtik_tests.moving_plane import OPTIONS, crossing
 
 

@@ -16,8 +16,10 @@ from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.model.goal import PositionGoal
 from rrtik_ompl.model.scene import ConstantVelocity, Obstacle, Scene, TimedPoses
 from rrtik_ompl.model.shapes import Box, PointCloud, Prism, Sphere
-from rrtik_ompl.replanning import PLANNERS, SpeedWarning, replan
 from rrtik_ompl.replanning.evading import evasion
+from rrtik_ompl.replanning.replanner import replan
+from rrtik_ompl.replanning.settings import PLANNERS
+from rrtik_ompl.replanning.travels import SpeedWarning
 from rrtik_ompl.world.moving_world import MovingWorld
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World

@@ -15,7 +15,8 @@ from rrtik_ompl.description.catalog import find_problem, list_problems, load_rob
 from rrtik_ompl.model.scene import ConstantVelocity, Obstacle, Scene
 from rrtik_ompl.model.shapes import HalfSpace
 from rrtik_ompl.problem_files.problem import load_problem
-from rrtik_ompl.replanning import load_run, replan
+from rrtik_ompl.replanning.record import load_run
+from rrtik_ompl.replanning.replanner import replan
 from rrtik_ompl.replanning.scenario import load_scenario
 from rrtik_ompl.viewer.drawing.robot_picture import node_name
 from rrtik_ompl.viewer.page import page

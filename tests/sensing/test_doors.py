@@ -25,7 +25,7 @@ from rrtik_ompl.sensing.markers.sheets import print_board, print_markers
 from rrtik_ompl.sensing.rig import Rig, detect_in_rig
 from rrtik_ompl.sensing.rig_calibration import calibrate_rig
 from rrtik_ompl.sensing.rig_file import load_rig, pictures_together, save_rig
-from rrtik_ompl.sensing.scene_feed import scene_feed
+from rrtik_ompl.sensing.scene_feed import scenes_of_pictures
 from rrtik_ompl.sensing.scene_from_view import scene_from_image
 from rrtik_ompl.sensing.sensor import Sensor
 from rrtik_ompl.sensing.sight import detect_objects
@@ -64,7 +64,7 @@ def first_pictures(sources):
 
 
 def all_views(*args):
-    return list(scene_feed(*args))
+    return list(scenes_of_pictures(*args))
 
 
 DOORS = {
@@ -116,7 +116,7 @@ DOORS = {
     "read_picture": (read_picture, ["a.png"], {}),
     "save_camera": (save_camera, [CAMERA, "c.yaml"], {}),
     "save_rig": (save_rig, [RIG, "r.yaml"], {}),
-    "scene_feed": (all_views, [[], Sensor(CAMERA, MAP), None], {}),
+    "scenes_of_pictures": (all_views, [[], Sensor(CAMERA, MAP), None], {}),
     "scene_from_image": (scene_from_image, [GRAY, CAMERA, MAP], {"sigmas": 3.0}),
 }
 

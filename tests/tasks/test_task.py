@@ -115,7 +115,7 @@ def test_a_goal_with_several_configurations_is_chosen_so_that_what_follows_works
         branches = rrtik.solve_ik(titan, rrtik.PoseGoal(begin), all=True, world=world, near=np.zeros(6)).solutions
         shift = rng.normal(0.0, 0.2, 3)
         goal = pin.SE3(begin.rotation, begin.translation + shift)
-        ends = [rrtik.straight(world, q, goal).fraction for q in branches]
+        ends = [rrtik.tip.straight(world, q, goal).fraction for q in branches]
         if len(ends) < 2 or ends[0] == 1.0 or max(ends) < 1.0:  # the nearest one fails
             continue
         plan = Task([MoveTo(begin), Straight(by=shift)]).plan(world, np.zeros(6), seed=1)

@@ -83,13 +83,13 @@ def test_the_page_draws_the_regions_of_stages_where_they_begin(served):
 @pytest.mark.kernels
 def test_a_constraint_that_no_goal_keeps_is_the_reason(serving):
     robot = serving.world.robot
-    level = rrtik.upright(robot, tolerance_deg=5.0)
+    level = rrtik.constraints.upright(robot, tolerance_deg=5.0)
     tip = robot.fk(serving.start)
     turned = pin.SE3(tip.rotation @ pin.rpy.rpyToMatrix(0.8, 0.0, 0.0), tip.translation)
     plan = Task([MoveTo(turned, [level])]).plan(serving.world, serving.start, seed=1, seconds=2.0)
     assert not plan.found
     assert "keeps the path constraints" in plan.reason
-    broken = rrtik.on_plane([0.0, 0.0, 1.5], [0.0, 0.0, 1.0])
+    broken = rrtik.constraints.on_plane([0.0, 0.0, 1.5], [0.0, 0.0, 1.0])
     plan = Task([MoveTo("ready", [broken])]).plan(serving.world, serving.start, seed=1)
     assert not plan.found
     assert "start breaks path constraint 1" in plan.reason
@@ -105,7 +105,7 @@ def test_what_is_no_constraint_is_refused(value):
 
 def test_a_frame_that_is_not_there_or_not_held_is_refused_before_the_search(serving):
     robot = serving.world.robot
-    cup, mug = (rrtik.upright(robot, frame=name) for name in ("cup", "mug"))
+    cup, mug = (rrtik.constraints.upright(robot, frame=name) for name in ("cup", "mug"))
     with pytest.raises(InputError, match=r"stage 1 \(MoveTo\).*'mug'"):
         Task([MoveTo("ready", [mug])]).plan(serving.world, serving.start)
     taken = Attach("cup", "panda_hand")
@@ -118,7 +118,7 @@ def test_a_frame_that_is_not_there_or_not_held_is_refused_before_the_search(serv
 def test_a_region_from_the_start_is_written_as_upright_or_not_at_all(serving):
     robot = serving.world.robot
     for axis in ("x", "y", "z"):
-        said = constraint_data(rrtik.upright(robot, axis, tolerance_deg=7.0, frame="cup"))
+        said = constraint_data(rrtik.constraints.upright(robot, axis, tolerance_deg=7.0, frame="cup"))
         assert said["upright"]["axis"] == axis
         assert said["upright"]["tolerance_deg"] == pytest.approx(7.0)
         assert said["frame"] == "cup"

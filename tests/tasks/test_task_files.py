@@ -209,7 +209,7 @@ def test_goals_in_order_are_the_tour_that_python_plans(tmp_path, capsys):
     plan = loaded.task.plan(loaded.world, loaded.start, seed=2)
     assert plan.found, plan.reason
     goals = [np.add(loaded.start, [0.8, 0, 0, 0, 0, 0]), rrtik.PositionGoal([0.3, 0.3, 0.4]), loaded.start]
-    cup = rrtik.upright(loaded.world.robot, "y", tolerance_deg=20.0)
+    cup = rrtik.constraints.upright(loaded.world.robot, "y", tolerance_deg=20.0)
     tour = rrtik.plan_through(loaded.world, loaded.start, goals, constraints=[cup], seed=2)
     rows = [plan.paths[0].waypoints, *(path.waypoints[1:] for path in plan.paths[1:])]
     assert np.array_equal(np.vstack(rows), tour.path.waypoints)

@@ -72,13 +72,13 @@ def test_results_are_lines(problem, plan):
     results = [
         plan,
         rrtik.solve_ik(robot, rrtik.PositionGoal(poses[0][:3, 3], tolerance=0.01)),
-        rrtik.reach_map(robot, samples=500, seed=1),
+        rrtik.ik.reach_map(robot, samples=500, seed=1),
         rrtik.motion_report(rrtik.time_parameterize(plan.path, robot), rrtik.RateLimits.of(robot)),
         rrtik.certificate_of(problem.world, plan.path, 0.0),
         rrtik.Mesh(np.random.default_rng(1).normal(size=(90, 3)), np.arange(90).reshape(30, 3)),
     ]
     ur5 = rrtik.load_robot("ur5")
-    results.append(rrtik.solve_ik_trajectory(ur5, ur5.fk_batch(np.linspace(np.full(6, 0.5), np.full(6, 0.7), 200))))
+    results.append(rrtik.ik.solve_trajectory(ur5, ur5.fk_batch(np.linspace(np.full(6, 0.5), np.full(6, 0.7), 200))))
     for result in results:
         assert "\n" not in repr(result)
         assert len(repr(result)) < 400, repr(result)

@@ -220,7 +220,7 @@ def drifting(time: float) -> rrtik.Scene:
 
 @pytest.mark.parametrize("source", ["stated", "feed"])
 def test_a_run_shows_obstacles_where_they_were_seen(arm: rrtik.Robot, source: str) -> None:
-    motion = rrtik.ConstantVelocity([0.0, 0.1, 0.0])
+    motion = rrtik.replanning.ConstantVelocity([0.0, 0.1, 0.0])
     ball = rrtik.Obstacle("ball", rrtik.Sphere(0.05), rrtik.pose([0.0, -1.0, 0.5]), motion)
     problem = rrtik.Problem(rrtik.World(arm, rrtik.Scene([ball], scene("hand").attached)), [0.0, 0.0], A)
     feed = None if source == "stated" else drifting
@@ -237,10 +237,10 @@ def test_a_run_shows_obstacles_where_they_were_seen(arm: rrtik.Robot, source: st
 
 
 def test_a_run_in_time_shows_obstacles_where_they_are_then(arm: rrtik.Robot) -> None:
-    motion = rrtik.ConstantVelocity([0.0, 0.1, 0.0])
+    motion = rrtik.replanning.ConstantVelocity([0.0, 0.1, 0.0])
     ball = rrtik.Obstacle("ball", rrtik.Sphere(0.05), rrtik.pose([0.0, -1.0, 0.5]), motion)
     problem = rrtik.Problem(rrtik.World(arm, rrtik.Scene([ball], scene("hand").attached)), [0.0, 0.0], A)
-    run = rrtik.plan_in_time(problem, seed=1).run
+    run = rrtik.replanning.plan_in_time(problem, seed=1).run
     assert run is not None
     page = Page.of(subject_of_run(problem, run))
     for number, tick in enumerate(run.ticks):

@@ -29,7 +29,7 @@ def arm() -> rrtik.Robot:
     return rrtik.load_robot("planar3")
 
 
-def ball(motion: rrtik.ConstantVelocity | None = None) -> rrtik.Obstacle:
+def ball(motion: rrtik.replanning.ConstantVelocity | None = None) -> rrtik.Obstacle:
     """A ball where the tip is in the posture IN."""
     return rrtik.Obstacle("ball", rrtik.Sphere(0.04), rrtik.pose(arm().fk(IN).translation), motion)
 
@@ -90,7 +90,9 @@ def of_itself(good: bool) -> Case:
 def of_constraints(good: bool) -> Case:
     robot = rrtik.load_robot("ur5")
     start, goal = np.array([0.0, -1.5, 1.5, -1.57, -1.57, 0.0]), np.array([0.6, -1.5, 1.5, -1.57, -1.57, 0.0])
-    held = rrtik.Problem(rrtik.World(robot), start, goal, constraints=[rrtik.upright(robot, tolerance_deg=5.0)])
+    held = rrtik.Problem(
+        rrtik.World(robot), start, goal, constraints=[rrtik.constraints.upright(robot, tolerance_deg=5.0)]
+    )
     rows = np.array([start, goal] if good else [start, start + 0.8 * np.eye(6)[3], goal])
     path = rrtik.JointPath.of(robot, rows)
     return page(held, path, still=True), {}, path.proved(held.world).proven and not path.violations(held.world)
@@ -140,11 +142,11 @@ def of_task(good: bool) -> Case:
 
 
 def crossed() -> rrtik.Problem:
-    moving = ball(rrtik.ConstantVelocity([0.0, 0.01, 0.0]))
+    moving = ball(rrtik.replanning.ConstantVelocity([0.0, 0.01, 0.0]))
     return rrtik.Problem(rrtik.World(arm(), rrtik.Scene([moving])), FAR, FAR + 0.5)
 
 
-def through_the_ball(run: rrtik.ReplanRun) -> rrtik.ReplanRun:
+def through_the_ball(run: rrtik.replanning.ReplanRun) -> rrtik.replanning.ReplanRun:
     """A record in which the arm has been in the ball for a tick."""
     inside = replace(run.ticks[2], q=IN)
     run.ticks[2] = inside
@@ -159,7 +161,7 @@ def of_run(good: bool) -> Case:
 
 def of_run_in_time(good: bool) -> Case:
     asked = crossed()
-    run = rrtik.plan_in_time(asked, seed=1).run
+    run = rrtik.replanning.plan_in_time(asked, seed=1).run
     return _run_page(asked, run if good else through_the_ball(run))
 
 
@@ -171,7 +173,7 @@ def of_unproven_run(good: bool) -> Case:
     return _run_page(asked, run)
 
 
-def _run_page(asked: rrtik.Problem, run: rrtik.ReplanRun) -> Case:
+def _run_page(asked: rrtik.Problem, run: rrtik.replanning.ReplanRun) -> Case:
     made, proven = run.moves
     return page(asked, run=run), {}, proven == made > 0 and not run.violations(asked)
 
@@ -194,9 +196,9 @@ KINDS: dict[str, tuple[Any, Callable[[bool], Case]]] = {
     "jab between knots": (rrtik.Trajectory, lambda good: of_motion(between_knots(0.6 if good else 1.0))),
     "set points": (rrtik.Trajectory, of_set_points),
     "task": (PlayedTask, of_task),
-    "run": (rrtik.ReplanRun, of_run),
-    "run of which a move is not proven": (rrtik.ReplanRun, of_unproven_run),
-    "run in time": (rrtik.ReplanRun, of_run_in_time),
+    "run": (rrtik.replanning.ReplanRun, of_run),
+    "run of which a move is not proven": (rrtik.replanning.ReplanRun, of_unproven_run),
+    "run in time": (rrtik.replanning.ReplanRun, of_run_in_time),
 }
 
 
@@ -312,7 +314,7 @@ NOT_PLAYED: dict[str, tuple[Callable[[], Any], str]] = {
     "Plan": (lambda: rrtik.plan(problem(), seed=1), "give its path"),
     "PlanThrough": (lambda: rrtik.plan_through(world(), FAR, [NEAR], seed=1), "give its path"),
     "TimedTask": (timed_task, "give its trajectory"),
-    "TimedPlan": (lambda: rrtik.plan_in_time(crossed(), seed=1), "give its run"),
+    "TimedPlan": (lambda: rrtik.replanning.plan_in_time(crossed(), seed=1), "give its run"),
     "Roadmap": (lambda: rrtik.Roadmap(world(), vertices=20), "expected numbers"),
     "Proof": (lambda: world().prove(np.array([FAR, NEAR])), "expected numbers"),
     "Problem": (problem, "expected numbers"),

@@ -168,7 +168,7 @@ def test_constraints_stay(queries):
     robot = queries[0]
     q = np.array([0.0, -1.2, 1.0, 0.2, 0.0, 0.0])
     world = rrtik.World(robot, rrtik.Scene([rrtik.Obstacle("box", rrtik.Box([0.1] * 3), rrtik.pose([2.0, 0, 0.5]))]))
-    region = rrtik.inside(robot.fk(q), [0.2, 0.2, 0.2])
+    region = rrtik.constraints.inside(robot.fk(q), [0.2, 0.2, 0.2])
     problem = rrtik.Problem(world, q, q, constraints=[region])
     moved = problem.world.moved("box", robot.fk(q).translation)
     assert not moved.valid(q)

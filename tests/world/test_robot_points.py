@@ -35,7 +35,7 @@ def test_points_on_the_links_go_and_all_others_stay(name):
     own, around = skin(robot, q, rng), rng.uniform(-1.5, 1.5, (300, 3))
     place = pin.SE3(pin.exp3(rng.normal(size=3)), rng.normal(size=3))
     seen = (np.concatenate([own, around]) - place.translation) @ place.rotation
-    left = rrtik.without_robot(PointCloud(seen, 0.005), robot, q, 0.01, pose=place)
+    left = rrtik.sensing.without_robot(PointCloud(seen, 0.005), robot, q, 0.01, pose=place)
     kept = {tuple(point) for point in left.points.tolist()}
     given = PointCloud(seen, 0.005).points
     assert not any(tuple(point) in kept for point in given[: len(own)].tolist())
@@ -51,6 +51,6 @@ def test_bad_input_is_one_line():
     robot = rrtik.load_robot("planar3")
     cloud = PointCloud([[0.5, 0.0, 0.0]], 0.01)
     with pytest.raises(InputError, match="none of the 1 points is left"):
-        rrtik.without_robot(cloud, robot, np.zeros(3), 0.5)
+        rrtik.sensing.without_robot(cloud, robot, np.zeros(3), 0.5)
     with pytest.raises(InputError, match="margin must not be negative"):
-        rrtik.without_robot(cloud, robot, np.zeros(3), -0.5)
+        rrtik.sensing.without_robot(cloud, robot, np.zeros(3), -0.5)

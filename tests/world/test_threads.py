@@ -144,7 +144,7 @@ def test_inverse_kinematics_of_many_poses_does_not_depend_on_the_number_of_threa
     robot, rng = rrtik.load_robot(name), np.random.default_rng(1)
     poses = robot.fk_batch(rng.uniform(*robot.finite_range(), (700, robot.dof)))
     poses[3, :3, 3] = 9.0
-    one, other = (rrtik.solve_ik_batch(robot, poses, seconds=0.05, threads=n) for n in (1, 2))
+    one, other = (rrtik.solve_ik_many(robot, poses, seconds=0.05, threads=n) for n in (1, 2))
     assert one.reasons == other.reasons
     assert not one.found[3]
     assert one.found.sum() > 600

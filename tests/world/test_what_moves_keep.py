@@ -9,6 +9,7 @@ import pinocchio as pin
 import pytest
 
 import rrtik_ompl as rrtik
+from rrtik_ompl.base.lazy import public_values
 
 KEPT = 0.06  # [m]
 HERE = np.array([0.0, -1.2, 1.4, -0.2, 1.6, 0.0])
@@ -72,7 +73,7 @@ def straight_stage(kept):
 
 
 def steered(kept):
-    servo = rrtik.Servo(kept, near=0.1, kept=0.0)
+    servo = rrtik.following.Servo(kept, near=0.1, kept=0.0)
     rows = [HERE]
     for _ in range(100):
         rows.append(rows[-1] + 0.02 * servo.step(rows[-1], [0.0, 0.2, 0.0, 0.0, 0.0, 0.0], 0.02))
@@ -80,7 +81,7 @@ def steered(kept):
 
 
 def in_time(kept):
-    made = rrtik.plan_in_time(across(kept), seed=1, rate=10.0, limits=LIMITS)
+    made = rrtik.replanning.plan_in_time(across(kept), seed=1, rate=10.0, limits=LIMITS)
     assert made.found, made.reason
     return np.array([tick.q for tick in made.run.ticks])
 
@@ -100,16 +101,16 @@ ACROSS = {  # motions around a post between two configurations
     "replan": lambda kept: np.array([tick.q for tick in rrtik.replan(across(kept), seed=1, step=0.2, rate=10.0).ticks]),
 }
 ALONG = {  # motions of the tip past a post
-    "straight": lambda kept: rrtik.straight(kept, HERE, LINE).path.waypoints,
-    "linear": lambda kept: rrtik.linear(kept, HERE, [LINE]).path.waypoints,
-    "arc": lambda kept: rrtik.arc(kept, HERE, LINE, LINE.translation - [0.01, 0.2, 0.0]).path.waypoints,
-    "screw": lambda kept: rrtik.screw(kept, HERE, LINE).path.waypoints,
+    "straight": lambda kept: rrtik.tip.straight(kept, HERE, LINE).path.waypoints,
+    "linear": lambda kept: rrtik.tip.follow(kept, HERE, [LINE]).path.waypoints,
+    "arc": lambda kept: rrtik.tip.arc(kept, HERE, LINE, LINE.translation - [0.01, 0.2, 0.0]).path.waypoints,
+    "screw": lambda kept: rrtik.tip.screw(kept, HERE, LINE).path.waypoints,
     "Straight": straight_stage,
     "Servo": steered,
 }
 STILL = {  # take a world or a problem, and make no motion
     *("certificate_of", "verify_certificate", "motion_report", "view", "plot_joints", "save_problem", "save_path"),
-    *("GoalSampler", "simple_setup", "space_information", "solve_ik", "solve_ik_batch", "solve_ik_trajectory"),
+    *("GoalSampler", "simple_setup", "space_information", "solve_ik", "solve_ik_many", "solve_trajectory"),
     *(
         "Problem",
         "World",
@@ -166,8 +167,7 @@ def test_without_a_clearance_the_tip_passes_the_post_nearer(verb):
 def test_every_function_that_takes_a_world_or_a_problem_is_looked_at():
     known = {verb.split(",")[0] for verb in (*ACROSS, *ALONG)} | STILL
     taking = set()
-    for name in rrtik.__all__:
-        value = getattr(rrtik, name)
+    for name, value in public_values(rrtik).items():
         if callable(value):
             annotations = {str(each.annotation) for each in inspect.signature(value).parameters.values()}
             if any("World" in each or "Problem" in each for each in annotations):
@@ -177,7 +177,7 @@ def test_every_function_that_takes_a_world_or_a_problem_is_looked_at():
 
 @pytest.mark.parametrize("way", WAYS)
 def test_a_path_that_does_not_keep_it_has_violations(way):
-    near = rrtik.straight(world(BLOCK), HERE, LINE).path
+    near = rrtik.tip.straight(world(BLOCK), HERE, LINE).path
     kept = WAYS[way](world(BLOCK))
     assert near.violations(world(BLOCK)) == ()
     assert near.violations(kept)

@@ -14,7 +14,7 @@ from rrtik_bench.shortening.plane_worlds import PUBLISHED, sampled_route
 from rrtik_bench.shortening.tables import METHODS, STEP
 from rrtik_ompl.model.transitions import route_length
 from rrtik_ompl.planning.shortening.task import Task
-from rrtik_ompl.replanning import ReplanRun
+from rrtik_ompl.replanning.record import ReplanRun
 from rrtik_ompl.replanning.scenario import load_scenario
 from rrtik_ompl.viewer.plots.joints import COLORS, tidy
 

@@ -29,8 +29,8 @@ class RobotLink(Protocol):
     """An arm that takes set points of its joints at a control rate.
 
     Example:
-        >>> arm = rrtik.SimulatedLink(rrtik.load_robot("planar3"), np.zeros(3))
-        >>> isinstance(arm, rrtik.RobotLink)
+        >>> arm = rrtik.following.SimulatedLink(rrtik.load_robot("planar3"), np.zeros(3))
+        >>> isinstance(arm, rrtik.following.RobotLink)
         True
     """
 
@@ -50,8 +50,8 @@ class SimulatedLink:
     Example:
         >>> path = rrtik.JointPath([[0.0, 0.0, 0.0], [0.05, 0.0, 0.0]])
         >>> motion = rrtik.time_parameterize(path, rrtik.RateLimits(2.0, 20.0))
-        >>> arm = rrtik.SimulatedLink(rrtik.load_robot("planar3"), np.zeros(3))
-        >>> rrtik.Follower(motion, arm).run().arrived
+        >>> arm = rrtik.following.SimulatedLink(rrtik.load_robot("planar3"), np.zeros(3))
+        >>> rrtik.following.Follower(motion, arm).run().arrived
         True
     """
 
@@ -96,8 +96,8 @@ class Followed:
     Example:
         >>> path = rrtik.JointPath([[0.0, 0.0, 0.0], [0.05, 0.0, 0.0]])
         >>> motion = rrtik.time_parameterize(path, rrtik.RateLimits(2.0, 20.0))
-        >>> arm = rrtik.SimulatedLink(rrtik.load_robot("planar3"), np.zeros(3))
-        >>> rrtik.Follower(motion, arm).run().arrived
+        >>> arm = rrtik.following.SimulatedLink(rrtik.load_robot("planar3"), np.zeros(3))
+        >>> rrtik.following.Follower(motion, arm).run().arrived
         True
     """
 
@@ -132,7 +132,7 @@ class Follower:
         >>> robot = rrtik.load_robot("planar3")
         >>> path = rrtik.JointPath.of(robot, [[0, 0, 0], [1, 0, 0]])
         >>> motion = rrtik.time_parameterize(path, robot)
-        >>> follower = rrtik.Follower(motion, rrtik.SimulatedLink(robot, path.start))
+        >>> follower = rrtik.following.Follower(motion, rrtik.following.SimulatedLink(robot, path.start))
         >>> while not follower.ended:
         ...     follower.step(0.01)
         >>> follower.result.arrived

@@ -59,7 +59,7 @@ class Servo:
     Example:
         >>> import rrtik_ompl as rrtik
         >>> robot = rrtik.load_robot("panda")
-        >>> servo = rrtik.Servo(rrtik.World(robot), centring=0.5)
+        >>> servo = rrtik.following.Servo(rrtik.World(robot), centring=0.5)
         >>> q = robot.posture("default")
         >>> for _ in range(10):
         ...     q = q + 0.01 * servo.step(q, [0.0, 0.0, 0.1, 0.0, 0.0, 0.0], 0.01)

@@ -94,7 +94,7 @@ class VisualServo:
     Example:
         >>> import rrtik_ompl as rrtik
         >>> robot = rrtik.load_robot("panda")
-        >>> q, leading = robot.posture("default"), VisualServo(rrtik.Servo(rrtik.World(robot)), robot)
+        >>> q, leading = robot.posture("default"), VisualServo(rrtik.following.Servo(rrtik.World(robot)), robot)
         >>> seen = robot.fk(q) * rrtik.pose([0.0, 0.0, 0.02])
         >>> for _ in range(200):
         ...     q = q + 0.02 * leading.step(q, seen, 0.02).rates

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.ik.analytic.closed_form import solutions
-from rrtik_ompl.ik.batch import solve_ik_batch
+from rrtik_ompl.ik.batch import solve_ik_many
 from rrtik_ompl.ik.solve import chosen_method, solve_ik
 from rrtik_ompl.model.goal import PoseGoal, joint_difference
 from rrtik_ompl.model.robot import Robot
@@ -171,7 +171,7 @@ def _postures(
         postures = np.where(closed_form.valid[..., None], closed_form.branches, np.nan)
         reasons = np.where(closed_form.real.any(axis=1), LIMITS, UNREACHABLE)
         return postures, np.where(closed_form.valid.any(axis=1), "", reasons).tolist()
-    batch = solve_ik_batch(robot, poses, near=near, seconds=seconds)
+    batch = solve_ik_many(robot, poses, near=near, seconds=seconds)
     return np.array(batch.q[:, None]), list(batch.reasons)
 
 

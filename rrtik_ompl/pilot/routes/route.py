@@ -16,7 +16,7 @@ import pinocchio as pin
 from rrtik_ompl.base.arrays import Vector
 from rrtik_ompl.base.errors import ProblemError
 from rrtik_ompl.base.poses import apart
-from rrtik_ompl.ik.batch import solve_ik_batch
+from rrtik_ompl.ik.batch import solve_ik_many
 from rrtik_ompl.model.goal import joint_difference
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.scene import Touching
@@ -180,7 +180,7 @@ def _tails(
     if few_moves:
         return few_moves
 
-    approach = solve_ik_batch(world.robot, [stages[0].homogeneous], near=grasp, world=world, seed=seed)
+    approach = solve_ik_many(world.robot, [stages[0].homogeneous], near=grasp, world=world, seed=seed)
     if not approach.found[0]:
         return NoRoute(approach.details[0] or approach.reasons[0] or "not to be reached", "the pose before the object")
 

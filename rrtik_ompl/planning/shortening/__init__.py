@@ -149,7 +149,7 @@ def shorten(
         A path with the same ends, and with its proof. If the input is proven free, so is the result, with the clearance
         if the input has it: motions that are not proven get detours; if that fails, only proven motions are used; if
         that does not help either, the input is returned. The result is not longer than the input (by
-        :func:`rrtik_ompl.weighted` if joints have weights), and a path of single-joint moves has no more moves.
+        ``joint_weights`` if joints have some), and a path of single-joint moves has no more moves.
 
     Raises:
         UnknownNameError: If there is no such method.

@@ -29,7 +29,7 @@ BRANCHES = 16  # configurations at a start pose that are tried
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class StraightResult:
+class TipMotion:
     """The result of a motion of the tip: how far it came, and why it ended.
 
     Attributes:
@@ -40,7 +40,7 @@ class StraightResult:
 
     Example:
         >>> world, q = rrtik.World(rrtik.load_robot("ur5")), np.array([0.0, -1.6, 1.8, -0.2, 1.6, 0.0])
-        >>> far = rrtik.straight(world, q, world.robot.fk(q).translation + [2.0, 0.0, 0.0])
+        >>> far = rrtik.tip.straight(world, q, world.robot.fk(q).translation + [2.0, 0.0, 0.0])
         >>> 0.0 < far.fraction < 1.0, far.reason != ""
         (True, True)
     """
@@ -59,7 +59,7 @@ def straight(
     turn_deviation: float = TURN_DEVIATION,
     clearance: float | None = None,
     seed: int = 0,
-) -> StraightResult:
+) -> TipMotion:
     """Move the tip in a straight line while its axes turn about one axis, as far as the arm can without collision.
 
     The tip stays within the deviations during the motions between waypoints, not only at the waypoints: the deviation
@@ -86,7 +86,7 @@ def straight(
     Example:
         >>> import rrtik_ompl as rrtik
         >>> world = rrtik.World(rrtik.load_robot("ur5"))
-        >>> lift = rrtik.straight(world, [0.0, -1.6, 1.8, -0.2, 1.6, 0.0], [0.45, 0.11, 0.6])
+        >>> lift = rrtik.tip.straight(world, [0.0, -1.6, 1.8, -0.2, 1.6, 0.0], [0.45, 0.11, 0.6])
         >>> lift.fraction, lift.path.proven
         (1.0, True)
     """
@@ -107,7 +107,7 @@ def arc(
     turn_deviation: float = TURN_DEVIATION,
     clearance: float | None = None,
     seed: int = 0,
-) -> StraightResult:
+) -> TipMotion:
     """Move the tip on the circle through a point to a goal; everything else is as for :func:`straight`.
 
     Args:
@@ -128,7 +128,7 @@ def arc(
     Example:
         >>> world, q = rrtik.World(rrtik.load_robot("ur5")), np.array([0.0, -1.6, 1.8, -0.2, 1.6, 0.0])
         >>> here = world.robot.fk(q).translation
-        >>> rrtik.arc(world, q, here + [0.0, 0.1, 0.0], through=here + [0.0, 0.05, 0.05]).fraction
+        >>> rrtik.tip.arc(world, q, here + [0.0, 0.1, 0.0], through=here + [0.0, 0.05, 0.05]).fraction
         1.0
     """
 
@@ -148,7 +148,7 @@ def screw(
     turn_deviation: float = TURN_DEVIATION,
     clearance: float | None = None,
     seed: int = 0,
-) -> StraightResult:
+) -> TipMotion:
     """Move the tip about and along one line of the world at the same time, like a screw, a door or a valve.
 
     Args:
@@ -170,7 +170,7 @@ def screw(
         >>> world, q = rrtik.World(rrtik.load_robot("ur5")), np.array([0.0, -1.6, 1.8, -0.2, 1.6, 0.0])
         >>> valve = world.robot.fk(q)
         >>> valve.rotation = valve.rotation @ np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-        >>> rrtik.screw(world, q, valve).fraction  # a quarter turn about the tip's z axis
+        >>> rrtik.tip.screw(world, q, valve).fraction  # a quarter turn about the tip's z axis
         1.0
     """
 
@@ -180,7 +180,7 @@ def screw(
     return _moved(world, q, rails, deviation, turn_deviation, clearance, seed)
 
 
-def linear(
+def follow(
     world: World,
     q: ArrayLike | str | pin.SE3,
     poses: Sequence[ArrayLike | pin.SE3],
@@ -189,7 +189,7 @@ def linear(
     turn_deviation: float = TURN_DEVIATION,
     clearance: float | None = None,
     seed: int = 0,
-) -> StraightResult:
+) -> TipMotion:
     """Move the tip in straight lines from pose to pose; everything else is as for :func:`straight`.
 
     Args:
@@ -209,7 +209,7 @@ def linear(
     Example:
         >>> world, q = rrtik.World(rrtik.load_robot("ur5")), np.array([0.0, -1.6, 1.8, -0.2, 1.6, 0.0])
         >>> here = world.robot.fk(q).translation
-        >>> rrtik.linear(world, q, [here + [0.0, 0.0, 0.1], here + [0.0, 0.1, 0.1]]).fraction
+        >>> rrtik.tip.follow(world, q, [here + [0.0, 0.0, 0.1], here + [0.0, 0.1, 0.1]]).fraction
         1.0
     """
 
@@ -240,7 +240,7 @@ def _moved(
     turn_deviation: float,
     clearance: float | None,
     seed: int,
-) -> StraightResult:
+) -> TipMotion:
     """Check the arguments, and follow the rails that ``rails`` builds from the pose of the tip at the start.
 
     Args:
@@ -266,7 +266,7 @@ def _moved(
     if way.leads_nowhere(world.robot):
         raise InputError("the tip is at the goal already: there is no line to follow")
     best = farthest(world, way, starts)
-    return StraightResult(path_of(world, best), best.fraction, best.reason)
+    return TipMotion(path_of(world, best), best.fraction, best.reason)
 
 
 def _begin(world: World, q: ArrayLike | str | pin.SE3, seed: int) -> tuple[pin.SE3, Matrix]:

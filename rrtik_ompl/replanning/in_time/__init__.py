@@ -48,7 +48,7 @@ class TimedPlan:
 
     Example:
         >>> scenario = rrtik.load_scenario("replan_planar_arm")
-        >>> plan = rrtik.plan_in_time(scenario.problem, rate=5.0, horizon=0.4)
+        >>> plan = rrtik.replanning.plan_in_time(scenario.problem, rate=5.0, horizon=0.4)
         >>> plan.found, plan.reason.startswith("speeds allow no arrival")
         (False, True)
     """
@@ -121,7 +121,7 @@ def plan_in_time(
 
     Example:
         >>> scenario = rrtik.load_scenario("replan_planar_arm")
-        >>> plan = rrtik.plan_in_time(scenario.problem, rate=5.0, speed=1.6, seed=1)
+        >>> plan = rrtik.replanning.plan_in_time(scenario.problem, rate=5.0, speed=1.6, seed=1)
         >>> plan.found and len(set(plan.run.moves)) == 1  # all moves are proven
         True
     """

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from rrtik_ompl.model.scene import Scene
-from rrtik_ompl.replanning import ReplanRun
 from rrtik_ompl.replanning.feed import Feed
+from rrtik_ompl.replanning.record import ReplanRun
 from rrtik_ompl.world.problem import Problem
 
 

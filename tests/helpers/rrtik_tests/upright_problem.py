@@ -21,4 +21,4 @@ def cup_problem() -> rrtik.Problem:
         rows = rrtik.solve_ik(robot, rrtik.PoseGoal(place), all=True).solutions
         rows = rows[world.valid_batch(rows) & (rows[:, 4] < 0.0)]
         ends.append(rows[np.abs(rows).max(axis=1).argmin()])
-    return rrtik.Problem(world, ends[0], ends[1], constraints=[rrtik.upright(robot)])
+    return rrtik.Problem(world, ends[0], ends[1], constraints=[rrtik.constraints.upright(robot)])

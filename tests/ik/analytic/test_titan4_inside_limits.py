@@ -10,7 +10,7 @@ from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.ik import solve as module
 from rrtik_ompl.ik.analytic.analytic_solver import wrapped
 from rrtik_ompl.ik.analytic.closed_form import form_of, solutions
-from rrtik_ompl.ik.batch import solve_ik_batch
+from rrtik_ompl.ik.batch import solve_ik_many
 from rrtik_ompl.ik.method_interface import IkResponse, Method
 from rrtik_ompl.ik.methods import METHODS
 from rrtik_ompl.ik.solve import solve_ik
@@ -52,7 +52,7 @@ def test_asked_near_the_original_the_original_is_kept(titan, case):
 @pytest.mark.parametrize("case", FAMILIES)
 def test_a_batch_of_a_thousand_poses_is_answered_whole(titan, case, method):
     poses = titan.fk_batch(inside(titan, case, 1_000, seed=2))
-    batch = solve_ik_batch(titan, poses, method=method)
+    batch = solve_ik_many(titan, poses, method=method)
     assert batch.found.all()
     assert titan.within_limits(batch.q, 0.0).all()
     np.testing.assert_allclose(titan.fk_batch(batch.q), poses, rtol=0, atol=1e-7)

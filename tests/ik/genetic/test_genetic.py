@@ -234,7 +234,7 @@ def test_settings_that_make_no_sense_are_refused(field, value):
 
 def test_an_unknown_preset_lists_the_known_ones():
     with pytest.raises(UnknownNameError, match="historical, refined, standard"):
-        rrtik.solve_ik_trajectory(rrtik.load_robot("puma560_3dof"), curve(1) * INCH, method="genetic", options="modern")
+        rrtik.ik.solve_trajectory(rrtik.load_robot("puma560_3dof"), curve(1) * INCH, method="genetic", options="modern")
 
 
 @pytest.mark.parametrize("gray", [True, False])

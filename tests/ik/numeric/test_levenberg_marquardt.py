@@ -9,7 +9,7 @@ import pytest
 import rrtik_ompl as rrtik
 from rrtik_ompl.base.errors import InputError, UnknownNameError
 from rrtik_ompl.description.urdf import robot_from_urdf_text
-from rrtik_ompl.ik.batch import solve_ik_batch
+from rrtik_ompl.ik.batch import solve_ik_many
 from rrtik_ompl.ik.kernel_tables import SEEDS
 from rrtik_ompl.ik.method_interface import mid_range_configuration
 from rrtik_ompl.ik.numeric import descent
@@ -70,7 +70,7 @@ def test_the_kernel_takes_the_same_steps_as_numpy(name, kind):
 def test_every_reachable_pose_is_solved_inside_the_limits(name):
     robot = rrtik.load_robot(name)
     poses = robot.fk_batch(random_rows(robot, 500, seed=3))
-    batch = solve_ik_batch(robot, poses, method="numeric")
+    batch = solve_ik_many(robot, poses, method="numeric")
     assert batch.found.all()
     assert robot.within_limits(batch.q, 0.0).all()
     np.testing.assert_allclose(robot.fk_batch(batch.q), poses, atol=2e-4)
@@ -176,7 +176,7 @@ def test_a_batch_in_a_world_takes_solutions_that_are_free():
     )
     rows = random_rows(robot, 80, seed=7)
     poses = robot.fk_batch(rows[world.valid_batch(rows)])
-    ignorant, aware = solve_ik_batch(robot, poses), solve_ik_batch(robot, poses, world=world)
+    ignorant, aware = solve_ik_many(robot, poses), solve_ik_many(robot, poses, world=world)
     assert not world.valid_batch(ignorant.q).all()
     assert aware.found.all()
     assert world.valid_batch(aware.q).all()
@@ -186,11 +186,11 @@ def test_a_batch_in_a_world_takes_solutions_that_are_free():
 def test_a_batch_takes_any_method_that_fits_and_refuses_the_others():
     robot = rrtik.load_robot("panda")
     poses = robot.fk_batch(random_rows(robot, 2, seed=8))
-    assert solve_ik_batch(robot, poses, method="damped").found.all()
+    assert solve_ik_many(robot, poses, method="damped").found.all()
     with pytest.raises(UnknownNameError, match="numeric"):
-        solve_ik_batch(robot, poses, method="numerical")
+        solve_ik_many(robot, poses, method="numerical")
     with pytest.raises(InputError, match=r"closed-form.*numeric"):
-        solve_ik_batch(robot, poses, method="closed-form")
+        solve_ik_many(robot, poses, method="closed-form")
 
 
 def test_forward_kinematics_of_few_and_of_many_agree():

@@ -5,10 +5,11 @@ import json
 import numpy as np
 import pytest
 
-from rrtik_ompl import Obstacle, Scene, World, load_robot, reach_map
+from rrtik_ompl import Obstacle, Scene, World, load_robot
 from rrtik_ompl.base.errors import InputError, UnknownNameError
 from rrtik_ompl.base.poses import pose
 from rrtik_ompl.cli.app import run
+from rrtik_ompl.ik import reach_map
 from rrtik_ompl.ik.reach import TURNS, load_reach_map
 from rrtik_ompl.ik.singularity import manipulability
 from rrtik_ompl.model.shapes import Box

@@ -21,13 +21,13 @@ def cases(name):
     q = np.random.default_rng(11).uniform(*robot.finite_range())
     T = robot.fk(q)
     sets = [
-        [rrtik.upright(robot, "x")],
-        [rrtik.orientation_of(T, 3.0)],
-        [rrtik.orientation_of(T, [5.0, 10.0, 20.0])],
-        [rrtik.on_plane(T.translation, [0.0, 0.6, 0.8])],
-        [rrtik.on_line(T.translation, [1.0, 0.0, 0.0])],
-        [rrtik.inside(T, [0.1, 0.2, 0.3])],
-        [rrtik.upright(robot), rrtik.on_plane(T.translation, [0.0, 0.0, 1.0])],
+        [rrtik.constraints.upright(robot, "x")],
+        [rrtik.constraints.orientation_of(T, 3.0)],
+        [rrtik.constraints.orientation_of(T, [5.0, 10.0, 20.0])],
+        [rrtik.constraints.on_plane(T.translation, [0.0, 0.6, 0.8])],
+        [rrtik.constraints.on_line(T.translation, [1.0, 0.0, 0.0])],
+        [rrtik.constraints.inside(T, [0.1, 0.2, 0.3])],
+        [rrtik.constraints.upright(robot), rrtik.constraints.on_plane(T.translation, [0.0, 0.0, 1.0])],
     ]
     return robot, q, [held_regions(robot, Scene(), regions, q) for regions in sets]
 

@@ -188,9 +188,9 @@ def test_inverse_kinematics_writes_nothing_beyond_its_memory(name, method, made)
     robot = rrtik.load_robot(name)
     Q = configurations(robot, 2 * WIDTH + 1)
     poses = robot.fk_batch(Q)
-    rrtik.solve_ik_batch(robot, poses[:5], method=method, seconds=20.0)
+    rrtik.solve_ik_many(robot, poses[:5], method=method, seconds=20.0)
     rrtik.solve_ik(robot, rrtik.PoseGoal(poses[0]), method=method, near=Q[0])
-    rrtik.solve_ik_batch(robot, poses, method=method, seconds=20.0)
+    rrtik.solve_ik_many(robot, poses, method=method, seconds=20.0)
     assert made
     assert all(each.intact() for each in made)
 

@@ -17,7 +17,7 @@ DT = 0.02
 
 def leading(method="position", world=None, **options):
     world = rrtik.World(ROBOT) if world is None else world
-    return VisualServo(rrtik.Servo(world), ROBOT, method, T_base_camera=CAMERA, **options)
+    return VisualServo(rrtik.following.Servo(world), ROBOT, method, T_base_camera=CAMERA, **options)
 
 
 def led(made, goal, seconds, q=START):
@@ -106,4 +106,4 @@ def test_wrong_options_are_refused(options, word):
     with pytest.raises(InputError, match=word):
         leading(**options)
     with pytest.raises(InputError, match="T_base_camera"):
-        VisualServo(rrtik.Servo(rrtik.World(ROBOT)), ROBOT, "image")
+        VisualServo(rrtik.following.Servo(rrtik.World(ROBOT)), ROBOT, "image")

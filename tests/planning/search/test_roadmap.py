@@ -148,7 +148,7 @@ def test_a_roadmap_is_saved_and_read_with_all_that_it_knows(tmp_path):
 def test_a_world_with_path_constraints_is_refused_for_a_roadmap_keeps_none(tmp_path):
     free = problem().world
     held = rrtik.Problem(
-        free, problem().start, problem().goal.q, constraints=[rrtik.inside(np.eye(4), [9.0] * 3)]
+        free, problem().start, problem().goal.q, constraints=[rrtik.constraints.inside(np.eye(4), [9.0] * 3)]
     ).world
     made = rrtik.Roadmap(free, vertices=20)
     made.save(tmp_path / "free.npz")

@@ -53,7 +53,7 @@ def test_the_tip_is_on_the_line_between_waypoints_too_and_joints_do_not_jump(nam
     robot = rrtik.load_robot(name)
     moved = 0
     for world, q, begin, end in random_lines(robot, 6, 3):
-        result = rrtik.straight(world, q, end)
+        result = rrtik.tip.straight(world, q, end)
         assert (result.fraction == 1.0) == (result.reason == "")
         if result.path is None:
             assert result.fraction == 0.0
@@ -82,7 +82,7 @@ def test_a_coarser_tolerance_takes_fewer_waypoints_and_is_kept():
     robot = rrtik.load_robot("ur5")
     world, begin = rrtik.World(robot), robot.fk(UR5_READY)
     goal = beside(begin, 0.1, 0.2, -0.1)
-    fine, coarse = (rrtik.straight(world, UR5_READY, goal, deviation=d) for d in (1e-5, 1e-3))
+    fine, coarse = (rrtik.tip.straight(world, UR5_READY, goal, deviation=d) for d in (1e-5, 1e-3))
     assert fine.fraction == coarse.fraction == 1.0
     assert len(fine.path.waypoints) > 3 * len(coarse.path.waypoints)
     direction = (goal - begin.translation) / np.linalg.norm(goal - begin.translation)
@@ -103,7 +103,7 @@ def test_the_end_of_the_reach_is_where_geometry_puts_it():
     direction = np.array([1.0, 0.0, 0.0])
     along = -wrist_at @ direction + np.sqrt((wrist_at @ direction) ** 2 + two**2 - wrist_at @ wrist_at)
     goal = begin.translation + lengths * direction
-    result = rrtik.straight(rrtik.World(robot), q, goal)
+    result = rrtik.tip.straight(rrtik.World(robot), q, goal)
     assert result.fraction * lengths == pytest.approx(along, abs=1e-4)
     assert "reach" in result.reason
 
@@ -114,7 +114,7 @@ def test_a_limit_is_named_and_reached():
     q = np.array([0.0, -1.6, 1.8, -0.2, 1.6, np.pi - 0.2])
     begin = robot.fk(q)
     turn = pin.exp3(begin.rotation[:, 2] * 0.5)  # the last joint's own axis
-    result = rrtik.straight(rrtik.World(robot), q, pin.SE3(turn @ begin.rotation, begin.translation))
+    result = rrtik.tip.straight(rrtik.World(robot), q, pin.SE3(turn @ begin.rotation, begin.translation))
     assert result.fraction == pytest.approx(0.4, abs=1e-4)
     assert result.reason.startswith("limit of joint 'wrist_3_joint'")
     assert result.path.end[5] == pytest.approx(np.pi, abs=1e-4)
@@ -125,7 +125,7 @@ def test_a_singular_posture_is_named_with_its_singular_value(titan):
     robot = rrtik.load_robot("ur5")
     q = np.array([0.0, -1.6, 1.8, -0.2, 1.6, 0.0])
     begin = robot.fk(q)
-    result = rrtik.straight(rrtik.World(robot), q, beside(begin, 2.0, 0.0, 0.0))
+    result = rrtik.tip.straight(rrtik.World(robot), q, beside(begin, 2.0, 0.0, 0.0))
     assert 0.0 < result.fraction < 0.5
     value = float(result.reason.rpartition(" ")[2])
     assert value == pytest.approx(np.linalg.svd(robot.jacobian(result.path.end))[1][-1], rel=0.01)
@@ -139,13 +139,13 @@ def test_an_obstacle_stops_it_just_before_contact_and_the_pair_is_named():
     wall = rrtik.Obstacle("wall", rrtik.Box([0.02, 1.0, 1.0]), rrtik.pose(beside(begin, 0.15, 0.0, 0.0)))
     free, world = rrtik.World(robot), rrtik.World(robot, rrtik.Scene([wall]))
     goal = beside(begin, 0.2, 0.0, 0.0)
-    whole, result = rrtik.straight(free, UR5_READY, goal), rrtik.straight(world, UR5_READY, goal)
+    whole, result = rrtik.tip.straight(free, UR5_READY, goal), rrtik.tip.straight(world, UR5_READY, goal)
     assert whole.fraction == 1.0
     assert 0.0 < result.fraction < 1.0
     assert "wall" in result.reason
     assert result.path.proven
     assert 0.0 < world.clearance(result.path.end) < 1e-3
-    margin = rrtik.straight(world, UR5_READY, goal, clearance=0.02)
+    margin = rrtik.tip.straight(world, UR5_READY, goal, clearance=0.02)
     assert margin.fraction * 0.2 == pytest.approx(result.fraction * 0.2 - 0.02, abs=1e-3)
 
 
@@ -160,8 +160,8 @@ def test_from_a_pose_the_branch_that_comes_farthest_is_taken(titan):
         if len(branches) < 2:
             continue
         goal = begin.translation + rng.normal(0.0, 0.2, 3)
-        each = [rrtik.straight(world, q, goal).fraction for q in branches]
-        chosen = rrtik.straight(world, begin, goal)
+        each = [rrtik.tip.straight(world, q, goal).fraction for q in branches]
+        chosen = rrtik.tip.straight(world, begin, goal)
         assert chosen.fraction == pytest.approx(max(each), abs=1e-9)
         better += max(each) > min(each) + 0.01
 
@@ -171,7 +171,7 @@ def test_an_arc_keeps_its_distance_from_the_centre():
     robot = rrtik.load_robot("ur5")
     begin = robot.fk(UR5_READY)
     through, goal = beside(begin, 0.0, 0.1, 0.1), beside(begin, 0.0, 0.2, 0.0)
-    result = rrtik.arc(rrtik.World(robot), UR5_READY, goal, through)
+    result = rrtik.tip.arc(rrtik.World(robot), UR5_READY, goal, through)
     assert result.fraction == 1.0
     places = dense_poses(robot, result.path)[:, :3, 3]
     centre = beside(begin, 0.0, 0.1, 0.0)
@@ -187,7 +187,7 @@ def test_a_screw_turns_and_slides_in_proportion():
     axis, point = np.array([0.0, 0.0, 1.0]), beside(begin, 0.05, 0.0, 0.0)
     turn = pin.exp3(1.2 * axis)
     goal = pin.SE3(turn @ begin.rotation, point + turn @ (begin.translation - point) + 0.06 * axis)
-    result = rrtik.screw(rrtik.World(robot), UR5_READY, goal)
+    result = rrtik.tip.screw(rrtik.World(robot), UR5_READY, goal)
     assert result.fraction == 1.0
     for pose in dense_poses(robot, result.path):
         turned = pin.log3(pose[:3, :3] @ begin.rotation.T) @ axis
@@ -230,11 +230,11 @@ def test_lines_through_poses_count_by_their_lengths():
     robot = rrtik.load_robot("ur5")
     begin = robot.fk(UR5_READY)
     corners = [begin.translation + offset for offset in ([0.0, 0.1, 0.0], [0.0, 0.1, 0.1], [2.0, 0.1, 0.1])]
-    whole = rrtik.linear(rrtik.World(robot), UR5_READY, corners[:2])
+    whole = rrtik.tip.follow(rrtik.World(robot), UR5_READY, corners[:2])
     assert whole.fraction == 1.0
     places = dense_poses(robot, whole.path)[:, :3, 3]
     assert np.linalg.norm(places - corners[0], axis=1).min() <= 1e-6
-    part = rrtik.linear(rrtik.World(robot), UR5_READY, corners)
+    part = rrtik.tip.follow(rrtik.World(robot), UR5_READY, corners)
     assert np.linalg.norm(robot.fk(part.path.end).translation - corners[1]) == pytest.approx(
         part.fraction * 2.2 - 0.2, abs=1e-3
     )
@@ -246,7 +246,7 @@ def test_a_redundant_arm_gets_on_where_its_first_way_is_stopped():
     robot, gained = rrtik.load_robot("panda"), 0
     for world, q, begin, end in random_lines(robot, 25, 11):
         way = Way((straight_rail(begin, end),), Tolerance(1e-4, np.radians(0.1)), 0.0)
-        alone, result = attempt(world, way, q, centred(robot)).fraction, rrtik.straight(world, q, end).fraction
+        alone, result = attempt(world, way, q, centred(robot)).fraction, rrtik.tip.straight(world, q, end).fraction
         assert result >= alone
         gained += result > alone + 0.01
     assert gained
@@ -271,7 +271,7 @@ def test_bad_input_is_said_in_a_line(change, error, words):
     world = rrtik.World(rrtik.load_robot("ur5_limited"))
     given = {"world": world, "q": UR5_READY, "T_world_goal": [0.4, 0.2, 0.4], **change}
     with pytest.raises(error, match=words) as caught:
-        rrtik.straight(**given)
+        rrtik.tip.straight(**given)
     assert "\n" not in str(caught.value)
 
 
@@ -279,18 +279,18 @@ def test_no_line_no_arc_no_turn():
     robot = rrtik.load_robot("ur5")
     world, begin = rrtik.World(robot), robot.fk(UR5_READY)
     with pytest.raises(InputError, match="at the goal already"):
-        rrtik.straight(world, UR5_READY, begin)
+        rrtik.tip.straight(world, UR5_READY, begin)
     with pytest.raises(InputError, match="at least one pose"):
-        rrtik.linear(world, UR5_READY, [])
+        rrtik.tip.follow(world, UR5_READY, [])
     with pytest.raises(InputError, match="lie on a line"):
-        rrtik.arc(world, UR5_READY, beside(begin, 0.0, 0.2, 0.0), beside(begin, 0.0, 0.1, 0.0))
+        rrtik.tip.arc(world, UR5_READY, beside(begin, 0.0, 0.2, 0.0), beside(begin, 0.0, 0.1, 0.0))
     with pytest.raises(InputError, match=r"turns=1.*goal"):
-        rrtik.screw(world, UR5_READY, beside(begin, 0.0, 0.2, 0.0), turns=1)
+        rrtik.tip.screw(world, UR5_READY, beside(begin, 0.0, 0.2, 0.0), turns=1)
     for turns in (1.5, "one", None, 2_000, 10**400):
         with pytest.raises(InputError, match="turns must be a whole number"):
-            rrtik.screw(world, UR5_READY, beside(begin, 0.0, 0.2, 0.0), turns=turns)
+            rrtik.tip.screw(world, UR5_READY, beside(begin, 0.0, 0.2, 0.0), turns=turns)
     with pytest.raises(InputError, match="6 joints"):
-        rrtik.straight(world, [[1.0, 2.0], [3.0]], begin)
+        rrtik.tip.straight(world, [[1.0, 2.0], [3.0]], begin)
 
 
 @pytest.mark.kernels
@@ -319,5 +319,5 @@ def test_too_few_joints_are_counted(joints, said):
     )
     world = rrtik.World(robot_from_urdf_text(f'<robot name="flat">{links}</robot>'))
     q = np.full(joints, 0.4)
-    result = rrtik.straight(world, q, beside(world.robot.fk(q), 0.0, 0.0, 0.1))
+    result = rrtik.tip.straight(world, q, beside(world.robot.fk(q), 0.0, 0.0, 0.1))
     assert result.reason.startswith(said)
