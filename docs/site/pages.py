@@ -28,6 +28,7 @@ REFERENCE = {
     "Lines of the tip and tasks": ("planning.tip_motion", "tasks"),
     "Trajectories and following": ("motion",),
     "Moving obstacles": ("replanning",),
+    "Cameras": ("sensing", "world.robot_points"),
     "Own OMPL code": ("ompl_bridge",),
     "Errors": ("base.errors",),
 }

@@ -48,7 +48,7 @@ def public_values(package: ModuleType) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for name in vars(package)["__all__"]:
         value = getattr(package, name)
-        if isinstance(value, ModuleType) and value.__name__ == f"{package.__name__}.{name}":
+        if isinstance(value, ModuleType) and "__all__" in vars(value):
             found |= {f"{name}.{inner}": member for inner, member in public_values(value).items()}
         else:
             found[name] = value

@@ -26,7 +26,10 @@ class RegionConstraint(ob.Constraint):  # type: ignore[misc]  # OMPL has no type
         InputError: If it has none.
 
     Example:
-        >>> constraint = RegionConstraint(problem)
+        >>> robot = rrtik.load_robot("ur5")
+        >>> start, kept = [0.0, -1.6, 1.8, -0.2, 1.6, 0.0], [rrtik.constraints.upright(robot)]
+        >>> problem = rrtik.Problem(rrtik.World(robot), start, start, constraints=kept)
+        >>> constraint = rrtik.ompl.RegionConstraint(problem)
         >>> constraint.isSatisfied(problem.start)
         True
     """

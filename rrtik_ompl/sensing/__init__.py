@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from rrtik_ompl.sensing.cameras.camera import Camera as Camera
     from rrtik_ompl.sensing.cameras.pan_tilt_zoom import PanTiltZoom as PanTiltZoom
     from rrtik_ompl.sensing.depth import cloud_from_depth as cloud_from_depth
+    from rrtik_ompl.sensing.markers.marker_map import MarkerMap as MarkerMap
     from rrtik_ompl.sensing.rig import Rig as Rig
     from rrtik_ompl.sensing.rig import detect_in_rig as detect_in_rig
     from rrtik_ompl.sensing.rig_calibration import calibrate_rig as calibrate_rig
@@ -32,6 +33,7 @@ else:
         "sensing.cameras.camera": ("Camera",),
         "sensing.cameras.pan_tilt_zoom": ("PanTiltZoom",),
         "sensing.depth": ("cloud_from_depth",),
+        "sensing.markers.marker_map": ("MarkerMap",),
         "sensing.rig": (
             "Rig",
             "detect_in_rig",

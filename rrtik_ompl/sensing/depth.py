@@ -43,8 +43,8 @@ def cloud_from_depth(
 
     Example:
         >>> import numpy as np
-        >>> camera = Camera([[100.0, 0.0, 1.0], [0.0, 100.0, 1.0], [0.0, 0.0, 1.0]], 3, 3)
-        >>> cloud_from_depth(np.full((3, 3), 2.0), camera).points[0].tolist()
+        >>> camera = rrtik.sensing.Camera([[100.0, 0.0, 1.0], [0.0, 100.0, 1.0], [0.0, 0.0, 1.0]], 3, 3)
+        >>> rrtik.sensing.cloud_from_depth(np.full((3, 3), 2.0), camera).points[0].tolist()
         [-0.019999999552965164, -0.019999999552965164, 2.0]
     """
     require(camera, Camera, "camera", "use load_camera(file)")

@@ -42,7 +42,9 @@ def test_every_room_of_the_ladder_has_a_row_in_the_architecture():
     ladder = next(contract["layers"] for contract in contracts if contract["id"] == "ladder")
     rooms = [room for floor in ladder for room in re.findall(r"\w+", floor)]
     rows = re.findall(r"^\| `(\w+)/`", (ROOT / "ARCHITECTURE.md").read_text(), re.MULTILINE)
-    assert [room for room in rows if room in rooms] == rooms[::-1]
+    public_modules = {"following", "ompl", "tip"}  # lists of names, in one row
+
+    assert [room for room in rows if room in rooms] == [room for room in rooms[::-1] if room not in public_modules]
 
 
 @pytest.mark.parametrize(

@@ -17,6 +17,8 @@ PUBLIC = public_values(rrtik)
 OURS = ("rrtik_ompl", "rrtik_planners", "rrtik_robots")
 KEPT_WITH_ROBOTS = {"Body"}  # of links: caches keep those of some robots; the last test bounds these
 REACH = "robot = rrtik.load_robot('planar3')"
+CAMERA = "camera = rrtik.sensing.Camera([[900, 0, 320], [0, 900, 240], [0, 0, 1]], 640, 480)"
+MARKER_MAP = "marker_map = rrtik.sensing.MarkerMap('DICT_4X4_50', [], rrtik.pose())"
 SHORT_OF_AN_EXAMPLE = {
     "AttachedObject": "rrtik.AttachedObject('tool', 'link3', rrtik.Box([0.1, 0.1, 0.1]))",
     "replanning.ConstantVelocity": "rrtik.replanning.ConstantVelocity([0.1, 0, 0])",
@@ -35,6 +37,12 @@ SHORT_OF_AN_EXAMPLE = {
     "ompl.BenchmarkNotes": "from ompl import tools\n"
     "setup = rrtik.ompl.simple_setup(rrtik.load_problem('planar3_boxes'))\n"
     "rrtik.ompl.BenchmarkNotes(tools.Benchmark(setup))",
+    "ompl.SafePlanner": "rrtik.plan(rrtik.load_problem('planar3_boxes'), 'fastrrtconnect', seed=1)",
+    "ompl.SearchResult": "rrtik.ompl.SearchResult(np.zeros((2, 3)))",
+    "sensing.Camera": CAMERA,
+    "sensing.MarkerMap": f"{CAMERA}\n{MARKER_MAP}",
+    "sensing.Rig": f"{CAMERA}\nrrtik.sensing.Rig([camera, camera], [rrtik.pose(), rrtik.pose([0.1, 0, 0])])",
+    "sensing.Sensor": f"{CAMERA}\n{MARKER_MAP}\nrrtik.sensing.Sensor(camera, marker_map)",
     "Trajectory": f"{REACH}\npath = rrtik.JointPath.of(robot, [[0, 0, 0], [0, 1, 0]])\n"
     "rrtik.time_parameterize(path, rrtik.RateLimits(1.0, 2.0, 20.0))",
 }

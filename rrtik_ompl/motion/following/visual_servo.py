@@ -94,7 +94,8 @@ class VisualServo:
     Example:
         >>> import rrtik_ompl as rrtik
         >>> robot = rrtik.load_robot("panda")
-        >>> q, leading = robot.posture("default"), VisualServo(rrtik.following.Servo(rrtik.World(robot)), robot)
+        >>> servo = rrtik.following.Servo(rrtik.World(robot))
+        >>> q, leading = robot.posture("default"), rrtik.following.VisualServo(servo, robot)
         >>> seen = robot.fk(q) * rrtik.pose([0.0, 0.0, 0.02])
         >>> for _ in range(200):
         ...     q = q + 0.02 * leading.step(q, seen, 0.02).rates

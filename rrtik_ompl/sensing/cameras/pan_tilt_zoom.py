@@ -50,8 +50,8 @@ class PanTiltZoom:
         InputError: If there is no camera, sizes differ, or zooms do not increase.
 
     Example:
-        >>> lens = Camera([[880.0, 0.0, 320.0], [0.0, 880.0, 240.0], [0.0, 0.0, 1.0]], 640, 480)
-        >>> head = PanTiltZoom([lens], [0.0], pin.SE3.Identity(), pin.SE3.Identity())
+        >>> lens = rrtik.sensing.Camera([[880.0, 0.0, 320.0], [0.0, 880.0, 240.0], [0.0, 0.0, 1.0]], 640, 480)
+        >>> head = rrtik.sensing.PanTiltZoom([lens], [0.0], rrtik.pose(), rrtik.pose())
         >>> head.pose(np.pi / 2, 0.0).rotation.round(6)[:, 0].tolist()
         [0.0, 1.0, 0.0]
     """
