@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Protocol, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -24,14 +24,6 @@ from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
 
 FINGER_DIGITS = 6
-
-
-class HasWorld(Protocol):
-    """A problem, or another value with a world."""
-
-    @property
-    def world(self) -> World:
-        """Robot and scene."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -147,7 +139,7 @@ class Shown:
     contacts: tuple[PathContact, ...] = ()
 
 
-Showable: TypeAlias = HasWorld | Shown | World | Robot | Scene
+Showable: TypeAlias = Problem | Shown | World | Robot | Scene
 ShownPath: TypeAlias = JointPath | Trajectory | ArrayLike
 
 

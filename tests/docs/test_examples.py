@@ -2,22 +2,20 @@
 
 import ast
 import json
-import re
 import runpy
-from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[2]
+from rrtik_tests.pages import EXAMPLES, NOTEBOOKS, blocks_of
+from rrtik_tests.places import ROOT
+
 LONGEST = 40  # lines
-EXAMPLES = sorted(file for file in (ROOT / "examples").glob("*.py") if not file.stem.startswith("follow_"))
-NOTEBOOKS = sorted((ROOT / "examples" / "notebooks").glob("*.ipynb"))
+ALONE = [file for file in EXAMPLES if not file.stem.startswith("follow_")]  # those need a robot
 TUTORIALS = sorted((ROOT / "docs" / "tutorials").glob("*.md"))
-CODE = re.compile(r"^```python\n(.*?)^```", re.MULTILINE | re.DOTALL)
 
 
 @pytest.mark.kernels
-@pytest.mark.parametrize("file", EXAMPLES, ids=lambda file: file.stem)
+@pytest.mark.parametrize("file", ALONE, ids=lambda file: file.stem)
 def test_an_example_is_short_and_runs(file, tmp_path, monkeypatch, capsys, quiet_ompl):
     assert len(file.read_text().splitlines()) <= LONGEST
     monkeypatch.chdir(tmp_path)
@@ -29,7 +27,7 @@ def test_an_example_is_short_and_runs(file, tmp_path, monkeypatch, capsys, quiet
 @pytest.mark.parametrize("file", TUTORIALS, ids=lambda file: file.stem)
 def test_the_code_of_a_tutorial_runs_from_top_to_bottom(file, tmp_path, monkeypatch, quiet_ompl):
     monkeypatch.chdir(tmp_path)
-    blocks = CODE.findall(file.read_text())
+    blocks = blocks_of(file.read_text())
     assert blocks
     names = {}
     for block in blocks:
@@ -37,7 +35,7 @@ def test_the_code_of_a_tutorial_runs_from_top_to_bottom(file, tmp_path, monkeypa
 
 
 def test_there_are_fifteen_examples():
-    assert len(EXAMPLES) >= 15
+    assert len(ALONE) >= 15
 
 
 def shown_by(cell, names):

@@ -18,6 +18,7 @@ from rrtik_ompl.ik.solve import solve_ik
 from rrtik_ompl.model.path import load_path
 from rrtik_ompl.problem_files.problem import load_problem
 from rrtik_ompl.problem_files.run import RunSection
+from rrtik_tests.pages import blocks_of
 from rrtik_tests.places import ROOT
 
 LIBRARY = ROOT / "rrtik_ompl"
@@ -28,7 +29,7 @@ FEWEST_WORDS, MOST_WORDS = 900, 1200
 
 
 def blocks(page, language):
-    return re.findall(rf"^```{language}\n(.*?)^```", PAGES[page], re.MULTILINE | re.DOTALL)
+    return blocks_of(PAGES[page], language)
 
 
 # --- README ------------------------------------------------------------------------------------------------------
@@ -105,7 +106,7 @@ HEADINGS += ["A shortening method"]
 @pytest.mark.parametrize("heading", HEADINGS)
 def test_an_example_of_contributing_runs_as_it_stands(heading, tmp_path, monkeypatch, quiet_ompl):
     _, _, section = PAGES["CONTRIBUTING"].partition(f"### {heading}\n")
-    (example,) = re.findall(r"^```python\n(.*?)^```", section.partition("\n### ")[0], re.MULTILINE | re.DOTALL)
+    (example,) = blocks_of(section.partition("\n### ")[0])
     monkeypatch.chdir(tmp_path)
     exec(compile(example, heading, "exec"), {"__name__": "example"})
 
