@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from rrtik_ompl import sensing as sensing
     from rrtik_ompl import tip as tip
     from rrtik_ompl.base.errors import InputError as InputError
+    from rrtik_ompl.base.errors import NotFoundError as NotFoundError
     from rrtik_ompl.base.errors import PlannerError as PlannerError
     from rrtik_ompl.base.errors import ProblemError as ProblemError
     from rrtik_ompl.base.errors import RrtikError as RrtikError
@@ -108,6 +109,7 @@ else:
     _HOMES = {
         "base.errors": (
             "InputError",
+            "NotFoundError",
             "PlannerError",
             "ProblemError",
             "RrtikError",

@@ -123,6 +123,17 @@ class PlannerError(RrtikError):
     """
 
 
+class NotFoundError(RrtikError):
+    """What was searched for was not found: raised by ``require()`` of a result, with the reason of the result.
+
+    Example:
+        >>> robot = rrtik.load_robot("ur5")
+        >>> rrtik.solve_ik(robot, rrtik.PositionGoal([9.0, 0.0, 0.0])).require()
+        Traceback (most recent call last):
+        rrtik_ompl.base.errors.NotFoundError: no configuration: unreachable: ...
+    """
+
+
 def require(value: object, kind: type | UnionType, what: str, remedy: str = "") -> None:
     """Refuse an argument that is not of the required type, or of one of several types.
 

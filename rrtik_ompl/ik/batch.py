@@ -12,7 +12,7 @@ from rrtik_ompl.base.arrays import Mask, Matrix, Vector, finite_array, frozen, n
 from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.choices import IkMethod
 from rrtik_ompl.base.copies import as_value, in_one_line
-from rrtik_ompl.base.errors import require
+from rrtik_ompl.base.errors import NotFoundError, require
 from rrtik_ompl.description.joint_weights import weighted_difference
 from rrtik_ompl.ik.analytic.branches import tip_residuals
 from rrtik_ompl.ik.analytic.closed_form import branches_of, check_poses, form_of
@@ -31,7 +31,7 @@ LEAST_SHARE = 256  # least number of poses of a thread: fewer take less time tha
 
 @dataclass(frozen=True, slots=True, eq=False)
 class IkBatch:
-    """The solutions for an array of m poses, one row for each.
+    """The solutions for an array of m poses: an array of results, with one row for each.
 
     Attributes:
         q: Solutions, shape (m, dof): by a closed form the nearest to the given configuration, by another method the
@@ -41,6 +41,7 @@ class IkBatch:
             solution.
         reasons: Why there is no solution, see `IkResult`; "" where there is one.
         details: Each reason as a line: by how much, which joint, what touches.
+        seconds: Time taken for all [s].
 
     Example:
         >>> robot = rrtik.load_robot("ur5")
@@ -54,9 +55,28 @@ class IkBatch:
     residuals: Matrix
     reasons: tuple[str, ...]
     details: tuple[str, ...]
+    seconds: float
 
     __reduce__ = as_value
     __repr__ = in_one_line
+
+    def require(self) -> Matrix:
+        """Return the solutions of all poses, shape (m, dof).
+
+        Raises:
+            NotFoundError: If a pose has none.
+
+        Example:
+            >>> robot = rrtik.load_robot("ur5")
+            >>> rrtik.solve_ik_many(robot, robot.fk_batch(np.full((3, 6), 0.4))).require().shape
+            (3, 6)
+        """
+        missing = np.flatnonzero(~self.found)
+        if not len(missing):
+            return self.q
+        first = missing[0]
+        what = f"{len(missing)} of {len(self.q)} poses have no configuration"
+        raise NotFoundError(f"{what}; pose {first}: {self.reasons[first]}: {self.details[first]}")
 
 
 def solve_ik_many(
@@ -92,6 +112,7 @@ def solve_ik_many(
         >>> rrtik.solve_ik_many(robot, robot.fk_batch(rows)).q.shape
         (50, 7)
     """
+    budget = Budget()
     check_world(world, robot)
     require(method, str, "method of inverse kinematics", "see list_methods()")
     load_kernels(robot)
@@ -104,11 +125,12 @@ def solve_ik_many(
 
     share = max(LEAST_SHARE, -(-len(targets) // count))
     how = partial(_solved, robot, targets, method, posture, world, limit, first_seed)
-    found = in_threads(how, [slice(k, k + share) for k in range(0, max(len(targets), 1), share)], count)
+    parts = in_threads(how, [slice(k, k + share) for k in range(0, max(len(targets), 1), share)], count)
 
-    q, residuals = (np.concatenate([each[k] for each in found]) for k in (0, 1))
-    reasons, details = (tuple(line for each in found for line in each[k]) for k in (2, 3))
-    return IkBatch(frozen(q), frozen(~np.isnan(q[:, 0]), bool), frozen(residuals), reasons, details)
+    q, residuals = (np.concatenate([each[k] for each in parts]) for k in (0, 1))
+    reasons, details = (tuple(line for each in parts for line in each[k]) for k in (2, 3))
+    found = frozen(~np.isnan(q[:, 0]), bool)
+    return IkBatch(frozen(q), found, frozen(residuals), reasons, details, budget.elapsed)
 
 
 def _solved(

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,7 @@ from rrtik_ompl.base.choices import IkMethod
 from rrtik_ompl.base.copies import as_value, in_one_line
 from rrtik_ompl.description.joint_weights import weighted_difference
 from rrtik_ompl.model.goal import Target, TipGoal, has_continuous, joint_difference
+from rrtik_ompl.model.result import required
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.world.world import World
 
@@ -124,6 +126,25 @@ class IkResult:
     def found(self) -> bool:
         """Whether there is a solution."""
         return len(self.solutions) > 0
+
+    @property
+    def statistics(self) -> Mapping[str, Any]:
+        """The method and its number of iterations."""
+        return {"method": self.method, "iterations": self.iterations}
+
+    def require(self) -> Vector:
+        """Return the best configuration, shape (dof,): the nearest one.
+
+        Raises:
+            NotFoundError: If there is none.
+
+        Example:
+            >>> robot = rrtik.load_robot("ur5")
+            >>> rrtik.solve_ik(robot, robot.fk(robot.posture("up"))).require().shape
+            (6,)
+        """
+        best = self.solutions[0] if self.found else None
+        return required(best, "no configuration", f"{self.reason}: {self.detail}")
 
     def nearest(self) -> IkResult:
         """Return the result with only its nearest solution."""

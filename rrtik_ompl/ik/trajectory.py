@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import get_args
+from typing import Any, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -25,6 +25,7 @@ from rrtik_ompl.ik.methods import METHODS, load_kernels
 from rrtik_ompl.ik.numeric.track import Tracker
 from rrtik_ompl.ik.solve import free_of_collision, solve_ik
 from rrtik_ompl.model.goal import GoalSet, PoseGoal, PositionGoal, Target, TipGoal, joint_difference
+from rrtik_ompl.model.result import required
 from rrtik_ompl.model.robot import Robot, inside_limits
 from rrtik_ompl.world.world import World, check_world
 
@@ -69,6 +70,36 @@ class IkTrajectory:
     def found(self) -> bool:
         """Whether every point has a configuration."""
         return not any(self.reasons)
+
+    @property
+    def reason(self) -> str:
+        """Why the first point without a configuration has none; "" if all have one."""
+        return next(filter(None, self.reasons), "")
+
+    @property
+    def statistics(self) -> Mapping[str, Any]:
+        """The method, its iterations, and the numbers of points without a configuration, of jumps and blocked ones."""
+        return {
+            "method": self.method,
+            "iterations": self.iterations,
+            "missing": sum(map(bool, self.reasons)),
+            "jumps": len(self.jumps),
+            "blocked": len(self.blocked),
+        }
+
+    def require(self) -> Matrix:
+        """Return the configurations, shape (k, dof).
+
+        Raises:
+            NotFoundError: If a point has none.
+
+        Example:
+            >>> robot = rrtik.load_robot("ur5")
+            >>> points = np.linspace([0.4, 0.1, 0.4], [0.4, 0.3, 0.4], 5)
+            >>> rrtik.ik.solve_trajectory(robot, points).require().shape
+            (5, 6)
+        """
+        return required(self.q if self.found else None, "no configurations for the whole trajectory", self.detail)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -11,12 +11,15 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from rrtik_ompl.base.arrays import Matrix, dimensions, not_negative, positive, whole_number
+from rrtik_ompl.base.budget import Budget
+from rrtik_ompl.base.copies import in_one_line
 from rrtik_ompl.base.errors import InputError, listed, require
 from rrtik_ompl.base.poses import rigid
 from rrtik_ompl.base.units import DEGREE
 from rrtik_ompl.ik.solve import solve_ik
 from rrtik_ompl.model.goal import PoseGoal
 from rrtik_ompl.model.path import JointPath
+from rrtik_ompl.model.result import required
 from rrtik_ompl.planning.tip_motion.attempts import Way, farthest, path_of
 from rrtik_ompl.planning.tip_motion.following import Tolerance
 from rrtik_ompl.planning.tip_motion.rails import Rail, arc_rail, screw_rail, straight_rail
@@ -37,6 +40,8 @@ class TipMotion:
         fraction: Share of the way that the path covers, from 0 to 1.
         reason: Why it ends there: a joint at its limit, a singular posture, the bodies in contact; "" if it is
             complete.
+        seconds: Wall time taken [s].
+        statistics: "starts", the number of start configurations, and "attempts", how many ways were tried from them.
 
     Example:
         >>> world, q = rrtik.World(rrtik.load_robot("ur5")), np.array([0.0, -1.6, 1.8, -0.2, 1.6, 0.0])
@@ -48,6 +53,34 @@ class TipMotion:
     path: JointPath | None
     fraction: float
     reason: str
+    seconds: float
+    statistics: Mapping[str, int]
+
+    __repr__ = in_one_line
+
+    @property
+    def found(self) -> bool:
+        """Whether the path covers the whole way."""
+        return self.fraction == 1.0
+
+    @property
+    def proven(self) -> bool | None:
+        """Whether the path is proven free, as it always is; None without a path."""
+        return None if self.path is None else self.path.proven
+
+    def require(self) -> JointPath:
+        """Return the path of the whole way.
+
+        Raises:
+            NotFoundError: If it ends before.
+
+        Example:
+            >>> world = rrtik.World(rrtik.load_robot("ur5"))
+            >>> rrtik.tip.straight(world, [0.0, -1.6, 1.8, -0.2, 1.6, 0.0], [0.45, 0.11, 0.6]).require().proven
+            True
+        """
+        came = f"the tip came {100.0 * self.fraction:.3g} % of its way"
+        return required(self.path if self.found else None, came, self.reason)
 
 
 def straight(
@@ -252,6 +285,7 @@ def _moved(
         clearance: Clearance from every obstacle on top of its margin [m].
         seed: Seed of the random numbers.
     """
+    budget = Budget()
     tolerance = Tolerance(positive(deviation, "deviation"), positive(turn_deviation, "turn_deviation"))
     if tolerance.turn > 1.0:
         raise InputError(f"turn_deviation must be 1 rad at most, got {tolerance.turn:g}; is it in radians?")
@@ -266,7 +300,8 @@ def _moved(
     if way.leads_nowhere(world.robot):
         raise InputError("the tip is at the goal already: there is no line to follow")
     best = farthest(world, way, starts)
-    return TipMotion(path_of(world, best), best.fraction, best.reason)
+    counts = {"starts": len(starts), "attempts": best.attempts}
+    return TipMotion(path_of(world, best), best.fraction, best.reason, budget.elapsed, counts)
 
 
 def _begin(world: World, q: ArrayLike | str | pin.SE3, seed: int) -> tuple[pin.SE3, Matrix]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -80,12 +80,14 @@ class Attempt:
         proof: Their proof, or None.
         fraction: Share of the way that they cover, from 0 to 1.
         reason: Why they end there; "" if they cover the whole way.
+        attempts: Number of attempts of which this is the best.
     """
 
     rows: Matrix
     proof: Proof | None
     fraction: float
     reason: str
+    attempts: int = 1
 
     @property
     def length(self) -> float:
@@ -104,9 +106,11 @@ def farthest(world: World, way: Way, starts: Matrix) -> Attempt:
         starts: Shape (k, dof), at least one.
     """
     best: Attempt | None = None
+    attempts = 0
     for q in starts:
         for leaning in leanings(world, way, q):
             found = attempt(world, way, q, leaning)
+            attempts += 1
             if best is None or (found.fraction, -found.length) > (best.fraction, -best.length):
                 best = found
             if found.fraction == 1.0:
@@ -114,7 +118,7 @@ def farthest(world: World, way: Way, starts: Matrix) -> Attempt:
         if best is not None and best.fraction == 1.0 and redundant(world.robot):
             break
     assert best is not None, "there is at least one start"
-    return best
+    return replace(best, attempts=attempts)
 
 
 def leanings(world: World, way: Way, q: Vector) -> Iterator[Leaning]:
