@@ -6,14 +6,10 @@ import csv
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from io import StringIO
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rrtik_ompl.benchmark.run import NOT_FOUND, SOLVED
 from rrtik_ompl.benchmark.statistics import QUANTITIES, Result, Spread
-
-if TYPE_CHECKING:
-    from rich.table import Table as RichTable
-
 
 OVERVIEW = (
     *("problem", "planner", "solved / valid / total", "planning, median / 95 % [s]", "shortening [s]"),
@@ -38,17 +34,6 @@ def overview(results: Iterable[Result]) -> list[tuple[str, ...]]:
         )
         for result in results
     ]
-
-
-def terminal_table(results: Iterable[Result]) -> RichTable:
-    """Return the overview as a table of rich."""
-    from rich import box
-    from rich.table import Table
-
-    table = Table(*OVERVIEW, box=box.SIMPLE_HEAD, pad_edge=False)
-    for row in overview(results):
-        table.add_row(*row)
-    return table
 
 
 def markdown(results: Sequence[Result], head: Mapping[str, Any]) -> str:

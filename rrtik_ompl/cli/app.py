@@ -12,7 +12,7 @@ from typing import Annotated, Any
 
 import typer
 
-from rrtik_ompl.base.errors import RrtikError, printable
+from rrtik_ompl.base.errors import RrtikError
 from rrtik_ompl.cli import BAD_INPUT, FOUND, INTERRUPTED, NOT_FOUND
 from rrtik_ompl.cli.bench import bench
 from rrtik_ompl.cli.check import check
@@ -26,7 +26,7 @@ from rrtik_ompl.cli.reach import reach
 from rrtik_ompl.cli.replan import replan_scenario
 from rrtik_ompl.cli.reproduce import reproduce
 from rrtik_ompl.cli.task import straight, task
-from rrtik_ompl.cli.terminal import drop_output, prepare_terminal, say, stoppable
+from rrtik_ompl.cli.terminal import drop_output, note, prepare_terminal, say, stoppable
 from rrtik_ompl.cli.trust import with_trust
 from rrtik_ompl.files.tables import FORMATS as PATH_FORMATS
 from rrtik_ompl.files.text import check_target
@@ -191,7 +191,7 @@ def run(arguments: list[str] | None = None) -> int:
     except UsageError as error:
         return _usage(error.format_message(), getattr(error, "ctx", None), given)
     except (KeyboardInterrupt, typer.Abort):
-        print("rrtik: interrupted; no file is half-written", file=sys.stderr)
+        note("interrupted; no file is half-written")
         return INTERRUPTED
     except (BrokenPipeError, SystemExit):  # the reader has closed the pipe; typer converts that to an exit
         drop_output()
@@ -211,7 +211,7 @@ def _complete() -> int:
 
 
 def _fail(message: str) -> int:
-    print(f"rrtik: {printable(message)}", file=sys.stderr)
+    note(message)
     return BAD_INPUT
 
 

@@ -11,6 +11,7 @@ from typing import Annotated, Any
 import typer
 
 from rrtik_ompl.cli import FOUND, NOT_FOUND
+from rrtik_ompl.cli.table import Table
 from rrtik_ompl.cli.terminal import counter, note, progress, say, suggest
 
 
@@ -38,7 +39,7 @@ def bench(
     from rrtik_ompl.benchmark.report import write_report
     from rrtik_ompl.benchmark.statistics import always_refused
     from rrtik_ompl.benchmark.suite import load_suite
-    from rrtik_ompl.benchmark.tables import failures, terminal_table
+    from rrtik_ompl.benchmark.tables import OVERVIEW, failures, overview
     from rrtik_ompl.kernels import warm_up
 
     campaign = load_suite(suite, folder=problems, runs=runs)
@@ -70,7 +71,10 @@ def bench(
         print(json.dumps({"runs": total, "outcomes": dict(outcomes), "files": [str(each) for each in files]}))
     else:
         counts = ", ".join(f"{number} {status}" for status, number in outcomes.items())
-        say(terminal_table(results), f"this round: {counts or 'no runs were left'}")
+        table = Table(*OVERVIEW, right=range(2, len(OVERVIEW)))
+        for row in overview(results):
+            table.add_row(*row)
+        say(table, f"this round: {counts or 'no runs were left'}")
         say(*(f"{problem}, {planner}: {number} x {why}" for problem, planner, number, why in failures(results)))
         say(*(f"wrote {each}" for each in files))
         suggest(*(f"open {each}" for each in files if each.suffix == ".html"))

@@ -238,15 +238,14 @@ def _one(given: Setting, goal: TipGoal, everything: bool, common: dict[str, Any]
         checked = world if world is not None and world.scene.obstacles else None
         clearances = [] if checked is None else [checked.clearance(q) for q in result.solutions]
         more = f" and {sum(turns)} more by full turns of joints" if any(turns) else ""
-        say(
-            f"{robot.name}, {result.method}: {plural(len(result.solutions), 'solution')}{more}, {_milliseconds(result)}"
-        )
+        count = f"{plural(len(result.solutions), 'solution')}{more}, {_milliseconds(result)}"
+        off = ik_report.off_words(result.residuals)
+        say(f"{ik_report.robot_words(robot)}, {result.method}: {count}, {off}")
         say(ik_report.solutions_table(robot, result, names, turns, clearances, MAX_ROWS))
         say(*_more(len(result.solutions)))
 
     if not result.found and not output.as_json:
-        tell = note if output.as_csv else say
-        tell(f"{robot.name}, {result.method}: no solution, {result.reason}: {result.detail}")
+        note(f"{robot.name}, {result.method}: no solution, {result.reason}: {result.detail}")
     if result.found:
         _draw(given, goal, result.solutions, output)
     return FOUND if result.found else NOT_FOUND
@@ -279,7 +278,7 @@ def _many(
         q, residuals, reasons, details, notes, line = solve(robot, rows, tolerances, common)
 
     found = sum(not reason for reason in reasons)
-    line += next((f"; no. {k + 1}: {detail}" for k, detail in enumerate(details) if detail), "")
+    why = next((f"; no. {k + 1}: {detail}" for k, detail in enumerate(details) if detail), "")
 
     if output.as_json:
         more = {"jumps": [k for k, note in enumerate(notes) if "jump" in note]} if trajectory else {}
@@ -288,8 +287,9 @@ def _many(
         print(ik_report.rows_csv(robot, q, residuals, reasons, notes), end="")
     else:
         shown = slice(MAX_ROWS)
-        say(f"{robot.name}: {found} of {plural(len(rows), 'pose')} solved{line}")
-        say(ik_report.rows_table(robot, q[shown], residuals[shown], reasons[shown], notes[shown]))
+        off = f", {ik_report.off_words(residuals)}" if found else ""
+        say(f"{ik_report.robot_words(robot)}: {found} of {plural(len(rows), 'pose')} solved{line}{off}{why}")
+        say(ik_report.rows_table(robot, q[shown], reasons[shown], notes[shown]))
         say(*_more(len(rows)))
 
     good = q[~np.isnan(q[:, 0])]

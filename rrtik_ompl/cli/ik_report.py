@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import TAU, Matrix, Vector, frozen
 from rrtik_ompl.base.units import DEGREES, shown_unit
-from rrtik_ompl.cli.terminal import Table
+from rrtik_ompl.cli.table import Table, short_names
 from rrtik_ompl.ik.analytic.branches import tip_fault
 from rrtik_ompl.ik.analytic.closed_form import form_of, has_closed_form, solutions
 from rrtik_ompl.ik.method_interface import IkResult, different_rows, mid_range_configuration
@@ -98,11 +98,21 @@ def _targets(robot: Robot, goal: TipGoal) -> NDArray[np.float64] | None:
     return goal.point[None] if form_of(robot).kind == "position" else None
 
 
-def joint_heads(robot: Robot) -> list[str]:
-    """Return the names of the joints with their units for display."""
-    return [
-        f"{name} [{shown_unit(slides)[1]}]" for name, slides in zip(robot.joint_names, robot.prismatic, strict=True)
-    ]
+def joint_heads(robot: Robot, names: Sequence[str]) -> list[str]:
+    """Return names of the joints with their units for display."""
+    return [f"{name} [{shown_unit(slides)[1]}]" for name, slides in zip(names, robot.prismatic, strict=True)]
+
+
+def robot_words(robot: Robot) -> str:
+    """Return the name of a robot, with what the names of its joints have in common, which the heads leave out."""
+    title, names = short_names(robot.joint_names)
+    return robot.name if tuple(names) == robot.joint_names else f"{robot.name} (joints {title})"
+
+
+def off_words(residuals: Matrix) -> str:
+    """Return the largest errors of position and orientation in words; rows of NaN are left out."""
+    position, orientation = np.nanmax(residuals, axis=0).tolist()
+    return f"off by at most {round(MILLIMETRES * position, 4):g} mm and {round(DEGREES * orientation, 4):g} deg"
 
 
 def solutions_table(
@@ -113,34 +123,35 @@ def solutions_table(
     clearances: Sequence[float],
     most: int,
 ) -> Table:
-    """Return a table with one row per solution, nearest first: branch, joints, residuals, full turns, clearance.
+    """Return a table with one row per solution, nearest first: branch, joints, full turns, clearance.
 
     Columns without content are left out; there are at most ``most`` rows.
     """
     named = any(names)
     turned = any(turns)
     cleared = len(clearances) > 0
+    _, joints = short_names(robot.joint_names)
 
-    heads = ["no.", *(["branch"] if named else []), *joint_heads(robot), "off [mm]", "off [deg]"]
+    heads = ["no.", *(["branch"] if named else []), *joint_heads(robot, joints)]
     heads += ["by full turns"] * turned + ["clearance [mm]"] * cleared
 
     table = Table(*heads, right={*range(len(heads))} - ({1} if named else set()))
-    for k, (q, residual) in enumerate(zip(result.solutions[:most], result.residuals[:most], strict=True)):
-        cells = [str(k + 1), *([names[k]] if named else []), *_joint_cells(robot, q), *_residual_cells(residual)]
+    for k, q in enumerate(result.solutions[:most]):
+        cells = [str(k + 1), *([names[k]] if named else []), *_joint_cells(robot, q)]
         cells += [f"+{turns[k]}"] if turned else []
         table.add_row(*cells, *([f"{MILLIMETRES * clearances[k]:.1f}"] if cleared else []))
     return table
 
 
-def rows_table(robot: Robot, q: Matrix, residuals: Matrix, reasons: Sequence[str], notes: Sequence[str]) -> Table:
-    """Return a table with one row per pose: joints and residuals, or the reason why there is no solution, and notes."""
+def rows_table(robot: Robot, q: Matrix, reasons: Sequence[str], notes: Sequence[str]) -> Table:
+    """Return a table with one row per pose: joints, or the reason why there is no solution, and notes."""
     noted = any(notes)
-    heads = ["no.", *joint_heads(robot), "off [mm]", "off [deg]", "no solution", *(["note"] if noted else [])]
-    table = Table(*heads, right=range(robot.dof + 3))
+    _, joints = short_names(robot.joint_names)
+    heads = ["no.", *joint_heads(robot, joints), "no solution", *(["note"] if noted else [])]
+    table = Table(*heads, right=range(robot.dof + 1))
 
-    for k, (row, residual) in enumerate(zip(q, residuals, strict=True)):
-        found = not reasons[k]
-        cells = [*_joint_cells(robot, row), *_residual_cells(residual)] if found else [""] * (robot.dof + 2)
+    for k, row in enumerate(q):
+        cells = [""] * robot.dof if reasons[k] else _joint_cells(robot, row)
         table.add_row(str(k + 1), *cells, reasons[k], *([notes[k]] if noted else []))
     return table
 
@@ -149,7 +160,7 @@ def rows_csv(robot: Robot, q: Matrix, residuals: Matrix, reasons: Sequence[str],
     """Return the same as CSV; joints in degrees (metres if prismatic), residuals in millimetres and degrees."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["number", *joint_heads(robot), "off [mm]", "off [deg]", "no solution", "note"])
+    writer.writerow(["number", *joint_heads(robot, robot.joint_names), "off [mm]", "off [deg]", "no solution", "note"])
 
     scale = np.where(robot.prismatic, 1.0, DEGREES)
     for k, (row, residual) in enumerate(zip(q * scale, residuals * [MILLIMETRES, DEGREES], strict=True)):
@@ -204,7 +215,3 @@ def _joint_cells(robot: Robot, q: NDArray[np.float64]) -> list[str]:
         f"{round(float(value), 4) + 0.0:.4f}" if slides else f"{round(DEGREES * float(value), 2) + 0.0:.2f}"
         for value, slides in zip(q, robot.prismatic, strict=True)
     ]
-
-
-def _residual_cells(residual: NDArray[np.float64]) -> list[str]:
-    return [f"{MILLIMETRES * residual[0]:.4f}", f"{DEGREES * residual[1]:.4f}"]

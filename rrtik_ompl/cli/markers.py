@@ -212,7 +212,7 @@ def sense(
 
     view = None
     for view in _views(sensor, source, frames):
-        say(json.dumps(view.document())) if as_json else say(*view.lines())
+        print(json.dumps(view.document())) if as_json else say(*view.lines())
 
     if view is None or not view.seen:
         raise InputError(sensor.why_nothing(source[0]))

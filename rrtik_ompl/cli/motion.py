@@ -12,7 +12,8 @@ import typer
 from rrtik_ompl.base.choices import one_of
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.cli import FOUND
-from rrtik_ompl.cli.terminal import TRAJECTORY_FORMATS, ProblemName, Table, progress, say
+from rrtik_ompl.cli.table import Table, joint_labels
+from rrtik_ompl.cli.terminal import TRAJECTORY_FORMATS, ProblemName, progress, say
 from rrtik_ompl.files.tables import FORMATS as PATH_FORMATS
 from rrtik_ompl.files.text import check_target, comma_numbers
 
@@ -153,19 +154,19 @@ def _peaks_table(trajectory: Trajectory, limits: RateLimits) -> Table:
     from rrtik_ompl.base.units import shown_unit
     from rrtik_ompl.motion.trajectory import motion_report
 
-    heads = [f"{what}{end}" for what in ("velocity", "acceleration", "jerk") for end in ("", " limit")]
-    numbers = range(1, len(heads) + 1)
-    table = Table("joint", *heads, "unit", "switches/s", right=(*numbers, len(heads) + 2))
+    title, names = joint_labels(trajectory.joint_names, trajectory.prismatic)
+    quantities = [head for what in ("velocity", "acceleration", "jerk") for head in (what, "limit")]
+    table = Table(title, *quantities, "switches/s", right=range(1, 8))
 
     often = motion_report(trajectory, limits).switches
     peaks = trajectory.peaks()
     words = ("jumps", "none")  # words for an infinite peak, and for an infinite limit
     pairs = ((peaks.velocity, limits.velocity), (peaks.acceleration, limits.acceleration), (peaks.jerk, limits.jerk))
 
-    for k, name in enumerate(trajectory.joint_names):
-        factor, unit = shown_unit(trajectory.prismatic[k])
+    for k, name in enumerate(names):
+        factor, _ = shown_unit(trajectory.prismatic[k])
         cells = (_rate(factor * float(row[k]), word) for pair in pairs for row, word in zip(pair, words, strict=True))
-        table.add_row(name, *cells, unit, f"{often[k]:.1f}")
+        table.add_row(name, *cells, f"{often[k]:.1f}")
     return table
 
 

@@ -122,6 +122,9 @@ def plan(
     lack = "" if path is None else _write(question, path, found.path, out, html, certificate, still=still)
     if as_json:
         print(json.dumps(report.document(question, found, path, shorten_seconds)))
+    elif path is None:
+        note(f"{question.name}: not found: {found.reason}")
+        suggest(*_next_steps(problem, path, out, html))
     else:
         say(*report.summary(question, found, path, shorten_seconds, named=planner))
         _say_path(path, (out, html, None if lack else certificate))

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from rrtik_ompl.base.units import reading, shown_unit
-from rrtik_ompl.cli.terminal import Table
+from rrtik_ompl.cli.table import Table, joint_labels, short_names
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.transitions import lower_bound
 from rrtik_ompl.ompl_bridge.planner_names import AUTO, is_auto
@@ -20,27 +20,28 @@ from rrtik_ompl.world.route_check import how_checked
 
 def moves_table(path: JointPath) -> Table:
     """Return a table with one row per single-joint move; degrees, or metres for a prismatic joint."""
-    table = Table(*COLUMNS, right=(0, 2, 3, 4))
+    title, names = short_names(path.joint_names)
+    short = dict(zip(path.joint_names, names, strict=True))
+    table = Table(*(title if head == "joint" else head for head in COLUMNS), right=(0, 2, 3, 4))
+
     for number, move in enumerate(path.moves(), start=1):
         start, unit = reading(move.start, move.unit)
         end, _ = reading(move.end, move.unit)
         digits = 4 if unit == "m" else 2
         values = (f"{start:.{digits}f}", f"{end:.{digits}f}", f"{end - start:+.{digits}f}")
-        table.add_row(str(number), move.joint, *values, unit)
+        table.add_row(str(number), short[move.joint], *values, unit)
     return table
 
 
 def waypoints_table(path: JointPath) -> Table:
-    """Return a table with one row per waypoint, one column per joint; degrees, or metres for a prismatic joint."""
-    factors, units = zip(*map(shown_unit, path.prismatic), strict=True)
-    heads = [f"{name} [{unit}]" for name, unit in zip(path.joint_names, units, strict=True)]
-    table = Table("waypoint", *heads, right=range(len(heads) + 1))
+    """Return a table with one row per joint, one column per waypoint; degrees, or metres for a prismatic joint."""
+    title, names = joint_labels(path.joint_names, path.prismatic)
+    count = len(path.waypoints)
+    table = Table(title, *map(str, range(1, count + 1)), right=range(1, count + 1))
 
-    for number, row in enumerate(path.waypoints * factors, start=1):
-        table.add_row(
-            str(number),
-            *(f"{value:.4f}" if m else f"{value:.2f}" for value, m in zip(row, path.prismatic, strict=False)),
-        )
+    for name, row, slides in zip(names, path.waypoints.T, path.prismatic, strict=True):
+        factor, _ = shown_unit(slides)
+        table.add_row(name, *(f"{value:.4f}" if slides else f"{value:.2f}" for value in (factor * row).tolist()))
     return table
 
 
@@ -55,14 +56,14 @@ def fewest_moves(problem: Problem, plan: Plan) -> int | None:
 
 
 def summary(
-    problem: Problem, plan: Plan, path: JointPath | None, shorten_seconds: float, named: str | None = None
+    problem: Problem, plan: Plan, path: JointPath, shorten_seconds: float, named: str | None = None
 ) -> list[str]:
-    """Return a few lines about a plan: what was found by which planner, why by this one, its quality, and the time.
+    """Return a few lines about a found path: by which planner, why by this one, its quality, and the time.
 
     Args:
         problem: The problem.
         plan: The result of planning.
-        path: Its path after shortening; None if there is none.
+        path: Its path after shortening.
         shorten_seconds: Time of shortening [s].
         named: The planner that was requested; None if none was.
     """
@@ -71,13 +72,10 @@ def summary(
     planner = f"planner {plan.planner}{why}"
 
     lines = [f"problem {problem.name}, robot {problem.world.robot.name}, {planner}, seed {plan.seed}"]
-    if plan.path is None or path is None:
-        return [*lines, f"not found: {plan.reason}"]
-
     bound = fewest_moves(problem, plan)
     if path.one_joint_at_a_time:
         least = "" if bound is None else f" (no path can have fewer than {bound})"
-        raw = plan.path
+        raw = path if plan.path is None else plan.path
         same = (raw.transitions, raw.length) == (path.transitions, path.length)
         before = "" if same else f"; {raw.transitions} moves and {raw.length:.2f} {raw.unit} before shortening"
         lines.append(f"{path.transitions} moves{least}, length {path.length:.2f} {path.unit}{before}")

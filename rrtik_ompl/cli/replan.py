@@ -76,8 +76,10 @@ def replan_scenario(
     if replay is None:
         made = _foreseen(chosen, seed, given) if foreseen else _new_run(chosen, seed, given)
         if isinstance(made, str):
-            failed = {"problem": chosen.problem.name, "outcome": "not found", "reason": made}
-            say(json.dumps(failed) if as_json else f"{chosen.problem.name}: {made}")
+            if as_json:
+                print(json.dumps({"problem": chosen.problem.name, "outcome": "not found", "reason": made}))
+            else:
+                note(f"{chosen.problem.name}: not found: {made}")
             return NOT_FOUND
         run = made
     else:

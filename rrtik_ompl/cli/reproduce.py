@@ -9,21 +9,18 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Annotated, Protocol
+from typing import Annotated, Protocol
 
 import typer
 
 from rrtik_ompl.base.errors import InputError, UnknownNameError
 from rrtik_ompl.base.version import __version__
 from rrtik_ompl.cli import FOUND, NOT_FOUND
+from rrtik_ompl.cli.table import Table as Printed
 from rrtik_ompl.cli.terminal import note, plural, progress, say
 from rrtik_ompl.files.text import check_target, read_text, write_text
 
-if TYPE_CHECKING:
-    from rich.table import Table as RichTable
-
 NONE: Mapping[str, str] = MappingProxyType({})
-WIDTH = 60  # width of the column "reading" in a printed table
 
 KEYS = ("name", "published", "measured", "verdict", "reading")
 HEADS = ("figure", *KEYS[1:])
@@ -286,24 +283,16 @@ def page(done: Done, quick: bool) -> str:
     return "\n".join([*lines, ""])
 
 
-def _list(tables: Iterable[Table]) -> RichTable:
-    from rich import box
-    from rich.table import Table
-
-    shown = Table("name", "what", "published in", "full", "quick", "--plot", box=box.SIMPLE_HEAD, pad_edge=False)
+def _list(tables: Iterable[Table]) -> Printed:
+    shown = Printed("name", "what", "published in", "full", "quick", "plots", right=(3, 4, 5))
     for each in tables:
-        figures = ", ".join(figure.name for figure in each.figures)
-        shown.add_row(each.name, each.title, each.source, _time(each.seconds), _time(each.quick_seconds), figures)
+        times = (_time(each.seconds), _time(each.quick_seconds))
+        shown.add_row(each.name, each.title, each.source, *times, str(len(each.figures) or ""))
     return shown
 
 
-def _table(rows: Sequence[Row]) -> RichTable:
-    from rich import box
-    from rich.table import Table
-
-    shown = Table(*HEADS, box=box.SIMPLE_HEAD, pad_edge=False)
-    shown.columns[-1].max_width = WIDTH
-
+def _table(rows: Sequence[Row]) -> Printed:
+    shown = Printed(*HEADS)
     for row in rows:
         shown.add_row(*cells(row))
     return shown

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rrtik_ompl.cli import FOUND, NOT_FOUND
-from rrtik_ompl.cli.terminal import PAGE_FORMATS, TRAJECTORY_FORMATS, command, progress, say, suggest
+from rrtik_ompl.cli.terminal import PAGE_FORMATS, TRAJECTORY_FORMATS, command, note, progress, say, suggest
 from rrtik_ompl.files.tables import FORMATS as PATH_FORMATS
 from rrtik_ompl.files.text import check_target
 
@@ -136,7 +136,7 @@ def task(
         seen = f"see it: {command('task', task, '--html', 'task.html')}" if html is None else f"open {html}"
         suggest(seen, *(["time it: --trajectory task.json"] if trajectory is None else []))
     else:
-        say(f"{loaded.name}: not found: {plan.reason}")
+        note(f"{loaded.name}: not found: {plan.reason}")
         suggest("give it more time: --seconds")
     return FOUND if plan.found else NOT_FOUND
 

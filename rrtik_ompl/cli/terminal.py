@@ -7,15 +7,15 @@ import shlex
 import signal
 import sys
 import warnings
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from threading import Timer, current_thread, main_thread
 from typing import TYPE_CHECKING, Annotated, Any
-from unicodedata import east_asian_width
 
 import typer
 
-from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.errors import InputError, printable
+from rrtik_ompl.cli.table import Table, columns_of, folded
 from rrtik_ompl.files import notice
 
 if TYPE_CHECKING:
@@ -25,50 +25,17 @@ TRAJECTORY_FORMATS = (".json", ".csv", ".yaml", ".mcap")
 PAGE_FORMATS = (".html", ".htm")
 # [s]; a spinner appears only after this time, because shorter tasks end before the message can be read.
 SPINNER_AFTER = 0.3
-GAP = "   "  # gap between two columns
 AGAIN_SECONDS = 0.02  # delay after which a lost Ctrl-C is repeated
 
 
-class Table:
-    """A table of text with columns as wide as their contents.
-
-    Args:
-        heads: Headings of the columns.
-        right: Numbers of the columns that are aligned to the right.
-    """
-
-    def __init__(self, *heads: str, right: Collection[int] = ()) -> None:
-        self._rows = [heads]
-        self._right = right
-
-    def add_row(self, *cells: str) -> None:
-        """Append a row."""
-        self._rows.append(cells)
-
-    def __str__(self) -> str:
-        widths = [max(map(_width, column)) for column in zip(*self._rows, strict=True)]
-        line = "\u2500" if (sys.stdout.encoding or "").lower().startswith("utf") else "-"
-        head, *rows = (f" {GAP.join(map(self._padded, range(len(row)), row, widths))} " for row in self._rows)
-        return "\n".join(["", head, f" {line * (len(head) - 2)} ", *rows, ""])
-
-    def _padded(self, column: int, cell: str, width: int) -> str:
-        blanks = " " * (width - _width(cell))
-        return blanks + cell if column in self._right else cell + blanks
-
-
-def _width(text: str) -> int:
-    """Return the number of terminal columns that a text occupies."""
-    return sum(2 if east_asian_width(letter) in "WF" else 1 for letter in text)
-
-
 def warn(message: Warning | str, *_: Any, **__: Any) -> None:
-    """Print a warning in one line; a replacement for ``warnings.showwarning``."""
-    print(f"rrtik: warning: {message}", file=sys.stderr)
+    """Print a warning; a replacement for ``warnings.showwarning``."""
+    note(f"warning: {message}")
 
 
 def note(message: str) -> None:
-    """Print a message in one line on standard error."""
-    print(f"rrtik: {message}", file=sys.stderr)
+    """Print a message in one line, which folds on a terminal, on standard error."""
+    print(folded(f"rrtik: {printable(message)}", columns_of(sys.stderr)), file=sys.stderr)
 
 
 def prepare_terminal() -> None:
@@ -141,28 +108,20 @@ def stoppable() -> Iterator[None]:
         sys.unraisablehook = unraised
 
 
-def say(*items: Any) -> None:
-    """Print texts and tables, also those of rich, on standard output."""
-    if all(isinstance(item, str | Table) for item in items):
-        for item in items:
-            print(item)
-        return
-
-    from rich.console import Console
-
-    # The console is wider than any table: a narrow terminal wraps lines, but no number is truncated.
-    console = Console(highlight=False, soft_wrap=True, markup=False, width=1000)
-
-    with console.capture() as captured:
-        for item in items:
-            console.print(item)
-    print(captured.get(), end="")
+def say(*items: str | Table) -> None:
+    """Print texts, whose lines fold on a terminal, and tables on standard output."""
+    for item in items:
+        print(folded(item, columns_of(sys.stdout)) if isinstance(item, str) else item)
 
 
 def suggest(*steps: str) -> None:
-    """Print possible next steps in a last line, but only on a terminal, not to a file or a pipe."""
-    if steps and sys.stdout.isatty():
-        say(f"next: {'; '.join(steps)}")
+    """Print possible next steps, one a line, but only on a terminal, not to a file or a pipe.
+
+    They do not fold, so that a command can be copied.
+    """
+    if sys.stdout.isatty():
+        for number, step in enumerate(steps):
+            print(f"{' ' * 5 if number else 'next:'} {step}")
 
 
 def plural(number: int, noun: str) -> str:

@@ -79,9 +79,9 @@ def test_options_of_the_planner_are_passed_on(capsys):
 
 def test_not_found_is_exit_1_with_the_reason_and_no_file(capsys, tmp_path):
     file = tmp_path / "path.json"
-    code, out, _ = rrtik(capsys, "plan", "titan4_sdu", "--seconds", "0.000001", "--out", str(file))
-    assert code == 1
-    assert "not found: no path within 1e-06 s" in out
+    code, out, err = rrtik(capsys, "plan", "titan4_sdu", "--seconds", "0.000001", "--out", str(file))
+    assert (code, out) == (1, "")
+    assert "not found: no path within 1e-06 s" in err
     assert not file.exists()
 
 

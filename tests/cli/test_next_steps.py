@@ -10,19 +10,22 @@ from rrtik_ompl.cli.app import run
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["plan", "planar3_boxes"], "next: see it move: rrtik plan planar3_boxes --html plan.html; keep it: --out"),
+        (
+            ["plan", "planar3_boxes"],
+            "next: see it move: rrtik plan planar3_boxes --html plan.html\n      keep it",
+        ),
         (["plan", "planar3_boxes", "--out", "{}/a path.json"], "time it: rrtik time planar3_boxes '{}/a path.json'"),
-        (["plan", "planar3_boxes", "--html", "{}/a.html"], "next: open {}/a.html; keep it"),
-        (["check", "planar3_boxes"], "next: rrtik plan planar3_boxes; rrtik show planar3_boxes"),
+        (["plan", "planar3_boxes", "--html", "{}/a.html"], "next: open {}/a.html\n      keep it"),
+        (["check", "planar3_boxes"], "next: rrtik plan planar3_boxes\n      rrtik show planar3_boxes"),
         (["show", "planar3_boxes", "--html", "{}/b.html"], "next: open {}/b.html"),
         (["straight", "titan4_sdu", "--by", "0", "0", "0.02"], "next: see it: --html line.html"),
-        (["ik", "planar3", "--position", "1.5", "1", "0"], "next: see it: --html ik.html; every solution: --all"),
+        (["ik", "planar3", "--position", "1.5", "1", "0"], "next: see it: --html ik.html\n      every solution: --all"),
     ],
 )
-def test_the_next_step_stands_in_the_last_line(tmp_path, capsys, monkeypatch, words, said):
+def test_the_next_steps_stand_in_the_last_lines(tmp_path, capsys, monkeypatch, words, said):
     monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
     assert run([word.format(tmp_path) for word in words]) == 0
-    last = capsys.readouterr().out.rstrip().splitlines()[-1]
+    last = "\n".join(capsys.readouterr().out.rstrip().splitlines()[-2:])
     assert said.format(tmp_path, tmp_path) in last
 
 
