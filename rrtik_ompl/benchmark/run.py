@@ -8,13 +8,16 @@ from typing import Any
 
 import numpy as np
 
+from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.choices import ShorteningMethod, SuiteShortening
 from rrtik_ompl.base.errors import RrtikError
 from rrtik_ompl.benchmark.sources import build, from_plain
 from rrtik_ompl.benchmark.suite import BY_KIND, NONE
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.world_settings import FINEST_RESOLUTION
-from rrtik_ompl.planning.plan import plan
+from rrtik_ompl.ompl_bridge.planner_names import AUTO
+from rrtik_ompl.planning.outcome import Request
+from rrtik_ompl.planning.plan import planned
 from rrtik_ompl.planning.shortening import shorten
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
@@ -56,7 +59,8 @@ def execute(job: Mapping[str, Any]) -> dict[str, Any]:
 
 def _measured(job: Mapping[str, Any], problem: Problem) -> dict[str, Any]:
     """Plan, shorten and check a path, and return the record of the run."""
-    found = plan(problem, job["planner"], seconds=job["seconds"], seed=job["seed"], parameters=job["parameters"])
+    request = Request(Budget(job["seed"], job["seconds"]), parameters=job["parameters"])
+    found = planned(problem, job["planner"] or problem.planner or AUTO, request)
     record: dict[str, Any] = {
         "status": SOLVED if found.found else NOT_FOUND,
         "reason": found.reason,

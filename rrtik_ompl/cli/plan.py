@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, get_args
@@ -21,7 +20,6 @@ if TYPE_CHECKING:
     from rrtik_ompl.model.path import JointPath
     from rrtik_ompl.world.problem import Problem
 
-RULES = ("joint_costs", "frozen_joints", "last_joints", "smallest_move")  # options of single-joint moves, see MoveRules
 SHORTEN: tuple[CommandShortening, ...] = get_args(CommandShortening)
 PROOF_MODES: tuple[ProofMode, ...] = get_args(ProofMode)
 
@@ -113,20 +111,18 @@ def plan(
             proof=proof,
             clearance=clearance,
             improve=improve,
+            shorten=False if shorten == "none" else shorten,
         )
 
-    with progress("shortening"):
-        rules = {name: value for name, value in options.items() if name in RULES}
-        path, shorten_seconds = _shortened(found.path, question, shorten, found.seed, rules, clearance)
-
-    lack = "" if path is None else _write(question, path, found.path, out, html, certificate, still=still)
+    path = found.path
+    lack = "" if path is None else _write(question, path, found.unshortened, out, html, certificate, still=still)
     if as_json:
-        print(json.dumps(report.document(question, found, path, shorten_seconds)))
+        print(json.dumps(report.document(question, found)))
     elif path is None:
         note(f"{question.name}: not found: {found.reason}")
         suggest(*_next_steps(problem, path, out, html))
     else:
-        say(*report.summary(question, found, path, shorten_seconds, named=planner))
+        say(*report.summary(question, found, path, named=planner))
         _say_path(path, (out, html, None if lack else certificate))
         suggest(*_next_steps(problem, path, out, html))
 
@@ -159,7 +155,7 @@ def _say_path(path: JointPath | None, written: tuple[Path | None, ...]) -> None:
 def _write(
     problem: Problem,
     path: JointPath,
-    raw: JointPath | None,
+    before: JointPath | None,
     out: Path | None,
     html: Path | None,
     certificate: Path | None,
@@ -173,39 +169,13 @@ def _write(
         from rrtik_ompl.viewer import view
 
         with progress("drawing"):
-            view(problem, path, html=html, before=None if path is raw else raw, still=still)
+            view(problem, path, html=html, before=before, still=still)
     if certificate is None:
         return ""
 
     from rrtik_ompl.cli.plan_report import write_certificate
 
     return write_certificate(problem, path, certificate, beside=certificate == out)
-
-
-def _shortened(
-    path: JointPath | None,
-    problem: Problem,
-    method: CommandShortening,
-    seed: int,
-    rules: dict[str, Any],
-    clearance: float | None,
-) -> tuple[JointPath | None, float]:
-    """Return the shortened path, or the given one, and the time that it took [s].
-
-    The planner's rules of single-joint moves also apply to shortening.
-    """
-    from rrtik_ompl.planning.shortening import MoveRules, shorten
-    from rrtik_ompl.world.clearances import possible_clearance
-
-    if path is None or method == "none" or len(path.waypoints) < 2:
-        return path, 0.0
-
-    begin = time.perf_counter()
-    kept = MoveRules.of_robot(problem.robot, **rules) if rules and path.one_joint_at_a_time else None
-    limit = possible_clearance(problem.world, clearance, path.waypoints)
-
-    shorter = shorten(path, problem, method=method, seed=seed, rules=kept, clearance=limit)
-    return shorter, time.perf_counter() - begin
 
 
 def _parameters(pairs: list[str]) -> dict[str, Any]:

@@ -55,16 +55,13 @@ def fewest_moves(problem: Problem, plan: Plan) -> int | None:
     return max(lower_bound(problem.start, problem.goal.q), int(plan.statistics.get("lower_bound", 0)))
 
 
-def summary(
-    problem: Problem, plan: Plan, path: JointPath, shorten_seconds: float, named: str | None = None
-) -> list[str]:
+def summary(problem: Problem, plan: Plan, path: JointPath, named: str | None = None) -> list[str]:
     """Return a few lines about a found path: by which planner, why by this one, its quality, and the time.
 
     Args:
         problem: The problem.
         plan: The result of planning.
-        path: Its path after shortening.
-        shorten_seconds: Time of shortening [s].
+        path: Its path.
         named: The planner that was requested; None if none was.
     """
     asked = named or problem.planner or AUTO
@@ -75,7 +72,7 @@ def summary(
     bound = fewest_moves(problem, plan)
     if path.one_joint_at_a_time:
         least = "" if bound is None else f" (no path can have fewer than {bound})"
-        raw = path if plan.path is None else plan.path
+        raw = plan.unshortened or path
         same = (raw.transitions, raw.length) == (path.transitions, path.length)
         before = "" if same else f"; {raw.transitions} moves and {raw.length:.2f} {raw.unit} before shortening"
         lines.append(f"{path.transitions} moves{least}, length {path.length:.2f} {path.unit}{before}")
@@ -91,8 +88,15 @@ def summary(
         lines.append(f"it ends at goal {plan.member + 1} of {len(problem.goal.parts)}")
 
     checked = how_checked(problem.world.checks, path.waypoints, path.proof)
-    lines.append(f"planning {plan.seconds:.3f} s, shortening {shorten_seconds:.3f} s; valid: {checked}")
+    searching, shortening = _seconds(plan)
+    lines.append(f"planning {searching:.3f} s, shortening {shortening:.3f} s; valid: {checked}")
     return lines
+
+
+def _seconds(plan: Plan) -> tuple[float, float]:
+    """Return how long the search took [s], and the shortening of its path [s]."""
+    shortening = float(plan.statistics.get("shortening_seconds", 0.0))
+    return plan.seconds - shortening, shortening
 
 
 def less_clearance(path: JointPath | None, asked: float | None) -> str:
@@ -106,8 +110,10 @@ def less_clearance(path: JointPath | None, asked: float | None) -> str:
     )
 
 
-def document(problem: Problem, plan: Plan, path: JointPath | None, shorten_seconds: float) -> dict[str, Any]:
+def document(problem: Problem, plan: Plan) -> dict[str, Any]:
     """Return the plan as plain values for JSON; rad, m, s."""
+    path = plan.path
+    searching, shortening = _seconds(plan)
     found: dict[str, Any] = {
         "problem": problem.name,
         "robot": problem.world.robot.name,
@@ -115,7 +121,7 @@ def document(problem: Problem, plan: Plan, path: JointPath | None, shorten_secon
         "seed": plan.seed,
         "found": plan.found,
         "reason": plan.reason,
-        "seconds": {"plan": plan.seconds, "shorten": shorten_seconds},
+        "seconds": {"plan": searching, "shorten": shortening},
         "statistics": dict(plan.statistics),
     }
 

@@ -187,6 +187,7 @@ def _solvable(problem: Problem) -> bool:
             restarts=0,
             parameters={"max_iterations": max_iterations},
             proof="off",
+            shorten=False,
         ).found
         for name, max_iterations in _proofs()
     )

@@ -28,6 +28,7 @@ from rrtik_ompl.ompl_bridge.attempt import ITERATION_LIMIT
 from rrtik_ompl.ompl_bridge.planner_options import planner_options
 from rrtik_ompl.ompl_bridge.weighted import has_weights
 from rrtik_ompl.planning.attempts import Turn, walk
+from rrtik_ompl.planning.finish import rules_among
 from rrtik_ompl.planning.outcome import Improvement, NamedPlanner, Plan, Request
 from rrtik_ompl.planning.shortening import Wishes, shortened
 from rrtik_ompl.world.clearance_curve import distances_at, places_along
@@ -98,6 +99,7 @@ class _Work:
         self._request = request
         self._how = how
         self._one_joint = first.path.one_joint_at_a_time
+        self._rules = rules_among(request.parameters, problem.robot) if self._one_joint else None
         self._takes_bound = BOUND_OPTION in planner_options(planner.factory) and not self._one_joint
 
         seconds = min(how.seconds, request.budget.seconds - first.seconds)
@@ -181,7 +183,7 @@ class _Work:
         clearance = possible_clearance(self._problem.world, self._request.clearance, path.waypoints)
         budget = Budget(self._budget.seed + self._shortenings, iterations=checks, stop=self._budget.over)
         single = self._one_joint and path.one_joint_at_a_time
-        found = shortened(path, self._problem, Wishes(budget, single, clearance=clearance))
+        found = shortened(path, self._problem, Wishes(budget, single, self._rules if single else None, clearance))
 
         self._keep_if_best(found)
         return found

@@ -69,14 +69,15 @@ class Plan:
         reason: One line. Without a path it says why there is none. If the path is not proven free everywhere, it names
             the first two bodies that are not proven apart, the place, and their distance there (moving obstacles as
             they stand at time 0). Otherwise "".
-        seconds: Wall time of planning, restarts and re-checks [s], without the time it took to count the vertices and
-            edges of an OMPL planner's graph.
+        seconds: Wall time of planning, restarts, re-checks and shortening [s], without the time it took to count the
+            vertices and edges of an OMPL planner's graph.
         planner: Name of the planner; with "auto" of the one that found the path, or that tried last.
         seed: The seed that repeats this plan.
         statistics: Counts added up over all attempts: attempts, rejected paths, and the planner's own. Statistics that
-            describe the path (``path_statistics`` of the planner's class) are those of the last attempt. With
-            ``improve=`` also the cost over time.
+            describe the path (``path_statistics`` of the planner's class) are those of the last attempt. If the path
+            was shortened also ``shortening_seconds``, and with ``improve=`` the cost over time.
         member: For a goal set, the index of the member that the path reaches, from 0; None for other goals.
+        unshortened: The planner's own path, if ``path`` was shortened from it; None otherwise.
         problem: The problem that was solved; None in a plan that comes from another process, which is sent without it.
 
     Example:
@@ -93,6 +94,7 @@ class Plan:
     seed: int
     statistics: Mapping[str, Any]
     member: int | None = None
+    unshortened: JointPath | None = None
     problem: Problem | None = field(default=None, repr=False)
 
     __repr__ = in_one_line

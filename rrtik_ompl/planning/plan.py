@@ -10,14 +10,15 @@ import numpy as np
 
 from rrtik_ompl.base.arrays import not_negative, positive, whole_number
 from rrtik_ompl.base.budget import Budget
-from rrtik_ompl.base.choices import Accuracy, ImproveStrategy, PathObjective, ProofMode, one_of
+from rrtik_ompl.base.choices import Accuracy, ImproveStrategy, PathObjective, ProofMode, ShorteningMethod, one_of
 from rrtik_ompl.base.errors import InputError, require
-from rrtik_ompl.ompl_bridge.planner_names import AUTO, find_planner
+from rrtik_ompl.ompl_bridge.planner_names import AUTO, find_planner, is_auto
 from rrtik_ompl.ompl_bridge.planner_names import list_planners as list_planners
 from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory
 from rrtik_ompl.planning.attempts import run_planner
 from rrtik_ompl.planning.outcome import RESTARTS, Improvement, NamedPlanner, Request
 from rrtik_ompl.planning.outcome import Plan as Plan
+from rrtik_ompl.planning.portfolio import run_portfolio
 from rrtik_ompl.planning.second_check import fixed_ends
 from rrtik_ompl.world.clearances import check_clearance
 from rrtik_ompl.world.problem import Problem
@@ -27,7 +28,7 @@ MAX_SECONDS = 1e9  # [s] thirty years; OMPL's clock overflows at about nine time
 PROOF_MODES: tuple[ProofMode, ...] = get_args(ProofMode)
 OBJECTIVES: tuple[PathObjective, ...] = get_args(PathObjective)
 STRATEGIES: tuple[ImproveStrategy, ...] = get_args(ImproveStrategy)
-NOT_IMPROVED = Improvement(0.0)
+SHORTENING_METHODS: tuple[ShorteningMethod, ...] = get_args(ShorteningMethod)
 
 
 def plan(
@@ -44,14 +45,15 @@ def plan(
     improve: float = 0.0,
     objective: PathObjective = "length",
     strategy: ImproveStrategy = "restart-shorten",
+    shorten: ShorteningMethod | bool = "auto",
 ) -> Plan:
-    """Find a collision-free path from the start to the goal of a problem.
+    """Find a collision-free path from the start to the goal of a problem, and shorten it.
 
     A goal of the tip is first turned into collision-free goal configurations by inverse kinematics, unless the planner
     finds such configurations itself. If the planner does not reach them within a bounded effort, more configurations
     are drawn and the planner is started anew with twice the effort (see :class:`GoalSearch`).
 
-    The search runs in three stages:
+    The search runs in three stages, and the path that it finds is shortened within the time left:
 
     1. For a short while, the planner relies on what the kernels can prove without coal.
     2. If that finds no path, the motions of the planner are checked exactly.
@@ -67,8 +69,7 @@ def plan(
         problem: The problem to solve.
         planner: The name of one of :func:`list_planners` (``geometric::`` may stand before OMPL's names), or a planner
             class that is built from a SpaceInformation alone. "auto" runs several planners one after the other until
-            one finds a path, and shortens that path a little. None stands for the planner that the problem names, or
-            else for "auto".
+            one finds a path. None stands for the planner that the problem names, or else for "auto".
         seconds: Limit of wall time for all attempts together [s]; a busy machine gets less done in it.
         seed: The same seed gives the same path, as long as the time limit does not cut in. None draws a seed. PRM and
             PRMstar depend on the clock, so their paths may differ even with the same seed.
@@ -92,9 +93,13 @@ def plan(
             the arm is to a body, double at 5 cm. The objective only chooses among paths: each of them is still
             shortened in length.
         strategy: How ``improve`` works: "restart-shorten" as described above; "shorten" shortens the first path alone.
+        shorten: How the path is shortened: a method of :func:`shorten`, or True for "auto", which keeps single-joint
+            moves and looks for the fewest. The path keeps the rules of single-joint moves in ``parameters``. False
+            leaves the planner's own path, which is also ``unshortened`` in the plan of a shortened one. Ctrl-C ends
+            the shortening, and leaves the path that was found.
 
     Raises:
-        UnknownNameError: If there is no planner, accuracy, objective or strategy of that name.
+        UnknownNameError: If there is no planner, accuracy, objective, strategy or method of shortening of that name.
         InputError: If a number or a parameter makes no sense, start or goal cannot keep the clearance, or the objective
             is "time" and the robot has no velocity limits.
         PlannerError: If the planner broke.
@@ -113,6 +118,7 @@ def plan(
     require(parameters, Mapping | None, "parameters of a planner", "use {name of an option: value}")
     drawn = int(np.random.default_rng().integers(2**31)) if seed is None else whole_number(seed, "seed")
     one_of(PROOF_MODES, proof, "proof")
+    method = _shortening_method(shorten)
     problem = problem if accuracy is None else problem.with_accuracy(accuracy)
     check_clearance(problem.world, clearance, fixed_ends(problem))
     how = Improvement(
@@ -120,8 +126,26 @@ def plan(
         one_of(OBJECTIVES, objective, "objective"),
         one_of(STRATEGIES, strategy, "strategy of improve"),
     )
+    request = Request(Budget(drawn, limit), restarts, parameters or {}, proof, clearance)
 
-    return planned(problem, planner, Request(Budget(drawn, limit), restarts, parameters or {}, proof, clearance), how)
+    found = _searched(problem, planner, request)
+    if method is not None:
+        from rrtik_ompl.planning.finish import finished  # with shortening, which many plans do without
+
+        found = finished(problem, found, request, method)
+    if found.found and how.seconds > 0.0:
+        from rrtik_ompl.planning.improving import improved
+
+        finder = named_planner(found.planner if isinstance(planner, str) else planner)
+        found = improved(problem, found, finder, request, how)
+    return found
+
+
+def _shortening_method(shorten: ShorteningMethod | bool) -> ShorteningMethod | None:
+    """Return the method of shortening that a caller asks for; None for no shortening."""
+    if isinstance(shorten, bool):
+        return "auto" if shorten else None
+    return one_of(SHORTENING_METHODS, shorten, "shortening method")
 
 
 def time_limit(seconds: float) -> float:
@@ -136,37 +160,38 @@ def time_limit(seconds: float) -> float:
     return limit
 
 
-def planned(problem: Problem, planner: str | PlannerFactory, request: Request, how: Improvement = NOT_IMPROVED) -> Plan:
-    """Plan as :func:`plan` does, with arguments that have been checked.
+def planned(problem: Problem, planner: str | PlannerFactory, request: Request) -> Plan:
+    """Search as :func:`plan` does, with arguments that have been checked; a path of "auto" is shortened a little.
+
+    For callers that plan many times, or shorten in a way of their own.
 
     Raises:
         UnknownNameError: If there is no planner of that name.
         InputError: If the planner does not take a parameter.
         PlannerError: If the planner broke.
     """
-    if isinstance(planner, str) and planner.lower() == AUTO:
-        found = _found_by_portfolio(problem, request)
+    found = _searched(problem, planner, request)
+    if not _is_auto(planner):
+        return found
+
+    from rrtik_ompl.planning.finish import briefly_shortened  # with shortening, which many plans do without
+
+    return briefly_shortened(problem, found, request)
+
+
+def _searched(problem: Problem, planner: str | PlannerFactory, request: Request) -> Plan:
+    """Return a plan with the planner's own path, and the member of a goal set that it reaches."""
+    if _is_auto(planner):
+        found = run_portfolio(problem, request)
     else:
         found = run_planner(problem, named_planner(planner), request)
-
-    if found.found and how.seconds > 0.0:
-        from rrtik_ompl.planning.improving import improved  # with shortening, which many plans do without
-
-        finder = named_planner(found.planner if isinstance(planner, str) else planner)
-        found = improved(problem, found, finder, request, how)
     if found.path is None:
         return found
     return replace(found, member=problem.goal.member_at(problem.robot, found.path.end))
 
 
-def plan_counted(problem: Problem, budget: Budget) -> Plan:
-    """Plan with "auto", limited by iterations instead of the clock, so that the result depends on the seed alone.
-
-    Args:
-        problem: The problem to solve.
-        budget: Its seed, and the approximate number of iterations of each planner.
-    """
-    return _found_by_portfolio(problem, Request(budget))
+def _is_auto(planner: str | PlannerFactory) -> bool:
+    return isinstance(planner, str) and is_auto(planner)
 
 
 def named_planner(planner: str | PlannerFactory) -> NamedPlanner:
@@ -178,10 +203,3 @@ def named_planner(planner: str | PlannerFactory) -> NamedPlanner:
     if isinstance(planner, str):
         return NamedPlanner(planner, find_planner(planner))
     return NamedPlanner(planner.__name__, planner)
-
-
-def _found_by_portfolio(problem: Problem, request: Request) -> Plan:
-    """Plan with the portfolio of planners behind the name "auto"."""
-    from rrtik_ompl.planning.portfolio import run_portfolio  # with shortening, which many plans do without
-
-    return run_portfolio(problem, request)

@@ -1,36 +1,24 @@
-"""The planner "auto": planners with complementary strengths take turns, and the path found is shortened a little."""
+"""The planner "auto": planners with complementary strengths take turns until one finds a path."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from itertools import chain
 from types import MappingProxyType
 
-from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.description.catalog import portfolio
-from rrtik_ompl.kernels.search.shortcut_layout import KERNELS as SHORTCUT_KERNELS
-from rrtik_ompl.kernels.search.taut.layout import KERNELS as TAUT_KERNELS
-from rrtik_ompl.kernels.warming import load_together
 from rrtik_ompl.model.goal import TipGoal
-from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.ompl_bridge.planner_names import AUTO, find_planner, refuse_options
-from rrtik_ompl.ompl_bridge.planner_traits import traits_of
 from rrtik_ompl.planning.attempts import Turn, walk
 from rrtik_ompl.planning.outcome import NamedPlanner, Plan, Request
-from rrtik_ompl.planning.shortening import Wishes, shortened
-from rrtik_ompl.world.clearances import possible_clearance
 from rrtik_ompl.world.problem import Problem
-from rrtik_ompl.world.proof import PROOF_KERNELS
-from rrtik_ompl.world.proven_motions import KERNELS as PROVEN_KERNELS
 
 SHARE = 0.5  # share of the time left for each planner but the last
-SHORTENING_CHECKS = 600  # motions, about 10 ms; a count, so that the result depends on the seed alone
 
 
 def run_portfolio(problem: Problem, request: Request) -> Plan:
-    """Let planners search one after the other until one finds a path, preferably a proven one, and shorten that path.
+    """Let planners search one after the other until one finds a path, preferably a proven one.
 
     Args:
         problem: The problem to solve.
@@ -44,7 +32,6 @@ def run_portfolio(problem: Problem, request: Request) -> Plan:
         PlannerError: If every planner broke.
     """
     refuse_options(request.parameters)
-    _load_kernels(problem)
     turns: list[Turn] = []
     for turn in walk(_turns(problem, request)):
         turns.append(turn)
@@ -53,12 +40,8 @@ def run_portfolio(problem: Problem, request: Request) -> Plan:
 
     best = _best(turns)
     reason = "" if best.found else "; ".join(_reason(turn) for turn in turns if turn.path is None)
-    counts = MappingProxyType(_totals(turns))
-
-    spent = sum(turn.seconds for turn in turns)
-    left = replace(request.budget, seconds=request.budget.seconds - spent).begun_now()
-    path = None if best.path is None else _shortened(best.path, problem, request, left)
-    return replace(best, path=path, reason=reason, seconds=spent + left.elapsed, statistics=counts)
+    seconds = sum(turn.seconds for turn in turns)
+    return replace(best, reason=reason, seconds=seconds, statistics=MappingProxyType(_totals(turns)))
 
 
 def members(problem: Problem) -> tuple[str, ...]:
@@ -74,13 +57,6 @@ def members(problem: Problem) -> tuple[str, ...]:
     else:
         wanted = {"any goal"}
     return tuple(name for name, solves in portfolio().items() if solves in wanted)
-
-
-def _load_kernels(problem: Problem) -> None:
-    """Load the kernels of the first planner and of the shortening; compiling them takes a while once per machine."""
-    if problem.world.fast is not None:
-        first = [traits_of(find_planner(name)).kernels for name in members(problem)[:1]]
-        load_together((*chain.from_iterable(first), PROOF_KERNELS, SHORTCUT_KERNELS, PROVEN_KERNELS, TAUT_KERNELS))
 
 
 def _turns(problem: Problem, request: Request) -> Iterator[Turn]:
@@ -124,14 +100,3 @@ def _totals(turns: Sequence[Turn]) -> dict[str, int | float]:
         for key, value in turn.totals.items():
             totals[key] = totals.get(key, 0) + value
     return totals
-
-
-def _shortened(path: JointPath, problem: Problem, request: Request, budget: Budget) -> JointPath:
-    """Shorten a path with a fixed number of checked motions, as far as there is time."""
-    if len(path.waypoints) < 3 or budget.over():
-        return path
-
-    clearance = possible_clearance(problem.world, request.clearance, path.waypoints)
-    counted = replace(budget, iterations=SHORTENING_CHECKS)
-    shorter = shortened(path, problem, Wishes(counted, clearance=clearance))
-    return shorter.with_waypoints(shorter.waypoints) if request.proof == "off" else shorter

@@ -17,7 +17,9 @@ from rrtik_ompl.base.arrays import TAU, Vector
 from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.errors import ProblemError
 from rrtik_ompl.model.path import JointPath, path_through
-from rrtik_ompl.planning.plan import plan_counted
+from rrtik_ompl.ompl_bridge.planner_names import AUTO
+from rrtik_ompl.planning.outcome import Request
+from rrtik_ompl.planning.plan import planned
 from rrtik_ompl.tasks.branches import Branch, Expander
 from rrtik_ompl.tasks.contact_life import MotionContact, follow_contacts
 from rrtik_ompl.tasks.program import Step
@@ -184,7 +186,9 @@ class TaskSearch:
     def _path_of(self, problem: Problem, link: Branch, effort: int) -> JointPath | None:
         """Plan a path for a motion's problem; if there is none, note the reason and return None."""
         seconds = max(self._budget.left, LEAST_SECONDS)
-        result = plan_counted(problem, Budget(self._budget.seed, seconds, FIRST_ITERATIONS * GROWTH**effort))
+        # Limited by iterations too, so that the result depends on the seed alone.
+        budget = Budget(self._budget.seed, seconds, FIRST_ITERATIONS * GROWTH**effort)
+        result = planned(problem, AUTO, Request(budget))
         if result.path is None:
             self._note_failure(link, result.reason)
         return result.path

@@ -253,7 +253,7 @@ def all_at_once(route: Route, world: World, rates: Vector, seed: int) -> Route |
         return NoRoute("only moves of single joints are left", STAGE)
 
     problem = Problem(world, rows[0], before)
-    planned = plan(problem, "rrtconnect", seconds=PLANNER_SECONDS, seed=seed)
+    planned = plan(problem, "rrtconnect", seconds=PLANNER_SECONDS, seed=seed, shorten=False)
     if planned.path is None:
         return NoRoute(planned.reason, STAGE)
 

@@ -253,7 +253,8 @@ def planned(world: World, start: Vector, goal: Vector, seed: int) -> Matrix | No
         InputError: If no package offers a planner that suits.
     """
     planner, options = _planner()
-    result = plan(Problem(world, start, goal), planner, seconds=PLANNER_SECONDS, seed=seed, parameters=options)
+    problem = Problem(world, start, goal)
+    result = plan(problem, planner, seconds=PLANNER_SECONDS, seed=seed, parameters=options, shorten=False)
     return NoRoute(result.reason) if result.path is None else result.path.waypoints
 
 

@@ -14,6 +14,7 @@ from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.transitions import merge_moves
 
 MOST_JOINTS = 1_000  # largest number of joints of an arm
+OPTIONS = ("joint_costs", "frozen_joints", "last_joints", "smallest_move")  # of planners, as of MoveRules
 
 Joints = Sequence[int | str]
 PerJoint = float | Sequence[float]
