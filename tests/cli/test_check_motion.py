@@ -18,7 +18,7 @@ def problem() -> rrtik.Problem:
 
 @pytest.fixture(scope="module")
 def path(problem: rrtik.Problem) -> rrtik.JointPath:
-    path = rrtik.plan(problem, "RRTConnect", seed=1).path
+    path = rrtik.plan(problem, "RRTConnect", seed=1, shorten=False).path
     assert path is not None
     return path
 

@@ -79,7 +79,7 @@ def test_a_foil_is_not_stepped_over_by_searches_that_leave_room(planner):
     walls = [Obstacle(f"foil{k}", Box([1e-4, 4.5, 2.0]), pose([5.0, y, 0.0])) for k, y in enumerate((2.25, 7.75))]
     world = rrtik.World(robot, Scene(tuple(walls)), motion_resolution=0.05)
     for seed in range(5):
-        found = plan(rrtik.Problem(world, [2.0, 2.0], [8.0, 2.0]), planner, seed=seed)
+        found = plan(rrtik.Problem(world, [2.0, 2.0], [8.0, 2.0]), planner, seed=seed, shorten=False)
         assert found.proven
         assert found.path.proof.clearance == CLEARANCE
         assert found.statistics["attempts"] == 1
@@ -248,7 +248,7 @@ def test_where_a_proof_is_required_the_planner_goes_on_with_room(monkeypatch):
 
 
 def _first_is_proven(problem, seed):
-    path = plan(problem, "RRTConnect", seed=seed, proof="off").path
+    path = plan(problem, "RRTConnect", seed=seed, proof="off", shorten=False).path
     return problem.world.prove(path.waypoints, clearance=0.013).proven
 
 

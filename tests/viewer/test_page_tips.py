@@ -50,7 +50,7 @@ def test_the_tips_of_a_goal_are_those_that_it_names() -> None:
 @needs_chromium
 def test_in_a_browser_the_right_arm_is_dragged_and_the_left_one_stays(tmp_path: Path) -> None:
     problem = rrtik.load_problem("two_titan4")
-    path = rrtik.plan(problem, "RRTConnect", seed=1).path
+    path = rrtik.plan(problem, "RRTConnect", seed=1, shorten=False).path
     with planning_page(page(problem, path), tmp_path) as browser:
         spot = browser.ask(GRASP)
         browser.drag(spot, [spot[0] + 6.0, spot[1] - 10.0])

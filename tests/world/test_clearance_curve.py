@@ -23,7 +23,7 @@ def true_distance(world, q):
 @pytest.mark.parametrize("name", ["titan4_sdu", "planar3_boxes"])
 def test_distances_are_never_too_large_and_hardly_too_small(name):
     problem = rrtik.load_problem(name)
-    world, path = problem.world, rrtik.plan(problem, "RRTConnect", seed=1).path
+    world, path = problem.world, rrtik.plan(problem, "RRTConnect", seed=1, shorten=False).path
     curve = clearance_along(world.checks, path.waypoints)
     for k in range(0, len(curve.distances), 9):
         a, b = path.waypoints[curve.motions[k]], path.waypoints[curve.motions[k] + 1]
@@ -42,7 +42,7 @@ def test_distances_are_never_too_large_and_hardly_too_small(name):
 
 def test_motions_that_are_not_proven_are_named():
     problem = rrtik.load_problem("titan4_sdu")
-    path = rrtik.plan(problem, "RRTConnect", seed=1).path
+    path = rrtik.plan(problem, "RRTConnect", seed=1, shorten=False).path
     through = np.vstack([path.waypoints, path.start])  # straight back, through the shelf
     curve = clearance_along(problem.world.checks, through)
     assert curve.unproven == (len(path.waypoints) - 1,)

@@ -90,7 +90,9 @@ def test_many_plans_are_those_of_single_calls(proof):
                 rrtik.Problem(world, start, goal)
             assert each.reason == str(refused.value)
             continue
-        alone = rrtik.plan(rrtik.Problem(world, start, goal), "fastrrtconnect", seed=each.seed, proof=proof)
+        alone = rrtik.plan(
+            rrtik.Problem(world, start, goal), "fastrrtconnect", seed=each.seed, proof=proof, shorten=False
+        )
         assert (alone.found, alone.reason, alone.statistics) == (each.found, each.reason, each.statistics)
         assert (alone.path is None) == (each.path is None)
         if alone.path is not None:

@@ -104,9 +104,9 @@ def test_the_same_seed_and_bound_give_the_same_path():
 
 
 def test_the_planner_takes_a_bound():
-    free = rrtik.plan(problem(), "fastrrtconnect", seed=1, proof="off")
+    free = rrtik.plan(problem(), "fastrrtconnect", seed=1, proof="off", shorten=False)
     bound = 0.95 * free.path.length
-    found = rrtik.plan(problem(), "fastrrtconnect", seed=2, proof="off", parameters={"bound": bound})
+    found = rrtik.plan(problem(), "fastrrtconnect", seed=2, proof="off", parameters={"bound": bound}, shorten=False)
     assert found.path.length < bound
     with pytest.raises(InputError, match="bound"):
         rrtik.plan(problem(), "fastrrtconnect", parameters={"bound": 0.0})

@@ -67,18 +67,20 @@ def test_a_search_that_has_grown_too_large_gives_its_memory_back(problem: Any, m
 def test_plans_one_after_the_other_are_those_of_fresh_worlds(problem: Any) -> None:
     for seed in range(4):
         fresh = load_problem("titan4_sdu")
-        one, two = (plan(p, "fastrrtconnect", seed=seed).path for p in (problem, fresh))
+        one, two = (plan(p, "fastrrtconnect", seed=seed, shorten=False).path for p in (problem, fresh))
         np.testing.assert_array_equal(one.waypoints, two.waypoints)
 
 
 def test_threads_with_a_world_each_find_what_one_thread_finds() -> None:
-    wanted = [plan(load_problem("titan4_sdu"), "fastrrtconnect", seed=s).path.waypoints for s in range(6)]
+    wanted = [
+        plan(load_problem("titan4_sdu"), "fastrrtconnect", seed=s, shorten=False).path.waypoints for s in range(6)
+    ]
     found: dict[int, Any] = {}
 
     def work(seeds: range) -> None:
         own = load_problem("titan4_sdu")
         for seed in seeds:
-            found[seed] = plan(own, "fastrrtconnect", seed=seed).path.waypoints
+            found[seed] = plan(own, "fastrrtconnect", seed=seed, shorten=False).path.waypoints
 
     threads = [Thread(target=work, args=(seeds,)) for seeds in (range(3), range(3, 6))]
     for thread in threads:

@@ -20,7 +20,7 @@ def problem(request):
 
 @pytest.fixture(scope="module")
 def route(problem):
-    return rrtik.plan(problem, "RRTConnect", seed=3, clearance=KEPT).path.waypoints
+    return rrtik.plan(problem, "RRTConnect", seed=3, clearance=KEPT, shorten=False).path.waypoints
 
 
 def near(route, seed, count=300):

@@ -33,19 +33,19 @@ from rrtik_tests.mazes import OPTIMA
 @pytest.mark.parametrize("name", OPTIMA)
 def test_planner_meets_the_proven_optimum(name: str) -> None:
     problem = load_problem(name)
-    found = plan(problem, FewestMoves, seed=3, seconds=60.0)
+    found = plan(problem, FewestMoves, seed=3, seconds=60.0, shorten=False)
     assert found.path is not None
     assert found.path.transitions == found.statistics["lower_bound"] == OPTIMA[name]
     assert found.statistics["gap"] == 0
     assert single_joint(found.path.waypoints)
     np.testing.assert_array_equal(found.path.waypoints[[0, -1]], [problem.start, problem.goal.q])
-    again = plan(problem, FewestMoves, seed=3, seconds=60.0)
+    again = plan(problem, FewestMoves, seed=3, seconds=60.0, shorten=False)
     assert again.path is not None
     np.testing.assert_array_equal(found.path.waypoints, again.path.waypoints)
 
 
 def test_theta6_rests_at_the_subsea_unit() -> None:
-    found = plan(load_problem("titan4_sdu"), FewestMoves, seed=5, seconds=60.0)
+    found = plan(load_problem("titan4_sdu"), FewestMoves, seed=5, seconds=60.0, shorten=False)
     assert found.path is not None
     assert np.ptp(found.path.waypoints[:, 5]) == 0.0
 
@@ -54,7 +54,7 @@ def test_theta6_rests_at_the_subsea_unit() -> None:
 def test_shortening_keeps_ends_and_validity_and_is_never_worse(name: str) -> None:
     problem = load_problem(name)
     for seed in range(3):
-        path = plan(problem, "bicrdt", seed=seed).path
+        path = plan(problem, "bicrdt", seed=seed, shorten=False).path
         assert path is not None
         shorter = shorten(path, problem, method="fewest-moves")
         assert (shorter.transitions, shorter.length) <= (path.transitions, path.length)
@@ -124,7 +124,7 @@ def test_a_route_of_one_configuration_stays() -> None:
 
 def test_time_that_runs_out_ends_the_search_soon_with_the_best_so_far() -> None:
     problem = load_problem("titan4_sdu")
-    raw = plan(problem, "bicrdt", seed=1).path
+    raw = plan(problem, "bicrdt", seed=1, shorten=False).path
     assert raw is not None
     for questions in (0, 1, 5, 20):
         left = [questions]
@@ -147,11 +147,11 @@ def test_an_interrupt_leaves_plan_and_the_next_one_works() -> None:
     begin = time.monotonic()
     try:
         with pytest.raises(KeyboardInterrupt):
-            plan(problem, FewestMoves, seed=1, seconds=120.0, parameters={"rounds": 10_000})
+            plan(problem, FewestMoves, seed=1, seconds=120.0, parameters={"rounds": 10_000}, shorten=False)
     finally:
         signal.signal(signal.SIGALRM, previous)
     assert time.monotonic() - begin < 60.0
-    assert plan(problem, FewestMoves, seed=1, seconds=2.0, parameters={"rounds": 0}).found
+    assert plan(problem, FewestMoves, seed=1, seconds=2.0, parameters={"rounds": 0}, shorten=False).found
 
 
 @pytest.mark.parametrize("options", [{"rounds": -1}, {"searches": 0}, {"rounds": 1.5}, {"searches": True}])
@@ -162,7 +162,7 @@ def test_options_out_of_range_are_refused(options: dict[str, float]) -> None:
 
 def test_frozen_joints_rest() -> None:
     problem = load_problem("titan4_prisms")
-    found = plan(problem, FewestMoves, seed=1, seconds=60.0, parameters={"frozen_joints": [1, 5]})
+    found = plan(problem, FewestMoves, seed=1, seconds=60.0, parameters={"frozen_joints": [1, 5]}, shorten=False)
     assert found.path is not None
     assert np.ptp(found.path.waypoints[:, [1, 5]]) == 0.0
     assert found.path.transitions == 3
@@ -171,7 +171,7 @@ def test_frozen_joints_rest() -> None:
 
 def test_a_long_route_is_cut_before_anything_takes_long() -> None:
     problem = load_problem("titan4_sdu")
-    sampled = plan(problem, "RRTConnect", seconds=10.0, seed=2).path
+    sampled = plan(problem, "RRTConnect", seconds=10.0, seed=2, shorten=False).path
     assert sampled is not None
     route, asked = one_joint_moves(sampled, problem).waypoints, count()
 
@@ -194,9 +194,9 @@ def test_where_single_joint_trees_find_nothing_a_sampled_route_is_converted(
 ) -> None:
     monkeypatch.setattr("rrtik_planners.bicrdt.BiCRDT.search", lambda *_: SearchResult(None, {}))
     problem = load_problem("titan4_sdu")
-    found = plan(problem, FewestMoves, seconds=20.0, seed=seed, parameters={"rounds": 1})
+    found = plan(problem, FewestMoves, seconds=20.0, seed=seed, parameters={"rounds": 1}, shorten=False)
     assert found.path is not None
     assert found.path.one_joint_at_a_time
     assert found.path.transitions <= 8
-    frozen = plan(problem, FewestMoves, seconds=0.3, seed=seed, parameters={"frozen_joints": [5]})
+    frozen = plan(problem, FewestMoves, seconds=0.3, seed=seed, parameters={"frozen_joints": [5]}, shorten=False)
     assert not frozen.found  # a sampled route would move the frozen joint

@@ -32,7 +32,7 @@ def fan(dof: int, *balls: tuple[float, float, float]) -> Problem:
 def test_a_single_joint_goes_straight_or_not_at_all() -> None:
     for balls, moves in (((), 1), (((0.9, 0.0, 0.05),), None)):
         problem = fan(1, *balls)
-        found = plan(problem, FewestMoves, seed=1, seconds=0.5)
+        found = plan(problem, FewestMoves, seed=1, seconds=0.5, shorten=False)
         assert found.found == (moves is not None)
         if found.path is not None:
             assert (found.path.transitions, found.statistics["lower_bound"]) == (moves, 1)
@@ -44,7 +44,7 @@ def test_a_single_joint_goes_straight_or_not_at_all() -> None:
 def test_without_obstacles_any_number_of_joints_moves_once_each(dof: int) -> None:
     problem = fan(dof)
     assert least_moves(problem) == dof
-    found = plan(problem, FewestMoves, seed=1, seconds=20.0)
+    found = plan(problem, FewestMoves, seed=1, seconds=20.0, shorten=False)
     assert found.path is not None
     assert (found.path.transitions, found.statistics["lower_bound"], found.statistics["gap"]) == (dof, dof, 0)
 
@@ -52,12 +52,12 @@ def test_without_obstacles_any_number_of_joints_moves_once_each(dof: int) -> Non
 @pytest.mark.parametrize("dof", [28, 40])
 def test_with_too_many_corners_the_bound_is_the_number_of_joints_that_differ(dof: int) -> None:
     problem = fan(dof, (0.75, 0.0, 0.05))
-    found = plan(problem, FewestMoves, seed=1, seconds=1.5)
+    found = plan(problem, FewestMoves, seed=1, seconds=1.5, shorten=False)
     assert found.path is not None
     assert single_joint(found.path.waypoints)
     assert not found.path.violations(problem.world)
     assert found.statistics["lower_bound"] == dof < found.path.transitions
-    raw = plan(problem, "bicrdt", seed=1).path
+    raw = plan(problem, "bicrdt", seed=1, shorten=False).path
     assert raw is not None
     short = shorten(raw, problem, method="fewest-moves", seconds=1.0)
     assert dof < short.transitions <= raw.transitions

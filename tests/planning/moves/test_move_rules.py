@@ -25,7 +25,7 @@ RULES = (
 def test_shortening_keeps_to_the_rules_of_the_plan(planner: str, name: str, options: dict[str, object]) -> None:
     problem = load_problem(name)
     rules = MoveRules(problem.robot.joint_names, **options)
-    found = plan(problem, planner, seed=2, seconds=60.0, parameters=options)
+    found = plan(problem, planner, seed=2, seconds=60.0, parameters=options, shorten=False)
     assert found.path is not None
     assert rules.kept_by(found.path.waypoints)
     for method in ("fewest-moves", "axis"):
@@ -37,7 +37,9 @@ def test_shortening_keeps_to_the_rules_of_the_plan(planner: str, name: str, opti
 
 
 def test_the_bound_of_a_plan_counts_the_last_moves_too() -> None:
-    found = plan(load_problem("titan4_sdu"), FewestMoves, seed=1, seconds=60.0, parameters={"last_joints": [4]})
+    found = plan(
+        load_problem("titan4_sdu"), FewestMoves, seed=1, seconds=60.0, parameters={"last_joints": [4]}, shorten=False
+    )
     assert found.path is not None
     assert found.path.transitions == found.statistics["lower_bound"] + found.statistics["gap"]
     assert [int((a != b).argmax()) for a, b in pairwise(found.path.waypoints)].index(4) == len(found.path.waypoints) - 2
@@ -62,7 +64,7 @@ def test_each_rule_is_judged() -> None:
 
 def test_a_path_that_breaks_the_rules_is_not_shortened_by_them() -> None:
     problem = load_problem("titan4_sdu")
-    path = plan(problem, "bicrdt", seed=1).path
+    path = plan(problem, "bicrdt", seed=1, shorten=False).path
     assert path is not None
     with pytest.raises(InputError, match="rules"):
         shorten(path, problem, rules=MoveRules(problem.robot.joint_names, frozen_joints=["azimuth"]))

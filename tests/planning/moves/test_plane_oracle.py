@@ -50,12 +50,12 @@ def test_a_disc_between_start_and_goal_costs_two_moves_on_a_grid() -> None:
 
 def test_a_winding_route_has_as_few_moves_as_the_oracle_and_a_bound_close_to_them() -> None:
     case = drawn_case(WINDING)
-    found = plan(case.problem, FewestMoves, seed=WINDING, seconds=60.0)
+    found = plan(case.problem, FewestMoves, seed=WINDING, seconds=60.0, shorten=False)
     assert found.path is not None
     assert case.arm.free(found.path.waypoints)
     assert found.path.transitions == case.moves == 8
     assert found.statistics["lower_bound"] == 7
-    raw = plan(case.problem, "bicrdt", seed=2).path
+    raw = plan(case.problem, "bicrdt", seed=2, shorten=False).path
     assert raw is not None
     short = shorten(raw, case.problem, method="fewest-moves")
     assert short.transitions == 8

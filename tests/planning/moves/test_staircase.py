@@ -81,7 +81,7 @@ def test_a_joint_that_trembles_makes_no_moves():
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_a_path_of_rrt_connect_is_converted_among_obstacles(seed):
     problem = load_problem("titan4_sdu")
-    path = plan(problem, "RRTConnect", seed=seed).path
+    path = plan(problem, "RRTConnect", seed=seed, shorten=False).path
     moves = one_joint_moves(path, problem)
     assert not path.one_joint_at_a_time
     assert moves.one_joint_at_a_time

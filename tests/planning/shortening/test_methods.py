@@ -180,13 +180,13 @@ def problem():
 
 @pytest.fixture(scope="module")
 def raw(problem):
-    plans = [rrtik.plan(problem, "RRTConnect", seed=seed, seconds=5.0) for seed in range(3)]
+    plans = [rrtik.plan(problem, "RRTConnect", seed=seed, seconds=5.0, shorten=False) for seed in range(3)]
     return [plan.path for plan in plans]
 
 
 @pytest.fixture(scope="module")
 def raw_moves(problem):
-    return [rrtik.plan(problem, "bicrdt", seed=seed, seconds=5.0).path for seed in range(3)]
+    return [rrtik.plan(problem, "bicrdt", seed=seed, seconds=5.0, shorten=False).path for seed in range(3)]
 
 
 @pytest.mark.parametrize("method", FOR_ALL_PATHS)

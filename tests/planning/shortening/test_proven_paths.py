@@ -16,7 +16,7 @@ JOINT_METHODS = [name for name, method in METHODS.items() if not method.keeps_mo
 @pytest.fixture(scope="module", params=["planar3_boxes", "titan4_sdu"])
 def question(request):
     problem = rrtik.load_problem(request.param)
-    return problem, rrtik.plan(problem, "RRTConnect", seed=2, clearance=CLEARANCE).path
+    return problem, rrtik.plan(problem, "RRTConnect", seed=2, clearance=CLEARANCE, shorten=False).path
 
 
 @pytest.mark.parametrize("method", JOINT_METHODS)
@@ -32,7 +32,7 @@ def test_shortened_paths_are_proven_to_keep_a_millimetre(question, method):
 @pytest.mark.parametrize("method", ["shortcut", "corners"])
 def test_a_larger_clearance_is_kept_where_the_path_has_it(question, method):
     problem, _ = question
-    raw = rrtik.plan(problem, "RRTConnect", seed=2, clearance=0.01).path
+    raw = rrtik.plan(problem, "RRTConnect", seed=2, clearance=0.01, shorten=False).path
     short = rrtik.shorten(raw, problem, method=method, clearance=0.01)
     assert short.proof.proven
     assert short.proof.clearance == 0.01
@@ -47,7 +47,7 @@ def test_a_clearance_that_an_end_cannot_keep_is_refused(question):
 
 def test_fewest_moves_of_a_path_keep_a_centimetre(question):
     problem, _ = question
-    raw = rrtik.plan(problem, "bicrdt", seed=2).path
+    raw = rrtik.plan(problem, "bicrdt", seed=2, shorten=False).path
     short = rrtik.shorten(raw, problem, method="fewest-moves")
     assert short.proof.proven
     assert short.proof.clearance == 0.01
@@ -88,7 +88,7 @@ def test_the_proof_of_a_motion_names_the_piece_that_touches(question):
 @pytest.mark.parametrize("method", ["auto", "shortcut", "retraction", "fewest-moves"])
 def test_ctrl_c_leaves_a_shortening_at_once_and_the_next_one_is_as_ever(question, method):
     problem, raw = question
-    path = rrtik.plan(problem, "bicrdt", seed=2).path if method == "fewest-moves" else raw
+    path = rrtik.plan(problem, "bicrdt", seed=2, shorten=False).path if method == "fewest-moves" else raw
     usual = rrtik.shorten(path, problem, method=method, seed=3)
     looks = []
 
