@@ -226,6 +226,10 @@ class CloudWarning(UserWarning):
     """A point cloud or a grid of heights is probably not what its author meant; the program continues."""
 
 
+class PoseWarning(UserWarning):
+    """An orientation is probably not what its author meant: another order of its numbers, or degrees."""
+
+
 class SceneWarning(UserWarning):
     """Something in a scene file is represented differently in the world that is made of it."""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from typing import TypeAlias, TypeVar
 
@@ -9,8 +10,8 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.base.arrays import LARGEST, Mask, Matrix, Vector, bounded_array, dimensions, finite_array, frozen
-from rrtik_ompl.base.errors import InputError, at_most
+from rrtik_ompl.base.arrays import LARGEST, TAU, Mask, Matrix, Vector, bounded_array, dimensions, finite_array, frozen
+from rrtik_ompl.base.errors import InputError, PoseWarning, at_most
 
 PoseLike: TypeAlias = pin.SE3 | ArrayLike  # a pose in any form that `rigid` takes
 Coordinate = TypeVar("Coordinate", float, Vector)
@@ -20,38 +21,115 @@ LAST_ROW = frozen([0.0, 0.0, 0.0, 1.0])  # last row of every homogeneous matrix
 LAST_ROW_TOLERANCE = 1e-8
 NOT_RIGID = 1e-6  # largest entry of R R^T - 1 that counts as a rounding error, which is removed
 ROUNDING = 1e-12  # largest entry of R R^T - 1 with which a rotation is used unchanged
+SAME_QUATERNION = 1e-6  # largest difference of a number of equal quaternions
+ORDER_DOUBT = (
+    "quat_xyzw [1, 0, 0, 0] is read as x, y, z, w: half a turn about x. No rotation is [0, 0, 0, 1], or quat_wxyz "
+    "[1, 0, 0, 0]. If half a turn is meant, write rpy [pi, 0, 0] (files: rpy_deg [180, 0, 0]) or quat_wxyz [0, 1, 0, 0]"
+)
 MOST_MOVING = 200  # largest number of joints for Pinocchio, whose memory grows with their cube (32 GB for 1,000)
 
 
-def pose(xyz: ArrayLike = (0.0, 0.0, 0.0), quat_xyzw: ArrayLike | None = None, what: str = "pose") -> pin.SE3:
-    """Make a pose from a position [m] and a unit quaternion in the order x, y, z, w.
+def pose(
+    xyz: PoseLike = (0.0, 0.0, 0.0),
+    quat_xyzw: ArrayLike | None = None,
+    *,
+    quat_wxyz: ArrayLike | None = None,
+    rpy: ArrayLike | None = None,
+) -> pin.SE3:
+    """Make a pose from a position [m] and at most one orientation, or from any form of a pose.
 
     Args:
-        xyz: The position [m], shape (3,); without ``quat_xyzw`` a pose in any form that :func:`rigid` accepts, such as
+        xyz: The position [m], shape (3,); without an orientation a pose in any form that :func:`rigid` accepts, such as
             [x, y, z, roll, pitch, yaw] in metres and radians or a 4 x 4 matrix.
-        quat_xyzw: The orientation, shape (4,).
-        what: Name of the pose, for messages.
+        quat_xyzw: The orientation as a unit quaternion in the order x, y, z, w (as in ROS and SciPy), shape (4,).
+        quat_wxyz: The orientation as a unit quaternion in the order w, x, y, z (as in MuJoCo and Eigen), shape (4,).
+        rpy: The orientation as roll, pitch, yaw about the fixed x, y and z axes [rad], shape (3,).
 
     Raises:
-        InputError: If a number is not finite, or the quaternion's length differs from 1 by more than 1e-3.
+        InputError: If a number is not finite, more than one orientation is given, or a quaternion's length differs
+            from 1 by more than 1e-3.
+
+    A :class:`~rrtik_ompl.base.errors.PoseWarning` says where ``quat_xyzw`` is [1, 0, 0, 0], half a turn, which would be
+    no rotation in the order w, x, y, z, and where ``rpy`` looks like degrees.
 
     Example:
         >>> rrtik.pose([0.1, 0.2, 0.3], [0.0, 0.0, 1.0, 0.0]).translation
         array([0.1, 0.2, 0.3])
-        >>> rrtik.pose([0.1, 0.2, 0.3, 0.0, 0.0, 1.57]).translation
-        array([0.1, 0.2, 0.3])
+        >>> down = rrtik.pose([0.1, 0.2, 0.3], rpy=[np.pi, 0.0, 0.0])
+        >>> down.isApprox(rrtik.pose([0.1, 0.2, 0.3], quat_wxyz=[0.0, 1.0, 0.0, 0.0]))
+        True
     """
-    if quat_xyzw is None:
-        return rigid(xyz, what)
+    if quat_xyzw is None and quat_wxyz is None and rpy is None:
+        return rigid(xyz, "pose")
+    angles = None if rpy is None else _radians(rpy, "pose")
+    return placed(xyz, "pose", quat_xyzw=quat_xyzw, quat_wxyz=quat_wxyz, rpy=angles)
+
+
+def placed(
+    xyz: PoseLike,
+    what: str,
+    *,
+    quat_xyzw: ArrayLike | None = None,
+    quat_wxyz: ArrayLike | None = None,
+    rpy: ArrayLike | None = None,
+) -> pin.SE3:
+    """Make a pose from a position and at most one orientation as a person wrote it, see :func:`pose`.
+
+    ``what`` names it in messages.
+    """
+    orientations = {"quat_xyzw": quat_xyzw, "quat_wxyz": quat_wxyz, "rpy": rpy}
+    given = [name for name, value in orientations.items() if value is not None]
+    if len(given) > 1:
+        raise InputError(f"{what}: give one orientation, got {' and '.join(given)}")
 
     position = bounded_array(xyz, (3,), f"{what}: xyz")
-    quaternion = finite_array(quat_xyzw, (4,), f"{what}: quat_xyzw")
+    if quat_xyzw is not None:
+        quaternion = unit_quaternion(quat_xyzw, f"{what}: quat_xyzw", "x, y, z, w")
+        if reads_as_identity(quaternion):
+            warnings.warn(PoseWarning(f"{what}: {ORDER_DOUBT}"), stacklevel=3)
+        return pose_from_xyzw(position, quaternion)
+    if quat_wxyz is not None:
+        return pose_from_xyzw(position, np.roll(unit_quaternion(quat_wxyz, f"{what}: quat_wxyz", "w, x, y, z"), -1))
+    if rpy is not None:
+        return pose_from_rpy(position, rpy, what)
+    return pin.SE3(np.eye(3), position)
+
+
+def pose_from_xyzw(xyz: ArrayLike, quaternion: ArrayLike, what: str = "pose") -> pin.SE3:
+    """Make a pose from a position [m] and a unit quaternion x, y, z, w, whose order is certain.
+
+    Raises:
+        InputError: If a number is not finite, or the quaternion's length differs from 1 by more than 1e-3.
+    """
+    position = bounded_array(xyz, (3,), f"{what}: xyz")
+    x, y, z, w = unit_quaternion(quaternion, f"{what}: quat_xyzw", "x, y, z, w")
+    return pin.SE3(pin.Quaternion(w, x, y, z).matrix(), position)
+
+
+def unit_quaternion(values: ArrayLike, what: str, order: str) -> Vector:
+    """Validate a quaternion of length 1, shape (4,), and normalise it; ``order`` is that of its numbers, for messages.
+
+    Raises:
+        InputError: If its length differs from 1 by more than 1e-3.
+    """
+    quaternion = finite_array(values, (4,), what)
     length = float(np.linalg.norm(quaternion))
     if abs(length - 1.0) > 1e-3:
-        raise InputError(f"{what}: quat_xyzw must have length 1, but has {length:.4g}; the order is x, y, z, w")
+        raise InputError(f"{what} must have length 1, but has {length:.4g}; the order is {order}")
+    return quaternion / length
 
-    x, y, z, w = quaternion / length
-    return pin.SE3(pin.Quaternion(w, x, y, z).matrix(), position)
+
+def reads_as_identity(quat_xyzw: Vector) -> bool:
+    """Check whether a quaternion x, y, z, w is [1, 0, 0, 0], which is no rotation in the order w, x, y, z."""
+    return bool(np.abs(quat_xyzw - (1.0, 0.0, 0.0, 0.0)).max() <= SAME_QUATERNION)
+
+
+def orientation_data(placement: pin.SE3) -> dict[str, list[float]]:
+    """Return the orientation of a pose as files write it; a half-turn about x such that reading it gives no warning."""
+    quaternion = quaternion_xyzw(placement)
+    if reads_as_identity(quaternion):
+        return {"quat_wxyz": np.roll(quaternion, 1).tolist()}
+    return {"quat_xyzw": quaternion.tolist()}
 
 
 def pose_from_rpy(xyz: ArrayLike, rpy: ArrayLike, what: str = "pose") -> pin.SE3:
@@ -141,15 +219,24 @@ def rigid(T: PoseLike, what: str) -> pin.SE3:
     return pin.SE3(matrix)
 
 
+def _radians(rpy: ArrayLike, what: str) -> Vector:
+    """Validate roll, pitch, yaw that a person wrote, shape (3,), and warn if they look like degrees."""
+    angles = bounded_array(rpy, (3,), f"{what}: rpy")
+    if np.abs(angles).max() > TAU:
+        doubt = f"rpy {angles.tolist()} is read as radians, which is more than a turn; for degrees write np.deg2rad(..)"
+        warnings.warn(PoseWarning(f"{what}: {doubt}"), stacklevel=4)
+    return angles
+
+
 def _written_pose(numbers: ArrayLike, what: str) -> pin.SE3:
     """Convert a pose that is written as 3, 6 or 7 numbers, see rigid."""
     values = finite_array(numbers, (None,), what)
     if len(values) == 3:
         return pin.SE3(np.eye(3), bounded_array(values, (3,), what))
     if len(values) == 6:
-        return pose_from_rpy(values[:3], values[3:], what)
+        return pose_from_rpy(values[:3], _radians(values[3:], what), what)
     if len(values) == 7:
-        return pose(values[:3], values[3:], what)
+        return placed(values[:3], what, quat_xyzw=values[3:])
     raise InputError(
         f"{what}: a pose is a pinocchio.SE3, a 4 x 4 matrix, [x, y, z], [x, y, z, roll, pitch, yaw] or "
         f"[x, y, z, qx, qy, qz, qw], not {len(values)} numbers"

@@ -178,7 +178,7 @@ def _goal(
     import numpy as np
 
     from rrtik_ompl import PoseGoal
-    from rrtik_ompl.base.poses import pose, pose_from_rpy
+    from rrtik_ompl.base.poses import placed, pose_from_rpy
     from rrtik_ompl.model.goal import TipGoal
 
     if quaternion and rpy_deg:
@@ -196,7 +196,7 @@ def _goal(
         return given.goal
 
     if quaternion:
-        return PoseGoal(pose(position, quaternion, "--position, --quaternion"), **tolerances)
+        return PoseGoal(placed(position, "--position, --quaternion", quat_xyzw=quaternion), **tolerances)
     if rpy_deg:
         return PoseGoal(pose_from_rpy(position, np.radians(rpy_deg), "--position, --rpy-deg"), **tolerances)
     return _point(position, tolerances)

@@ -9,10 +9,10 @@ import numpy as np
 from pydantic import Field
 
 from rrtik_ompl.base.choices import DhConvention
-from rrtik_ompl.base.poses import IDENTITY_QUATERNION, pose
 from rrtik_ompl.base.units import DEGREE
 from rrtik_ompl.description.dh import DhRow, robot_from_dh
 from rrtik_ompl.description.tree import JOINT_KINDS
+from rrtik_ompl.files.pose_entry import PoseEntry
 from rrtik_ompl.files.sections import (
     Name,
     NotNegative,
@@ -21,8 +21,6 @@ from rrtik_ompl.files.sections import (
     Positive,
     Section,
     Vector2,
-    Vector3,
-    Vector4,
     Version,
     parse,
 )
@@ -52,20 +50,13 @@ class RowEntry(Section):
     jerk: Positive | None = None
 
 
-class ToolEntry(Section):
-    """Pose of the tip in the frame of the last row."""
-
-    xyz: Vector3
-    quat_xyzw: Vector4 = Field(default_factory=lambda: list(IDENTITY_QUATERNION))
-
-
 class TableEntry(Section):
     """The table."""
 
     convention: DhConvention = Field(description="standard (Paul [32]) or modified (Craig [33])")
     rows: Annotated[list[RowEntry], Field(min_length=1)]
     radius: NotNegative | list[NotNegative] = Field(0.05, description="of the links [m], one number or one per row")
-    tool: ToolEntry | None = None
+    tool: PoseEntry | None = Field(None, description="pose of the tip in the frame of the last row")
 
 
 class DhFile(Section):
@@ -107,7 +98,7 @@ def robot_from_dh_file(path: str | os.PathLike[str], *, tip: str = "tip", base_p
             rows,
             convention=entry.dh.convention,
             radius=entry.dh.radius,
-            tool=None if tool is None else pose(tool.xyz, tool.quat_xyzw),
+            tool=None if tool is None else tool.build("pose of the tool"),
             tip=tip,
             base_pose=base_pose,
             postures=postures,

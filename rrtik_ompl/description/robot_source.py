@@ -12,17 +12,17 @@ import numpy as np
 import pinocchio as pin
 
 from rrtik_ompl.base.arrays import finite_array
-from rrtik_ompl.base.errors import InputError, UnknownNameError
-from rrtik_ompl.base.poses import PoseLike, pose, pose_from_rpy, quaternion_xyzw, rigid
+from rrtik_ompl.base.errors import UnknownNameError
+from rrtik_ompl.base.poses import PoseLike, orientation_data, placed, rigid
 
 BasePose: TypeAlias = PoseLike | Mapping[str, Sequence[float]] | None
-POSE_KEYS = ("xyz", "quat_xyzw", "rpy_deg")
+POSE_KEYS = ("xyz", "quat_xyzw", "quat_wxyz", "rpy_deg")
 
 
 def plain(value: object) -> object:
     """Convert a value to None, booleans, numbers, text, lists and dictionaries; paths become absolute."""
     if isinstance(value, pin.SE3):
-        return {"xyz": value.translation.tolist(), "quat_xyzw": quaternion_xyzw(value).tolist()}
+        return {"xyz": value.translation.tolist(), **orientation_data(value)}
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         return {field.name: plain(getattr(value, field.name)) for field in dataclasses.fields(value)}
     if isinstance(value, Mapping):
@@ -43,7 +43,7 @@ def source_entry(options: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def base_pose(value: BasePose, what: str = "base_pose") -> pin.SE3 | None:
-    """Return a base pose, from a form of `rrtik_ompl.base.poses.rigid` or ``{xyz: .., quat_xyzw: .. | rpy_deg: ..}``.
+    """Return a base pose, from a form of `rrtik_ompl.base.poses.rigid` or a mapping with the keys of ``POSE_KEYS``.
 
     Raises:
         InputError: If it has neither form, or a key or number in it is not valid.
@@ -58,8 +58,6 @@ def base_pose(value: BasePose, what: str = "base_pose") -> pin.SE3 | None:
             raise UnknownNameError("key", key, POSE_KEYS, where=what)
 
     xyz = value.get("xyz", (0.0, 0.0, 0.0))
-    if "rpy_deg" not in value:
-        return pose(xyz, value.get("quat_xyzw", (0.0, 0.0, 0.0, 1.0)), what)
-    if "quat_xyzw" in value:
-        raise InputError(f"{what}: give quat_xyzw or rpy_deg, not both")
-    return pose_from_rpy(xyz, np.radians(finite_array(value["rpy_deg"], (3,), f"{what}: rpy_deg")), what)
+    angles = value.get("rpy_deg")
+    rpy = None if angles is None else np.radians(finite_array(angles, (3,), f"{what}: rpy_deg"))
+    return placed(xyz, what, quat_xyzw=value.get("quat_xyzw"), quat_wxyz=value.get("quat_wxyz"), rpy=rpy)

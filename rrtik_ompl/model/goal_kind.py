@@ -251,7 +251,7 @@ class TaskRegion(GoalPart):
     Example:
         >>> bounds = np.zeros((6, 2))
         >>> bounds[5] = -np.pi, np.pi  # the tool may turn about the z axis of the region
-        >>> drill = rrtik.TaskRegion(rrtik.pose([0.4, 0.2, 0.3], [1.0, 0.0, 0.0, 0.0]), bounds)
+        >>> drill = rrtik.TaskRegion(rrtik.pose([0.4, 0.2, 0.3], rpy=[np.pi, 0.0, 0.0]), bounds)
         >>> rrtik.solve_ik(rrtik.load_robot("ur5"), drill).found
         True
     """

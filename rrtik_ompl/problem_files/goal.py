@@ -12,6 +12,7 @@ from pydantic_core import PydanticCustomError
 from rrtik_ompl.base.arrays import Vector
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.base.poses import pose
+from rrtik_ompl.files.pose_entry import PoseEntry, pose_data
 from rrtik_ompl.files.sections import (
     Name,
     NotNegative,
@@ -26,7 +27,6 @@ from rrtik_ompl.files.sections import (
 from rrtik_ompl.model.goal import JOINT_TOLERANCE, Goal, GoalPart, GoalSet, JointGoal, MultiGoal, PoseGoal, PositionGoal
 from rrtik_ompl.model.goal_kind import COORDINATES, TaskRegion
 from rrtik_ompl.model.robot import Robot
-from rrtik_ompl.problem_files.scene import PoseEntry, pose_data
 
 
 class JointsDeg(Section):

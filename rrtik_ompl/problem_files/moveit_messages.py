@@ -16,7 +16,7 @@ from pydantic_core import PydanticCustomError
 
 from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.base.errors import InputError
-from rrtik_ompl.base.poses import IDENTITY_QUATERNION, pose
+from rrtik_ompl.base.poses import IDENTITY_QUATERNION, pose_from_xyzw
 from rrtik_ompl.files.sections import Length, Name, NotNegative, Number, Positive, Vector3, Vector4
 from rrtik_ompl.model.shapes import SHAPES, Shape
 
@@ -112,7 +112,7 @@ class PoseMessage(Message):
 
     def build(self) -> pin.SE3:
         """Return the pose as ``pinocchio.SE3``; the identity if it was not filled in."""
-        return pose(self.position, self.orientation if any(self.orientation) else IDENTITY_QUATERNION)
+        return pose_from_xyzw(self.position, self.orientation if any(self.orientation) else IDENTITY_QUATERNION)
 
 
 class Header(Message):
@@ -282,7 +282,7 @@ class Transform(Message):
 
     def build(self) -> pin.SE3:
         """Return the pose as ``pinocchio.SE3``; the identity if it was not filled in."""
-        return pose(self.translation, self.rotation if any(self.rotation) else IDENTITY_QUATERNION)
+        return pose_from_xyzw(self.translation, self.rotation if any(self.rotation) else IDENTITY_QUATERNION)
 
 
 class BaseState(Message):
@@ -424,7 +424,7 @@ class OrientationConstraint(Message):
 
     def build_rotation(self) -> Matrix:
         """Return the orientation as a matrix, shape (3, 3)."""
-        rotation: Matrix = pose([0.0, 0.0, 0.0], self.orientation).rotation
+        rotation: Matrix = pose_from_xyzw([0.0, 0.0, 0.0], self.orientation).rotation
         return rotation
 
     @property

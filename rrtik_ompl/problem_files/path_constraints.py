@@ -12,12 +12,12 @@ from pydantic import Field, Tag
 from rrtik_ompl.base.arrays import TAU
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.constraints.shorthands import inside, on_line, on_plane, orientation_of, upright
+from rrtik_ompl.files.pose_entry import PoseEntry
 from rrtik_ompl.files.sections import Name, NotNegative, Positive, Section, Vector3, tag, told_apart_by
 from rrtik_ompl.files.strict_yaml import YamlDocument
 from rrtik_ompl.model.goal_kind import TaskRegion
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.problem_files.goal import TaskRegionEntry, goal_data
-from rrtik_ompl.problem_files.scene import PoseEntry
 
 
 class Constraint(Section):

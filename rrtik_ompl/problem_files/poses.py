@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from rrtik_ompl.base.errors import InputError
-from rrtik_ompl.base.poses import pose, pose_from_rpy
+from rrtik_ompl.base.poses import pose_from_rpy, pose_from_xyzw
+from rrtik_ompl.files.pose_entry import PoseEntry
 from rrtik_ompl.files.sections import Section, Vector3, exactly_one, parse
 from rrtik_ompl.files.strict_yaml import read_yaml
 from rrtik_ompl.files.text import file_name, read_text
-from rrtik_ompl.problem_files.scene import PoseEntry
 
 FORMATS = (".csv", ".json", ".yaml", ".yml")
 POSITION = ("x", "y", "z")
@@ -96,7 +96,7 @@ def _numbers(path: object, number: int, row: list[str], names: list[str]) -> dic
 def _pose(row: dict[str, float], what: str) -> NDArray[np.float64]:
     place = [row[name] for name in POSITION]
     if QUATERNION[0] in row:
-        placed = pose(place, [row[name] for name in QUATERNION], what)
+        placed = pose_from_xyzw(place, [row[name] for name in QUATERNION], what)
     else:
         placed = pose_from_rpy(place, np.radians([row[name] for name in ANGLES]), what)
     matrix: NDArray[np.float64] = placed.homogeneous

@@ -9,6 +9,7 @@ from typing import Annotated, Any, TypeAlias
 import pinocchio as pin
 from pydantic import ConfigDict, Discriminator, Field, Tag
 
+from rrtik_ompl.files.pose_entry import PoseEntry, pose_data
 from rrtik_ompl.files.sections import (
     Length,
     Name,
@@ -20,7 +21,6 @@ from rrtik_ompl.files.sections import (
     tag,
     told_apart_by,
 )
-from rrtik_ompl.problem_files.scene import PoseEntry, pose_data
 from rrtik_ompl.problem_files.shapes import relative_name
 
 PATH_KEYS = ("urdf", "srdf", "joint_limits", "dh", "moveit", "mjcf", "packages")

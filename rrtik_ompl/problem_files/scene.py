@@ -6,20 +6,17 @@ import os
 from pathlib import Path
 from typing import Annotated, Any
 
-import numpy as np
 import pinocchio as pin
 from pydantic import Field, create_model, model_validator
-from pydantic_core import PydanticCustomError
 
 from rrtik_ompl.base.errors import require
-from rrtik_ompl.base.poses import pose, pose_from_rpy, quaternion_xyzw
+from rrtik_ompl.files.pose_entry import PoseEntry, pose_data
 from rrtik_ompl.files.sections import (
     Name,
     NotNegative,
     Number,
     Section,
     Vector3,
-    Vector4,
     Version,
     exactly_one,
     parse,
@@ -29,26 +26,6 @@ from rrtik_ompl.files.text import file_name
 from rrtik_ompl.model.scene import AttachedObject, ConstantVelocity, Motion, Obstacle, Scene, TimedPoses, Touching
 from rrtik_ompl.model.world_settings import SETTINGS_IN_FILES
 from rrtik_ompl.problem_files.shapes import ONE_SHAPE, ShapeEntry, shape_data
-
-
-class PoseEntry(Section):
-    """A pose: position [m], and the orientation as a quaternion x, y, z, w or as fixed-axis roll, pitch, yaw."""
-
-    xyz: Vector3 = Field(description="position [m]")
-    quat_xyzw: Vector4 | None = Field(None, description="unit quaternion x, y, z, w; no rotation if absent")
-    rpy_deg: Vector3 | None = Field(None, description="roll, pitch, yaw about the fixed x, y, z axes [deg]")
-
-    @model_validator(mode="after")
-    def _one_orientation(self) -> PoseEntry:
-        if self.quat_xyzw is not None and self.rpy_deg is not None:
-            raise PydanticCustomError("two_orientations", "give quat_xyzw or rpy_deg, not both")
-        return self
-
-    def build(self) -> pin.SE3:
-        """Return the pose as ``pinocchio.SE3``."""
-        if self.rpy_deg is not None:
-            return pose_from_rpy(self.xyz, np.radians(self.rpy_deg))
-        return pose(self.xyz) if self.quat_xyzw is None else pose(self.xyz, self.quat_xyzw)
 
 
 class WaypointEntry(Section):
@@ -84,7 +61,7 @@ class SolidEntry(ShapeEntry):
 
     def build_pose(self) -> pin.SE3:
         """Return the pose; the identity if none is given."""
-        return pin.SE3.Identity() if self.pose is None else self.pose.build()
+        return pin.SE3.Identity() if self.pose is None else self.pose.build(f"pose of '{self.name}'")
 
 
 class ObstacleEntry(SolidEntry, json_schema_extra=ONE_SHAPE):
@@ -248,14 +225,6 @@ def scene_data(scene: Scene, folder: Path) -> dict[str, Any]:
         data["allowed_collisions"] = [list(pair) for pair in scene.allowed_collisions]
     if scene.contacts:
         data["contacts"] = [{"pair": list(each.names), "distance": each.distance} for each in scene.contacts]
-    return data
-
-
-def pose_data(placement: pin.SE3) -> dict[str, Any]:
-    """Return the entry of a pose; the orientation is left out if it is the identity."""
-    data: dict[str, Any] = {"xyz": placement.translation.tolist()}
-    if not np.array_equal(placement.rotation, np.eye(3)):
-        data["quat_xyzw"] = quaternion_xyzw(placement).tolist()
     return data
 
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Vector
 from rrtik_ompl.base.copies import as_value
-from rrtik_ompl.base.poses import pose
+from rrtik_ompl.base.poses import pose_from_xyzw
 from rrtik_ompl.geometry.collision.bodies import Body, contact_distance, keeps_clearance, kept_apart
 from rrtik_ompl.geometry.collision.cloud_solid import Ends
 from rrtik_ompl.geometry.collision.distances import gap_beyond, is_ours, own_nearest
@@ -153,7 +153,7 @@ def _snapshots(
 
 def _scene_at_tick(scene: Scene, tick: Tick) -> Scene:
     """Return a scene with its obstacles, now at rest, at the poses that a tick records."""
-    poses = {name: pose(row[:3], row[3:]) for name, row in tick.poses.items()}
+    poses = {name: pose_from_xyzw(row[:3], row[3:]) for name, row in tick.poses.items()}
     obstacles = (replace(o, motion=None, pose=poses.get(o.name, o.pose)) for o in scene.obstacles)
     return replace(scene, obstacles=tuple(obstacles))
 

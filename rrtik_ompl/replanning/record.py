@@ -22,7 +22,7 @@ from rrtik_ompl.base.arrays import Matrix, Vector, finite_array, finite_number, 
 from rrtik_ompl.base.choices import RunOutcome, TickEvent, one_of
 from rrtik_ompl.base.copies import in_one_line
 from rrtik_ompl.base.errors import InputError, in_file, require
-from rrtik_ompl.base.poses import pose, pose_row
+from rrtik_ompl.base.poses import pose_from_xyzw, pose_row
 from rrtik_ompl.files.tables import json_object
 from rrtik_ompl.files.text import read_text, write_text
 from rrtik_ompl.model.judgement import Contact, Judged, PathContact, Verdict
@@ -343,7 +343,7 @@ def _pose_row(values: ArrayLike, name: str) -> Vector:
     """Check the pose of an obstacle or attached object and return it as written: x, y, z, quaternion; shape (7,)."""
     what = f"pose of '{name}'"
     row = finite_array(values, (7,), what)
-    pose(row[:3], row[3:], what)
+    pose_from_xyzw(row[:3], row[3:], what)
     return row
 
 
@@ -509,4 +509,4 @@ def _numbered(row: Mapping[str, Any], shapes: Sequence[Shape]) -> Shape:
 
 def _pose(values: ArrayLike, name: str) -> pin.SE3:
     row = _pose_row(values, name)
-    return pose(row[:3], row[3:])
+    return pose_from_xyzw(row[:3], row[3:])

@@ -13,10 +13,10 @@ import pinocchio as pin
 from pydantic import Field
 
 from rrtik_ompl.base.errors import InputError, listed, require
+from rrtik_ompl.files.pose_entry import PoseEntry, pose_data
 from rrtik_ompl.files.sections import Name, NotNegative, Section, Version, parse
 from rrtik_ompl.files.strict_yaml import read_yaml, write_yaml
 from rrtik_ompl.files.text import file_name
-from rrtik_ompl.problem_files.scene import PoseEntry, pose_data
 from rrtik_ompl.sensing.camera_file import load_camera, save_camera
 from rrtik_ompl.sensing.cameras.pictures import Picture, pictures_from
 from rrtik_ompl.sensing.rig import Rig

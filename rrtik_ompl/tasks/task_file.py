@@ -16,6 +16,7 @@ from rrtik_ompl.base.arrays import Vector
 from rrtik_ompl.base.errors import InputError, UnknownNameError
 from rrtik_ompl.description.catalog import list_problems, robot_from_entry, task_files
 from rrtik_ompl.description.xacro_text import expanding
+from rrtik_ompl.files.pose_entry import PoseEntry, pose_data
 from rrtik_ompl.files.sections import (
     Name,
     NotNegative,
@@ -36,7 +37,7 @@ from rrtik_ompl.problem_files.goal import GoalSection, Posture, StartSection, bu
 from rrtik_ompl.problem_files.path_constraints import ConstraintSection, build_constraints, constraint_data
 from rrtik_ompl.problem_files.problem_values import WorldKeys
 from rrtik_ompl.problem_files.robot import RobotEntry
-from rrtik_ompl.problem_files.scene import PoseEntry, SceneEntry, pose_data
+from rrtik_ompl.problem_files.scene import SceneEntry
 from rrtik_ompl.tasks import Task
 from rrtik_ompl.tasks.program import check_program, steps_of
 from rrtik_ompl.tasks.setting import Setting

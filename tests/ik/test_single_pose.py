@@ -120,7 +120,7 @@ def test_a_pose_is_solved_while_another_is_being_accepted(name, monkeypatch):
 def test_the_error_of_one_configuration_is_that_of_many(name):
     robot = rrtik.load_robot(name)
     Q = drawn(robot, 10)
-    near, half_turn = robot.fk(Q[0]), robot.fk(Q[1]) * rrtik.pose(quat_xyzw=[1.0, 0.0, 0.0, 0.0])
+    near, half_turn = robot.fk(Q[0]), robot.fk(Q[1]) * rrtik.pose(rpy=[np.pi, 0.0, 0.0])
     goals = [rrtik.PoseGoal(near), rrtik.PoseGoal(half_turn), rrtik.PositionGoal(near.translation)]
     for goal in goals:
         one = [error_of_one(robot, goal, q) for q in Q]

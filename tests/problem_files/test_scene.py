@@ -185,14 +185,18 @@ BAD = {
     "mesh missing": ("{name: a, mesh: no.stl}", r"obstacles\[0\]: .*no\.stl: no such file"),
     "two orientations": (
         "{name: a, sphere: 1, pose: {xyz: [0, 0, 0], quat_xyzw: [0, 0, 0, 1], rpy_deg: [0, 0, 0]}}",
-        "pose: give quat_xyzw or rpy_deg, not both",
+        "pose: give one of quat_xyzw, quat_wxyz and rpy_deg",
     ),
     "long quaternion": ("{name: a, sphere: 1, pose: {xyz: [0, 0, 0], quat_xyzw: [0, 0, 1, 1]}}", "must have length 1"),
     "pose without place": ("{name: a, sphere: 1, pose: {rpy_deg: [0, 0, 0]}}", "pose.xyz: missing"),
     "pose as list": ("{name: a, sphere: 1, pose: [0, 0, 0]}", "pose: must be a group of keys"),
-    "wrong order of quaternion": (
-        "{name: a, sphere: 1, pose: {xyz: [0, 0, 0], quat_wxyz: [1, 0, 0, 0]}}",
-        "unknown key 'quat_wxyz'; did you mean 'quat_xyzw'",
+    "two orders of a quaternion": (
+        "{name: a, sphere: 1, pose: {xyz: [0, 0, 0], quat_wxyz: [1, 0, 0, 0], quat_xyzw: [0, 0, 0, 1]}}",
+        "pose: give one of quat_xyzw, quat_wxyz and rpy_deg",
+    ),
+    "quaternion of another name": (
+        "{name: a, sphere: 1, pose: {xyz: [0, 0, 0], quat: [1, 0, 0, 0]}}",
+        "unknown key 'quat'",
     ),
     "empty motion": ("{name: a, sphere: 1, motion: {}}", "a motion needs exactly one of velocity, waypoints"),
     "times backwards": (

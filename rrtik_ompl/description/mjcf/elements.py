@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.base.errors import InputError, MissingFileError, UnknownNameError
-from rrtik_ompl.base.poses import pose, turned_z
+from rrtik_ompl.base.poses import pose_from_xyzw, turned_z
 from rrtik_ompl.description.package_path import MESH_SUFFIXES
 from rrtik_ompl.description.tree import MeshFile, Solid
 from rrtik_ompl.description.urdf_read import attribute, numbers
@@ -110,7 +110,7 @@ class Settings:
         length = float(np.linalg.norm([w, x, y, z]))
         if length < 1e-9:
             raise InputError(f"{where}: <{element.tag} quat> is zero; 1 0 0 0 turns nothing")
-        turn: Matrix = pose(quat_xyzw=np.array([x, y, z, w]) / length).rotation
+        turn: Matrix = pose_from_xyzw(np.zeros(3), np.array([x, y, z, w]) / length).rotation
         return turn
 
     def _axisangle(self, element: Element, where: str) -> Matrix:

@@ -14,12 +14,12 @@ from pydantic import Field
 
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.description.catalog import problem_folders
+from rrtik_ompl.files.pose_entry import PoseEntry
 from rrtik_ompl.files.sections import Length, Name, NotNegative, Number, Section, Version, parse
 from rrtik_ompl.files.strict_yaml import read_yaml
 from rrtik_ompl.pilot.devices.simulation import BaseMotion, Mount
 from rrtik_ompl.pilot.devices.wrong_arm import Faults
 from rrtik_ompl.pilot.interlock import UNSEEN_SECONDS
-from rrtik_ompl.problem_files.scene import PoseEntry
 from rrtik_ompl.sensing.camera_file import load_camera
 from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.markers.marker_map import MarkerMap

@@ -9,10 +9,11 @@ from typing import Annotated, Literal
 import pinocchio as pin
 from pydantic import Field
 
+from rrtik_ompl.files.pose_entry import PoseEntry
 from rrtik_ompl.files.sections import Length, Name, NotNegative, Section, Version, parse
 from rrtik_ompl.files.strict_yaml import YamlDocument, read_yaml
 from rrtik_ompl.model.scene import Obstacle
-from rrtik_ompl.problem_files.scene import PoseEntry, SolidEntry
+from rrtik_ompl.problem_files.scene import SolidEntry
 from rrtik_ompl.sensing.markers.marker_map import GraspType, MarkedObject, MarkerMap, MountedMarker
 
 
