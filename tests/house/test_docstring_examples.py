@@ -15,7 +15,6 @@ WITHOUT = {
     "AttachedObject",
     "GoalSet",
     "JointGoal",
-    "JointPath",
     "Obstacle",
     "PoseGoal",
     "PositionGoal",
