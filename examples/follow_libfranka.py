@@ -92,7 +92,7 @@ def main() -> int:
         return 1
     limits = rrtik.RateLimits.of(robot, share=0.3)
     motion = rrtik.time_parameterize(path, limits, blend=0.1, world=world)
-    print(rrtik.motion_report(motion, limits))
+    print(motion.report(limits))
     follower = rrtik.following.Follower(motion, link, limits=limits, rate=1.0 / TICK)
     while not follower.ended:
         link.last = follower.place + TICK >= motion.duration

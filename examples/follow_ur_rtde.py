@@ -84,7 +84,7 @@ def main() -> int:
         return 1
     limits = rrtik.RateLimits.of(robot, share=0.3)
     motion = rrtik.time_parameterize(path, limits, blend=0.1, world=world, tip_speed=0.25)
-    print(rrtik.motion_report(motion, limits))
+    print(motion.report(limits))
     found = rrtik.following.Follower(motion, link, limits=limits, rate=RATE).run()
     link.close()
     print("arrived" if found.arrived else f"stopped: {found.reason}")

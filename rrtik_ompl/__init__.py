@@ -65,7 +65,6 @@ if TYPE_CHECKING:
     from rrtik_ompl.motion.trajectory import RateLimits as RateLimits
     from rrtik_ompl.motion.trajectory import Trajectory as Trajectory
     from rrtik_ompl.motion.trajectory import load_trajectory as load_trajectory
-    from rrtik_ompl.motion.trajectory import motion_report as motion_report
     from rrtik_ompl.motion.trajectory import time_parameterize as time_parameterize
     from rrtik_ompl.planning.many import plan_many as plan_many
     from rrtik_ompl.planning.moves.staircase import one_joint_moves as one_joint_moves
@@ -198,7 +197,6 @@ else:
             "RateLimits",
             "Trajectory",
             "load_trajectory",
-            "motion_report",
             "time_parameterize",
         ),
         "replanning.replanner": ("replan",),

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bench.trajectories.cases import Case, lines, planned, single_joint_moves
-from rrtik_ompl import RateLimits, motion_report, time_parameterize
+from rrtik_ompl import RateLimits, time_parameterize
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.motion.trajectory import Trajectory
 
@@ -87,7 +87,7 @@ def _timed(case: Case) -> Measured:
     motion = time_parameterize(case.path, case.limits, blend=BLEND, world=case.world)
     brisk = time_parameterize(case.path, case.without_jerk, blend=BLEND, world=case.world)
     stopping = time_parameterize(case.path, case.limits)
-    shown, quick = motion_report(motion, case.limits), motion_report(brisk, case.without_jerk)
+    shown, quick = motion.report(case.limits), brisk.report(case.without_jerk)
     above = max(_above(motion, case.limits), _above(brisk, case.without_jerk), 0.0)
     often = max(float(shown.switches.max()), float(quick.switches.max()))
     ratios = (motion.duration / brisk.duration, motion.duration / stopping.duration)

@@ -152,13 +152,12 @@ def time_path(
 def _peaks_table(trajectory: Trajectory, limits: RateLimits) -> Table:
     """Return a table with the largest velocity, acceleration and jerk of each joint beside their limits; deg or m."""
     from rrtik_ompl.base.units import shown_unit
-    from rrtik_ompl.motion.trajectory import motion_report
 
     title, names = joint_labels(trajectory.joint_names, trajectory.prismatic)
     quantities = [head for what in ("velocity", "acceleration", "jerk") for head in (what, "limit")]
     table = Table(title, *quantities, "switches/s", right=range(1, 8))
 
-    often = motion_report(trajectory, limits).switches
+    often = trajectory.report(limits).switches
     peaks = trajectory.peaks()
     words = ("jumps", "none")  # words for an infinite peak, and for an infinite limit
     pairs = ((peaks.velocity, limits.velocity), (peaks.acceleration, limits.acceleration), (peaks.jerk, limits.jerk))
@@ -176,10 +175,8 @@ def _rate(value: float, word: str) -> str:
 
 def _timing_document(problem: Problem, trajectory: Trajectory, limits: RateLimits) -> dict[str, Any]:
     """Return a timed motion as plain values: duration and joints' peaks (a jerk of null is a jump of acceleration)."""
-    from rrtik_ompl.motion.trajectory import motion_report
-
     peaks = trajectory.peaks()
-    report = motion_report(trajectory, limits)
+    report = trajectory.report(limits)
     return {
         "problem": problem.name,
         "robot": trajectory.robot_name,

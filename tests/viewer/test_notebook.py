@@ -73,7 +73,7 @@ def test_results_are_lines(problem, plan):
         plan,
         rrtik.solve_ik(robot, rrtik.PositionGoal(poses[0][:3, 3], tolerance=0.01)),
         rrtik.ik.reach_map(robot, samples=500, seed=1),
-        rrtik.motion_report(rrtik.time_parameterize(plan.path, robot), rrtik.RateLimits.of(robot)),
+        rrtik.time_parameterize(plan.path, robot).report(rrtik.RateLimits.of(robot)),
         rrtik.certificate_of(problem.world, plan.path, 0.0),
         rrtik.Mesh(np.random.default_rng(1).normal(size=(90, 3)), np.arange(90).reshape(30, 3)),
     ]

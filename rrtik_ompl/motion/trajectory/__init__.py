@@ -15,7 +15,7 @@ from rrtik_ompl.motion.trajectory.dynamics import DynamicLimits
 from rrtik_ompl.motion.trajectory.limits import RateLimits
 from rrtik_ompl.motion.trajectory.load import load_trajectory
 from rrtik_ompl.motion.trajectory.motion import Trajectory
-from rrtik_ompl.motion.trajectory.report import MotionReport, motion_report
+from rrtik_ompl.motion.trajectory.report import MotionReport
 from rrtik_ompl.world.clearances import check_route_clearance
 from rrtik_ompl.world.world import World
 
@@ -26,7 +26,6 @@ __all__ = [
     "State",
     "Trajectory",
     "load_trajectory",
-    "motion_report",
     "time_parameterize",
 ]
 

@@ -27,7 +27,9 @@ from rrtik_ompl.motion.trajectory.cubics import (
     hermite_accelerations,
     places,
 )
+from rrtik_ompl.motion.trajectory.limits import RateLimits
 from rrtik_ompl.motion.trajectory.played import played_motion
+from rrtik_ompl.motion.trajectory.report import MotionReport, report_of
 from rrtik_ompl.motion.trajectory.text import dumps, write_mcap, written_ending
 from rrtik_ompl.world.world import World
 
@@ -174,6 +176,22 @@ class Trajectory:
         """
         cubics = self.cubics
         return cubics.peaks() if self.set_points is None else cubics.at_knots(self.set_points).set_point_peaks()
+
+    def report(self, limits: RateLimits) -> MotionReport:
+        """Report how the motion uses limits: peaks as shares of them, sign changes and jumps of its acceleration.
+
+        Args:
+            limits: Of its joints.
+
+        Raises:
+            InputError: If the limits are for another number of joints.
+
+        Example:
+            >>> limits = rrtik.RateLimits(1.0, 2.0, 10.0)
+            >>> rrtik.time_parameterize(rrtik.JointPath([[0.0], [1.0]]), limits).report(limits).kept
+            True
+        """
+        return report_of(self, limits)
 
     def slowed(self, factor: float) -> Trajectory:
         """Return the same motion, ``factor`` times as long.

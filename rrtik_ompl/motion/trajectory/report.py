@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +14,9 @@ from rrtik_ompl.base.errors import require
 from rrtik_ompl.base.units import shown_unit
 from rrtik_ompl.motion.trajectory.cubics import JUMP_SHARE
 from rrtik_ompl.motion.trajectory.limits import RateLimits
-from rrtik_ompl.motion.trajectory.motion import Trajectory
+
+if TYPE_CHECKING:
+    from rrtik_ompl.motion.trajectory.motion import Trajectory
 
 QUIET_SHARE = 0.02  # share of a joint's largest acceleration below which an acceleration is ignored
 
@@ -63,24 +66,8 @@ class MotionReport:
         return "\n".join(lines)
 
 
-def motion_report(motion: Trajectory, limits: RateLimits) -> MotionReport:
-    """Report how a motion uses limits.
-
-    Args:
-        motion: The motion.
-        limits: Of its joints.
-
-    Raises:
-        InputError: If the limits are for another number of joints.
-
-    Example:
-        >>> import rrtik_ompl as rrtik
-        >>> limits = rrtik.RateLimits(1.0, 2.0, 10.0)
-        >>> motion = rrtik.time_parameterize(rrtik.JointPath([[0.0], [1.0]]), limits)
-        >>> rrtik.motion_report(motion, limits).kept
-        True
-    """
-    require(motion, Trajectory, "motion to report of")
+def report_of(motion: Trajectory, limits: RateLimits) -> MotionReport:
+    """Report how a motion uses the limits of its joints; see :meth:`Trajectory.report`."""
     require(limits, RateLimits, "limits of a report", "use RateLimits.of(robot)")
 
     bounds = limits.for_joints(len(motion.joint_names))

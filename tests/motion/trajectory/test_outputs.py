@@ -10,7 +10,7 @@ import yaml
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.model.path import JointPath
-from rrtik_ompl.motion.trajectory import RateLimits, Trajectory, load_trajectory, motion_report, time_parameterize
+from rrtik_ompl.motion.trajectory import RateLimits, Trajectory, load_trajectory, time_parameterize
 from rrtik_ompl.viewer import view
 from rrtik_ompl.viewer.plots.joints import plot_joints
 
@@ -102,20 +102,20 @@ def test_mcap_holds_joint_states_at_their_times(tmp_path, motion):
 
 
 def test_the_report_names_peaks_switches_and_jumps(motion):
-    found = motion_report(motion, LIMITS)
+    found = motion.report(LIMITS)
     assert found.kept
     assert found.velocity.max() == pytest.approx(1.0)
     assert (found.switches * motion.duration == 1).all()  # once from pushing to braking
     assert (found.jump == 0.0).all()
     assert "within all limits" in str(found)
     brisk = time_parameterize(JointPath([[0.0], [1.0]]), RateLimits(1.0, 2.0))
-    shown = motion_report(brisk, RateLimits(0.5, 2.0))
+    shown = brisk.report(RateLimits(0.5, 2.0))
     assert shown.jump == pytest.approx([2.0])
     assert not shown.kept
     assert "exceeds" in str(shown)
     assert "jumps by" in str(shown)
     with pytest.raises(InputError, match="limits for 3"):
-        motion_report(brisk, LIMITS)
+        brisk.report(LIMITS)
 
 
 def test_the_plot_draws_limits_and_marks_jumps(tmp_path):
@@ -166,10 +166,10 @@ def test_set_points_stay_what_they_are_and_keep_the_limits_of_their_motion(tmp_p
     np.testing.assert_allclose(found(clock).positions, samples, rtol=0.0, atol=2e-9)
     dense = np.linspace(0.0, motion.duration, 5000)
     assert np.abs(found(dense).positions - motion(dense).positions).max() < 20.0 / rate**3
-    report = motion_report(found, ODD)
+    report = found.report(ODD)
     assert report.kept
     assert not report.jump.any()
-    assert not motion_report(found, RateLimits(ODD.velocity, ODD.acceleration, 0.9 * ODD.jerk)).kept
+    assert not found.report(RateLimits(ODD.velocity, ODD.acceleration, 0.9 * ODD.jerk)).kept
     found.save(again)
     assert again.read_text() == file.read_text()
     assert found.slowed(2.0).peaks().velocity == pytest.approx(0.5 * found.peaks().velocity)
@@ -185,7 +185,7 @@ def test_points_that_are_far_from_each_other_are_no_set_points(tmp_path, robot):
     for found, wanted in zip(sparse(samples.times), state, strict=True):
         np.testing.assert_allclose(found, wanted, rtol=0.0, atol=1e-9)
     assert not sparse.jumps().max() > 1e-6
-    assert not motion_report(sparse, ODD).kept
+    assert not sparse.report(ODD).kept
 
 
 def test_set_points_of_a_motion_that_jumps_exceed_a_jerk_limit(tmp_path, robot):
@@ -193,8 +193,8 @@ def test_set_points_of_a_motion_that_jumps_exceed_a_jerk_limit(tmp_path, robot):
     hard.save(tmp_path / "hard.csv", rate=100.0)
     found = load_trajectory(tmp_path / "hard.csv")
     assert found.set_points is not None
-    assert motion_report(found, RateLimits(1.07, 2.3)).kept
-    assert not motion_report(found, ODD).kept
+    assert found.report(RateLimits(1.07, 2.3)).kept
+    assert not found.report(ODD).kept
 
 
 def test_a_tick_just_before_the_end_is_the_end(tmp_path, robot):
