@@ -6,24 +6,27 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
 from rrtik_ompl.base.errors import InputError, ProblemError
 from rrtik_ompl.cli import FOUND
-from rrtik_ompl.cli.terminal import PAGE_FORMATS, ProblemName, note, progress, say, shown_names, suggest
+from rrtik_ompl.cli.terminal import PAGE_FORMATS, ProblemName, note, plural, progress, say, shown_names, suggest
 from rrtik_ompl.files.text import check_target
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from rrtik_ompl.model.path import JointPath
     from rrtik_ompl.model.robot import Robot
     from rrtik_ompl.pilot.overlay.film import ArmInPictures
     from rrtik_ompl.sensing.cameras.pictures import Picture
 
 ROBOT_FILES = (".urdf", ".xml", ".xacro")
+FILM_SECONDS = 4.0  # duration of the film of a path
+LONGEST_FILM = 48.0  # [s] of a task; longer ones play faster
 ENDINGS = (".mp4", ".avi", ".png", ".jpg")
 
 
@@ -31,7 +34,8 @@ def show(
     problem: Annotated[
         str,
         typer.Argument(
-            help="A shipped problem (rrtik list problems), a YAML file, or a robot.", autocompletion=shown_names
+            help="A shipped problem (rrtik list problems), a YAML file, a robot, or the plan of a task (.json).",
+            autocompletion=shown_names,
         ),
     ],
     path: Annotated[
@@ -43,7 +47,9 @@ def show(
     film: Annotated[
         Path | None, typer.Option(help="Write the path as a film: .gif, .mp4; or the start: .png. Needs a browser.")
     ] = None,
-    seconds: Annotated[float, typer.Option(help="Duration of the film [s].")] = 4.0,
+    seconds: Annotated[
+        float | None, typer.Option(help="Duration of the film [s]; if left out 4, or what a task takes, at most 48.")
+    ] = None,
     port: Annotated[int, typer.Option(help="Port on 127.0.0.1; 0 takes a free one.", min=0, max=65535)] = 0,
     still: Annotated[bool, typer.Option("--still", help="A page that does not plan by itself: smaller.")] = False,
 ) -> int:
@@ -51,25 +57,23 @@ def show(
 
     A live page on 127.0.0.1, or a file. Start, goal and obstacles can be dragged there: the page plans by itself.
 
-    A robot is shown alone, or in a scene. Where the start is in collision, the bodies are red, and the exit code is 1.
+    A robot is shown alone, or in a scene; the plan of a task with all its motions, and with what is carried. Where the
+    start is in collision, the bodies are red, and the exit code is 1.
     """
     check_target(html, PAGE_FORMATS)
     check_target(film, (".gif", ".mp4", ".png"))
 
-    from rrtik_ompl import load_path
-    from rrtik_ompl.motion.trajectory.load import load_motion_or_path
+    from rrtik_ompl.tasks.plan_file import is_task_plan
     from rrtik_ompl.viewer import view
 
-    question, robot, fault = _subject(problem, scene)
-    route = None if path is None else load_motion_or_path(path, robot)
-    earlier = None if before is None else load_path(before, robot)
-    title = fault or None
+    drawn = _of_task if is_task_plan(problem) else _of_problem
+    question, route, earlier, fault, title, duration = drawn(problem, path, scene, before)
 
     if film is not None:
         from rrtik_ompl.viewer.film import film as write_film
 
         with progress("drawing"):
-            write_film(question, route, film, seconds=seconds)
+            write_film(question, route, film, seconds=duration if seconds is None else seconds)
     if html is not None:
         view(question, route, html=html, before=earlier, still=still, title=title)
 
@@ -84,6 +88,52 @@ def show(
 
     view(question, route, before=earlier, port=port, still=still, title=title, on_ready=ready)
     return int(bool(fault))
+
+
+class Drawn(NamedTuple):
+    """What a page or a film shows.
+
+    Attributes:
+        question: A problem, a world, or a robot.
+        route: What is played; None if nothing moves.
+        before: A path to compare with; None without one.
+        fault: Why the start is invalid; "" if it is valid.
+        title: Heading; None derives it from the name.
+        seconds: Duration of a film [s].
+    """
+
+    question: Any
+    route: Any
+    before: JointPath | None
+    fault: str
+    title: str | None
+    seconds: float
+
+
+def _of_problem(name: str, path: Path | None, scene: Path | None, before: Path | None) -> Drawn:
+    """Return a problem or a robot, with the path in a file."""
+    from rrtik_ompl import load_path
+    from rrtik_ompl.motion.trajectory.load import load_motion_or_path
+
+    question, robot, fault = _subject(name, scene)
+    route = None if path is None else load_motion_or_path(path, robot)
+    earlier = None if before is None else load_path(before, robot)
+    return Drawn(question, route, earlier, fault, fault or None, FILM_SECONDS)
+
+
+def _of_task(name: str, path: Path | None, scene: Path | None, before: Path | None) -> Drawn:
+    """Return the plan of a task, as it is played."""
+    from rrtik_ompl import load_task_plan
+
+    given = {"PATH": path, "--scene": scene, "--before": before}
+    wrong = [option for option, value in given.items() if value is not None]
+    if wrong:
+        raise InputError(f"{name}: the plan of a task, which holds its paths and scenes: leave {wrong[0]} out")
+
+    plan = load_task_plan(name)
+    played = plan.played()
+    seconds = min(len(played.waypoints) / played.rate, LONGEST_FILM)
+    return Drawn(plan.worlds[0], played, None, "", f"{Path(name).stem}: {plural(len(plan.paths), 'motion')}", seconds)
 
 
 def _subject(name: str, scene: Path | None) -> tuple[Any, Robot, str]:

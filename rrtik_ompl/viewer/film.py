@@ -19,6 +19,7 @@ from PIL import Image
 
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.files.text import check_target
+from rrtik_ompl.tasks.played import PlayedTask
 from rrtik_ompl.viewer.page import ASKING_POLICY, POLICY, asset, page
 from rrtik_ompl.viewer.serve import PageServer
 from rrtik_ompl.viewer.subject import Showable, ShownPath, subject_of
@@ -41,7 +42,7 @@ PICTURE_ONLY = (
 
 def film(
     shown: Showable,
-    path: ShownPath | None,
+    path: ShownPath | PlayedTask | None,
     file: str | os.PathLike[str],
     *,
     seconds: float = 4.0,
@@ -52,7 +53,7 @@ def film(
 
     Args:
         shown: A ``Problem``, ``World``, ``Robot`` or ``Scene``.
-        path: What is played; may be None for a PNG.
+        path: What is played, such as the ``played()`` of a plan of a task; may be None for a PNG.
         file: .gif, .mp4 or .png (the first picture).
         seconds: Duration of the whole path.
         rate: Pictures a second.
@@ -68,7 +69,7 @@ def film(
     target = Path(file)
     check_target(target, FILMS)
     still = target.suffix.lower() == ".png"
-    if not still and not subject_of(shown, path).is_path:
+    if not still and not isinstance(path, PlayedTask) and not subject_of(shown, path).is_path:
         raise InputError(f"{target}: a film needs a path; give one (rrtik plan --out path.json), or ask for a .png")
 
     count = 1 if still else round(seconds * rate) + 1

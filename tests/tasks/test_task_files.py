@@ -6,12 +6,14 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from PIL import Image
 
 import rrtik_ompl as rrtik
 from rrtik_ompl.base.errors import InputError, UnknownNameError
 from rrtik_ompl.cli.app import run
 from rrtik_ompl.tasks.task_file import stage_data
 from rrtik_ompl.viewer.task_story import run_of
+from rrtik_tests.programs import needs_chromium
 
 SMALL = """\
 version: 1
@@ -79,6 +81,34 @@ def test_a_plan_comes_back_from_its_file_as_it_was(small, tmp_path):
         for a, b in zip(one.scene.attached, other.scene.attached, strict=True):
             assert (a.link, a.padding) == (b.link, b.padding) == ("ee_link", 0.004)
         assert path.violations(other) == ()
+
+
+@pytest.mark.kernels
+def test_a_saved_plan_is_shown_as_the_task_was(small, tmp_path, capsys):
+    plan, made, shown = (tmp_path / name for name in ("plan.json", "made.html", "shown.html"))
+    assert run(["task", str(small), "--seed", "1", "--out", str(plan), "--html", str(made)]) == 0
+    assert run(["show", str(plan), "--html", str(shown)]) == 0
+    stories = [re.search(r'id="story"[^>]*>(.*?)</script>', page.read_text(), re.S).group(1) for page in (made, shown)]
+    one, other = (json.loads(story) for story in stories)
+    assert other["title"] == "plan: 4 motions"
+    assert {key for key in one if one[key] != other[key]} <= {"title", "plan"}
+    capsys.readouterr()
+    for more in (["path.json"], ["--scene", "scene.yaml"], ["--before", "path.json"]):
+        assert run(["show", str(plan), *more]) == 2
+        said = capsys.readouterr().err
+        assert said.count("\n") == 1
+        assert "the plan of a task, which holds its paths and scenes" in said
+
+
+@pytest.mark.slow
+@pytest.mark.kernels
+@needs_chromium
+def test_a_saved_plan_is_filmed_with_all_its_motions(small, tmp_path):
+    plan, film = tmp_path / "plan.json", tmp_path / "task.gif"
+    assert run(["task", str(small), "--seed", "1", "--out", str(plan)]) == 0
+    assert run(["show", str(plan), "--film", str(film), "--seconds", "0.5"]) == 0
+    with Image.open(film) as moving:
+        assert moving.n_frames == 7
 
 
 @pytest.mark.kernels
