@@ -73,7 +73,7 @@ def run_case(run: Any) -> Result:
 
 
 def scenario_case(name: str, **options: Any) -> Result:
-    return run_case(rrtik.load_scenario(name).run(repair_budget=LONG, **options))
+    return run_case(rrtik.replanning.Scenario.load(name).run(repair_budget=LONG, **options))
 
 
 def feed_case(kind: str) -> Result:

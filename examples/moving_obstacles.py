@@ -2,7 +2,7 @@
 
 import rrtik_ompl as rrtik
 
-scenario = rrtik.load_scenario("replan_walls")
+scenario = rrtik.replanning.Scenario.load("replan_walls")
 run = scenario.run(record="run.json", seed=1)
 print(f"{run.problem}: {len(run.ticks)} ticks, {run.outcome} {run.reason}")
 rrtik.view(scenario.problem, run=run, html="run.html")

@@ -6,13 +6,13 @@ problem = rrtik.load_problem("planar3_boxes")
 path = rrtik.plan(problem, seed=1).path
 print(f"proven: {path.proven}, {1e3 * path.proof.clearance:.1f} mm are kept on the whole way")
 path.save("path.json")
-rrtik.certificate_of(problem.world, path, path.proof.clearance).save("proof.json")
+problem.world.certificate(path, path.proof.clearance).save("proof.json")
 
-certificate = rrtik.load_certificate("proof.json")
-fault = rrtik.verify_certificate(certificate, problem.world, rrtik.load_path("path.json").waypoints)
+certificate = rrtik.Certificate.load("proof.json")
+fault = problem.world.verify(certificate, rrtik.JointPath.load("path.json").waypoints)
 print(fault or "verified")
 
 moved = path.waypoints.copy()
 moved[1, 0] += 0.3
-print("a waypoint moved:", rrtik.verify_certificate(certificate, problem.world, moved))
+print("a waypoint moved:", problem.world.verify(certificate, moved))
 print("and by a search:", problem.world.prove(moved).unproven)

@@ -30,15 +30,10 @@ if TYPE_CHECKING:
     from rrtik_ompl.description.catalog import list_problems as list_problems
     from rrtik_ompl.description.catalog import list_robots as list_robots
     from rrtik_ompl.description.catalog import load_robot as load_robot
-    from rrtik_ompl.description.shapes.cloud import load_cloud as load_cloud
-    from rrtik_ompl.description.shapes.cloud import save_cloud as save_cloud
-    from rrtik_ompl.description.shapes.heights import load_height_field as load_height_field
-    from rrtik_ompl.description.shapes.mesh import load_mesh as load_mesh
-    from rrtik_ompl.description.shapes.octree import load_octree as load_octree
+    from rrtik_ompl.files.kinds import load as load
     from rrtik_ompl.ik.batch import solve_ik_many as solve_ik_many
     from rrtik_ompl.ik.solve import solve_ik as solve_ik
     from rrtik_ompl.model.certificate import Certificate as Certificate
-    from rrtik_ompl.model.certificate import load_certificate as load_certificate
     from rrtik_ompl.model.goal import GoalSet as GoalSet
     from rrtik_ompl.model.goal import JointGoal as JointGoal
     from rrtik_ompl.model.goal import MultiGoal as MultiGoal
@@ -46,7 +41,6 @@ if TYPE_CHECKING:
     from rrtik_ompl.model.goal import PositionGoal as PositionGoal
     from rrtik_ompl.model.goal_kind import TaskRegion as TaskRegion
     from rrtik_ompl.model.path import JointPath as JointPath
-    from rrtik_ompl.model.path import load_path as load_path
     from rrtik_ompl.model.robot import Robot as Robot
     from rrtik_ompl.model.scene import AttachedObject as AttachedObject
     from rrtik_ompl.model.scene import Obstacle as Obstacle
@@ -64,7 +58,6 @@ if TYPE_CHECKING:
     from rrtik_ompl.model.shapes import Sphere as Sphere
     from rrtik_ompl.motion.trajectory import RateLimits as RateLimits
     from rrtik_ompl.motion.trajectory import Trajectory as Trajectory
-    from rrtik_ompl.motion.trajectory import load_trajectory as load_trajectory
     from rrtik_ompl.motion.trajectory import time_parameterize as time_parameterize
     from rrtik_ompl.planning.many import plan_many as plan_many
     from rrtik_ompl.planning.moves.staircase import one_joint_moves as one_joint_moves
@@ -72,16 +65,11 @@ if TYPE_CHECKING:
     from rrtik_ompl.planning.plan import list_planners as list_planners
     from rrtik_ompl.planning.plan import plan as plan
     from rrtik_ompl.planning.search.roadmap import Roadmap as Roadmap
-    from rrtik_ompl.planning.search.roadmap import load_roadmap as load_roadmap
     from rrtik_ompl.planning.shortening import MoveRules as MoveRules
     from rrtik_ompl.planning.shortening import shorten as shorten
     from rrtik_ompl.problem_files.problem import load_problem as load_problem
-    from rrtik_ompl.problem_files.problem import save_problem as save_problem
     from rrtik_ompl.problem_files.scene import load_scene as load_scene
-    from rrtik_ompl.problem_files.scene import save_scene as save_scene
-    from rrtik_ompl.replanning.record import load_run as load_run
     from rrtik_ompl.replanning.replanner import replan as replan
-    from rrtik_ompl.replanning.scenario import load_scenario as load_scenario
     from rrtik_ompl.tasks import Alternatives as Alternatives
     from rrtik_ompl.tasks import Attach as Attach
     from rrtik_ompl.tasks import Detach as Detach
@@ -90,18 +78,13 @@ if TYPE_CHECKING:
     from rrtik_ompl.tasks import Straight as Straight
     from rrtik_ompl.tasks import Task as Task
     from rrtik_ompl.tasks import TaskPlan as TaskPlan
-    from rrtik_ompl.tasks.plan_file import load_task_plan as load_task_plan
-    from rrtik_ompl.tasks.plan_file import save_task_plan as save_task_plan
     from rrtik_ompl.tasks.task_file import list_tasks as list_tasks
-    from rrtik_ompl.tasks.task_file import load_task as load_task
     from rrtik_ompl.tasks.through import PlanThrough as PlanThrough
     from rrtik_ompl.tasks.through import plan_through as plan_through
     from rrtik_ompl.tasks.timed import TimedTask as TimedTask
     from rrtik_ompl.tasks.timed import time_task as time_task
     from rrtik_ompl.viewer import view as view
     from rrtik_ompl.viewer.plots.joints import plot_joints as plot_joints
-    from rrtik_ompl.world.certificates import certificate_of as certificate_of
-    from rrtik_ompl.world.certificates import verify_certificate as verify_certificate
     from rrtik_ompl.world.problem import Problem as Problem
     from rrtik_ompl.world.world import World as World
 else:
@@ -141,40 +124,18 @@ else:
             "PositionGoal",
         ),
         "model.goal_kind": ("TaskRegion",),
-        "model.path": (
-            "JointPath",
-            "load_path",
-        ),
-        "model.certificate": (
-            "Certificate",
-            "load_certificate",
-        ),
+        "model.path": ("JointPath",),
+        "model.certificate": ("Certificate",),
+        "files.kinds": ("load",),
         "description.catalog": (
             "list_problems",
             "list_robots",
             "load_robot",
         ),
-        "description.shapes.cloud": (
-            "load_cloud",
-            "save_cloud",
-        ),
-        "description.shapes.heights": ("load_height_field",),
-        "description.shapes.mesh": ("load_mesh",),
-        "description.shapes.octree": ("load_octree",),
         "world.world": ("World",),
         "world.problem": ("Problem",),
-        "world.certificates": (
-            "certificate_of",
-            "verify_certificate",
-        ),
-        "problem_files.problem": (
-            "load_problem",
-            "save_problem",
-        ),
-        "problem_files.scene": (
-            "load_scene",
-            "save_scene",
-        ),
+        "problem_files.problem": ("load_problem",),
+        "problem_files.scene": ("load_scene",),
         "planning.plan": (
             "Plan",
             "list_planners",
@@ -187,21 +148,15 @@ else:
             "shorten",
         ),
         "planning.moves.staircase": ("one_joint_moves",),
-        "planning.search.roadmap": (
-            "Roadmap",
-            "load_roadmap",
-        ),
+        "planning.search.roadmap": ("Roadmap",),
         "ik.solve": ("solve_ik",),
         "ik.batch": ("solve_ik_many",),
         "motion.trajectory": (
             "RateLimits",
             "Trajectory",
-            "load_trajectory",
             "time_parameterize",
         ),
         "replanning.replanner": ("replan",),
-        "replanning.record": ("load_run",),
-        "replanning.scenario": ("load_scenario",),
         "tasks": (
             "Alternatives",
             "Attach",
@@ -212,14 +167,7 @@ else:
             "Task",
             "TaskPlan",
         ),
-        "tasks.plan_file": (
-            "load_task_plan",
-            "save_task_plan",
-        ),
-        "tasks.task_file": (
-            "list_tasks",
-            "load_task",
-        ),
+        "tasks.task_file": ("list_tasks",),
         "tasks.through": (
             "PlanThrough",
             "plan_through",

@@ -13,7 +13,7 @@ from typer import Option
 
 import rrtik_ompl as rrtik
 from bench.shared.run import REPORTS
-from rrtik_ompl.tasks.task_file import load_task
+from rrtik_ompl.tasks import Task
 from rrtik_ompl.viewer.film import drawn
 from rrtik_ompl.viewer.page import page
 
@@ -30,8 +30,8 @@ FULL = (640, 400)  # as they are drawn [px]
 def page_of(name: str) -> str:
     """The page of a task or of a problem, with what was planned."""
     if name in rrtik.list_tasks():
-        task = load_task(name)
-        made = task.task.plan(task.world, task.start, seconds=60.0, seed=SEED)
+        task = Task.load(name)
+        made = task.plan(seconds=60.0, seed=SEED)
         if not made.found:
             raise SystemExit(f"{name}: {made.reason}")
         return page(task.world, made.played(), still=True)

@@ -105,8 +105,8 @@ def judged(group: str, planner: str, problem: Problem, rows: Matrix | None, seco
         return Outcome(group, planner, seconds, False, False, False, False, float("nan"), failed)
     path = JointPath.of(problem.robot, rows)
     free = not path.violations(problem.world)
-    proof = rrtik.certificate_of(problem.world, path) if free else None
-    proven = proof is not None and not rrtik.verify_certificate(proof, problem.world, rows)
+    proof = problem.world.certificate(path) if free else None
+    proven = proof is not None and not problem.world.verify(proof, rows)
     return Outcome(group, planner, seconds, True, joins(problem, rows), free, proven, path.length, failed)
 
 

@@ -15,7 +15,6 @@ from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import Obstacle, Scene
 from rrtik_ompl.model.shapes import Box, Cylinder, HalfSpace, Mesh, Sphere
-from rrtik_ompl.world.certificates import certificate_of
 from rrtik_ompl.world.world import World
 
 WAYPOINTS = 7
@@ -72,7 +71,7 @@ def random_cases(robot: Robot, seed: int, clearance: float = 0.001) -> Iterator[
         world = World(robot, random_scene(robot, rng))
         for _ in range(5):
             path = random_path(world, rng, clearance)
-            found = None if path is None else certificate_of(world, path, clearance)
+            found = None if path is None else world.certificate(path, clearance)
             if path is not None and found is not None:
                 yield Case(world, path, found)
 

@@ -16,15 +16,15 @@ from rrtik_ompl.benchmark.records import NAME, key_of, read_head, read_records
 from rrtik_ompl.cli import FOUND, NOT_FOUND
 from rrtik_ompl.cli.app import run
 from rrtik_ompl.cli.terminal import stoppable
-from rrtik_ompl.ik.reach import load_reach_map
-from rrtik_ompl.model.certificate import load_certificate
+from rrtik_ompl.ik.reach import ReachMap
+from rrtik_ompl.model.certificate import Certificate
 from rrtik_ompl.pilot.overlay.film import write_film
 from rrtik_ompl.pilot.record import read_record
 from rrtik_ompl.pilot.run import Loop
 from rrtik_ompl.pilot.setup import SessionOptions, open_session
 from rrtik_ompl.pilot.web.server import PilotServer
-from rrtik_ompl.replanning.record import load_run
-from rrtik_ompl.tasks.plan_file import load_task_plan
+from rrtik_ompl.replanning.record import ReplanRun
+from rrtik_ompl.tasks import TaskPlan
 
 SUITE = "version: 1\nproblems: [planar3_a]\nplanners: [bicrdt, fastrrtconnect]\nruns: 3\nseconds: 0.5\n"
 RUNS = 6
@@ -149,15 +149,15 @@ BENCH = ("bench", "suite.yaml", "--out", "out", "--views", "0")
 WORK: dict[str, LongWork] = {
     "plan": LongWork(
         _command(*PLAN, *PLAN_FILES),
-        {"path.json": rrtik.load_path, "page.html": _page, "proof.json": load_certificate},
+        {"path.json": rrtik.JointPath.load, "page.html": _page, "proof.json": Certificate.load},
     ),
     "task": LongWork(
         _command("task", "titan4_drawer", "--out", "task.json", "--trajectory", "motion.json", "--html", "page.html"),
-        {"task.json": load_task_plan, "motion.json": lambda file: json.loads(file.read_text()), "page.html": _page},
+        {"task.json": TaskPlan.load, "motion.json": lambda file: json.loads(file.read_text()), "page.html": _page},
     ),
     "replan --record": LongWork(
         _command("replan", "replan_walls", "--seconds", "1", "--record", "run.json", "--html", "page.html"),
-        {"run.json": load_run, "page.html": _page},
+        {"run.json": ReplanRun.load, "page.html": _page},
     ),
     "pilot --record": LongWork(
         _session("session.jsonl"),
@@ -171,7 +171,7 @@ WORK: dict[str, LongWork] = {
     ),
     "reach": LongWork(
         _command("reach", "planar3", "--samples", "20000", "--out", "map.npz", "--html", "page.html"),
-        {"map.npz": load_reach_map, "page.html": _page},
+        {"map.npz": ReachMap.load, "page.html": _page},
     ),
     "documents": LongWork(_command("markers", "print", "sheet.pdf"), {"sheet.pdf": _sheet}),
     "films": LongWork(_drawn_film, {"film.avi": _film}),

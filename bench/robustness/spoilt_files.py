@@ -39,9 +39,9 @@ FILES: dict[str, tuple[str, Callable[[Path], object]]] = {
         "version: 1\nname: arm\ndh: {convention: standard, rows: [{a: 1, limits_deg: [-90, 90]}]}\n",
         rrtik.load_robot,
     ),
-    "path.json": ('{"version": 1, "joint_names": ["a", "b"], "waypoints": [[0, 0], [0.5, 0]]}', rrtik.load_path),
-    "path.csv": ("a,b\n0,0\n1,0.5\n", rrtik.load_path),
-    "mesh.stl": (STL, rrtik.load_mesh),
+    "path.json": ('{"version": 1, "joint_names": ["a", "b"], "waypoints": [[0, 0], [0.5, 0]]}', rrtik.JointPath.load),
+    "path.csv": ("a,b\n0,0\n1,0.5\n", rrtik.JointPath.load),
+    "mesh.stl": (STL, rrtik.Mesh.load),
     "message": ('{"name": "jog", "direction": 0.1, "press": 2, "seq": 3}', lambda path: message_in(path.read_bytes())),
 }
 BITS = (

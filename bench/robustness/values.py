@@ -40,7 +40,7 @@ def good() -> tuple[Any, ...]:
         *(rrtik.PoseGoal(rrtik.pose([1, 1, 0])), rrtik.JointGoal([0, 0, 0]), rrtik.MultiGoal({"planar3": position})),
         *(scenario, rrtik.Sphere(0.1), rrtik.Box([0.1, 0.1, 0.1]), rrtik.Capsule(0.1, 0.2), rrtik.HalfSpace([0, 0, 1])),
         *(rrtik.PointCloud(points), rrtik.HeightField(np.zeros((3, 3)), 0.1), rrtik.Octree(points, [0.1, 0.1])),
-        *(rrtik.plan(problem, "bicrdt", seed=1), task.plan(world, [0, 0, 0]), rrtik.certificate_of(world, path)),
+        *(rrtik.plan(problem, "bicrdt", seed=1), task.plan(world, [0, 0, 0]), world.certificate(path)),
         *(rrtik.following.SimulatedLink(robot, [0, 0, 0]), rrtik.following.Servo(world)),
         rrtik.replanning.ConstantVelocity([0, 0, 0.1]),
         *(rrtik.Roadmap(world, vertices=20), rrtik.ik.reach_map(robot, samples=100), rrtik.MoveTo([0.2, 0.1, 0])),

@@ -14,7 +14,7 @@ from rrtik_ompl.model.transitions import route_length
 from rrtik_ompl.replanning.connecting import PythonConnect, TreeOptions
 from rrtik_ompl.replanning.drrt_con import DrrtCon
 from rrtik_ompl.replanning.record import ReplanRun
-from rrtik_ompl.replanning.scenario import Scenario, load_scenario
+from rrtik_ompl.replanning.scenario import Scenario
 from rrtik_ompl.world.moving_world import MovingWorld
 
 SOURCE = "[1, ch. 5.2]"
@@ -30,7 +30,7 @@ def _runs(scenario: Scenario, count: int, speed_bound: float | None = None) -> l
 
 def static(quick: bool) -> list[Row]:
     """Two walls that stand: what was walked, beside RRT-Connect with one pass of post-processing."""
-    scenario, count = load_scenario("replan_walls"), 3 if quick else 30
+    scenario, count = Scenario.load("replan_walls"), 3 if quick else 30
     problem, edge = scenario.problem, scenario.settings.edge_length(scenario.problem.robot)
     assert isinstance(problem.goal, JointGoal)
     walked = [run.length for run in _runs(scenario, count)]
@@ -49,7 +49,7 @@ def static(quick: bool) -> list[Row]:
 
 def triangles(quick: bool) -> list[Row]:
     """Six triangles that wander: new routes, arrival, no contact; and what the printed loop would do."""
-    scenario, count = load_scenario("replan_triangles"), 3 if quick else 30
+    scenario, count = Scenario.load("replan_triangles"), 3 if quick else 30
     runs = _runs(scenario, count)
     arrived, repairs = sum(run.arrived for run in runs), [run.count("repair") for run in runs]
     clean = sum(_kept_free(scenario, run) for run in runs)
@@ -94,7 +94,7 @@ def _untouched(scenario: Scenario, runs: list[ReplanRun]) -> int:
 def pockets(quick: bool) -> list[Row]:
     """Two pockets, one of them sliding: the path ahead becomes shorter as the robot goes."""
     count = 3 if quick else 30
-    runs = _runs(load_scenario("replan_pockets"), count)
+    runs = _runs(Scenario.load("replan_pockets"), count)
     shrinking = [
         route_length(b.path) < route_length(a.path)
         for run in runs
@@ -112,7 +112,7 @@ def pockets(quick: bool) -> list[Row]:
 def planar_arm(quick: bool) -> list[Row]:
     """A planar arm whose goal posture is covered for a while: the order of events."""
     count = 3 if quick else 30
-    runs = _runs(load_scenario("replan_planar_arm"), count)
+    runs = _runs(Scenario.load("replan_planar_arm"), count)
     orders = [_order(run) for run in runs]
     kept = sum([event for event, _ in order] == [GO, STOP, GO, "arrive"] for order in orders)
     steps = [step for _, step in orders[0][1:]]

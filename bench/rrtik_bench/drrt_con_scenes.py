@@ -14,7 +14,7 @@ from rrtik_ompl.base.arrays import Vector
 from rrtik_ompl.model.scene import Obstacle, TimedPoses
 from rrtik_ompl.model.shapes import Box
 from rrtik_ompl.replanning.record import ReplanRun
-from rrtik_ompl.replanning.scenario import Scenario, load_scenario
+from rrtik_ompl.replanning.scenario import Scenario
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
 
@@ -36,7 +36,7 @@ def present(place: Vector, begin: float, end: float | None) -> TimedPoses:
 
 def appearing(seed: int, *, changes: bool) -> tuple[Scenario, ReplanRun]:
     """A run between the walls into whose way a box comes from nowhere; it ``changes`` into another, longer one."""
-    scenario = load_scenario("replan_walls")
+    scenario = Scenario.load("replan_walls")
     alone = scenario.run(seed=seed, repair_budget=REPAIR_SECONDS)
     ticks = alone.ticks
     begin = ticks[int(HALF * len(ticks))].time

@@ -20,7 +20,7 @@ from rrtik_bench.tables import Table
 from rrtik_ompl.replanning.in_time import plan_in_time
 from rrtik_ompl.replanning.record import ReplanRun
 from rrtik_ompl.replanning.replanner import replan_with
-from rrtik_ompl.replanning.scenario import load_scenario
+from rrtik_ompl.replanning.scenario import Scenario
 from rrtik_ompl.replanning.settings import ReplanSettings
 from rrtik_ompl.world.problem import Problem
 
@@ -65,7 +65,7 @@ def _beside(problem: Problem, planned: ReplanRun | None, replanned: ReplanRun) -
 @cache
 def shipped(name: str, seed: int) -> Beside:
     """A shipped scenario by both."""
-    scenario = load_scenario(name)
+    scenario = Scenario.load(name)
     problem, settings = scenario.problem, scenario.settings
     plan = plan_in_time(
         problem, rate=RATE, horizon=settings.seconds, speed=settings.step * settings.rate, margin=settings.margin,

@@ -25,7 +25,7 @@ from rrtik_ompl.replanning.drrt_con import points_along, without_points_between
 from rrtik_ompl.replanning.feed import feed_of
 from rrtik_ompl.replanning.loop import Loop
 from rrtik_ompl.replanning.record import ReplanRun
-from rrtik_ompl.replanning.scenario import Scenario, load_scenario
+from rrtik_ompl.replanning.scenario import Scenario
 from rrtik_ompl.replanning.settings import ReplanSettings
 from rrtik_ompl.world.motion_queries import MotionQueries
 
@@ -163,7 +163,7 @@ class Reshaped:
 @cache
 def reshaped(name: str, reshaper: Reshaper, seed: int, speed_bound: float) -> Reshaped:
     """One run of a scenario by a reshaper."""
-    scenario = load_scenario(name)
+    scenario = Scenario.load(name)
     settings = replace(scenario.settings, seed=seed, repair_budget=REPAIR_SECONDS, speed_bound=speed_bound)
     loop = ReshapedLoop(scenario, settings, reshaper)
     for number in range(int(settings.seconds * settings.rate) + 1):

@@ -167,7 +167,7 @@ def loaders() -> dict[str, Callable[..., Any]]:
 
 
 def _opens(node: ast.FunctionDef) -> bool:
-    named = node.name.startswith(("load_", "read_")) or "_from_" in node.name
+    named = node.name == "load" or node.name.startswith(("load_", "read_")) or "_from_" in node.name
     first = node.args.args[0] if node.args.args else None
     kind = "" if first is None or first.annotation is None else ast.unparse(first.annotation)
     return named and first is not None and first.arg in OPENING and ("Path" in kind)

@@ -39,7 +39,7 @@ from bench.truth.shape_kinds import kinds
 from rrtik_ompl import AttachedObject, Obstacle, Problem, Roadmap, Robot, Scene, World
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector
 from rrtik_ompl.base.errors import InputError
-from rrtik_ompl.base.lazy import public_values
+from rrtik_ompl.files.kinds import KINDS, found
 from rrtik_ompl.geometry.collision.certificate import Certificate
 from rrtik_ompl.model.goal_kind import TaskRegion
 from rrtik_ompl.model.shapes import HeightField, Mesh, PointCloud, Shape
@@ -451,7 +451,7 @@ def _roadmap(case: Case) -> Judged:
     with TemporaryDirectory() as folder:
         file = Path(folder) / "map.npz"
         before.save(file)
-        loaded = rrtik.load_roadmap(file, case.fresh(), moved=True)
+        loaded = rrtik.Roadmap.load(file, case.fresh(), moved=True)
     return _routes(before.moved_to(case.fresh()), case) + _routes(loaded, case)
 
 
@@ -482,12 +482,12 @@ def _with_files(shape: Shape, folder: Path) -> Shape:
     if isinstance(shape, Mesh):
         solid = "solid a\n" + "".join(map(_facet, shape.vertices[shape.triangles])) + "endsolid a\n"
         (folder / "a.stl").write_text(solid)
-        return rrtik.load_mesh(folder / "a.stl")
+        return rrtik.Mesh.load(folder / "a.stl")
     if isinstance(shape, PointCloud):
-        return rrtik.save_cloud(shape, folder / "a.npy")
+        return shape.save(folder / "a.npy")
     if isinstance(shape, HeightField):
         np.save(folder / "h.npy", shape.heights)
-        return rrtik.load_height_field(folder / "h.npy", shape.cell, floor=shape.floor)
+        return rrtik.HeightField.load(folder / "h.npy", shape.cell, floor=shape.floor)
     return shape
 
 
@@ -505,7 +505,7 @@ def _load_problem(case: Case) -> Judged:
         held = tuple(replace(a, shape=_with_files(a.shape, folder)) for a in scene.attached)
         world = World(case.robot, replace(scene, obstacles=things, attached=held))
         written = Problem(world, problem.start, problem.goal)
-        rrtik.save_problem(written, folder / "p.yaml")
+        written.save(folder / "p.yaml")
         return alike(rrtik.load_problem(folder / "p.yaml").world, world, case)
 
 
@@ -563,17 +563,17 @@ WAYS: dict[str, Way] = {
     "Problem.with_resolution": _problem(lambda problem: problem.with_resolution(0.01)),
     "Problem.with_world": _problem_with_world,
     "Roadmap.moved_to": _roadmap,
-    "load_problem": _load_problem,
-    "load_roadmap": _roadmap,
+    "Problem.load": _load_problem,
+    "Roadmap.load": _roadmap,
     "page": _page,
 }
 
 ASKED = {"motion_valid_batch", "motions_proven", "valid_batch", "steps_free"}  # by these a way is known
 NO_WAYS = {
     "MotionQueries": "a protocol, and what those share who keep to it",
-    "load_task": "its world is made as that of load_problem is; tests/tasks compares them",
-    "load_task_plan": "likewise, of each motion",
-    "load_scenario": "it holds a problem, read as that of load_problem",
+    "Task.load": "its world is made as that of a problem is; tests/tasks compares them",
+    "TaskPlan.load": "likewise, of each motion",
+    "Scenario.load": "it holds a problem, read as one",
 }
 
 
@@ -585,11 +585,9 @@ def found_ways() -> Iterator[str]:
                 yield f"{kind.__name__}.{name}"
     for package in (rrtik, rrtik_planners):
         yield from _classes(Path(str(package.__file__)).parent)
-    for name, value in public_values(rrtik).items():
-        if name.split(".")[-1].startswith("load_") and _makes(value) in (
-            *("Problem", "Roadmap", "World", "TaskPlan", "LoadedTask", "Scenario"),
-        ):
-            yield name
+    for name, row in KINDS.items():
+        if not {"world", "worlds", "problem"}.isdisjoint(dir(found(row.value))):
+            yield f"{name}.load"
 
 
 def _makes(member: Any) -> str:

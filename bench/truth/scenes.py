@@ -57,7 +57,7 @@ def pair(name: str, drawn: int) -> Read:
             return Read("read", 1, ["read, though it has to be refused"])
         wrong, compared = answers(case, problem, drawn)
         try:
-            rrtik.save_problem(problem, file.with_name("written.yaml"))
+            problem.save(file.with_name("written.yaml"))
         except RrtikError:  # a map made in memory has no file
             return Read("read; cannot be written", compared, wrong)
         again, more = answers(case, rrtik.load_problem(file.with_name("written.yaml")), drawn)

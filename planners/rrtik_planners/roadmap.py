@@ -15,7 +15,7 @@ from rrtik_ompl.kernels.search import connect_layout
 from rrtik_ompl.kernels.search.roadmap.graph import KernelGraph
 from rrtik_ompl.kernels.search.roadmap.layout import KERNELS
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SafePlanner, SearchResult, Stop
-from rrtik_ompl.planning.search.roadmap import NEAR, Graph, Roadmap, checked_near, graph_in, load_roadmap
+from rrtik_ompl.planning.search.roadmap import NEAR, Graph, Roadmap, checked_near, graph_in
 from rrtik_ompl.world.world import World
 from rrtik_planners.fast_rrt_connect import FastRRTConnect
 
@@ -112,7 +112,7 @@ def _roadmap_in(world: MotionQueries | None, roadmap: Roadmap | str | os.PathLik
     if not isinstance(world, World):
         raise InputError("roadmap: it needs the world that it is of; use plan(), or give the planner world=")
     if not isinstance(roadmap, Roadmap):
-        return load_roadmap(roadmap, world)
+        return Roadmap.load(roadmap, world)
     if roadmap.world is world:
         return roadmap
     one, other = (world_digest(each.robot, each.bodies, each.pairs) for each in (roadmap.world, world))

@@ -69,7 +69,7 @@ def plan_batch(
         raise InputError(f"problems must be a list of names or files, got {problems!r:.80}")
     problems = listed(problems, "problems", MOST_PROBLEMS)
     for k, each in enumerate(problems):
-        require(each, str | os.PathLike, f"problems[{k}]", "give a name or a file; save_problem() writes one")
+        require(each, str | os.PathLike, f"problems[{k}]", "give a name or a file; Problem.save() writes one")
     require(parameters, Mapping | None, "parameters of a planner", "use {name of an option: value}")
 
     named = [file_source(os.fspath(each), Path.cwd()) for each in problems]

@@ -94,14 +94,14 @@ def convert(
 
     Paths: .json, .csv, .txt (OMPL's matrix). Problems, MotionBenchMaker's too, become problem files (.yaml).
     """
-    from rrtik_ompl import load_path, load_problem, load_robot, save_problem
+    from rrtik_ompl import JointPath, load_problem, load_robot
 
     if Path(source).suffix.lower() in PATH_FORMATS:
         check_target(target, PATH_FORMATS)
-        load_path(source, None if robot is None else load_robot(robot)).save(target)
+        JointPath.load(source, None if robot is None else load_robot(robot)).save(target)
     else:
         check_target(target, (".yaml", ".yml"))
-        save_problem(load_problem(source, robot=robot), target)
+        load_problem(source, robot=robot).save(target)
 
     say(f"wrote {target}")
     return FOUND

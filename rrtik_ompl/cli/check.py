@@ -45,17 +45,17 @@ def check(
     In the place of a problem there may be the plan of a task (.json): each motion is checked in its own world, on the
     contacts that it stands on and no longer.
     """
-    from rrtik_ompl.tasks.plan_file import is_task_plan
+    from rrtik_ompl.files.kinds import kind_of
 
-    if is_task_plan(problem):
+    if kind_of(problem) == "TaskPlan":
         if path is not None or proof is not None:
             raise typer.BadParameter("the plan of a task holds its paths; leave the path and '--proof' out.")
         return _check_task_plan(problem)
     if proof is not None and path is None:
         raise typer.BadParameter("'--proof' needs the path that the certificate is for.")
 
-    from rrtik_ompl import load_path, load_problem
-    from rrtik_ompl.model.certificate import load_certificate
+    from rrtik_ompl import JointPath, load_problem
+    from rrtik_ompl.model.certificate import Certificate
     from rrtik_ompl.motion.trajectory import Trajectory
     from rrtik_ompl.motion.trajectory.load import load_motion_or_path
 
@@ -63,7 +63,7 @@ def check(
     world = question.world
 
     if path is not None and proof is not None:
-        return _say_certified(question, load_path(path, world.robot), load_certificate(proof), proof)
+        return _say_certified(question, JointPath.load(path, world.robot), Certificate.load(proof), proof)
     if _is_record(path):
         return _check_run(question, path)
 
@@ -213,9 +213,9 @@ def _is_record(file: Path | None) -> TypeGuard[Path]:
 
 def _check_run(problem: Problem, file: Path) -> int:
     """Judge a record: print whether bodies touch in it, and return the exit code."""
-    from rrtik_ompl.replanning.record import load_run
+    from rrtik_ompl.replanning.record import ReplanRun
 
-    run = load_run(file)
+    run = ReplanRun.load(file)
     with progress(f"{file}: judging {len(run.ticks)} ticks"):
         try:
             found = run.violations(problem)
@@ -240,10 +240,10 @@ def _check_run(problem: Problem, file: Path) -> int:
 
 def _check_task_plan(name: str) -> int:
     """Print for each motion of a saved plan how it is known to be free, and its contacts; return the exit code."""
-    from rrtik_ompl.tasks.plan_file import load_task_plan
+    from rrtik_ompl.tasks import TaskPlan
     from rrtik_ompl.tasks.setting import world_of_motion
 
-    plan = load_task_plan(name)
+    plan = TaskPlan.load(name)
     faults = plan.faults()
     paths = tuple(
         path.proved(world_of_motion(path, world, stage))

@@ -63,10 +63,10 @@ def show(
     check_target(html, PAGE_FORMATS)
     check_target(film, (".gif", ".mp4", ".png"))
 
-    from rrtik_ompl.tasks.plan_file import is_task_plan
+    from rrtik_ompl.files.kinds import kind_of
     from rrtik_ompl.viewer import view
 
-    drawn = _of_task if is_task_plan(problem) else _of_problem
+    drawn = _of_task if kind_of(problem) == "TaskPlan" else _of_problem
     question, route, earlier, fault, title, duration = drawn(problem, path, scene, before)
 
     if film is not None:
@@ -112,25 +112,25 @@ class Drawn(NamedTuple):
 
 def _of_problem(name: str, path: Path | None, scene: Path | None, before: Path | None) -> Drawn:
     """Return a problem or a robot, with the path in a file."""
-    from rrtik_ompl import load_path
+    from rrtik_ompl import JointPath
     from rrtik_ompl.motion.trajectory.load import load_motion_or_path
 
     question, robot, fault = _subject(name, scene)
     route = None if path is None else load_motion_or_path(path, robot)
-    earlier = None if before is None else load_path(before, robot)
+    earlier = None if before is None else JointPath.load(before, robot)
     return Drawn(question, route, earlier, fault, fault or None, FILM_SECONDS)
 
 
 def _of_task(name: str, path: Path | None, scene: Path | None, before: Path | None) -> Drawn:
     """Return the plan of a task, as it is played."""
-    from rrtik_ompl import load_task_plan
+    from rrtik_ompl import TaskPlan
 
     given = {"PATH": path, "--scene": scene, "--before": before}
     wrong = [option for option, value in given.items() if value is not None]
     if wrong:
         raise InputError(f"{name}: the plan of a task, which holds its paths and scenes: leave {wrong[0]} out")
 
-    plan = load_task_plan(name)
+    plan = TaskPlan.load(name)
     played = plan.played()
     seconds = min(len(played.waypoints) / played.rate, LONGEST_FILM)
     return Drawn(plan.worlds[0], played, None, "", f"{Path(name).stem}: {plural(len(plan.paths), 'motion')}", seconds)
@@ -171,11 +171,11 @@ def play(
 
     A live page on 127.0.0.1, until Ctrl-C.
     """
-    from rrtik_ompl import load_path, load_problem
+    from rrtik_ompl import JointPath, load_problem
     from rrtik_ompl.viewer import play as serve
 
     question = load_problem(problem)
-    route = None if path is None else load_path(path, question.world.robot)
+    route = None if path is None else JointPath.load(path, question.world.robot)
     serve(question, route, port=port, on_ready=lambda url: say(f"open {url} in a browser; Ctrl-C ends"))
     return FOUND
 
@@ -202,7 +202,7 @@ def overlay(
     if source.isdecimal() and not frames:
         raise InputError(f"camera {source} has no last picture; say --frames N")
 
-    from rrtik_ompl import load_path, load_problem
+    from rrtik_ompl import JointPath, load_problem
     from rrtik_ompl.pilot.overlay.film import ArmInPictures, rate_of, write_film
     from rrtik_ompl.sensing.camera_file import load_camera
     from rrtik_ompl.sensing.cameras.pictures import pictures_from, write_picture
@@ -210,7 +210,7 @@ def overlay(
     from rrtik_ompl.sensing.sensor import Sensor
 
     task = load_problem(problem)
-    rows = [task.start] if path is None else load_path(path, task.robot).waypoints
+    rows = [task.start] if path is None else JointPath.load(path, task.robot).waypoints
     sensor = Sensor(load_camera(camera), load_marker_map(marker_map))
     arm = ArmInPictures(task.robot, sensor, rows, seconds=seconds, ghosts=ghosts)
     rate, pictures = rate_of(islice(pictures_from(source), frames or None))

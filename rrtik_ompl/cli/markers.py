@@ -219,14 +219,12 @@ def sense(
     if picture is not None:
         view.save_picture(picture)
     if scene is not None:
-        from rrtik_ompl.problem_files.scene import save_scene
-
-        save_scene(view.scene(), scene)
+        view.scene().save(scene)
     if task is not None:
-        from rrtik_ompl import load_problem, save_problem
+        from rrtik_ompl import load_problem
         from rrtik_ompl.sensing.scene_from_view import grasp_problem
 
-        save_problem(grasp_problem(load_problem(str(problem)), view.usable(), *goal), task)
+        grasp_problem(load_problem(str(problem)), view.usable(), *goal).save(task)
     return FOUND
 
 

@@ -194,12 +194,12 @@ def _timing_document(problem: Problem, trajectory: Trajectory, limits: RateLimit
 
 def _path_of_moves(path: Path, problem: str | None, shorten: str | None) -> JointPath:
     """Load a path as single-joint moves; convert and shorten it if a problem is given."""
-    from rrtik_ompl import load_path, load_problem, one_joint_moves
+    from rrtik_ompl import JointPath, load_problem, one_joint_moves
     from rrtik_ompl.planning.shortening import METHODS
     from rrtik_ompl.planning.shortening import shorten as shortened
 
     if problem is None:
-        route = load_path(path)
+        route = JointPath.load(path)
         _check_waypoints(path, route)
         if shorten is not None:
             raise InputError("--shorten needs the obstacles: give --problem too")
@@ -221,9 +221,9 @@ def _path_of_moves(path: Path, problem: str | None, shorten: str | None) -> Join
 
 def _valid_path(path: Path, task: Problem) -> JointPath:
     """Load a path, and check it against its problem."""
-    from rrtik_ompl import load_path
+    from rrtik_ompl import JointPath
 
-    route = load_path(path, task.robot)
+    route = JointPath.load(path, task.robot)
     faults = route.violations(task.world)
     if faults:
         raise InputError(f"{path}: not valid for {task.name}: motion {faults[0].edge + 1}: {faults[0].reason}")

@@ -70,9 +70,9 @@ def replan_scenario(
             f"--replay shows a run that is over: leave out --{next(iter(given)).replace('_', '-')}, or --replay"
         )
 
-    from rrtik_ompl.replanning.scenario import load_scenario
+    from rrtik_ompl.replanning.scenario import Scenario
 
-    chosen = load_scenario(scenario)
+    chosen = Scenario.load(scenario)
     if replay is None:
         made = _foreseen(chosen, seed, given) if foreseen else _new_run(chosen, seed, given)
         if isinstance(made, str):
@@ -157,9 +157,9 @@ def _recorded(file: Path, problem: str) -> ReplanRun:
     Raises:
         InputError: If it is not, or is no record.
     """
-    from rrtik_ompl.replanning.record import load_run
+    from rrtik_ompl.replanning.record import ReplanRun
 
-    run = load_run(file)
+    run = ReplanRun.load(file)
     if run.problem != problem:
         raise InputError(f"{file}: a run of '{run.problem}', not of '{problem}'; give the scenario that was run")
     return run

@@ -110,15 +110,14 @@ def task(
     check_target(trajectory, TRAJECTORY_FORMATS)
     check_target(html, PAGE_FORMATS)
 
-    from rrtik_ompl.tasks.plan_file import save_task_plan
-    from rrtik_ompl.tasks.task_file import load_task
+    from rrtik_ompl.tasks import Task
 
-    loaded = load_task(task)
+    loaded = Task.load(task)
     with progress(f"planning {loaded.name}"):
-        plan = loaded.task.plan(loaded.world, loaded.start, seconds=seconds, seed=seed)
+        plan = loaded.plan(seconds=seconds, seed=seed)
 
     if plan.found and out is not None:
-        save_task_plan(plan, out)
+        plan.save(out)
     duration = None if trajectory is None or not plan.found else _timed(plan, trajectory, share, pause)
 
     if plan.found and html is not None:

@@ -30,10 +30,12 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.base.choices import one_of
 from rrtik_ompl.base.errors import InputError, RrtikError, UnknownNameError, listed, name_of, require
-from rrtik_ompl.description.robot_source import base_pose, plain, source_entry
+from rrtik_ompl.description.robot_source import BasePose, plain, source_entry
+from rrtik_ompl.description.robot_source import base_pose as checked_base
 from rrtik_ompl.description.urdf import URDF_OPTIONS, robot_from_urdf
 from rrtik_ompl.description.variants import narrowed, padded, scaled, weighted
 from rrtik_ompl.description.xacro_text import expanding
+from rrtik_ompl.files.kinds import FilePath, refusing_others
 from rrtik_ompl.files.text import file_name
 from rrtik_ompl.model.robot import Robot
 
@@ -170,42 +172,88 @@ def task_files() -> dict[str, Path]:
 
 
 def load_robot(
-    name: str | os.PathLike[str],
+    name: FilePath,
     *,
-    trust_xacro: bool = False,
+    tip: str | None = None,
+    group: str | None = None,
+    joints: Iterable[str] | None = None,
+    locked: Mapping[str, float] | None = None,
+    base_pose: BasePose = None,
+    padding: float | Mapping[str, float] | None = None,
+    scale: Mapping[str, float] | None = None,
+    joint_ranges: Mapping[str, Sequence[float]] | None = None,
+    joint_weights: Mapping[str, float] | None = None,
+    srdf: FilePath | None = None,
+    urdf: FilePath | None = None,
+    joint_limits: FilePath | None = None,
+    packages: FilePath | Iterable[FilePath] | None = None,
+    strict: bool = False,
+    xacro_args: Mapping[str, object] | None = None,
     xacro_limits: Mapping[str, float] | None = None,
-    **options: RobotOption,
+    trust_xacro: bool = False,
+    **own: RobotOption,
 ) -> Robot:
     """Load a robot by name or from a file; the same call returns the same object, unless one of its files has changed.
+
+    A DH table takes ``tip`` and ``base_pose``, and the options of every robot: ``padding``, ``scale``,
+    ``joint_ranges``, ``joint_weights``. An MJCF also takes ``joints``, ``locked``, ``joint_limits`` and ``strict``.
 
     Args:
         name: A name from `list_robots`; or the path of a URDF (``.urdf``, ``.xml``; ``.xacro`` needs the package
             xacro), of an MJCF (``.xml``, ``.mjcf``), of a DH table (``.yaml``), or of a MoveIt configuration folder.
+        tip: Link that goals refer to; the last link that every actuated joint moves, or that of the group, if None.
+        group: Group of the SRDF whose joints are actuated.
+        joints: Actuated joints, in the order wanted.
+        locked: Values of joints that are held fixed [rad or m]; by default 0, moved into the limits.
+        base_pose: T_world_base: a ``pinocchio.SE3``, or ``{"xyz": [..], "quat_xyzw": [..]}``.
+        padding: How much thicker links are than their geometry [m]: one number for all, or by name of link.
+        scale: Factors by which the solids of links are larger about their own middles, by name of link.
+        joint_ranges: Narrower limits of joints, by name [rad or m].
+        joint_weights: How much joints count in the length of a path, by name; 1 if not named.
+        srdf: SRDF beside a URDF, or in place of that of a folder; one named ``.xacro`` is expanded.
+        urdf: URDF in place of that of a MoveIt folder.
+        joint_limits: File in the format of MoveIt's ``joint_limits.yaml``.
+        packages: Folders in which ``package://`` names are sought first.
+        strict: Whether a URDF, folder or MJCF is refused if it would otherwise give a `DescriptionWarning`: because a
+            name in it does not exist, a posture is outside the limits, or something in it is not read.
+        xacro_args: Arguments of macros, by name.
+        xacro_limits: Limits for the expansion of macros: ``{"seconds": 10, "gigabytes": 1}``, or one of these.
         trust_xacro: Whether macros are evaluated by xacro's own evaluator, which can run any code, and may read files
             anywhere. Otherwise expressions that are not on a list of allowed ones are refused.
-        xacro_limits: Limits for the expansion of macros: ``{"seconds": 10, "gigabytes": 1}``, or one of these.
-        **options: Options of the robot. Every robot takes ``scale``, ``padding``, ``joint_ranges``
-            and ``joint_weights`` (by name of link or joint), and ``base_pose``, ``tip`` and ``locked``
-            where they apply; a URDF ``srdf, group, joints, joint_limits, packages, xacro_args``, a folder also
-            ``urdf``; a shipped robot its own, such as ``limits="envelope"``. ``base_pose`` is a ``pinocchio.SE3`` or
-            ``{"xyz": [..], "quat_xyzw": [..]}``. With ``strict=True`` a URDF, folder or MJCF is refused if it would
-            otherwise give a `DescriptionWarning`: because a name in it does not exist, a posture is outside the limits,
-            or something in it is not read.
+        **own: Options that a shipped robot has of its own, such as ``limits="envelope"`` of titan4.
 
     Raises:
         UnknownNameError: If there is no robot of that name.
         InputError: If the robot does not take an option, or a file or value cannot be used.
+
+    Example:
+        >>> rrtik.load_robot("panda", tip="panda_hand", padding=0.01).dof
+        7
     """
+    options: dict[str, Any] = {
+        "tip": tip, "group": group, "joints": joints, "locked": locked, "base_pose": base_pose, "padding": padding,
+        "scale": scale, "joint_ranges": joint_ranges, "joint_weights": joint_weights, "srdf": srdf, "urdf": urdf,
+        "joint_limits": joint_limits, "packages": packages, "strict": strict or None, "xacro_args": xacro_args, **own,
+    }  # fmt: skip
+    with refusing_others(name, "Robot"):
+        return _loaded(name, options, trust_xacro, xacro_limits)
+
+
+def _loaded(
+    name: FilePath, given: Mapping[str, Any], trust_xacro: bool, xacro_limits: Mapping[str, float] | None
+) -> Robot:
+    """Load a robot as :func:`load_robot` does, with the options that are not None."""
     recipe = _recipe(file_name(name) if not isinstance(name, str) else name)
+    options = {option: value for option, value in given.items() if value is not None}
     for option in options:
         if option not in (*recipe.options, *COMMON_OPTIONS):
             takes = ", ".join(sorted((*recipe.options, *COMMON_OPTIONS)))
             raise InputError(f"robot '{os.fspath(name)}' takes no option '{option}'; it takes {takes}")
 
     where = f"robot '{os.fspath(name)}'"
-    values = {key: _checked(key, value, where) for key, value in options.items() if value is not None}
+    values = {key: _checked(key, value, where) for key, value in options.items()}
     if "base_pose" in values:
-        values["base_pose"] = base_pose(values["base_pose"], f"{where}: base_pose")
+        values["base_pose"] = checked_base(values["base_pose"], f"{where}: base_pose")
 
     key = json.dumps([recipe.target, plain(values)], sort_keys=True, default=repr)
     loaded = _cache.get(key)

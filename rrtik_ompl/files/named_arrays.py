@@ -42,6 +42,11 @@ class NamedArrays:
         except _NOT_WHOLE:
             raise InputError(f"{path}: not a whole .npz file of numbers; save it again") from None
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names of the arrays."""
+        return tuple(self._arrays)
+
     def __contains__(self, name: object) -> bool:
         return name in self._arrays
 

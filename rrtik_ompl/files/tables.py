@@ -43,6 +43,8 @@ def loads(text: str, ending: str) -> dict[str, Any]:
 
 def _from_table(text: str, separator: str | None) -> dict[str, Any]:
     names, rows = table_rows(text, separator)
+    if names is not None and names[0] == "time":
+        raise InputError("line 1: a column of times; is this a path file?")
     return {"waypoints": rows} if names is None else {"waypoints": rows, "joint_names": names}
 
 
@@ -76,9 +78,7 @@ def checked_object(document: object, kind: str, key: str) -> dict[str, Any]:
         InputError: If it is something else; the message names the key.
     """
     if not isinstance(document, dict) or key not in document:
-        timed = key == "waypoints" and isinstance(document, dict) and "points" in document
-        remedy = "this is a timed motion: load_trajectory() reads it, rrtik show draws it" if timed else _asked(kind)
-        raise InputError(f"expected an object with the key '{key}'; {remedy}")
+        raise InputError(f"expected an object with the key '{key}'; {_asked(kind)}")
     _check_heads(document, kind)
     return document
 

@@ -10,7 +10,6 @@ from rrtik_ompl.base.lazy import lazy_names
 if TYPE_CHECKING:
     from rrtik_ompl.ik.batch import IkBatch as IkBatch
     from rrtik_ompl.ik.reach import ReachMap as ReachMap
-    from rrtik_ompl.ik.reach import load_reach_map as load_reach_map
     from rrtik_ompl.ik.reach import reach_map as reach_map
     from rrtik_ompl.ik.solve import IkResult as IkResult
     from rrtik_ompl.ik.solve import list_methods as list_methods
@@ -29,7 +28,6 @@ else:
         ),
         "ik.reach": (
             "ReachMap",
-            "load_reach_map",
             "reach_map",
         ),
     }

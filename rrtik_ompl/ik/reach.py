@@ -18,6 +18,7 @@ from rrtik_ompl.base.arrays import TAU, Matrix, Vector, finite_array, frozen, po
 from rrtik_ompl.base.choices import one_of
 from rrtik_ompl.base.copies import as_value, in_one_line
 from rrtik_ompl.base.errors import InputError, at_most
+from rrtik_ompl.files.kinds import read
 from rrtik_ompl.files.named_arrays import NamedArrays
 from rrtik_ompl.files.text import known_ending, write_bytes, write_text
 from rrtik_ompl.model.robot import Robot, jacobians, poses
@@ -295,23 +296,37 @@ class ReachMap:
         ]
         return cuts[1:] if self.flat else cuts
 
-    def save(self, path: str | os.PathLike[str]) -> None:
+    def save(self, file: str | os.PathLike[str]) -> None:
         """Write the map as .npz, or one row per reached cell (centre and value) as .csv, whole or not at all.
 
         Raises:
             InputError: If the ending is another one or the file cannot be written.
         """
-        ending = known_ending(path, FORMATS, "map of reach")
+        ending = known_ending(file, FORMATS, "map of reach")
         if ending == ".csv":
             places = np.argwhere(self.reached)
             rows = np.column_stack([self.corner + self.size * (places + 0.5), self.values[self.reached]])
-            write_text(path, "\n".join([f"x,y,z,{self.measure}", *(",".join(f"{v:.6g}" for v in r) for r in rows), ""]))
+            write_text(file, "\n".join([f"x,y,z,{self.measure}", *(",".join(f"{v:.6g}" for v in r) for r in rows), ""]))
             return
 
         data = BytesIO()
         scalars = {name: getattr(self, name) for name in ("robot", "measure", "size", "samples")}
         np.savez_compressed(data, corner=self.corner, values=self.values, base=self.base, **scalars)
-        write_bytes(path, data.getvalue())
+        write_bytes(file, data.getvalue())
+
+    @staticmethod
+    def load(file: str | os.PathLike[str]) -> ReachMap:
+        """Read a map that was saved as .npz.
+
+        Raises:
+            InputError: If the file cannot be used.
+
+        Example:
+            >>> rrtik.reach_map(rrtik.load_robot("planar3"), samples=2000, seed=1).save("reach.npz")
+            >>> rrtik.ik.ReachMap.load("reach.npz").robot
+            'planar3'
+        """
+        return read(ReachMap, file)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -342,20 +357,15 @@ class Slice:
     meanings: Mapping[float, str] = field(default_factory=dict)
 
 
-def load_reach_map(path: str | os.PathLike[str]) -> ReachMap:
-    """Read a map that was saved as .npz.
+def read_reach_map(file: str | os.PathLike[str]) -> ReachMap:
+    """Read a map; see :meth:`ReachMap.load`.
 
     Raises:
         InputError: If the file cannot be used.
-
-    Example:
-        >>> rrtik.ik.reach_map(rrtik.load_robot("planar3"), samples=2000, seed=1).save("reach.npz")
-        >>> rrtik.ik.load_reach_map("reach.npz").robot
-        'planar3'
     """
-    if known_ending(path, FORMATS, "map of reach") != ".npz":
-        raise InputError(f"{path}: only .npz holds a whole map; a .csv cannot be read back")
-    data = NamedArrays(path)
+    if known_ending(file, FORMATS, "map of reach") != ".npz":
+        raise InputError(f"{file}: only .npz holds a whole map; a .csv cannot be read back")
+    data = NamedArrays(file)
     try:
         return ReachMap(
             robot=str(data["robot"]),
@@ -367,7 +377,7 @@ def load_reach_map(path: str | os.PathLike[str]) -> ReachMap:
             base=frozen(finite_array(data["base"], (3,), "base")),
         )
     except InputError as error:
-        raise InputError(f"{path}: is no map of reach: {error}; make one with `rrtik reach ... --out`") from error
+        raise InputError(f"{file}: is no map of reach: {error}; make one with `rrtik reach ... --out`") from error
 
 
 class Counter:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from rrtik_ompl.base.arrays import Matrix, finite_array, finite_number, frozen, not_negative
 from rrtik_ompl.base.copies import as_value, in_one_line
 from rrtik_ompl.base.errors import InputError, in_file
+from rrtik_ompl.files.kinds import read
 from rrtik_ompl.files.tables import checked_object, json_object
 from rrtik_ompl.files.text import known_ending, read_text, write_text
 
@@ -76,10 +77,10 @@ class Certificate:
     Example:
         >>> problem = rrtik.load_problem("planar3_boxes")
         >>> path = rrtik.plan(problem, seed=1).path
-        >>> found = rrtik.certificate_of(problem.world, path)
-        >>> rrtik.verify_certificate(found, problem.world, path.waypoints)
+        >>> certificate = problem.world.certificate(path)
+        >>> problem.world.verify(certificate, path)
         ''
-        >>> rrtik.verify_certificate(found, problem.world, path.waypoints[::-1])
+        >>> problem.world.verify(certificate, path.waypoints[::-1])
         'it is for another path: waypoints differ'
     """
 
@@ -121,33 +122,42 @@ class Certificate:
             "motions": motions,
         }
 
-    def save(self, path: str | os.PathLike[str]) -> None:
+    def save(self, file: str | os.PathLike[str]) -> None:
         """Write the certificate to a JSON file, completely or not at all.
 
         Raises:
             InputError: If the file has another ending or cannot be written.
         """
-        known_ending(path, (".json",), "certificate")
-        write_text(path, json.dumps(self.document(), separators=(",", ":")) + "\n")
+        known_ending(file, (".json",), "certificate")
+        write_text(file, json.dumps(self.document(), separators=(",", ":")) + "\n")
+
+    @staticmethod
+    def load(file: str | os.PathLike[str]) -> Certificate:
+        """Read a certificate, from a file of its own or from a path saved with its proof.
+
+        Raises:
+            InputError: If the file is missing, too large, or no certificate; the message names the file and the field.
+
+        Example:
+            >>> rrtik.Certificate.load("absent.json")
+            Traceback (most recent call last):
+            rrtik_ompl.base.errors.InputError: absent.json: ...
+        """
+        return read(Certificate, file)
 
 
-def load_certificate(path: str | os.PathLike[str]) -> Certificate:
-    """Read a certificate, from a file of its own or from a path saved with its proof.
+def read_certificate(file: str | os.PathLike[str]) -> Certificate:
+    """Read a certificate; see :meth:`Certificate.load`.
 
     Raises:
         InputError: If the file is missing, too large, or no certificate; the message names the file and the field.
-
-    Example:
-        >>> rrtik.load_certificate("absent.json")
-        Traceback (most recent call last):
-        rrtik_ompl.base.errors.InputError: absent.json: ...
     """
-    known_ending(path, (".json",), "certificate")
-    text = read_text(path)
+    known_ending(file, (".json",), "certificate")
+    text = read_text(file)
     try:
         return from_document(_inside(text))
     except InputError as error:
-        raise in_file(path, error) from None
+        raise in_file(file, error) from None
 
 
 def _inside(text: str) -> dict[str, Any]:

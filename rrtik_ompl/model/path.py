@@ -25,6 +25,7 @@ from rrtik_ompl.base.arrays import (
 from rrtik_ompl.base.copies import as_value, changed, in_notebook
 from rrtik_ompl.base.errors import InputError, in_file, listed, name_of, require
 from rrtik_ompl.base.units import joint_units
+from rrtik_ompl.files.kinds import read
 from rrtik_ompl.files.tables import FORMATS, dumps, loads
 from rrtik_ompl.files.text import known_ending, read_text, write_text
 from rrtik_ompl.model.judgement import Judge, Played, Violation, require_judge
@@ -253,13 +254,13 @@ class JointPath(Rows):
         """Check whether the proof of the path holds in a world, see :meth:`rrtik_ompl.World.has_proven`."""
         return self.proof is not None and world.has_proven(self.proof)
 
-    def save(self, path: str | os.PathLike[str], *, proof: bool = False) -> None:
+    def save(self, file: str | os.PathLike[str], *, proof: bool = False) -> None:
         """Write the path to a file: .json (complete), .csv (a header of joint names), .txt (OMPL's matrix text).
 
         The file is written completely or not at all.
 
         Args:
-            path: Name of the file.
+            file: Name of the file.
             proof: Whether a .json file also contains the certificate of the path, for ``rrtik check``.
 
         Raises:
@@ -269,16 +270,34 @@ class JointPath(Rows):
         Example:
             >>> path = rrtik.plan(rrtik.load_problem("planar3_boxes"), seed=1).path
             >>> path.save("path.json", proof=True)
-            >>> rrtik.load_certificate("path.json").clearance
+            >>> rrtik.Certificate.load("path.json").clearance
             0.001
         """
         require(proof, bool, "proof")
         document = self.document()
-        ending = known_ending(path, FORMATS, "path")
+        ending = known_ending(file, FORMATS, "path")
         if proof:
-            known_ending(path, FORMATS[:1], "path with its proof")
+            known_ending(file, FORMATS[:1], "path with its proof")
             document["certificate"] = certificate_by(self.proof, self.waypoints).document()
-        write_text(path, dumps(document, ending))
+        write_text(file, dumps(document, ending))
+
+    @staticmethod
+    def load(file: str | os.PathLike[str], robot: Robot | None = None) -> JointPath:
+        """Read a path written by :meth:`save` or by OMPL (``printAsMatrix``).
+
+        Args:
+            file: A .json, .csv or .txt file.
+            robot: If given, the path must fit it and takes over its joint names.
+
+        Raises:
+            InputError: If the file is missing, malformed, or does not fit the robot; the message names file and line.
+
+        Example:
+            >>> rrtik.JointPath([[0.0, 0.0], [0.5, 1.0]], ["a", "b"]).save("path.csv")
+            >>> rrtik.JointPath.load("path.csv").joint_names
+            ('a', 'b')
+        """
+        return read(JointPath, file, robot)
 
     def document(self) -> dict[str, Any]:
         """Return the content of a .json file of the path."""
@@ -306,21 +325,17 @@ def _at_zero(robot: Robot) -> JointPath:
     return JointPath(np.zeros((1, robot.dof)), robot.joint_names, robot.prismatic, robot.name, robot.continuous)
 
 
-def load_path(path: str | os.PathLike[str], robot: Robot | None = None) -> JointPath:
-    """Read a path written by :meth:`JointPath.save` or by OMPL (``printAsMatrix``).
-
-    Args:
-        path: A .json, .csv or .txt file.
-        robot: If given, the path must fit it and takes over its joint names.
+def read_path(file: str | os.PathLike[str], robot: Robot | None = None) -> JointPath:
+    """Read a path; see :meth:`JointPath.load`.
 
     Raises:
         InputError: If the file is missing, malformed, or does not fit the robot; the message names file and line.
     """
     require(robot, Robot | None, "robot of a path", "use load_robot(name)")
-    ending = known_ending(path, FORMATS, "path")
+    ending = known_ending(file, FORMATS, "path")
 
     try:
-        document = loads(read_text(path), ending)
+        document = loads(read_text(file), ending)
         names = document.get("joint_names")
         name = str(document.get("robot", ""))
         units = document.get("units")
@@ -330,7 +345,7 @@ def load_path(path: str | os.PathLike[str], robot: Robot | None = None) -> Joint
         found = JointPath(document["waypoints"], names, sliding, name, turning)
         return found if robot is None else fitted(found, robot)
     except InputError as error:
-        raise in_file(path, error) from None
+        raise in_file(file, error) from None
 
 
 def fitted(path: JointPath, robot: Robot) -> JointPath:

@@ -6,7 +6,7 @@ methods of :class:`Chain`, which expect valid rows: float64, shape (m, dof).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache, partial
 from threading import get_ident
@@ -20,8 +20,9 @@ from numpy.typing import ArrayLike, NDArray
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector, allocated, finite_array, finite_number, in_blocks, number_rows
 from rrtik_ompl.base.copies import as_value, itself
 from rrtik_ompl.base.errors import InputError, UnknownNameError, require
-from rrtik_ompl.base.poses import MOST_MOVING, cross_products, joint_motions
+from rrtik_ompl.base.poses import MOST_MOVING, PoseLike, cross_products, joint_motions
 from rrtik_ompl.base.units import shown_unit
+from rrtik_ompl.files.kinds import FilePath, read
 
 FEW = 16  # number of configurations up to which Pinocchio is faster than numpy
 PER_RADIAN = 0.5  # [reach/rad] weight of rotations in tip distances: two radians count as much as the whole reach
@@ -127,6 +128,64 @@ class Robot:
 
     def __repr__(self) -> str:
         return f"Robot('{self.name}', {self.dof} joints: {', '.join(self.joint_names)}; tip '{self.tip}')"
+
+    @staticmethod
+    def load(
+        file: FilePath,
+        *,
+        tip: str | None = None,
+        group: str | None = None,
+        joints: Iterable[str] | None = None,
+        locked: Mapping[str, float] | None = None,
+        base_pose: PoseLike | Mapping[str, Sequence[float]] | None = None,
+        padding: float | Mapping[str, float] | None = None,
+        scale: Mapping[str, float] | None = None,
+        joint_ranges: Mapping[str, Sequence[float]] | None = None,
+        joint_weights: Mapping[str, float] | None = None,
+        srdf: FilePath | None = None,
+        urdf: FilePath | None = None,
+        joint_limits: FilePath | None = None,
+        packages: FilePath | Iterable[FilePath] | None = None,
+        strict: bool = False,
+        xacro_args: Mapping[str, object] | None = None,
+        xacro_limits: Mapping[str, float] | None = None,
+        trust_xacro: bool = False,
+    ) -> Robot:
+        """Load a robot from a file, or by name, as `load_robot` does, which also takes options of shipped robots.
+
+        Args:
+            file: A name from `list_robots`; or the path of a URDF (``.urdf``, ``.xml``; ``.xacro`` needs the package
+                xacro), of an MJCF (``.xml``, ``.mjcf``), of a DH table (``.yaml``), or of a MoveIt folder.
+            tip: Link that goals refer to; the last link that every actuated joint moves, or that of the group, if None.
+            group: Group of the SRDF whose joints are actuated.
+            joints: Actuated joints, in the order wanted.
+            locked: Values of joints that are held fixed [rad or m]; by default 0, moved into the limits.
+            base_pose: T_world_base: a ``pinocchio.SE3``, or ``{"xyz": [..], "quat_xyzw": [..]}``.
+            padding: How much thicker links are than their geometry [m]: one number for all, or by name of link.
+            scale: Factors by which the solids of links are larger about their own middles, by name of link.
+            joint_ranges: Narrower limits of joints, by name [rad or m].
+            joint_weights: How much joints count in the length of a path, by name; 1 if not named.
+            srdf: SRDF beside a URDF, or in place of that of a folder; one named ``.xacro`` is expanded.
+            urdf: URDF in place of that of a MoveIt folder.
+            joint_limits: File in the format of MoveIt's ``joint_limits.yaml``.
+            packages: Folders in which ``package://`` names are sought first.
+            strict: Whether a URDF, folder or MJCF is refused if it would otherwise give a `DescriptionWarning`: because
+                a name in it does not exist, a posture is outside the limits, or something in it is not read.
+            xacro_args: Arguments of macros, by name.
+            xacro_limits: Limits for the expansion of macros: ``{"seconds": 10, "gigabytes": 1}``, or one of these.
+            trust_xacro: Whether macros are evaluated by xacro's own evaluator, which can run any code, and may read
+                files anywhere. Otherwise expressions that are not on a list of allowed ones are refused.
+
+        Raises:
+            UnknownNameError: If there is no robot of that name.
+            InputError: If the robot does not take an option, or a file or value cannot be used.
+        """
+        return read(
+            Robot, file, tip=tip, group=group, joints=joints, locked=locked, base_pose=base_pose, padding=padding,
+            scale=scale, joint_ranges=joint_ranges, joint_weights=joint_weights, srdf=srdf, urdf=urdf,
+            joint_limits=joint_limits, packages=packages, strict=strict, xacro_args=xacro_args,
+            xacro_limits=xacro_limits, trust_xacro=trust_xacro,
+        )  # fmt: skip
 
     @property
     def dof(self) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections import Counter
 from collections.abc import Iterable
@@ -16,6 +17,7 @@ from rrtik_ompl.base.arrays import LARGEST, Vector, bounded_array, finite_array,
 from rrtik_ompl.base.copies import as_value, changed
 from rrtik_ompl.base.errors import InputError, UnknownNameError, at_most, listed, name_of, require
 from rrtik_ompl.base.poses import rigid
+from rrtik_ompl.files.kinds import read, write
 from rrtik_ompl.model.shapes import SHAPES, Shape
 
 MOST_SOLIDS = 10_000  # largest number of obstacles and attached objects of a scene
@@ -290,6 +292,30 @@ class Scene:
     def names(self) -> tuple[str, ...]:
         """Names of all obstacles and attached objects."""
         return (*(o.name for o in self.obstacles), *(o.name for o in self.attached))
+
+    @staticmethod
+    def load(file: str | os.PathLike[str]) -> Scene:
+        """Read the scene of a YAML file, as `load_scene` does: ``version: 1`` and ``scene:``, or a whole problem file.
+
+        Raises:
+            InputError: If the file cannot be used; one line with file, line, key, what was found and the remedy.
+        """
+        return read(Scene, file)
+
+    def save(self, file: str | os.PathLike[str]) -> None:
+        """Write the scene as YAML; if writing fails, no incomplete file is left.
+
+        Files of meshes and clouds are named relative to the new file's folder.
+
+        Raises:
+            InputError: If the file cannot be written, or a mesh or a cloud does not come from a file.
+
+        Example:
+            >>> rrtik.Scene().save("empty.yaml")
+            >>> print(open("empty.yaml").read().splitlines()[0])
+            version: 1
+        """
+        write(self, file)
 
     def obstacle(self, name: str) -> Obstacle:
         """Return the obstacle with a given name.

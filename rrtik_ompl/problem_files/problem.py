@@ -10,10 +10,11 @@ from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
-from rrtik_ompl.base.errors import ProblemError, require
+from rrtik_ompl.base.errors import ProblemError
 from rrtik_ompl.description.xacro_text import expanding
+from rrtik_ompl.files.kinds import refusing_others
 from rrtik_ompl.files.sections import parse
-from rrtik_ompl.files.strict_yaml import write_yaml
+from rrtik_ompl.files.strict_yaml import read_yaml, write_yaml
 from rrtik_ompl.files.text import file_name
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.problem_files.goal import goal_data
@@ -23,7 +24,6 @@ from rrtik_ompl.problem_files.problem_values import (
     ProblemFile,
     ends_of,
     planner_of,
-    problem_document,
     problem_path,
     settings_of,
     world_data,
@@ -53,7 +53,7 @@ def load_problem(
         >>> problem.planner, problem.robot.dof
         ('bicrdt', 6)
     """
-    with expanding(trusted=trust_xacro):
+    with expanding(trusted=trust_xacro), refusing_others(name_or_file, "Problem"):
         return _problem(name_or_file, robot)
 
 
@@ -63,7 +63,7 @@ def _problem(name_or_file: FilePath, robot: Robot | FilePath | None) -> Problem:
     Errors of the problem name the line of the part that is at fault.
     """
     path = problem_path(name_or_file)
-    document = problem_document(path)
+    document = read_yaml(path)
     if _is_motion_bench_maker(document.data):
         # Imported late, because it takes long and is rarely needed.
         from rrtik_ompl.problem_files.motion_bench_maker import load_motion_bench_maker
@@ -92,22 +92,13 @@ def _is_motion_bench_maker(data: Mapping[str, Any]) -> bool:
     return "version" not in data and any(key in data for key in ("robot_model_name", "goal_constraints"))
 
 
-def save_problem(problem: Problem, path: FilePath) -> None:
-    """Write a problem as YAML; if writing fails, no incomplete file is left.
-
-    Numbers are read back bit for bit, rotations to the last digit or two. Angles are written in radians. Files (meshes,
-    URDF) are named relative to the new file's folder.
+def write_problem(problem: Problem, file: FilePath) -> None:
+    """Write a problem as YAML; see :meth:`Problem.save`.
 
     Raises:
         InputError: If the file cannot be written, or the format cannot express a part of the problem.
-
-    Example:
-        >>> rrtik.save_problem(rrtik.load_problem("planar3_boxes"), "boxes.yaml")
-        >>> rrtik.load_problem("boxes.yaml").world.scene.names == rrtik.load_problem("planar3_boxes").world.scene.names
-        True
     """
-    require(problem, Problem, "problem to save")
-    write_yaml(path, problem_data(problem, file_name(path).parent))
+    write_yaml(file, problem_data(problem, file_name(file).parent))
 
 
 def problem_data(problem: Problem, folder: Path) -> dict[str, Any]:

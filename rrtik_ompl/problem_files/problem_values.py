@@ -14,6 +14,7 @@ from rrtik_ompl.base.arrays import Vector
 from rrtik_ompl.base.choices import Accuracy
 from rrtik_ompl.base.errors import InputError, UnknownNameError
 from rrtik_ompl.description.catalog import find_problem, list_planners, load_robot, robot_from_entry, task_files
+from rrtik_ompl.files.kinds import refusing_others
 from rrtik_ompl.files.sections import NotNegative, Positive, Section, Version, parse, without_null
 from rrtik_ompl.files.strict_yaml import YamlDocument, read_yaml
 from rrtik_ompl.files.text import file_name
@@ -28,11 +29,6 @@ from rrtik_ompl.problem_files.run import RunSection
 from rrtik_ompl.problem_files.scene import SceneEntry
 
 FilePath = str | os.PathLike[str]
-ONLY_PATHS = (".csv", ".txt")  # endings of path files; a .json may be a path or a problem
-NO_GOAL = "it has stages and no goal"
-# The reasons why a file is a task and not a problem, by the key that shows it.
-OF_TASKS = {"task": NO_GOAL, "goals": "it has several goals, to be reached in order"}
-OF_PATHS = ("waypoints", "points")  # keys of path and trajectory files
 ELSEWHERE = ("robot", "scene", "constraints")  # settings that have sections of their own in a file
 TYPES = {  # types of keys, by the types of settings
     "float": NotNegative,
@@ -92,24 +88,11 @@ def load_unchecked(name_or_file: FilePath) -> tuple[WorldSettings, Vector, Goal]
     Raises:
         InputError: As for :func:`load_problem`, except for faults that only a world can find.
     """
-    document = problem_document(problem_path(name_or_file))
-    entry = parse(document, ProblemFile)
-    settings = settings_of(document, entry, None)
-    return settings, *ends_of(document, entry, settings.robot)
-
-
-def problem_document(path: Path) -> YamlDocument:
-    """Read the content of a problem file; for files of paths or tasks, raise an error that names the right command."""
-    document = None if path.suffix.lower() in ONLY_PATHS and os.path.isfile(path) else read_yaml(path)
-    if document is None or (isinstance(document.data, dict) and not document.data.keys().isdisjoint(OF_PATHS)):
-        name = path.name
-        raise InputError(f"{path}: a path, not a problem; name its problem before it: rrtik check PROBLEM {name}")
-
-    if isinstance(document.data, dict) and "goal" not in document.data:
-        for key, what in OF_TASKS.items():
-            if key in document.data:
-                raise InputError(f"{path}: a task, not a problem: {what}; use rrtik task {path.name}")
-    return document
+    with refusing_others(name_or_file, "Problem"):
+        document = read_yaml(problem_path(name_or_file))
+        entry = parse(document, ProblemFile)
+        settings = settings_of(document, entry, None)
+        return settings, *ends_of(document, entry, settings.robot)
 
 
 def problem_path(name_or_file: FilePath) -> Path:
@@ -128,7 +111,7 @@ def problem_path(name_or_file: FilePath) -> Path:
         if os.path.isfile(path):
             return path
         if name_or_file in task_files():
-            raise InputError(f"'{name_or_file}' is a task, not a problem: {NO_GOAL}; use rrtik task {path}") from None
+            raise InputError(f"'{name_or_file}' is a task, not a problem; use rrtik task {path}") from None
         raise
 
 

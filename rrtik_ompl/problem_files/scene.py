@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import pinocchio as pin
 from pydantic import Field, create_model, model_validator
 
-from rrtik_ompl.base.errors import require
+from rrtik_ompl.files.kinds import refusing_others
 from rrtik_ompl.files.pose_entry import PoseEntry, pose_data
 from rrtik_ompl.files.sections import (
     Name,
@@ -182,36 +182,29 @@ _KEYS_OF_WORLDS: dict[str, Any] = {each.name: (Any, None) for each in SETTINGS_I
 SceneFile = create_model("SceneFile", __base__=_SceneFile, **_KEYS_OF_WORLDS)
 
 
-def load_scene(path: str | os.PathLike[str]) -> Scene:
+def load_scene(file: str | os.PathLike[str]) -> Scene:
     """Read the scene of a YAML file: ``version: 1`` and ``scene:``, or a whole problem file.
 
     Raises:
         InputError: If the file cannot be used; one line with file, line, key, what was found and the remedy.
 
     Example:
-        >>> rrtik.save_scene(rrtik.Scene([rrtik.Obstacle("post", rrtik.Box([0.1, 0.1, 1.0]))]), "scene.yaml")
+        >>> rrtik.Scene([rrtik.Obstacle("post", rrtik.Box([0.1, 0.1, 1.0]))]).save("scene.yaml")
         >>> rrtik.load_scene("scene.yaml")
         Scene(post)
     """
-    document = read_yaml(path)
-    return parse(document, SceneFile).scene.build(document)
+    with refusing_others(file, "Scene"):
+        document = read_yaml(file)
+        return parse(document, SceneFile).scene.build(document)
 
 
-def save_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
-    """Write a scene as YAML; if writing fails, no incomplete file is left.
-
-    Mesh files are named relative to the new file's folder.
+def write_scene(scene: Scene, file: str | os.PathLike[str]) -> None:
+    """Write a scene as YAML; see :meth:`Scene.save`.
 
     Raises:
         InputError: If the file cannot be written, or a mesh does not come from a file.
-
-    Example:
-        >>> rrtik.save_scene(rrtik.Scene(), "empty.yaml")
-        >>> print(open("empty.yaml").read().splitlines()[0])
-        version: 1
     """
-    require(scene, Scene, "scene to save")
-    write_yaml(path, {"version": 1, "scene": scene_data(scene, file_name(path).parent)})
+    write_yaml(file, {"version": 1, "scene": scene_data(scene, file_name(file).parent)})
 
 
 def scene_data(scene: Scene, folder: Path) -> dict[str, Any]:

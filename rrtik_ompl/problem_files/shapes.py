@@ -13,10 +13,10 @@ from pydantic import Field, create_model, model_validator
 from pydantic_core import PydanticCustomError
 
 from rrtik_ompl.base.errors import InputError
-from rrtik_ompl.description.shapes.cloud import load_cloud
-from rrtik_ompl.description.shapes.heights import load_height_field
-from rrtik_ompl.description.shapes.mesh import load_mesh
-from rrtik_ompl.description.shapes.octree import load_octree
+from rrtik_ompl.description.shapes.cloud import read_cloud
+from rrtik_ompl.description.shapes.heights import read_heights
+from rrtik_ompl.description.shapes.mesh import read_mesh
+from rrtik_ompl.description.shapes.octree import read_octree
 from rrtik_ompl.files.sections import (
     Length,
     Name,
@@ -116,27 +116,27 @@ def _heights_details(field: HeightField) -> dict[str, Any]:
 _FILES: dict[type[Shape], _FileRow] = {
     Mesh: _FileRow(
         "mesh",
-        "save it as STL and use load_mesh",
-        lambda path, e: load_mesh(path, 1.0 if e.scale is None else e.scale),
+        "save it as STL and use Mesh.load",
+        lambda path, e: read_mesh(path, 1.0 if e.scale is None else e.scale),
     ),
     PointCloud: _FileRow(
         "cloud",
-        "use the one that save_cloud returns",
-        lambda path, e: load_cloud(path, e.radius, scale=e.scale, invalid=e.invalid),
+        "use the one that PointCloud.save returns",
+        lambda path, e: read_cloud(path, e.radius, scale=e.scale, invalid=e.invalid),
         _cloud_details,
         CloudEntry,
     ),
     HeightField: _FileRow(
         "height field",
         "load it from a file",
-        lambda path, e: load_height_field(path, e.cell, e.floor, scale=e.scale, invalid=e.invalid, nodata=e.nodata),
+        lambda path, e: read_heights(path, e.cell, e.floor, scale=e.scale, invalid=e.invalid, nodata=e.nodata),
         _heights_details,
         HeightsEntry,
     ),
     Octree: _FileRow(
         "octree",
         "load it from a file",
-        lambda path, e: load_octree(path, scale=e.scale),
+        lambda path, e: read_octree(path, scale=e.scale),
         entry=OctreeEntry,
     ),
 }

@@ -23,6 +23,7 @@ from rrtik_ompl.base.choices import RunOutcome, TickEvent, one_of
 from rrtik_ompl.base.copies import in_one_line
 from rrtik_ompl.base.errors import InputError, in_file, require
 from rrtik_ompl.base.poses import pose_from_xyzw, pose_row
+from rrtik_ompl.files.kinds import read
 from rrtik_ompl.files.tables import json_object
 from rrtik_ompl.files.text import read_text, write_text
 from rrtik_ompl.model.judgement import Contact, Judged, PathContact, Verdict
@@ -60,9 +61,9 @@ class ReplanRun:
         reason: Why the robot has not arrived, or "".
 
     Example:
-        >>> scenario = rrtik.load_scenario("replan_walls")
+        >>> scenario = rrtik.replanning.Scenario.load("replan_walls")
         >>> rrtik.replan(scenario.problem, step=0.05, rate=20.0, seconds=1.0, seed=1).save("run.json")
-        >>> rrtik.load_run("run.json").seed
+        >>> rrtik.replanning.ReplanRun.load("run.json").seed
         1
     """
 
@@ -122,7 +123,7 @@ class ReplanRun:
             InputError: If the run is another robot's, or its scenes were too large to be kept.
 
         Example:
-            >>> scenario = rrtik.load_scenario("replan_walls")
+            >>> scenario = rrtik.replanning.Scenario.load("replan_walls")
             >>> scenario.run(seconds=1.0, seed=1).violations(scenario.problem)
             ()
         """
@@ -235,7 +236,7 @@ class ReplanRun:
             "repair_p95": float(np.percentile(repairs, 95)) if len(repairs) else None,
         }
 
-    def save(self, path: str | os.PathLike[str]) -> None:
+    def save(self, file: str | os.PathLike[str]) -> None:
         """Write the record as JSON, whole or not at all.
 
         Raises:
@@ -247,7 +248,22 @@ class ReplanRun:
         ticks = [_tick_data(tick) for tick in self.ticks]
         scenes = scenes_data(self.scenes) if self.scenes else {}
         document = {"version": 1, "kind": KIND, **heads, "clearance": self.clearance, **scenes, "ticks": ticks}
-        write_text(path, json.dumps(document) + "\n")
+        write_text(file, json.dumps(document) + "\n")
+
+    @staticmethod
+    def load(file: str | os.PathLike[str]) -> ReplanRun:
+        """Read a record written by :meth:`save`.
+
+        Raises:
+            InputError: If the file is missing or malformed; the message names it.
+
+        Example:
+            >>> scenario = rrtik.replanning.Scenario.load("replan_walls")
+            >>> rrtik.replan(scenario.problem, step=0.05, rate=20.0, seconds=1.0, seed=1).save("run.json")
+            >>> rrtik.replanning.ReplanRun.load("run.json").seed
+            1
+        """
+        return read(ReplanRun, file)
 
 
 _HEADS: tuple[str, ...] = ("problem", "robot", "joint_names", "planner", "seed", "step", "rate", "margin")
@@ -261,28 +277,22 @@ def _contact(fault: RunViolation) -> PathContact:
     return PathContact(float(fault.tick), float(fault.tick + 1), contact, names)
 
 
-def load_run(path: str | os.PathLike[str]) -> ReplanRun:
-    """Read a record written by :meth:`ReplanRun.save`.
+def read_run(file: str | os.PathLike[str]) -> ReplanRun:
+    """Read a record; see :meth:`ReplanRun.load`.
 
     Raises:
         InputError: If the file is missing or malformed; the message names it.
-
-    Example:
-        >>> scenario = rrtik.load_scenario("replan_walls")
-        >>> rrtik.replan(scenario.problem, step=0.05, rate=20.0, seconds=1.0, seed=1).save("run.json")
-        >>> rrtik.load_run("run.json").seed
-        1
     """
     try:
-        document = json_object(read_text(path, MAX_RECORD_BYTES), KIND, "ticks")
+        document = json_object(read_text(file, MAX_RECORD_BYTES), KIND, "ticks")
         heads = _heads(document)
         ticks = [_tick(entry, len(heads["joint_names"])) for entry in document["ticks"]]
         _check_times(ticks)
         return ReplanRun(**heads, ticks=ticks, scenes=scenes_of(document))
     except (KeyError, TypeError, AttributeError) as error:
-        raise InputError(f"{path}: not a whole record: {error!r}; write it again with rrtik replan --record") from None
+        raise InputError(f"{file}: not a whole record: {error!r}; write it again with rrtik replan --record") from None
     except InputError as error:
-        raise in_file(path, error) from None
+        raise in_file(file, error) from None
 
 
 def _heads(document: Mapping[str, Any]) -> dict[str, Any]:

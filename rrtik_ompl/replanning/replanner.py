@@ -88,7 +88,7 @@ def replan(  # noqa: D417 - the settings are described in one place
         UnknownNameError: If there is no planner of that name.
 
     Example:
-        >>> scenario = rrtik.load_scenario("replan_walls")
+        >>> scenario = rrtik.replanning.Scenario.load("replan_walls")
         >>> run = rrtik.replan(scenario.problem, step=0.05, rate=20.0, seconds=2.0, seed=1)
         >>> run.problem
         'replan_walls'
@@ -119,7 +119,7 @@ def replan_with(
         InputError: See :func:`replan`.
     """
     require(settings, ReplanSettings, "settings", "use ReplanSettings(step=..., rate=...)")
-    require(problem, Problem, "problem to replan", "use Problem(world, start, goal) or load_scenario(name)")
+    require(problem, Problem, "problem to replan", "use Problem(world, start, goal) or Scenario.load(name)")
     refuse_constraints(problem, "replan")
     if goal_feed is not None:
         called(goal_feed, "goal_feed", "time [s]")

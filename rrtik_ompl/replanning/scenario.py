@@ -7,6 +7,7 @@ import time
 from dataclasses import dataclass, replace
 
 from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.files.kinds import read
 from rrtik_ompl.files.sections import parse
 from rrtik_ompl.files.strict_yaml import read_yaml
 from rrtik_ompl.model.robot import Robot
@@ -33,7 +34,7 @@ class Scenario:
         goal_feed: Function from a time [s] to the configuration of a moving goal, or None.
 
     Example:
-        >>> scenario = rrtik.load_scenario("replan_planar_arm")
+        >>> scenario = rrtik.replanning.Scenario.load("replan_planar_arm")
         >>> scenario.problem.robot.dof > 1
         True
     """
@@ -69,23 +70,34 @@ class Scenario:
             feed_patience=feed_patience,
         )  # fmt: skip
 
+    @staticmethod
+    def load(file: str | os.PathLike[str], *, trust_xacro: bool = False) -> Scenario:
+        """Load a shipped scenario by name, or from a problem file that has a ``run:`` section.
 
-def load_scenario(name_or_file: str | os.PathLike[str], *, trust_xacro: bool = False) -> Scenario:
-    """Load a shipped scenario by name, or from a problem file that has a ``run:`` section.
+        Args:
+            file: A name that is shipped, or a file.
+            trust_xacro: Whether the macros of a robot's file are trusted, see `load_robot`.
 
-    Args:
-        name_or_file: A name, or a path.
-        trust_xacro: Whether the macros of a robot's file are trusted, see `load_robot`.
+        Raises:
+            InputError: If the file cannot be used or has no such section; the message has file, key and remedy in one
+                line.
+            ProblemError: If start or goal is in collision or outside the limits.
+
+        Example:
+            >>> rrtik.replanning.Scenario.load("replan_ur5").problem.robot.name
+            'ur5'
+        """
+        return read(Scenario, file, trust_xacro=trust_xacro)
+
+
+def read_scenario(file: str | os.PathLike[str], *, trust_xacro: bool = False) -> Scenario:
+    """Read a scenario; see :meth:`Scenario.load`.
 
     Raises:
-        InputError: If the file cannot be used or has no such section; the message has file, key and remedy in one line.
+        InputError: If the file cannot be used or has no section ``run``.
         ProblemError: If start or goal is in collision or outside the limits.
-
-    Example:
-        >>> rrtik.load_scenario("replan_ur5").problem.robot.name
-        'ur5'
     """
-    path = problem_path(name_or_file)
+    path = problem_path(file)
     document = read_yaml(path)
     entry = parse(document, ProblemFile).run
     if entry is None:

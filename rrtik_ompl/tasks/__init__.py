@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.base.arrays import Vector, positive, whole_number
+from rrtik_ompl.base.arrays import Vector, finite_array, frozen, positive, whole_number
 from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.copies import in_one_line
-from rrtik_ompl.base.errors import require
+from rrtik_ompl.base.errors import InputError, require
+from rrtik_ompl.files.kinds import read, write
 from rrtik_ompl.geometry.collision.distances import measured
 from rrtik_ompl.model.judgement import Violation
 from rrtik_ompl.model.path import JointPath
@@ -60,8 +62,7 @@ class TaskPlan:
             up to which waypoint; from there on the motion is checked without the contact.
 
     Example:
-        >>> loaded = rrtik.load_task("titan4_drawer")
-        >>> plan = loaded.task.plan(loaded.world, loaded.start, seed=1)
+        >>> plan = rrtik.Task.load("titan4_drawer").plan(seed=1)
         >>> plan.found, len(plan.paths) == len(plan.worlds)
         (True, True)
     """
@@ -109,8 +110,7 @@ class TaskPlan:
         """Return the violations of each motion, see :meth:`violations`.
 
         Example:
-            >>> loaded = rrtik.load_task("titan4_drawer")
-            >>> set(loaded.task.plan(loaded.world, loaded.start, seed=1).faults())
+            >>> set(rrtik.Task.load("titan4_drawer").plan(seed=1).faults())
             {()}
         """
         faults_of_motions: list[tuple[Violation, ...]] = []
@@ -137,6 +137,35 @@ class TaskPlan:
 
         return played_task(self)
 
+    def save(self, file: str | os.PathLike[str]) -> None:
+        """Write the plan to a .json file, whole or not at all.
+
+        Raises:
+            InputError: If the plan has no motion, the ending is not .json, or the file cannot be written.
+
+        Example:
+            >>> plan = rrtik.Task.load("titan4_drawer").plan(seed=1)
+            >>> plan.save("task.json")
+            >>> len(rrtik.TaskPlan.load("task.json").paths) == len(plan.paths)
+            True
+        """
+        write(self, file)
+
+    @staticmethod
+    def load(file: str | os.PathLike[str], *, trust_xacro: bool = False) -> TaskPlan:
+        """Read a plan that :meth:`save` has written.
+
+        Its motions have no proofs; `proven` makes them.
+
+        Args:
+            file: A .json file.
+            trust_xacro: Whether the macros of a robot's file are trusted, see `load_robot`.
+
+        Raises:
+            InputError: If the file is missing, malformed, or its parts do not fit each other.
+        """
+        return read(TaskPlan, file, trust_xacro=trust_xacro)
+
     def _stood_on(self) -> tuple[tuple[MotionContact, ...], ...]:
         return self.contacts or ((),) * len(self.paths)
 
@@ -148,8 +177,11 @@ class TaskPlan:
 class Task:
     """Stages to be done one after the other, each from where the one before ends.
 
-    Attributes:
+    Args:
         stages: `MoveTo`, `Straight`, `Attach`, `Detach`, `Gripper`, `Alternatives`.
+        world: Robot and scene at the beginning; a task of a file has its own, others may leave it to :meth:`plan`.
+        start: Configuration at the beginning, shape (dof,), or the name of a posture, likewise.
+        name: Name used in messages.
 
     Raises:
         InputError: If there are no stages, or something else is among them.
@@ -166,19 +198,88 @@ class Task:
     """
 
     stages: tuple[Stage, ...]
+    name: str
+    _world: World | None = field(repr=False)
+    _start: Vector | str | None = field(repr=False)
 
-    def __init__(self, stages: Sequence[Stage]) -> None:
-        object.__setattr__(self, "stages", checked_stages(stages, "task"))
+    def __init__(
+        self,
+        stages: Sequence[Stage],
+        world: World | None = None,
+        start: ArrayLike | str | None = None,
+        *,
+        name: str = "task",
+    ) -> None:
+        require(world, World | None, "world of a task", "use World(robot, scene)")
+        placed = start if start is None or isinstance(start, str) else frozen(finite_array(start, (None,), "start"))
+        values = {"stages": checked_stages(stages, "task"), "name": name, "_world": world, "_start": placed}
+        for attribute, value in values.items():
+            object.__setattr__(self, attribute, value)
 
-    def plan(self, world: World, start: ArrayLike | str, *, seconds: float = SECONDS, seed: int = 0) -> TaskPlan:
+    @property
+    def world(self) -> World:
+        """Robot and scene at the beginning; an `InputError` if the task has none of its own."""
+        if self._world is None:
+            raise InputError("task: it has no world of its own; give plan() one, or Task(stages, world, start)")
+        return self._world
+
+    @property
+    def start(self) -> Vector | str:
+        """Configuration or posture at the beginning; an `InputError` if the task has none of its own."""
+        if self._start is None:
+            raise InputError("task: it has no start of its own; give plan() one, or Task(stages, world, start)")
+        return self._start
+
+    @staticmethod
+    def load(file: str | os.PathLike[str], *, trust_xacro: bool = False) -> Task:
+        """Load a shipped task by name, or a task file, with its world and its start.
+
+        Args:
+            file: A name of `list_tasks`, or a file.
+            trust_xacro: Whether the macros of a robot's file are trusted, see `load_robot`.
+
+        Raises:
+            UnknownNameError: If it is a single word but not a known name.
+            InputError: If the file cannot be used; one line with file, line, key, what was found and the remedy.
+
+        Example:
+            >>> plan = rrtik.Task.load("titan4_drawer").plan(seed=1)
+            >>> plan.found, len(plan.paths) == len(plan.worlds)
+            (True, True)
+        """
+        return read(Task, file, trust_xacro=trust_xacro)
+
+    def save(self, file: str | os.PathLike[str]) -> None:
+        """Write the task with its world and its start as YAML; if writing fails, no incomplete file is left.
+
+        Raises:
+            InputError: If it has no world or start of its own, the file cannot be written, or the format cannot express
+                a part of it.
+
+        Example:
+            >>> task = rrtik.Task.load("titan4_drawer")
+            >>> task.save("drawer.yaml")
+            >>> len(rrtik.Task.load("drawer.yaml").stages) == len(task.stages)
+            True
+        """
+        write(self, file)
+
+    def plan(
+        self,
+        world: World | None = None,
+        start: ArrayLike | str | None = None,
+        *,
+        seconds: float = SECONDS,
+        seed: int = 0,
+    ) -> TaskPlan:
         """Choose alternatives and configurations such that the whole task works, and plan its motions.
 
         Every motion is collision-free in its own world: straight lines are proven, the others are as :func:`plan` makes
         them.
 
         Args:
-            world: Robot and scene at the beginning.
-            start: Configuration, shape (dof,), or the name of a posture.
+            world: Robot and scene at the beginning; those of the task if None.
+            start: Configuration, shape (dof,), or the name of a posture; that of the task if None.
             seconds: Limit of wall time [s].
             seed: The same seed gives the same plan, unless the time limit ends the search.
 
@@ -188,6 +289,8 @@ class Task:
             UnknownNameError: If an object, link or posture does not exist.
             ProblemError: If the start is in collision or outside the limits.
         """
+        world = self.world if world is None else world
+        start = self.start if start is None else start
         require(world, World, "world of a task", "use World(robot, scene)")
         steps = steps_of(self.stages)
         check_program(steps, world)

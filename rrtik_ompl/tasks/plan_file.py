@@ -11,12 +11,12 @@ import numpy as np
 from pydantic import Field
 
 from rrtik_ompl.base.arrays import finite_array
-from rrtik_ompl.base.errors import InputError, require
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.description.catalog import robot_from_entry
 from rrtik_ompl.description.xacro_text import expanding
 from rrtik_ompl.files.sections import Name, Number, Numbers, Positive, Section, Version, parse
 from rrtik_ompl.files.strict_yaml import YamlDocument, read_yaml
-from rrtik_ompl.files.text import file_name, known_ending, read_text, write_text
+from rrtik_ompl.files.text import file_name, known_ending, write_text
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.world_settings import FINEST_RESOLUTION
 from rrtik_ompl.problem_files.problem_values import WorldKeys, world_data
@@ -72,21 +72,13 @@ class TaskPlanFile(WorldKeys):
     notes: list[str] = Field(default=[])
 
 
-def save_task_plan(plan: TaskPlan, file: str | os.PathLike[str]) -> None:
-    """Write the plan of a task to a .json file, whole or not at all.
+def write_task_plan(plan: TaskPlan, file: str | os.PathLike[str]) -> None:
+    """Write the plan of a task; see :meth:`TaskPlan.save`.
 
     Raises:
         InputError: If the plan has no motion, the ending is not .json, or the file cannot be written.
-
-    Example:
-        >>> loaded = rrtik.load_task("titan4_drawer")
-        >>> plan = loaded.task.plan(loaded.world, loaded.start, seed=1)
-        >>> rrtik.save_task_plan(plan, "task.json")
-        >>> len(rrtik.load_task_plan("task.json").paths) == len(plan.paths)
-        True
     """
     known_ending(file, (".json",), "task plan")
-    require(plan, TaskPlan, "plan of a task", "use Task(stages).plan(world, start)")
     if not plan.paths:
         raise InputError("task plan: it has no motion to save" + (f": {plan.reason}" if plan.reason else ""))
     if plan.worlds[0].constraints is not None:
@@ -119,43 +111,18 @@ def save_task_plan(plan: TaskPlan, file: str | os.PathLike[str]) -> None:
     write_text(file, json.dumps(document, allow_nan=False))
 
 
-def is_task_plan(file: str | os.PathLike[str]) -> bool:
-    """Check whether a file exists and states that it holds the plan of a task."""
-    path = Path(file)
-    if path.suffix.lower() != ".json" or not path.is_file():
-        return False
-    try:
-        document = json.loads(read_text(path))
-    except (ValueError, RecursionError):
-        return False
-    return isinstance(document, dict) and document.get("kind") == KIND
-
-
-def load_task_plan(file: str | os.PathLike[str], *, trust_xacro: bool = False) -> TaskPlan:
-    """Read a plan that :func:`save_task_plan` has written.
-
-    Its motions have no proofs; `TaskPlan.proven` makes them.
-
-    Args:
-        file: The path of the file.
-        trust_xacro: Whether the macros of a robot's file are trusted, see `load_robot`.
+def read_task_plan(file: str | os.PathLike[str], *, trust_xacro: bool = False) -> TaskPlan:
+    """Read a plan; see :meth:`TaskPlan.load`.
 
     Raises:
         InputError: If the file is missing, malformed, or its parts do not fit each other.
-
-    Example:
-        >>> loaded = rrtik.load_task("titan4_drawer")
-        >>> plan = loaded.task.plan(loaded.world, loaded.start, seed=1)
-        >>> rrtik.save_task_plan(plan, "task.json")
-        >>> len(rrtik.load_task_plan("task.json").paths) == len(plan.paths)
-        True
     """
     with expanding(trusted=trust_xacro):
         return _task_plan(file)
 
 
 def _task_plan(file: str | os.PathLike[str]) -> TaskPlan:
-    """Read a plan; see :func:`load_task_plan`.
+    """Read a plan as :func:`read_task_plan` does.
 
     Each motion must begin where the one before ends.
     """

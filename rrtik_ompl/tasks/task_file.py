@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass
 from typing import Annotated, Any, Literal, TypeAlias
 
 import numpy as np
@@ -28,16 +27,16 @@ from rrtik_ompl.files.sections import (
     tag,
     told_apart_by,
 )
-from rrtik_ompl.files.strict_yaml import YamlDocument, read_yaml
+from rrtik_ompl.files.strict_yaml import YamlDocument, read_yaml, write_yaml
 from rrtik_ompl.files.text import file_name
 from rrtik_ompl.model.goal import Goal
 from rrtik_ompl.model.goal_kind import TaskRegion
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.problem_files.goal import GoalSection, Posture, StartSection, build_goal, goal_data
 from rrtik_ompl.problem_files.path_constraints import ConstraintSection, build_constraints, constraint_data
-from rrtik_ompl.problem_files.problem_values import WorldKeys
-from rrtik_ompl.problem_files.robot import RobotEntry
-from rrtik_ompl.problem_files.scene import SceneEntry
+from rrtik_ompl.problem_files.problem_values import WorldKeys, world_data
+from rrtik_ompl.problem_files.robot import RobotEntry, robot_data
+from rrtik_ompl.problem_files.scene import SceneEntry, scene_data
 from rrtik_ompl.tasks import Task
 from rrtik_ompl.tasks.program import check_program, steps_of
 from rrtik_ompl.tasks.setting import Setting
@@ -46,7 +45,6 @@ from rrtik_ompl.tasks.through import placed_constraints
 from rrtik_ompl.world.problem import usable_configuration
 from rrtik_ompl.world.world import World
 
-NO_STAGES = "it has a goal and no stages"
 NUMBER = re.compile(r"stage (\d+)")
 OF_TASKS = ("task", "goals")  # A task file has exactly one of these keys.
 
@@ -185,16 +183,6 @@ class TaskFile(WorldKeys):
         return self
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class LoadedTask:
-    """The contents of a task file: the world at the beginning, the start, shape (dof,), the task, and its name."""
-
-    world: World
-    start: Vector
-    task: Task
-    name: str
-
-
 def list_tasks() -> tuple[str, ...]:
     """Return the names of the tasks that packages ship.
 
@@ -205,29 +193,19 @@ def list_tasks() -> tuple[str, ...]:
     return tuple(sorted(task_files()))
 
 
-def load_task(name_or_file: str | os.PathLike[str], *, trust_xacro: bool = False) -> LoadedTask:
-    """Load a shipped task by name, or a task file.
-
-    Args:
-        name_or_file: A name, or the path of a file.
-        trust_xacro: Whether the macros of a robot's file are trusted, see `load_robot`.
+def read_task(file: str | os.PathLike[str], *, trust_xacro: bool = False) -> Task:
+    """Load a task; see :meth:`Task.load`.
 
     Raises:
         UnknownNameError: If it is a single word but not a known name.
         InputError: If the file cannot be used; one line with file, line, key, what was found and the remedy.
-
-    Example:
-        >>> loaded = rrtik.load_task("titan4_drawer")
-        >>> plan = loaded.task.plan(loaded.world, loaded.start, seed=1)
-        >>> plan.found, len(plan.paths) == len(plan.worlds)
-        (True, True)
     """
     with expanding(trusted=trust_xacro):
-        return _task(name_or_file)
+        return _task(file)
 
 
-def _task(name_or_file: str | os.PathLike[str]) -> LoadedTask:
-    """Load a task; see :func:`load_task`.
+def _task(name_or_file: str | os.PathLike[str]) -> Task:
+    """Load a task as :func:`read_task` does.
 
     The robot, the scene, the start and the stages are built in this order, so that errors name the line of their key.
     """
@@ -236,16 +214,11 @@ def _task(name_or_file: str | os.PathLike[str]) -> LoadedTask:
         shipped = task_files()
         if name_or_file not in shipped:
             if name_or_file in list_problems():
-                raise InputError(
-                    f"'{name_or_file}' is a problem, not a task: {NO_STAGES}; use rrtik plan {name_or_file}"
-                )
+                raise InputError(f"'{name_or_file}' is a problem, not a task; use rrtik plan {name_or_file}")
             raise UnknownNameError("task", name_or_file, shipped)
         path = shipped[name_or_file]
 
     document = read_yaml(path)
-    if isinstance(document.data, dict) and "goal" in document.data and document.data.keys().isdisjoint(OF_TASKS):
-        raise InputError(f"{path}: a problem, not a task: {NO_STAGES}; use rrtik plan {path.name}")
-
     entry = parse(document, TaskFile)
     with document.at(("robot",)):
         robot = robot_from_entry(document.data["robot"], document.path.parent)
@@ -257,11 +230,31 @@ def _task(name_or_file: str | os.PathLike[str]) -> LoadedTask:
         begun = Setting.beginning(world, robot.configuration(given, "start"))
         start = usable_configuration(begun.world, given, "start")
 
-    task = Task(_stages(document, entry, world, start))
+    task = Task(_stages(document, entry, world, start), world, start, name=path.stem)
     for key in OF_TASKS:
         if getattr(entry, key) is not None:
             _check(document, key, task, world)
-    return LoadedTask(world, start, task, path.stem)
+    return task
+
+
+def write_task(task: Task, file: str | os.PathLike[str]) -> None:
+    """Write a task; see :meth:`Task.save`.
+
+    Raises:
+        InputError: If the task has no world or start, the format cannot express a part of it, or the file cannot be
+            written.
+    """
+    world = task.world
+    start = {"posture": task.start} if isinstance(task.start, str) else {"joints": task.start.tolist()}
+    if world.constraints is not None:
+        raise InputError("task: its world has path constraints, which the file has no key for; give MoveTo them")
+
+    folder = file_name(file).parent
+    data: dict[str, Any] = {"version": 1, "robot": robot_data(world.robot.source, folder)}
+    scene = scene_data(world.scene, folder)
+    data |= {"scene": scene} if scene else {}
+    data |= {"start": start, **world_data(world.settings), "task": [stage_data(stage) for stage in task.stages]}
+    write_yaml(file, data)
 
 
 def _check(document: YamlDocument, key: str, task: Task, world: World) -> None:

@@ -34,8 +34,8 @@ class TimedTask:
         pauses: Times at which each rest for a gripper or an object begins and ends [s], shape (p, 2).
 
     Example:
-        >>> loaded = rrtik.load_task("titan4_drawer")
-        >>> timed = rrtik.time_task(loaded.task.plan(loaded.world, loaded.start, seed=1))
+        >>> task = rrtik.Task.load("titan4_drawer")
+        >>> timed = rrtik.time_task(task.plan(seed=1))
         >>> bool(timed.begins[0] == 0.0)
         True
     """
@@ -70,8 +70,8 @@ def time_task(
 
     Example:
         >>> import rrtik_ompl as rrtik
-        >>> loaded = rrtik.load_task("titan4_drawer")
-        >>> timed = rrtik.time_task(loaded.task.plan(loaded.world, loaded.start, seed=1))
+        >>> task = rrtik.Task.load("titan4_drawer")
+        >>> timed = rrtik.time_task(task.plan(seed=1))
         >>> len(timed.begins), bool(timed.trajectory.duration > timed.begins[-1])
         (4, True)
     """

@@ -289,7 +289,7 @@ def replayed(shown: Showable, run: ReplanRun) -> Subject:
     Raises:
         InputError: If it is no run, or not one of that robot.
     """
-    require(run, ReplanRun, "run to show", "use replan() or load_run(file)")
+    require(run, ReplanRun, "run to show", "use replan() or ReplanRun.load(file)")
     if len(run.ticks) == 0:
         raise InputError("run to show: it has no tick")
 

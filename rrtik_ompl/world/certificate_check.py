@@ -67,7 +67,7 @@ class Entry(NamedTuple):
 
 
 def certificate_fault(certificate: Certificate, world: World, waypoints: ArrayLike, *, clearance: float = 0.0) -> str:
-    """Verify a certificate, as :func:`rrtik_ompl.verify_certificate` but without checking the types of arguments.
+    """Verify a certificate, as :meth:`rrtik_ompl.World.verify` but without checking the types of arguments.
 
     Args:
         certificate: The certificate.

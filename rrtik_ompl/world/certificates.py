@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 from numpy.typing import ArrayLike
 
@@ -11,7 +11,9 @@ from rrtik_ompl.base.errors import require
 from rrtik_ompl.model.certificate import Certificate
 from rrtik_ompl.model.robot import require_joints, unnamed_joints
 from rrtik_ompl.world.certificate_check import certificate_fault
-from rrtik_ompl.world.world import World
+
+if TYPE_CHECKING:
+    from rrtik_ompl.world.world import World
 
 
 @runtime_checkable
@@ -23,23 +25,12 @@ class HasWaypoints(Protocol):
         """The waypoints, shape (k, dof)."""
 
 
-def certificate_of(world: World, path: HasWaypoints | ArrayLike, clearance: float = 0.0) -> Certificate | None:
-    """Certify a path; return None if not every motion of it is proven free.
-
-    Args:
-        world: The world.
-        path: A path of the world's robot, or its waypoints, shape (k, dof).
-        clearance: Distance kept from every obstacle on top of its margin [m].
+def certificate_for(world: World, path: HasWaypoints | ArrayLike, clearance: float) -> Certificate | None:
+    """Certify a path; see :meth:`rrtik_ompl.World.certificate`.
 
     Raises:
         InputError: If the path is another robot's, the clearance is negative or infinite, or the scene has a cloud.
-
-    Example:
-        >>> problem = rrtik.load_problem("planar3_boxes")
-        >>> path = rrtik.plan(problem, seed=1).path
-        >>> rrtik.certificate_of(problem.world, path, path.proof.clearance).save("proof.json")
     """
-    require(world, World, "world of a certificate")
     required_clearance = not_negative(clearance, "clearance")
     robot = world.robot
     waypoints = path.waypoints if isinstance(path, HasWaypoints) else path
@@ -48,27 +39,13 @@ def certificate_of(world: World, path: HasWaypoints | ArrayLike, clearance: floa
     return world.prover.certificate(rows, required_clearance)
 
 
-def verify_certificate(certificate: Certificate, world: World, waypoints: ArrayLike, *, clearance: float = 0.0) -> str:
-    """Verify a certificate of a path: return its first fault in one line, or "" if it proves the path free.
-
-    Args:
-        certificate: The certificate; nothing in it is trusted.
-        world: The robot and the scene. Only the bodies, pairs and the chain of joints are read; none of the world's
-            own checks are used.
-        waypoints: Waypoints of the path, shape (k, dof); they have to equal those of the certificate to the bit.
-        clearance: Least distance that the path has to keep from obstacles on top of their margins [m].
+def fault_of(certificate: Certificate, world: World, path: HasWaypoints | ArrayLike, clearance: float) -> str:
+    """Verify a certificate of a path; see :meth:`rrtik_ompl.World.verify`.
 
     Raises:
         InputError: If an argument has the wrong type.
-
-    Example:
-        >>> problem = rrtik.load_problem("planar3_boxes")
-        >>> path = rrtik.plan(problem, seed=1).path
-        >>> rrtik.verify_certificate(rrtik.certificate_of(problem.world, path), problem.world, path.waypoints)
-        ''
     """
-    require(certificate, Certificate, "certificate")
-    require(world, World, "world of a certificate")
+    require(certificate, Certificate, "certificate", "World.certificate(path) makes one")
+    waypoints = path.waypoints if isinstance(path, HasWaypoints) else path
     rows = number_rows(waypoints, "waypoints of a certificate")
-    required_clearance = not_negative(clearance, "clearance")
-    return certificate_fault(certificate, world, rows, clearance=required_clearance)
+    return certificate_fault(certificate, world, rows, clearance=not_negative(clearance, "clearance"))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -17,6 +18,7 @@ from rrtik_ompl.base.errors import InputError, ProblemError, listed, require
 from rrtik_ompl.base.poses import rigid
 from rrtik_ompl.constraints.held_regions import HeldRegions, goal_regions, held_regions
 from rrtik_ompl.constraints.residuals import contradiction
+from rrtik_ompl.files.kinds import read, write
 from rrtik_ompl.model.goal import Goal, JointGoal, PoseGoal
 from rrtik_ompl.model.goal_kind import TaskRegion
 from rrtik_ompl.model.robot import Robot
@@ -139,6 +141,43 @@ class Problem:
     def constraints(self) -> tuple[TaskRegion, ...]:
         """Regions that a frame must not leave on the whole path; those ``from_start`` are placed in the world."""
         return tuple(self.settings.constraints)
+
+    @staticmethod
+    def load(
+        file: str | os.PathLike[str],
+        *,
+        robot: Robot | str | os.PathLike[str] | None = None,
+        trust_xacro: bool = False,
+    ) -> Problem:
+        """Load a shipped problem by name, a problem file, or a MotionBenchMaker pair, as `load_problem` does.
+
+        Args:
+            file: A name of `list_problems`, or a file.
+            robot: A robot (or its name, or its URDF) to be used in place of the one that the file names.
+            trust_xacro: Whether the macros of a robot's file are trusted, see `load_robot`.
+
+        Raises:
+            InputError: If the file cannot be used; one line with file, line, key, what was found and the remedy.
+            ProblemError: If start or goal is in collision or outside the limits.
+        """
+        return read(Problem, file, robot=robot, trust_xacro=trust_xacro)
+
+    def save(self, file: str | os.PathLike[str]) -> None:
+        """Write the problem as YAML; if writing fails, no incomplete file is left.
+
+        Numbers are read back bit for bit, rotations to the last digit or two. Angles are written in radians. Files
+        (meshes, URDF) are named relative to the new file's folder.
+
+        Raises:
+            InputError: If the file cannot be written, or the format cannot express a part of the problem.
+
+        Example:
+            >>> problem = rrtik.load_problem("planar3_boxes")
+            >>> problem.save("boxes.yaml")
+            >>> rrtik.Problem.load("boxes.yaml").world.scene.names == problem.world.scene.names
+            True
+        """
+        write(self, file)
 
     def with_resolution(self, motion_resolution: float) -> Problem:
         """Return the same problem with another motion resolution [m], see :meth:`World.with_resolution`."""

@@ -20,11 +20,13 @@ from rrtik_ompl.constraints.held_regions import HeldRegions
 from rrtik_ompl.geometry.collision.bodies import Body, Pairs
 from rrtik_ompl.kernels import FastWorld
 from rrtik_ompl.kernels.search.motions.motion_table import FastMotions, motions_of, step_counts
+from rrtik_ompl.model.certificate import Certificate
 from rrtik_ompl.model.judgement import Contact, Judge, Judged, Violation
 from rrtik_ompl.model.proof import Proof
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import Scene
 from rrtik_ompl.model.world_settings import WorldSettings, checked_settings
+from rrtik_ompl.world.certificates import HasWaypoints, certificate_for, fault_of
 from rrtik_ompl.world.judgement import judged_path
 from rrtik_ompl.world.proof import Prover
 from rrtik_ompl.world.route_check import violations_of
@@ -363,6 +365,44 @@ class World(Judge):
         time_limit = None if seconds is None else positive(seconds, "seconds")
         rows = self._rows(waypoints, 2)
         return self.prover.route(rows, clearance=required_clearance, slack=required_slack, seconds=time_limit)
+
+    def certificate(self, path: HasWaypoints | ArrayLike, clearance: float = 0.0) -> Certificate | None:
+        """Certify a path: return a proof that others can verify, or None if not every motion is proven free.
+
+        Args:
+            path: A path of this robot, or its waypoints, shape (k, dof).
+            clearance: Distance kept from every obstacle on top of its margin [m].
+
+        Raises:
+            InputError: If the path is another robot's, the clearance is negative or infinite, or the scene has a cloud.
+
+        Example:
+            >>> problem = rrtik.load_problem("planar3_boxes")
+            >>> path = rrtik.plan(problem, seed=1).path
+            >>> problem.world.certificate(path, path.proof.clearance).save("proof.json")
+        """
+        return certificate_for(self, path, clearance)
+
+    def verify(self, certificate: Certificate, path: HasWaypoints | ArrayLike, *, clearance: float = 0.0) -> str:
+        """Verify a certificate of a path: return its first fault in one line, or "" if it proves the path free.
+
+        Only the bodies, pairs and the chain of joints of this world are read; none of its own checks are used.
+
+        Args:
+            certificate: The certificate; nothing in it is trusted.
+            path: A path, or its waypoints, shape (k, dof); they have to equal those of the certificate to the bit.
+            clearance: Least distance that the path has to keep from obstacles on top of their margins [m].
+
+        Raises:
+            InputError: If an argument has the wrong type.
+
+        Example:
+            >>> problem = rrtik.load_problem("planar3_boxes")
+            >>> path = rrtik.plan(problem, seed=1).path
+            >>> problem.world.verify(problem.world.certificate(path), path)
+            ''
+        """
+        return fault_of(certificate, self, path, clearance)
 
     def has_proven(self, proof: Proof) -> bool:
         """Check whether a proof holds in this world.

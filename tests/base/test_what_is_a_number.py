@@ -191,7 +191,6 @@ ODD_CALLS = {
     "marks": lambda: rrtik.view(ROBOT, marks=0.5, html="page.html"),
     "mark": lambda: rrtik.view(ROBOT, marks=[0.5], html="page.html"),
     "scene of an arm": lambda: rrtik.sensing.without_robot(rrtik.PointCloud([[0, 0, 9]]), ROBOT, [0, 0, 0], scene=[1]),
-    "plan of a task": lambda: rrtik.save_task_plan(PATH, "plan.json"),
     "ragged waypoints": lambda: rrtik.JointPath.of(ROBOT, [[1, 2], [3]]),
     "so2": lambda: rrtik.ompl.space_information(WORLD, so2=np.zeros(3)),
     "one_joint": lambda: rrtik.shorten(PATH, PROBLEM, one_joint=np.zeros(3)),

@@ -116,10 +116,10 @@ def test_a_half_turn_is_written_without_a_warning(tmp_path):
 def test_a_half_turn_that_is_saved_is_read_without_a_warning(tmp_path):
     placement = pin.SE3(HALF_TURN, np.zeros(3))
     ball = rrtik.Obstacle("ball", rrtik.Sphere(0.1), placement)
-    rrtik.save_scene(rrtik.Scene([ball]), tmp_path / "scene.yaml")
+    rrtik.Scene([ball]).save(tmp_path / "scene.yaml")
     assert rrtik.load_scene(tmp_path / "scene.yaml").obstacle("ball").pose == placement
     robot = rrtik.load_robot("planar3", base_pose=placement)
-    rrtik.save_problem(rrtik.Problem(rrtik.World(robot), [0, 0, 0], [1, 0, 0]), tmp_path / "problem.yaml")
+    rrtik.Problem(rrtik.World(robot), [0, 0, 0], [1, 0, 0]).save(tmp_path / "problem.yaml")
     again = rrtik.load_problem(tmp_path / "problem.yaml").robot
     assert (again.fk([0, 0, 0]).homogeneous == robot.fk([0, 0, 0]).homogeneous).all()
 

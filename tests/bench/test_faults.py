@@ -8,7 +8,7 @@ import pytest
 
 from bench.robustness import faults, long_work
 from bench.robustness.long_work import LongWork
-from rrtik_ompl import load_path
+from rrtik_ompl import JointPath
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(3600)]
 
@@ -52,7 +52,7 @@ BAD = {
 @pytest.mark.parametrize("case", BAD)
 def test_what_is_wrong_is_seen(monkeypatch, case):
     work, kind, said = BAD[case]
-    monkeypatch.setitem(long_work.WORK, "bad", LongWork(work, {"path.json": load_path}))
+    monkeypatch.setitem(long_work.WORK, "bad", LongWork(work, {"path.json": JointPath.load}))
     monkeypatch.setattr(faults, "OUTLIVE_SECONDS", 0.5)
     found = faults.trials("bad", kind, 0, 3)
     assert any(said in wrong for wrong in found), found

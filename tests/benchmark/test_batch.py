@@ -36,7 +36,7 @@ def test_planners_of_ours_work_in_threads_and_find_the_same_however_many(monkeyp
     [
         ({"problems": ["planar3_z"]}, "no problem 'planar3_z'"),
         ({"problems": "planar3_a"}, "must be a list"),
-        ({"problems": ["planar3_a", 3]}, r"problems\[1\] must be of type str or PathLike, got int; .* save_problem"),
+        ({"problems": ["planar3_a", 3]}, r"problems\[1\] must be of type str or PathLike, got int; .* Problem.save"),
         ({"planner": "bicrtd"}, "no planner 'bicrtd'"),
         ({"planner": "bicrdt", "parameters": {"rnage": 1}}, "no parameter of planner bicrdt 'rnage'"),
         ({"parameters": {"range": 1}}, "planner 'auto' takes no options, got range"),

@@ -350,7 +350,7 @@ API = {
     "unknown posture": (lambda: robot().posture("stowed"), ["stowed"]),
     "None as problem": (lambda: rrtik.load_problem(None), ["name of a file", "None"]),
     "a number as scene": (lambda: rrtik.load_scene(3), ["name of a file", "3"]),
-    "a list as file to write": (lambda: rrtik.save_scene(rrtik.Scene(), ["a"]), ["name of a file", "list"]),
+    "a list as file to write": (lambda: rrtik.Scene().save(["a"]), ["name of a file", "list"]),
     "unknown planner": (lambda: rrtik.plan(small(), "RRTConect"), ["RRTConect", "RRTConnect"]),
     "no time to plan": (lambda: rrtik.plan(small(), seconds=-1), ["seconds"]),
     "seed is text": (lambda: rrtik.plan(small(), seed="one"), ["seed"]),
@@ -367,16 +367,14 @@ API = {
     "obstacle without name": (lambda: rrtik.Obstacle(None, Sphere(1)), ["name", "str", "NoneType"]),
     "motion of numbers": (lambda: rrtik.Obstacle("a", Sphere(1), motion=[1, 0, 0]), ["motion of 'a'", "TimedPoses"]),
     "path checked in a robot": (lambda: rrtik.JointPath([[0, 0, 0]]).violations(robot()), ["world", "Robot"]),
-    "path read for a name": (lambda: rrtik.load_path("a.json", "titan4"), ["robot of a path", "load_robot"]),
+    "path read for a name": (lambda: rrtik.JointPath.load("a.json", "titan4"), ["robot of a path", "load_robot"]),
     "robot of no name": (lambda: rrtik.load_robot(None), ["name of a file", "None"]),
     "fk_batch of two joints": (lambda: robot().fk_batch(np.zeros((4, 2))), ["shape (m, 3)", "(4, 2)"]),
     "reaching with two joints": (lambda: small().reached([0, 0]), ["3 joints"]),
-    "saving no problem": (lambda: rrtik.save_problem(None, "a.yaml"), ["problem to save", "NoneType"]),
-    "saving no scene": (lambda: rrtik.save_scene(None, "a.yaml"), ["scene to save", "NoneType"]),
     "path of nothing": (lambda: rrtik.JointPath([]), ["path waypoints"]),
     "path with NaN": (lambda: rrtik.JointPath([[0, NAN]]), ["path waypoints", "finite"]),
     "path of text": (lambda: rrtik.JointPath("path"), ["path waypoints"]),
-    "saving to a folder that is not there": (lambda: rrtik.save_scene(rrtik.Scene(), "/no/s.yaml"), ["/no/s.yaml"]),
+    "saving to a folder that is not there": (lambda: rrtik.Scene().save("/no/s.yaml"), ["/no/s.yaml"]),
 }  # fmt: skip
 
 

@@ -12,7 +12,7 @@ from contextlib import suppress
 import pytest
 
 from rrtik_ompl.cli.app import run
-from rrtik_ompl.model.path import load_path
+from rrtik_ompl.model.path import JointPath
 from rrtik_tests.command_line import rrtik
 
 
@@ -20,7 +20,7 @@ def test_plan_prints_the_moves_and_saves_a_path_that_check_accepts(capsys, tmp_p
     file = tmp_path / "path.json"
     code, out, err = rrtik(capsys, "plan", "titan4_sdu", "--seed", "1", "--out", str(file))
     assert (code, err) == (0, "")
-    path = load_path(file)
+    path = JointPath.load(file)
     assert f"{path.transitions} moves (no path can have fewer than 5)" in out
     rows = [line for line in out.splitlines() if line.rstrip().endswith(" deg")]
     assert len(rows) == path.transitions
@@ -135,7 +135,7 @@ def test_a_path_of_several_joints_is_no_list_of_moves_until_it_is_converted(caps
     target = tmp_path / "moves.json"
     converted = ("moves", several, "--problem", "titan4_sdu", "--shorten", "axis", "--out", str(target))
     assert rrtik(capsys, *converted)[0] == 0
-    assert load_path(target).one_joint_at_a_time
+    assert JointPath.load(target).one_joint_at_a_time
     assert rrtik(capsys, "check", "titan4_sdu", str(target))[0] == 0
     assert rrtik(capsys, "moves", str(target))[0] == 0
 
@@ -152,12 +152,12 @@ def test_moves_are_printed_as_csv_json_and_sentences(capsys, several):
 
 
 def test_time_writes_a_trajectory_and_a_picture(capsys, tmp_path, several):
-    from rrtik_ompl import load_trajectory
+    from rrtik_ompl import Trajectory
 
     target, picture = tmp_path / "motion.json", tmp_path / "joints.png"
     code, out, err = rrtik(capsys, "time", "titan4_sdu", several, "--out", str(target), "--plot", str(picture))
     assert (code, err) == (0, "")
-    motion = load_trajectory(target)
+    motion = Trajectory.load(target)
     assert f"{motion.duration:.3f} s" in out
     assert picture.read_bytes().startswith(b"\x89PNG")
     faster = json.loads(rrtik(capsys, "time", "titan4_sdu", several, "--velocity", "40", "--jerk", "inf", "--json")[1])
@@ -252,7 +252,7 @@ def test_convert_between_path_formats(capsys, tmp_path, ending):
     assert rrtik(capsys, "plan", "planar3_a", "--seed", "1", "--out", str(source))[0] == 0
     assert rrtik(capsys, "convert", str(source), str(target))[0] == 0
     assert rrtik(capsys, "convert", str(target), str(back), "--robot", "planar3")[0] == 0
-    assert (load_path(source).waypoints == load_path(back).waypoints).all()
+    assert (JointPath.load(source).waypoints == JointPath.load(back).waypoints).all()
 
 
 def test_convert_writes_a_problem_that_loads_again(capsys, tmp_path):

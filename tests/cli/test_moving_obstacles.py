@@ -11,7 +11,6 @@ import yaml
 
 import rrtik_ompl as rrtik
 from rrtik_ompl.cli.app import run
-from rrtik_ompl.tasks.plan_file import save_task_plan
 
 pytestmark = pytest.mark.kernels
 
@@ -29,14 +28,14 @@ def files(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
     high = robot.fk(np.array([0.8, *START[1:]])).translation + np.array([0.0, 0.0, 1.0])
     ball = rrtik.Obstacle("ball", rrtik.Sphere(0.15), rrtik.pose(high), motion)
     problem = rrtik.Problem(rrtik.World(robot, rrtik.Scene([ball])), START, GOAL, name="passing")
-    rrtik.save_problem(problem, folder / "problem.yaml")
+    problem.save(folder / "problem.yaml")
     path = rrtik.plan(problem, seed=1).path
     assert path is not None
     path.save(folder / "path.json", proof=True)
     rrtik.JointPath(path.waypoints, path.joint_names).save(folder / "bare.json")
     rrtik.time_parameterize(path, rrtik.RateLimits.of(robot)).save(folder / "motion.json")
     plan = rrtik.Task([rrtik.MoveTo(GOAL)]).plan(problem.world, START, seed=1)
-    save_task_plan(plan, folder / "task_plan.json")
+    plan.save(folder / "task_plan.json")
     task = yaml.safe_load((folder / "problem.yaml").read_text())
     task.pop("goal")
     task["task"] = [{"move_to": {"joints": GOAL}}]

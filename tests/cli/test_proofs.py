@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from rrtik_ompl.model.path import load_path
+from rrtik_ompl.model.path import JointPath
 from rrtik_tests.command_line import rrtik
 
 pytestmark = pytest.mark.kernels
@@ -65,9 +65,9 @@ def test_a_certificate_that_does_not_hold_is_refused_with_the_fault(files, capsy
 
 def test_another_path_and_another_problem_are_refused(files, capsys):
     path, proof = files
-    rows = np.array(load_path(path).waypoints)
+    rows = np.array(JointPath.load(path).waypoints)
     rows[1] += 1e-6
-    load_path(path).with_waypoints(rows).save(path.with_name("other.json"))
+    JointPath.load(path).with_waypoints(rows).save(path.with_name("other.json"))
     code, out, _ = rrtik(capsys, "check", "titan4_prisms", path.with_name("other.json"), "--proof", proof)
     assert (code, "another path" in out) == (1, True)
     code, out, _ = rrtik(capsys, "check", "titan4_sdu", path, "--proof", proof)

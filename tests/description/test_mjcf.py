@@ -9,7 +9,7 @@ import pytest
 
 from rrtik_ompl.base.errors import RrtikError
 from rrtik_ompl.description.catalog import load_robot
-from rrtik_ompl.problem_files.problem import load_problem, save_problem
+from rrtik_ompl.problem_files.problem import load_problem
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
 
@@ -93,7 +93,7 @@ def test_a_tip_chooses_the_joints_and_problem_files_name_the_file(tmp_path):
     file = written(tmp_path)
     assert load_robot(file, tip="lower").joint_names == ("turn", "bend")
     robot = load_robot(file, tip="hand")
-    save_problem(Problem(World(robot), "home", "home"), tmp_path / "p.yaml")
+    Problem(World(robot), "home", "home").save(tmp_path / "p.yaml")
     assert "mjcf: arm.xml" in (tmp_path / "p.yaml").read_text()
     assert load_problem(tmp_path / "p.yaml").robot is robot
 

@@ -9,7 +9,7 @@ import pytest
 from rrtik_ompl.base.errors import DescriptionWarning, InputError, RrtikError, UnknownNameError
 from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.description.joint_limits import read_joint_limits
-from rrtik_ompl.problem_files.problem import load_problem, save_problem
+from rrtik_ompl.problem_files.problem import load_problem
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
 from rrtik_robots.example_arms import data_folder
@@ -138,7 +138,7 @@ def test_states_are_known_by_the_words_in_their_names(folder, names, state):
 
 def test_problem_files_name_the_folder(folder):
     robot = load_robot(folder, padding={"panda_hand": 0.01})
-    save_problem(Problem(World(robot), "ready", "ready"), folder.parent / "problem.yaml")
+    Problem(World(robot), "ready", "ready").save(folder.parent / "problem.yaml")
     assert "moveit: panda_moveit_config" in (folder.parent / "problem.yaml").read_text()
     assert load_problem(folder.parent / "problem.yaml").robot is robot
 
@@ -149,7 +149,7 @@ def test_a_urdf_that_is_given_is_read_in_place_of_the_folders(folder):
     robot = load_robot(folder, urdf=given)
     assert robot.posture("ready") == pytest.approx(READY)
     assert list(robot.joint_names) == ARM
-    save_problem(Problem(World(robot), "ready", "ready"), folder.parent / "problem.yaml")
+    Problem(World(robot), "ready", "ready").save(folder.parent / "problem.yaml")
     assert load_problem(folder.parent / "problem.yaml").robot is robot
 
 
@@ -263,7 +263,7 @@ def test_macros_are_expanded(xacro_file, tmp_path):
     assert load_robot(xacro_file).fk([0.0]).translation[0] == 1.0
     robot = load_robot(xacro_file, xacro_args={"reach": 0.75})
     assert robot.fk([0.0]).translation[0] == 1.5
-    save_problem(Problem(World(robot), [0.0], [0.5]), tmp_path / "p.yaml")
+    Problem(World(robot), [0.0], [0.5]).save(tmp_path / "p.yaml")
     assert load_problem(tmp_path / "p.yaml").robot is robot
 
 
@@ -359,7 +359,7 @@ def test_the_arm_is_the_one_that_the_assistant_has_expanded(workspace, form):
     assert "finger" in own.link_names
     own_file = workspace.parent / "arm_description" / "urdf" / "arm.urdf.xacro"
     assert reach(load_robot(workspace, urdf=own_file)) == pytest.approx(0.3)
-    save_problem(Problem(World(robot), [0.1, 0.2], [0.3, 0.4]), workspace.parent / "p.yaml")
+    Problem(World(robot), [0.1, 0.2], [0.3, 0.4]).save(workspace.parent / "p.yaml")
     assert load_problem(workspace.parent / "p.yaml").robot is robot
 
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from rrtik_ompl import InputError, Problem, World, load_problem, load_robot, save_problem
+from rrtik_ompl import InputError, Problem, World, load_problem, load_robot
 from rrtik_ompl.description.catalog import robot_from_entry
 from rrtik_ompl.description.xacro_expression import FUNCTIONS, MATHEMATICS, Evaluator, Refused
 from rrtik_ompl.description.xacro_text import expanding, robot_text
@@ -172,7 +172,7 @@ def test_trust_hands_an_expression_to_xacro(write, tmp_path):
         load_robot(file)
     robot = load_robot(file, trust_xacro=True)
     assert robot.upper[0] == 2.0
-    save_problem(Problem(World(robot), [0.0], [0.5]), tmp_path / "p.yaml")
+    Problem(World(robot), [0.0], [0.5]).save(tmp_path / "p.yaml")
     assert "trust" not in (tmp_path / "p.yaml").read_text()
 
 

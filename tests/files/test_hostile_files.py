@@ -8,15 +8,16 @@ import rrtik_ompl as rrtik
 from bench.truth import hostile
 from rrtik_ompl.base.lazy import public_values
 from rrtik_ompl.cli.app import COMMANDS, OPEN_NO_FILES
+from rrtik_ompl.files.kinds import KINDS, found
 from rrtik_tests.command_line import rrtik as rrtik_command
 
 pytestmark = pytest.mark.filterwarnings("ignore")  # files that are taken have nothing to collide with
 EVERY = 19  # of the hostile files whose names say nothing about them, each loader gets one in so many
 
 
-def test_every_public_loader_is_found():
-    public = {value for name, value in public_values(rrtik).items() if name.split(".")[-1].startswith("load_")}
-    assert public <= set(hostile.loaders().values())
+def test_every_public_loader_and_the_reader_of_every_kind_is_found():
+    public = {value for name, value in public_values(rrtik).items() if name.split(".")[-1].startswith("load")}
+    assert public | {found(kind.reader) for kind in KINDS.values()} <= set(hostile.loaders().values())
 
 
 def test_every_command_is_asked():
@@ -46,9 +47,9 @@ def test_every_command_that_opens_robots_has_the_word(name, capsys):
 
 
 def test_what_a_loader_would_execute_is_seen(tmp_path, monkeypatch):
-    monkeypatch.setattr(rrtik, "load_path", lambda path: __import__("pickle").loads(Path(path).read_bytes()))
+    monkeypatch.setattr(rrtik.JointPath, "load", lambda path: __import__("pickle").loads(Path(path).read_bytes()))
     (tmp_path / "a.pkl").write_bytes(hostile.CONTENTS["a pickle"])
-    assert hostile.opened(tmp_path, lambda: rrtik.load_path("a.pkl")) == "EXECUTED"
+    assert hostile.opened(tmp_path, lambda: rrtik.JointPath.load("a.pkl")) == "EXECUTED"
 
 
 @pytest.mark.parametrize("text", [*hostile.EXPRESSIONS, *hostile.ELEMENTS.values()])

@@ -53,7 +53,7 @@ BROKEN = {
 def test_a_broken_file_is_named_without_the_advice_of_others(tmp_path, world, arrays, case):
     file = tmp_path / "map.npz"
     file.write_bytes(BROKEN[case](arrays))
-    for load in (lambda: rrtik.load_roadmap(file, world), lambda: rrtik.ik.load_reach_map(file)):
+    for load in (lambda: rrtik.Roadmap.load(file, world), lambda: rrtik.ik.ReachMap.load(file)):
         with pytest.raises(InputError) as caught:
             load()
         assert str(caught.value).startswith(f"{file}: ")
@@ -83,10 +83,10 @@ def test_arrays_that_make_no_sense_are_named(tmp_path, world, arrays, case):
     name, spoil, said = WRONG[case]
     (tmp_path / "map.npz").write_bytes(packed(arrays | {name: spoil(arrays[name])}))
     with pytest.raises(InputError, match=rf"map\.npz.*'planar3': .*{said}"):
-        rrtik.load_roadmap(tmp_path / "map.npz", world)
+        rrtik.Roadmap.load(tmp_path / "map.npz", world)
 
 
 def test_an_array_that_is_missing_is_named(tmp_path, world, arrays):
     (tmp_path / "map.npz").write_bytes(packed({k: v for k, v in arrays.items() if k != "states"}))
     with pytest.raises(InputError, match="'states' is missing"):
-        rrtik.load_roadmap(tmp_path / "map.npz", world)
+        rrtik.Roadmap.load(tmp_path / "map.npz", world)

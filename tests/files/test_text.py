@@ -17,7 +17,7 @@ from rrtik_ompl.files.text import write_bytes, write_text
 def test_any_name_that_the_file_system_takes_can_be_written(tmp_path):
     longest = tmp_path / ("n" * 250 + ".json")
     rrtik.JointPath([[0.0], [1.0]]).save(longest)
-    assert len(rrtik.load_path(longest).waypoints) == 2
+    assert len(rrtik.JointPath.load(longest).waypoints) == 2
     with pytest.raises(InputError, match="cannot be written"):
         write_text(tmp_path / ("n" * 300), "text")
     assert os.listdir(tmp_path) == [longest.name]
@@ -94,4 +94,4 @@ def test_a_table_with_a_name_that_no_reader_takes_is_refused(tmp_path):
     longer = csv.field_size_limit() + 1
     (tmp_path / "a.csv").write_text(f"{'j' * longer},b\n0,0\n")
     with pytest.raises(InputError, match=r"a\.csv: line 1"):
-        rrtik.load_path(tmp_path / "a.csv")
+        rrtik.JointPath.load(tmp_path / "a.csv")

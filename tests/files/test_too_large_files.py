@@ -11,23 +11,23 @@ from rrtik_ompl.files.text import read_bytes
 
 GIGABYTES = 3
 LOADERS = {
-    "cloud.npy": rrtik.load_cloud,
-    "cloud.pcd": rrtik.load_cloud,
-    "cloud.ply": rrtik.load_cloud,
-    "cloud.xyz": rrtik.load_cloud,
-    "cloud.bt": rrtik.load_cloud,
-    "map.bt": rrtik.load_octree,
-    "heights.csv": lambda file: rrtik.load_height_field(file, 0.1),
-    "mesh.stl": rrtik.load_mesh,
-    "mesh.obj": rrtik.load_mesh,
-    "path.json": rrtik.load_path,
-    "path.csv": rrtik.load_path,
+    "cloud.npy": rrtik.PointCloud.load,
+    "cloud.pcd": rrtik.PointCloud.load,
+    "cloud.ply": rrtik.PointCloud.load,
+    "cloud.xyz": rrtik.PointCloud.load,
+    "cloud.bt": rrtik.PointCloud.load,
+    "map.bt": rrtik.Octree.load,
+    "heights.csv": lambda file: rrtik.HeightField.load(file, 0.1),
+    "mesh.stl": rrtik.Mesh.load,
+    "mesh.obj": rrtik.Mesh.load,
+    "path.json": rrtik.JointPath.load,
+    "path.csv": rrtik.JointPath.load,
     "problem.yaml": rrtik.load_problem,
     "arm.urdf": rrtik.load_robot,
-    "reach.npz": rrtik.ik.load_reach_map,
-    "motion.csv": rrtik.load_trajectory,
-    "run.json": rrtik.load_run,
-    "proof.json": rrtik.load_certificate,
+    "reach.npz": rrtik.ik.ReachMap.load,
+    "motion.csv": rrtik.Trajectory.load,
+    "run.json": rrtik.replanning.ReplanRun.load,
+    "proof.json": rrtik.Certificate.load,
 }
 
 
@@ -54,10 +54,10 @@ def test_what_has_no_size_is_read_up_to_the_limit():
 def test_long_tables_of_points_are_read_line_by_line(tmp_path):
     file = tmp_path / "points.xyz"
     file.write_text("# made by hand\n\n0,0,0.5\n 1 2 3\n\n")
-    assert rrtik.load_cloud(file).points.tolist() == [[0.0, 0.0, 0.5], [1.0, 2.0, 3.0]]
+    assert rrtik.PointCloud.load(file).points.tolist() == [[0.0, 0.0, 0.5], [1.0, 2.0, 3.0]]
     file.write_text("\n \n")
     with pytest.raises(rrtik.InputError):
-        rrtik.load_cloud(file)
+        rrtik.PointCloud.load(file)
 
 
 @pytest.mark.parametrize("name", ["a" * 300 + ".yaml", "b/" * 3000 + "x.yaml"])

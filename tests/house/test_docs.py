@@ -15,7 +15,7 @@ import rrtik_ompl
 from rrtik_ompl.benchmark import load_suite
 from rrtik_ompl.cli.app import run
 from rrtik_ompl.ik.solve import solve_ik
-from rrtik_ompl.model.path import load_path
+from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.problem_files.problem import load_problem
 from rrtik_ompl.problem_files.run import RunSection
 from rrtik_tests.pages import blocks_of
@@ -70,7 +70,7 @@ def test_the_python_example_runs_from_top_to_bottom(page, tmp_path, monkeypatch)
     names = {}
     exec(compile(example, page, "exec"), names)
     assert names["plan"].found, names["plan"].reason
-    assert load_path("path.json").transitions == names["path"].transitions
+    assert JointPath.load("path.json").transitions == names["path"].transitions
     assert load_problem("reach.yaml").world.scene.names == ("post",)
     assert Path("view.html").stat().st_size > 100_000
 

@@ -31,7 +31,6 @@ WITHOUT = {
     "ik.solve_trajectory",
     "list_problems",
     "list_robots",
-    "load_path",
     "load_robot",
     "ompl.SafePlanner",
     "ompl.SearchResult",

@@ -79,7 +79,7 @@ def test_an_octree_without_cells_or_with_too_many_is_refused():
         Octree(np.zeros((0, 3)), [])
     with pytest.raises(InputError, match="sides must be greater than 0"):
         Octree(np.zeros((1, 3)), -1.0)
-    with pytest.raises(InputError, match=r"boxes.*load_cloud"):
+    with pytest.raises(InputError, match=r"boxes.*PointCloud.load"):
         Octree(np.zeros((30_000, 3)), 0.1)
 
 

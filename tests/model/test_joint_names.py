@@ -43,7 +43,7 @@ TAKERS = {  # what takes a motion and a robot: how it is called
     "Trajectory.played": lambda names, task, file: motion(names).played(task.world),
     "Trajectory.faults": lambda names, task, file: motion(names).faults(task.world),
     "Trajectory.prove": lambda names, task, file: motion(names).prove(task.world),
-    "certificate_of": lambda names, task, file: rrtik.certificate_of(task.world, path(names)),
+    "World.certificate": lambda names, task, file: task.world.certificate(path(names)),
     "one_joint_moves": lambda names, task, file: rrtik.one_joint_moves(path(names), task),
     "shorten": lambda names, task, file: rrtik.shorten(path(names), task),
     "time_parameterize": lambda names, task, file: rrtik.time_parameterize(path(names), task.robot),
@@ -53,8 +53,8 @@ TAKERS = {  # what takes a motion and a robot: how it is called
     ),
     "view of a path before": lambda names, task, file: subject_of(task, path(NAMES), path(names)),
     "view of a trajectory": lambda names, task, file: subject_of(task, motion(names)),
-    "load_path": lambda names, task, file: _of_a_file(names, task, file, path, rrtik.load_path),
-    "load_trajectory": lambda names, task, file: _of_a_file(names, task, file, motion, rrtik.load_trajectory),
+    "JointPath.load": lambda names, task, file: _of_a_file(names, task, file, path, rrtik.JointPath.load),
+    "Trajectory.load": lambda names, task, file: _of_a_file(names, task, file, motion, rrtik.Trajectory.load),
 }
 NO_ANSWER_OF_NAMES = {"JointPath.proven_in"}  # asks who made a proof, which came from there
 
@@ -99,7 +99,7 @@ def test_other_names_of_joints_are_refused_in_one_line(taker, names, tmp_path):
 @pytest.mark.parametrize("taker", TAKERS)
 def test_the_names_of_the_robot_are_taken_and_no_names_are_as_good(taker, tmp_path):
     TAKERS[taker](NAMES, problem(), tmp_path / "named.json")
-    if taker != "load_trajectory":  # a message of ROS always names its joints
+    if taker != "Trajectory.load":  # a message of ROS always names its joints
         TAKERS[taker](None, problem(), tmp_path / "unnamed.json")
 
 

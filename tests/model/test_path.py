@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.base.poses import pose
 from rrtik_ompl.description.catalog import load_robot
-from rrtik_ompl.model.path import JointPath, load_path
+from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.scene import Obstacle, Scene
 from rrtik_ompl.model.shapes import Box, Sphere
 from rrtik_ompl.model.transitions import Move, subdivided
@@ -105,7 +105,7 @@ def test_every_format_gives_back_the_same_numbers(tmp_path_factory, ending, rows
     file = tmp_path_factory.mktemp("paths") / f"path{ending}"
     path = JointPath(rows, [f"axis {k}" for k in range(len(rows[0]))], robot_name="some arm")
     path.save(file)
-    again = load_path(file)
+    again = JointPath.load(file)
     assert (again.waypoints == path.waypoints).all()
     if ending != ".txt":
         assert again.joint_names == path.joint_names
@@ -121,16 +121,16 @@ def test_no_file_shows_a_zero_with_a_sign(tmp_path, ending):
 def test_a_file_of_another_version_is_refused(tmp_path, version):
     (file := tmp_path / "path.json").write_text(f'{{"version": {version}, "waypoints": [[0, 0], [1, 0]]}}')
     with pytest.raises(InputError, match="version: expected 1"):
-        load_path(file)
+        JointPath.load(file)
 
 
 def test_a_path_takes_the_names_of_the_robot_it_is_read_for(tmp_path, sdu_route):
     robot = load_robot("titan4")
     file = tmp_path / "path.txt"
     JointPath(sdu_route).save(file)
-    assert load_path(file, robot).joint_names == robot.joint_names
+    assert JointPath.load(file, robot).joint_names == robot.joint_names
     with pytest.raises(InputError, match="planar3"):
-        load_path(file, load_robot("planar3"))
+        JointPath.load(file, load_robot("planar3"))
 
 
 def test_a_path_knows_which_joints_turn_without_limits_from_its_robot_and_from_its_file(tmp_path):
@@ -138,12 +138,12 @@ def test_a_path_knows_which_joints_turn_without_limits_from_its_robot_and_from_i
     path = JointPath.of(robot, [[0.0] * 6, [1.0] + [0.0] * 5])
     assert robot.continuous.any()
     path.save(tmp_path / "path.json")
-    for same in (path, load_path(tmp_path / "path.json"), path.with_waypoints(path.waypoints[::-1])):
+    for same in (path, JointPath.load(tmp_path / "path.json"), path.with_waypoints(path.waypoints[::-1])):
         np.testing.assert_array_equal(same.continuous, robot.continuous)
         assert same.moves()[0].continuous == robot.continuous[0]
     (tmp_path / "odd.json").write_text('{"waypoints": [[0]], "joint_names": ["a"], "continuous": 3}')
     with pytest.raises(InputError, match=r"continuous.*names of joints"):
-        load_path(tmp_path / "odd.json")
+        JointPath.load(tmp_path / "odd.json")
 
 
 def test_ompl_and_we_agree_on_the_matrix_text(tmp_path, sdu_route):
@@ -157,7 +157,7 @@ def test_ompl_and_we_agree_on_the_matrix_text(tmp_path, sdu_route):
         path.append(state)
     rows = (" ".join(f"{x:.9g}" for x in path.getState(k)[0:6]) + " " for k in range(path.getStateCount()))
     (tmp_path / "ompl.txt").write_text("\n".join(rows) + "\n\n")  # blanks at the end of lines, one empty line
-    assert np.allclose(load_path(tmp_path / "ompl.txt").waypoints, sdu_route, atol=1e-8)
+    assert np.allclose(JointPath.load(tmp_path / "ompl.txt").waypoints, sdu_route, atol=1e-8)
 
 
 @given(matrices, st.floats(0.05, 3.0))
@@ -242,7 +242,7 @@ def test_the_json_says_units_and_measures(tmp_path, sdu_route):
 def test_a_file_that_holds_no_path_is_refused(tmp_path, name, text, words):
     (tmp_path / name).write_text(text)
     with pytest.raises(InputError, match=words):
-        load_path(tmp_path / name)
+        JointPath.load(tmp_path / name)
 
 
 @pytest.mark.parametrize("resolution", [0.0, -1.0, np.nan])

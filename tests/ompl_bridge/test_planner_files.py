@@ -10,7 +10,7 @@ from rrtik_ompl.base.errors import InputError, PlannerError, UnknownNameError
 from rrtik_ompl.benchmark import load_suite
 from rrtik_ompl.ompl_bridge.planner_names import find_planner
 from rrtik_ompl.planning.plan import plan
-from rrtik_ompl.problem_files.problem import load_problem, save_problem
+from rrtik_ompl.problem_files.problem import load_problem
 
 CODE = """
 from rrtik_ompl.ompl_bridge import SafePlanner
@@ -118,7 +118,7 @@ def test_a_suite_finds_the_file_beside_itself_and_calls_it_by_its_class(file):
 
 def test_a_problem_file_runs_no_code(file, tmp_path):
     saved = tmp_path / "problem.yaml"
-    save_problem(load_problem("titan4_prisms"), saved)
+    load_problem("titan4_prisms").save(saved)
     text = saved.read_text()
     lines = [line for line in text.splitlines() if not line.startswith("planner:")]
     saved.write_text("\n".join([*lines, f"planner: '{file}:Mine'", ""]))

@@ -175,7 +175,7 @@ def test_weights_are_an_option_of_every_robot_and_stand_in_files(tmp_path):
     again = pickle.loads(pickle.dumps(robot))
     assert again.joint_weights == robot.joint_weights
     problem = rrtik.Problem(rrtik.World(robot), [0.1, 0.2, 0.3], [0.3, 0.2, 0.1])
-    rrtik.save_problem(problem, tmp_path / "weighted.yaml")
+    problem.save(tmp_path / "weighted.yaml")
     assert rrtik.load_problem(tmp_path / "weighted.yaml").robot is robot
     arm = rrtik.load_robot("ur5", joint_weights={"elbow_joint": 3.0}, padding={"wrist_3_link": 0.01})
     assert (arm.padding["wrist_3_link"], arm.joint_weights["elbow_joint"]) == (0.01, 3.0)

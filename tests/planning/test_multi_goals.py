@@ -133,7 +133,7 @@ def test_which_member_of_a_set_was_reached_is_said(titan, tmp_path, capsys):
     assert goal.member_at(titan, titan.posture("ready")) is None
     assert rrtik.plan(rrtik.Problem(world, "ready", near), seed=1).member is None
     file = tmp_path / "set.yaml"
-    rrtik.save_problem(rrtik.Problem(world, "ready", goal), file)
+    rrtik.Problem(world, "ready", goal).save(file)
     assert run(["plan", str(file)]) == 0
     assert "it ends at goal 2 of 3" in capsys.readouterr().out
 

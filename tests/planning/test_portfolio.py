@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import rrtik_planners
-from rrtik_ompl import Problem, load_problem, plan, plan_batch, save_problem
+from rrtik_ompl import Problem, load_problem, plan, plan_batch
 from rrtik_ompl.base.errors import InputError, PlannerError, UnknownNameError
 from rrtik_ompl.description import catalog
 from rrtik_ompl.ompl_bridge import SafePlanner, SearchResult
@@ -188,7 +188,7 @@ def test_a_problem_names_its_planner(boxes, tmp_path):
     assert plan(named, seed=1).planner == "bicrdt"
     assert plan(named, AUTO, seed=1).planner == "fastrrtconnect"
     file = tmp_path / "named.yaml"
-    save_problem(named, file)
+    named.save(file)
     again = load_problem(file)
     assert again.planner == "bicrdt"
     assert np.array_equal(plan(again, seed=1).path.waypoints, plan(named, seed=1).path.waypoints)
@@ -199,7 +199,7 @@ def test_a_problem_names_its_planner(boxes, tmp_path):
 
 def test_a_planner_that_there_is_not_is_named_with_its_line(boxes, tmp_path):
     file = tmp_path / "typo.yaml"
-    save_problem(Problem(boxes.world, boxes.start, boxes.goal, planner="bicrdt"), file)
+    Problem(boxes.world, boxes.start, boxes.goal, planner="bicrdt").save(file)
     text = file.read_text()
     line = 1 + text[: text.index("planner:")].count("\n")
     file.write_text(text.replace("planner: bicrdt", "planner: bicrtd"))

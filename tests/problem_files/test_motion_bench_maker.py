@@ -9,7 +9,7 @@ from rrtik_ompl.base.errors import InputError, ProblemError, RrtikError
 from rrtik_ompl.model.goal import JointGoal, PoseGoal, PositionGoal
 from rrtik_ompl.model.shapes import Box, Cylinder, Sphere
 from rrtik_ompl.problem_files.motion_bench_maker import load_motion_bench_maker
-from rrtik_ompl.problem_files.problem import load_problem, save_problem
+from rrtik_ompl.problem_files.problem import load_problem
 from rrtik_tests.places import ROOT
 
 ARCHIVE = ROOT.parent / "shared" / "data" / "mbm_panda.tar.bz2"
@@ -133,7 +133,7 @@ def test_load_problem_recognises_either_file_of_the_pair(pair):
 
 def test_a_pair_can_be_written_as_a_problem_file(pair, tmp_path):
     problem = load(pair())
-    save_problem(problem, tmp_path / "converted.yaml")
+    problem.save(tmp_path / "converted.yaml")
     copy = load_problem(tmp_path / "converted.yaml")
     np.testing.assert_array_equal(copy.start, problem.start)
     np.testing.assert_array_equal(copy.goal.q, problem.goal.q)

@@ -174,7 +174,7 @@ def test_scales_and_ranges_of_a_robot_are_written_and_read_again(files):
     assert robot.collision.geometryObjects[0].geometry.radius == pytest.approx(0.03)
     np.testing.assert_allclose([robot.lower[2], robot.upper[2]], [-0.1, 5.0])
     problem = rrtik.Problem(rrtik.World(robot), [0, 0, 0], [1, 0, 0])
-    rrtik.save_problem(problem, files / "p.yaml")
+    problem.save(files / "p.yaml")
     assert rrtik.load_problem(files / "p.yaml").robot is robot
     twice = scaled(robot, {"tool": 2.0})
     assert twice.source["scale"] == {"tool": 6.0}

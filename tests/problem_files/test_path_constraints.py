@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rrtik_ompl.base.errors import InputError, ProblemError
-from rrtik_ompl.problem_files.problem import load_problem, save_problem
+from rrtik_ompl.problem_files.problem import load_problem
 
 START = "[0.3, -1.2, 1.4, -0.4, 0.6, 0.2]"
 HERE = "{xyz: [-0.336, -0.277, 0.378]}"
@@ -31,7 +31,7 @@ ALL = """
 def test_every_kind_is_read_and_written_back(tmp_path):
     problem = load(tmp_path, ALL.replace("[180, 70, 180]", "[180, 74, 180]"))
     assert [region.frame for region in problem.constraints] == ["tool0", None, None, "wrist_3_link", None, None]
-    save_problem(problem, tmp_path / "again.yaml")
+    problem.save(tmp_path / "again.yaml")
     again = load_problem(tmp_path / "again.yaml")
     for one, other in zip(problem.constraints, again.constraints, strict=True):
         np.testing.assert_array_equal(one.bounds, other.bounds)

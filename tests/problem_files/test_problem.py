@@ -18,7 +18,7 @@ from rrtik_ompl.description.catalog import list_problems
 from rrtik_ompl.files.strict_yaml import read_yaml, write_yaml
 from rrtik_ompl.model.goal import GoalSet, JointGoal, PoseGoal, PositionGoal
 from rrtik_ompl.model.goal_kind import TaskRegion
-from rrtik_ompl.problem_files.problem import load_problem, save_problem
+from rrtik_ompl.problem_files.problem import load_problem
 from rrtik_ompl.problem_files.problem_values import load_unchecked, problem_schema
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
@@ -130,7 +130,7 @@ GOALS = [
 def test_a_problem_survives_writing_and_reading(tmp_path, goal):
     world = load(tmp_path, text()).world
     problem = Problem(world, [0.1 + 0.2, 1 / 3, 0], goal)
-    save_problem(problem, tmp_path / "copy.yaml")
+    problem.save(tmp_path / "copy.yaml")
     copy = load_problem(tmp_path / "copy.yaml")
     np.testing.assert_array_equal(copy.start, problem.start)
     assert type(copy.goal) is type(goal)
@@ -144,7 +144,7 @@ def test_a_problem_survives_writing_and_reading(tmp_path, goal):
 def test_files_of_a_robot_are_named_relative_to_the_new_file(tmp_path, slide):
     problem = load(tmp_path, text(slide, "{posture: home}", "{joints: [1, 1]}"))
     (tmp_path / "sub").mkdir()
-    save_problem(problem, tmp_path / "sub" / "copy.yaml")
+    problem.save(tmp_path / "sub" / "copy.yaml")
     assert read_yaml(tmp_path / "sub" / "copy.yaml").data["robot"]["urdf"] == "../slide.urdf"
     assert load_problem(tmp_path / "sub" / "copy.yaml").world.robot.joint_names == ("rail", "turn")
 
@@ -152,7 +152,7 @@ def test_files_of_a_robot_are_named_relative_to_the_new_file(tmp_path, slide):
 def test_what_the_format_has_no_words_for_is_refused(tmp_path):
     world = load(tmp_path, text()).world
     with pytest.raises(InputError, match="goal: a problem file can"):
-        save_problem(Problem(world, [0, 0, 0], JointGoal([0, 0, 0], 0.1)), tmp_path / "copy.yaml")
+        Problem(world, [0, 0, 0], JointGoal([0, 0, 0], 0.1)).save(tmp_path / "copy.yaml")
     assert not (tmp_path / "copy.yaml").exists()
 
 

@@ -10,7 +10,7 @@ from rrtik_ompl.files.strict_yaml import read_yaml
 from rrtik_ompl.model.scene import AttachedObject, ConstantVelocity, Obstacle, Scene, TimedPoses
 from rrtik_ompl.model.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, Prism, Sphere
 from rrtik_ompl.problem_files.problem_values import ProblemFile, load_unchecked
-from rrtik_ompl.problem_files.scene import SceneFile, load_scene, save_scene
+from rrtik_ompl.problem_files.scene import SceneFile, load_scene
 
 EVERY_KEY = """version: 1
 scene:
@@ -104,7 +104,7 @@ def motion_numbers(motion):
 def test_a_scene_survives_writing_and_reading(file, tmp_path):
     scene = load_scene(file)
     (tmp_path / "elsewhere").mkdir()
-    save_scene(scene, tmp_path / "elsewhere" / "copy.yaml")
+    scene.save(tmp_path / "elsewhere" / "copy.yaml")
     copy = load_scene(tmp_path / "elsewhere" / "copy.yaml")
     assert copy.names == scene.names
     assert copy.allowed_collisions == scene.allowed_collisions
@@ -124,7 +124,7 @@ def test_numbers_survive_bit_for_bit(tmp_path):
     moves = [ConstantVelocity([0.1, 1e-9, 3]), TimedPoses([0.1, 0.3], poses[:2]), None, None]
     rows = zip("abcd", shapes, poses, moves, strict=True)
     scene = Scene(tuple(Obstacle(*row) for row in rows), (AttachedObject("e", "hand", Box([1, 2, 3])),))
-    save_scene(scene, tmp_path / "scene.yaml")
+    scene.save(tmp_path / "scene.yaml")
     for one, two in zip(scene.obstacles, load_scene(tmp_path / "scene.yaml").obstacles, strict=True):
         assert shape_numbers(one.shape) == shape_numbers(two.shape)
         assert same_pose(one.pose, two.pose)
@@ -132,7 +132,7 @@ def test_numbers_survive_bit_for_bit(tmp_path):
 
 
 def test_an_empty_scene_survives(tmp_path):
-    save_scene(Scene(), tmp_path / "scene.yaml")
+    Scene().save(tmp_path / "scene.yaml")
     assert load_scene(tmp_path / "scene.yaml").names == ()
 
 
@@ -143,7 +143,7 @@ def test_the_scene_of_a_whole_problem_file_can_be_read(tmp_path):
 
 
 def test_a_mesh_is_named_relative_to_the_file_that_names_it(file, tmp_path):
-    save_scene(load_scene(file), tmp_path / "parts" / "copy.yaml")
+    load_scene(file).save(tmp_path / "parts" / "copy.yaml")
     names = [o["mesh"] for o in read_yaml(tmp_path / "parts" / "copy.yaml").data["scene"]["obstacles"] if "mesh" in o]
     assert names == ["frame.obj"]
 
@@ -151,7 +151,7 @@ def test_a_mesh_is_named_relative_to_the_file_that_names_it(file, tmp_path):
 def test_a_mesh_made_in_memory_cannot_be_written(tmp_path):
     mesh = Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
     with pytest.raises(InputError, match=r"'a'.*made in memory"):
-        save_scene(Scene((Obstacle("a", mesh),)), tmp_path / "scene.yaml")
+        Scene((Obstacle("a", mesh),)).save(tmp_path / "scene.yaml")
     assert not (tmp_path / "scene.yaml").exists()
 
 

@@ -14,7 +14,7 @@ from rrtik_ompl.model.scene import AttachedObject, ConstantVelocity, Obstacle, S
 from rrtik_ompl.model.shapes import Box, HalfSpace, Sphere
 from rrtik_ompl.motion.trajectory.limits import RateLimits
 from rrtik_ompl.replanning.feed import Snapshot, Stream
-from rrtik_ompl.replanning.record import load_run
+from rrtik_ompl.replanning.record import ReplanRun
 from rrtik_ompl.replanning.replanner import replan
 from rrtik_ompl.replanning.travels import MotionTracker, SpeedWarning
 from rrtik_ompl.world.problem import Problem
@@ -252,7 +252,7 @@ def test_a_half_space_that_is_seen_to_turn_ends_the_run_in_one_line(tmp_path):
     problem = Problem(World(ball().robot, feed(0.0)), [-0.6, 0.0], [0.6, 0.0])
     with pytest.raises(InputError, match="'ground' has no end and turns"):
         replan(problem, feed, **OPTIONS, **KEPT, record=tmp_path / "run.json")
-    assert len(load_run(tmp_path / "run.json").ticks) > 10
+    assert len(ReplanRun.load(tmp_path / "run.json").ticks) > 10
 
 
 def test_a_stream_gives_the_last_scene_that_is_not_later_and_reads_no_further():

@@ -16,7 +16,7 @@ from rrtik_ompl.model.scene import AttachedObject, Obstacle, Scene, TimedPoses
 from rrtik_ompl.model.shapes import Box, HalfSpace, Sphere
 from rrtik_ompl.motion.trajectory.limits import RateLimits
 from rrtik_ompl.replanning.in_time import plan_in_time
-from rrtik_ompl.replanning.record import load_run
+from rrtik_ompl.replanning.record import ReplanRun
 from rrtik_ompl.replanning.replanner import replan
 from rrtik_ompl.replanning.travels import SpeedWarning
 from rrtik_ompl.world.problem import Problem
@@ -92,7 +92,7 @@ def test_obstacles_that_come_go_or_grow_are_refused_and_the_record_is_kept(later
         replan(
             plane(lift), lambda t: Scene([lift] if t < 0.5 else later(lift)), record=tmp_path / "run.json", **OPTIONS
         )
-    assert len(load_run(tmp_path / "run.json").ticks) == 5
+    assert len(ReplanRun.load(tmp_path / "run.json").ticks) == 5
 
 
 @pytest.mark.parametrize(

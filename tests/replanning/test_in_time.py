@@ -93,7 +93,7 @@ def test_nothing_in_the_way_arrives_as_soon_as_speed_allows():
 @pytest.mark.kernels
 @pytest.mark.parametrize("name", ["replan_ur5", "replan_planar_arm"])
 def test_arms_among_what_moves_are_free_at_every_time_with_margin(name):
-    scenario = rrtik.load_scenario(name)
+    scenario = rrtik.replanning.Scenario.load(name)
     problem, settings = scenario.problem, scenario.settings
     speed = settings.step * settings.rate
     plan = plan_in_time(problem, speed=speed, margin=settings.margin, limits=settings.limits, seed=2)
@@ -108,7 +108,7 @@ def test_the_same_seed_gives_the_same_motion_and_a_record_keeps_it(tmp_path):
     one, two = (plan_in_time(crossing(), seed=3, seconds=600.0, **PLANE).run for _ in range(2))
     assert (one.configurations == two.configurations).all()
     one.save(tmp_path / "run.json")
-    back = rrtik.load_run(tmp_path / "run.json")
+    back = rrtik.replanning.ReplanRun.load(tmp_path / "run.json")
     assert (back.configurations == one.configurations).all()
     assert back.planner == "in-time"
 
@@ -116,7 +116,7 @@ def test_the_same_seed_gives_the_same_motion_and_a_record_keeps_it(tmp_path):
 def test_the_command_plans_in_time_and_says_when_there_is_no_way(tmp_path, capsys):
     record = tmp_path / "run.json"
     assert run_command(["replan", "replan_planar_arm", "--foreseen", "--record", str(record)]) == 0
-    assert rrtik.load_run(record).planner == "in-time"
+    assert rrtik.replanning.ReplanRun.load(record).planner == "in-time"
     assert "moves proven" in capsys.readouterr().out
     assert run_command(["replan", "replan_planar_arm", "--foreseen", "--seconds", "0.5", "--json"]) == 1
     reason = json.loads(capsys.readouterr().out)["reason"]

@@ -18,9 +18,9 @@ from rrtik_ompl.model.shapes import Box, HalfSpace, PointCloud
 from rrtik_ompl.problem_files.problem import load_problem
 from rrtik_ompl.replanning import record
 from rrtik_ompl.replanning.feed import Snapshot
-from rrtik_ompl.replanning.record import ReplanRun, load_run
+from rrtik_ompl.replanning.record import ReplanRun
 from rrtik_ompl.replanning.replanner import replan
-from rrtik_ompl.replanning.scenario import load_scenario
+from rrtik_ompl.replanning.scenario import Scenario
 from rrtik_ompl.replanning.tick import Tick
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
@@ -76,7 +76,7 @@ def test_an_arm_that_sweeps_through_any_shape_is_seen(name, moves, tmp_path):
     assert all(each.proven for each in found)
 
     run.save(tmp_path / "run.json")
-    again = load_run(tmp_path / "run.json").violations(problem)
+    again = ReplanRun.load(tmp_path / "run.json").violations(problem)
     assert [(each.tick, each.first) for each in again] == [(each.tick, each.first) for each in found]
     assert [each.distance for each in again] == pytest.approx([each.distance for each in found], abs=1e-5)
 
@@ -174,12 +174,12 @@ def test_a_cloud_that_is_seen_anew_is_judged_as_it_was_then_and_too_many_points_
     run = by_hand(robot, [[0.0, 0.0]] * 11, [Snapshot(k / RATE, seen(k / RATE)) for k in range(11)])
     problem = Problem(World(robot), [0, 0], [0, 1])
     run.save(tmp_path / "run.json")
-    for each in (run, load_run(tmp_path / "run.json")):
+    for each in (run, ReplanRun.load(tmp_path / "run.json")):
         assert {each.tick for each in each.violations(problem)} == {9, 10}
     monkeypatch.setattr(record, "MOST_POINTS", 10)
     short = by_hand(robot, [[0.0, 0.0]] * 11, [Snapshot(k / RATE, seen(k / RATE)) for k in range(11)])
     short.save(tmp_path / "short.json")
-    for each in (short, load_run(tmp_path / "short.json")):
+    for each in (short, ReplanRun.load(tmp_path / "short.json")):
         with pytest.raises(InputError, match=r"too large.*0\.5 s"):
             each.violations(problem)
         assert {each.tick for each in each.violations(problem, seen)} == {8, 9, 10}  # straight on between two looks
@@ -193,7 +193,7 @@ def test_a_run_of_another_robot_is_not_judged():
 
 def test_the_command_judges_a_record(tmp_path, capsys):
     file = tmp_path / "run.json"
-    scenario = load_scenario("replan_planar_arm")
+    scenario = Scenario.load("replan_planar_arm")
     scenario.run(seed=1, repair_budget=30.0, record=file)
     assert rrtik(["check", "replan_planar_arm", str(file)]) == 0
     assert "nothing touches" in capsys.readouterr().out
@@ -213,7 +213,7 @@ def test_the_command_judges_a_record(tmp_path, capsys):
 
 
 def test_the_command_refuses_a_record_of_another_robot_in_one_line(tmp_path, capsys):
-    load_scenario("replan_walls").run(seconds=0.3, record=tmp_path / "run.json")
+    Scenario.load("replan_walls").run(seconds=0.3, record=tmp_path / "run.json")
     assert rrtik(["check", "titan4_prisms", str(tmp_path / "run.json")]) == 2
     said = capsys.readouterr().err
     assert "run.json: " in said
@@ -225,7 +225,7 @@ def test_the_record_holds_what_was_seen(tmp_path):
     scene = problem.world.scene
     run = judged(replan(problem, scene.at, seed=1, **OPTIONS, speed_bound=3.0), problem)
     run.save(tmp_path / "run.json")
-    again = load_run(tmp_path / "run.json")
+    again = ReplanRun.load(tmp_path / "run.json")
     assert [seen.time for seen in again.scenes] == [seen.time for seen in run.scenes]
     for one, other in zip(run.scenes, again.scenes, strict=True):
         pair = one.scene.obstacle("lift"), other.scene.obstacle("lift")
@@ -241,5 +241,5 @@ def test_a_contact_that_the_scene_names_may_go_as_deep_as_it_says_and_no_deeper(
     for deep, wrong in ((0.008, False), (0.012, True)):
         run = by_hand(robot, [[0.8 + deep, 0.0]] * 3, [Snapshot(0.0, scene, stated=True)], proven=True, margin=0.02)
         run.save(tmp_path / "run.json")
-        for each in (run, load_run(tmp_path / "run.json")):
+        for each in (run, ReplanRun.load(tmp_path / "run.json")):
             assert bool(each.violations(problem)) == wrong

@@ -12,7 +12,7 @@ SETTINGS = {"step": 0.05, "rate": 20.0, "seconds": 2.0, "seed": 1, "repair_budge
 
 @pytest.fixture
 def problem():
-    return rrtik.load_scenario("replan_walls").problem
+    return rrtik.replanning.Scenario.load("replan_walls").problem
 
 
 @pytest.fixture
@@ -37,7 +37,7 @@ def test_a_feed_that_hangs_ends_the_run_and_the_record_has_what_was_before(probl
     feed = hanging(problem.world.scene, 0.2, never)
     with pytest.raises(InputError, match=r"scene feed.*0\.25 s.*0\.5 s.*feed_patience"):
         rrtik.replan(problem, feed, **SETTINGS, record=tmp_path / "run.json", feed_patience=0.5)
-    run = rrtik.load_run(tmp_path / "run.json")
+    run = rrtik.replanning.ReplanRun.load(tmp_path / "run.json")
     assert (len(run.ticks), run.outcome) == (5, "interrupted")
 
 

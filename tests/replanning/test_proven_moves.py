@@ -9,7 +9,7 @@ from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.model.scene import Obstacle, Scene
 from rrtik_ompl.model.shapes import Box, Capsule, Cylinder, HalfSpace, PointCloud, Prism, Sphere
 from rrtik_ompl.replanning.feed import Snapshot
-from rrtik_ompl.replanning.record import load_run
+from rrtik_ompl.replanning.record import ReplanRun
 from rrtik_ompl.replanning.replanner import replan
 from rrtik_ompl.replanning.travels import MotionTracker
 from rrtik_ompl.world.moving_world import MovingWorld
@@ -97,7 +97,7 @@ def test_a_run_says_which_moves_are_proven(planner, tmp_path):
     assert proven >= 0.9 * moves
     assert f"{proven} of {moves} moves proven" in run.summary()
     assert (run.figures()["moves"], run.figures()["moves_proven"]) == (moves, proven)
-    again = load_run(tmp_path / "run.json")
+    again = ReplanRun.load(tmp_path / "run.json")
     assert [tick.proven for tick in again.ticks] == [tick.proven for tick in run.ticks]
 
 

@@ -7,14 +7,14 @@ import json
 import pytest
 
 from rrtik_ompl.base.errors import InputError
-from rrtik_ompl.replanning.record import load_run
+from rrtik_ompl.replanning.record import ReplanRun
 from rrtik_ompl.replanning.replanner import replan
 from rrtik_tests.moving_plane import OPTIONS, crossing
 
 
 def test_a_record_reads_back_as_the_same_run(tmp_path):
     run = replan(crossing(), record=tmp_path / "run.json", **OPTIONS)
-    again = load_run(tmp_path / "run.json")
+    again = ReplanRun.load(tmp_path / "run.json")
     assert (again.configurations == run.configurations).all()
     assert again.figures() == run.figures()
     assert again.ticks[3].poses["lift"] == pytest.approx(run.ticks[3].poses["lift"])
@@ -25,7 +25,7 @@ def test_a_record_of_a_long_run_is_read_too(tmp_path):
     replan(crossing(), record=file, **{**OPTIONS, "seconds": 0.5})
     with file.open("a") as record:
         record.write(" " * (65 * 2**20))
-    assert len(load_run(file).ticks) == 6
+    assert len(ReplanRun.load(file).ticks) == 6
 
 
 def test_the_record_is_kept_when_the_run_is_interrupted(tmp_path):
@@ -38,7 +38,7 @@ def test_the_record_is_kept_when_the_run_is_interrupted(tmp_path):
 
     with pytest.raises(KeyboardInterrupt):
         replan(crossing(), feed, record=tmp_path / "run.json", **OPTIONS)
-    kept = load_run(tmp_path / "run.json")
+    kept = ReplanRun.load(tmp_path / "run.json")
     assert kept.outcome == "interrupted"
     assert len(kept.ticks) == 11
 
@@ -59,7 +59,7 @@ def test_a_run_interrupted_before_its_first_tick_leaves_no_record(tmp_path):
 def test_a_file_that_is_no_record_is_refused(tmp_path):
     (tmp_path / "run.json").write_text('{"kind": "replan_run", "version": 1, "ticks": [{"time": 0}]}')
     with pytest.raises(InputError, match="not a whole record"):
-        load_run(tmp_path / "run.json")
+        ReplanRun.load(tmp_path / "run.json")
 
 
 @pytest.mark.parametrize(
@@ -84,4 +84,4 @@ def test_a_record_that_cannot_be_is_refused_with_its_name(tmp_path, change, word
     change(record)
     file.write_text(json.dumps(record))
     with pytest.raises(InputError, match=f"run.json: .*{words}"):
-        load_run(file)
+        ReplanRun.load(file)

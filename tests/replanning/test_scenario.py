@@ -15,9 +15,9 @@ from rrtik_ompl.description.catalog import find_problem, list_problems, load_rob
 from rrtik_ompl.model.scene import ConstantVelocity, Obstacle, Scene
 from rrtik_ompl.model.shapes import HalfSpace
 from rrtik_ompl.problem_files.problem import load_problem
-from rrtik_ompl.replanning.record import load_run
+from rrtik_ompl.replanning.record import ReplanRun
 from rrtik_ompl.replanning.replanner import replan
-from rrtik_ompl.replanning.scenario import load_scenario
+from rrtik_ompl.replanning.scenario import Scenario
 from rrtik_ompl.viewer.drawing.robot_picture import node_name
 from rrtik_ompl.viewer.page import page
 from rrtik_ompl.viewer.picture import draw
@@ -49,7 +49,7 @@ def crossing(tmp_path):
 
 @pytest.mark.parametrize("name", SCENARIOS)
 def test_every_shipped_scenario_is_run_to_its_goal_without_contact(name):
-    scenario = load_scenario(name)
+    scenario = Scenario.load(name)
     run = scenario.run(seed=1, repair_budget=30.0)
     assert run.arrived, run.summary()
     if scenario.problem.robot.name != "point2d":  # a point has no room around it to keep
@@ -63,7 +63,7 @@ def test_the_scenes_of_the_paper_are_shipped():
 def test_a_goal_that_moves_is_read_from_the_file(crossing):
     moving = "goal: [{time: 0, joints: [19, 10]}, {time: 2, joints: [19, 14]}]"
     crossing.write_text(TEXT.replace("velocity: [1000]", f"velocity: [1000], {moving}"))
-    scenario = load_scenario(crossing)
+    scenario = Scenario.load(crossing)
     assert scenario.goal_feed(1.0) == pytest.approx([19.0, 12.0])
     assert scenario.run(repair_budget=30.0).configurations[-1] == pytest.approx([19.0, 14.0])
 
@@ -83,7 +83,7 @@ def test_a_goal_that_moves_is_read_from_the_file(crossing):
 def test_what_is_wrong_with_a_scenario_is_said_in_one_line(crossing, old, new, words):
     crossing.write_text(TEXT.replace(old, new))
     with pytest.raises(InputError, match=words) as caught:
-        load_scenario(crossing)
+        Scenario.load(crossing)
     assert "\n" not in str(caught.value)
 
 
@@ -93,7 +93,7 @@ def test_the_command_writes_a_record_and_a_page_that_replays_it(crossing, tmp_pa
     said = capsys.readouterr().out
     assert "crossing: arrived after" in said
     assert f"wrote {record}" in said
-    run = load_run(record)
+    run = ReplanRun.load(record)
     story = json.loads(re.search(r'id="story" type="application/json">\n(.*?)\n</script>', html.read_text(), re.S)[1])
     assert len(story["run"]["line"]) == len(run.ticks) == len(story["times"])
     assert list(story["run"]["moving"]) == [node_name("lift")]
@@ -115,7 +115,7 @@ def test_the_command_refuses_a_problem_that_is_no_scenario(capsys):
 
 
 def test_where_a_run_was_given_up_is_not_shown_as_its_goal(crossing):
-    scenario = load_scenario(crossing)
+    scenario = Scenario.load(crossing)
     shown = subject_of_run(scenario.problem, scenario.run(seconds=0.3))
     assert (shown.end == scenario.problem.goal.q).all()
 
@@ -142,23 +142,23 @@ def test_what_only_a_new_run_can_heed_is_refused_beside_a_replay(option, value, 
 
 
 def test_the_command_replays_no_run_of_another_scenario(crossing, tmp_path, capsys):
-    load_scenario(crossing).run(seconds=0.3, record=tmp_path / "run.json")
+    Scenario.load(crossing).run(seconds=0.3, record=tmp_path / "run.json")
     assert rrtik(["replan", "replan_walls", "--replay", str(tmp_path / "run.json")]) == 2
     assert "a run of 'crossing', not of 'replan_walls'" in capsys.readouterr().err
 
 
 def test_a_run_is_not_shown_with_another_robot(crossing):
-    run = load_scenario(crossing).run(seconds=0.3)
+    run = Scenario.load(crossing).run(seconds=0.3)
     with pytest.raises(InputError, match=r"'point2d'.*joints"):
         page(load_problem("replan_planar_arm"), run=run)
 
 
 def test_a_record_of_another_problem_is_refused(crossing):
-    run = load_scenario(crossing).run(repair_budget=30.0)
+    run = Scenario.load(crossing).run(repair_budget=30.0)
     with pytest.raises(InputError, match="lift"):
         page(load_problem("env_e"), run=run)
 
 
 def test_a_scenario_is_a_problem_too():
-    assert load_problem("replan_ur5").start == pytest.approx(load_scenario("replan_ur5").problem.start)
+    assert load_problem("replan_ur5").start == pytest.approx(Scenario.load("replan_ur5").problem.start)
     assert find_problem("replan_ur5").is_file()

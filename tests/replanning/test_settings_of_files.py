@@ -5,7 +5,7 @@ import pytest
 
 from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.replanning.replanner import replan, replan_with
-from rrtik_ompl.replanning.scenario import load_scenario
+from rrtik_ompl.replanning.scenario import Scenario
 from rrtik_ompl.replanning.settings import ReplanSettings
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
@@ -27,13 +27,13 @@ def empty_plane():
 def test_a_key_of_a_file_is_a_setting(new, tmp_path):
     file = tmp_path / "new.yaml"
     file.write_text(TEXT % f"{new}: 1")
-    assert getattr(load_scenario(file).settings, new) == 1
+    assert getattr(Scenario.load(file).settings, new) == 1
 
 
 def test_a_name_that_never_was_is_no_setting():
     for call in (
         lambda: replan(empty_plane(), step=0.5, rate=10.0, speed=1),
-        lambda: load_scenario("replan_walls").run(x=1),
+        lambda: Scenario.load("replan_walls").run(x=1),
     ):
         with pytest.raises(TypeError, match="unexpected keyword"):
             call()
@@ -42,7 +42,7 @@ def test_a_name_that_never_was_is_no_setting():
 def test_a_file_and_the_arguments_make_the_same_settings(tmp_path):
     file = tmp_path / "new.yaml"
     file.write_text(TEXT % "max_edge: 1.5, lookahead_ticks: 2, margin: 0.1, seconds: 3, repair_budget: 20")
-    scenario = load_scenario(file)
+    scenario = Scenario.load(file)
     made = ReplanSettings(step=0.5, rate=10, max_edge=1.5, lookahead_ticks=2, margin=0.1, seconds=3, repair_budget=20)
     for name in ReplanSettings.__dataclass_fields__:
         assert getattr(scenario.settings, name) == getattr(made, name)

@@ -8,7 +8,7 @@ from rrtik_ompl.description.catalog import find_problem, list_problems
 from rrtik_ompl.files.strict_yaml import read_yaml
 from rrtik_ompl.model.goal import JointGoal, PoseGoal, PositionGoal
 from rrtik_ompl.planning.plan import plan
-from rrtik_ompl.problem_files.problem import load_problem, save_problem
+from rrtik_ompl.problem_files.problem import load_problem
 from rrtik_ompl.problem_files.problem_values import problem_schema
 
 NAMES = [
@@ -61,7 +61,7 @@ def test_start_and_goal_are_free_with_room_to_spare(name):
 @pytest.mark.parametrize("name", NAMES)
 def test_every_problem_survives_writing_and_reading(name, tmp_path):
     problem = load_problem(name)
-    save_problem(problem, tmp_path / "copy.yaml")
+    problem.save(tmp_path / "copy.yaml")
     copy = load_problem(tmp_path / "copy.yaml")
     np.testing.assert_array_equal(copy.start, problem.start)
     assert copy.world.scene.names == problem.world.scene.names

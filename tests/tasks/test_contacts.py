@@ -293,7 +293,7 @@ def test_a_thing_held_from_the_beginning_may_touch_what_it_touches(tmp_path, pan
     plan = planned(panda, around, [Straight(by=UP)], start=q)
     assert plan.found, plan.reason
     assert plan.contacts[0][0].touching.names == ("cup", "table")
-    rrtik.save_problem(rrtik.Problem(rrtik.World(panda, rrtik.Scene([], [held])), q, "ready"), tmp_path / "p.yaml")
+    rrtik.Problem(rrtik.World(panda, rrtik.Scene([], [held])), q, "ready").save(tmp_path / "p.yaml")
     text = (tmp_path / "p.yaml").read_text().split("goal:")[0]
     where = {"xyz": [0.55, 0.0, TOP - 0.02]}
     table = f"scene:\n  obstacles:\n  - {{name: table, box: [0.7, 1.2, 0.04], pose: {json.dumps(where)}}}\n"
@@ -307,7 +307,7 @@ def test_contacts_are_listed_in_the_order_of_the_world(tmp_path, panda, capsys):
     far_away = [rrtik.Obstacle(name, rrtik.Sphere(0.05), [3.0, 0.3 * k, 0.0]) for k, name in enumerate(names)]
     contacts = [rrtik.Touching("panda_hand", name, 0.0) for name in reversed(names)]
     plan = planned(panda, rrtik.Scene(far_away, contacts=contacts), [MoveTo(above(*PLACE[:2]))])
-    rrtik.save_task_plan(plan, tmp_path / "plan.json")
+    plan.save(tmp_path / "plan.json")
     assert run(["check", str(tmp_path / "plan.json")]) == 0
     assert re.findall(r"stands on a contact: 'panda_hand' and '(.*)'", capsys.readouterr().out) == names[::-1]
 
@@ -315,7 +315,7 @@ def test_contacts_are_listed_in_the_order_of_the_world(tmp_path, panda, capsys):
 def test_the_check_of_a_saved_plan_names_contacts_and_finds_those_that_are_not_said(tmp_path, panda, capsys):
     plan = planned(panda, scene(), [*taken(), Straight(by=UP)])
     file = tmp_path / "plan.json"
-    rrtik.save_task_plan(plan, file)
+    plan.save(file)
     assert run(["check", str(file)]) == 0
     assert "motion 3 stands on a contact: 'cup' and 'table' may overlap by 1 mm, up to" in capsys.readouterr().out
     document = json.loads(file.read_text())
@@ -424,7 +424,7 @@ def of_a_scene_that_has_it_not(document):
 )
 def test_the_check_of_a_saved_plan_does_not_take_its_word(tmp_path, put_down, capsys, change, said):
     file = tmp_path / "plan.json"
-    rrtik.save_task_plan(put_down, file)
+    put_down.save(file)
     document = json.loads(file.read_text())
     change(document)
     file.write_text(json.dumps(document))
@@ -434,7 +434,7 @@ def test_the_check_of_a_saved_plan_does_not_take_its_word(tmp_path, put_down, ca
     number = int(said.split("motion ")[1].split(":")[0])
     (line,) = [each for each in printed.splitlines() if each.startswith(f"  {number} ")]
     assert "proven free" not in line
-    assert not rrtik.load_task_plan(file).proven
+    assert not rrtik.TaskPlan.load(file).proven
 
 
 def test_a_line_down_into_the_table_is_not_valid_on_a_contact_as_deep(tmp_path, panda, put_down, capsys):
@@ -450,7 +450,7 @@ def test_a_line_down_into_the_table_is_not_valid_on_a_contact_as_deep(tmp_path, 
             around = dataclasses.replace(around, contacts=(rrtik.Touching("cup", "table", -0.02),))
         worlds.append(world.with_scene(around))
     false = dataclasses.replace(down, worlds=tuple(worlds), end=worlds[-1], contacts=())
-    rrtik.save_task_plan(false, tmp_path / "plan.json")
+    false.save(tmp_path / "plan.json")
     assert run(["check", str(tmp_path / "plan.json")]) == 1
     printed = capsys.readouterr().out
     assert "not valid: motion 3: contact of 'cup' and 'table'" in printed
@@ -459,8 +459,8 @@ def test_a_line_down_into_the_table_is_not_valid_on_a_contact_as_deep(tmp_path, 
 
 def test_a_loaded_plan_is_proven_if_the_saved_one_was(tmp_path, put_down):
     assert put_down.proven
-    rrtik.save_task_plan(put_down, tmp_path / "plan.json")
-    again = rrtik.load_task_plan(tmp_path / "plan.json")
+    put_down.save(tmp_path / "plan.json")
+    again = rrtik.TaskPlan.load(tmp_path / "plan.json")
     assert again.violations() == ()
     assert again.proven
 
@@ -469,15 +469,15 @@ def test_a_loaded_plan_is_proven_if_the_saved_one_was(tmp_path, put_down):
 def test_a_depth_that_a_grasp_has_named_is_valid_in_the_plan_and_in_its_file(tmp_path, panda, inside):
     plan = planned(panda, scene(inside=inside), [*taken(allow=["table"]), Straight(by=UP)])
     assert plan.violations() == ()
-    rrtik.save_task_plan(plan, tmp_path / "plan.json")
-    assert rrtik.load_task_plan(tmp_path / "plan.json").violations() == ()
+    plan.save(tmp_path / "plan.json")
+    assert rrtik.TaskPlan.load(tmp_path / "plan.json").violations() == ()
 
 
 def test_plans_keep_their_contacts_in_files_copies_and_times(tmp_path, panda):
     plan = planned(panda, scene(), [*taken(), Straight(by=UP), *put(0.0005)])
     assert plan.found, plan.reason
-    rrtik.save_task_plan(plan, tmp_path / "plan.json")
-    for again in (rrtik.load_task_plan(tmp_path / "plan.json"), pickle.loads(pickle.dumps(plan))):
+    plan.save(tmp_path / "plan.json")
+    for again in (rrtik.TaskPlan.load(tmp_path / "plan.json"), pickle.loads(pickle.dumps(plan))):
         assert again.contacts == plan.contacts
         assert again.notes == plan.notes
         assert [world.scene.contacts for world in again.worlds] == [world.scene.contacts for world in plan.worlds]
@@ -487,7 +487,7 @@ def test_plans_keep_their_contacts_in_files_copies_and_times(tmp_path, panda):
     first["motions"][2]["contacts"][0].pop("distance")
     (tmp_path / "bad.json").write_text(json.dumps(first))
     with pytest.raises(rrtik.InputError, match="distance"):
-        rrtik.load_task_plan(tmp_path / "bad.json")
+        rrtik.TaskPlan.load(tmp_path / "bad.json")
     timed = rrtik.time_task(plan, pause=0.0)
     samples = timed.trajectory.sample(500.0)
     rows = samples.positions
@@ -503,13 +503,13 @@ def test_plans_keep_their_contacts_in_files_copies_and_times(tmp_path, panda):
 def test_certificates_stand_on_contacts_and_no_deeper(panda):
     plan = planned(panda, scene(), [*taken(), Straight(by=UP)])
     lift, world = plan.paths[2], plan.worlds[2]
-    found = rrtik.certificate_of(world, lift)
-    assert rrtik.verify_certificate(found, world, lift.waypoints) == ""
+    found = world.certificate(lift)
+    assert world.verify(found, lift.waypoints) == ""
     (contact,) = world.scene.contacts
     for other in ((), (dataclasses.replace(contact, distance=0.0),)):
         strict = world.with_scene(dataclasses.replace(world.scene, contacts=other))
-        assert rrtik.verify_certificate(found, strict, lift.waypoints) == "it is for another scene"
-        assert rrtik.certificate_of(strict, lift) is None
+        assert strict.verify(found, lift.waypoints) == "it is for another scene"
+        assert strict.certificate(lift) is None
 
 
 def plate_beside(robot, away):

@@ -19,12 +19,12 @@ from rrtik_ompl.viewer.page import page
 
 @pytest.fixture(scope="module")
 def serving():
-    return rrtik.load_task("panda_serve")
+    return rrtik.Task.load("panda_serve")
 
 
 @pytest.fixture(scope="module")
 def served(serving):
-    return serving.task.plan(serving.world, serving.start, seed=2)
+    return serving.plan(seed=2)
 
 
 def axis_of(world, q, name):
@@ -49,7 +49,7 @@ def test_the_cup_stays_upright_while_it_is_carried_and_nothing_is_touched(served
 
 @pytest.mark.kernels
 def test_without_the_constraint_the_same_carry_tilts(serving):
-    stages = [MoveTo(s.goal) if isinstance(s, MoveTo) else s for s in serving.task.stages]
+    stages = [MoveTo(s.goal) if isinstance(s, MoveTo) else s for s in serving.stages]
     plan = Task(stages).plan(serving.world, serving.start, seed=2)
     assert plan.found, plan.reason
     world, path = plan.worlds[3], plan.paths[3]
@@ -59,8 +59,8 @@ def test_without_the_constraint_the_same_carry_tilts(serving):
 
 @pytest.mark.kernels
 def test_a_plan_with_constraints_comes_back_from_its_file(served, tmp_path):
-    rrtik.save_task_plan(served, tmp_path / "plan.json")
-    again = rrtik.load_task_plan(tmp_path / "plan.json")
+    served.save(tmp_path / "plan.json")
+    again = rrtik.TaskPlan.load(tmp_path / "plan.json")
     assert [stage_data(stage) for stage in again.stages] == [stage_data(stage) for stage in served.stages]
     assert again.stages[3].constraints[0].from_start
     assert again.stages[3].constraints[0].frame == "cup"

@@ -45,8 +45,8 @@ def small(tmp_path):
 @pytest.mark.kernels
 @pytest.mark.parametrize("name", rrtik.list_tasks())
 def test_every_shipped_task_has_a_plan_that_is_free_all_along(name):
-    loaded = rrtik.load_task(name)
-    plan = loaded.task.plan(loaded.world, loaded.start, seed=1)
+    loaded = rrtik.Task.load(name)
+    plan = loaded.plan(seed=1)
     assert plan.found, plan.reason
     for path, world in zip(plan.paths, plan.worlds, strict=True):
         assert path.proven
@@ -55,8 +55,8 @@ def test_every_shipped_task_has_a_plan_that_is_free_all_along(name):
 
 @pytest.mark.kernels
 def test_the_drawers_tool_touches_nothing_on_its_way_out_of_half_a_millimetre_of_play():
-    loaded = rrtik.load_task("titan4_drawer")
-    plan = loaded.task.plan(loaded.world, loaded.start, seed=1)
+    loaded = rrtik.Task.load("titan4_drawer")
+    plan = loaded.plan(seed=1)
     world, path = plan.worlds[2], plan.paths[2]
     clearances = [world.clearance(q) for q in path.resample(0.01).waypoints]
     assert 2e-4 < min(clearances) < 5.1e-4
@@ -64,11 +64,11 @@ def test_the_drawers_tool_touches_nothing_on_its_way_out_of_half_a_millimetre_of
 
 @pytest.mark.kernels
 def test_a_plan_comes_back_from_its_file_as_it_was(small, tmp_path):
-    loaded = rrtik.load_task(small)
-    plan = loaded.task.plan(loaded.world, loaded.start, seed=1)
+    loaded = rrtik.Task.load(small)
+    plan = loaded.plan(seed=1)
     assert plan.found, plan.reason
-    rrtik.save_task_plan(plan, tmp_path / "plan.json")
-    again = rrtik.load_task_plan(tmp_path / "plan.json")
+    plan.save(tmp_path / "plan.json")
+    again = rrtik.TaskPlan.load(tmp_path / "plan.json")
     assert again.chosen == plan.chosen == (1,)
     assert again.end.scene.names == plan.end.scene.names
     assert again.end.scene.attached == ()
@@ -127,15 +127,15 @@ def test_the_commands_write_what_they_say(small, tmp_path, capsys):
     assert run(["straight", "titan4_sdu", "--by", "1", "0", "0", "--out", str(tmp_path / "part.json")]) == 1
     said = capsys.readouterr().out
     assert "contact" in said or "limit" in said or "singular" in said
-    assert len(rrtik.load_path(tmp_path / "part.json").waypoints) > 1
+    assert len(rrtik.JointPath.load(tmp_path / "part.json").waypoints) > 1
     assert run(["list", "tasks"]) == 0
     assert "panda_pick_place" in capsys.readouterr().out
 
 
 @pytest.mark.kernels
 def test_the_page_carries_the_object_with_the_hand(small):
-    loaded = rrtik.load_task(small)
-    plan = loaded.task.plan(loaded.world, loaded.start, seed=1)
+    loaded = rrtik.Task.load(small)
+    plan = loaded.plan(seed=1)
     shown = run_of(plan.played())
     ticks = shown.ticks
     second = [tick for tick in ticks if tick.reason.startswith("motion 2")]
@@ -150,8 +150,8 @@ def test_the_page_carries_the_object_with_the_hand(small):
 
 @pytest.mark.kernels
 def test_the_page_plays_a_task_in_the_time_that_it_takes(small):
-    loaded = rrtik.load_task(small)
-    plan = loaded.task.plan(loaded.world, loaded.start, seed=1)
+    loaded = rrtik.Task.load(small)
+    plan = loaded.plan(seed=1)
     shown, timed = run_of(plan.played()), rrtik.time_task(plan)
     duration = timed.trajectory.duration
     assert shown.times[-1] == pytest.approx(duration, abs=2.0 / shown.rate)
@@ -193,20 +193,20 @@ def test_a_bad_file_is_refused_with_file_and_line(small, capsys, old, new, words
 
 def test_what_is_no_task_and_what_is_no_plan(tmp_path, small, capsys):
     with pytest.raises(UnknownNameError, match="no task 'panda_pick'"):
-        rrtik.load_task("panda_pick")
+        rrtik.Task.load("panda_pick")
     problem = tmp_path / "problem.yaml"
     problem.write_text("version: 1\nrobot: ur5\nstart: {posture: up}\ngoal: {posture: up}\n")
     with pytest.raises(InputError, match="a problem, not a task"):
-        rrtik.load_task(problem)
+        rrtik.Task.load(problem)
     failed = rrtik.TaskPlan(False, (), (), (), (), "stage 1 failed")
     with pytest.raises(InputError, match="stage 1 failed"):
-        rrtik.save_task_plan(failed, tmp_path / "plan.json")
+        failed.save(tmp_path / "plan.json")
     with pytest.raises(InputError, match="no motion"):
         failed.played()
     broken = tmp_path / "broken.json"
     broken.write_text('{"version": 1, "kind": "task_plan", "motions": []}')
     with pytest.raises(InputError, match=r"broken\.json"):
-        rrtik.load_task_plan(broken)
+        rrtik.TaskPlan.load(broken)
     assert run(["task", "ur5_upright"]) == 2
     assert "'ur5_upright' is a problem, not a task" in capsys.readouterr().err
     for command in (["straight", "panda_pick_place", "--by", "0", "0", "0.1"], ["plan", "panda_pick_place"]):
@@ -235,16 +235,16 @@ path_constraints:
 def test_goals_in_order_are_the_tour_that_python_plans(tmp_path, capsys):
     file = tmp_path / "tour.yaml"
     file.write_text(TOUR)
-    loaded = rrtik.load_task(file)
-    plan = loaded.task.plan(loaded.world, loaded.start, seed=2)
+    loaded = rrtik.Task.load(file)
+    plan = loaded.plan(seed=2)
     assert plan.found, plan.reason
     goals = [np.add(loaded.start, [0.8, 0, 0, 0, 0, 0]), rrtik.PositionGoal([0.3, 0.3, 0.4]), loaded.start]
     cup = rrtik.constraints.upright(loaded.world.robot, "y", tolerance_deg=20.0)
     tour = rrtik.plan_through(loaded.world, loaded.start, goals, constraints=[cup], seed=2)
     rows = [plan.paths[0].waypoints, *(path.waypoints[1:] for path in plan.paths[1:])]
     assert np.array_equal(np.vstack(rows), tour.path.waypoints)
-    rrtik.save_task_plan(plan, tmp_path / "plan.json")
-    assert len(rrtik.load_task_plan(tmp_path / "plan.json").paths) == 3
+    plan.save(tmp_path / "plan.json")
+    assert len(rrtik.TaskPlan.load(tmp_path / "plan.json").paths) == 3
     assert run(["task", str(file), "--seed", "2", "--trajectory", str(tmp_path / "tour.json")]) == 0
     assert "tour: 3 motions" in capsys.readouterr().out
 

@@ -14,8 +14,8 @@ from rrtik_ompl.cli.app import run
 
 @pytest.fixture(scope="module")
 def served():
-    loaded = rrtik.load_task("panda_serve")
-    return loaded.task.plan(loaded.world, loaded.start, seed=2)
+    loaded = rrtik.Task.load("panda_serve")
+    return loaded.plan(seed=2)
 
 
 @pytest.mark.kernels
@@ -94,7 +94,7 @@ def test_the_command_saves_a_trajectory(tmp_path, capsys):
     file = tmp_path / "task.json"
     assert run(["task", "titan4_drawer", "--seed", "1", "--trajectory", str(file), "--pause", "0.5", "--json"]) == 0
     said = json.loads(capsys.readouterr().out)
-    motion = rrtik.load_trajectory(file)
+    motion = rrtik.Trajectory.load(file)
     assert said["duration"] == pytest.approx(motion.duration)
     assert run(["task", "titan4_drawer", "--trajectory", str(tmp_path / "task.docx")]) == 2
     assert ".json" in capsys.readouterr().err

@@ -56,8 +56,8 @@ def test_fingers_are_where_the_robot_of_each_motion_has_them(closing):
 
 
 def test_a_task_without_gripper_has_no_fingers_that_move():
-    loaded = rrtik.load_task("titan4_drawer")
-    plan = loaded.task.plan(loaded.world, loaded.start, seed=1)
+    loaded = rrtik.Task.load("titan4_drawer")
+    plan = loaded.plan(seed=1)
     subject = subject_of_task(loaded.world, plan.played())
     assert subject.fingers.poses == {}
 

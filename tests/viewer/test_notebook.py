@@ -74,7 +74,7 @@ def test_results_are_lines(problem, plan):
         rrtik.solve_ik(robot, rrtik.PositionGoal(poses[0][:3, 3], tolerance=0.01)),
         rrtik.ik.reach_map(robot, samples=500, seed=1),
         rrtik.time_parameterize(plan.path, robot).report(rrtik.RateLimits.of(robot)),
-        rrtik.certificate_of(problem.world, plan.path, 0.0),
+        problem.world.certificate(plan.path, 0.0),
         rrtik.Mesh(np.random.default_rng(1).normal(size=(90, 3)), np.arange(90).reshape(30, 3)),
     ]
     ur5 = rrtik.load_robot("ur5")

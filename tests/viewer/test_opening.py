@@ -60,7 +60,7 @@ def test_a_saved_problem_that_is_dropped_gives_the_page_its_state_again(browser:
     (tmp_path / "problem.yaml").write_text(browser.ask("problemText()"), encoding="utf-8")
     (tmp_path / "path.json").write_text(browser.ask("pathText()"), encoding="utf-8")
     again = rrtik.load_problem(tmp_path / "problem.yaml")
-    path = rrtik.load_path(tmp_path / "path.json", again.robot)
+    path = rrtik.JointPath.load(tmp_path / "path.json", again.robot)
     assert [each.name for each in again.world.scene.obstacles] == ["crate", "wedge", "sphere 1"]
     np.testing.assert_allclose(again.world.scene.obstacles[0].pose.translation, [0.5, -0.6, 0.7], atol=1e-12)
     assert path.violations(again.world) == ()

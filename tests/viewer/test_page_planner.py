@@ -286,7 +286,7 @@ def test_in_a_browser_goal_and_obstacles_are_dragged_and_the_saved_files_hold(tm
     assert chosen == "goal"
     assert np.abs(goal - problem.goal.q).max() > 1e-3
     saved = rrtik.load_problem(tmp_path / "problem.yaml")
-    path = rrtik.load_path(tmp_path / "path.json", saved.robot)
+    path = rrtik.JointPath.load(tmp_path / "path.json", saved.robot)
     assert "radius must be above 0" in refused
     assert [each.name for each in saved.world.scene.obstacles] == ["crate", "box 1", "capsule 1"]
     assert saved.world.scene.obstacles[2].shape.length == 0.4

@@ -106,9 +106,9 @@ def of_tour(good: bool) -> Case:
 
 def of_certificate(good: bool) -> Case:
     """What a certificate is about, one for this world or one for an empty world."""
-    proven = rrtik.certificate_of(world() if good else rrtik.World(arm()), [FAR, NEAR if good else IN])
+    proven = (world() if good else rrtik.World(arm())).certificate([FAR, NEAR if good else IN])
     assert proven is not None
-    return page(world(), proven), {}, rrtik.verify_certificate(proven, world(), proven.waypoints) == ""
+    return page(world(), proven), {}, world().verify(proven, proven.waypoints) == ""
 
 
 def of_a_clearance(good: bool) -> Case:
@@ -342,7 +342,7 @@ def test_a_path_with_other_joint_names_is_refused_as_load_path_does(
         page(problem(), still=True, **paths)
     other.save(tmp_path / "other.json")
     with pytest.raises(rrtik.InputError) as loading:
-        rrtik.load_path(tmp_path / "other.json", robot)
+        rrtik.JointPath.load(tmp_path / "other.json", robot)
     assert str(refused.value) in str(loading.value)
 
 

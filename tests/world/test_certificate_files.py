@@ -10,7 +10,7 @@ import pytest
 import rrtik_ompl as rrtik
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.files.text import MAX_BYTES
-from rrtik_ompl.model.certificate import Certificate, MotionEntries, from_document, load_certificate
+from rrtik_ompl.model.certificate import Certificate, MotionEntries, from_document
 from rrtik_ompl.model.proof import Proof
 from rrtik_ompl.model.scene import Obstacle, Scene
 from rrtik_ompl.model.shapes import Box
@@ -29,7 +29,7 @@ def certificate():
 def test_a_certificate_is_read_as_it_was_written(tmp_path):
     file = tmp_path / "c.json"
     certificate().save(file)
-    again = load_certificate(file)
+    again = Certificate.load(file)
     assert again.document() == certificate().document()
     assert again.waypoints.tobytes() == certificate().waypoints.tobytes()
     assert [len(motion.solids) for motion in again.motions] == [2, 0]
@@ -97,7 +97,7 @@ def test_a_broken_certificate_is_refused_in_one_line_with_file_and_field(what, t
     file = tmp_path / "c.json"
     file.write_text(json.dumps(change(certificate().document())))
     with pytest.raises(InputError, match=re.escape(field)) as caught:
-        load_certificate(file)
+        Certificate.load(file)
     assert str(caught.value).startswith(str(file))
     assert "\n" not in str(caught.value)
 
@@ -116,7 +116,7 @@ def test_a_file_that_is_no_json_object_is_refused(data, words, tmp_path):
     file = tmp_path / "c.json"
     file.write_bytes(data)
     with pytest.raises(InputError, match=words):
-        load_certificate(file)
+        Certificate.load(file)
 
 
 def test_a_file_that_is_too_large_or_is_not_there_is_refused(tmp_path):
@@ -124,7 +124,7 @@ def test_a_file_that_is_too_large_or_is_not_there_is_refused(tmp_path):
         file.truncate(MAX_BYTES + 1)
     for name, words in (("large.json", "larger than 64 MiB"), ("none.json", "no such file"), ("c.yaml", "ending")):
         with pytest.raises(InputError, match=words):
-            load_certificate(tmp_path / name)
+            Certificate.load(tmp_path / name)
     with pytest.raises(InputError, match="ending"):
         certificate().save(tmp_path / "c.txt")
 
@@ -134,7 +134,7 @@ def test_every_cut_of_a_document_is_refused_or_read(tmp_path):
     for end in range(0, len(text), 7):
         (tmp_path / "c.json").write_text(text[:end])
         with pytest.raises(InputError):
-            load_certificate(tmp_path / "c.json")
+            Certificate.load(tmp_path / "c.json")
     assert from_document(json.loads(text)).robot == "arm"
 
 

@@ -10,7 +10,6 @@ from bench.proofs.cases import random_scene
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.proof import Proof
 from rrtik_ompl.world.certificate_check import certificate_fault
-from rrtik_ompl.world.certificates import certificate_of
 from rrtik_ompl.world.proof import Prover
 from rrtik_ompl.world.world import World
 from rrtik_tests.turning_slider import slider
@@ -43,7 +42,7 @@ def test_what_a_lying_prover_says_of_a_motion_that_collides_is_refused(name, dep
     lies = 0
     for k in np.flatnonzero(colliding)[:200]:
         path = JointPath.of(robot, [tails[k], heads[k]])
-        forged = certificate_of(world, path)
+        forged = world.certificate(path)
         if forged is not None:
             lies += 1
             assert certificate_fault(forged, world, path.waypoints)
@@ -60,7 +59,7 @@ def test_what_is_proven_for_a_slower_motion_does_not_hold_for_a_faster_one(name)
         middle = 0.5 * (a + b)
         if not world.motion_proven(a, middle) or world.motion_valid(a, b):
             continue
-        half = certificate_of(world, JointPath.of(robot, [a, middle]))
+        half = world.certificate(JointPath.of(robot, [a, middle]))
         path = JointPath.of(robot, [a, b])
         assert certificate_fault(replace(half, waypoints=path.waypoints), world, path.waypoints)
         refused += 1

@@ -14,7 +14,7 @@ from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.scene import AttachedObject, ConstantVelocity, Obstacle, Scene
 from rrtik_ompl.model.shapes import Box, Capsule, Cylinder, HalfSpace, Prism, Sphere
 from rrtik_ompl.planning.plan import plan
-from rrtik_ompl.problem_files.scene import load_scene, save_scene
+from rrtik_ompl.problem_files.scene import load_scene
 from rrtik_ompl.world.moving_world import MovingWorld
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
@@ -160,7 +160,7 @@ def test_files_state_margins_for_one_obstacle_or_for_all(tmp_path):
     obstacles = "[{name: a, sphere: 0.1}, {name: b, sphere: 0.1, margin: 0}, {name: c, sphere: 0.1, margin: 0.5}]"
     file.write_text(f"version: 1\nscene:\n  margin: 0.02\n  obstacles: {obstacles}\n")
     assert [o.margin for o in load_scene(file).obstacles] == [0.02, 0.0, 0.5]
-    save_scene(load_scene(file), tmp_path / "copy.yaml")
+    load_scene(file).save(tmp_path / "copy.yaml")
     assert [o.margin for o in load_scene(tmp_path / "copy.yaml").obstacles] == [0.02, 0.0, 0.5]
 
 

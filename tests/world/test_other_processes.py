@@ -20,7 +20,6 @@ from rrtik_ompl.pilot.overlay.virtual_camera import pinhole_camera
 from rrtik_ompl.sensing.cameras.pictures import CameraLostError
 from rrtik_ompl.sensing.markers.marker_map import GraspType, MarkedObject, MarkerMap, MountedMarker
 from rrtik_ompl.sensing.scene_from_view import NoBaseError
-from rrtik_ompl.world.certificates import certificate_of
 
 AT = rrtik.pose([0.1, 0.2, 0.3])
 BALL = rrtik.Obstacle("ball", rrtik.Sphere(0.2), rrtik.pose([9, 9, 9]), margin=0.1)
@@ -64,7 +63,7 @@ VALUES = {
     "IkResult": lambda: rrtik.solve_ik(planar(), rrtik.PositionGoal([1, 1, 0])),
     "SingularityReport": lambda: singularity_report(planar(), [0, 0, 0]),
     "ReachMap": lambda: rrtik.ik.reach_map(planar(), samples=100),
-    "Certificate": lambda: certificate_of(world(), plan().path),
+    "Certificate": lambda: world().certificate(plan().path),
     "HeightField": lambda: rrtik.HeightField([[0.1, 0.2], [0.3, 0.4]], 0.1),
     "PointCloud": lambda: rrtik.PointCloud([[0, 0, 0], [0, 0, 1]], 0.1),
     "Roadmap": lambda: rrtik.Roadmap(world(), vertices=20, seed=1),
@@ -85,7 +84,7 @@ VALUES = {
     "MoveRules": lambda: rrtik.MoveRules(planar().joint_names, frozen_joints=["joint2"]),
     "Camera": pinhole_camera,
     "MarkerMap": lambda: MarkerMap("4x4_50", (THING,), AT),
-    "Scenario": lambda: rrtik.load_scenario("replan_ur5"),
+    "Scenario": lambda: rrtik.replanning.Scenario.load("replan_ur5"),
 }
 THROUGH = {
     "a deep copy": copy.deepcopy,

@@ -14,9 +14,8 @@ from rrtik_ompl.description.variants import padded
 from rrtik_ompl.model.scene import AttachedObject, Obstacle, Scene
 from rrtik_ompl.model.shapes import Box, Capsule, Cylinder, Sphere
 from rrtik_ompl.planning.plan import plan
-from rrtik_ompl.problem_files.problem import load_problem, save_problem
+from rrtik_ompl.problem_files.problem import load_problem
 from rrtik_ompl.world.certificate_check import certificate_fault
-from rrtik_ompl.world.certificates import certificate_of
 from rrtik_ompl.world.moving_world import MovingWorld
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
@@ -139,7 +138,7 @@ def test_what_is_held_may_be_padded_too():
 def test_a_file_keeps_the_padding_of_what_is_held(tmp_path):
     scene = Scene([Obstacle("cup", Sphere(0.03))]).attaching("cup", "panda_hand", pose=[0.0, 0.0, 0.2], padding=0.01)
     assert scene.attached[0].padding == 0.01
-    save_problem(Problem(World(load_robot("panda"), scene), "ready", "ready"), tmp_path / "p.yaml")
+    Problem(World(load_robot("panda"), scene), "ready", "ready").save(tmp_path / "p.yaml")
     assert load_problem(tmp_path / "p.yaml").world.scene.attached[0].padding == 0.01
     for value, said in ((-1.0, "0 metres or more"), (float("nan"), "padding of 'cup'"), ("wide", "padding of 'cup'")):
         with pytest.raises(InputError, match=said):
@@ -172,7 +171,7 @@ def test_what_is_carried_keeps_its_margin_and_comes_back_with_it(tmp_path):
     valid = World(robot, held).valid_batch(Q)
     assert (valid == World(robot, as_padding).valid_batch(Q)).all()
     assert (valid < World(robot, scene.without("cup")).valid_batch(Q)).any()
-    save_problem(Problem(World(robot, held), "ready", "ready"), tmp_path / "p.yaml")
+    Problem(World(robot, held), "ready", "ready").save(tmp_path / "p.yaml")
     assert load_problem(tmp_path / "p.yaml").world.scene.attached[0].margin == 0.05
 
 
@@ -183,7 +182,7 @@ def test_paths_and_certificates_keep_it():
     found = plan(problem, seconds=10.0, seed=1)
     assert found.proven
     assert rooms(problem.world, found.path.resample(0.02).waypoints, {"link6": 0.3}).min() >= -1e-9
-    certificate = certificate_of(problem.world, found.path)
+    certificate = problem.world.certificate(found.path)
     assert certificate_fault(certificate, problem.world, found.path.waypoints) == ""
     for other in ({}, {"link6": 0.31}, {"link5": 0.3}):
         assert certificate_fault(certificate, World(padded(robot, other), Scene([wall])), found.path.waypoints) != ""
@@ -211,10 +210,10 @@ def test_files_options_and_copies_keep_it(padding, tmp_path):
     assert robot.padding["panda_hand"] == (padding["panda_hand"] if isinstance(padding, dict) else padding)
     assert pickle.loads(pickle.dumps(robot)).padding == robot.padding
     problem = Problem(World(robot), "ready", "ready")
-    save_problem(problem, tmp_path / "problem.yaml")
+    problem.save(tmp_path / "problem.yaml")
     assert load_problem(tmp_path / "problem.yaml").robot is robot
     by_hand = padded(load_robot("panda"), padding)
-    save_problem(Problem(World(by_hand), "ready", "ready"), tmp_path / "by_hand.yaml")
+    Problem(World(by_hand), "ready", "ready").save(tmp_path / "by_hand.yaml")
     assert load_problem(tmp_path / "by_hand.yaml").robot.padding == robot.padding
 
 
@@ -223,7 +222,7 @@ def test_a_planar_arm_in_a_file_may_be_padded(tmp_path):
     (tmp_path / "p.yaml").write_text(text + "start: {joints: [0, 1]}\ngoal: {joints: [0, 0]}\n")
     problem = load_problem(tmp_path / "p.yaml")
     assert dict(problem.robot.padding) == {"link2": 0.1}
-    save_problem(problem, tmp_path / "q.yaml")
+    problem.save(tmp_path / "q.yaml")
     assert load_problem(tmp_path / "q.yaml").robot is problem.robot
 
 

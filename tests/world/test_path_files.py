@@ -26,10 +26,10 @@ def path(problem):
 def test_a_path_saved_with_its_proof_is_read_as_a_path_and_as_a_certificate(problem, path, tmp_path):
     file = tmp_path / "path.json"
     path.save(file, proof=True)
-    again, certificate = rrtik.load_path(file, problem.robot), rrtik.load_certificate(file)
+    again, certificate = rrtik.JointPath.load(file, problem.robot), rrtik.Certificate.load(file)
     assert again.waypoints.tobytes() == path.waypoints.tobytes()
-    assert certificate.document() == rrtik.certificate_of(problem.world, path, path.proof.clearance).document()
-    assert rrtik.verify_certificate(certificate, problem.world, again.waypoints, clearance=0.001) == ""
+    assert certificate.document() == problem.world.certificate(path, path.proof.clearance).document()
+    assert problem.world.verify(certificate, again.waypoints, clearance=0.001) == ""
     path.save(file)
     assert "certificate" not in json.loads(file.read_text())
 
@@ -39,22 +39,22 @@ def test_a_zero_with_a_sign_is_a_zero(problem, tmp_path):
     signed = rrtik.JointPath.of(problem.robot, [[0.0, -0.0, 0.0], [0.1, -0.0, 0.0]])
     assert np.signbit(signed.waypoints[:, 1]).all()
     signed.proved(problem.world).save(file, proof=True)
-    again = rrtik.load_path(file, problem.robot)
-    assert rrtik.verify_certificate(rrtik.load_certificate(file), problem.world, again.waypoints) == ""
-    assert rrtik.verify_certificate(rrtik.load_certificate(file), problem.world, signed.waypoints) == ""
+    again = rrtik.JointPath.load(file, problem.robot)
+    assert problem.world.verify(rrtik.Certificate.load(file), again.waypoints) == ""
+    assert problem.world.verify(rrtik.Certificate.load(file), signed.waypoints) == ""
 
 
 def test_a_certificate_may_be_asked_for_waypoints(problem, path):
-    of_rows = rrtik.certificate_of(problem.world, path.waypoints.tolist(), path.proof.clearance)
-    assert of_rows.document() == rrtik.certificate_of(problem.world, path, path.proof.clearance).document()
+    of_rows = problem.world.certificate(path.waypoints.tolist(), path.proof.clearance)
+    assert of_rows.document() == problem.world.certificate(path, path.proof.clearance).document()
 
 
 def test_a_self_margin_and_held_obstacles_are_in_the_certificate(problem, path, tmp_path):
     world = rrtik.World(problem.robot, problem.world.scene, self_margin=0.001)
     path.proved(world).save(tmp_path / "path.json", proof=True)
-    certificate = rrtik.load_certificate(tmp_path / "path.json")
+    certificate = rrtik.Certificate.load(tmp_path / "path.json")
     assert certificate.self_margin == 0.001
-    assert rrtik.verify_certificate(certificate, world, path.waypoints) == ""
+    assert world.verify(certificate, path.waypoints) == ""
 
 
 @pytest.mark.parametrize("how", ["no proof", "other waypoints", "elsewhere", "not proven", "a table"])
@@ -76,16 +76,16 @@ def test_what_has_no_proof_at_hand_is_refused_in_one_line(how, problem, path, tm
 
 def test_a_proof_from_another_process_is_made_again_by_the_world(problem, path, tmp_path):
     pickle.loads(pickle.dumps(path)).proved(problem.world).save(tmp_path / "path.json", proof=True)
-    assert rrtik.load_certificate(tmp_path / "path.json").waypoints.shape == path.waypoints.shape
+    assert rrtik.Certificate.load(tmp_path / "path.json").waypoints.shape == path.waypoints.shape
 
 
 def test_a_path_without_a_certificate_is_none(path, tmp_path):
     path.save(tmp_path / "path.json")
     with pytest.raises(InputError, match=r"path\.json: .*certificate"):
-        rrtik.load_certificate(tmp_path / "path.json")
+        rrtik.Certificate.load(tmp_path / "path.json")
     (tmp_path / "path.json").write_text(json.dumps({**path.document(), "certificate": {"motions": "all"}}))
     with pytest.raises(InputError, match=r"path\.json: "):
-        rrtik.load_certificate(tmp_path / "path.json")
+        rrtik.Certificate.load(tmp_path / "path.json")
     (tmp_path / "path.json").write_text(json.dumps({**path.document(), "certificate": np.pi}))
     with pytest.raises(InputError, match=r"path\.json: "):
-        rrtik.load_certificate(tmp_path / "path.json")
+        rrtik.Certificate.load(tmp_path / "path.json")

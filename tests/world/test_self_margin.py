@@ -16,9 +16,8 @@ from rrtik_ompl.model.scene import AttachedObject, Obstacle, Scene
 from rrtik_ompl.model.shapes import Box, Capsule, Sphere
 from rrtik_ompl.planning.plan import plan
 from rrtik_ompl.planning.shortening import shorten
-from rrtik_ompl.problem_files.problem import load_problem, save_problem
+from rrtik_ompl.problem_files.problem import load_problem
 from rrtik_ompl.world.certificate_check import certificate_fault
-from rrtik_ompl.world.certificates import certificate_of
 from rrtik_ompl.world.moving_world import MovingWorld
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
@@ -164,7 +163,7 @@ def test_paths_keep_the_margin(method):
     short = shorten(found.path, problem, method=method, seed=1)
     for path in (found.path, short):
         assert own_gaps(problem.world, path.resample(0.02).waypoints).min() >= 0.05 - 1e-9
-        certificate = certificate_of(problem.world, path)
+        certificate = problem.world.certificate(path)
         assert certificate_fault(certificate, problem.world, path.waypoints) == ""
         for other in (0.0, 0.04, 0.06):
             fault = certificate_fault(certificate, folding(other).world, path.waypoints)
@@ -178,7 +177,7 @@ def test_a_verifier_finds_a_margin_that_is_not_kept():
     least = own_gaps(problem.world, path.resample(0.02).waypoints).min()
     wide = World(problem.robot, Scene([]), self_margin=least + 0.01)
     forged = replace(
-        certificate_of(problem.world, path),
+        problem.world.certificate(path),
         self_margin=wide.self_margin,
         scene_digest=scene_digest(wide.bodies, wide.pairs),
     )
@@ -221,10 +220,10 @@ def test_problem_files_state_it(tmp_path):
     file.write_text(FILE + "self_margin: 0.02\n")
     problem = load_problem(file)
     assert problem.world.self_margin == 0.02
-    save_problem(problem, tmp_path / "copy.yaml")
+    problem.save(tmp_path / "copy.yaml")
     assert load_problem(tmp_path / "copy.yaml").world.self_margin == 0.02
     file.write_text(FILE)
-    save_problem(load_problem(file), tmp_path / "copy.yaml")
+    load_problem(file).save(tmp_path / "copy.yaml")
     assert "self_margin" not in (tmp_path / "copy.yaml").read_text()
 
 

@@ -107,8 +107,8 @@ def test_a_roadmap_is_checked_again_in_a_world_that_keeps_more(world, tmp_path):
     near = world.with_scene(rrtik.Scene([rrtik.Obstacle("ball", rrtik.Sphere(0.3), rrtik.pose([1.5, 1.0, 0.0]))]))
     rrtik.Roadmap(near, vertices=60, seed=1).save(tmp_path / "map.npz")
     wide = near.with_clearance(0.4)
-    roadmap = rrtik.load_roadmap(tmp_path / "map.npz", wide)
+    roadmap = rrtik.Roadmap.load(tmp_path / "map.npz", wide)
     ends = roadmap.vertices[roadmap.edges]
     assert wide.valid_batch(ends.reshape(-1, 3)).all()
-    known = rrtik.load_roadmap(tmp_path / "map.npz", near)
+    known = rrtik.Roadmap.load(tmp_path / "map.npz", near)
     assert not wide.valid_batch(known.vertices[known.edges].reshape(-1, 3)).all()

@@ -21,7 +21,6 @@ from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.scene import AttachedObject, Obstacle, Scene
 from rrtik_ompl.model.shapes import Box, Sphere
 from rrtik_ompl.world.certificate_check import Motions, certificate_fault
-from rrtik_ompl.world.certificates import certificate_of
 from rrtik_ompl.world.proof import CoalProof
 from rrtik_ompl.world.world import World
 from rrtik_tests.turning_slider import slider
@@ -75,7 +74,7 @@ def test_a_gap_of_an_obstacle_less_than_a_millimetre_away_is_looked_at_closely()
     beyond = World(robot, Scene([ball])).clearance(np.zeros(3))
     near = World(robot, Scene([replace(ball, pose=rrtik.pose([3.2 - beyond + 1e-5, 0.0, 0.0]))]))
     path = JointPath.of(robot, [a, b])
-    certificate = certificate_of(near, path)
+    certificate = near.certificate(path)
     assert max(motion.intervals[:, 0].max() for motion in certificate.motions) >= 6
     assert certificate_fault(certificate, near, path.waypoints) == ""
     assert "not shown apart" in certificate_fault(replace(certificate, clearance=2e-5), near, path.waypoints)
@@ -88,7 +87,7 @@ def test_what_an_arm_holds_and_what_it_may_touch_are_part_of_the_scene():
     world = World(robot, Scene([post], attached=[tool]))
     start = np.array([0.0, -1.2, 1.0, -1.0, -1.5, 0.0])
     path = JointPath.of(robot, [start, start + np.array([-0.6, 0.2, 0.1, 0.3, 0.0, 1.0])])
-    certificate = certificate_of(world, path)
+    certificate = world.certificate(path)
     assert certificate_fault(certificate, world, path.waypoints) == ""
     for other in (Scene([post]), Scene([post], attached=[replace(tool, allow=("forearm_link",))])):
         assert certificate_fault(certificate, World(robot, other), path.waypoints) == "it is for another scene"
@@ -98,10 +97,10 @@ def test_a_path_that_is_not_proven_has_no_certificate():
     robot = rrtik.load_robot("planar3", radius=0.02)
     world = World(robot, Scene([Obstacle("ball", Sphere(0.1), rrtik.pose([2.5, 0.0, 0.0]))]))
     path = JointPath.of(robot, [[-0.5, 0.0, 0.0], [0.5, 0.0, 0.0]])
-    assert certificate_of(world, path) is None
-    assert certificate_of(world, JointPath.of(robot, [[9.0, 0.0, 0.0], [9.1, 0.0, 0.0]])) is None
+    assert world.certificate(path) is None
+    assert world.certificate(JointPath.of(robot, [[9.0, 0.0, 0.0], [9.1, 0.0, 0.0]])) is None
     with pytest.raises(InputError, match="another robot"):
-        certificate_of(world, JointPath([[0.0, 1.0]]))
+        world.certificate(JointPath([[0.0, 1.0]]))
 
 
 def test_a_path_that_stands_still_has_a_certificate():
@@ -109,7 +108,7 @@ def test_a_path_that_stands_still_has_a_certificate():
     world, q = World(robot, random_scene(robot, np.random.default_rng(4))), robot.posture("default")
     for rows in ([q], [q, q], [q, q, q + 0.01]):
         path = JointPath.of(robot, rows)
-        certificate = certificate_of(world, path)
+        certificate = world.certificate(path)
         assert certificate_fault(certificate, world, path.waypoints) == ""
         assert len(certificate.motions) == max(1, len(rows) - 1)
 
@@ -118,7 +117,7 @@ def test_a_base_that_touches_an_obstacle_has_none_and_a_forged_one_is_refused(ca
     case = cases("panda")[0]
     floor = Obstacle("slab", Box([1.0, 1.0, 0.1]), rrtik.pose([0.0, 0.0, 0.0]))
     world = World(case.world.robot, Scene([floor]))
-    assert certificate_of(world, case.path) is None
+    assert world.certificate(case.path) is None
     fault = certificate_fault(replace(case.certificate, scene_digest=scene_of(world)), world, case.path.waypoints)
     assert "touch and never move" in fault
 
@@ -156,7 +155,7 @@ def test_links_that_coal_proves_apart_are_in_the_certificate_and_measured_again(
         starts = drawn[[gap.motion for gap in world.prover.still_gaps(drawn, clearance=0.0)]][:3]
     assert len(starts) == 3
     for a, b in zip(starts, starts + np.array([1e-3, -1e-3, 1e-3, 1e-3, -1e-3, 0.1]), strict=True):
-        certificate = from_document(json.loads(json.dumps(certificate_of(world, [a, b]).document())))
+        certificate = from_document(json.loads(json.dumps(world.certificate([a, b]).document())))
         (motion,) = certificate.motions
         measured = np.flatnonzero(motion.solids[:, 1] < 0)
         assert len(measured) > 0
@@ -172,7 +171,7 @@ def test_links_that_touch_are_not_measured_apart_whatever_a_certificate_says():
     world = World(rrtik.load_robot("ur5"))
     q = np.zeros(world.robot.dof)
     q[2] = np.pi  # the forearm in the upper arm
-    honest = certificate_of(world, [np.zeros(6), np.zeros(6)])
+    honest = world.certificate([np.zeros(6), np.zeros(6)])
     motions = Motions(world, np.array([q, q]), 0.0)
     solids = np.array([[i, -1, j, -1] for i, j in motions.pairs])
     entries = MotionEntries(solids, np.zeros((len(solids), 2), dtype=np.int64), np.zeros((len(solids), 3)))
@@ -209,7 +208,7 @@ def test_the_log_grows_where_it_is_too_small_and_costs_nothing_afterwards(cases,
     case = cases("panda")[0]
     packed = case.world.prover.tables.packed
     monkeypatch.setattr(log.logged, "__defaults__", (1,))
-    again = certificate_of(case.world, case.path, 0.001)
+    again = case.world.certificate(case.path, 0.001)
     assert certificate_fault(again, case.world, case.path.waypoints) == ""
     assert again.entries == case.certificate.entries
     assert packed.table.intact()

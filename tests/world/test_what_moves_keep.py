@@ -109,7 +109,7 @@ ALONG = {  # motions of the tip past a post
     "Servo": steered,
 }
 STILL = {  # take a world or a problem, and make no motion
-    *("certificate_of", "verify_certificate", "view", "plot_joints", "save_problem", "save_path"),
+    *("view", "plot_joints"),
     *("GoalSampler", "simple_setup", "space_information", "solve_ik", "solve_ik_many", "solve_trajectory"),
     *(
         "Problem",
@@ -118,9 +118,7 @@ STILL = {  # take a world or a problem, and make no motion
         "TaskPlan",
         "without_robot",
         "reach_map",
-        "load_roadmap",
         "Scenario",
-        "load_scenario",
         "BenchmarkNotes",
     ),
 }

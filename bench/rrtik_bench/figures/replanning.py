@@ -15,7 +15,7 @@ from rrtik_bench.shortening.tables import METHODS, STEP
 from rrtik_ompl.model.transitions import route_length
 from rrtik_ompl.planning.shortening.task import Task
 from rrtik_ompl.replanning.record import ReplanRun
-from rrtik_ompl.replanning.scenario import load_scenario
+from rrtik_ompl.replanning.scenario import Scenario
 from rrtik_ompl.viewer.plots.joints import COLORS, tidy
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ CUTS = {"sequential": COLORS[0], "random 100": COLORS[1], "retraction": COLORS[2
 def frames(name: str, drawing: Drawing, quick: bool) -> None:
     """Frames of one run: walked black, the path ahead green."""
     del quick
-    scenario = load_scenario(name)
+    scenario = Scenario.load(name)
     run = scenario.run(seed=0, repair_budget=REPAIR_SECONDS)
     walked = np.array([tick.q for tick in run.ticks])
     panels = drawing.subplots(2, FRAMES // 2, sharex=True, sharey=True)
@@ -52,7 +52,7 @@ def _first(run: ReplanRun, event: str, after: int = 0) -> int:
 def arm(drawing: Drawing, quick: bool) -> None:
     """The planar arm whose goal is covered for a while: follows, stops, holds, goes on, arrives."""
     del quick
-    scenario = load_scenario("replan_planar_arm")
+    scenario = Scenario.load("replan_planar_arm")
     run = scenario.run(seed=0, repair_budget=REPAIR_SECONDS)
     stop = _first(run, "wait")
     go = next((k for k in range(stop, len(run.ticks)) if run.ticks[k].event != "wait"), len(run.ticks) - 1)

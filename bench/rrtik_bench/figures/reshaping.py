@@ -10,7 +10,7 @@ from rrtik_bench.figures.plane import INK, draw_scene
 from rrtik_bench.report.figures import Figure
 from rrtik_bench.reshaping import SCENES, SOURCE, WAYS, reshaped
 from rrtik_ompl.model.transitions import route_length
-from rrtik_ompl.replanning.scenario import load_scenario
+from rrtik_ompl.replanning.scenario import Scenario
 from rrtik_ompl.viewer.plots.joints import COLORS, tidy
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ def loop(drawing: Drawing, quick: bool) -> None:
     steps = np.append(np.linalg.norm(np.diff(walked, axis=0), axis=1), 0.0)
     ahead = [np.nan if tick.path is None else route_length(tick.path) for tick in ticks]
     room, course = drawing.subplots(1, 2, width_ratios=(1.0, 1.4))
-    draw_scene(room, load_scenario(SCENE).problem.world.scene)
+    draw_scene(room, Scenario.load(SCENE).problem.world.scene)
     room.plot(*walked.T, color=INK, linewidth=0.8)
     for act, (label, color) in ACTS.items():
         chosen = acts == act

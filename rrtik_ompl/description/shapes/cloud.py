@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import positive
-from rrtik_ompl.base.errors import InputError, require
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.description.shapes.octree import octree_points, octree_resolution
 from rrtik_ompl.files.point_files import AXES, npy_rows, pcd_points, ply_points, text_rows
 from rrtik_ompl.files.text import file_name, read_bytes, write_bytes
@@ -25,71 +25,46 @@ PLY_HEADER = "ply\nformat binary_little_endian 1.0\nelement vertex {}\n" + "".jo
 )
 
 
-def load_cloud(
-    path: str | os.PathLike[str],
+def read_cloud(
+    file: str | os.PathLike[str],
     radius: float | None = None,
     *,
     scale: float = 1.0,
     invalid: Invalid = "refuse",
 ) -> PointCloud:
-    """Read a cloud of points: ``.npy`` (an array of shape (n, 3)), ``.ply``, ``.pcd``, ``.bt``, ``.xyz`` (text).
-
-    From a map of OctoMap (``.bt``) the centre of each occupied cell is taken; unless a radius is given, the points have
-    balls that cover the cells, of half the cells' diagonal.
-
-    Args:
-        path: The file.
-        radius: Radius of the ball at each point [m]; if None, 0.01, or what covers the cells of a map.
-        scale: Metres per unit of the file; 0.001 for millimetres.
-        invalid: Whether points that are not finite are refused or dropped.
+    """Read a cloud of points; see :meth:`PointCloud.load`.
 
     Raises:
         InputError: If the file cannot be read, is broken, or has no usable point; one line.
-
-    Warns:
-        CloudWarning: If the cloud is so large that it is probably in millimetres.
-
-    Example:
-        >>> cloud = load_cloud("scan.ply", radius=0.01).voxel(0.01)  # doctest: +SKIP
     """
-    file_name(path)
-    factor = positive(scale, f"{path}: scale")
-    suffix = Path(path).suffix.lower()
+    factor = positive(scale, f"{file_name(file)}: scale")
+    suffix = Path(file).suffix.lower()
     if suffix not in _READERS:
-        raise InputError(f"{path}: unknown kind of cloud; have {', '.join(_READERS)}; export it as PLY")
+        raise InputError(f"{file}: unknown kind of cloud; have {', '.join(_READERS)}; export it as PLY")
 
-    data = read_bytes(path, MAX_BYTES)
-    points = _READERS[suffix](data, str(path))
+    data = read_bytes(file, MAX_BYTES)
+    points = _READERS[suffix](data, str(file))
 
     if factor != 1.0:
         points = points * factor
 
     if radius is None and suffix == ".bt":
-        radius = factor * 0.5 * np.sqrt(3.0) * octree_resolution(data, str(path))
+        radius = factor * 0.5 * np.sqrt(3.0) * octree_resolution(data, str(file))
         # Points are stored in float32, so their rounding is added.
         radius += float(np.finfo(np.float32).eps) * float(np.abs(points).max(initial=0.0))
     elif radius is None:
         radius = RADIUS
 
-    return PointCloud(points, radius, invalid=invalid, source=os.path.abspath(path), scale=factor)
+    return PointCloud(points, radius, invalid=invalid, source=os.path.abspath(file), scale=factor)
 
 
-def save_cloud(cloud: PointCloud, path: str | os.PathLike[str]) -> PointCloud:
-    """Write the points of a cloud as ``.npy`` or ``.ply``, whole or not at all.
-
-    Returns:
-        The cloud with that file as its source, so that a scene with it can be written.
+def write_cloud(cloud: PointCloud, file: str | os.PathLike[str]) -> PointCloud:
+    """Write the points of a cloud; see :meth:`PointCloud.save`.
 
     Raises:
         InputError: If the name has another ending, or the file cannot be written.
-
-    Example:
-        >>> cloud = rrtik.PointCloud(np.eye(3), radius=0.01)
-        >>> rrtik.save_cloud(cloud, "scan.ply").points.shape
-        (3, 3)
     """
-    require(cloud, PointCloud, "cloud to save")
-    suffix = file_name(path).suffix.lower()
+    suffix = file_name(file).suffix.lower()
     if suffix == ".npy":
         stream = io.BytesIO()
         np.save(stream, cloud.points)
@@ -97,9 +72,9 @@ def save_cloud(cloud: PointCloud, path: str | os.PathLike[str]) -> PointCloud:
     elif suffix == ".ply":
         data = (PLY_HEADER.format(len(cloud.points)) + "end_header\n").encode() + cloud.points.astype("<f4").tobytes()
     else:
-        raise InputError(f"{path}: a cloud is written as .npy or .ply")
-    write_bytes(path, data)
-    return PointCloud(cloud.points, cloud.radius, source=os.path.abspath(path))
+        raise InputError(f"{file}: a cloud is written as .npy or .ply")
+    write_bytes(file, data)
+    return PointCloud(cloud.points, cloud.radius, source=os.path.abspath(file))
 
 
 def _npy_points(data: bytes, what: str) -> NDArray[Any]:

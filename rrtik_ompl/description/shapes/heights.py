@@ -23,8 +23,8 @@ USUAL = (-9999.0, -99999.0, -32768.0, -32767.0)  # numbers that often mean "no d
 MAX_BYTES = 256 * 1024 * 1024
 
 
-def load_height_field(
-    path: str | os.PathLike[str],
+def read_heights(
+    file: str | os.PathLike[str],
     cell: float,
     floor: float | None = None,
     *,
@@ -32,38 +32,20 @@ def load_height_field(
     invalid: Invalid = "refuse",
     nodata: float | None = None,
 ) -> HeightField:
-    """Read a grid of heights: ``.npy``, rows of numbers (``.csv``, ``.txt``), or a grey picture of up to 32 bits.
-
-    Rows of arrays and tables go along y, from the lowest y on; a picture is a view from above, with its upper edge at
-    the largest y. A value of 0 in a picture is a height of 0.
-
-    Args:
-        path: The file.
-        cell: Side of a cell [m].
-        floor: Height of the solid's lower face [m]; one cell below the lowest height if None.
-        scale: Metres per unit of the file's heights; 0.001 for millimetres.
-        invalid: Whether heights that are not finite, or mean "no data", are refused or dropped.
-        nodata: The number in the file that means "no data". If None, the one that a TIFF states (GDAL_NODATA) is used,
-            and the usual ones (-9999, -32768...) are refused where they lie far below all heights.
+    """Read a grid of heights; see :meth:`HeightField.load`.
 
     Raises:
         InputError: If the file cannot be read, is broken, has cells without data, or makes no height field; one line.
-
-    Warns:
-        CloudWarning: If a few heights lie far beyond the rest.
-
-    Example:
-        >>> seabed = load_height_field("seabed.npy", cell=0.1)  # doctest: +SKIP
     """
-    factor = positive(scale, f"{file_name(path)}: scale")
-    suffix = Path(path).suffix.lower()
+    factor = positive(scale, f"{file_name(file)}: scale")
+    suffix = Path(file).suffix.lower()
     if suffix not in (".npy", *TABLES, *PICTURES):
         have = ", ".join((".npy", *TABLES, *PICTURES))
-        raise InputError(f"{path}: unknown kind of heights; have {have}; export it as one of these")
+        raise InputError(f"{file}: unknown kind of heights; have {have}; export it as one of these")
 
-    data = read_bytes(path, MAX_BYTES)
-    what = str(path)
-    no_data_value = None if nodata is None else finite_number(nodata, f"{path}: nodata")
+    data = read_bytes(file, MAX_BYTES)
+    what = str(file)
+    no_data_value = None if nodata is None else finite_number(nodata, f"{file}: nodata")
     known_choice(invalid, what)
 
     picture = suffix in PICTURES
@@ -77,7 +59,7 @@ def load_height_field(
         rows = text_rows(data, None, what)
 
     rows = _with_missing_as_nan(rows, no_data_value, invalid, what, from_above=picture)
-    source = os.path.abspath(path)
+    source = os.path.abspath(file)
 
     return HeightField(
         factor * rows,

@@ -30,43 +30,29 @@ _NOT_FINITE = re.compile(
 )
 
 
-def load_mesh(path: str | os.PathLike[str], scale: float = 1.0) -> Mesh:
-    """Read a triangle mesh.
-
-    Polygons are divided into triangles, equal vertices merged, and triangles without area dropped. A closed mesh whose
-    triangles all face inwards is turned inside out. The unit that a DAE file states is used, its up axis is not.
-
-    Args:
-        path: File whose name ends in .stl, .obj or .dae.
-        scale: Metres per unit of the file.
+def read_mesh(file: str | os.PathLike[str], scale: float = 1.0) -> Mesh:
+    """Read a triangle mesh; see :meth:`Mesh.load`.
 
     Raises:
         InputError: If the file cannot be read, is broken, or holds no triangle.
-
-    Warns:
-        MeshWarning: If the surface is not closed (or not manifold): it is then treated as a surface, not as a solid.
-
-    Example:
-        >>> rrtik.load_mesh("part.stl", scale=0.001)  # a file in millimetres  # doctest: +SKIP
     """
-    file_name(path)
-    factor = positive(scale, f"{path}: scale")
-    if Path(path).suffix.lower() not in SUFFIXES:
-        raise InputError(f"{path}: unknown kind of mesh; have {', '.join(SUFFIXES)}; export it as STL")
+    factor = positive(scale, f"{file_name(file)}: scale")
+    if Path(file).suffix.lower() not in SUFFIXES:
+        raise InputError(f"{file}: unknown kind of mesh; have {', '.join(SUFFIXES)}; export it as STL")
 
-    data = read_bytes(path, MAX_BYTES)
+    data = read_bytes(file, MAX_BYTES)
     if not data:
-        raise InputError(f"{path}: the file is empty; export the mesh again")
+        raise InputError(f"{file}: the file is empty; export the mesh again")
     if not finite_numbers(data):
-        raise InputError(f"{path}: not a usable mesh: it holds numbers that are not finite; export it again")
+        raise InputError(f"{file}: not a usable mesh: it holds numbers that are not finite; export it again")
 
     if len(data) > LONG_BYTES:
-        tell_once(f"reading {os.fspath(path)}, {len(data) / 1e6:.0f} MB: about ten seconds for a million triangles")
+        tell_once(f"reading {os.fspath(file)}, {len(data) / 1e6:.0f} MB: about ten seconds for a million triangles")
 
-    vertices, triangles = _read(path, factor * stated_unit(path, data))
-    mesh = Mesh(vertices, triangles, source=os.path.abspath(path), scale=factor)
+    vertices, triangles = _read(file, factor * stated_unit(file, data))
+    mesh = Mesh(vertices, triangles, source=os.path.abspath(file), scale=factor)
     if not mesh.closed:
-        message = f"{path}: {mesh.open_edges} open edges; the mesh is treated as a surface, not as a solid"
+        message = f"{file}: {mesh.open_edges} open edges; the mesh is treated as a surface, not as a solid"
         warnings.warn(message, MeshWarning, stacklevel=2)
     elif _volume(mesh) < 0.0:
         mesh = Mesh(mesh.vertices, mesh.triangles[:, ::-1], source=mesh.source, scale=factor)

@@ -24,22 +24,15 @@ DEPTH = 16  # number of levels below the root
 MAX_BYTES = 256 * 1024 * 1024
 
 
-def load_octree(path: str | os.PathLike[str], *, scale: float = 1.0) -> Octree:
-    """Read a map of OctoMap, a ``.bt`` file: its occupied cells as cubes.
-
-    Args:
-        path: The file.
-        scale: Metres per unit of the file.
+def read_octree(file: str | os.PathLike[str], *, scale: float = 1.0) -> Octree:
+    """Read a map of OctoMap; see :meth:`Octree.load`.
 
     Raises:
         InputError: If the file cannot be read, is broken, or has no occupied cell or too many; one line.
-
-    Example:
-        >>> map = load_octree("rooms.bt")  # doctest: +SKIP
     """
-    factor = positive(scale, f"{file_name(path)}: scale")
-    centres, sides = octree_cells(read_bytes(path, MAX_BYTES), str(path))
-    return Octree(factor * centres, factor * sides, source=os.path.abspath(path), scale=factor)
+    factor = positive(scale, f"{file_name(file)}: scale")
+    centres, sides = octree_cells(read_bytes(file, MAX_BYTES), str(file))
+    return Octree(factor * centres, factor * sides, source=os.path.abspath(file), scale=factor)
 
 
 def octree_cells(data: bytes, what: str) -> tuple[Matrix, Vector]:

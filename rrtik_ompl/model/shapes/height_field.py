@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import warnings
 from dataclasses import dataclass
 
@@ -11,6 +12,7 @@ from numpy.typing import ArrayLike
 from rrtik_ompl.base.arrays import LARGEST, Matrix, finite_number, frozen, length, number_rows, positive, whole_number
 from rrtik_ompl.base.copies import as_value
 from rrtik_ompl.base.errors import CloudWarning, InputError, require
+from rrtik_ompl.files.kinds import read
 from rrtik_ompl.model.shapes.box_pile import BoxPile, few_enough, merged
 from rrtik_ompl.model.shapes.point_cloud import Invalid, known_choice
 
@@ -115,6 +117,42 @@ class HeightField(BoxPile):
         few_enough(len(merged(self.heights)), what, COARSER)
         if far := _far_beyond(rows, side):
             warnings.warn(f"{what}: {far}; if that stands for no data, make it NaN or say nodata=", CloudWarning, 2)
+
+    @staticmethod
+    def load(
+        file: str | os.PathLike[str],
+        cell: float,
+        floor: float | None = None,
+        *,
+        scale: float = 1.0,
+        invalid: Invalid = "refuse",
+        nodata: float | None = None,
+    ) -> HeightField:
+        """Read a grid of heights: ``.npy``, rows of numbers (``.csv``, ``.txt``), or a grey picture of up to 32 bits.
+
+        Rows of arrays and tables go along y, from the lowest y on; a picture is a view from above, with its upper edge
+        at the largest y. A value of 0 in a picture is a height of 0.
+
+        Args:
+            file: The file.
+            cell: Side of a cell [m].
+            floor: Height of the solid's lower face [m]; one cell below the lowest height if None.
+            scale: Metres per unit of the file's heights; 0.001 for millimetres.
+            invalid: Whether heights that are not finite, or mean "no data", are refused or dropped.
+            nodata: The number in the file that means "no data". If None, the one that a TIFF states (GDAL_NODATA) is
+                used, and the usual ones (-9999, -32768...) are refused where they lie far below all heights.
+
+        Raises:
+            InputError: If the file cannot be read, is broken, has cells without data, or makes no height field; one
+                line.
+
+        Warns:
+            CloudWarning: If a few heights lie far beyond the rest.
+
+        Example:
+            >>> seabed = rrtik.HeightField.load("seabed.npy", cell=0.1)  # doctest: +SKIP
+        """
+        return read(HeightField, file, cell, floor, scale=scale, invalid=invalid, nodata=nodata)
 
     def __repr__(self) -> str:
         rows, columns = self.heights.shape

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -20,6 +21,7 @@ from rrtik_ompl.base.arrays import (
 )
 from rrtik_ompl.base.copies import as_value, in_one_line
 from rrtik_ompl.base.errors import InputError, at_most, require
+from rrtik_ompl.files.kinds import read
 from rrtik_ompl.model.shapes.shape import Shape
 from rrtik_ompl.model.shapes.surfaces import Triangles
 
@@ -81,6 +83,30 @@ class Mesh(Shape):
         object.__setattr__(self, "source", source)
         object.__setattr__(self, "scale", positive(scale, f"{what}: scale"))
         object.__setattr__(self, "open_edges", _open_edges(faces))
+
+    @staticmethod
+    def load(file: str | os.PathLike[str], scale: float = 1.0) -> Mesh:
+        """Read a triangle mesh.
+
+        Polygons are divided into triangles, equal vertices merged, and triangles without area dropped. A closed mesh
+        whose triangles all face inwards is turned inside out. The unit that a DAE file states is used, its up axis is
+        not.
+
+        Args:
+            file: File whose name ends in .stl, .obj or .dae.
+            scale: Metres per unit of the file.
+
+        Raises:
+            InputError: If the file cannot be read, is broken, or holds no triangle.
+
+        Warns:
+            MeshWarning: If the surface is not closed (or not manifold): it is then treated as a surface, not as a
+                solid.
+
+        Example:
+            >>> rrtik.Mesh.load("part.stl", scale=0.001)  # a file in millimetres  # doctest: +SKIP
+        """
+        return read(Mesh, file, scale)
 
     @property
     def closed(self) -> bool:

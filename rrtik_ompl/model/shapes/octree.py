@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +11,7 @@ from numpy.typing import ArrayLike
 from rrtik_ompl.base.arrays import Matrix, Vector, bounded_array, frozen, positive
 from rrtik_ompl.base.copies import as_value
 from rrtik_ompl.base.errors import InputError, require
+from rrtik_ompl.files.kinds import read
 from rrtik_ompl.model.shapes.box_pile import BoxPile, few_enough
 
 
@@ -52,12 +54,28 @@ class Octree(BoxPile):
             raise InputError(f"{what}: none of its cells is occupied; leave the obstacle out")
         if not (widths > 0.0).all():
             raise InputError(f"{what}: sides must be greater than 0, got {widths.min():g}")
-        few_enough(len(rows), what, "use load_cloud(file, radius).voxel(size), or a map of a coarser resolution")
+        few_enough(len(rows), what, "use PointCloud.load(file, radius).voxel(size), or a map of a coarser resolution")
 
         object.__setattr__(self, "centres", frozen(rows))
         object.__setattr__(self, "sides", frozen(widths))
         object.__setattr__(self, "source", source)
         object.__setattr__(self, "scale", positive(scale, f"{what}: scale"))
+
+    @staticmethod
+    def load(file: str | os.PathLike[str], *, scale: float = 1.0) -> Octree:
+        """Read a map of OctoMap, a ``.bt`` file: its occupied cells as cubes.
+
+        Args:
+            file: The file.
+            scale: Metres per unit of the file.
+
+        Raises:
+            InputError: If the file cannot be read, is broken, or has no occupied cell or too many; one line.
+
+        Example:
+            >>> rooms = rrtik.Octree.load("rooms.bt")  # doctest: +SKIP
+        """
+        return read(Octree, file, scale=scale)
 
     def __repr__(self) -> str:
         return f"Octree({len(self.sides)} cubes of {self.sides.min():g} to {self.sides.max():g} m)"

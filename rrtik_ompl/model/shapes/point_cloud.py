@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -24,6 +25,7 @@ from rrtik_ompl.base.arrays import (
 )
 from rrtik_ompl.base.copies import as_value
 from rrtik_ompl.base.errors import CloudWarning, InputError, at_most, require
+from rrtik_ompl.files.kinds import read, write
 from rrtik_ompl.model.shapes.point_tree import PointTree, extremes, point_tree
 from rrtik_ompl.model.shapes.shape import Shape
 from rrtik_ompl.model.shapes.surfaces import Triangles
@@ -118,6 +120,53 @@ class PointCloud(_Kept, Shape):
         if (extent := high - low).max() > WIDEST:
             sides = " x ".join(f"{side:.4g}" for side in extent)
             warnings.warn(f"{what}: it is {sides} m wide; if that is millimetres, scale it by 0.001", CloudWarning, 2)
+
+    def save(self, file: str | os.PathLike[str]) -> PointCloud:
+        """Write the points as ``.npy`` or ``.ply``, whole or not at all.
+
+        Returns:
+            The cloud with that file as its source, so that a scene with it can be written.
+
+        Raises:
+            InputError: If the name has another ending, or the file cannot be written.
+
+        Example:
+            >>> cloud = rrtik.PointCloud(np.eye(3), radius=0.01)
+            >>> cloud.save("scan.ply").points.shape
+            (3, 3)
+        """
+        saved: PointCloud = write(self, file)
+        return saved
+
+    @staticmethod
+    def load(
+        file: str | os.PathLike[str],
+        radius: float | None = None,
+        *,
+        scale: float = 1.0,
+        invalid: Invalid = "refuse",
+    ) -> PointCloud:
+        """Read a cloud of points: ``.npy`` (an array of shape (n, 3)), ``.ply``, ``.pcd``, ``.bt``, ``.xyz`` (text).
+
+        From a map of OctoMap (``.bt``) the centre of each occupied cell is taken; unless a radius is given, the points
+        have balls that cover the cells, of half the cells' diagonal.
+
+        Args:
+            file: The file.
+            radius: Radius of the ball at each point [m]; if None, 0.01, or what covers the cells of a map.
+            scale: Metres per unit of the file; 0.001 for millimetres.
+            invalid: Whether points that are not finite are refused or dropped.
+
+        Raises:
+            InputError: If the file cannot be read, is broken, or has no usable point; one line.
+
+        Warns:
+            CloudWarning: If the cloud is so large that it is probably in millimetres.
+
+        Example:
+            >>> cloud = rrtik.PointCloud.load("scan.ply", radius=0.01).voxel(0.01)  # doctest: +SKIP
+        """
+        return read(PointCloud, file, radius, scale=scale, invalid=invalid)
 
     def __repr__(self) -> str:
         return f"PointCloud({len(self.points)} points, radius={self.radius:g} m)"

@@ -13,7 +13,6 @@ from rrtik_ompl.motion.trajectory.corners import vertices
 from rrtik_ompl.motion.trajectory.cubics import Peaks, State
 from rrtik_ompl.motion.trajectory.dynamics import DynamicLimits
 from rrtik_ompl.motion.trajectory.limits import RateLimits
-from rrtik_ompl.motion.trajectory.load import load_trajectory
 from rrtik_ompl.motion.trajectory.motion import Trajectory
 from rrtik_ompl.motion.trajectory.report import MotionReport
 from rrtik_ompl.world.clearances import check_route_clearance
@@ -25,7 +24,6 @@ __all__ = [
     "RateLimits",
     "State",
     "Trajectory",
-    "load_trajectory",
     "time_parameterize",
 ]
 

@@ -9,35 +9,21 @@ import numpy as np
 
 from rrtik_ompl.base.arrays import finite_array
 from rrtik_ompl.base.errors import InputError, in_file, require
+from rrtik_ompl.files.kinds import kind_of
 from rrtik_ompl.files.tables import FORMATS as PATH_FORMATS
 from rrtik_ompl.files.text import known_ending, read_text
-from rrtik_ompl.model.path import JointPath, load_path
+from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.motion.trajectory.cubics import Cubics
 from rrtik_ompl.motion.trajectory.motion import Trajectory
-from rrtik_ompl.motion.trajectory.text import FORMATS, holds_motion, loads
+from rrtik_ompl.motion.trajectory.text import FORMATS, loads
 
 
-def load_trajectory(file: str | os.PathLike[str], robot: Robot | None = None) -> Trajectory:
-    """Read a motion written by :meth:`Trajectory.save`, or a JointTrajectory message as JSON or YAML.
-
-    Points at a control rate (even steps of 20 ms or less, as ``Trajectory.save(file, rate=...)`` writes them) keep
-    their positions, velocities and accelerations, and limits are judged at these points, as a drive does; they are the
-    ``set_points`` of the motion. If accelerations do not lead to the next point (other programs join their points by
-    other curves), three cubics lead there instead, so that the acceleration does not jump.
-
-    Args:
-        file: A .json, .yaml or .csv file.
-        robot: If given, the motion must have its joints.
+def read_trajectory(file: str | os.PathLike[str], robot: Robot | None = None) -> Trajectory:
+    """Read a motion; see :meth:`Trajectory.load`.
 
     Raises:
         InputError: If the file is missing, malformed, or does not fit the robot; the message names file and line.
-
-    Example:
-        >>> motion = rrtik.time_parameterize(rrtik.JointPath([[0.0], [1.0]]), rrtik.RateLimits(1.0, 4.0))
-        >>> motion.save("motion.json")
-        >>> rrtik.load_trajectory("motion.json").duration
-        1.25
     """
     require(robot, Robot | None, "robot of a trajectory", "use load_robot(name)")
     ending = known_ending(file, FORMATS, "trajectory")
@@ -61,9 +47,8 @@ def load_motion_or_path(file: str | os.PathLike[str], robot: Robot) -> Trajector
     Raises:
         InputError: If the file holds neither, or does not fit the robot.
     """
-    ending = known_ending(file, (*PATH_FORMATS, ".yaml"), "path or trajectory")
-    is_motion = ending == ".yaml" or (ending != ".txt" and holds_motion(read_text(file), ending))
-    return load_trajectory(file, robot) if is_motion else load_path(file, robot)
+    known_ending(file, (*PATH_FORMATS, ".yaml"), "path or trajectory")
+    return Trajectory.load(file, robot) if kind_of(file) == "Trajectory" else JointPath.load(file, robot)
 
 
 def _from_document(document: dict[str, Any], robot: Robot | None) -> Trajectory:

@@ -14,11 +14,12 @@ from rrtik_ompl.base.arrays import MOST_ROWS, Mask, Matrix, Rows, Vector, finite
 from rrtik_ompl.base.copies import as_value, changed, in_notebook, in_one_line
 from rrtik_ompl.base.errors import InputError, at_most, require
 from rrtik_ompl.base.units import joint_units
+from rrtik_ompl.files.kinds import read
 from rrtik_ompl.files.text import write_text
 from rrtik_ompl.model.judgement import Played
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.proof import Proof
-from rrtik_ompl.model.robot import require_joints
+from rrtik_ompl.model.robot import Robot, require_joints
 from rrtik_ompl.motion.trajectory.checks import faults_of, proof_of_motion
 from rrtik_ompl.motion.trajectory.cubics import (
     Cubics,
@@ -77,7 +78,7 @@ class Trajectory:
         joint_names: Names of the n joints.
         prismatic: Mask of the joints that slide, shape (n,).
         robot_name: Name of the robot that the motion is for, or "".
-        set_points: Indices of the knots that are set points of a file at a control rate, see :func:`load_trajectory`;
+        set_points: Indices of the knots that are set points of a file at a control rate, see :meth:`load`;
             None if the motion is known between its knots too.
     """
 
@@ -318,7 +319,7 @@ class Trajectory:
     def save(self, file: str | os.PathLike[str], *, rate: float | None = None, accelerations: bool = True) -> None:
         """Write the motion to a file.
 
-        A .json or .csv file (``time,<joint>...``) can be read back as the same motion by :func:`load_trajectory`. A
+        A .json or .csv file (``time,<joint>...``) can be read back as the same motion by :meth:`load`. A
         .yaml or .ros.json file holds a JointTrajectory message of ROS 2 and nothing else. A .mcap file holds joint
         states for Foxglove (it needs the package mcap). Each file is written whole or not at all.
 
@@ -350,3 +351,27 @@ class Trajectory:
         if not accelerations and ending != ".csv":
             columns.pop()
         write_text(file, dumps(self.robot_name, self.joint_names, joint_units(self.prismatic), columns, ending))
+
+    @staticmethod
+    def load(file: str | os.PathLike[str], robot: Robot | None = None) -> Trajectory:
+        """Read a motion written by :meth:`save`, or a JointTrajectory message as JSON or YAML.
+
+        Points at a control rate (even steps of 20 ms or less, as ``save(file, rate=...)`` writes them) keep their
+        positions, velocities and accelerations, and limits are judged at these points, as a drive does; they are the
+        ``set_points`` of the motion. If accelerations do not lead to the next point (other programs join their points
+        by other curves), three cubics lead there instead, so that the acceleration does not jump.
+
+        Args:
+            file: A .json, .yaml or .csv file.
+            robot: If given, the motion must have its joints.
+
+        Raises:
+            InputError: If the file is missing, malformed, or does not fit the robot; the message names file and line.
+
+        Example:
+            >>> motion = rrtik.time_parameterize(rrtik.JointPath([[0.0], [1.0]]), rrtik.RateLimits(1.0, 4.0))
+            >>> motion.save("motion.json")
+            >>> rrtik.Trajectory.load("motion.json").duration
+            1.25
+        """
+        return read(Trajectory, file, robot)

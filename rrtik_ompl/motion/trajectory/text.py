@@ -153,13 +153,6 @@ def _seconds(time: object) -> object:
         raise InputError(f"time_from_start: expected seconds, or sec and nanosec, got {time!r}") from None
 
 
-def holds_motion(text: str, ending: str) -> bool:
-    """Check whether the text of a .json or .csv file is a trajectory, well formed or not, rather than a path."""
-    if ending == ".csv":
-        return text.startswith("time,") and " velocity" in text.partition("\n")[0]
-    return '"points"' in text and '"waypoints"' not in text
-
-
 def joint_trajectory(names: Sequence[str], columns: Sequence[list[Any]]) -> dict[str, Any]:
     """Return the message ``trajectory_msgs/JointTrajectory`` with just the fields that ROS 2 knows.
 

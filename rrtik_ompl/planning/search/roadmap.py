@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from rrtik_ompl.base.arrays import TAU, Matrix, Vector, filled_rows, finite_array, positive, whole_number
 from rrtik_ompl.base.budget import Stop
 from rrtik_ompl.base.errors import InputError, called, in_file, require
+from rrtik_ompl.files.kinds import read
 from rrtik_ompl.files.named_arrays import NamedArrays
 from rrtik_ompl.files.text import known_ending, write_bytes
 from rrtik_ompl.geometry.collision.digests import robot_digest, world_digest
@@ -252,13 +253,13 @@ class Roadmap:
         states = np.where(free[edges].all(axis=1), UNKNOWN, BLOCKED).astype(np.int32)
         return _restored(world, rows, edges, states, seed=self.seed, near=self.near)
 
-    def save(self, path: str | os.PathLike[str]) -> None:
+    def save(self, file: str | os.PathLike[str]) -> None:
         """Write the roadmap as .npz file; if writing fails, no incomplete file is left.
 
         Raises:
             InputError: If the ending is another one or the file cannot be written.
         """
-        known_ending(path, (".npz",), "file of a roadmap")
+        known_ending(file, (".npz",), "file of a roadmap")
         data = BytesIO()
         world = self.world
         numbers = {"format": FORMAT, "seed": self.seed, "near": self.near, "resolution": world.motion_resolution}
@@ -266,30 +267,39 @@ class Roadmap:
         graph = {"rows": self.graph.rows, "edges": self.graph.edges, "states": self.graph.states.astype(np.int8)}
         everything: dict[str, Any] = {**numbers, "kept": _clearances_of(world), **names, **graph}
         np.savez_compressed(data, **everything)
-        write_bytes(path, data.getvalue())
+        write_bytes(file, data.getvalue())
+
+    @staticmethod
+    def load(file: str | os.PathLike[str], world: World, *, moved: bool = False) -> Roadmap:
+        """Read a roadmap that was saved.
+
+        Args:
+            file: A .npz file.
+            world: The world of the roadmap.
+            moved: Whether the world may be another one of the same robot; if so, everything is checked again as by
+                :meth:`moved_to`.
+
+        Raises:
+            InputError: If the file cannot be used or is of another world, or this one has path constraints.
+
+        Example:
+            >>> world = rrtik.World(rrtik.load_robot("planar3"))
+            >>> rrtik.Roadmap(world, seed=1).save("map.npz")
+            >>> rrtik.Roadmap.load("map.npz", world).world is world
+            True
+        """
+        return read(Roadmap, file, world, moved=moved)
 
 
-def load_roadmap(path: str | os.PathLike[str], world: World, *, moved: bool = False) -> Roadmap:
-    """Read a roadmap that was saved.
-
-    Args:
-        path: The file.
-        world: The world of the roadmap.
-        moved: Whether the world may be another one of the same robot; if so, everything is checked again as by
-            :meth:`Roadmap.moved_to`.
+def read_roadmap(file: str | os.PathLike[str], world: World, *, moved: bool = False) -> Roadmap:
+    """Read a roadmap; see :meth:`Roadmap.load`.
 
     Raises:
         InputError: If the file cannot be used or is of another world, or this one has path constraints.
-
-    Example:
-        >>> world = rrtik.World(rrtik.load_robot("planar3"))
-        >>> rrtik.Roadmap(world, seed=1).save("map.npz")
-        >>> rrtik.load_roadmap("map.npz", world).world is world
-        True
     """
-    known_ending(path, (".npz",), "file of a roadmap")
+    known_ending(file, (".npz",), "file of a roadmap")
     require(world, World, "world of a roadmap", "use World(robot, scene)")
-    data = NamedArrays(path)
+    data = NamedArrays(file)
     try:
         if (version := data.count("format")) != FORMAT:
             raise InputError(f"its format is {version}, not {FORMAT}")
@@ -308,17 +318,17 @@ def load_roadmap(path: str | os.PathLike[str], world: World, *, moved: bool = Fa
             data["resolution"], "resolution"
         ) == world.motion_resolution and clearances == _clearances_of(world)
     except InputError as error:
-        raise InputError(f"{path}: is no roadmap of robot '{world.robot.name}': {error}") from error
+        raise InputError(f"{file}: is no roadmap of robot '{world.robot.name}': {error}") from error
 
     # The states of the edges only hold in the same world with the same checks; otherwise they are checked again.
     known = edges.astype(np.int32), states.astype(np.int32)
     found = world_digest(world.robot, world.bodies, world.pairs)
     if moved is not True and digest != found:
-        raise InputError(f"{path}: is the roadmap of another world; load it with moved=True, or make a new one")
+        raise InputError(f"{file}: is the roadmap of another world; load it with moved=True, or make a new one")
     try:
         roadmap = _restored(world, rows, *known, seed=seed, near=near)
     except InputError as error:
-        raise in_file(path, error) from error
+        raise in_file(file, error) from error
     return roadmap if digest == found and same_checks else roadmap.moved_to(world)
 
 

@@ -47,7 +47,7 @@ class TimedPlan:
         seconds: Wall time of the search [s].
 
     Example:
-        >>> scenario = rrtik.load_scenario("replan_planar_arm")
+        >>> scenario = rrtik.replanning.Scenario.load("replan_planar_arm")
         >>> plan = rrtik.replanning.plan_in_time(scenario.problem, rate=5.0, horizon=0.4)
         >>> plan.found, plan.reason.startswith("speeds allow no arrival")
         (False, True)
@@ -120,12 +120,12 @@ def plan_in_time(
             problem has path constraints.
 
     Example:
-        >>> scenario = rrtik.load_scenario("replan_planar_arm")
+        >>> scenario = rrtik.replanning.Scenario.load("replan_planar_arm")
         >>> plan = rrtik.replanning.plan_in_time(scenario.problem, rate=5.0, speed=1.6, seed=1)
         >>> plan.found and len(set(plan.run.moves)) == 1  # all moves are proven
         True
     """
-    require(problem, Problem, "problem to plan in time", "use Problem(world, start, goal) or load_scenario(name)")
+    require(problem, Problem, "problem to plan in time", "use Problem(world, start, goal) or Scenario.load(name)")
     refuse_constraints(problem, "plan in time")
     refuse_endless_turns(problem.world.scene)
 

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 from rrtik_ompl.base.errors import CloudWarning, InputError
-from rrtik_ompl.description.shapes.cloud import load_cloud, save_cloud
 from rrtik_ompl.files.point_files import unpacked
 from rrtik_ompl.model.scene import Obstacle, Scene
 from rrtik_ompl.model.shapes import PointCloud, same_shape
-from rrtik_ompl.problem_files.scene import load_scene, save_scene
+from rrtik_ompl.problem_files.scene import load_scene
 
 POINTS = np.array([[0.5, -1.25, 2.0], [0.0, 0.0, 0.0], [1e-3, 7.0, -3.0]])
 PLY = "ply\nformat {} 1.0\ncomment made by hand\nelement vertex 3\n{}end_header\n"
@@ -78,7 +77,7 @@ FILES = {
 @pytest.mark.parametrize("name", FILES)
 def test_every_format_is_read(name, tmp_path):
     (tmp_path / name).write_bytes(FILES[name])
-    cloud = load_cloud(tmp_path / name, radius=0.02)
+    cloud = PointCloud.load(tmp_path / name, radius=0.02)
     assert np.array_equal(cloud.points, POINTS.astype(np.float32))
     assert cloud.radius == 0.02
 
@@ -127,7 +126,7 @@ def test_a_bad_file_is_refused_in_one_line_that_names_it(name, tmp_path):
     data, message = BAD[name]
     (tmp_path / name).write_bytes(data)
     with pytest.raises(InputError, match=message) as caught:
-        load_cloud(tmp_path / name)
+        PointCloud.load(tmp_path / name)
     assert name in str(caught.value)
     assert "\n" not in str(caught.value)
 
@@ -135,8 +134,8 @@ def test_a_bad_file_is_refused_in_one_line_that_names_it(name, tmp_path):
 def test_millimetres_can_be_scaled_and_bad_points_dropped(tmp_path):
     (tmp_path / "a.xyz").write_text("0 0 0\n1000 2000 300000\nnan 0 0\n")
     with pytest.warns(CloudWarning, match="m wide"):
-        load_cloud(tmp_path / "a.xyz", invalid="drop")
-    cloud = load_cloud(tmp_path / "a.xyz", scale=1e-3, invalid="drop")
+        PointCloud.load(tmp_path / "a.xyz", invalid="drop")
+    cloud = PointCloud.load(tmp_path / "a.xyz", scale=1e-3, invalid="drop")
     assert (len(cloud.points), cloud.dropped) == (2, 1)
     assert np.allclose(cloud.points[1], [1.0, 2.0, 300.0])
 
@@ -144,9 +143,9 @@ def test_millimetres_can_be_scaled_and_bad_points_dropped(tmp_path):
 @pytest.mark.parametrize("name", ["scan.npy", "scan.ply"])
 def test_a_scene_with_a_cloud_comes_back_from_its_file(name, tmp_path):
     cloud = PointCloud(POINTS, 0.03)
-    kept = save_cloud(cloud, tmp_path / name)
+    kept = cloud.save(tmp_path / name)
     scene = Scene([Obstacle("scan", kept, margin=0.01)])
-    save_scene(scene, tmp_path / "scene.yaml")
+    scene.save(tmp_path / "scene.yaml")
     again = load_scene(tmp_path / "scene.yaml").obstacles[0]
     assert same_shape(again.shape, kept)
     assert np.array_equal(again.shape.points, cloud.points)
@@ -154,10 +153,10 @@ def test_a_scene_with_a_cloud_comes_back_from_its_file(name, tmp_path):
 
 
 def test_a_cloud_without_a_file_is_not_written(tmp_path):
-    with pytest.raises(InputError, match="save_cloud"):
-        save_scene(Scene([Obstacle("scan", PointCloud(POINTS, 0.03))]), tmp_path / "scene.yaml")
+    with pytest.raises(InputError, match=r"PointCloud\.save"):
+        Scene([Obstacle("scan", PointCloud(POINTS, 0.03))]).save(tmp_path / "scene.yaml")
     with pytest.raises(InputError, match="written as"):
-        save_cloud(PointCloud(POINTS, 0.03), tmp_path / "scan.pcd")
+        PointCloud(POINTS, 0.03).save(tmp_path / "scan.pcd")
 
 
 def test_what_a_scene_says_of_a_cloud(tmp_path):
@@ -167,7 +166,7 @@ def test_what_a_scene_says_of_a_cloud(tmp_path):
     cloud = load_scene(tmp_path / "scene.yaml").obstacles[0].shape
     assert np.allclose(cloud.points, [[0.0, 0.0, 1.0]])
     assert cloud.radius == 0.02
-    save_scene(Scene([Obstacle("scan", cloud)]), tmp_path / "again.yaml")
+    Scene([Obstacle("scan", cloud)]).save(tmp_path / "again.yaml")
     assert same_shape(load_scene(tmp_path / "again.yaml").obstacles[0].shape, cloud)
     (tmp_path / "scene.yaml").write_text(entry.format("radius: -1"))
     with pytest.raises(InputError, match=r"scene.yaml:5"):

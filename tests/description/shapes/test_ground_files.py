@@ -42,13 +42,13 @@ def test_heights_are_read_as_they_were_written(name, tmp_path):
     grey = (1000 * HEIGHTS).astype(np.uint16)
     data = {"npy": lambda: npy(HEIGHTS), "png": lambda: picture(grey[::-1])}.get(name[-3:], text.encode)()
     file = saved(tmp_path, name, data)
-    field = rrtik.load_height_field(file, 0.5, scale=0.001 if name.endswith("png") else 1.0)
+    field = rrtik.HeightField.load(file, 0.5, scale=0.001 if name.endswith("png") else 1.0)
     np.testing.assert_allclose(field.heights, HEIGHTS, atol=1e-12)
     assert field.source == str(file)
 
 
 def test_a_map_has_its_occupied_cells_where_the_tree_puts_them(tmp_path):
-    tree = rrtik.load_octree(saved(tmp_path, "map.bt", HEAD + BODY))
+    tree = rrtik.Octree.load(saved(tmp_path, "map.bt", HEAD + BODY))
     half = 0.1 * 2**15  # the root reaches so far along each axis
     found = dict(zip(tree.sides.tolist(), tree.centres.tolist(), strict=True))
     assert found == {half: pytest.approx([0.5 * half] * 3), 0.5 * half: pytest.approx([-0.25 * half] * 3)}
@@ -60,7 +60,7 @@ def test_a_cloud_of_a_map_has_a_point_for_each_finest_cell(tmp_path):
         path += bytes([0, 0b11000000])
     path += bytes([2, 0b11000000]) + bytes([0, 0b11000000]) + bytes([0b10, 0])
     file = saved(tmp_path, "map.bt", HEAD + path)
-    cloud, tree = rrtik.load_cloud(file, 0.09), rrtik.load_octree(file)
+    cloud, tree = rrtik.PointCloud.load(file, 0.09), rrtik.Octree.load(file)
     assert len(cloud.points) == 4**3 + 1
     assert np.sort(tree.sides) == pytest.approx([0.1, 0.4])
     away = np.abs(cloud.points[:, None] - tree.centres).max(axis=2) + 0.05 - 0.5 * tree.sides
@@ -68,10 +68,10 @@ def test_a_cloud_of_a_map_has_a_point_for_each_finest_cell(tmp_path):
 
 
 def test_a_scene_with_ground_and_a_map_comes_back(tmp_path):
-    field = rrtik.load_height_field(saved(tmp_path, "ground.npy", npy(HEIGHTS)), 0.5, -1.0, scale=0.5)
-    tree = rrtik.load_octree(saved(tmp_path, "map.bt", HEAD + BODY), scale=0.5)
+    field = rrtik.HeightField.load(saved(tmp_path, "ground.npy", npy(HEIGHTS)), 0.5, -1.0, scale=0.5)
+    tree = rrtik.Octree.load(saved(tmp_path, "map.bt", HEAD + BODY), scale=0.5)
     scene = rrtik.Scene((rrtik.Obstacle("ground", field), rrtik.Obstacle("map", tree, rrtik.pose([1.0, 0.0, 0.0]))))
-    rrtik.save_scene(scene, tmp_path / "scene.yaml")
+    scene.save(tmp_path / "scene.yaml")
     again = rrtik.load_scene(tmp_path / "scene.yaml")
     assert all(same_shape(again.obstacle(o.name).shape, o.shape) for o in scene.obstacles)
 
@@ -99,20 +99,20 @@ def test_broken_files_are_one_line_with_the_file(name, data, message, tmp_path):
         pytest.importorskip("cv2")
     file = saved(tmp_path, name, data)
     with pytest.raises(InputError, match=message) as told:
-        rrtik.load_octree(file) if name == "a.bt" else rrtik.load_height_field(file, 0.1)
+        rrtik.Octree.load(file) if name == "a.bt" else rrtik.HeightField.load(file, 0.1)
     assert str(file) in str(told.value)
     assert "\n" not in str(told.value)
 
 
 def test_a_cloud_of_a_map_with_too_many_cells_is_refused(tmp_path):
     with pytest.raises(InputError, match="take it as an octree instead"):
-        rrtik.load_cloud(saved(tmp_path, "map.bt", HEAD + BODY), 0.1)
+        rrtik.PointCloud.load(saved(tmp_path, "map.bt", HEAD + BODY), 0.1)
 
 
 def test_ground_made_in_memory_cannot_be_written(tmp_path):
     scene = rrtik.Scene((rrtik.Obstacle("ground", rrtik.HeightField(HEIGHTS, 0.5)),))
     with pytest.raises(InputError, match=r"ground.*load.*file"):
-        rrtik.save_scene(scene, tmp_path / "scene.yaml")
+        scene.save(tmp_path / "scene.yaml")
 
 
 def tiff(rows, *tags, bits=32, photometric=1, order="<"):
@@ -160,7 +160,7 @@ def grey_png(rows, bits):
 
 def assert_comes_back(field, folder):
     """From a scene that was written and read again."""
-    rrtik.save_scene(rrtik.Scene([rrtik.Obstacle("ground", field)]), folder / "scene.yaml")
+    rrtik.Scene([rrtik.Obstacle("ground", field)]).save(folder / "scene.yaml")
     again = rrtik.load_scene(folder / "scene.yaml").obstacle("ground").shape
     np.testing.assert_array_equal(again.heights, field.heights)
     assert (again.cell, again.floor, again.nodata) == (field.cell, field.floor, field.nodata)
@@ -185,13 +185,13 @@ def test_cells_without_data_are_refused_with_their_place_and_left_out_on_a_word(
     data = {"npy": npy, "csv": written, "tif": tiff}[kind](holed(value))
     file = saved(tmp_path, f"a.{kind}", data)
     with pytest.raises(InputError, match=r"1 of 25.*row 1, column 3.*invalid='drop'") as told:
-        rrtik.load_height_field(file, 0.5)
+        rrtik.HeightField.load(file, 0.5)
     assert str(file) in str(told.value)
     stated = {"nodata": value} if np.isfinite(value) else {}
     if stated:
         with pytest.raises(InputError, match=rf"{value:g}.*no data.*nodata="):
-            rrtik.load_height_field(file, 0.5, invalid="drop")
-    field = rrtik.load_height_field(file, 0.5, -1.0, invalid="drop", **stated)
+            rrtik.HeightField.load(file, 0.5, invalid="drop")
+    field = rrtik.HeightField.load(file, 0.5, -1.0, invalid="drop", **stated)
     assert np.isnan(field.heights).sum() == 1
     assert np.isnan(field.heights[3 if kind == "tif" else 1, 3])  # a picture lies as seen from above
     assert_comes_back(field, tmp_path)
@@ -202,24 +202,24 @@ def test_the_number_that_a_tiff_names_stands_for_no_data(order, tmp_path):
     pytest.importorskip("cv2")
     file = saved(tmp_path, "a.tif", tiff(holed(7.5), (42113, "7.5"), order=order))
     with pytest.raises(InputError, match=r"7\.5.*row 1, column 3"):
-        rrtik.load_height_field(file, 0.5)
-    field = rrtik.load_height_field(file, 0.5, invalid="drop")
+        rrtik.HeightField.load(file, 0.5)
+    field = rrtik.HeightField.load(file, 0.5, invalid="drop")
     assert np.isnan(field.heights).sum() == 1
     assert_comes_back(field, tmp_path)
-    other = rrtik.load_height_field(file, 0.5, nodata=-1.0)  # whoever states another one means it
+    other = rrtik.HeightField.load(file, 0.5, nodata=-1.0)  # whoever states another one means it
     assert other.heights.max() == 7.5
 
 
 def test_heights_among_the_others_are_heights_whatever_their_number(tmp_path):
     file = saved(tmp_path, "a.npy", npy(np.array([[-12000.0, -9999.0], [-5000.0, 0.0]])))
-    assert rrtik.load_height_field(file, 1000.0, scale=0.001).heights.min() == -12.0
+    assert rrtik.HeightField.load(file, 1000.0, scale=0.001).heights.min() == -12.0
 
 
 @pytest.mark.parametrize("value", [-500.0, 800.0])
 def test_a_height_far_beyond_the_rest_is_warned_of_with_its_place(value, tmp_path):
     file = saved(tmp_path, "a.npy", npy(holed(value)))
     with pytest.warns(CloudWarning, match=rf"1 height.*: {value:g} m in row 1, column 3"):
-        rrtik.load_height_field(file, 0.5)
+        rrtik.HeightField.load(file, 0.5)
     rng = np.random.default_rng(1)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -232,7 +232,7 @@ def test_a_height_far_beyond_the_rest_is_warned_of_with_its_place(value, tmp_pat
 def test_grey_pictures_of_few_bits_have_the_heights_of_their_numbers(bits, tmp_path):
     pytest.importorskip("cv2")
     rows = np.arange(16).reshape(4, 4) % 2**bits
-    field = rrtik.load_height_field(saved(tmp_path, "a.png", grey_png(rows.tolist(), bits)), 0.5)
+    field = rrtik.HeightField.load(saved(tmp_path, "a.png", grey_png(rows.tolist(), bits)), 0.5)
     np.testing.assert_array_equal(field.heights, rows[::-1])
 
 
@@ -241,7 +241,7 @@ def test_grey_maps_in_text_have_the_heights_of_their_numbers(tmp_path):
     rows = np.arange(16).reshape(4, 4)
     text = "P2 # a comment\n4 4\n15\n" + " ".join(map(str, rows.ravel())) + "\n"
     np.testing.assert_array_equal(
-        rrtik.load_height_field(saved(tmp_path, "a.pgm", text.encode()), 0.5).heights, rows[::-1]
+        rrtik.HeightField.load(saved(tmp_path, "a.pgm", text.encode()), 0.5).heights, rows[::-1]
     )
 
 
@@ -257,7 +257,7 @@ def test_grey_maps_in_text_have_the_heights_of_their_numbers(tmp_path):
 def test_pictures_whose_numbers_are_no_heights_are_refused(data, message, tmp_path):
     file = saved(tmp_path, "a.pgm" if data.startswith(b"P") else "a.tif", data)
     with pytest.raises(InputError, match=message) as told:
-        rrtik.load_height_field(file, 0.5)
+        rrtik.HeightField.load(file, 0.5)
     assert str(file) in str(told.value)
 
 
@@ -266,21 +266,21 @@ def test_a_damaged_tiff_is_read_or_refused_wherever_it_is_cut(tmp_path):
     whole = tiff(holed(1.0), (42113, "-9999"))
     for size in range(0, len(whole), 7):
         with contextlib.suppress(InputError):
-            rrtik.load_height_field(saved(tmp_path, "a.tif", whole[:size]), 0.5)
+            rrtik.HeightField.load(saved(tmp_path, "a.tif", whole[:size]), 0.5)
 
 
 def test_the_balls_of_a_map_cover_its_cells_unless_a_radius_is_given(tmp_path):
     path = b"".join(bytes([0, 0b11000000]) for _ in range(14)) + bytes([0b10, 0b10000000]) + bytes([0b10, 0])
     file = saved(tmp_path, "map.bt", HEAD + path[:-2])
-    cloud, tree = rrtik.load_cloud(file), rrtik.load_octree(file)
+    cloud, tree = rrtik.PointCloud.load(file), rrtik.Octree.load(file)
     corners = np.array(np.meshgrid(*[[-0.5, 0.5]] * 3)).reshape(3, -1).T
     for centre, side in zip(tree.centres, tree.sides, strict=True):
         for corner in centre + side * corners:
             assert np.linalg.norm(cloud.points.astype(np.float64) - corner, axis=1).min() <= cloud.radius
     assert cloud.radius == pytest.approx(0.05 * np.sqrt(3.0), rel=0.01)
-    half = rrtik.load_cloud(file, scale=0.5)
+    half = rrtik.PointCloud.load(file, scale=0.5)
     assert half.radius == pytest.approx(0.5 * cloud.radius)
-    assert rrtik.load_cloud(file, 0.02).radius == 0.02
+    assert rrtik.PointCloud.load(file, 0.02).radius == 0.02
     scene = {"obstacles": [{"name": "map", "cloud": {"file": "map.bt"}}]}
     (tmp_path / "scene.yaml").write_text(str({"version": 1, "scene": scene}).replace("'", ""))
     assert rrtik.load_scene(tmp_path / "scene.yaml").obstacle("map").shape.radius == cloud.radius

@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 from rrtik_ompl.base.errors import InputError, MeshWarning
 from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.description.shapes import mesh as mesh_files
-from rrtik_ompl.description.shapes.mesh import load_mesh
 from rrtik_ompl.description.urdf import robot_from_urdf_text
 from rrtik_ompl.files import notice
 from rrtik_ompl.model.scene import Obstacle, Scene
@@ -75,7 +74,7 @@ GOOD = {
 @pytest.mark.parametrize("name", GOOD)
 def test_every_format_gives_the_same_solid(tmp_path, name):
     (tmp_path / name).write_bytes(GOOD[name])
-    mesh = load_mesh(tmp_path / name)
+    mesh = Mesh.load(tmp_path / name)
     assert mesh.closed
     assert mesh.vertices.shape == (4, 3)
     assert mesh.triangles.shape == (4, 3)
@@ -86,7 +85,7 @@ def test_every_format_gives_the_same_solid(tmp_path, name):
 @pytest.mark.parametrize("name", GOOD)
 def test_scale_applies_to_every_format(tmp_path, name):
     (tmp_path / name).write_bytes(GOOD[name])
-    mesh = load_mesh(tmp_path / name, scale=0.001)
+    mesh = Mesh.load(tmp_path / name, scale=0.001)
     np.testing.assert_allclose(mesh.vertices.max(axis=0), [0.001, 0.002, 0.003])
     assert mesh.scale == 0.001
     assert mesh.source == str(tmp_path / name)
@@ -94,7 +93,7 @@ def test_scale_applies_to_every_format(tmp_path, name):
 
 def test_the_unit_of_a_collada_file_is_honoured(tmp_path):
     (tmp_path / "part.dae").write_bytes(dae("0.01"))
-    np.testing.assert_allclose(load_mesh(tmp_path / "part.dae", 2.0).vertices.max(axis=0), [0.02, 0.04, 0.06])
+    np.testing.assert_allclose(Mesh.load(tmp_path / "part.dae", 2.0).vertices.max(axis=0), [0.02, 0.04, 0.06])
 
 
 LINK_WITH_A_MESH = """<robot name="arm"><link name="base"/>
@@ -111,7 +110,7 @@ def test_a_mesh_has_the_same_size_as_an_obstacle_as_a_solid_of_a_link_and_as_wha
     expected = 2.0 * np.array(CORNERS, dtype=float).max(axis=0) * (float(unit) if name.endswith(".dae") else 1.0)
     mesh = f'<geometry><mesh filename="{name}" scale="2 2 2"/></geometry>'
     robot = robot_from_urdf_text(LINK_WITH_A_MESH.format(mesh=mesh), folder=tmp_path)
-    found = [load_mesh(tmp_path / name, 2.0).vertices]
+    found = [Mesh.load(tmp_path / name, 2.0).vertices]
     found += [geometry.geometryObjects[0].geometry.vertices() for geometry in (robot.collision, robot.visual)]
     for vertices in found:
         np.testing.assert_allclose(vertices.max(axis=0), expected, rtol=1e-6)
@@ -121,13 +120,13 @@ def test_a_mesh_has_the_same_size_as_an_obstacle_as_a_solid_of_a_link_and_as_wha
 @pytest.mark.parametrize(("name", "data"), [("part.stl", stl_text(FACES[:, ::-1])), ("part.obj", obj(FACES[:, ::-1]))])
 def test_an_inside_out_solid_is_turned(tmp_path, name, data):
     (tmp_path / name).write_bytes(data)
-    assert volume(load_mesh(tmp_path / name)) == pytest.approx(1.0)
+    assert volume(Mesh.load(tmp_path / name)) == pytest.approx(1.0)
 
 
 def test_an_open_surface_is_loaded_with_a_warning_that_counts_its_edges(tmp_path):
     (tmp_path / "open.stl").write_bytes(stl_binary(FACES[:3]))
     with pytest.warns(MeshWarning, match=r"open\.stl: 6 open edges.*surface"):
-        mesh = load_mesh(tmp_path / "open.stl")
+        mesh = Mesh.load(tmp_path / "open.stl")
     assert not mesh.closed
 
 
@@ -153,13 +152,13 @@ def test_a_world_warns_of_a_mesh_of_the_memory_that_is_open():
 def test_a_mesh_with_a_triangle_of_the_wrong_sense_is_not_a_solid(tmp_path):
     (tmp_path / "bent.obj").write_bytes(obj([FACES[0][::-1], *FACES[1:]]))
     with pytest.warns(MeshWarning):
-        assert not load_mesh(tmp_path / "bent.obj").closed
+        assert not Mesh.load(tmp_path / "bent.obj").closed
 
 
 def test_polygons_are_cut_into_triangles(tmp_path):
     text = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0.5 0.5 1\nf 4 3 2 1\nf 1 2 5\nf 2 3 5\nf 3 4 5\nf 4 1 5\n"
     (tmp_path / "pyramid.obj").write_text(text)
-    mesh = load_mesh(tmp_path / "pyramid.obj")
+    mesh = Mesh.load(tmp_path / "pyramid.obj")
     assert len(mesh.triangles) == 6
     assert volume(mesh) == pytest.approx(1.0 / 3.0)
 
@@ -193,7 +192,7 @@ def test_a_broken_mesh_is_one_line_and_silent(tmp_path, capfd, name):
     data, message = BROKEN[name]
     (tmp_path / name).write_bytes(data)
     with pytest.raises(InputError, match=message) as caught:
-        load_mesh(tmp_path / name)
+        Mesh.load(tmp_path / name)
     assert name in str(caught.value)
     assert "\n" not in str(caught.value)
     assert capfd.readouterr() == ("", "")
@@ -201,17 +200,17 @@ def test_a_broken_mesh_is_one_line_and_silent(tmp_path, capfd, name):
 
 def test_a_missing_file_and_a_folder_are_named(tmp_path):
     with pytest.raises(InputError, match="no such file"):
-        load_mesh(tmp_path / "missing.stl")
+        Mesh.load(tmp_path / "missing.stl")
     (tmp_path / "folder.stl").mkdir()
     with pytest.raises(InputError, match="this is a folder"):
-        load_mesh(tmp_path / "folder.stl")
+        Mesh.load(tmp_path / "folder.stl")
 
 
 @pytest.mark.parametrize("scale", [0.0, -1.0, float("nan"), float("inf"), "x", [1, 1, 1]])
 def test_a_scale_that_makes_no_sense_is_refused(tmp_path, scale):
     (tmp_path / "part.obj").write_bytes(obj())
     with pytest.raises(InputError, match="scale"):
-        load_mesh(tmp_path / "part.obj", scale)
+        Mesh.load(tmp_path / "part.obj", scale)
 
 
 @pytest.mark.filterwarnings("ignore::rrtik_ompl.base.errors.MeshWarning")
@@ -228,7 +227,7 @@ def test_a_damaged_file_gives_a_mesh_or_one_line(tmp_path, name, wounds):
     (tmp_path / name).write_bytes(data)
     message = ""
     try:
-        mesh = load_mesh(tmp_path / name)
+        mesh = Mesh.load(tmp_path / name)
     except InputError as error:
         message = str(error)
     assert name in message if message else np.isfinite(mesh.vertices).all()
@@ -240,7 +239,7 @@ def test_numbers_that_are_not_finite_are_refused_before_c_sees_them(tmp_path, ca
     file.write_bytes(stl_text().replace(b"vertex 1.0 0.0 0.0", f"vertex {number} 0 0".encode()))
     urdf = f"""<robot name="arm"><link name="a"><collision><geometry><mesh filename="{file}"/></geometry></collision>
         </link><link name="b"/><joint name="j" type="continuous"><parent link="a"/><child link="b"/></joint></robot>"""
-    for load in (lambda: load_mesh(file), lambda: robot_from_urdf_text(urdf)):
+    for load in (lambda: Mesh.load(file), lambda: robot_from_urdf_text(urdf)):
         with pytest.raises(InputError, match="not finite"):
             load()
     assert capfd.readouterr().err == ""
@@ -251,7 +250,7 @@ def test_normals_of_a_binary_file_may_be_no_numbers(tmp_path, capfd):
     data = bytearray(stl_binary())
     data[84:96] = np.full(3, np.nan, dtype="<f4").tobytes()
     (tmp_path / "a.stl").write_bytes(data)
-    assert volume(load_mesh(tmp_path / "a.stl")) > 0.0
+    assert volume(Mesh.load(tmp_path / "a.stl")) > 0.0
     assert capfd.readouterr().err == ""
 
 
@@ -259,14 +258,14 @@ def test_a_mesh_beyond_the_world_is_refused(tmp_path):
     file = tmp_path / "a.stl"
     file.write_bytes(stl_text().replace(b"vertex 1.0 0.0 0.0", b"vertex 1e30 0 0"))
     with pytest.raises(InputError, match="check units"):
-        load_mesh(file)
+        Mesh.load(file)
 
 
 def test_threads_that_read_meshes_leave_standard_error_alone(tmp_path):
     (tmp_path / "a.stl").write_bytes(stl_text())
     before = os.fstat(2)
     with ThreadPoolExecutor(4) as pool:
-        list(pool.map(lambda _: load_mesh(tmp_path / "a.stl"), range(200)))
+        list(pool.map(lambda _: Mesh.load(tmp_path / "a.stl"), range(200)))
     assert os.path.samestat(before, os.fstat(2))
 
 
@@ -276,5 +275,5 @@ def test_who_reads_a_large_mesh_is_told_that_it_takes_long(tmp_path, monkeypatch
     monkeypatch.setattr(mesh_files, "LONG_BYTES", 10)
     file = tmp_path / "part.stl"
     file.write_bytes(stl_binary())
-    load_mesh(file)
+    Mesh.load(file)
     assert told == [f"reading {file}, 0 MB: about ten seconds for a million triangles"]

@@ -16,7 +16,6 @@ from rrtik_ompl.kernels import COLLIDING, FREE
 from rrtik_ompl.kernels.tables import cloud_layout
 from rrtik_ompl.model.scene import AttachedObject, Obstacle, Scene
 from rrtik_ompl.model.shapes import Mesh, PointCloud, Sphere, point_tree
-from rrtik_ompl.world.certificates import certificate_of
 from rrtik_ompl.world.moving_world import MovingWorld
 from rrtik_ompl.world.world import World
 
@@ -245,7 +244,7 @@ def test_no_certificate_is_written_of_a_scene_with_a_cloud():
     robot = rrtik.load_robot("planar3")
     world = World(robot, Scene([Obstacle("scan", PointCloud([[9.0, 9.0, 9.0]], 0.1))]))
     with pytest.raises(InputError, match="'scan' is a cloud"):
-        certificate_of(world, rrtik.JointPath.of(robot, [[0.0, 0.0, 0.0], [0.1, 0.0, 0.0]]))
+        world.certificate(rrtik.JointPath.of(robot, [[0.0, 0.0, 0.0], [0.1, 0.0, 0.0]]))
 
 
 def test_kernels_have_the_blocks_of_the_tree():

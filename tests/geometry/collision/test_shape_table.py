@@ -31,7 +31,7 @@ from rrtik_ompl.model.shapes import (
     same_shape,
 )
 from rrtik_ompl.pilot.overlay.rasterizer import surface_of_shape
-from rrtik_ompl.problem_files.scene import load_scene, save_scene
+from rrtik_ompl.problem_files.scene import load_scene
 from rrtik_ompl.viewer.drawing.meshes import look_of_margin, look_of_shape
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -133,7 +133,7 @@ def test_a_half_space_has_no_end():
 
 def test_every_kind_with_measures_is_read_as_it_was_written(tmp_path):
     scene = Scene([Obstacle(f"o{k}", s) for k, s in enumerate((*BOUNDED, FLOOR)) if s.measures])
-    save_scene(scene, tmp_path / "scene.yaml")
+    scene.save(tmp_path / "scene.yaml")
     back = load_scene(tmp_path / "scene.yaml")
     assert all(same_shape(a.shape, b.shape) for a, b in zip(scene.obstacles, back.obstacles, strict=True))
 
@@ -210,7 +210,7 @@ assert not problem.world.valid_batch(straight).all()
 found = rrtik.plan(problem, seed=1, seconds=20.0)
 assert found.found, found.reason
 assert problem.world.valid_batch(found.path.waypoints).all()
-rrtik.save_problem(problem, "again.yaml")
+problem.save("again.yaml")
 assert rrtik.load_problem("again.yaml").world.scene.obstacle("hat").shape == hat.shape
 assert look_of_shape(hat.shape).geometry.faces.size == obstacle_surfaces([hat])[0].faces.size == 3 * 48
 rrtik.view(problem, found.path, html="page.html")

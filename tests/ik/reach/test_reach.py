@@ -10,7 +10,7 @@ from rrtik_ompl.base.errors import InputError, UnknownNameError
 from rrtik_ompl.base.poses import pose
 from rrtik_ompl.cli.app import run
 from rrtik_ompl.ik import reach_map
-from rrtik_ompl.ik.reach import TURNS, load_reach_map
+from rrtik_ompl.ik.reach import TURNS, ReachMap
 from rrtik_ompl.ik.singularity import manipulability
 from rrtik_ompl.model.shapes import Box
 from rrtik_ompl.viewer.drawing.marks import cubes, reach_marks
@@ -82,7 +82,7 @@ def test_a_map_is_the_same_for_the_same_seed_and_survives_its_file(titan, found,
     np.testing.assert_array_equal(again.values, found.values)
     assert not np.array_equal(reach_map(titan, samples=SAMPLES, seed=1).values, found.values)
     found.save(tmp_path / "map.npz")
-    read = load_reach_map(tmp_path / "map.npz")
+    read = ReachMap.load(tmp_path / "map.npz")
     np.testing.assert_array_equal(read.values, found.values)
     assert (read.robot, read.measure, read.samples) == ("titan4", "orientations", found.samples)
     found.save(tmp_path / "map.csv")
@@ -114,7 +114,7 @@ def test_a_file_that_is_no_map_is_refused(tmp_path, content):
     file = tmp_path / "map.npz"
     file.write_bytes(content)
     with pytest.raises(InputError, match=r"map\.npz.*save it again"):
-        load_reach_map(file)
+        ReachMap.load(file)
 
 
 def test_cubes_have_no_faces_between_two_cells():

@@ -10,7 +10,7 @@ import yaml
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.model.path import JointPath
-from rrtik_ompl.motion.trajectory import RateLimits, Trajectory, load_trajectory, time_parameterize
+from rrtik_ompl.motion.trajectory import RateLimits, Trajectory, time_parameterize
 from rrtik_ompl.viewer import view
 from rrtik_ompl.viewer.plots.joints import plot_joints
 
@@ -71,7 +71,7 @@ def test_yaml_and_ros_json_are_the_message_of_ros_and_nothing_else(tmp_path, rob
         assert set(point["time_from_start"]) == {"sec", "nanosec"}
         assert all(type(value) is int for value in point["time_from_start"].values())
         assert 0 <= point["time_from_start"]["nanosec"] < 10**9
-    again = load_trajectory(file, robot)
+    again = Trajectory.load(file, robot)
     clock = np.linspace(0.0, motion.duration, 500)
     assert np.abs(again(clock).positions - motion(clock).positions).max() < 1e-5
     assert not re.search(r"-0\.0[,\]]", file.read_text())
@@ -85,7 +85,7 @@ def test_yaml_that_is_no_trajectory_is_refused_in_one_line(tmp_path, text, words
     file = tmp_path / "a.yaml"
     file.write_text(text)
     with pytest.raises(InputError, match=words) as caught:
-        load_trajectory(file)
+        Trajectory.load(file)
     assert "\n" not in str(caught.value)
 
 
@@ -155,7 +155,7 @@ def test_set_points_stay_what_they_are_and_keep_the_limits_of_their_motion(tmp_p
     motion = time_parameterize(JointPath.of(robot, ROWS), ODD)
     file, again = tmp_path / f"motion{ending}", tmp_path / f"again{ending}"
     motion.save(file, rate=rate)
-    found = load_trajectory(file, robot)
+    found = Trajectory.load(file, robot)
     samples = motion.sample(rate)
     clock = samples.times
     state = (samples.positions, samples.velocities, samples.accelerations)
@@ -178,7 +178,7 @@ def test_set_points_stay_what_they_are_and_keep_the_limits_of_their_motion(tmp_p
 def test_points_that_are_far_from_each_other_are_no_set_points(tmp_path, robot):
     motion = time_parameterize(JointPath.of(robot, ROWS), ODD)
     motion.save(tmp_path / "sparse.json", rate=10.0)
-    sparse = load_trajectory(tmp_path / "sparse.json")
+    sparse = Trajectory.load(tmp_path / "sparse.json")
     samples = motion.sample(10.0)
     state = (samples.positions, samples.velocities, samples.accelerations)
     assert sparse.set_points is None
@@ -191,7 +191,7 @@ def test_points_that_are_far_from_each_other_are_no_set_points(tmp_path, robot):
 def test_set_points_of_a_motion_that_jumps_exceed_a_jerk_limit(tmp_path, robot):
     hard = time_parameterize(JointPath.of(robot, ROWS), RateLimits(1.07, 2.3))
     hard.save(tmp_path / "hard.csv", rate=100.0)
-    found = load_trajectory(tmp_path / "hard.csv")
+    found = Trajectory.load(tmp_path / "hard.csv")
     assert found.set_points is not None
     assert found.report(RateLimits(1.07, 2.3)).kept
     assert not found.report(ODD).kept
@@ -202,4 +202,4 @@ def test_a_tick_just_before_the_end_is_the_end(tmp_path, robot):
     assert 3.1 < motion.duration < 3.1 + 1e-9
     assert np.diff(motion.sample(1000.0).times).min() > 0.9e-3
     motion.save(tmp_path / "motion.yaml", rate=1000.0)
-    assert load_trajectory(tmp_path / "motion.yaml").duration == pytest.approx(3.1)
+    assert Trajectory.load(tmp_path / "motion.yaml").duration == pytest.approx(3.1)

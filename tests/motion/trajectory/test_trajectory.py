@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.model.path import JointPath
-from rrtik_ompl.motion.trajectory import RateLimits, Trajectory, load_trajectory, time_parameterize
+from rrtik_ompl.motion.trajectory import RateLimits, Trajectory, time_parameterize
 from rrtik_ompl.motion.trajectory.limits import default_words
 from rrtik_ompl.planning.plan import plan
 from rrtik_ompl.problem_files.problem import load_problem
@@ -199,7 +199,7 @@ def test_a_file_gives_back_the_same_motion(tmp_path_factory, ending, task):
     file = tmp_path_factory.mktemp("motions") / f"motion{ending}"
     motion = time_parameterize(*task)
     motion.save(file)
-    again = load_trajectory(file)
+    again = Trajectory.load(file)
     for name in ("times", "positions", "velocities", "accelerations"):
         assert (getattr(again, name) == getattr(motion, name)).all()
     assert again.joint_names == motion.joint_names
@@ -212,9 +212,9 @@ def test_the_json_has_the_shape_of_a_joint_trajectory(tmp_path, sdu):
     document = json.loads(file.read_text())
     assert document["joint_names"] == list(problem.robot.joint_names)
     assert set(document["points"][0]) == {"positions", "velocities", "accelerations", "time_from_start"}
-    assert load_trajectory(file, problem.robot).robot_name == "titan4"
+    assert Trajectory.load(file, problem.robot).robot_name == "titan4"
     with pytest.raises(InputError, match="planar3"):
-        load_trajectory(file, load_robot("planar3"))
+        Trajectory.load(file, load_robot("planar3"))
 
 
 def test_a_message_of_ros_is_read_even_if_its_points_are_joined_by_other_curves(tmp_path):
@@ -225,7 +225,7 @@ def test_a_message_of_ros_is_read_even_if_its_points_are_joined_by_other_curves(
     ]
     points[0]["time_from_start"] = {"sec": 0, "nanosec": 0}
     file.write_text(json.dumps({"joint_names": ["a"], "points": points}))
-    motion = load_trajectory(file)
+    motion = Trajectory.load(file)
     assert motion(1.0 + 5e-7).positions == pytest.approx([0.5])
     assert motion.duration == pytest.approx(2.0, abs=1e-6)
 
@@ -246,7 +246,7 @@ def test_a_message_of_ros_is_read_even_if_its_points_are_joined_by_other_curves(
 def test_a_file_that_holds_no_trajectory_is_refused_in_one_line(tmp_path, name, text, words):
     (tmp_path / name).write_text(text)
     with pytest.raises(InputError, match=words) as caught:
-        load_trajectory(tmp_path / name)
+        Trajectory.load(tmp_path / name)
     assert str(caught.value).startswith(str(tmp_path / name))
 
 

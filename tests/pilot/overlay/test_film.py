@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import rrtik_robots
-from rrtik_ompl import load_path, load_problem, load_robot
+from rrtik_ompl import JointPath, load_problem, load_robot
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.pilot.overlay.film import ArmInPictures, write_film
 from rrtik_ompl.sensing.camera_file import load_camera
@@ -159,7 +159,7 @@ def test_the_commands_of_the_page_on_sensing_lead_from_photographs_to_a_film(cap
         assert rrtik(capsys, *words)[0] == 0, line
     assert {line.split()[1] for line in lines} == {"markers", "plan", "overlay", "pilot"}
     problem = load_problem("task.yaml")
-    path = load_path("path.json", problem.robot)
+    path = JointPath.load("path.json", problem.robot)
     assert path.violations(problem.world) == ()
     valve = next(o for o in problem.world.scene.obstacles if o.name == "valve.body")
     assert valve.pose.translation == pytest.approx([1.36, 0.15, 0.12], abs=2e-3)

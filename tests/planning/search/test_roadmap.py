@@ -135,7 +135,7 @@ def test_after_an_obstacle_has_moved_no_path_runs_through_it_and_the_old_roadmap
 def test_a_roadmap_is_saved_and_read_with_all_that_it_knows(tmp_path):
     made = roadmap()
     made.save(tmp_path / "cell.npz")
-    read = rrtik.load_roadmap(tmp_path / "cell.npz", problem().world)
+    read = rrtik.Roadmap.load(tmp_path / "cell.npz", problem().world)
     assert np.array_equal(read.vertices, made.vertices)
     assert np.array_equal(read.graph.edges, made.graph.edges)
     assert np.array_equal(read.graph.states, made.graph.states)
@@ -152,7 +152,7 @@ def test_a_world_with_path_constraints_is_refused_for_a_roadmap_keeps_none(tmp_p
     ).world
     made = rrtik.Roadmap(free, vertices=20)
     made.save(tmp_path / "free.npz")
-    for use in (rrtik.Roadmap, made.moved_to, lambda world: rrtik.load_roadmap(tmp_path / "free.npz", world)):
+    for use in (rrtik.Roadmap, made.moved_to, lambda world: rrtik.Roadmap.load(tmp_path / "free.npz", world)):
         with pytest.raises(InputError, match=r"roadmap.*path constraints"):
             use(held)
 
@@ -161,14 +161,14 @@ def test_a_roadmap_of_another_world_is_refused_in_one_line(tmp_path):
     file = tmp_path / "wall.npz"
     rrtik.Roadmap(wall(0.5), vertices=50).save(file)
     with pytest.raises(InputError, match=r"wall\.npz.*moved=True"):
-        rrtik.load_roadmap(file, wall(1.8))
-    assert len(rrtik.load_roadmap(file, wall(1.8), moved=True).vertices) == 50
+        rrtik.Roadmap.load(file, wall(1.8))
+    assert len(rrtik.Roadmap.load(file, wall(1.8), moved=True).vertices) == 50
     with pytest.raises(InputError, match="roadmap"):
-        rrtik.load_roadmap(file, problem().world)
+        rrtik.Roadmap.load(file, problem().world)
     other = rrtik.World(replace(wall(0.5).robot, name="other"), wall(0.5).scene)
     told = r"wall\.npz: is no roadmap of robot 'other': it is of robot 'planar3'$"
     with pytest.raises(InputError, match=told):
-        rrtik.load_roadmap(file, other, moved=True)
+        rrtik.Roadmap.load(file, other, moved=True)
     with pytest.raises(InputError, match="another robot"):
         roadmap().moved_to(wall(0.5))
     with pytest.raises(InputError, match=r"roadmap\.moved_to"):
@@ -181,7 +181,7 @@ def test_spoilt_files_are_refused_in_one_line(tmp_path, spoil):
     roadmap().save(file)
     file.write_bytes(spoil(file.read_bytes()))
     with pytest.raises(InputError, match=r"cell\.npz") as caught:
-        rrtik.load_roadmap(file, problem().world)
+        rrtik.Roadmap.load(file, problem().world)
     assert "\n" not in str(caught.value)
 
 
@@ -300,4 +300,4 @@ def test_a_file_with_a_vertex_outside_the_box_is_named(tmp_path):
     np.savez_compressed(file, **stored)
     for moved in (False, True):
         with pytest.raises(InputError, match=r"cell\.npz: roadmap: vertex 7 is not in the box of configurations$"):
-            rrtik.load_roadmap(file, problem().world, moved=moved)
+            rrtik.Roadmap.load(file, problem().world, moved=moved)

@@ -1,0 +1,289 @@
+"""The kinds of files: which value each of them holds, which function reads it, and how to tell.
+
+Values know nothing of the modules that read them, so those are named here, as entry points name them, and imported when
+a file is read. A new kind of file is a new row.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, TypeAlias, TypeVar
+
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.files.named_arrays import NamedArrays
+from rrtik_ompl.files.text import file_name, read_text
+
+FilePath: TypeAlias = str | os.PathLike[str]
+Value = TypeVar("Value")
+MAX_BYTES = 512 * 1024 * 1024  # the largest file of all kinds that tell what they are by their words: a record of a run
+
+
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """A kind of file.
+
+    Attributes:
+        what: What messages call it, with its article.
+        value: Class of the value, "module:name".
+        reader: Function that reads it, "module:name"; its arguments are those of ``load`` of the class.
+        writer: Function that takes a value and a file and writes it; "" if the class does that itself, or nothing does.
+        words: What a file of this kind says: its "kind", or keys (columns, arrays), one of which is sufficient.
+        endings: Endings that only this kind has.
+        also: Names of other classes whose ``load`` accepts such a file.
+        needs: Arguments without which ``load`` cannot read the file.
+        command: Command that takes such a file.
+    """
+
+    what: str
+    value: str
+    reader: str
+    writer: str = ""
+    words: tuple[str, ...] = ()
+    endings: tuple[str, ...] = ()
+    also: tuple[str, ...] = ()
+    needs: str = ""
+    command: str = ""
+
+
+# The first row whose words a file says is its kind: a problem with a section "run" is a scenario.
+KINDS = MappingProxyType(
+    {
+        "Certificate": Kind(
+            "a certificate of a path",
+            "model.certificate:Certificate",
+            "model.certificate:read_certificate",
+            words=("path_certificate", "motions"),
+        ),
+        "JointPath": Kind(
+            "a path",
+            "model.path:JointPath",
+            "model.path:read_path",
+            words=("joint_path", "waypoints"),
+            endings=(".txt",),
+            also=("Certificate", "HeightField"),
+            command="rrtik check PROBLEM {}",
+        ),
+        "Trajectory": Kind(
+            "a timed motion",
+            "motion.trajectory:Trajectory",
+            "motion.trajectory.load:read_trajectory",
+            words=("joint_trajectory", "points"),
+            command="rrtik show PROBLEM {}",
+        ),
+        "ReplanRun": Kind(
+            "a record of a run",
+            "replanning.record:ReplanRun",
+            "replanning.record:read_run",
+            words=("replan_run", "ticks"),
+            command="rrtik check PROBLEM {}",
+        ),
+        "TaskPlan": Kind(
+            "a plan of a task",
+            "tasks:TaskPlan",
+            "tasks.plan_file:read_task_plan",
+            "tasks.plan_file:write_task_plan",
+            words=("task_plan",),
+            command="rrtik check {}",
+        ),
+        "Task": Kind(
+            "a task",
+            "tasks:Task",
+            "tasks.task_file:read_task",
+            "tasks.task_file:write_task",
+            words=("task", "goals"),
+            command="rrtik task {}",
+        ),
+        "Scenario": Kind(
+            "a scenario",
+            "replanning.scenario:Scenario",
+            "replanning.scenario:read_scenario",
+            words=("run",),
+            also=("Problem", "Scene"),
+            command="rrtik replan {}",
+        ),
+        "Problem": Kind(
+            "a problem",
+            "world.problem:Problem",
+            "problem_files.problem:load_problem",
+            "problem_files.problem:write_problem",
+            words=("goal", "start", "goal_constraints", "robot_model_name"),
+            also=("Scene",),
+            command="rrtik plan {}",
+        ),
+        "Scene": Kind(
+            "a scene",
+            "model.scene:Scene",
+            "problem_files.scene:load_scene",
+            "problem_files.scene:write_scene",
+            words=("scene",),
+        ),
+        "Robot": Kind(
+            "a robot",
+            "model.robot:Robot",
+            "description.catalog:load_robot",
+            words=("dh",),
+            endings=(".urdf", ".xacro", ".mjcf", ".xml"),
+        ),
+        "Roadmap": Kind(
+            "a roadmap",
+            "planning.search.roadmap:Roadmap",
+            "planning.search.roadmap:read_roadmap",
+            words=("edges",),
+            needs="world",
+        ),
+        "ReachMap": Kind("a map of reach", "ik.reach:ReachMap", "ik.reach:read_reach_map", words=("measure",)),
+        "PointCloud": Kind(
+            "a point cloud",
+            "model.shapes:PointCloud",
+            "description.shapes.cloud:read_cloud",
+            "description.shapes.cloud:write_cloud",
+            endings=(".ply", ".pcd", ".xyz", ".npy"),
+            also=("HeightField",),
+        ),
+        "Octree": Kind(
+            "an octree",
+            "model.shapes:Octree",
+            "description.shapes.octree:read_octree",
+            endings=(".bt",),
+            also=("PointCloud",),
+        ),
+        "Mesh": Kind(
+            "a mesh", "model.shapes:Mesh", "description.shapes.mesh:read_mesh", endings=(".stl", ".obj", ".dae")
+        ),
+        "HeightField": Kind(
+            "a grid of heights",
+            "model.shapes:HeightField",
+            "description.shapes.heights:read_heights",
+            endings=(".tif", ".tiff", ".pgm", ".png"),
+            needs="cell=[m]",
+        ),
+    }
+)
+
+
+def load(file: FilePath) -> Any:  # noqa: ANN401 - whatever the file holds
+    """Read a file of any kind, as ``load`` of the class of its value does.
+
+    What a file is, is told by the kind or the keys that it states (JSON, YAML, NPZ), by its columns (CSV), or else by
+    its ending; a folder is a MoveIt configuration. For options, and for type checkers, call ``load`` of the class.
+
+    Args:
+        file: Name of the file.
+
+    Returns:
+        A `Robot`, `Problem`, `Scene`, `JointPath`, `Trajectory`, `Certificate`, `Task`, `TaskPlan`, `Mesh`,
+        `PointCloud`, `Octree`, ``rrtik.replanning.Scenario``, ``rrtik.replanning.ReplanRun`` or ``rrtik.ik.ReachMap``.
+
+    Raises:
+        InputError: If the file cannot be read, its kind cannot be told, or it needs further arguments, as a `Roadmap`
+            needs its world; one line.
+
+    Example:
+        >>> rrtik.JointPath([[0.0], [1.0]]).save("path.json")
+        >>> rrtik.load("path.json")
+        JointPath(2 waypoints of 1 joints, 1 transitions, length 1 rad)
+    """
+    name = kind_of(file)
+    if name is None:
+        if not os.path.exists(file):
+            raise InputError(f"{file}: no such file; load_robot and load_problem take names that are shipped")
+        raise InputError(f"{file}: is none of {', '.join(KINDS)}; name its class, such as JointPath.load(file)")
+    if needs := KINDS[name].needs:
+        raise InputError(f"{file}: {KINDS[name].what} is read with {name}.load(file, {needs})")
+    return found(KINDS[name].value).load(file)
+
+
+def read(value: type[Value], file: FilePath, *arguments: Any, **options: Any) -> Value:
+    """Read a file of a class, by the reader of its row.
+
+    Raises:
+        InputError: If the file cannot be read; if it holds another kind of value, the message says so.
+    """
+    name = value.__name__
+    with refusing_others(file, name):
+        read_value: Value = found(KINDS[name].reader)(file, *arguments, **options)
+    return read_value
+
+
+def write(value: object, file: FilePath) -> Any:  # noqa: ANN401 - what the writer returns
+    """Write a value to a file, by the writer of its row.
+
+    Raises:
+        InputError: If the file cannot be written.
+    """
+    return found(KINDS[type(value).__name__].writer)(value, file)
+
+
+@contextmanager
+def refusing_others(file: FilePath, name: str) -> Iterator[None]:
+    """Raise an error that says what a file is, if it cannot be read because it holds a value of another class."""
+    try:
+        yield
+    except InputError as error:
+        try:
+            other = kind_of(file)
+        except InputError:  # it is what the reader says
+            other = None
+        if other is None or other == name or name in KINDS[other].also:
+            raise
+        kind = KINDS[other]
+        command = f" or {kind.command.format(file_name(file).name)}" if kind.command else ""
+        raise InputError(f"{file}: {kind.what}, not {KINDS[name].what}; use {other}.load(file){command}") from error
+
+
+def kind_of(file: FilePath) -> str | None:
+    """Return the name of the class of the value that a file holds, or None.
+
+    Raises:
+        InputError: If the file cannot be read.
+    """
+    path = file_name(file)
+    if os.path.isdir(path):  # which takes names of any length
+        return "Robot"
+    ending = path.suffix.lower()
+    words = _words(path, ending)
+    said = (name for name, kind in KINDS.items() if not words.isdisjoint(kind.words))
+    ended = (name for name, kind in KINDS.items() if ending in kind.endings)
+    return next(said, None) or next(ended, None)
+
+
+def _words(path: Path, ending: str) -> set[str]:
+    """Return the words that tell what a file is: its kind if it states that, or else its keys, or nothing."""
+    if ending == ".csv":
+        first = read_text(path).partition("\n")[0]
+        return {"points" if first.startswith("time,") else "waypoints"}
+    if ending == ".npz":
+        return set(NamedArrays(path).names)
+    if ending == ".json":
+        document = _json(path)
+    elif ending in (".yaml", ".yml"):
+        from rrtik_ompl.files.strict_yaml import read_yaml  # loads slowly, and every value imports this module
+
+        document = read_yaml(path).data
+    else:
+        return set()
+
+    keys = document if isinstance(document, dict) else {}
+    return {str(keys["kind"])} if "kind" in keys else set(keys)
+
+
+def _json(path: Path) -> object:
+    try:
+        return json.loads(read_text(path, MAX_BYTES))
+    except json.JSONDecodeError as error:
+        raise InputError(f"{path}: line {error.lineno}: not JSON: {error.msg}") from None
+    except (RecursionError, ValueError):
+        raise InputError(f"{path}: not JSON that can be read") from None
+
+
+def found(name: str) -> Any:  # noqa: ANN401 - a class or a function
+    """Return what stands under a name of the table, such as "model.path:JointPath"."""
+    module, _, attribute = name.partition(":")
+    return getattr(import_module(f"rrtik_ompl.{module}"), attribute)
