@@ -54,7 +54,7 @@ def ghosts(page: Path) -> None:
 
 
 def reach(page: Path) -> None:
-    robot = rrtik.load_robot("titan4", limits="envelope")
+    robot = rrtik.load_robot("titan4", parameters={"limits": "envelope"})
     found = reach_map(robot)
     view(robot, marks=reach_marks(found), html=page, title="titan4: share of directions in reach")
 

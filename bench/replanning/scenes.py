@@ -28,7 +28,7 @@ def limits() -> rrtik.RateLimits:
 
 
 def point() -> rrtik.Robot:
-    return rrtik.load_robot("point2d", radius=0.0, bounds=[[0, SIZE], [0, SIZE]])
+    return rrtik.load_robot("point2d", parameters={"radius": 0.0, "bounds": [[0, SIZE], [0, SIZE]]})
 
 
 def place(x: float, y: float) -> pin.SE3:
@@ -109,7 +109,7 @@ def moving_goal(seed: int) -> tuple[rrtik.Problem, Callable[[float], np.ndarray]
 
 def planar_arm() -> rrtik.Problem:
     """Scene 4: a planar arm; the second box covers the goal posture for a while, the first one leaves its place."""
-    robot = rrtik.load_robot("planar", lengths=[1.0, 1.0, 1.0], radius=0.02)
+    robot = rrtik.load_robot("planar", parameters={"lengths": [1.0, 1.0, 1.0], "radius": 0.02})
     box = [(-0.25, -0.4), (0.25, -0.4), (0.25, 0.4), (-0.25, 0.4)]
     first = TimedPoses([0.0, 2.0, 5.0], [place(1.6, 1.6), place(1.6, 1.6), place(1.6, 3.4)])
     second = TimedPoses([0.0, 0.6, 4.5, 6.5], [place(-3.2, 1.9), place(-1.1, 1.9), place(-1.1, 1.9), place(-3.4, 1.9)])

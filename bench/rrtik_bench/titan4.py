@@ -33,7 +33,7 @@ LENGTHS = "no lengths are printed; a1 to a4 measured from the vendor's drawing, 
 
 def sizes(quick: bool) -> list[Row]:
     """Reach and envelope."""
-    robot, count = rrtik.load_robot("titan4", limits="envelope"), 20_000 if quick else 300_000
+    robot, count = rrtik.load_robot("titan4", parameters={"limits": "envelope"}), 20_000 if quick else 300_000
     tip = robot.fk_batch(np.zeros((1, 6)))[0]
     wanted = np.column_stack([[0, 0, 1], [0, -1, 0], [1, 0, 0], [A1 + A2 + A3 + A4 + D6, 0, 0]])
     Q = np.random.default_rng(0).uniform(robot.lower, robot.upper, (count, 6))

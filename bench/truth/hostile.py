@@ -192,7 +192,7 @@ def other_arguments(function: Callable[..., Any]) -> dict[str, Any]:
 
 
 def _robot() -> rrtik.Robot:
-    return rrtik.load_robot("planar", lengths=[1.0])
+    return rrtik.load_robot("planar", parameters={"lengths": [1.0]})
 
 
 def _world() -> rrtik.World:

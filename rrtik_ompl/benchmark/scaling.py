@@ -42,7 +42,7 @@ def planar_chain(joints: int, seed: int = 0) -> Problem:
     if joints < 2:
         raise InputError(f"joints of a planar chain must be 2 or more, got {joints}")
 
-    robot = load_robot("planar", lengths=[CHAIN_LENGTH / joints] * joints, radius=0.01)
+    robot = load_robot("planar", parameters={"lengths": [CHAIN_LENGTH / joints] * joints, "radius": 0.01})
     start = _bent(joints, BEND)
     rng = np.random.default_rng([joints, seed])
 

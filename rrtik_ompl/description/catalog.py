@@ -22,11 +22,7 @@ from functools import cache
 from importlib import import_module
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, TypeAlias
-
-import numpy as np
-import pinocchio as pin
-from numpy.typing import NDArray
+from typing import TYPE_CHECKING, Any
 
 from rrtik_ompl.base.choices import one_of
 from rrtik_ompl.base.errors import InputError, RrtikError, UnknownNameError, listed, name_of, require
@@ -41,11 +37,6 @@ from rrtik_ompl.model.robot import Robot
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint, EntryPoints
-
-# Value of a robot's option: a name, a number, a file, a pose, or a mapping or list of these.
-RobotOption: TypeAlias = (
-    str | float | os.PathLike[str] | Mapping[str, object] | Sequence[object] | NDArray[np.float64] | pin.SE3 | None
-)
 
 SOLVED_KINDS = ("any goal", "goal of the tip", "path constraints")  # what planners of "auto" say that they solve
 FILE_OPTIONS = ("urdf", "srdf", "joint_limits", "dh", "moveit", "mjcf")
@@ -191,7 +182,7 @@ def load_robot(
     xacro_args: Mapping[str, object] | None = None,
     xacro_limits: Mapping[str, float] | None = None,
     trust_xacro: bool = False,
-    **own: RobotOption,
+    parameters: Mapping[str, object] | None = None,
 ) -> Robot:
     """Load a robot by name or from a file; the same call returns the same object, unless one of its files has changed.
 
@@ -220,7 +211,8 @@ def load_robot(
         xacro_limits: Limits for the expansion of macros: ``{"seconds": 10, "gigabytes": 1}``, or one of these.
         trust_xacro: Whether macros are evaluated by xacro's own evaluator, which can run any code, and may read files
             anywhere. Otherwise expressions that are not on a list of allowed ones are refused.
-        **own: Options that a shipped robot has of its own, such as ``limits="envelope"`` of titan4.
+        parameters: What a shipped robot has of its own, such as ``{"limits": "envelope"}`` of titan4 and
+            ``{"radius": 0.05}`` of planar3.
 
     Raises:
         UnknownNameError: If there is no robot of that name.
@@ -229,20 +221,44 @@ def load_robot(
     Example:
         >>> rrtik.load_robot("panda", tip="panda_hand", padding=0.01).dof
         7
+        >>> rrtik.load_robot("planar", parameters={"lengths": [1.0, 0.5], "radius": 0.02}).dof
+        2
     """
-    options: dict[str, Any] = {
-        "tip": tip, "group": group, "joints": joints, "locked": locked, "base_pose": base_pose, "padding": padding,
-        "scale": scale, "joint_ranges": joint_ranges, "joint_weights": joint_weights, "srdf": srdf, "urdf": urdf,
-        "joint_limits": joint_limits, "packages": packages, "strict": strict or None, "xacro_args": xacro_args, **own,
-    }  # fmt: skip
+    require(strict, bool, "strict")
+    require(parameters, Mapping | None, "parameters of a robot", "give values by name")
+    options = {
+        "tip": tip,
+        "group": group,
+        "joints": joints,
+        "locked": locked,
+        "base_pose": base_pose,
+        "padding": padding,
+        "scale": scale,
+        "joint_ranges": joint_ranges,
+        "joint_weights": joint_weights,
+        "srdf": srdf,
+        "urdf": urdf,
+        "joint_limits": joint_limits,
+        "packages": packages,
+        "strict": strict or None,
+        "xacro_args": xacro_args,
+    }
+    own = dict(parameters or {})
+    for key in own:
+        if key in options:
+            raise InputError(f"robot '{name}': parameters has '{key}', which is an option: {key}=...")
+
     with refusing_others(name, "Robot"):
-        return _loaded(name, options, trust_xacro, xacro_limits)
+        return _loaded(name, own | options, trust_xacro, xacro_limits)
 
 
 def _loaded(
-    name: FilePath, given: Mapping[str, Any], trust_xacro: bool, xacro_limits: Mapping[str, float] | None
+    name: FilePath,
+    given: Mapping[str, Any],
+    trust_xacro: bool = False,
+    xacro_limits: Mapping[str, float] | None = None,
 ) -> Robot:
-    """Load a robot as :func:`load_robot` does, with the options that are not None."""
+    """Load a robot as :func:`load_robot` does; options and parameters are in one mapping, as in problem files."""
     recipe = _recipe(file_name(name) if not isinstance(name, str) else name)
     options = {option: value for option, value in given.items() if value is not None}
     for option in options:
@@ -445,12 +461,12 @@ def robot_from_entry(entry: str | Mapping[str, Any], folder: str | os.PathLike[s
     if kind in PARAMETRIC:
         if not isinstance(entry[kind], Mapping):
             raise InputError(f"robot: {kind}: expected a group of keys such as {{radius: 0.1}}")
-        return load_robot(kind, **dict(entry[kind]), **options)
+        return _loaded(kind, {**entry[kind], **options})
 
     target = entry[kind]
     if not isinstance(target, str):
         raise InputError(f"robot: {kind}: expected text, found {target!r}")
-    return load_robot(target if kind == "name" else _in_folder(target, folder), **options)
+    return _loaded(target if kind == "name" else _in_folder(target, folder), options)
 
 
 def _refuse_caller_options(entry: Mapping[str, object]) -> None:

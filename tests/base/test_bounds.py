@@ -28,7 +28,7 @@ def urdf(joints):
 
 
 def planar(joints):
-    return rrtik.load_robot("planar", lengths=np.full(joints, 0.05))
+    return rrtik.load_robot("planar", parameters={"lengths": np.full(joints, 0.05)})
 
 
 def straight(length):
@@ -43,7 +43,7 @@ TOO_MANY = {
         "1501 are more than the 1001",
     ),
     "lengths of a planar arm": (
-        lambda: rrtik.load_robot("planar", lengths=np.ones(1_000_000)),
+        lambda: rrtik.load_robot("planar", parameters={"lengths": np.ones(1_000_000)}),
         "1000001 are more than the 1001",
     ),
     "moving joints of a world": (lambda: rrtik.World(planar(1_000)), "1000 are more than the 200 .*fix some"),

@@ -35,7 +35,7 @@ def test_round_solids_are_as_far_away_as_by_hand():
 
 def world_beside(shape, gap):
     """A bar along x, and a solid that ends 5 cm from its frame towards the bar, a gap [m] beside that."""
-    robot = rrtik.load_robot("planar", lengths=[1.0], limits_deg=[[-90, 90]], radius=0.05)
+    robot = rrtik.load_robot("planar", parameters={"lengths": [1.0], "limits_deg": [[-90, 90]], "radius": 0.05})
     place = rrtik.pose([0.5, 0.1 + gap, 0.0])
     return rrtik.World(robot, rrtik.Scene([rrtik.Obstacle("near", shape, place, margin=0.0)]))
 

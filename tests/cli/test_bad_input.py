@@ -344,7 +344,10 @@ API = {
     ),
     "region about axis w": (lambda: rrtik.GoalSet([rrtik.PositionGoal([0, 0, 0])], "w"), ["free_rotation_axis"]),
     "unknown robot": (lambda: rrtik.load_robot("pand"), ["pand", "did you mean 'panda'"]),
-    "unknown option of a robot": (lambda: rrtik.load_robot("titan4", limit="envelope"), ["limit", "limits"]),
+    "unknown parameter of a robot": (
+        lambda: rrtik.load_robot("titan4", parameters={"limit": "envelope"}),
+        ["limit", "limits"],
+    ),
     "fk of two joints": (lambda: robot().fk([0, 0]), ["3 joints"]),
     "unknown frame": (lambda: robot().fk([0, 0, 0], "claw"), ["claw"]),
     "unknown posture": (lambda: robot().posture("stowed"), ["stowed"]),

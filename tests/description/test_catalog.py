@@ -49,6 +49,15 @@ def entry_of(path):
     return next(each for each in os.scandir(path.parent) if each.name == path.name)
 
 
+OWN = ("limits", "lengths", "limits_deg", "radius", "bounds", "base_height", "apart")
+
+
+def as_options(given):
+    """Options of load_robot, with a robot's own as its parameters."""
+    own = {key: value for key, value in given.items() if key in OWN}
+    return {key: value for key, value in given.items() if key not in OWN} | ({"parameters": own} if own else {})
+
+
 @pytest.mark.parametrize("kind", [str, Path, entry_of, OnlyFspath])
 def test_files_are_named_by_every_kind_of_path(urdf, kind):
     srdf = urdf.with_suffix(".srdf")
@@ -64,13 +73,15 @@ def test_a_path_of_bytes_is_refused(urdf, option):
 
 
 def test_the_same_call_gives_the_same_object():
-    options = {"lengths": [1.0, 2.0], "base_pose": {"xyz": [0, 0, 1]}}
+    options = {"parameters": {"lengths": [1.0, 2.0]}, "base_pose": {"xyz": [0, 0, 1]}}
     assert load_robot("planar", **options) is load_robot("planar", **options)
-    assert load_robot("planar", lengths=np.array([1.0, 2.0])) is load_robot("planar", lengths=[1.0, 2.0])
+    lists, arrays = {"lengths": [1.0, 2.0]}, {"lengths": np.array([1.0, 2.0])}
+    assert load_robot("planar", parameters=arrays) is load_robot("planar", parameters=lists)
 
 
 def test_another_option_gives_another_robot():
-    assert load_robot("planar", lengths=[1.0, 2.0]) is not load_robot("planar", lengths=[1.0, 2.5])
+    first, second = (load_robot("planar", parameters={"lengths": [1.0, length]}) for length in (2.0, 2.5))
+    assert first is not second
     poses = (pin.SE3(np.eye(3), np.array([0, 0, height])) for height in (1.0, 2.0))
     first, second = (load_robot("titan4", base_pose=pose) for pose in poses)
     assert second.fk(np.zeros(6)).translation[2] - first.fk(np.zeros(6)).translation[2] == pytest.approx(1.0)
@@ -140,7 +151,20 @@ def test_an_option_that_does_not_apply_names_those_that_do():
 )
 def test_a_bad_value_gets_one_line(name, options, expected):
     with pytest.raises(InputError, match=expected):
-        load_robot(name, **options)
+        load_robot(name, **as_options(options))
+
+
+@pytest.mark.parametrize(
+    ("parameters", "expected"),
+    [
+        ({"tip": "gripper"}, "'tip', which is an option: tip="),
+        ({"girth": 1}, "no option 'girth'"),
+        (3, "must be of type"),
+    ],
+)
+def test_parameters_are_what_the_robot_has_of_its_own(parameters, expected):
+    with pytest.raises(InputError, match=expected):
+        load_robot("titan4", parameters=parameters)
 
 
 @pytest.mark.parametrize(
@@ -202,7 +226,7 @@ def test_an_option_without_sense_is_refused_in_one_line(name, urdf):
     for option in (*options, "scale", "padding", "joint_ranges", "joint_weights"):
         for value in ODD:
             try:
-                load_robot(urdf if name == "urdf" else name, **{option: value})
+                load_robot(urdf if name == "urdf" else name, **as_options({option: value}))
             except InputError as error:
                 refusals.append(str(error))
     assert len(refusals) > len(options)
@@ -212,4 +236,4 @@ def test_an_option_without_sense_is_refused_in_one_line(name, urdf):
 @pytest.mark.parametrize("option", [{"limits": [0, 1]}, {"lengths": 5}, {"lengths": np.zeros(3)}])
 def test_limits_and_lengths_of_the_titan_are_checked(option):
     with pytest.raises(InputError, match=f"titan4: {next(iter(option))} must be of type"):
-        load_robot("titan4", **option)
+        load_robot("titan4", parameters=option)

@@ -285,7 +285,7 @@ def test_the_same_seed_gives_the_same_path_to_a_grasp_set(bar, name):
 @pytest.mark.parametrize("name", ["bicrdt", "fastrrtconnect"])
 def test_plan_draws_others_when_what_it_aimed_at_is_out_of_its_reach(name):
     """Most parts of the goal lie in a cage, and these are the nearest to the start."""
-    robot = load_robot("point2d", radius=0.2, bounds=[[0, 10], [0, 10]])
+    robot = load_robot("point2d", parameters={"radius": 0.2, "bounds": [[0, 10], [0, 10]]})
     cage = [
         Obstacle("left", Box([0.2, 3, 2]), pose([3.0, 5, 0])),
         Obstacle("right", Box([0.2, 3, 2]), pose([5.0, 5, 0])),

@@ -179,7 +179,7 @@ def test_subdivision_numbers_the_edges():
 
 def test_violations_name_edge_and_pair():
     box = Obstacle("box", Box([1, 1, 2]), pin.SE3(np.eye(3), np.array([5.0, 5.0, 0.0])))
-    world = World(load_robot("point2d", radius=0.1, bounds=[[0, 10], [0, 10]]), Scene([box]))
+    world = World(load_robot("point2d", parameters={"radius": 0.1, "bounds": [[0, 10], [0, 10]]}), Scene([box]))
     clear = JointPath([[1, 1], [1, 9], [9, 9]])
     blocked = JointPath([[1, 1], [1, 5], [9, 5], [11, 5]])
     assert clear.violations(world) == ()
@@ -194,7 +194,11 @@ def test_violations_name_edge_and_pair():
 @pytest.mark.parametrize("at_once", [1, 7, 100])
 def test_a_long_path_is_checked_in_parts_with_the_same_violations(monkeypatch, at_once):
     box = Obstacle("box", Box([1, 1, 2]), pin.SE3(np.eye(3), np.array([5.0, 5.0, 0.0])))
-    world = World(load_robot("point2d", radius=0.1, bounds=[[0, 10], [0, 10]]), Scene([box]), motion_resolution=0.1)
+    world = World(
+        load_robot("point2d", parameters={"radius": 0.1, "bounds": [[0, 10], [0, 10]]}),
+        Scene([box]),
+        motion_resolution=0.1,
+    )
     rows = np.random.default_rng(0).integers(0, 12, (40, 2)).astype(float)
     rows[[7, 20]] = 5.0  # waypoints inside the box, where parts may end
     whole = JointPath(rows).violations(world)

@@ -124,7 +124,7 @@ def test_the_frame_of_a_joint_is_where_the_description_puts_it_also_for_a_slante
 
 
 def test_a_robot_of_one_joint_has_a_jacobian_of_one_column():
-    robot = load_robot("planar", lengths=[2.0])
+    robot = load_robot("planar", parameters={"lengths": [2.0]})
     np.testing.assert_allclose(robot.jacobian([0.0])[:, 0], [0, 2, 0, 0, 0, 1], atol=1e-12)
 
 

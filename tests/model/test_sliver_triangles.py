@@ -25,7 +25,7 @@ def test_vertices_a_nanometre_apart_stay_two():
 
 @pytest.mark.parametrize("gap", [1e-3, 1e-5])
 def test_a_ball_beside_the_mesh_is_as_far_away_as_it_is(gap):
-    robot = rrtik.load_robot("planar", lengths=[1.0], limits_deg=[[-90, 90]], radius=0.05)
+    robot = rrtik.load_robot("planar", parameters={"lengths": [1.0], "limits_deg": [[-90, 90]], "radius": 0.05})
     link = robot.link_names[-1]
     held = rrtik.AttachedObject("held", link, ball_of_triangles(), rrtik.pose([0.0, 0.0, 0.5]))
     above = np.add(robot.fk([0.0], link).translation, [0.0, 0.0, 0.8 + gap])

@@ -58,7 +58,7 @@ def test_little_room_is_warned_of():
 
 def test_a_move_that_steps_over_a_needle_is_warned_of():
     needle = Obstacle("needle", Cylinder(2e-4, 1.0), pose([2.0, 0.0, 0.0]))
-    world = World(load_robot("planar3", radius=0.01), Scene([needle]), motion_resolution=0.2)
+    world = World(load_robot("planar3", parameters={"radius": 0.01}), Scene([needle]), motion_resolution=0.2)
     over = [q for q in np.linspace(-1.2, -0.4, 40) if world.motion_valid([q, 0.0, 0.0], [0.9, 0.0, 0.0])]
     assert over  # the check in steps does not see what stands in the way
     for first in over:

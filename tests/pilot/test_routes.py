@@ -111,7 +111,7 @@ def test_where_no_joint_alone_goes_round_a_planner_finds_the_route(name):
 
 
 def test_a_route_that_is_proven_is_taken_before_others_and_one_that_is_not_says_so():
-    robot = load_robot("planar3", radius=0.01)
+    robot = load_robot("planar3", parameters={"radius": 0.01})
     rates = joint_rates(robot)
     goal = np.array([0.9, 0.0, 0.0])
     needle = Obstacle("needle", Cylinder(2e-4, 1.0), pose([2.9, 0.0, 0.0]))  # within reach of a straight arm alone

@@ -170,7 +170,7 @@ def test_the_nearest_solution_of_inverse_kinematics_is_so_by_the_weighted_way():
 
 
 def test_weights_are_an_option_of_every_robot_and_stand_in_files(tmp_path):
-    robot = rrtik.load_robot("planar3", radius=0.01, joint_weights={"joint2": 2.5, "joint3": 1.0})
+    robot = rrtik.load_robot("planar3", joint_weights={"joint2": 2.5, "joint3": 1.0}, parameters={"radius": 0.01})
     assert dict(robot.joint_weights) == {"joint2": 2.5}
     again = pickle.loads(pickle.dumps(robot))
     assert again.joint_weights == robot.joint_weights
@@ -193,5 +193,5 @@ def test_weights_are_an_option_of_every_robot_and_stand_in_files(tmp_path):
 )
 def test_bad_weights_are_one_line(weights, error, said):
     with pytest.raises(error, match=said) as caught:
-        weighted(rrtik.load_robot("planar3", radius=0.01), weights)
+        weighted(rrtik.load_robot("planar3", parameters={"radius": 0.01}), weights)
     assert "\n" not in str(caught.value)

@@ -95,7 +95,7 @@ def test_the_arms_of_a_pair_are_the_single_arm_and_check_each_other(pair):
     assert not rrtik.World(pair).valid(crossed)
     assert "left_" in rrtik.World(pair).explain(crossed)
     assert "right_" in rrtik.World(pair).explain(crossed)
-    apart = rrtik.load_robot("two_titan4", apart=4.0)
+    apart = rrtik.load_robot("two_titan4", parameters={"apart": 4.0})
     assert rrtik.World(apart).valid(crossed)
 
 

@@ -37,7 +37,7 @@ def at(x, y):
 @pytest.fixture(scope="module")
 def wall():
     """A disc that has to go round a wall."""
-    robot = load_robot("point2d", radius=0.3, bounds=[[0, 10], [0, 10]])
+    robot = load_robot("point2d", parameters={"radius": 0.3, "bounds": [[0, 10], [0, 10]]})
     world = World(robot, Scene([Obstacle("wall", Box([1, 7, 2]), at(5, 3.5))]), motion_resolution=0.05)
     return Problem(world, [2, 2], [8, 2], name="wall")
 
@@ -45,7 +45,7 @@ def wall():
 @pytest.fixture(scope="module")
 def closed():
     """A goal that cannot be reached."""
-    robot = load_robot("point2d", radius=0.3, bounds=[[0, 10], [0, 10]])
+    robot = load_robot("point2d", parameters={"radius": 0.3, "bounds": [[0, 10], [0, 10]]})
     world = World(robot, Scene([Obstacle("wall", Box([1, 20, 2]), at(5, 5))]), motion_resolution=0.05)
     return Problem(world, [2, 2], [8, 2], name="closed")
 

@@ -25,7 +25,7 @@ PLANNERS = ("bicrdt", "fastrrtconnect", "fewest-moves", "RRTConnect", "KPIECE1")
 
 def disc_world(*boxes):
     """A disc of 0.3 m that slides in the plane among boxes (x, y, width, depth)."""
-    robot = rrtik.load_robot("point2d", radius=0.3, bounds=[[0, 10], [0, 10]])
+    robot = rrtik.load_robot("point2d", parameters={"radius": 0.3, "bounds": [[0, 10], [0, 10]]})
     walls = [Obstacle(f"box{k}", Box([w, d, 2.0]), pose([x, y, 0.0])) for k, (x, y, w, d) in enumerate(boxes)]
     return rrtik.World(robot, Scene(tuple(walls)), motion_resolution=0.05)
 
@@ -75,7 +75,7 @@ def test_a_preference_gives_way_where_no_path_keeps_it(planner):
 @pytest.mark.parametrize("planner", ["bicrdt", "fastrrtconnect"])
 def test_a_foil_is_not_stepped_over_by_searches_that_leave_room(planner):
     """A wall of 0.1 mm with a gap in it, in the way of a disc of 0.2 mm: steps of 25 mm pass it nearly everywhere."""
-    robot = rrtik.load_robot("point2d", radius=1e-4, bounds=[[0, 10], [0, 10]])
+    robot = rrtik.load_robot("point2d", parameters={"radius": 1e-4, "bounds": [[0, 10], [0, 10]]})
     walls = [Obstacle(f"foil{k}", Box([1e-4, 4.5, 2.0]), pose([5.0, y, 0.0])) for k, y in enumerate((2.25, 7.75))]
     world = rrtik.World(robot, Scene(tuple(walls)), motion_resolution=0.05)
     for seed in range(5):

@@ -45,7 +45,7 @@ def stream(begin=0.0, end=8.0, silent=(), every=0.02, unit=1.0):
 
 
 def ball():
-    robot = load_robot("point2d", radius=0.05, bounds=[[-1, 1], [-1, 1]])
+    robot = load_robot("point2d", parameters={"radius": 0.05, "bounds": [[-1, 1], [-1, 1]]})
     return Problem(World(robot, at(0.0)), [-0.6, 0.0], [0.6, 0.0], name="ball")
 
 
@@ -219,7 +219,7 @@ def test_what_one_scene_allows_is_not_allowed_by_the_next(given):
 
 
 def test_what_is_held_otherwise_than_before_is_refused():
-    robot = load_robot("planar", lengths=[1.0, 1.0])
+    robot = load_robot("planar", parameters={"lengths": [1.0, 1.0]})
     far = Obstacle("far", Sphere(0.1), pin.SE3(np.eye(3), np.array([9.0, 9.0, 0.0])))
 
     def scene(shift):

@@ -147,7 +147,7 @@ def test_a_floor_that_slides_has_a_speed_like_any_obstacle():
 
 @pytest.mark.parametrize("seen", [0.0, 0.2])
 def test_a_feed_whose_scenes_forget_what_the_arm_holds_is_refused(seen):
-    robot = load_robot("planar", lengths=[1.0, 1.0])
+    robot = load_robot("planar", parameters={"lengths": [1.0, 1.0]})
     far, held = box("far", 9.0, 9.0), AttachedObject("tool", robot.tip, Sphere(0.05))
     problem = Problem(World(robot, Scene((far,), (held,))), [0.0, 0.3], [1.0, 0.3])
 
@@ -159,7 +159,7 @@ def test_a_feed_whose_scenes_forget_what_the_arm_holds_is_refused(seen):
 
 
 def test_path_constraints_are_refused_for_they_would_not_be_kept():
-    robot = load_robot("planar", lengths=[1.0, 1.0])
+    robot = load_robot("planar", parameters={"lengths": [1.0, 1.0]})
     bounds = [[-9, 9]] * 3 + [[-7, 7]] * 3
     held = Problem(World(robot), [0.0, 0.3], [1.0, 0.3], constraints=[TaskRegion(np.eye(4), bounds)])
     with pytest.raises(InputError, match="replan: path constraints"):

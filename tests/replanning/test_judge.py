@@ -121,7 +121,7 @@ def test_a_plate_that_flies_past_between_two_ticks_is_seen():
 
 
 def test_what_is_called_proven_has_to_keep_margin_and_clearance_and_the_rest_must_not_touch():
-    robot = load_robot("point2d", radius=0.1, bounds=[[-2, 2], [-2, 2]])
+    robot = load_robot("point2d", parameters={"radius": 0.1, "bounds": [[-2, 2], [-2, 2]]})
     scene = Scene([Obstacle("wall", Box([0.2, 4.0, 1.0]), along(1.0, 0.0), margin=0.05)])
     rows, seen = [[0.0, 0.0], [0.75, 0.0], [0.0, 0.0]], [Snapshot(0.0, scene, stated=True)]
     problem = Problem(World(robot, Scene()), [0, 0], [0, 1])
@@ -137,7 +137,7 @@ def test_what_is_called_proven_has_to_keep_margin_and_clearance_and_the_rest_mus
 
 
 def test_pairs_may_touch_only_while_a_scene_allows_it():
-    robot = load_robot("point2d", radius=0.1, bounds=[[-2, 2], [-2, 2]])
+    robot = load_robot("point2d", parameters={"radius": 0.1, "bounds": [[-2, 2], [-2, 2]]})
     wall = Obstacle("wall", Box([0.2, 4.0, 1.0]), along(1.0, 0.0))
     link = robot.link_names[-1]
     seen = [Snapshot(0.0, Scene([wall], allowed_collisions=[(link, "wall")])), Snapshot(0.3, Scene([wall]))]
@@ -147,7 +147,7 @@ def test_pairs_may_touch_only_while_a_scene_allows_it():
 
 
 def test_between_two_sightings_obstacles_go_straight():
-    robot = load_robot("point2d", radius=0.1, bounds=[[-2, 2], [-2, 2]])
+    robot = load_robot("point2d", parameters={"radius": 0.1, "bounds": [[-2, 2], [-2, 2]]})
     at = {t: Scene([Obstacle("box", Box([0.2, 0.2, 1.0]), along(0.0, y))]) for t, y in ((0.0, -1.0), (1.0, 1.0))}
     run = by_hand(robot, [[0.0, 0.0]] * 11, [Snapshot(time, scene) for time, scene in at.items()])
     found = run.violations(Problem(World(robot), [0, 0], [0, 1]))
@@ -166,7 +166,7 @@ def test_a_record_of_before_is_judged_by_the_poses_of_its_ticks():
 
 
 def test_a_cloud_that_is_seen_anew_is_judged_as_it_was_then_and_too_many_points_are_not_kept(monkeypatch, tmp_path):
-    robot = load_robot("point2d", radius=0.1, bounds=[[-2, 2], [-2, 2]])
+    robot = load_robot("point2d", parameters={"radius": 0.1, "bounds": [[-2, 2], [-2, 2]]})
 
     def seen(time):
         return Scene([Obstacle("cloud", PointCloud([[0.0, 1.0 - time, 0.0], [0.0, 2.0, 0.0]], 0.05))])
@@ -234,7 +234,7 @@ def test_the_record_holds_what_was_seen(tmp_path):
 
 
 def test_a_contact_that_the_scene_names_may_go_as_deep_as_it_says_and_no_deeper(tmp_path):
-    robot = load_robot("point2d", radius=0.1, bounds=[[-2, 2], [-2, 2]])
+    robot = load_robot("point2d", parameters={"radius": 0.1, "bounds": [[-2, 2], [-2, 2]]})
     wall = Obstacle("wall", Box([0.2, 4.0, 1.0]), along(1.0, 0.0))
     scene = Scene((wall,), contacts=(Touching(robot.link_names[-1], "wall", -0.01),))
     problem = Problem(World(robot), [0, 0], [0, 1])

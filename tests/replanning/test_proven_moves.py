@@ -78,7 +78,7 @@ def test_nothing_is_proven_while_an_obstacle_overlaps_the_base():
 
 
 def test_a_thin_plate_between_two_steps_is_found():
-    robot = load_robot("point2d", radius=0.01, bounds=[[0, 1], [0, 1]])
+    robot = load_robot("point2d", parameters={"radius": 0.01, "bounds": [[0, 1], [0, 1]]})
     plate = Obstacle("plate", Box([1e-4, 2.0, 1.0]), pin.SE3(np.eye(3), np.array([3.0, 0.0, 0.0])))
     moving = MovingWorld(World(robot, Scene([plate]), motion_resolution=0.1))
     a, b = np.array([[0.0, 0.5]]), np.array([[1.0, 0.5]])

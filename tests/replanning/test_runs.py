@@ -153,7 +153,7 @@ def test_a_moving_goal_is_caught():
 
 
 def test_another_branch_is_taken_where_the_goal_configuration_is_blocked():
-    robot = load_robot("planar", lengths=[1.0, 1.0], radius=0.01)
+    robot = load_robot("planar", parameters={"lengths": [1.0, 1.0], "radius": 0.01})
     pole = [(-0.08, -0.08), (0.08, -0.08), (0.08, 0.08), (-0.08, 0.08)]
     poles = [
         Obstacle(name, Prism(pole), place(*p), TimedPoses([0.0, 0.3], [place(*p), place(*q)]))

@@ -121,7 +121,7 @@ def test_where_a_run_was_given_up_is_not_shown_as_its_goal(crossing):
 
 
 def test_a_floor_that_moves_is_replayed_as_it_lies():
-    robot = load_robot("point2d", radius=0.0, bounds=[[0, 20], [0, 20]])
+    robot = load_robot("point2d", parameters={"radius": 0.0, "bounds": [[0, 20], [0, 20]]})
     floor = Obstacle("floor", HalfSpace([0, 1, 0], -2.0), pose(), ConstantVelocity([0.0, 0.1, 0.0]))
     problem = Problem(World(robot, Scene([floor])), [1, 10], [19, 10])
     run = replan(problem, step=0.5, rate=10.0, seconds=0.3)

@@ -20,7 +20,7 @@ run: {step: 0.5, rate: 10, %s}
 
 
 def empty_plane():
-    return Problem(World(load_robot("point2d", bounds=[[0, 20], [0, 20]])), [1.0, 10.0], [3.0, 10.0])
+    return Problem(World(load_robot("point2d", parameters={"bounds": [[0, 20], [0, 20]]})), [1.0, 10.0], [3.0, 10.0])
 
 
 @pytest.mark.parametrize("new", NAMES)

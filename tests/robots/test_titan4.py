@@ -84,7 +84,7 @@ def test_at_zero_the_tip_is_at_full_reach_with_the_published_axes(titan):
 
 
 def test_the_limit_sets_differ_in_the_shoulder_alone():
-    planning, envelope = load_robot("titan4"), load_robot("titan4", limits="envelope")
+    planning, envelope = load_robot("titan4"), load_robot("titan4", parameters={"limits": "envelope"})
     others = [0, 2, 3, 4, 5]
     for robot, shoulder in ((planning, (-34.19, 85.81)), (envelope, (-42, 78))):
         np.testing.assert_allclose(np.degrees([robot.lower[1], robot.upper[1]]), shoulder)
@@ -103,7 +103,9 @@ def test_the_shipped_urdf_is_what_the_generator_writes():
 
 
 def test_another_geometry_moves_the_tip():
-    assert load_robot("titan4", lengths={"d6": 0.333}).fk(np.zeros(6)).translation[0] == pytest.approx(1.916)
+    assert load_robot("titan4", parameters={"lengths": {"d6": 0.333}}).fk(np.zeros(6)).translation[0] == pytest.approx(
+        1.916
+    )
 
 
 def test_the_joints_and_the_tip_speak_the_arms_vocabulary(titan):
@@ -112,7 +114,7 @@ def test_the_joints_and_the_tip_speak_the_arms_vocabulary(titan):
 
 
 def test_named_postures_are_within_both_limit_sets_and_free_of_self_collision(titan):
-    world, envelope = World(titan, Scene()), load_robot("titan4", limits="envelope")
+    world, envelope = World(titan, Scene()), load_robot("titan4", parameters={"limits": "envelope"})
     for name, q in titan.postures.items():
         assert world.valid(q), name
         assert envelope.within_limits(q)[0], name

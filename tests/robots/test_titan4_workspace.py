@@ -14,7 +14,7 @@ NOWHERE = np.array([[50.0, 50.0, 50.0], [51.0, 51.0, 51.0]])
 
 @pytest.fixture(scope="module")
 def robot():
-    return load_robot("titan4", limits="envelope")
+    return load_robot("titan4", parameters={"limits": "envelope"})
 
 
 def seeing_all():
@@ -83,7 +83,7 @@ def test_the_default_space_lies_in_front_of_the_vehicle_and_inside_the_reach(rob
 
 
 def test_moving_the_vehicle_moves_the_space_with_it(robot):
-    moved = load_robot("titan4", limits="envelope", base_pose=pose_from_rpy([1, 2, 3], [0.1, 0.2, 0.3]))
+    moved = load_robot("titan4", base_pose=pose_from_rpy([1, 2, 3], [0.1, 0.2, 0.3]), parameters={"limits": "envelope"})
     x, z = np.arange(0.0, 2.0, 0.2), np.arange(-1.0, 1.0, 0.2)
     np.testing.assert_array_equal(EffectiveWorkspace(moved).side_view(x, z), EffectiveWorkspace(robot).side_view(x, z))
 

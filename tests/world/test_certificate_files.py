@@ -143,7 +143,7 @@ def test_every_cut_of_a_document_is_refused_or_read(tmp_path):
 
 @pytest.mark.kernels
 def test_a_proof_names_what_it_is_about():
-    robot = rrtik.load_robot("planar3", radius=0.02)
+    robot = rrtik.load_robot("planar3", parameters={"radius": 0.02})
 
     def digest(x, margin=0.0):
         wall = Obstacle("wall", Box([0.1, 0.1, 1.0]), rrtik.pose([x, 2.0, 0.0]), margin=margin)
@@ -152,7 +152,7 @@ def test_a_proof_names_what_it_is_about():
         assert pickle.loads(pickle.dumps(proof)).digest == proof.digest
         return proof.digest
 
-    other = World(rrtik.load_robot("planar3", radius=0.03)).prove(np.zeros((2, 3))).digest
+    other = World(rrtik.load_robot("planar3", parameters={"radius": 0.03})).prove(np.zeros((2, 3))).digest
     found = [digest(1.0), digest(1.0 + 1e-9), digest(1.0, margin=0.001), other]
     assert len(set(found)) == 4
     assert all(re.fullmatch("[0-9a-f]{32}", text) for text in found)

@@ -86,7 +86,7 @@ solids = st.one_of(
 
 @given(solids, st.floats(0.0, 0.5), st.integers(0, 2**32 - 1))
 def test_a_disc_is_free_where_it_is_farther_than_the_margin(shape, margin, seed):
-    robot = load_robot("point2d", radius=0.2, bounds=[[-3, 3], [-3, 3]])
+    robot = load_robot("point2d", parameters={"radius": 0.2, "bounds": [[-3, 3], [-3, 3]]})
     rng = np.random.default_rng(seed)
     pose = pin.SE3(pin.exp3(rng.normal(size=3)), np.array([*rng.uniform(-1.0, 1.0, 2), rng.uniform(-0.3, 0.3)]))
     world = World(robot, Scene([Obstacle("it", shape, pose, margin=margin)]))
@@ -99,7 +99,7 @@ def test_a_disc_is_free_where_it_is_farther_than_the_margin(shape, margin, seed)
 
 
 def disc_and_wall(margin, **options):
-    robot = load_robot("point2d", radius=0.5, bounds=[[0, 10], [0, 10]])
+    robot = load_robot("point2d", parameters={"radius": 0.5, "bounds": [[0, 10], [0, 10]]})
     wall = Obstacle("wall", Box([2, 4, 2]), pin.SE3(np.eye(3), np.array([5.0, 5.0, 0.0])), margin=margin)
     return World(robot, Scene([wall]), **options)
 

@@ -32,7 +32,11 @@ HELD = AttachedObject("rod", "panda_hand", Capsule(0.02, 0.3), [0.1, 0.0, 0.2], 
 
 
 def arm_of(name):
-    return replace(load_robot("planar6", radius=0.03), self_collision=True) if name == "planar6" else load_robot(name)
+    return (
+        replace(load_robot("planar6", parameters={"radius": 0.03}), self_collision=True)
+        if name == "planar6"
+        else load_robot(name)
+    )
 
 
 def crowd(name):

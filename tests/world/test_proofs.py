@@ -115,7 +115,7 @@ def test_no_point_leaves_its_chord_by_more_than_the_bound(name, tmp_path):
 
 @pytest.mark.kernels
 def test_a_clearance_is_kept_to_the_micrometre():
-    robot = rrtik.load_robot("point2d", radius=0.5, bounds=[[0.0, 26.0], [0.0, 20.0]])
+    robot = rrtik.load_robot("point2d", parameters={"radius": 0.5, "bounds": [[0.0, 26.0], [0.0, 20.0]]})
     wall = Obstacle("wall", Box([30.0, 1.0, 4.0]), rrtik.pose([13.0, 10.0, 0.0]), margin=0.1)
     world = World(robot, Scene([wall]))
     a, b = np.array([[2.0, 8.895]]), np.array([[20.0, 8.895]])  # 5 mm beyond wall, margin and radius
@@ -129,7 +129,11 @@ def test_a_clearance_is_kept_to_the_micrometre():
 @pytest.mark.parametrize("gap", [1e-4, 2e-6, -2e-6, -1e-4])
 @pytest.mark.parametrize("share", [0.5, 0.31])
 def test_the_outermost_point_of_an_arc_is_seen_to_the_micrometre(gap, share):
-    robot, a, b = rrtik.load_robot("planar3", radius=0.02), np.array([-0.5, 0.0, 0.0]), np.array([0.5, 0.0, 0.0])
+    robot, a, b = (
+        rrtik.load_robot("planar3", parameters={"radius": 0.02}),
+        np.array([-0.5, 0.0, 0.0]),
+        np.array([0.5, 0.0, 0.0]),
+    )
     q = a + share * (b - a)
     way = np.array([np.cos(q[0]), np.sin(q[0]), 0.0])
 
@@ -210,7 +214,7 @@ def test_bodies_of_several_parts_are_not_proven_apart_from_a_half_space_that_the
 
 @pytest.mark.kernels
 def test_a_proof_says_the_least_margin_of_the_obstacles_and_how_far_apart_an_open_pair_is():
-    robot = rrtik.load_robot("point2d", radius=0.5, bounds=[[0, 26], [0, 20]])
+    robot = rrtik.load_robot("point2d", parameters={"radius": 0.5, "bounds": [[0, 26], [0, 20]]})
     wall = Obstacle("wall", Box([30, 1, 4]), rrtik.pose([13, 10, 0]), margin=0.25)
     post = Obstacle("post", Box([1, 1, 4]), rrtik.pose([1, 1, 0]), margin=0.75)
     world = World(robot, Scene([wall, post]))

@@ -49,7 +49,11 @@ def own_gaps(world, Q):
 
 
 def arm_of(name):
-    return replace(load_robot("planar6", radius=0.03), self_collision=True) if name == "planar6" else load_robot(name)
+    return (
+        replace(load_robot("planar6", parameters={"radius": 0.03}), self_collision=True)
+        if name == "planar6"
+        else load_robot(name)
+    )
 
 
 def free_of_contact(name, count):

@@ -68,7 +68,7 @@ def test_what_is_tampered_with_is_refused(name, kind, seed, cases):
 
 
 def test_a_gap_of_an_obstacle_less_than_a_millimetre_away_is_looked_at_closely():
-    robot = rrtik.load_robot("planar3", radius=0.02)
+    robot = rrtik.load_robot("planar3", parameters={"radius": 0.02})
     a, b = np.array([-0.5, 0.0, 0.0]), np.array([0.5, 0.0, 0.0])
     ball = Obstacle("ball", Sphere(0.01), rrtik.pose([3.2, 0.0, 0.0]))
     beyond = World(robot, Scene([ball])).clearance(np.zeros(3))
@@ -94,7 +94,7 @@ def test_what_an_arm_holds_and_what_it_may_touch_are_part_of_the_scene():
 
 
 def test_a_path_that_is_not_proven_has_no_certificate():
-    robot = rrtik.load_robot("planar3", radius=0.02)
+    robot = rrtik.load_robot("planar3", parameters={"radius": 0.02})
     world = World(robot, Scene([Obstacle("ball", Sphere(0.1), rrtik.pose([2.5, 0.0, 0.0]))]))
     path = JointPath.of(robot, [[-0.5, 0.0, 0.0], [0.5, 0.0, 0.0]])
     assert world.certificate(path) is None

@@ -46,7 +46,7 @@ def test_both_opinions_agree_on_random_configurations(name, reach, dented_cube):
 
 def test_a_collision_is_named_with_its_pair_depth_and_points():
     world = World(
-        load_robot("point2d", radius=0.5, bounds=[[0, 10], [0, 10]]),
+        load_robot("point2d", parameters={"radius": 0.5, "bounds": [[0, 10], [0, 10]]}),
         Scene([Obstacle("wall", Box([2, 10, 2]), at(5, 5, 0))]),
     )
     (contact,) = world.contacts([4.2, 5.0])
@@ -73,7 +73,9 @@ def test_motions_are_the_same_in_both_directions_and_see_thin_walls():
     scene = Scene(
         [Obstacle("wall", Box([0.01, 4, 2]), at(5, 5, 0)), Obstacle("block", Prism([(1, 1), (3, 1), (2, 4)]))]
     )
-    world = World(load_robot("point2d", radius=0.01, bounds=[[0, 10], [0, 10]]), scene, motion_resolution=0.02)
+    world = World(
+        load_robot("point2d", parameters={"radius": 0.01, "bounds": [[0, 10], [0, 10]]}), scene, motion_resolution=0.02
+    )
     rng = np.random.default_rng(0)
     A, B = rng.uniform(0, 10, (2, 300, 2))
     forward, backward = world.motion_valid_batch(A, B), world.motion_valid_batch(B, A)
@@ -112,7 +114,7 @@ def test_the_number_of_steps_follows_the_resolution():
 
 
 def test_a_body_wholly_inside_a_hollow_mesh_is_in_collision(dented_cube):
-    robot = load_robot("point2d", radius=0.05, bounds=[[-5, 5], [-5, 5]])
+    robot = load_robot("point2d", parameters={"radius": 0.05, "bounds": [[-5, 5], [-5, 5]]})
     world = World(robot, Scene([Obstacle("tank", dented_cube(3.0, 2.0))]))
     assert not world.valid([0.0, 0.0])
     assert not world.certify(np.zeros((1, 2)))[0]
@@ -152,7 +154,7 @@ def test_the_base_must_not_touch_the_floor():
 @pytest.mark.parametrize("lift", [0.0, -2.9])  # with the second one the open side lies near the origin of the mesh
 def test_a_body_inside_an_open_mesh_is_free(cube, lift):
     basket = Mesh(3.0 * cube.vertices + [0.0, 0.0, lift], cube.triangles[:-2])
-    robot = load_robot("point2d", radius=0.05, bounds=[[-5, 5], [-5, 5]])
+    robot = load_robot("point2d", parameters={"radius": 0.05, "bounds": [[-5, 5], [-5, 5]]})
     world = World(robot, Scene([Obstacle("basket", basket, at(0, 0, -lift))]))
     assert world.valid([0.0, 0.0])
     assert world.certify([[0.0, 0.0]])[0]
@@ -160,7 +162,7 @@ def test_a_body_inside_an_open_mesh_is_free(cube, lift):
 
 
 def test_inside_a_hollow_mesh_the_closest_pair_is_the_one_in_collision(dented_cube):
-    robot = load_robot("point2d", radius=0.05, bounds=[[-5, 5], [-5, 5]])
+    robot = load_robot("point2d", parameters={"radius": 0.05, "bounds": [[-5, 5], [-5, 5]]})
     world = World(robot, Scene([Obstacle("tank", dented_cube(3.0, 2.0)), Obstacle("ball", Sphere(0.1), at(1, 0, 0))]))
     assert world.clearance([0.0, 0.0]) <= 0.0
     assert "tank" in (world.closest([0.0, 0.0]).first, world.closest([0.0, 0.0]).second)
@@ -223,7 +225,7 @@ def test_batches_may_be_empty_of_any_layout_and_any_real_type():
 def test_moving_obstacles_stand_where_they_are_at_time_zero():
     from rrtik_ompl.model.scene import ConstantVelocity, TimedPoses
 
-    robot = load_robot("point2d", radius=0.1, bounds=[[0, 10], [0, 10]])
+    robot = load_robot("point2d", parameters={"radius": 0.1, "bounds": [[0, 10], [0, 10]]})
     buoy = Obstacle("buoy", Sphere(0.5), at(2, 2, 0), ConstantVelocity([1, 0, 0]))
     door = Obstacle("door", Sphere(0.5), motion=TimedPoses([0, 4], [at(8, 2, 0), at(8, 6, 0)]))
     scene = Scene([buoy, door])
@@ -250,7 +252,7 @@ def test_a_half_space_cannot_be_held():
 
 
 def test_where_two_meshes_touch_the_depth_and_a_point_of_the_overlap_are_given(dented_cube):
-    robot = load_robot("point2d", radius=0.05, bounds=[[-5, 5], [-5, 5]])
+    robot = load_robot("point2d", parameters={"radius": 0.05, "bounds": [[-5, 5], [-5, 5]]})
     held = AttachedObject("cup", robot.link_names[-1], dented_cube(0.5, -0.4), at(0, 0, 1))
     bowl = Obstacle("bowl", dented_cube(1.0, -0.8), at(0, 0, 1))
     world = World(robot, Scene([bowl], [held], [("disc", "bowl")]))

@@ -87,7 +87,9 @@ class TrajectoryRun:
 def arm(joints: int, d7: float = 2.2) -> Robot:
     """The arm of three joints, or that of five with a last segment of ``d7`` inches."""
     return (
-        rrtik.load_robot("puma560_3dof") if joints == 3 else rrtik.load_robot("puma560_5dof", lengths={"d7": d7 * INCH})
+        rrtik.load_robot("puma560_3dof")
+        if joints == 3
+        else rrtik.load_robot("puma560_5dof", parameters={"lengths": {"d7": d7 * INCH}})
     )
 
 

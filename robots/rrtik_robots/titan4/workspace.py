@@ -90,7 +90,7 @@ class EffectiveWorkspace:
     """The operating space of an arm on its vehicle.
 
     Attributes:
-        robot: A TITAN 4; use ``limits="envelope"`` for statements about reach.
+        robot: A TITAN 4; use ``parameters={"limits": "envelope"}`` for statements about reach.
         cameras: Cameras, one of which has to see the grip point.
         vehicle: Low and high corner of the vehicle's box in the base frame [m], shape (2, 3). Elbow, wrist and grip
             point must be outside. The default is 3 m long and 2 m high, behind and above the base.
@@ -181,7 +181,7 @@ def effective_slices(space: EffectiveWorkspace | None = None, *, cell: float = C
         space: The workspace of a robot with its cameras and vehicle; the defaults with the envelope limits if None.
         cell: Distance between points of the grid [m].
     """
-    used = EffectiveWorkspace(load_robot("titan4", limits="envelope")) if space is None else space
+    used = EffectiveWorkspace(load_robot("titan4", parameters={"limits": "envelope"})) if space is None else space
     reach = replace(used, cameras=[ALL_SEEING], vehicle=FAR_VEHICLE, margin=0.0)
     x, y, z = (np.arange(low, high, cell) for low, high in GRID)
     views = (

@@ -331,7 +331,7 @@ def joined_links(robot: Robot) -> frozenset[frozenset[str]]:
     is, the joint cannot be attributed to one of them, and the frame counts as joined to none.
 
     Example:
-        >>> sorted(map(sorted, joined_links(rrtik.load_robot("planar3", radius=0.02))))
+        >>> sorted(map(sorted, joined_links(rrtik.load_robot("planar3", parameters={"radius": 0.02}))))
         [['base', 'link1'], ['link1', 'link2'], ['link2', 'link3']]
     """
     links = _links(robot)

@@ -26,7 +26,7 @@ def box(name, x, y, wide=4.0, high=4.0, motion=None):
 
 
 def plane(*obstacles, start=(1.0, 10.0), goal=(19.0, 10.0)):
-    robot = load_robot("point2d", radius=0.0, bounds=[[0, 20], [0, 20]])
+    robot = load_robot("point2d", parameters={"radius": 0.0, "bounds": [[0, 20], [0, 20]]})
     return Problem(World(robot, Scene(obstacles), motion_resolution=0.05), start, goal, name="plane")
 
 

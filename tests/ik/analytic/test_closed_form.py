@@ -29,7 +29,7 @@ def closest(found, Q):
 @pytest.mark.parametrize(
     ("name", "options"),
     [("titan4", {}), ("titan4", {"tip": "gripper"}), ("puma560", {}), ("puma560_3dof", {}), ("planar3", {}),
-     ("planar", {"lengths": [0.7, 0.4]})],
+     ("planar", {"parameters": {"lengths": [0.7, 0.4]}})],
 )  # fmt: skip
 def test_the_base_may_stand_anywhere_and_the_tip_be_any_frame_of_the_last_link(name, options):
     robot = load_robot(name, base_pose=BASE, **options)
@@ -65,7 +65,7 @@ def test_a_planar_arm_of_three_links_reaches_a_pose_in_two_ways():
 
 
 def test_a_planar_arm_of_two_links_reaches_a_point_in_two_ways():
-    robot = load_robot("planar", lengths=[1.0, 0.6])
+    robot = load_robot("planar", parameters={"lengths": [1.0, 0.6]})
     found = solutions(robot, [[1.0, 0.5, 0.0], [1.6, 0.0, 0.0], [0.0, 1.7, 0.0], [1.0, 0.5, 0.1]])
     assert found.real.tolist() == [[True, True], [True, True], [False, False], [False, False]]
     np.testing.assert_allclose(found.residuals[2:, :, 0], 0.1, atol=1e-12)

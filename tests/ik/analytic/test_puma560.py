@@ -49,14 +49,14 @@ def test_joints_with_wide_limits_are_turned_into_them():
 
 
 def test_the_height_of_the_base_counts():
-    robot = load_robot("puma560", base_height=0.0)
+    robot = load_robot("puma560", parameters={"base_height": 0.0})
     q = np.radians([40, 60, -120, 30, 40, 20])
     assert distance_to_branches(solutions(robot, robot.fk_batch(q[None])), q[None])[0] < 1e-9
 
 
-@pytest.mark.parametrize("options", [{}, {"lengths": {"d3": 0.05, "a3": -0.02}}])
-def test_the_first_three_joints_reach_a_point_in_four_ways(options):
-    robot = load_robot("puma560_3dof", **options)
+@pytest.mark.parametrize("parameters", [{}, {"lengths": {"d3": 0.05, "a3": -0.02}}])
+def test_the_first_three_joints_reach_a_point_in_four_ways(parameters):
+    robot = load_robot("puma560_3dof", parameters=parameters)
     Q = np.random.default_rng(2).uniform(robot.lower, robot.upper, (20_000, 3))
     found = solutions(robot, robot.fk_batch(Q))
     assert found.real.all()
@@ -103,7 +103,7 @@ def test_the_form_says_what_its_branches_are():
 
 @pytest.mark.parametrize("d7", [0.05588, 0.2])
 def test_five_joints_reach_their_own_poses_and_the_posture_asked_for_is_among_the_answers(d7):
-    robot = load_robot("puma560_5dof", lengths={"d7": d7})
+    robot = load_robot("puma560_5dof", parameters={"lengths": {"d7": d7}})
     Q = np.random.default_rng(3).uniform(robot.lower, robot.upper, (20_000, 5))
     Q[:5_000, 4] = 0.0  # a straight wrist
     found = solutions(robot, robot.fk_batch(Q), near=Q)

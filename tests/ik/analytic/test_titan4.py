@@ -254,7 +254,7 @@ def test_moving_along_the_null_vector_keeps_the_pose(titan, case):
 
 def test_the_envelope_has_the_vendors_measures():
     """Straight wrist; from the azimuth axis and the mounting face: reach 1922, top 1984, bottom -1308, rear 1125 mm."""
-    robot = load_robot("titan4", limits="envelope")
+    robot = load_robot("titan4", parameters={"limits": "envelope"})
     rng = np.random.default_rng(14)
     Q = rng.uniform(robot.lower, robot.upper, (200_000, 6))
     corners = rng.random((200_000, 6)) < 0.5  # extremes lie on limits and on the stretched arm
@@ -267,7 +267,7 @@ def test_the_envelope_has_the_vendors_measures():
 
 
 def test_another_geometry_has_its_own_closed_form():
-    robot = load_robot("titan4", lengths={"d6": 0.333, "a4": 0.15})
+    robot = load_robot("titan4", parameters={"lengths": {"d6": 0.333, "a4": 0.15}})
     Q = np.random.default_rng(15).uniform(-np.pi, np.pi, (500, 6))
     found = solutions(robot, robot.fk_batch(Q))
     assert distance_to_branches(found, Q).max() < 1e-8

@@ -149,7 +149,7 @@ def test_five_joints_complete_without_extrapolation_and_run_away_with_it():
 
 
 def test_joints_move_less_if_motion_counts():
-    robot = rrtik.load_robot("puma560_5dof", lengths={"d7": 4.0 * INCH})
+    robot = rrtik.load_robot("puma560_5dof", parameters={"lengths": {"d7": 4.0 * INCH}})
     options = replace(STANDARD, motion_weight=0.05 * INCH * 180.0 / np.pi)
     travel = [
         np.median([np.abs(np.diff(follow(robot, 1, each, seed).q, axis=0)).sum() for seed in range(2)])

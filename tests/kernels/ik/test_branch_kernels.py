@@ -134,7 +134,9 @@ def test_blocks_need_not_be_full(name, count):
     assert len(kernel_branches(robot, form_of(robot), poses[:count], None, 0.0, False)[4]) == 0
 
 
-@pytest.mark.parametrize(("name", "options"), [("titan4", {"tip": "gripper"}), ("puma560", {"base_height": 0.2})])
+@pytest.mark.parametrize(
+    ("name", "options"), [("titan4", {"tip": "gripper"}), ("puma560", {"parameters": {"base_height": 0.2}})]
+)
 def test_a_base_elsewhere_another_tip_and_slack_change_nothing(name, options):
     robot = rrtik.load_robot(name, base_pose=BASE, **options)
     Q = np.random.default_rng(2).uniform(robot.lower, robot.upper, (3_000, 6))

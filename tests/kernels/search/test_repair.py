@@ -34,7 +34,7 @@ def wall(y, high):
 
 
 def plane(high):
-    robot = load_robot("point2d", radius=0.0, bounds=[[0, 20], [0, 20]])
+    robot = load_robot("point2d", parameters={"radius": 0.0, "bounds": [[0, 20], [0, 20]]})
     return MovingWorld(World(robot, Scene((wall(10.0, high),)), motion_resolution=0.05))
 
 

@@ -112,7 +112,7 @@ def test_shortcuts_keep_to_their_memory_while_the_route_grows_and_shrinks(name: 
 
 @pytest.mark.parametrize("max_edge", [0.02, 1.0])
 def test_a_repair_keeps_to_its_memory_while_paths_grow(max_edge: float) -> None:
-    robot = load_robot("point2d", radius=0.0, bounds=[[0, 20], [0, 20]])
+    robot = load_robot("point2d", parameters={"radius": 0.0, "bounds": [[0, 20], [0, 20]]})
     wall = Obstacle("wall", Box([2.0, 12.0, 1.0]), pin.SE3(np.eye(3), np.array([10.0, 10.0, 0.0])))
     world = MovingWorld(World(robot, Scene((wall,)), motion_resolution=0.05))
     low, high = robot.finite_range()

@@ -42,8 +42,8 @@ def made(monkeypatch):
 
 
 def robot_of(name):
-    bounds = {"radius": 0.3, "bounds": [[-5, 5], [-5, 5]]} if name == "point2d" else {}
-    return rrtik.load_robot(name, **bounds)
+    parameters = {"radius": 0.3, "bounds": [[-5, 5], [-5, 5]]} if name == "point2d" else None
+    return rrtik.load_robot(name, parameters=parameters)
 
 
 def clutter(robot, reach, shell):

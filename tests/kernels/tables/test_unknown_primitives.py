@@ -20,7 +20,7 @@ UNKNOWN = layout.KINDS.stop
 
 def spoiled_world():
     """A point beside a ball whose kind nobody knows, and the bodies."""
-    robot = rrtik.load_robot("point2d", radius=0.5, bounds=[[0, 10], [0, 10]])
+    robot = rrtik.load_robot("point2d", parameters={"radius": 0.5, "bounds": [[0, 10], [0, 10]]})
     fast = rrtik.World(robot, rrtik.Scene([rrtik.Obstacle("ball", rrtik.Sphere(1.0), rrtik.pose([5, 5, 0]))])).fast
     assert isinstance(fast, FastWorld)
     for primitives in fast._primitives:
@@ -68,7 +68,7 @@ def test_each_twin_refuses_it(twin):
 
 
 def test_no_table_is_packed_with_it():
-    robot = rrtik.load_robot("point2d", radius=0.5, bounds=[[0, 10], [0, 10]])
+    robot = rrtik.load_robot("point2d", parameters={"radius": 0.5, "bounds": [[0, 10], [0, 10]]})
     (body,) = scene_bodies(robot, rrtik.Scene([rrtik.Obstacle("box", rrtik.Box([1, 1, 1]))]))
     known = outer_primitives([body], [np.zeros((0, 4))])
     checked = np.ones((1, 1), dtype=bool)

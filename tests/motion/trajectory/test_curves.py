@@ -190,7 +190,7 @@ def test_a_blend_keeps_the_jerk_limit_and_is_no_slower_than_stopping(seed, blend
 @pytest.mark.parametrize("gap", [1e-3, 5e-5, 2e-6])
 def test_a_motion_that_is_nearer_to_something_than_its_chords_is_proven(gap):
     """Chords leave it by 0.1 mm; where that is too much, finer ones are tried."""
-    robot = load_robot("planar3", radius=0.02)
+    robot = load_robot("planar3", parameters={"radius": 0.02})
     q = np.array([1.1, 0.2, 0.3])
     tip, out = robot.fk(q).translation, np.array([np.cos(1.6), np.sin(1.6), 0.0])
     ball = Obstacle("ball", Sphere(0.1), pose((tip + (0.12 + gap) * out).tolist()))

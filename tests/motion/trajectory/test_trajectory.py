@@ -182,7 +182,7 @@ def test_a_corner_that_cannot_be_rounded_is_a_stop():
     from rrtik_ompl.model.shapes import Box
 
     box = Obstacle("box", Box([2, 2, 2]), pin.SE3(np.eye(3), np.array([6.0, 4.0, 0.0])))
-    world = World(load_robot("point2d", radius=0.1, bounds=[[0, 10], [0, 10]]), Scene([box]))
+    world = World(load_robot("point2d", parameters={"radius": 0.1, "bounds": [[0, 10], [0, 10]]}), Scene([box]))
     path = JointPath.of(world.robot, [[4.89, 1.0], [4.89, 5.11], [9.0, 5.11]])  # close round the corner of the box
     motion = time_parameterize(path, RateLimits(1.0, 1.0), blend=3.0, world=world)
     assert motion.faults(world) == ()

@@ -51,7 +51,7 @@ def gate(width: float) -> Problem:
     obstacles = [
         Obstacle(f"half{k}", box, pose(5.0, y)) for k, (box, y) in enumerate(zip(halves, middles, strict=True))
     ]
-    robot = load_robot("point2d", radius=0.0, bounds=[[0.0, 10.0], [0.0, 10.0]])
+    robot = load_robot("point2d", parameters={"radius": 0.0, "bounds": [[0.0, 10.0], [0.0, 10.0]]})
     return Problem(World(robot, Scene(obstacles)), [2.0, 2.0], [8.0, 2.0])
 
 

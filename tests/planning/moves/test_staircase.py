@@ -23,7 +23,7 @@ from rrtik_ompl.world.world import World
 
 values = st.one_of(st.floats(-3.0, 3.0), st.integers(-2, 2).map(float))
 routes = st.integers(1, 4).flatmap(lambda n: st.lists(st.lists(values, min_size=n, max_size=n), min_size=2, max_size=6))
-FREE = {n: World(load_robot("planar", lengths=[1.0] * n)) for n in (1, 2, 3, 4)}
+FREE = {n: World(load_robot("planar", parameters={"lengths": [1.0] * n})) for n in (1, 2, 3, 4)}
 
 
 def corridor(clearance):
@@ -35,7 +35,7 @@ def corridor(clearance):
         )
         for name, sign in (("left", 1.0), ("right", -1.0))
     ]
-    return World(load_robot("point2d", radius=0.1, bounds=[[0, 10], [0, 10]]), Scene(walls))
+    return World(load_robot("point2d", parameters={"radius": 0.1, "bounds": [[0, 10], [0, 10]]}), Scene(walls))
 
 
 def rebuilt(path):

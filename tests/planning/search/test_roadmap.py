@@ -114,7 +114,7 @@ def test_every_edge_that_is_known_to_be_free_is_free():
 def wall(x):
     """A plane arm's workspace with a ball at the height of its middle."""
     ball = rrtik.Obstacle("ball", rrtik.Sphere(0.25), rrtik.pose([x, 0.9, 0.0]))
-    return rrtik.World(rrtik.load_robot("planar3", radius=0.02), rrtik.Scene([ball]))
+    return rrtik.World(rrtik.load_robot("planar3", parameters={"radius": 0.02}), rrtik.Scene([ball]))
 
 
 def test_after_an_obstacle_has_moved_no_path_runs_through_it_and_the_old_roadmap_is_as_it_was():
@@ -224,7 +224,7 @@ def test_the_planner_takes_the_file_of_a_roadmap(tmp_path):
 
 
 def test_joints_without_limits_are_turned_by_whole_turns():
-    robot = rrtik.load_robot("planar3", radius=0.02)
+    robot = rrtik.load_robot("planar3", parameters={"radius": 0.02})
     endless = robot.continuous.any()
     world = wall(0.5) if endless else rrtik.World(rrtik.load_robot("titan4"))
     made = rrtik.Roadmap(world, vertices=200)
