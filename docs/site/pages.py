@@ -5,12 +5,14 @@ from __future__ import annotations
 import re
 from importlib import import_module
 from pathlib import Path
-from typing import Any
-
-from mkdocs.structure.files import File, Files
+from typing import TYPE_CHECKING, Any
 
 import rrtik_ompl
 from rrtik_ompl.base.lazy import public_values
+
+if TYPE_CHECKING:
+    from mkdocs.config.defaults import MkDocsConfig
+    from mkdocs.structure.files import Files
 
 ROOT = Path(__file__).resolve().parents[2]
 LINK = re.compile(r"\]\((\.\./[^)\s#]+)(#[^)\s]*)?\)")
@@ -18,29 +20,27 @@ PICTURES = ROOT / "bench" / "reports"
 PICTURE = re.compile(
     r"\]\((?:https://raw\.githubusercontent\.com/rrtik-ompl/rrtik-ompl/main|\.\.)/bench/reports/([\w.-]+\.(?:png|gif))\)"
 )
-# The pages of the public names, and the rooms or modules that each of them is of; the longest that fits counts.
-REFERENCE = {
-    "Robots and scenes": ("description", "model", "files", "base.poses", "world"),
-    "Goals and problems": ("model.goal", "model.goal_kind", "constraints", "world.problem", "problem_files"),
-    "Plans and paths": ("planning", "world.path", "benchmark", "viewer"),
-    "Certificates": ("world.certificates",),
-    "Inverse kinematics": ("ik",),
-    "Lines of the tip and tasks": ("planning.tip_motion", "tasks"),
-    "Trajectories and following": ("motion",),
-    "Moving obstacles": ("replanning",),
-    "Cameras": ("sensing", "world.robot_points"),
-    "Own OMPL code": ("ompl_bridge",),
-    "Errors": ("base.errors",),
-}
+NAME = re.compile(r"`([a-zA-Z_.]+)`")
+TABLES = re.compile(r"^### (.+)\n\n\| name \|.*\n\|.*\n((?:\|.*\n)+)", re.MULTILINE)
+
+
+def on_config(config: MkDocsConfig) -> MkDocsConfig:
+    """Give each group of public names a place in the menu."""
+    pages = [_reference_file(title) for title in groups()]
+    assert config.nav is not None
+    config.nav.append({"Reference": pages})
+    return config
 
 
 def on_files(files: Files, config: Any) -> Files:
     """Add the front page, which is the README, the pictures, and one page for each group of public names."""
+    from mkdocs.structure.files import File
+
     files.append(File.generated(config, "index.md", content=_front_page()))
     for picture in [*PICTURES.glob("*.png"), *PICTURES.glob("*.gif")]:
         files.append(File.generated(config, f"pictures/{picture.name}", abs_src_path=str(picture)))
-    for title, names in _groups().items():
-        text = [f"# {title}", *(f"::: {name}" for name in names)]
+    for title, names in groups().items():
+        text = [f"# {title}", *map(_reference, names)]
         files.append(File.generated(config, _reference_file(title), content="\n\n".join(text) + "\n"))
     return files
 
@@ -62,6 +62,9 @@ def on_page_markdown(markdown: str, page: Any, config: Any, files: Files) -> str
         kind = "tree" if file.is_dir() else "blob"
         return f"]({config.repo_url}/{kind}/main/{file.relative_to(ROOT).as_posix()}{found[2] or ''})"
 
+    if page.file.src_uri == "python.md":
+        markdown = TABLES.sub(_linked, markdown)
+
     up = "../" * page.file.src_uri.count("/")
     return LINK.sub(target, PICTURE.sub(rf"]({up}pictures/\1)", markdown))
 
@@ -78,29 +81,37 @@ def _front_page() -> str:
     return re.sub(r"\]\((?!https?:|#)([^)]+)\)", moved, text)
 
 
-def _groups() -> dict[str, list[str]]:
-    """For each page the full names of what is on it.
-
-    Raises:
-        ValueError: If a public name has no page.
-    """
-    groups: dict[str, list[str]] = {title: [] for title in REFERENCE}
-    for public_name, value in public_values(rrtik_ompl).items():
-        name = public_name.split(".")[-1]
-        home = value.__module__ if hasattr(value, "__module__") else value.__name__.rpartition(".")[0]
-        full = f"{home}.{name}"
-        assert getattr(import_module(home), name) is value
-        fitting = {part: title for part, title in _homes().items() if full.startswith(f"rrtik_ompl.{part}.")}
-        if not fitting:
-            raise ValueError(f"{full} is on no page: give its room one in REFERENCE of docs/site/pages.py")
-        groups[fitting[max(fitting, key=len)]].append(full)
-    return groups
+def groups() -> dict[str, list[str]]:
+    """Return the public names by what they are for, such as "plan" and "tip.straight": the tables of docs/python.md."""
+    text = (ROOT / "docs" / "python.md").read_text(encoding="utf-8")
+    return {
+        title: [name for row in table.splitlines() for name in NAME.findall(row.split("|")[1])]
+        for title, table in TABLES.findall(text)
+    }
 
 
-def _homes() -> dict[str, str]:
-    """The page of each room or module."""
-    return {part: title for title, parts in REFERENCE.items() for part in parts}
+def _linked(table: re.Match[str]) -> str:
+    """A table of public names, with a link from each name to its reference."""
+    return re.sub(r"^\|[^|]+\|", lambda cell: NAME.sub(_link, cell[0]), table[0], flags=re.MULTILINE)
+
+
+def _link(name: re.Match[str]) -> str:
+    return f"[{name[0]}][{_full_name(name[1])}]"
+
+
+def _reference(name: str) -> str:
+    """What mkdocstrings makes the reference of a public name of."""
+    return f"::: {_full_name(name)}\n    options:\n      heading: rrtik.{name}\n      toc_label: {name}"
+
+
+def _full_name(public: str) -> str:
+    """The module and the name by which a public name is defined."""
+    value = public_values(rrtik_ompl)[public]
+    home = value.__module__ if hasattr(value, "__module__") else value.__name__.rpartition(".")[0]
+    name = public.split(".")[-1]
+    assert getattr(import_module(home), name) is value
+    return f"{home}.{name}"
 
 
 def _reference_file(title: str) -> str:
-    return f"reference/{title.lower().replace(' ', '_')}.md"
+    return f"reference/{re.sub(r'[ ,]+', '_', title.lower())}.md"

@@ -52,17 +52,17 @@ class Scenario:
         feed_patience: float | None = None,
         **changes: object,
     ) -> ReplanRun:
-        """Replan, with some settings changed; see :func:`rrtik_ompl.replanning.replan`.
+        """Replan, with some settings changed; see :func:`rrtik_ompl.replan`.
 
         Args:
-            scene_feed: See :func:`rrtik_ompl.replanning.replan`.
-            record: See :func:`rrtik_ompl.replanning.replan`.
-            clock: See :func:`rrtik_ompl.replanning.replan`.
-            feed_patience: See :func:`rrtik_ompl.replanning.replan`.
-            changes: Attributes of :class:`rrtik_ompl.replanning.ReplanSettings` that differ from the scenario's.
+            scene_feed: See :func:`rrtik_ompl.replan`.
+            record: See :func:`rrtik_ompl.replan`.
+            clock: See :func:`rrtik_ompl.replan`.
+            feed_patience: See :func:`rrtik_ompl.replan`.
+            changes: Attributes of :class:`.settings.ReplanSettings` that differ from the scenario's.
 
         Raises:
-            InputError: See :func:`rrtik_ompl.replanning.replan`.
+            InputError: See :func:`rrtik_ompl.replan`.
         """
         settings = replace(self.settings, **changes)  # type: ignore[arg-type]
         return replan_with(

@@ -56,7 +56,7 @@ def view(
             kinematics; they replace the ghosts of start and goal. If the goal of a problem is one of them, the page
             plans to the ghost that is chosen there.
         marks: Further bodies: see ``rrtik_ompl.viewer.drawing.marks``.
-        run: A ``ReplanRun`` of :func:`rrtik_ompl.replanning.replan` to replay instead of a path.
+        run: A ``ReplanRun`` of :func:`rrtik_ompl.replan` to replay instead of a path.
         html: File to write. If None, the page is served on 127.0.0.1 until Ctrl-C is pressed.
         title: Heading of the page; None derives it from the name of the problem or robot.
         still: Whether to leave out the planner of the page. With it, start, goal and obstacles of a problem can be

@@ -12,6 +12,7 @@ import pytest
 import yaml
 
 import rrtik_ompl
+from rrtik_ompl.base.lazy import public_values
 from rrtik_ompl.benchmark import load_suite
 from rrtik_ompl.cli.app import run
 from rrtik_ompl.ik.solve import solve_ik
@@ -238,20 +239,34 @@ def test_nothing_is_left_to_verify():
     assert [page for page, text in PAGES.items() if "VERIFY" in text] == []
 
 
+# --- public names ------------------------------------------------------------------------------------------------
+
+
+def test_every_public_name_is_in_one_table_of_the_page_of_names():
+    groups = _script("docs/site/pages.py").groups()
+    named = [name for names in groups.values() for name in names]
+    assert sorted(named) == sorted(public_values(rrtik_ompl))
+    assert next(iter(groups.values()))[0] == "plan"
+
+
 # --- the ladder --------------------------------------------------------------------------------------------------
 
 
 @pytest.fixture(scope="module")
 def ladder():
-    spec = importlib.util.spec_from_file_location("ladder", ROOT / "docs" / "figures" / "ladder.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return _script("docs/figures/ladder.py")
 
 
 def test_the_picture_of_the_ladder_names_every_room(ladder):
     picture = (ROOT / "docs" / "figures" / "ladder.svg").read_text()
     assert [name for floor in ladder.floors() for name in floor if name not in picture] == []
+
+
+def _script(name):
+    spec = importlib.util.spec_from_file_location(Path(name).stem, ROOT / name)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
 
 
 def _prose(page):
