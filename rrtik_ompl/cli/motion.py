@@ -74,11 +74,14 @@ def list_moves(
 def time_path(
     problem: ProblemName,
     path: GivenPath,
-    velocity: Annotated[str | None, typer.Option(help=UNITS.format(""))] = None,
-    acceleration: Annotated[str | None, typer.Option(help=UNITS.format("^2"))] = None,
-    jerk: Annotated[str | None, typer.Option(help=f"{UNITS.format('^3')} inf: no limit.")] = None,
+    velocity_deg: Annotated[str | None, typer.Option(help=UNITS.format(""))] = None,
+    acceleration_deg: Annotated[str | None, typer.Option(help=UNITS.format("^2"))] = None,
+    jerk_deg: Annotated[str | None, typer.Option(help=f"{UNITS.format('^3')} inf: no limit.")] = None,
     share: Annotated[float, typer.Option(help="Share of all limits, above 0 to 1: 0.5 is half as fast.")] = 1.0,
-    blend: Annotated[float, typer.Option(help="Round corners from this far before them [deg]; 0 stops there.")] = 0.0,
+    blend_deg: Annotated[float, typer.Option(help="Round corners from so far before them [deg]; 0 stops there.")] = 0.0,
+    clearance: Annotated[
+        float | None, typer.Option(help="Distance that rounded corners keep from obstacles [m]; 0.001 if left out.")
+    ] = None,
     tip_speed: Annotated[float | None, typer.Option(help="Largest speed of the tip [m/s].")] = None,
     tip_acceleration: Annotated[float | None, typer.Option(help="Largest acceleration of the tip [m/s^2].")] = None,
     torque: Annotated[bool, typer.Option(help="Keep torques within the efforts of the robot's description.")] = False,
@@ -102,11 +105,11 @@ def time_path(
     if payload > 0.0 and not torque:
         raise InputError("--payload counts only for torques: give --torque too")
 
-    texts = {"velocity": velocity, "acceleration": acceleration, "jerk": jerk}
-    given = {name: None if text is None else _rates(text, f"--{name}") for name, text in texts.items()}
+    texts = {"velocity": velocity_deg, "acceleration": acceleration_deg, "jerk": jerk_deg}
+    given = {name: None if text is None else _rates(text, f"--{name}-deg") for name, text in texts.items()}
 
-    if not blend >= 0.0:
-        raise InputError(f"--blend: expected 0 degrees or more, got {blend:g}")
+    if not blend_deg >= 0.0:
+        raise InputError(f"--blend-deg: expected 0 degrees or more, got {blend_deg:g}")
 
     import numpy as np
 
@@ -127,8 +130,9 @@ def time_path(
         found = time_parameterize(
             route,
             limits,
-            blend=float(np.deg2rad(blend)),
+            blend=float(np.deg2rad(blend_deg)),
             world=task.world,
+            clearance=clearance,
             tip_speed=tip_speed,
             tip_acceleration=tip_acceleration,
             torque=torque or None,

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 import typer
 
-from rrtik_ompl.base.choices import CommandShortening, Name, ProofMode, one_of
+from rrtik_ompl.base.choices import Accuracy, CommandShortening, ImproveStrategy, PathObjective, ProofMode, one_of
 from rrtik_ompl.base.errors import InputError, UnknownNameError
 from rrtik_ompl.cli import FOUND, NOT_FOUND
 from rrtik_ompl.cli.terminal import PAGE_FORMATS, ProblemName, command, note, progress, say, suggest
@@ -20,20 +19,24 @@ if TYPE_CHECKING:
     from rrtik_ompl.model.path import JointPath
     from rrtik_ompl.world.problem import Problem
 
-SHORTEN: tuple[CommandShortening, ...] = get_args(CommandShortening)
-PROOF_MODES: tuple[ProofMode, ...] = get_args(ProofMode)
 
+def _choice(names: object, what: str, text: str) -> Any:  # noqa: ANN401 - typer's class has no public name
+    """Return an option that takes one of the names of a ``Literal``.
 
-def _chosen(names: tuple[Name, ...], what: str) -> Callable[[str], Name]:
-    """Return a parser that converts the text of an option to one of the given names."""
+    Args:
+        names: The ``Literal``.
+        what: What is chosen, for the error message.
+        text: The help of the option.
+    """
+    known: tuple[str, ...] = get_args(names)
 
-    def parse(name: str) -> Name:
+    def parse(name: str) -> str:
         try:
-            return one_of(names, name, what)
+            return one_of(known, name, what)
         except UnknownNameError:
-            raise typer.BadParameter(f"'{name}' is not one of {', '.join(map(repr, names))}.") from None
+            raise typer.BadParameter(f"'{name}' is not one of {', '.join(map(repr, known))}.") from None
 
-    return parse
+    return typer.Option(parser=parse, metavar=what.split()[-1].upper(), help=f"{text} One of {', '.join(known)}.")
 
 
 def plan(
@@ -46,23 +49,23 @@ def plan(
     restarts: Annotated[int, typer.Option(help="Largest number of new attempts, if one ends early.")] = 20,
     parameter: Annotated[
         list[str] | None,
-        typer.Option("--set", metavar="NAME=VALUE", help="An option of the planner, in JSON; repeatable."),
+        typer.Option("--parameter", metavar="NAME=VALUE", help="An option of the planner, in JSON; repeatable."),
     ] = None,
     shorten: Annotated[
         CommandShortening,
-        typer.Option(
-            parser=_chosen(SHORTEN, "shortening method"),
-            metavar=f"[{'|'.join(SHORTEN)}]",
-            help="How the path is made shorter; auto: fewest-moves for single-joint moves.",
+        _choice(
+            CommandShortening,
+            "shortening method",
+            "How the path is made shorter; auto keeps single-joint moves and makes them few.",
         ),
     ] = "auto",
+    accuracy: Annotated[
+        Accuracy | None,
+        _choice(Accuracy, "accuracy", "Collisions: conservative counts a doubt as one; the problem's if left out."),
+    ] = None,
     proof: Annotated[
         ProofMode,
-        typer.Option(
-            parser=_chosen(PROOF_MODES, "proof"),
-            metavar=f"[{'|'.join(PROOF_MODES)}]",
-            help="Whether every motion has to be proven free for its whole length.",
-        ),
+        _choice(ProofMode, "proof", "Whether every motion has to be proven free for its whole length."),
     ] = "preferred",
     clearance: Annotated[
         float | None,
@@ -74,6 +77,11 @@ def plan(
         float,
         typer.Option(help="How long to improve the path after it was found [s], within --seconds."),
     ] = 0.0,
+    objective: Annotated[PathObjective, _choice(PathObjective, "objective", "What --improve makes small.")] = "length",
+    strategy: Annotated[
+        ImproveStrategy,
+        _choice(ImproveStrategy, "strategy", "How --improve works: by plans with other seeds, or by this path alone."),
+    ] = "restart-shorten",
     out: Annotated[Path | None, typer.Option(help="Save the path: .json, .csv or .txt (OMPL matrix).")] = None,
     html: Annotated[Path | None, typer.Option(help="Write a self-contained 3-D page to this file.")] = None,
     still: Annotated[bool, typer.Option("--still", help="A page that does not plan by itself: smaller.")] = False,
@@ -108,9 +116,12 @@ def plan(
             seed=seed,
             restarts=restarts,
             parameters=options,
+            accuracy=accuracy,
             proof=proof,
             clearance=clearance,
             improve=improve,
+            objective=objective,
+            strategy=strategy,
             shorten=False if shorten == "none" else shorten,
         )
 
@@ -179,17 +190,17 @@ def _write(
 
 
 def _parameters(pairs: list[str]) -> dict[str, Any]:
-    """Parse options: ``--set range=0.5`` becomes {"range": 0.5}; values are JSON, anything else is text."""
+    """Parse options: ``--parameter range=0.5`` becomes {"range": 0.5}; values are JSON, anything else is text."""
     found = {}
     for pair in pairs:
         name, equals, value = pair.partition("=")
         if not equals or not name:
-            raise InputError(f"--set {pair}: expected NAME=VALUE, for example --set range=0.5")
+            raise InputError(f"--parameter {pair}: expected NAME=VALUE, for example --parameter range=0.5")
 
         try:
             found[name] = json.loads(value)
         except json.JSONDecodeError:
             if value[:1] in ("[", "{"):
-                raise InputError(f"--set {pair}: names stand in quotes: --set 'frozen_joints=[\"elbow\"]'") from None
+                raise InputError(f"--parameter {pair}: names stand in quotes: 'last_joints=[\"elbow\"]'") from None
             found[name] = value
     return found

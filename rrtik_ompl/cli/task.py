@@ -28,7 +28,12 @@ def straight(
     ] = None,
     through: Annotated[Three | None, typer.Option(help="Go along the circle through this point [m].")] = None,
     deviation: Annotated[float, typer.Option(help="Largest deviation of the tip from the line [m].")] = 1e-4,
-    clearance: Annotated[float, typer.Option(help="Distance to keep from obstacles on top of margins [m].")] = 0.0,
+    turn_deviation_deg: Annotated[float, typer.Option(help="Largest deviation of its orientation [deg].")] = 1.0,
+    clearance: Annotated[
+        float | None,
+        typer.Option(help="Distance to keep from obstacles on top of margins [m]; that of the problem if left out."),
+    ] = None,
+    seed: Annotated[int, typer.Option(help="The same seed gives the same motion.")] = 0,
     out: Annotated[Path | None, typer.Option(help="Save the path: .json, .csv or .txt (OMPL matrix).")] = None,
     html: Annotated[Path | None, typer.Option(help="Write a self-contained 3-D page to this file.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")] = False,
@@ -55,7 +60,8 @@ def straight(
     tip = question.robot.fk(question.start)
     place = tip.translation + np.array(by) if by is not None else np.array(to)
     goal: Any = place if rpy_deg is None else pose_from_rpy(place, np.radians(rpy_deg))
-    kept: dict[str, Any] = {"deviation": deviation, "clearance": clearance}
+    turn = float(np.radians(turn_deviation_deg))
+    kept: dict[str, Any] = {"deviation": deviation, "turn_deviation": turn, "clearance": clearance, "seed": seed}
 
     with progress(f"following a line in {question.name}"):
         if through is None:

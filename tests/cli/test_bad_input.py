@@ -72,7 +72,8 @@ def mesh(name, data, rest=""):
 
 CHECK = ("check", "task.yaml")
 # fmt: off
-OPTION = ("plan", "task.yaml", "--planner", "bicrdt", "--set")
+ITS_PLANNER = ("plan", "task.yaml", "--planner")
+OPTION = (*ITS_PLANNER, "bicrdt", "--parameter")
 COMMAND_LINE = {
     # files
     "missing problem file": ({}, CHECK, ["task.yaml", "no such file"]),
@@ -225,12 +226,12 @@ COMMAND_LINE = {
                                   ["max_iteration", "did you mean 'max_iterations'"]),
     "parameter that is not given by hand": (task(), (*OPTION, "world=1"), ["world", "max_iter"]),
     "parameter of another type": (task(), (*OPTION, "max_iterations=few"), ["max_it", "'few'"]),
-    "parameter is nan": (task(), ("plan", "task.yaml", "--planner", "RRT", "--set", "range=NaN"), ["range", "finite"]),
+    "parameter is nan": (task(), (*ITS_PLANNER, "RRT", "--parameter", "range=NaN"), ["range", "finite"]),
     "time is nan": (task(), ("plan", "task.yaml", "--seconds", "nan"), ["seconds"]),
     "negative restarts": (task(), ("plan", "task.yaml", "--restarts", "-1"), ["restarts"]),
     "unknown shortener": (task(), ("plan", "task.yaml", "--shorten", "magic"), ["--shorten", "magic"]),
-    "parameter without value": (task(), ("plan", "task.yaml", "--set", "range"), ["--set", "NAME=VALUE"]),
-    "names without quotes": (task(), ("plan", "task.yaml", "--set", "frozen_joints=[joint1]"), ["--set", "in quotes"]),
+    "parameter without value": (task(), ("plan", "task.yaml", "--parameter", "range"), ["--parameter", "NAME=VALUE"]),
+    "names without quotes": (task(), (*OPTION, "frozen_joints=[joint1]"), ["--parameter", "in quotes"]),
     "record of a replay": ({}, ("replan", "replan_ur5", "--replay", "a.json", "--record", "b.json"), ["leave out"]),
     "foreseen replay": ({}, ("replan", "replan_ur5", "--replay", "a.json", "--foreseen"), ["leave out --foreseen"]),
     "foreseen ticks": ({}, ("replan", "replan_ur5", "--foreseen", "--lookahead-ticks", "3"), ["--foreseen"]),

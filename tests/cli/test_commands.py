@@ -71,10 +71,11 @@ def test_a_planner_that_moves_all_joints_prints_waypoints(capsys):
 
 
 def test_options_of_the_planner_are_passed_on(capsys):
-    code, _, err = rrtik(capsys, "plan", "titan4_sdu", "--planner", "RRTConnect", "--set", "rang=0.5")
+    asked = ("plan", "titan4_sdu", "--planner", "RRTConnect", "--seed", "1", "--parameter")
+    code, _, err = rrtik(capsys, *asked, "rang=0.5")
     assert code == 2
     assert "did you mean 'range'" in err
-    assert rrtik(capsys, "plan", "titan4_sdu", "--planner", "RRTConnect", "--set", "range=0.5", "--seed", "1")[0] == 0
+    assert rrtik(capsys, *asked, "range=0.5")[0] == 0
 
 
 def test_not_found_is_exit_1_with_the_reason_and_no_file(capsys, tmp_path):
@@ -160,23 +161,24 @@ def test_time_writes_a_trajectory_and_a_picture(capsys, tmp_path, several):
     motion = Trajectory.load(target)
     assert f"{motion.duration:.3f} s" in out
     assert picture.read_bytes().startswith(b"\x89PNG")
-    faster = json.loads(rrtik(capsys, "time", "titan4_sdu", several, "--velocity", "40", "--jerk", "inf", "--json")[1])
+    quick = ("--velocity-deg", "40", "--jerk-deg", "inf")
+    faster = json.loads(rrtik(capsys, "time", "titan4_sdu", several, *quick, "--json")[1])
     assert faster["duration"] < motion.duration
     slower = json.loads(rrtik(capsys, "time", "titan4_sdu", several, "--share", "0.5", "--json")[1])
     assert slower["duration"] > motion.duration
-    rounded = ("time", "titan4_sdu", several, "--blend", "20", "--jerk", "inf", "--json")
+    rounded = ("time", "titan4_sdu", several, "--blend-deg", "20", "--jerk-deg", "inf", "--json")
     assert json.loads(rrtik(capsys, *rounded)[1])["duration"] < motion.duration
 
 
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (("--velocity", "0"), "--velocity: expected numbers greater than 0, got 0"),
-        (("--velocity", "nan"), "--velocity: expected numbers greater than 0, got nan"),
-        (("--acceleration", "1,2"), "6 joints"),
-        (("--jerk", "fast"), "expected a number"),
+        (("--velocity-deg", "0"), "--velocity-deg: expected numbers greater than 0, got 0"),
+        (("--velocity-deg", "nan"), "--velocity-deg: expected numbers greater than 0, got nan"),
+        (("--acceleration-deg", "1,2"), "6 joints"),
+        (("--jerk-deg", "fast"), "expected a number"),
         (("--share", "0"), "share"),
-        (("--blend", "-1"), "0 degrees or more, got -1"),
+        (("--blend-deg", "-1"), "0 degrees or more, got -1"),
         (("--rate", "100"), "give --out FILE too"),
         (("--payload", "1"), "give --torque too"),
         (("--tip-speed", "250"), "for 250 mm/s give 0.25"),
@@ -192,7 +194,7 @@ def test_limits_and_files_that_are_none_are_refused_in_one_line(capsys, several,
 
 
 def test_a_plan_and_its_shortening_move_the_last_joint_last(capsys):
-    last = ("--set", 'last_joints=["azimuth"]', "--seed", "2", "--json")
+    last = ("--parameter", 'last_joints=["azimuth"]', "--seed", "2", "--json")
     found = json.loads(rrtik(capsys, "plan", "titan4_sdu", *last)[1])
     assert [move["joint"] for move in found["moves"]].index("azimuth") == found["transitions"] - 1
 

@@ -2,6 +2,7 @@
 
 import time
 from itertools import pairwise
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -9,8 +10,8 @@ import pytest
 import rrtik_ompl as rrtik
 from rrtik_bench.shortening import plane_worlds
 from rrtik_ompl.base.budget import Budget
+from rrtik_ompl.base.choices import CommandShortening
 from rrtik_ompl.base.errors import InputError, PathWarning
-from rrtik_ompl.cli.plan import SHORTEN
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.transitions import route_length, single_joint, transitions
 from rrtik_ompl.planning.shortening import METHODS, Task, Wishes
@@ -314,7 +315,7 @@ def test_a_path_in_collision_is_refused(problem, raw):
 
 
 def test_the_command_line_offers_every_method():
-    assert set(SHORTEN) == {*METHODS, "none"}
+    assert set(get_args(CommandShortening)) == {*METHODS, "none"}
 
 
 @pytest.fixture(scope="module")
