@@ -40,7 +40,7 @@ OPTIONS = (
 @cache
 def plan_of(name: str, planner: Any, seed: int = 1, options: str = "{}", **more: Any) -> Any:
     chosen = json.loads(options) | ({"ik_seconds": LONG} if planner == "mbrrt" else {})
-    return rrtik.plan(problem_of(name), planner, seconds=LONG, seed=seed, parameters=chosen, **more)
+    return rrtik.plan(problem_of(name), planner, seconds=LONG, seed=seed, parameters=chosen, **more, shorten=False)
 
 
 def plan_case(*given: Any, **more: Any) -> Result:

@@ -5,8 +5,9 @@ import numpy as np
 import rrtik_ompl as rrtik
 
 problem = rrtik.load_problem("titan4_sdu")
-quick = rrtik.plan(problem, "bicrdt", seed=1)
-print(f"bicrdt: {quick.path.transitions} moves")
+own = rrtik.plan(problem, "bicrdt", shorten=False).require()
+quick = rrtik.plan(problem, "bicrdt").require()
+print(f"bicrdt: {own.transitions} moves; shortened: {quick.transitions}")
 
 best = rrtik.plan(problem, "fewest-moves", seed=1)
 print(f"fewest-moves: {best.path.transitions}, and no path has fewer than {best.statistics['lower_bound']}")

@@ -64,17 +64,19 @@ def measured(name: str, kind: str, seed: int) -> Outcome:
     problem = drawn.problem
     if problem is None:
         return Outcome(drawn.scenes, False, 0, False, False, False, False, 0.0, 0.0, False, 0, 0.0, 0.0, 0.0, 0)
-    first = rrtik.plan(problem, "cbirrt", seconds=WALL * LIMIT, seed=seed)  # kernels and the tables of the world too
+    # Loads the kernels and makes the tables of the world too.
+    first = rrtik.plan(problem, "cbirrt", seconds=WALL * LIMIT, seed=seed, shorten=False)
     times: dict[str, list[float]] = {"cbirrt": [], "auto": []}
     plans = {"cbirrt": first, "auto": first}
     for _ in range(ROUNDS if first.found else 0):
         for planner, taken in times.items():
-            seconds, plans[planner] = spent(partial(rrtik.plan, problem, planner, seconds=WALL * LIMIT, seed=seed))
+            given = {"seconds": WALL * LIMIT, "seed": seed, "shorten": planner == "auto"}
+            seconds, plans[planner] = spent(partial(rrtik.plan, problem, planner, **given))
             taken.append(seconds)
     search, whole = plans["cbirrt"], plans["auto"]
     found = search.found and whole.found and max(min(taken) for taken in times.values()) <= LIMIT
     apart = not search.found and "keeps start and goal apart" in search.reason
-    solvable = search.found or rrtik.plan(problem, "cbirrt", seconds=LONG, seed=seed + 1).found
+    solvable = search.found or rrtik.plan(problem, "cbirrt", seconds=LONG, seed=seed + 1, shorten=False).found
     seen = [judged(problem, plan.path.waypoints) for plan in (search, whole) if plan.path is not None]
     return Outcome(
         drawn.scenes,
@@ -119,7 +121,7 @@ def branches(name: str, kind: str, seed: int) -> Branches:
         return Branches(False, False, False, 0.0)
     world = rrtik.World(crowded.robot)
     problem = rrtik.Problem(world, crowded.start, crowded.goal, constraints=crowded.constraints)
-    seconds, plan = spent(lambda: rrtik.plan(problem, "cbirrt", seconds=LIMIT, seed=seed))
+    seconds, plan = spent(lambda: rrtik.plan(problem, "cbirrt", seconds=LIMIT, seed=seed, shorten=False))
     apart = not plan.found and "keeps start and goal apart" in plan.reason
     return Branches(plan.found, apart, joined_without_obstacles(problem, seed, EXPLORED), seconds)
 

@@ -69,9 +69,9 @@ class FewestMovesRun:
 
 def one_run(problem: Problem, seed: int) -> FewestMovesRun:
     """Plan twice."""
-    plan = rrtik.plan(problem, FewestMoves, seconds=LIMITS.get(problem.name, LIMIT), seed=seed)
+    plan = rrtik.plan(problem, FewestMoves, seconds=LIMITS.get(problem.name, LIMIT), seed=seed, shorten=False)
     begin = perf_counter()
-    raw = rrtik.plan(problem, "bicrdt", seconds=60.0, seed=seed)
+    raw = rrtik.plan(problem, "bicrdt", seconds=60.0, seed=seed, shorten=False)
     if raw.path is None:
         raise SystemExit(f"{problem.name}, seed {seed}: {raw.reason}")
     cut = rrtik.shorten(raw.path, problem, method="axis")
@@ -195,7 +195,7 @@ def tables(report: Report, results: dict[str, Measured]) -> None:
 def main(run: Run, *, runs: Annotated[int, Option(help="Of each problem.")] = 100) -> Report:
     """Measure."""
     report = run.report("Fewest moves, measured")
-    rrtik.plan(rrtik.load_problem("titan4_sdu"), FewestMoves, seed=0)  # compiles, if need be
+    rrtik.plan(rrtik.load_problem("titan4_sdu"), FewestMoves, seed=0, shorten=False)  # compiles, if need be
     results = {name: measured(name, runs) for name in NAMES}
     bars(report, results)
     tables(report, results)

@@ -149,7 +149,7 @@ def outcome(number: int) -> Outcome:
     goal = goal_joints(case.problem)
     begin = process_time()
     with patch("time.perf_counter", process_time):  # so that a busy machine does not decide
-        plan = rrtik.plan(case.problem, FewestMoves, seconds=LIMIT, seed=number)
+        plan = rrtik.plan(case.problem, FewestMoves, seconds=LIMIT, seed=number, shorten=False)
     seconds = process_time() - begin
     route = None if plan.path is None else plan.path.waypoints
     return Outcome(

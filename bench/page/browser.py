@@ -55,7 +55,7 @@ class Dragged:
 
 def dragged(problem: rrtik.Problem, drags: int, timed: int, seed: int) -> Dragged:
     """Drag at random in the page of a problem; every path with its problem goes through `rrtik check`."""
-    path = rrtik.plan(problem, "fastrrtconnect", seed=seed).path
+    path = rrtik.plan(problem, "fastrrtconnect", seed=seed, shorten=False).path
     text = page(problem, path, asks=True)
     found: dict[str, Any] = {}
     arrived = threading.Event()

@@ -133,7 +133,7 @@ def compared(
     group = f"{arm}, {family}"
     problem = _problem(arm, family, number, file)
     outcomes = []
-    call = partial(rrtik.plan, problem, PLANNER, seconds=seconds)
+    call = partial(rrtik.plan, problem, PLANNER, seconds=seconds, shorten=False)
     call(seed=0)  # what a world keeps is made
     paths: dict[str, JointPath] = {}
     with TemporaryDirectory() as folder:

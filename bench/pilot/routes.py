@@ -95,7 +95,7 @@ def simulated_pilot(count: int) -> SimulatedPilot:
     rng, rates, rows = np.random.default_rng(3), joint_rates(ROBOT), []
     for seed in range(count):
         route = route_to(WORLD, np.array(PROBLEM.start), np.array(goal_joints(PROBLEM)), rates, seed)
-        several = rrtik.plan(PROBLEM, "RRTConnect", seconds=5.0, seed=seed).path
+        several = rrtik.plan(PROBLEM, "RRTConnect", seconds=5.0, seed=seed, shorten=False).path
         if isinstance(route, NoRoute) or several is None:
             continue
         rows.append([*_piloted(route.path, rates, rng), *_piloted(_naive(several), rates, rng)])

@@ -49,7 +49,7 @@ def shortest(problem: Problem, seconds: float) -> float:
     for seed in count():
         if time.process_time() >= end:
             return best
-        found = plan(problem, "fastrrtconnect", seed=seed, seconds=seconds)
+        found = plan(problem, "fastrrtconnect", seed=seed, seconds=seconds, shorten=False)
         if found.path is not None and len(found.path.waypoints) > 2:
             best = min(best, shorten(found.path, problem, seed=seed, one_joint=False, checks=CHECKS).length)
         elif found.path is not None:

@@ -71,7 +71,7 @@ def planned(world: World, ends: Matrix, planner: str, parameters: dict[str, obje
     for start, goal in ends:
         problem = Problem(world, start, goal)
         begin = process_time()
-        found = plan(problem, planner, seed=1, parameters=parameters)
+        found = plan(problem, planner, seed=1, parameters=parameters, shorten=False)
         seconds.append(process_time() - begin)
         proven += bool(found.proven)
     return np.array(seconds), proven

@@ -93,7 +93,7 @@ def planned(arm: str, family: str, seed: int) -> Judged:
     problem = thin_problem(arm, family, seed)
     if problem is None:
         return Judged(found=False)
-    found = rrtik.plan(problem, PLANNERS[seed % len(PLANNERS)], seed=seed, seconds=SECONDS)
+    found = rrtik.plan(problem, PLANNERS[seed % len(PLANNERS)], seed=seed, seconds=SECONDS, shorten=False)
     if found.path is None or found.path.proof is None:
         return Judged(found=False)
     cut = deepest_cut(problem.world, found.path)
@@ -127,7 +127,9 @@ def by_every_method(problem: Problem, seed: int) -> Iterator[tuple[JointPath, Jo
     Methods for single-joint moves take a path of BiCRDT, the others one of RRT-Connect.
     """
     paths = {
-        single: rrtik.plan(problem, "bicrdt" if single else "fastrrtconnect", seed=seed, seconds=SECONDS).path
+        single: rrtik.plan(
+            problem, "bicrdt" if single else "fastrrtconnect", seed=seed, seconds=SECONDS, shorten=False
+        ).path
         for single in (False, True)
     }
     for method in METHODS:
@@ -230,9 +232,9 @@ def benchmark_problem(file: str, urdf: str) -> Timed:
 
     with patch("rrtik_ompl.planning.attempts.attempt", timed):
         begin = process_time()
-        found = rrtik.plan(problem, "fastrrtconnect", seed=1)
+        found = rrtik.plan(problem, "fastrrtconnect", seed=1, shorten=False)
         whole = process_time() - begin
-    first = rrtik.plan(problem, "fastrrtconnect", seed=1, proof="off").path
+    first = rrtik.plan(problem, "fastrrtconnect", seed=1, proof="off", shorten=False).path
     assert first is not None
     assert found.path is not None
     proof = _seconds(problem.world, first.waypoints, 5)

@@ -194,7 +194,7 @@ def _by_plan(loop: Loop, planner: str) -> tuple[float, float] | None:
     begin = time.process_time()
     world = rrtik.World(loop._problem.robot, still(loop._world.scene), accuracy="conservative")
     problem = rrtik.Problem(world, loop.q, loop._goals[0])
-    found = plan(problem, planner, seconds=2.0, seed=1)
+    found = plan(problem, planner, seconds=2.0, seed=1, shorten=False)
     if found.path is None:
         return None
     several = len(found.path.waypoints) > 2

@@ -57,7 +57,7 @@ def memory(what: str, count: int) -> list[float]:
     problem, sizes = load_problem("planar3_boxes"), list[float]()
     with TemporaryDirectory() as folder:
         for number in range(1, count + 1):
-            path = plan(problem, "bicrdt", seed=1 if what == "pages" else number).path
+            path = plan(problem, "bicrdt", seed=1 if what == "pages" else number, shorten=False).path
             if what == "pages":
                 view(problem, path, html=Path(folder) / "page.html")
             if number % max(count // LOOKS, 1) == 0:

@@ -90,7 +90,7 @@ def _among(scene: Scene, plans: int, *, corner: bool = False) -> Among:
         blocked = ~world.motion_valid_batch(starts[:FIRST], ends[:FIRST])
         starts, ends = starts[:FIRST][blocked], ends[:FIRST][blocked]
     problems = [Problem(world, a, b) for a, b in zip(starts[:plans], ends[:plans], strict=True)]
-    ask = [partial(plan, problem, PLANNER, seed=1, seconds=BUSY) for problem in problems]
+    ask = [partial(plan, problem, PLANNER, seed=1, seconds=BUSY, shorten=False) for problem in problems]
     ask[0]()
     runs, moves = [spent(call) for call in ask], _move(world)
     return Among(

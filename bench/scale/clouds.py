@@ -83,8 +83,8 @@ def seen_as_points(file: str, folder: str, count: int, judged: bool) -> Seen:
         asked = Problem(world, problem.start, problem.goal)
     except ProblemError:
         return cost("swallowed")
-    plan(asked, PLANNER, seed=2, seconds=BUSY)
-    taken, found = spent(partial(plan, asked, PLANNER, seed=1, seconds=BUSY))
+    plan(asked, PLANNER, seed=2, seconds=BUSY, shorten=False)
+    taken, found = spent(partial(plan, asked, PLANNER, seed=1, seconds=BUSY, shorten=False))
     if found.path is None:
         return cost("not found", plan=1e3 * taken)
     gap = nearest(robot, found.path.waypoints, cloud) if judged else float("nan")

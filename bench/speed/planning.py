@@ -149,7 +149,7 @@ def _whole_plan(problem: Problem, options: Options) -> Callable[[int], Matrix | 
     """The call that a person makes: search, restarts and second check; from a seed to a path."""
 
     def whole(seed: int) -> Matrix | None:
-        found = plan(problem, PLANNER, seconds=options.limit, seed=seed)
+        found = plan(problem, PLANNER, seconds=options.limit, seed=seed, shorten=False)
         return None if found.path is None else found.path.waypoints
 
     return whole

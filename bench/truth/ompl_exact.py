@@ -183,7 +183,7 @@ def own_planner(name: str, way: str, count: int) -> None:
     planner = getattr(own_planners, name)
     for seed in range(count):
         if way == "plan":
-            assert plan(problem, planner, seed=seed).found
+            assert plan(problem, planner, seed=seed, shorten=False).found
         else:
             setup = simple_setup(problem)
             setup.setPlanner(planner(setup.getSpaceInformation()))

@@ -10,6 +10,7 @@ from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.choices import ImproveStrategy, PathObjective, ProofMode
 from rrtik_ompl.base.copies import as_value, in_notebook, in_one_line
 from rrtik_ompl.model.path import JointPath
+from rrtik_ompl.model.result import required
 from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.route_check import as_it_stands
@@ -112,6 +113,14 @@ class Plan:
 
     def __reduce__(self) -> tuple[Any, ...]:
         return as_value(replace(self, problem=None))
+
+    def require(self) -> JointPath:
+        """Return the path.
+
+        Raises:
+            NotFoundError: If there is none; the message is one line with the reason.
+        """
+        return required(self.path, "no path", self.reason)
 
     @property
     def proven(self) -> bool | None:

@@ -60,7 +60,7 @@ class CountedMotions:
 
 def route_run(problem: Problem, seed: int) -> RouteRun:
     """Plan with BiCRDT and cut."""
-    plan = rrtik.plan(problem, planner="bicrdt", seconds=60.0, seed=seed)
+    plan = rrtik.plan(problem, planner="bicrdt", seconds=60.0, seed=seed, shorten=False)
     if plan.path is None:
         raise SystemExit(f"{problem.name}, seed {seed}: {plan.reason}")
     motions, raw, begin = CountedMotions(problem.world), plan.path.waypoints, perf_counter()

@@ -125,7 +125,7 @@ def pilots_route(quick: bool) -> list[Row]:
     problem = rrtik.load_problem("titan4_sdu")
     search, cut = [], []
     for seed in range(5 if quick else 25):
-        plan = rrtik.plan(problem, "RRTConnect", seconds=10.0, seed=seed)
+        plan = rrtik.plan(problem, "RRTConnect", seconds=10.0, seed=seed, shorten=False)
         if plan.path is None:
             continue
         begin = time.perf_counter()
