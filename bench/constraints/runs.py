@@ -70,8 +70,9 @@ def measured(name: str, kind: str, seed: int) -> Outcome:
     plans = {"cbirrt": first, "auto": first}
     for _ in range(ROUNDS if first.found else 0):
         for planner, taken in times.items():
-            given = {"seconds": WALL * LIMIT, "seed": seed, "shorten": planner == "auto"}
-            seconds, plans[planner] = spent(partial(rrtik.plan, problem, planner, **given))
+            finished = planner == "auto"
+            call = partial(rrtik.plan, problem, planner, seconds=WALL * LIMIT, seed=seed, shorten=finished)
+            seconds, plans[planner] = spent(call)
             taken.append(seconds)
     search, whole = plans["cbirrt"], plans["auto"]
     found = search.found and whole.found and max(min(taken) for taken in times.values()) <= LIMIT

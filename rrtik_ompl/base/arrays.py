@@ -344,6 +344,17 @@ def whole_number(value: object, what: str, least: int = 0) -> int:
     return int(value)
 
 
+def seed_of(seed: object) -> int:
+    """Validate the seed of random numbers given by a user; None draws one.
+
+    Raises:
+        InputError: If it is neither None nor a whole number of at least 0.
+    """
+    if seed is None:
+        return int(np.random.default_rng().integers(2**31))
+    return whole_number(seed, "seed")
+
+
 def _short(value: object) -> str:
     text = repr(value)
     return text if len(text) <= 60 else text[:57] + "..."

@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from rrtik_ompl.base.arrays import positive, whole_number
+from rrtik_ompl.base.arrays import positive, seed_of, whole_number
 from rrtik_ompl.base.choices import SuiteShortening, one_of
 from rrtik_ompl.base.errors import InputError, RrtikError, UnknownNameError, listed, require
 from rrtik_ompl.benchmark import spread
@@ -26,7 +26,7 @@ def plan_batch(
     planner: str | None = None,
     *,
     seconds: float = 5.0,
-    seed: int = 0,
+    seed: int | None = 0,
     parameters: Mapping[str, Any] | None = None,
     shorten: SuiteShortening = NONE,
     memory_mb: float = 4096.0,
@@ -46,7 +46,7 @@ def plan_batch(
         problems: Names of shipped problems, or files.
         planner: Name of one of :func:`rrtik_ompl.list_planners`; None for the default of :func:`rrtik_ompl.plan`.
         seconds: Time limit of each query [s]; a query in a process is killed 30 s after three times this limit.
-        seed: Seed of all queries.
+        seed: Seed of all queries; None draws one.
         parameters: Options of the planner.
         shorten: A shortening method, "none", or "by-kind": axis for single-joint moves.
         memory_mb: Memory of a query in a process in addition to robot, scene and library [MB].
@@ -85,7 +85,7 @@ def plan_batch(
         seconds=limit,
         patience=3.0 * limit + 30.0,
         memory_mb=positive(memory_mb, "memory_mb"),
-        seed=whole_number(seed, "seed"),
+        seed=seed_of(seed),
     )
 
     left = all_jobs(suite)

@@ -11,7 +11,7 @@ import typer
 
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.cli import FOUND, NOT_FOUND
-from rrtik_ompl.cli.terminal import PAGE_FORMATS, note, plural, progress, say, suggest
+from rrtik_ompl.cli.terminal import PAGE_FORMATS, Seed, note, plural, progress, say, suggest
 from rrtik_ompl.files.text import check_target, comma_numbers
 
 if TYPE_CHECKING:
@@ -92,7 +92,7 @@ def inverse_kinematics(
     seconds: Annotated[
         float | None, typer.Option(help="Wall time for a numeric method [s]; per pose with --poses.")
     ] = None,
-    seed: Annotated[int, typer.Option(help="The same seed gives the same answer.")] = 0,
+    seed: Seed = 0,
     poses: Annotated[Path | None, typer.Option(help="Many poses or points: .csv, .json or .yaml.")] = None,
     trajectory: Annotated[
         bool, typer.Option("--trajectory", help="Follow --poses from one to the next without jumps.")

@@ -10,7 +10,7 @@ import typer
 
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.cli import FOUND
-from rrtik_ompl.cli.terminal import ProblemName, note, progress, say
+from rrtik_ompl.cli.terminal import ProblemName, Seed, note, progress, say
 
 if TYPE_CHECKING:
     from rrtik_ompl.pilot.setup import OpenSession
@@ -53,7 +53,7 @@ def pilot(
     key: Annotated[Path | None, typer.Option(help="Private key of the certificate, if it is not in its file.")] = None,
     sigmas: Annotated[float, typer.Option(help="Margin of detected objects, in standard deviations; 0: none.")] = 3.0,
     no_browser: Annotated[bool, typer.Option("--no-browser", help="Do not open a browser.")] = False,
-    seed: Annotated[int, typer.Option(help="The same commands give the same routes.", min=0)] = 0,
+    seed: Seed = 0,
 ) -> int:
     """Open a page that helps a pilot drive an arm.
 

@@ -11,7 +11,7 @@ import typer
 from rrtik_ompl.base.choices import Accuracy, CommandShortening, ImproveStrategy, PathObjective, ProofMode, one_of
 from rrtik_ompl.base.errors import InputError, UnknownNameError
 from rrtik_ompl.cli import FOUND, NOT_FOUND
-from rrtik_ompl.cli.terminal import PAGE_FORMATS, ProblemName, command, note, progress, say, suggest
+from rrtik_ompl.cli.terminal import PAGE_FORMATS, ProblemName, Seed, command, note, progress, say, suggest
 from rrtik_ompl.files.tables import FORMATS as PATH_FORMATS
 from rrtik_ompl.files.text import check_target
 
@@ -45,7 +45,7 @@ def plan(
         str | None, typer.Option(help="See: rrtik list planners. If left out, the problem's planner, or else auto.")
     ] = None,
     seconds: Annotated[float, typer.Option(help="Limit of wall time [s].")] = 5.0,
-    seed: Annotated[int | None, typer.Option(help="The same seed gives the same path; random if left out.")] = None,
+    seed: Seed = 0,
     restarts: Annotated[int, typer.Option(help="Largest number of new attempts, if one ends early.")] = 20,
     parameter: Annotated[
         list[str] | None,

@@ -10,7 +10,7 @@ import typer
 
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.cli import FOUND
-from rrtik_ompl.cli.terminal import PAGE_FORMATS, progress, say
+from rrtik_ompl.cli.terminal import PAGE_FORMATS, Seed, progress, say
 from rrtik_ompl.files.text import check_target
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ def reach(
     effective: Annotated[
         bool, typer.Option("--effective", help="The robot's effective workspace: cameras, vehicle, margins (titan4).")
     ] = False,
-    seed: Annotated[int, typer.Option(help="The same seed gives the same map.")] = 0,
+    seed: Seed = 0,
     out: Annotated[Path | None, typer.Option(help="Save the map: .npz, or .csv with a row per cell.")] = None,
     plot: Annotated[Path | None, typer.Option(help="Draw two slices: .png or .svg.")] = None,
     html: Annotated[Path | None, typer.Option(help="Write a 3-D page with the cells, a quarter cut away.")] = None,

@@ -12,7 +12,7 @@ import typer
 
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.cli import FOUND, NOT_FOUND
-from rrtik_ompl.cli.terminal import PAGE_FORMATS, note, progress, say
+from rrtik_ompl.cli.terminal import PAGE_FORMATS, Seed, note, progress, say
 from rrtik_ompl.files.text import check_target
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ def replan_scenario(
     planner: Annotated[
         str | None, typer.Option(help=f"{PLANNER} if absent, or to compare with: rrt-connect, drrt.")
     ] = None,
-    seed: Annotated[int, typer.Option(help="The same seed gives the same run.")] = 0,
+    seed: Seed = 0,
     lookahead_ticks: Annotated[int | None, typer.Option(help="Predict obstacle motion this many ticks ahead.")] = None,
     foreseen: Annotated[
         bool, typer.Option("--foreseen", help="Plan in configuration and time: obstacles move as stated.")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rrtik_ompl.cli import FOUND, NOT_FOUND
-from rrtik_ompl.cli.terminal import PAGE_FORMATS, TRAJECTORY_FORMATS, command, note, progress, say, suggest
+from rrtik_ompl.cli.terminal import PAGE_FORMATS, TRAJECTORY_FORMATS, Seed, command, note, progress, say, suggest
 from rrtik_ompl.files.tables import FORMATS as PATH_FORMATS
 from rrtik_ompl.files.text import check_target
 
@@ -95,7 +95,7 @@ def straight(
 def task(
     task: Annotated[str, typer.Argument(help="A shipped task (see: rrtik list tasks) or a YAML file with task:.")],
     seconds: Annotated[float, typer.Option(help="Limit of wall time [s].")] = 10.0,
-    seed: Annotated[int, typer.Option(help="The same seed gives the same plan.")] = 0,
+    seed: Seed = 0,
     out: Annotated[Path | None, typer.Option(help="Save all motions with their worlds: .json.")] = None,
     trajectory: Annotated[
         Path | None,

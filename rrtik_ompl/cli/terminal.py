@@ -25,6 +25,7 @@ TRAJECTORY_FORMATS = (".json", ".csv", ".yaml", ".mcap")
 PAGE_FORMATS = (".html", ".htm")
 # [s]; a spinner appears only after this time, because shorter tasks end before the message can be read.
 SPINNER_AFTER = 0.3
+RANDOM = "random"  # a seed that is drawn
 AGAIN_SECONDS = 0.02  # delay after which a lost Ctrl-C is repeated
 
 
@@ -199,4 +200,22 @@ def shown_names(incomplete: str) -> list[str]:
 ProblemName = Annotated[
     str,
     typer.Argument(help="A shipped problem (see: rrtik list problems) or a YAML file.", autocompletion=problem_names),
+]
+
+
+def _seed(text: object) -> int:
+    """Parse a seed: a whole number, or "random" to draw one."""
+    from rrtik_ompl.base.arrays import seed_of  # with numpy, which help texts do without
+
+    try:
+        return seed_of(None if text == RANDOM else int(str(text)))
+    except (ValueError, InputError):
+        raise typer.BadParameter(f"'{text}' is neither a whole number of at least 0 nor '{RANDOM}'.") from None
+
+
+Seed = Annotated[
+    int,
+    typer.Option(
+        parser=_seed, metavar=f"[N|{RANDOM}]", help=f"The same seed gives the same result; {RANDOM}: one is drawn."
+    ),
 ]

@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.base.arrays import Mask, Matrix, Vector, finite_array, frozen, not_negative, whole_number
+from rrtik_ompl.base.arrays import Mask, Matrix, Vector, finite_array, frozen, not_negative, seed_of, whole_number
 from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.choices import IkMethod
 from rrtik_ompl.base.copies import as_value, in_one_line
@@ -87,7 +87,7 @@ def solve_ik_many(
     near: ArrayLike | None = None,
     world: World | None = None,
     seconds: float = SECONDS,
-    seed: int = 0,
+    seed: int | None = 0,
     threads: int | None = None,
 ) -> IkBatch:
     """Find for each pose a solution inside the limits and, if a world is given, free of collision.
@@ -99,7 +99,7 @@ def solve_ik_many(
         near: Configuration near which solutions are wanted, shape (dof,); the middle of the limits if None.
         world: If given, solutions in collision are left out. Its robot must be this one.
         seconds: Wall time for each pose that has no closed-form solution [s].
-        seed: Seed of the random numbers.
+        seed: Seed of the random numbers; None draws one.
         threads: Number of threads that share the poses; the number of cores if None. Solutions do not depend on it.
 
     Raises:
@@ -119,7 +119,7 @@ def solve_ik_many(
     targets = finite_array(poses, (None, 4, 4), "poses")
     posture = mid_range_configuration(robot) if near is None else robot.configuration(near, "near")
     limit = not_negative(seconds, "seconds")
-    first_seed = whole_number(seed, "seed")
+    first_seed = seed_of(seed)
     count = cores() if threads is None else whole_number(threads, "threads", 1)
     check_poses(targets, "poses")
 

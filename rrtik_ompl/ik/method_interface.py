@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.base.arrays import Mask, Matrix, Vector, frozen, whole_number
+from rrtik_ompl.base.arrays import Mask, Matrix, Vector, frozen, seed_of
 from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.choices import IkMethod
 from rrtik_ompl.base.copies import as_value, in_one_line
@@ -195,14 +195,14 @@ class RandomStream:
     """A source of random numbers that is made when it is first used; the same seed gives the same numbers.
 
     Args:
-        seed: A whole number of at least 0.
+        seed: A whole number of at least 0; None draws one.
 
     Raises:
         InputError: If the seed is no such number.
     """
 
-    def __init__(self, seed: int) -> None:
-        self._seed = whole_number(seed, "seed")
+    def __init__(self, seed: int | None) -> None:
+        self._seed = seed_of(seed)
 
     @cached_property
     def rng(self) -> np.random.Generator:

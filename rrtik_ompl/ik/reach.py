@@ -14,7 +14,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.base.arrays import TAU, Matrix, Vector, finite_array, frozen, positive, whole_number
+from rrtik_ompl.base.arrays import TAU, Matrix, Vector, finite_array, frozen, positive, seed_of, whole_number
 from rrtik_ompl.base.choices import one_of
 from rrtik_ompl.base.copies import as_value, in_one_line
 from rrtik_ompl.base.errors import InputError, at_most
@@ -49,7 +49,7 @@ def reach_map(
     samples: int = SAMPLES,
     world: World | None = None,
     axis: str | None = None,
-    seed: int = 0,
+    seed: int | None = 0,
 ) -> ReachMap:
     """Map where an arm can bring its tip.
 
@@ -65,7 +65,7 @@ def reach_map(
         world: If given, only free configurations count. Its robot must be this one.
         axis: The axis of the tip's frame that points, for ``orientations``: "x", "y" or "z"; z if None, and x for
             planar arms.
-        seed: Seed of the random numbers.
+        seed: Seed of the random numbers; None draws one.
 
     Raises:
         UnknownNameError: If there is no such measure.
@@ -83,7 +83,7 @@ def reach_map(
         raise InputError(f"axis must be x, y or z, got {axis!r:.80}")
     count = whole_number(samples, "samples", 1)
     at_most(count, MOST_SAMPLES, "samples")
-    rng = np.random.default_rng(whole_number(seed, "seed"))
+    rng = np.random.default_rng(seed_of(seed))
 
     base = poses(robot, np.zeros((1, robot.dof)), robot.link_names[0])[0, :3, 3]
     corner, size, shape = _grid(robot, base, cell)

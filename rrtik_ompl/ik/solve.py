@@ -52,7 +52,7 @@ def solve_ik(
     all: bool = False,
     world: World | None = None,
     seconds: float = SECONDS,
-    seed: int = 0,
+    seed: int | None = 0,
 ) -> IkResult:
     """Find configurations at a goal.
 
@@ -73,7 +73,8 @@ def solve_ik(
         world: If given, solutions in collision are left out. Its robot must be this one.
         seconds: Wall time that a numeric method may take [s]. The clock is read between rounds, and the first round is
             always done.
-        seed: Seed of the random numbers; the same seed gives the same answer as long as time does not run out.
+        seed: Seed of the random numbers; the same seed gives the same answer as long as time does not run out. None
+            draws one.
 
     Raises:
         UnknownNameError: If there is no such method.

@@ -140,7 +140,7 @@ def solve_trajectory(
     jump: float = JUMP,
     options: GeneticOptions | GeneticPreset = "refined",
     seconds: float = SECONDS,
-    seed: int = 0,
+    seed: int | None = 0,
 ) -> IkTrajectory:
     """Find a configuration for each pose of a trajectory such that the joints move on without jumps.
 
@@ -159,7 +159,7 @@ def solve_trajectory(
             makes none.
         options: Options of the genetic algorithm, or the name of a preset: "standard", "historical", "refined".
         seconds: Time that a method may take [s]; the closed form is not limited.
-        seed: Seed of the random numbers.
+        seed: Seed of the random numbers; None draws one.
 
     Raises:
         UnknownNameError: If there is no such method or preset.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from ompl import base as ob
 
-from rrtik_ompl.base.arrays import Mask, Matrix, frozen, whole_number
+from rrtik_ompl.base.arrays import Mask, Matrix, frozen, seed_of
 from rrtik_ompl.base.errors import InputError, require
 from rrtik_ompl.ik.goal_configurations import MAX_TOTAL, GoalSearch
 from rrtik_ompl.ompl_bridge.setup import ValidityCallback, space_information
@@ -35,7 +35,12 @@ class GoalSampler(ob.GoalSampleableRegion):  # type: ignore[misc]  # OMPL has no
     """
 
     def __init__(
-        self, problem: Problem, si: ob.SpaceInformation | None = None, *, seed: int = 0, most: int = MAX_CONFIGURATIONS
+        self,
+        problem: Problem,
+        si: ob.SpaceInformation | None = None,
+        *,
+        seed: int | None = 0,
+        most: int = MAX_CONFIGURATIONS,
     ) -> None:
         """Make a goal.
 
@@ -43,7 +48,7 @@ class GoalSampler(ob.GoalSampleableRegion):  # type: ignore[misc]  # OMPL has no
             problem: Its goal is to be reached; configurations near its start are preferred.
             si: ``ompl.base.SpaceInformation`` over the robot's joints; None for one with the checks of the problem's
                 world, which ``getSpaceInformation()`` returns.
-            seed: The same seed gives the same configurations in the same order.
+            seed: The same seed gives the same configurations in the same order; None draws one.
             most: Limit of the configurations.
 
         Raises:
@@ -70,7 +75,7 @@ class GoalSampler(ob.GoalSampleableRegion):  # type: ignore[misc]  # OMPL has no
         self._num_seen = 0  # rows of the search whose validity has been checked
         self._rows: Matrix = frozen(np.zeros((0, robot.dof)))
 
-        self._search = GoalSearch(problem, np.random.default_rng(whole_number(seed, "seed")))
+        self._search = GoalSearch(problem, np.random.default_rng(seed_of(seed)))
         self._search.first()
 
     @property

@@ -170,7 +170,7 @@ def space_information(world_or_problem: World | Problem, *, so2: bool = False) -
     return _judged(projected_space(world_or_problem, *bounds), world_or_problem.world)
 
 
-def simple_setup(problem: Problem, *, seed: int = 0, so2: bool = False) -> og.SimpleSetup:
+def simple_setup(problem: Problem, *, seed: int | None = 0, so2: bool = False) -> og.SimpleSetup:
     """Return a problem as ``ompl.geometric.SimpleSetup``: space, checks, start and goal; only the planner is missing.
 
     A goal in joint values becomes a GoalState, any other goal a :class:`~rrtik_ompl.ompl_bridge.GoalSampler`. Its
@@ -178,7 +178,7 @@ def simple_setup(problem: Problem, *, seed: int = 0, so2: bool = False) -> og.Si
 
     Args:
         problem: The problem to plan.
-        seed: Seed of the search for configurations at a goal of the tip.
+        seed: Seed of the search for configurations at a goal of the tip; None draws one.
         so2: See :func:`space_information`.
 
     Raises:

@@ -76,14 +76,20 @@ class Row(NamedTuple):
     checked: bool = False
 
 
-def run_planner(problem: Problem, planner: NamedPlanner, request: Request) -> Plan:
+def run_planner(problem: Problem, planner: NamedPlanner, request: Request, budget: Budget | None = None) -> Plan:
     """Let one planner search for a path that the second check accepts.
+
+    Args:
+        problem: The problem to solve.
+        planner: The planner that solves it.
+        request: What is asked for.
+        budget: Budget of the search in place of the request's.
 
     Raises:
         InputError: If the planner does not take a parameter.
         PlannerError: If the planner broke.
     """
-    (turn,) = walk([Turn(problem, planner, request)])
+    (turn,) = walk([Turn(problem, planner, request, budget)])
     if turn.error is not None:
         raise turn.error
     return turn.plan()
@@ -229,7 +235,8 @@ class Turn:
             attempts = self.totals["attempts"]
             tried = f"{attempts} attempt{'s' * (attempts != 1)}"
             last = self.reason or "out of time"
-            self.reason = f"no path within {self.budget.seconds:g} s of wall time ({tried}; the last one: {last})"
+            seconds = self._request.budget.seconds  # of which others may need a part
+            self.reason = f"no path within {seconds:g} s of wall time ({tried}; the last one: {last})"
 
     def plan(self) -> Plan:
         """Return the result of the turn as a `Plan`."""

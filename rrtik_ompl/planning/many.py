@@ -18,7 +18,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.base.arrays import Mask, Matrix, Vector, dimensions, finite_array, whole_number
+from rrtik_ompl.base.arrays import Mask, Matrix, Vector, dimensions, finite_array, seed_of
 from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.choices import ProofMode, one_of
 from rrtik_ompl.base.errors import InputError, ProblemError, require
@@ -52,7 +52,7 @@ def plan_many(
     planner: str | None = None,
     *,
     seconds: float = 5.0,
-    seed: int = 0,
+    seed: int | None = 0,
     parameters: Mapping[str, Any] | None = None,
     proof: ProofMode = "preferred",
     threads: int | None = None,
@@ -66,7 +66,8 @@ def plan_many(
         planner: As for :func:`rrtik_ompl.plan`. OMPL's planners, and third-party ones in Python, share one generator of
             random numbers among all threads, so they plan one query after the other.
         seconds: Limit of wall time for each query [s].
-        seed: Seed of all queries; the k-th query has a seed of its own that depends on this and k alone.
+        seed: Seed of all queries; the k-th query has a seed of its own that depends on this and k alone. None draws
+            one.
         parameters: Options of the planner.
         proof: As for :func:`rrtik_ompl.plan`.
         threads: Number of queries at a time; None for the number of cores.
@@ -100,7 +101,7 @@ def plan_many(
         raise InputError(f"plan_many: as many starts as goals are needed, got {len(rows)} and {len(wanted)}")
 
     # Give each query its own seed.
-    seeds = np.random.SeedSequence(whole_number(seed, "seed")).generate_state(max(len(rows), 1), np.uint32).tolist()
+    seeds = np.random.SeedSequence(seed_of(seed)).generate_state(max(len(rows), 1), np.uint32).tolist()
     queries = list(zip(rows, wanted, seeds[: len(rows)], strict=True))
 
     # Plan in batches of a fixed size, so that the results do not depend on the number of threads.

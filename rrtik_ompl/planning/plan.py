@@ -6,15 +6,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any, get_args
 
-import numpy as np
-
-from rrtik_ompl.base.arrays import not_negative, positive, whole_number
+from rrtik_ompl.base.arrays import not_negative, positive, seed_of
 from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.choices import Accuracy, ImproveStrategy, PathObjective, ProofMode, ShorteningMethod, one_of
 from rrtik_ompl.base.errors import InputError, require
 from rrtik_ompl.ompl_bridge.planner_names import AUTO, find_planner, is_auto
 from rrtik_ompl.ompl_bridge.planner_names import list_planners as list_planners
-from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory
+from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory, traits_of
 from rrtik_ompl.planning.attempts import run_planner
 from rrtik_ompl.planning.outcome import RESTARTS, Improvement, NamedPlanner, Request
 from rrtik_ompl.planning.outcome import Plan as Plan
@@ -28,6 +26,7 @@ MAX_SECONDS = 1e9  # [s] thirty years; OMPL's clock overflows at about nine time
 PROOF_MODES: tuple[ProofMode, ...] = get_args(ProofMode)
 OBJECTIVES: tuple[PathObjective, ...] = get_args(PathObjective)
 STRATEGIES: tuple[ImproveStrategy, ...] = get_args(ImproveStrategy)
+ANYTIME_SHARE = 0.8  # share of the time for a planner that would use all of it, where its path is shortened
 SHORTENING_METHODS: tuple[ShorteningMethod, ...] = get_args(ShorteningMethod)
 
 
@@ -36,7 +35,7 @@ def plan(
     planner: str | PlannerFactory | None = None,
     *,
     seconds: float = 5.0,
-    seed: int | None = None,
+    seed: int | None = 0,
     restarts: int = RESTARTS,
     parameters: Mapping[str, Any] | None = None,
     accuracy: Accuracy | None = None,
@@ -116,7 +115,6 @@ def plan(
     if isinstance(restarts, bool) or not isinstance(restarts, int) or not 0 <= restarts <= MAX_RESTARTS:
         raise InputError(f"restarts must be a whole number from 0 to {MAX_RESTARTS}, got {restarts!r}")
     require(parameters, Mapping | None, "parameters of a planner", "use {name of an option: value}")
-    drawn = int(np.random.default_rng().integers(2**31)) if seed is None else whole_number(seed, "seed")
     one_of(PROOF_MODES, proof, "proof")
     method = _shortening_method(shorten)
     problem = problem if accuracy is None else problem.with_accuracy(accuracy)
@@ -126,9 +124,9 @@ def plan(
         one_of(OBJECTIVES, objective, "objective"),
         one_of(STRATEGIES, strategy, "strategy of improve"),
     )
-    request = Request(Budget(drawn, limit), restarts, parameters or {}, proof, clearance)
+    request = Request(Budget(seed_of(seed), limit), restarts, parameters or {}, proof, clearance)
 
-    found = _searched(problem, planner, request)
+    found = _searched(problem, planner, request, finish_follows=method is not None)
     if method is not None:
         from rrtik_ompl.planning.finish import finished  # with shortening, which many plans do without
 
@@ -179,12 +177,24 @@ def planned(problem: Problem, planner: str | PlannerFactory, request: Request) -
     return briefly_shortened(problem, found, request)
 
 
-def _searched(problem: Problem, planner: str | PlannerFactory, request: Request) -> Plan:
-    """Return a plan with the planner's own path, and the member of a goal set that it reaches."""
+def _searched(
+    problem: Problem, planner: str | PlannerFactory, request: Request, *, finish_follows: bool = False
+) -> Plan:
+    """Return a plan with the planner's own path, and the member of a goal set that it reaches.
+
+    Args:
+        problem: The problem to solve.
+        planner: The planner.
+        request: What is asked for.
+        finish_follows: Whether some time has to be left by planners that would use all of it.
+    """
     if _is_auto(planner):
         found = run_portfolio(problem, request)
     else:
-        found = run_planner(problem, named_planner(planner), request)
+        named = named_planner(planner)
+        share = ANYTIME_SHARE if finish_follows and traits_of(named.factory).anytime else 1.0
+        budget = replace(request.budget, seconds=share * request.budget.seconds)
+        found = run_planner(problem, named, request, budget)
     if found.path is None:
         return found
     return replace(found, member=problem.goal.member_at(problem.robot, found.path.end))

@@ -7,7 +7,7 @@ import time
 from contextlib import ExitStack
 from functools import partial
 
-from rrtik_ompl.base.arrays import positive
+from rrtik_ompl.base.arrays import positive, seed_of
 from rrtik_ompl.base.choices import Replanner
 from rrtik_ompl.base.errors import called, require
 from rrtik_ompl.files.text import check_target, file_name
@@ -37,7 +37,7 @@ def replan(  # noqa: D417 - the settings are described in one place
     lookahead_ticks: int = 0,
     seconds: float = 60.0,
     repair_budget: float | None = None,
-    seed: int = 0,
+    seed: int | None = 0,
     goal_feed: GoalFeed | None = None,
     record: str | os.PathLike[str] | None = None,
     clock: Clock = time.perf_counter,
@@ -96,7 +96,7 @@ def replan(  # noqa: D417 - the settings are described in one place
     settings = ReplanSettings(
         step=step, rate=rate, planner=planner, max_edge=max_edge, margin=margin, clearance=clearance,
         speed_bound=speed_bound, limits=limits, lookahead_ticks=lookahead_ticks, seconds=seconds,
-        repair_budget=repair_budget, seed=seed,
+        repair_budget=repair_budget, seed=seed_of(seed),
     )  # fmt: skip
     return replan_with(
         settings, problem, scene_feed, goal_feed=goal_feed, record=record, clock=clock, feed_patience=feed_patience

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rrtik_ompl.base.arrays import TAU, Vector, not_negative, positive, whole_number
+from rrtik_ompl.base.arrays import TAU, Vector, not_negative, positive, seed_of, whole_number
 from rrtik_ompl.base.choices import Replanner, one_of
 from rrtik_ompl.base.errors import InputError, require
 from rrtik_ompl.kernels.search.connect_lengths import connect_lengths
@@ -55,7 +55,7 @@ class ReplanSettings:
             and at half that time. 0 means no prediction, as published.
         seconds: Largest simulated time [s].
         repair_budget: Time that a repair may take [s]; one tick if None.
-        seed: The same seed gives the same run, as long as no repair is cut short by its budget.
+        seed: The same seed gives the same run, as long as no repair is cut short by its budget. None draws one.
 
     Raises:
         InputError: If a number is out of range; the message names the setting and the remedy.
@@ -85,7 +85,8 @@ class ReplanSettings:
             raise InputError(f"rate must be {MAX_RATE:g} Hz or less, got {rate:g}")
 
         checked: dict[str, float | None] = {"rate": rate}
-        checked |= {name: whole_number(getattr(self, name), name) for name in ("lookahead_ticks", "seed")}
+        checked["seed"] = seed_of(self.seed)
+        checked["lookahead_ticks"] = whole_number(self.lookahead_ticks, "lookahead_ticks")
         checked["margin"] = not_negative(self.margin, "margin")
         checked["clearance"] = None if self.clearance is None else not_negative(self.clearance, "clearance")
         for name, meaning in _POSITIVE.items():

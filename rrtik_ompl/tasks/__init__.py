@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.base.arrays import Vector, finite_array, frozen, positive, whole_number
+from rrtik_ompl.base.arrays import Vector, finite_array, frozen, positive, seed_of
 from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.copies import in_one_line
 from rrtik_ompl.base.errors import InputError, require
@@ -270,7 +270,7 @@ class Task:
         start: ArrayLike | str | None = None,
         *,
         seconds: float = SECONDS,
-        seed: int = 0,
+        seed: int | None = 0,
     ) -> TaskPlan:
         """Choose alternatives and configurations such that the whole task works, and plan its motions.
 
@@ -281,7 +281,7 @@ class Task:
             world: Robot and scene at the beginning; those of the task if None.
             start: Configuration, shape (dof,), or the name of a posture; that of the task if None.
             seconds: Limit of wall time [s].
-            seed: The same seed gives the same plan, unless the time limit ends the search.
+            seed: The same seed gives the same plan, unless the time limit ends the search. None draws one.
 
         Raises:
             InputError: If the stages are inconsistent in this world, as when something is attached twice, or detached
@@ -302,7 +302,7 @@ class Task:
             return TaskPlan(False, (), (), (), (), reason)
 
         time_limit = positive(seconds, "seconds")
-        search = TaskSearch(Budget(whole_number(seed, "seed"), time_limit))
+        search = TaskSearch(Budget(seed_of(seed), time_limit))
         done = search.run(Branch(setting, np.array(q), steps))
         if done is None:
             return TaskPlan(False, (), (), (), (), search.reason())

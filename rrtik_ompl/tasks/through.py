@@ -62,7 +62,7 @@ def plan_through(
     *,
     constraints: Iterable[TaskRegion] = (),
     seconds: float = SECONDS,
-    seed: int = 0,
+    seed: int | None = 0,
 ) -> PlanThrough:
     """Plan a path that reaches one goal after the other, with configurations chosen such that all can be reached.
 
@@ -73,7 +73,7 @@ def plan_through(
             matrix.
         constraints: Regions that a frame must not leave on the whole path; those ``from_start`` refer to the start.
         seconds: Time limit [s].
-        seed: The same seed gives the same path, unless the time limit ends the search.
+        seed: The same seed gives the same path, unless the time limit ends the search. None draws one.
 
     Raises:
         InputError: If there are no goals, or one is not valid; the message gives its number.

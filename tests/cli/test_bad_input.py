@@ -216,7 +216,7 @@ COMMAND_LINE = {
     "option with too few values": ({}, ("ik", "titan4", "--position", "1", "2"), ["--position", "rrtik ik --help"]),
     "no command of a group": ({}, ("markers",), ["Missing command", "rrtik markers --help"]),
     "unknown planner": (task(), ("plan", "task.yaml", "--planner", "bicdrt"), ["bicdrt", "did you mean 'bicrdt'"]),
-    "seed is text": (task(), ("plan", "task.yaml", "--seed", "one"), ["--seed", "integer"]),
+    "seed is text": (task(), ("plan", "task.yaml", "--seed", "one"), ["--seed", "whole number", "random"]),
     "negative seed": (task(), ("plan", "task.yaml", "--seed", "-1"), ["seed", "-1"]),
     "no time": (task(), ("plan", "task.yaml", "--seconds", "0"), ["seconds"]),
     "endless time": (task(), ("plan", "task.yaml", "--seconds", "1e400"), ["seconds: must be a finite number"]),

@@ -199,7 +199,7 @@ def test_the_page_of_one_solution_plans_to_it(capsys, tmp_path):
         (["puma560", "--position", 1, 0, 0, "--near", "reddy"], "did you mean 'ready'"),
         (["puma560", "--position", 1, 0, 0, "--method", "fabrick"], "did you mean 'fabrik'"),
         (["ur5", "--position", 0.4, 0, 0.4, "--method", "closed-form"], "brings no closed form; what fits: numeric"),
-        (["puma560", "--position", 1, 0, 0, "--seed", -1], "seed must be a whole number"),
+        (["puma560", "--position", 1, 0, 0, "--seed", -1], "neither a whole number of at least 0 nor"),
         (["puma560", "--position", 1, 0, 0, "--seconds", -1], "seconds must not be negative"),
         (["puma560", "--position", 1, 0, 0, "--tolerance-mm", -1], "--tolerance-mm: must be greater than 0, got -1"),
         (["puma560", "--position", 1, 0, 0, "--tolerance-deg", 1], "--tolerance-deg is of an orientation"),

@@ -11,7 +11,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.base.arrays import TAU, Matrix, Vector, filled_rows, finite_array, positive, whole_number
+from rrtik_ompl.base.arrays import TAU, Matrix, Vector, filled_rows, finite_array, positive, seed_of, whole_number
 from rrtik_ompl.base.budget import Stop
 from rrtik_ompl.base.errors import InputError, called, in_file, require
 from rrtik_ompl.files.kinds import read
@@ -122,7 +122,7 @@ class Roadmap:
     Args:
         world: Robot and scene.
         vertices: Number of free configurations to begin with; there are fewer if they are not found within a minute.
-        seed: The same seed gives the same roadmap.
+        seed: The same seed gives the same roadmap; None draws one.
         near: With how many of the vertices near it a new vertex is joined, from 1 to 100.
 
     Raises:
@@ -138,7 +138,7 @@ class Roadmap:
         True
     """
 
-    def __init__(self, world: World, *, vertices: int = VERTICES, seed: int = 0, near: int = NEAR) -> None:
+    def __init__(self, world: World, *, vertices: int = VERTICES, seed: int | None = 0, near: int = NEAR) -> None:
         require(world, World, "world of a roadmap", "use World(robot, scene)")
         if not 0 <= whole_number(vertices, "vertices") <= MOST_VERTICES:
             raise InputError(f"vertices must be {MOST_VERTICES} or less, got {vertices}")
@@ -148,7 +148,7 @@ class Roadmap:
 
         self.near = checked_near(near)
         self.world = world
-        self.seed = whole_number(seed, "seed")
+        self.seed = seed_of(seed)
         self.graph = graph_in(world, *_box(world.robot), near=near, seed=self.seed, checks=world)
         self.grow(vertices)
 

@@ -9,7 +9,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from rrtik_ompl.base.arrays import Matrix, positive, whole_number
+from rrtik_ompl.base.arrays import Matrix, positive, seed_of, whole_number
 from rrtik_ompl.base.budget import Budget, no_stop
 from rrtik_ompl.base.choices import ShorteningMethod, one_of
 from rrtik_ompl.base.errors import InputError, PathWarning, called, require
@@ -106,7 +106,7 @@ def shorten(
     method: ShorteningMethod = "auto",
     seconds: float | None = None,
     checks: int | None = None,
-    seed: int = 0,
+    seed: int | None = 0,
     one_joint: bool | None = None,
     rules: MoveRules | None = None,
     on_better: Callable[[JointPath], object] | None = None,
@@ -135,7 +135,7 @@ def shorten(
             they make a fixed number of tries, so that a seed always gives the same path.
         checks: Limit of the checked motions (of the tries, in random methods), which always gives the same path; 100
             take some milliseconds. None for no such limit; "ompl" and "fewest-moves" are limited by time only.
-        seed: Seed of the random methods.
+        seed: Seed of the random methods; None draws one.
         one_joint: Whether a path of single-joint moves stays one; fewer moves come first then, length second. None
             stands for True with "auto" and such a path.
         rules: Rules that the path of single-joint moves keeps and the result has to keep: joints that must not move or
@@ -179,7 +179,7 @@ def shorten(
         positive(seconds, "seconds")
     if checks is not None and whole_number(checks, "checks") < 1:
         raise InputError("checks must be 1 or more, got 0")
-    whole_number(seed, "seed")
+    seed = seed_of(seed)
     _refuse_what_cannot_be_shortened(path, problem)
     check_route_clearance(problem.world, clearance, path.waypoints)
 

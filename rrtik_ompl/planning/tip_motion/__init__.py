@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.base.arrays import Matrix, dimensions, not_negative, positive, whole_number
+from rrtik_ompl.base.arrays import Matrix, dimensions, not_negative, positive, seed_of
 from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.copies import in_one_line
 from rrtik_ompl.base.errors import InputError, listed, require
@@ -91,7 +91,7 @@ def straight(
     deviation: float = DEVIATION,
     turn_deviation: float = TURN_DEVIATION,
     clearance: float | None = None,
-    seed: int = 0,
+    seed: int | None = 0,
 ) -> TipMotion:
     """Move the tip in a straight line while its axes turn about one axis, as far as the arm can without collision.
 
@@ -109,7 +109,7 @@ def straight(
         deviation: Greatest distance of the tip from the line [m].
         turn_deviation: Greatest deviation of its orientation [rad].
         clearance: Clearance from every obstacle on top of its margin [m]; that of the world if None or less.
-        seed: Seed of the random numbers with which a redundant arm tries other ways.
+        seed: Seed of the random numbers with which a redundant arm tries other ways; None draws one.
 
     Raises:
         ProblemError: If q is in collision or outside the limits.
@@ -139,7 +139,7 @@ def arc(
     deviation: float = DEVIATION,
     turn_deviation: float = TURN_DEVIATION,
     clearance: float | None = None,
-    seed: int = 0,
+    seed: int | None = 0,
 ) -> TipMotion:
     """Move the tip on the circle through a point to a goal; everything else is as for :func:`straight`.
 
@@ -151,7 +151,7 @@ def arc(
         deviation: Greatest distance of the tip from the line [m].
         turn_deviation: Greatest deviation of its orientation [rad].
         clearance: Clearance from every obstacle on top of its margin [m]; that of the world if None or less.
-        seed: Seed of the random numbers with which a redundant arm tries other ways.
+        seed: Seed of the random numbers with which a redundant arm tries other ways; None draws one.
 
     Raises:
         ProblemError: See :func:`straight`.
@@ -180,7 +180,7 @@ def screw(
     deviation: float = DEVIATION,
     turn_deviation: float = TURN_DEVIATION,
     clearance: float | None = None,
-    seed: int = 0,
+    seed: int | None = 0,
 ) -> TipMotion:
     """Move the tip about and along one line of the world at the same time, like a screw, a door or a valve.
 
@@ -192,7 +192,7 @@ def screw(
         deviation: Greatest distance of the tip from the line [m].
         turn_deviation: Greatest deviation of its orientation [rad].
         clearance: Clearance from every obstacle on top of its margin [m]; that of the world if None or less.
-        seed: Seed of the random numbers with which a redundant arm tries other ways.
+        seed: Seed of the random numbers with which a redundant arm tries other ways; None draws one.
 
     Raises:
         ProblemError: See :func:`straight`.
@@ -221,7 +221,7 @@ def follow(
     deviation: float = DEVIATION,
     turn_deviation: float = TURN_DEVIATION,
     clearance: float | None = None,
-    seed: int = 0,
+    seed: int | None = 0,
 ) -> TipMotion:
     """Move the tip in straight lines from pose to pose; everything else is as for :func:`straight`.
 
@@ -232,7 +232,7 @@ def follow(
         deviation: Greatest distance of the tip from the line [m].
         turn_deviation: Greatest deviation of its orientation [rad].
         clearance: Clearance from every obstacle on top of its margin [m]; that of the world if None or less.
-        seed: Seed of the random numbers with which a redundant arm tries other ways.
+        seed: Seed of the random numbers with which a redundant arm tries other ways; None draws one.
 
     Raises:
         ProblemError: See :func:`straight`.
@@ -272,7 +272,7 @@ def _moved(
     deviation: float,
     turn_deviation: float,
     clearance: float | None,
-    seed: int,
+    seed: int | None,
 ) -> TipMotion:
     """Check the arguments, and follow the rails that ``rails`` builds from the pose of the tip at the start.
 
@@ -289,7 +289,7 @@ def _moved(
     tolerance = Tolerance(positive(deviation, "deviation"), positive(turn_deviation, "turn_deviation"))
     if tolerance.turn > 1.0:
         raise InputError(f"turn_deviation must be 1 rad at most, got {tolerance.turn:g}; is it in radians?")
-    number = whole_number(seed, "seed")
+    number = seed_of(seed)
     require(world, World, "world", "use World(robot, scene)")
     required_clearance = (
         None if clearance is None else max(not_negative(clearance, "clearance"), world.settings.required_clearance)

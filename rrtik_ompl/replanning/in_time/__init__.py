@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rrtik_ompl.base.arrays import Matrix, not_negative, positive, whole_number
+from rrtik_ompl.base.arrays import Matrix, not_negative, positive, seed_of, whole_number
 from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.choices import TickEvent
 from rrtik_ompl.base.copies import in_one_line
@@ -83,7 +83,7 @@ def plan_in_time(
     limits: RateLimits | None = None,
     iterations: int = 6000,
     seconds: float = 20.0,
-    seed: int = 0,
+    seed: int | None = 0,
 ) -> TimedPlan:
     """Plan a motion in configuration and time to the goal, among obstacles that move as they state.
 
@@ -113,7 +113,7 @@ def plan_in_time(
         iterations: Largest number of iterations; the search goes on for earlier arrivals until it has found no more for
             a while.
         seconds: Largest wall time of the search [s].
-        seed: The same seed gives the same motion, as long as the time limit does not end the search.
+        seed: The same seed gives the same motion, as long as the time limit does not end the search. None draws one.
 
     Raises:
         InputError: If a number is out of range, no configuration reaches the goal, an unbounded obstacle turns, or the
@@ -138,9 +138,7 @@ def plan_in_time(
         margin=not_negative(margin, "margin"),
         clearance=max(wanted_clearance, (settings.proving or 0.0) - settings.clearance),
         limits=limits,
-        budget=Budget(
-            whole_number(seed, "seed"), positive(seconds, "seconds"), whole_number(iterations, "iterations", least=1)
-        ),
+        budget=Budget(seed_of(seed), positive(seconds, "seconds"), whole_number(iterations, "iterations", least=1)),
     )
     at_most(options.horizon / options.slot, MOST_SLOTS, "slots of time", "lower horizon or rate")
 
