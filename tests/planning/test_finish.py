@@ -138,7 +138,7 @@ def test_planners_that_use_all_of_the_time_leave_some_to_shorten(planner):
 
 def test_a_path_is_required_or_the_reason_raised():
     wall = rrtik.Obstacle("wall", rrtik.Box([1.0, 20.0, 2.0]), rrtik.pose([5.0, 5.0, 0.0]))
-    robot = rrtik.load_robot("point2d", radius=0.3, bounds=[[0, 10], [0, 10]])
+    robot = rrtik.load_robot("point2d", parameters={"radius": 0.3, "bounds": [[0, 10], [0, 10]]})
     plan = rrtik.plan(rrtik.Problem(rrtik.World(robot, rrtik.Scene([wall])), [2, 2], [8, 2]), "bicrdt", seconds=0.1)
     with pytest.raises(rrtik.NotFoundError) as raised:
         plan.require()
