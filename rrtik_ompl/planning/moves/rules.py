@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
@@ -67,10 +66,24 @@ class MoveRules:
         self.smallest_move = smallest_moves(smallest_move, dof)
 
     @classmethod
-    def of_robot(cls, robot: Robot, **options: Any) -> MoveRules:
+    def of_robot(
+        cls,
+        robot: Robot,
+        *,
+        joint_costs: PerJoint | None = None,
+        frozen_joints: Joints = (),
+        last_joints: Joints = (),
+        smallest_move: PerJoint = 0.0,
+    ) -> MoveRules:
         """Return the rules for a robot; weights of its joints are their costs unless ``joint_costs`` is given."""
         require(robot, Robot, "robot")
-        return cls(robot.joint_names, **weights_as_costs(robot) | options)
+        return cls(
+            robot.joint_names,
+            joint_costs=weights_as_costs(robot).get("joint_costs") if joint_costs is None else joint_costs,
+            frozen_joints=frozen_joints,
+            last_joints=last_joints,
+            smallest_move=smallest_move,
+        )
 
     def kept_by(self, route: Matrix) -> bool:
         """Check whether a route of single-joint moves, shape (k, n), keeps all rules.
