@@ -25,6 +25,6 @@ plan = Task(stages).plan(world, "ready", seed=1)
 assert plan.found, plan.reason
 print(*plan.notes, sep="\n")
 
-timed = rrtik.time_task(plan, pause=0.5)
+timed = plan.time_parameterize(pause=0.5)
 print(f"{len(plan.stages)} stages, grasp {plan.chosen[0] + 1}, {timed.trajectory.duration:.1f} s")
 rrtik.view(world, plan, html="task.html")

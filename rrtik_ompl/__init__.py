@@ -81,8 +81,6 @@ if TYPE_CHECKING:
     from rrtik_ompl.tasks.task_file import list_tasks as list_tasks
     from rrtik_ompl.tasks.through import PlanThrough as PlanThrough
     from rrtik_ompl.tasks.through import plan_through as plan_through
-    from rrtik_ompl.tasks.timed import TimedTask as TimedTask
-    from rrtik_ompl.tasks.timed import time_task as time_task
     from rrtik_ompl.viewer import view as view
     from rrtik_ompl.viewer.plots.joints import plot_joints as plot_joints
     from rrtik_ompl.world.problem import Problem as Problem
@@ -171,10 +169,6 @@ else:
         "tasks.through": (
             "PlanThrough",
             "plan_through",
-        ),
-        "tasks.timed": (
-            "TimedTask",
-            "time_task",
         ),
         "viewer": ("view",),
         "viewer.plots.joints": ("plot_joints",),

@@ -170,10 +170,10 @@ def plan_lines(name: str, plan: TaskPlan, wrong: frozenset[int] = frozenset()) -
 
 def _timed(plan: TaskPlan, file: Path, share: float, pause: float) -> float:
     """Time a task and save its trajectory; return its duration [s]."""
-    from rrtik_ompl import RateLimits, time_task
+    from rrtik_ompl import RateLimits
 
     with progress("timing"):
-        timed = time_task(plan, RateLimits.of(plan.worlds[0].robot, share=share), pause=pause)
+        timed = plan.time_parameterize(RateLimits.of(plan.worlds[0].robot, share=share), pause=pause)
 
     timed.trajectory.save(file)
     return timed.trajectory.duration

@@ -38,9 +38,14 @@ from rrtik_ompl.world.problem import usable_configuration
 from rrtik_ompl.world.world import World
 
 if TYPE_CHECKING:
+    from rrtik_ompl.model.robot import Robot
+    from rrtik_ompl.motion.trajectory.limits import RateLimits
     from rrtik_ompl.tasks.played import PlayedTask
+    from rrtik_ompl.tasks.timed import TimedTask
 
 SECONDS = 10.0  # [s] default time limit for planning a task
+BLEND = 0.05  # [rad] or [m] default blend of corners
+PAUSE = 1.0  # [s] default rest for a gripper or an object
 FAR = 0.05  # [m] distance between an object and the link that holds it above which a note says so
 
 
@@ -127,8 +132,49 @@ class TaskPlan:
             faults_of_motions.append(tuple(faults))
         return tuple(faults_of_motions)
 
+    def time_parameterize(
+        self,
+        limits: RateLimits | Robot | None = None,
+        *,
+        blend: float = BLEND,
+        pause: float = PAUSE,
+        clearance: float | None = None,
+        tip_speed: float | None = None,
+        tip_acceleration: float | None = None,
+        torque: ArrayLike | bool | None = None,
+        payload: float = 0.0,
+    ) -> TimedTask:
+        """Time the whole task: each motion as :func:`rrtik_ompl.time_parameterize` times it, from rest to rest.
+
+        Args:
+            limits: Limits of the joints; None for those of the robot.
+            blend: As there; rounded corners are checked in the world of their motion, and keep the constraints of
+                their stage.
+            pause: How long the arm rests where a gripper opens or closes and where an object is taken or put down [s].
+            clearance: As there.
+            tip_speed: As there.
+            tip_acceleration: As there.
+            torque: As there.
+            payload: As there.
+
+        Raises:
+            InputError: If there is no motion, or an option is not valid.
+
+        Example:
+            >>> loaded = rrtik.load_task("titan4_drawer")
+            >>> timed = loaded.task.plan(loaded.world, loaded.start, seed=1).time_parameterize(pause=0.5)
+            >>> len(timed.begins), bool(timed.trajectory.duration > timed.begins[-1])
+            (4, True)
+        """
+        from rrtik_ompl.tasks.timed import timed_task
+
+        return timed_task(
+            self, limits, blend=blend, pause=pause, clearance=clearance, tip_speed=tip_speed,
+            tip_acceleration=tip_acceleration, torque=torque, payload=payload,
+        )  # fmt: skip
+
     def played(self) -> PlayedTask:
-        """Return the plan as a picture plays it: timed by :func:`time_task`, with the verdict of :meth:`faults`.
+        """Return the plan as a picture plays it: timed at the robot's limits, with the verdict of :meth:`faults`.
 
         Raises:
             InputError: If there is no motion.

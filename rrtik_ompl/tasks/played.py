@@ -15,7 +15,6 @@ from rrtik_ompl.constraints.held_regions import held_regions
 from rrtik_ompl.model.judgement import Judged, PathContact, Verdict
 from rrtik_ompl.tasks import MoveTo, TaskPlan
 from rrtik_ompl.tasks.setting import world_of_motion
-from rrtik_ompl.tasks.timed import time_task
 from rrtik_ompl.world.judgement import contacts_at
 from rrtik_ompl.world.route_check import as_it_stands
 from rrtik_ompl.world.world import World
@@ -25,7 +24,7 @@ RATE = 25.0  # ticks per second
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlayedTask:
-    """A plan over time, as :func:`time_task` times it: at the robot's own limits, with rests between motions.
+    """A plan over time, as :meth:`TaskPlan.time_parameterize` times it: at the robot's limits, with rests.
 
     Attributes:
         plan: The plan; each of its motions has at least one tick.
@@ -68,7 +67,7 @@ def _ticks(plan: TaskPlan) -> tuple[NDArray[np.int64], Matrix, Vector]:
     if not any(path.length > 0.0 for path in plan.paths):
         return numbers, starts, np.zeros(len(numbers))
 
-    timed = time_task(plan)
+    timed = plan.time_parameterize()
     samples = timed.trajectory.sample(RATE)
     motions = np.searchsorted(timed.begins, samples.times, side="right") - 1
     rests = np.array([_share_of_rest(timed.pauses, time) for time in samples.times.tolist()])

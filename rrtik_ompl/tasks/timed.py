@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from functools import partial
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from rrtik_ompl.base.arrays import Matrix, Vector, frozen, not_negative
 from rrtik_ompl.base.copies import in_one_line
-from rrtik_ompl.base.errors import InputError, require
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.model.path import JointPath
+from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.motion.trajectory import RateLimits, Trajectory, time_parameterize
 from rrtik_ompl.motion.trajectory.checks import proof_of_pieces
 from rrtik_ompl.tasks import TaskPlan
@@ -18,8 +21,6 @@ from rrtik_ompl.tasks.contact_life import MotionContact, world_from
 from rrtik_ompl.tasks.setting import world_of_motion
 from rrtik_ompl.world.world import World
 
-BLEND = 0.05  # [rad] or [m] default blend of corners
-PAUSE = 1.0  # [s] default rest for a gripper or an object
 ROUNDED = (1.0, 0.3, 0.1, 0.03)  # shares of the blend that are tried until things that parted stay apart
 LOOKS = 1000  # samples of a motion among which the place is found at which two things have parted
 
@@ -32,12 +33,6 @@ class TimedTask:
         trajectory: All motions one after the other; the arm rests where something is done.
         begins: Time at which each motion of the plan begins [s], shape (k,).
         pauses: Times at which each rest for a gripper or an object begins and ends [s], shape (p, 2).
-
-    Example:
-        >>> task = rrtik.Task.load("titan4_drawer")
-        >>> timed = rrtik.time_task(task.plan(seed=1))
-        >>> bool(timed.begins[0] == 0.0)
-        True
     """
 
     trajectory: Trajectory
@@ -47,41 +42,33 @@ class TimedTask:
     __repr__ = in_one_line
 
 
-def time_task(
+def timed_task(
     plan: TaskPlan,
-    limits: RateLimits | None = None,
+    limits: RateLimits | Robot | None,
     *,
-    blend: float = BLEND,
-    pause: float = PAUSE,
-    **options: Any,
+    blend: float,
+    pause: float,
+    clearance: float | None,
+    tip_speed: float | None,
+    tip_acceleration: float | None,
+    torque: ArrayLike | bool | None,
+    payload: float,
 ) -> TimedTask:
-    """Time a whole task: each motion as :func:`time_parameterize` times it, from rest to rest.
-
-    Args:
-        plan: The plan of a task, which was found.
-        limits: Limits of the joints; None for those of the robot.
-        blend: See :func:`time_parameterize`; rounded corners are checked in the world of their motion, and keep the
-            constraints of their stage.
-        pause: How long the arm rests where a gripper opens or closes and where an object is taken or put down [s].
-        **options: Further options of :func:`time_parameterize`: ``clearance``, ``tip_speed``, ``payload``, ...
-
-    Raises:
-        InputError: If there is no motion, or an option is not valid.
-
-    Example:
-        >>> import rrtik_ompl as rrtik
-        >>> task = rrtik.Task.load("titan4_drawer")
-        >>> timed = rrtik.time_task(task.plan(seed=1))
-        >>> len(timed.begins), bool(timed.trajectory.duration > timed.begins[-1])
-        (4, True)
-    """
-    require(plan, TaskPlan, "plan of a task", "use Task(stages).plan(world, start)")
+    """Time the plan of a task; see :meth:`TaskPlan.time_parameterize`."""
     rest = not_negative(pause, "pause")
     radius = not_negative(blend, "blend")
     if not any(path.length > 0.0 for path in plan.paths):
         raise InputError("task plan to time: it has no motion" + (f": {plan.reason}" if plan.reason else ""))
 
-    rate_limits = RateLimits.of(plan.worlds[0].robot) if limits is None else limits
+    timing = partial(
+        time_parameterize,
+        limits=plan.worlds[0].robot if limits is None else limits,
+        clearance=clearance,
+        tip_speed=tip_speed,
+        tip_acceleration=tip_acceleration,
+        torque=torque,
+        payload=payload,
+    )
     parts: list[Trajectory] = []
     rests_before: list[float] = []  # [s] rest before each part
     begins: list[float] = []
@@ -99,7 +86,7 @@ def time_task(
             continue
 
         motion_world = world_of_motion(path, world, stage)
-        part = _timed(path, motion_world, plan.contacts[number] if plan.contacts else (), rate_limits, radius, options)
+        part = _timed(path, motion_world, plan.contacts[number] if plan.contacts else (), timing, radius)
         parts.append(part)
         rests_before.append(rest_so_far)
         rest_so_far = 0.0
@@ -112,18 +99,25 @@ def _timed(
     path: JointPath,
     world: World,
     contacts: tuple[MotionContact, ...],
-    limits: RateLimits,
+    timing: Callable[..., Trajectory],
     blend: float,
-    options: dict[str, Any],
 ) -> Trajectory:
-    """Time a motion, with corners that are rounded less if things that have parted would touch again."""
+    """Time a motion, with corners that are rounded less if things that have parted would touch again.
+
+    Args:
+        path: The path of the motion.
+        world: The world of the motion.
+        contacts: The contacts on which it depends.
+        timing: :func:`time_parameterize` with the limits; it takes a path, a blend and a world.
+        blend: The largest blend to try [rad or m].
+    """
     parting_waypoints = sorted({contact.until for contact in contacts if contact.until is not None})
     passed_with_world = [(path.waypoints[until], world_from(world, contacts, until)) for until in parting_waypoints]
     for share in ROUNDED:
-        trajectory = time_parameterize(path, limits, blend=share * blend, world=world, **options)
+        trajectory = timing(path, blend=share * blend, world=world)
         if all(_free_from(trajectory, q, world_after) for q, world_after in passed_with_world):
             return trajectory
-    return time_parameterize(path, limits, blend=0.0, world=world, **options)
+    return timing(path, blend=0.0, world=world)
 
 
 def _free_from(motion: Trajectory, q: Vector, world: World) -> bool:

@@ -488,7 +488,7 @@ def test_plans_keep_their_contacts_in_files_copies_and_times(tmp_path, panda):
     (tmp_path / "bad.json").write_text(json.dumps(first))
     with pytest.raises(rrtik.InputError, match="distance"):
         rrtik.TaskPlan.load(tmp_path / "bad.json")
-    timed = rrtik.time_task(plan, pause=0.0)
+    timed = plan.time_parameterize(pause=0.0)
     samples = timed.trajectory.sample(500.0)
     rows = samples.positions
     clock = samples.times

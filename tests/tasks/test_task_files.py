@@ -152,7 +152,7 @@ def test_the_page_carries_the_object_with_the_hand(small):
 def test_the_page_plays_a_task_in_the_time_that_it_takes(small):
     loaded = rrtik.Task.load(small)
     plan = loaded.plan(seed=1)
-    shown, timed = run_of(plan.played()), rrtik.time_task(plan)
+    shown, timed = run_of(plan.played()), plan.time_parameterize()
     duration = timed.trajectory.duration
     assert shown.times[-1] == pytest.approx(duration, abs=2.0 / shown.rate)
     for tick in shown.ticks[:-1:20]:

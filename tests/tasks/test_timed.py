@@ -20,7 +20,7 @@ def served():
 
 @pytest.mark.kernels
 def test_every_motion_begins_where_and_when_it_is_said_and_limits_are_kept(served):
-    timed = rrtik.time_task(served, pause=0.5)
+    timed = served.time_parameterize(pause=0.5)
     motion, limits = timed.trajectory, rrtik.RateLimits.of(served.worlds[0].robot)
     assert len(timed.begins) == len(served.paths)
     for begin, path in zip(timed.begins, served.paths, strict=True):
@@ -34,20 +34,20 @@ def test_every_motion_begins_where_and_when_it_is_said_and_limits_are_kept(serve
 
 @pytest.mark.kernels
 def test_the_arm_rests_where_the_cup_is_taken_and_put_down(served):
-    timed = rrtik.time_task(served, pause=0.5)
+    timed = served.time_parameterize(pause=0.5)
     assert np.diff(timed.pauses, axis=1) == pytest.approx(0.5)
     assert timed.pauses[:, 1] == pytest.approx(timed.begins[[2, 5]])  # the lift, and the retreat
     for first, last in timed.pauses:
         rows = timed.trajectory(np.linspace(first, last, 11)).positions
         assert np.abs(rows - rows[0]).max() < 1e-9
-    without = rrtik.time_task(served, pause=0.0)
+    without = served.time_parameterize(pause=0.0)
     assert without.pauses.shape == (0, 2)
     assert timed.trajectory.duration == pytest.approx(without.trajectory.duration + 1.0)
 
 
 @pytest.mark.kernels
 def test_between_waypoints_each_motion_is_free_in_its_own_world_and_the_cup_upright(served):
-    timed = rrtik.time_task(served)
+    timed = served.time_parameterize()
     ends = [*timed.begins[1:], timed.trajectory.duration]
     for number, (begin, end) in enumerate(zip(timed.begins, ends, strict=True)):
         rows = timed.trajectory(np.arange(begin, end, 0.01)).positions
@@ -64,7 +64,7 @@ def test_goals_one_after_the_other_are_one_motion(titan):
     world = rrtik.World(titan)
     goals = [titan.fk(np.radians(row)) for row in ([20, 30, -70, 20, 30, 40], [-20, 40, -90, 30, 0, 0])]
     plan = Task([*map(MoveTo, goals), MoveTo("ready")]).plan(world, "ready", seed=1)
-    timed = rrtik.time_task(plan)
+    timed = plan.time_parameterize()
     assert timed.pauses.size == 0
     for goal, begin in zip(goals, timed.begins[1:], strict=True):
         away = goal.actInv(titan.fk(timed.trajectory(begin).positions))
@@ -77,16 +77,14 @@ def test_a_motion_of_no_length_takes_no_time_and_none_at_all_is_refused(titan):
     world = rrtik.World(titan)
     here = titan.fk(titan.posture("ready"))
     plan = Task([Straight(to=here), MoveTo("zero")]).plan(world, "ready", seed=1)
-    assert rrtik.time_task(plan).begins.tolist() == [0.0, 0.0]
+    assert plan.time_parameterize().begins.tolist() == [0.0, 0.0]
     still = Task([Straight(to=here)]).plan(world, "ready", seed=1)
     with pytest.raises(InputError, match="no motion"):
-        rrtik.time_task(still)
+        still.time_parameterize()
     for wrong in ({"pause": -1.0}, {"pause": "long"}, {"blend": -1.0}):
         with pytest.raises(InputError) as caught:
-            rrtik.time_task(plan, **wrong)
+            plan.time_parameterize(**wrong)
         assert "\n" not in str(caught.value)
-    with pytest.raises(InputError, match="plan of a task"):
-        rrtik.time_task(None)
 
 
 @pytest.mark.kernels

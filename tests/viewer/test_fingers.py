@@ -45,7 +45,7 @@ def test_fingers_are_where_the_robot_of_each_motion_has_them(closing):
     for name, sign in ((":left_0", 1.0), (":right_0", -1.0)):
         assert np.allclose(poses[name], [[0, 0, 0, 0, 0, 0, 1], [-0.4 * sign, 0, 0, 0, 0, 0, 1]], atol=1e-12)
     at, clock = subject.fingers.at, subject.run.times
-    (begin, end), begins = rrtik.time_task(plan).pauses[0], rrtik.time_task(plan).begins
+    (begin, end), begins = plan.time_parameterize().pauses[0], plan.time_parameterize().begins
     assert len(at) == len(clock)
     assert (np.diff(at) >= 0.0).all()
     assert (at[clock < begin - 0.1] == 0.0).all()
@@ -67,7 +67,7 @@ def test_a_browser_shows_the_fingers_come_together(closing, tmp_path):
     world, plan = closing
     target = tmp_path / "fork.html"
     target.write_text(page(world, plan.played()), encoding="utf-8")
-    begin, end = rrtik.time_task(plan).pauses[0]
+    begin, end = plan.time_parameterize().pauses[0]
     wide = []
     for time in (begin, 0.5 * (begin + end), end):
         picture = screenshot(target, f"#view=Front&time={time:.2f}")

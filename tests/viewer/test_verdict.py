@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 import rrtik_ompl as rrtik
 from rrtik_ompl.tasks import MoveTo, Task
 from rrtik_ompl.tasks.played import PlayedTask
+from rrtik_ompl.tasks.timed import TimedTask
 from rrtik_ompl.viewer.page import page
 from rrtik_ompl.viewer.subject import ShownPath, subject_of
 from rrtik_tests.crane import story
@@ -306,8 +307,8 @@ def test_moving_obstacles_are_said_to_stand_where_they_do_at_time_0() -> None:
     assert story(page(asked.world, plan.played()))["proof"]["text"].count("as they stand at time 0") == 1
 
 
-def timed_task() -> rrtik.TimedTask:
-    return rrtik.time_task(Task([MoveTo(NEAR)]).plan(world(), FAR, seed=1))
+def timed_task() -> TimedTask:
+    return Task([MoveTo(NEAR)]).plan(world(), FAR, seed=1).time_parameterize()
 
 
 NOT_PLAYED: dict[str, tuple[Callable[[], Any], str]] = {

@@ -58,7 +58,7 @@ def blended(kept, blend):
 
 def timed_task(kept):
     plan = rrtik.Task([rrtik.MoveTo(rrtik.JointGoal(THERE))]).plan(kept, HERE, seed=1)
-    motion = rrtik.time_task(plan, blend=1.0).trajectory
+    motion = plan.time_parameterize(blend=1.0).trajectory
     return motion(np.linspace(0.0, motion.duration, 120)).positions
 
 
@@ -95,7 +95,7 @@ ACROSS = {  # motions around a post between two configurations
     "Roadmap": lambda kept: roadmap(kept).waypoints,
     "time_parameterize": lambda kept: blended(kept, 0.3),
     "time_parameterize, all corners": lambda kept: blended(kept, 1.0),
-    "time_task": timed_task,
+    "TaskPlan.time_parameterize": timed_task,
     "Task": task,
     "plan_in_time": in_time,
     "replan": lambda kept: np.array([tick.q for tick in rrtik.replan(across(kept), seed=1, step=0.2, rate=10.0).ticks]),
