@@ -79,8 +79,6 @@ if TYPE_CHECKING:
     from rrtik_ompl.tasks import Task as Task
     from rrtik_ompl.tasks import TaskPlan as TaskPlan
     from rrtik_ompl.tasks.task_file import list_tasks as list_tasks
-    from rrtik_ompl.tasks.through import PlanThrough as PlanThrough
-    from rrtik_ompl.tasks.through import plan_through as plan_through
     from rrtik_ompl.viewer import view as view
     from rrtik_ompl.viewer.plots.joints import plot_joints as plot_joints
     from rrtik_ompl.world.problem import Problem as Problem
@@ -166,10 +164,6 @@ else:
             "TaskPlan",
         ),
         "tasks.task_file": ("list_tasks",),
-        "tasks.through": (
-            "PlanThrough",
-            "plan_through",
-        ),
         "viewer": ("view",),
         "viewer.plots.joints": ("plot_joints",),
     }

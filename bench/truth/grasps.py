@@ -195,7 +195,7 @@ def _judged(arm: str, number: int, case: Case, plan: rrtik.TaskPlan) -> Carried:
         arm,
         number,
         True,
-        proven=plan.proven and not plan.violations(),
+        proven=bool(plan.proven) and not plan.violations(),
         before=float(lift[0]),
         lifted=float(lift[: parted + 1].max()),
         between=between,

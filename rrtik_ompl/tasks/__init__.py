@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import product
 from typing import TYPE_CHECKING, Any
 
@@ -17,21 +17,24 @@ from rrtik_ompl.base.copies import in_one_line
 from rrtik_ompl.base.errors import InputError, require
 from rrtik_ompl.files.kinds import read, write
 from rrtik_ompl.geometry.collision.distances import measured
+from rrtik_ompl.model.goal_kind import TaskRegion
 from rrtik_ompl.model.judgement import Violation
-from rrtik_ompl.model.path import JointPath
+from rrtik_ompl.model.path import JointPath, path_through
+from rrtik_ompl.model.proof import Proof
+from rrtik_ompl.model.result import required
 from rrtik_ompl.tasks.branches import Branch
 from rrtik_ompl.tasks.contact_life import MotionContact as MotionContact
 from rrtik_ompl.tasks.contact_life import world_from
 from rrtik_ompl.tasks.handling import never_set_down
 from rrtik_ompl.tasks.program import check_program, steps_of
 from rrtik_ompl.tasks.search import Done, TaskSearch
-from rrtik_ompl.tasks.setting import Setting, world_of_motion
+from rrtik_ompl.tasks.setting import Setting, placed_constraints, world_of_motion
 from rrtik_ompl.tasks.stages import Alternatives as Alternatives
 from rrtik_ompl.tasks.stages import Attach as Attach
 from rrtik_ompl.tasks.stages import Detach as Detach
 from rrtik_ompl.tasks.stages import Gripper as Gripper
 from rrtik_ompl.tasks.stages import MoveTo as MoveTo
-from rrtik_ompl.tasks.stages import Stage, checked_stages
+from rrtik_ompl.tasks.stages import Stage, checked_regions, checked_stages, holding
 from rrtik_ompl.tasks.stages import Straight as Straight
 from rrtik_ompl.tasks.standing import standing_faults
 from rrtik_ompl.world.problem import usable_configuration
@@ -65,11 +68,13 @@ class TaskPlan:
             an object attached from far away, contacts, fingers whose motion is not proven.
         contacts: For each motion the contacts on which it depends: which things touch, how deep they may overlap, and
             up to which waypoint; from there on the motion is checked without the contact.
+        seconds: Wall time of planning [s]; 0 for a plan from a file.
+        statistics: Counts of the search; empty for a plan from a file.
 
     Example:
         >>> plan = rrtik.Task.load("titan4_drawer").plan(seed=1)
-        >>> plan.found, len(plan.paths) == len(plan.worlds)
-        (True, True)
+        >>> plan.found, len(plan.paths) == len(plan.worlds), plan.path.end.shape
+        (True, True, (6,))
     """
 
     found: bool
@@ -81,23 +86,45 @@ class TaskPlan:
     end: World | None = None
     notes: tuple[str, ...] = ()
     contacts: tuple[tuple[MotionContact, ...], ...] = ()
+    seconds: float = 0.0
+    statistics: Mapping[str, Any] = field(default_factory=dict)
 
     __repr__ = in_one_line
 
     @property
-    def proven(self) -> bool:
-        """Return whether every motion is proven free in its own world, with the contacts that the plan states.
+    def proven(self) -> bool | None:
+        """Whether every motion is proven free in its own world, with the contacts that the plan states; None without.
 
         A motion without a proof, such as one from a file, is proved on each access. The answer is False too if a stated
         contact or the place of a thing is not true, see :meth:`violations`.
         """
-        if not self.found or any(self._standing_faults()):
-            return False
-        for path, world, stage in zip(self.paths, self.worlds, self.stages, strict=True):
-            proved = path if path.proof is not None else path.proved(world_of_motion(path, world, stage))
-            if not proved.proven:
-                return False
-        return True
+        if not self.found:
+            return None
+        return not any(self._standing_faults()) and all(path.proven for path in self._proved_paths())
+
+    @property
+    def path(self) -> JointPath | None:
+        """The whole motion of the arm, without what is done between its parts; None if there is no plan or motion.
+
+        It is proven if every motion is, each in its own world; motions without a proof are proved on each access.
+        """
+        if not self.found or not self.paths:
+            return None
+        whole = _joined(self._proved_paths())
+        return whole.with_waypoints(whole.waypoints) if any(self._standing_faults()) else whole
+
+    def require(self) -> JointPath:
+        """Return the path of the whole motion.
+
+        Raises:
+            NotFoundError: If there is no plan, or no motion in it.
+
+        Example:
+            >>> world = rrtik.World(rrtik.load_robot("titan4"))
+            >>> rrtik.Task([rrtik.MoveTo("ready"), rrtik.MoveTo("zero")]).plan(world, "zero").require().proven
+            True
+        """
+        return required(self.path, "no motion for the task", self.reason)
 
     def violations(self) -> tuple[Violation, ...]:
         """Check all motions again, each in its world, and without each contact once it has ended.
@@ -161,8 +188,7 @@ class TaskPlan:
             InputError: If there is no motion, or an option is not valid.
 
         Example:
-            >>> loaded = rrtik.load_task("titan4_drawer")
-            >>> timed = loaded.task.plan(loaded.world, loaded.start, seed=1).time_parameterize(pause=0.5)
+            >>> timed = rrtik.Task.load("titan4_drawer").plan(seed=1).time_parameterize(pause=0.5)
             >>> len(timed.begins), bool(timed.trajectory.duration > timed.begins[-1])
             (4, True)
         """
@@ -212,6 +238,13 @@ class TaskPlan:
         """
         return read(TaskPlan, file, trust_xacro=trust_xacro)
 
+    def _proved_paths(self) -> list[JointPath]:
+        """Return the paths of the motions; those without a proof are proved."""
+        return [
+            path if path.proof is not None else path.proved(world_of_motion(path, world, stage))
+            for path, world, stage in zip(self.paths, self.worlds, self.stages, strict=True)
+        ]
+
     def _stood_on(self) -> tuple[tuple[MotionContact, ...], ...]:
         return self.contacts or ((),) * len(self.paths)
 
@@ -228,6 +261,8 @@ class Task:
         world: Robot and scene at the beginning; a task of a file has its own, others may leave it to :meth:`plan`.
         start: Configuration at the beginning, shape (dof,), or the name of a posture, likewise.
         name: Name used in messages.
+        constraints: Regions that a frame must not leave on the way of any `MoveTo`, in addition to those of the stage;
+            those ``from_start`` refer to where the task begins.
 
     Raises:
         InputError: If there are no stages, or something else is among them.
@@ -244,6 +279,7 @@ class Task:
     """
 
     stages: tuple[Stage, ...]
+    constraints: tuple[TaskRegion, ...]
     name: str
     _world: World | None = field(repr=False)
     _start: Vector | str | None = field(repr=False)
@@ -255,10 +291,17 @@ class Task:
         start: ArrayLike | str | None = None,
         *,
         name: str = "task",
+        constraints: Iterable[TaskRegion] = (),
     ) -> None:
         require(world, World | None, "world of a task", "use World(robot, scene)")
         placed = start if start is None or isinstance(start, str) else frozen(finite_array(start, (None,), "start"))
-        values = {"stages": checked_stages(stages, "task"), "name": name, "_world": world, "_start": placed}
+        values = {
+            "stages": checked_stages(stages, "task"),
+            "constraints": checked_regions(constraints, "a task"),
+            "name": name,
+            "_world": world,
+            "_start": placed,
+        }
         for attribute, value in values.items():
             object.__setattr__(self, attribute, value)
 
@@ -333,25 +376,26 @@ class Task:
             InputError: If the stages are inconsistent in this world, as when something is attached twice, or detached
                 while it is not held; the message names the stage.
             UnknownNameError: If an object, link or posture does not exist.
-            ProblemError: If the start is in collision or outside the limits.
+            ProblemError: If the start is in collision, outside the limits or outside the region of a constraint.
         """
+        budget = Budget(seed_of(seed), positive(seconds, "seconds"))
         world = self.world if world is None else world
         start = self.start if start is None else start
         require(world, World, "world of a task", "use World(robot, scene)")
-        steps = steps_of(self.stages)
+        steps = steps_of(holding(self.stages, placed_constraints(world, start, self.constraints)))
         check_program(steps, world)
 
         given: Any = world.robot.posture(start) if isinstance(start, str) else start
         setting = Setting.beginning(world, world.robot.configuration(given, "start"))
         q = usable_configuration(setting.world, given, "start")
         if reason := never_set_down(steps, setting.world, np.array(q)):
-            return TaskPlan(False, (), (), (), (), reason)
+            return TaskPlan(False, (), (), (), (), reason, seconds=budget.elapsed)
 
-        time_limit = positive(seconds, "seconds")
-        search = TaskSearch(Budget(seed_of(seed), time_limit))
+        search = TaskSearch(budget.begun_now())
         done = search.run(Branch(setting, np.array(q), steps))
+        taken = budget.elapsed
         if done is None:
-            return TaskPlan(False, (), (), (), (), search.reason())
+            return TaskPlan(False, (), (), (), (), search.reason(), seconds=taken, statistics=search.statistics)
         return TaskPlan(
             found=True,
             paths=tuple(path for _, path in done.motions),
@@ -362,7 +406,33 @@ class Task:
             end=done.last.after.world,
             notes=_notes_of(done),
             contacts=done.contacts,
+            seconds=taken,
+            statistics=search.statistics,
         )
+
+
+def _joined(paths: Sequence[JointPath]) -> JointPath:
+    """Return motions that have proofs as one path, whose proof refers to a world only if all of theirs do."""
+    rows = [paths[0].waypoints, *(path.waypoints[1:] for path in paths[1:])]
+    proofs = [path.proof for path in paths if path.proof is not None]
+    before = np.cumsum([0, *(len(path) - 1 for path in paths)]).tolist()
+    motions = max(before[-1], 1)
+    # A motion of one waypoint has no edge, so a gap of it counts as one of the next edge.
+    gaps = [
+        replace(gap, motion=min(first + gap.motion, motions - 1))
+        for first, proof in zip(before, proofs, strict=False)
+        for gap in proof.unproven
+    ]
+
+    maker = proofs[0].maker
+    whole = Proof(
+        motions,
+        min(proof.clearance for proof in proofs),
+        tuple(gaps),
+        min(proof.margin for proof in proofs),
+        maker=maker if all(proof.maker is maker for proof in proofs) else None,
+    )
+    return path_through(paths[0], np.vstack(rows)).with_proof(whole)
 
 
 def _notes_of(done: Done) -> tuple[str, ...]:

@@ -71,6 +71,21 @@ class TaskSearch:
         self._motions_not_found: set[int] = set()
         self._waiting: list[Branch] = []
 
+        # Counts: rounds, branches that were expanded, motions between configurations for which a path was looked for.
+        self._rounds = 0
+        self._expanded = 0
+        self._motions = 0
+
+    @property
+    def statistics(self) -> dict[str, int]:
+        """Numbers of rounds, expanded branches, motions that were planned, and steps that failed."""
+        return {
+            "rounds": self._rounds,
+            "branches": self._expanded,
+            "motions_planned": self._motions,
+            "failures": len(self._expander.failures),
+        }
+
     def run(self, start: Branch) -> Done | None:
         """Search for choices with which the whole task works; None if there are none.
 
@@ -79,6 +94,7 @@ class TaskSearch:
         """
         self._push(start)
         for effort in range(ROUNDS):
+            self._rounds += 1
             done = self._run_round(effort)
             if done is not None or self._out_of_time:
                 return done
@@ -125,6 +141,7 @@ class TaskSearch:
                 self._out_of_time = True
                 return None
             branch = heapq.heappop(self._queue)[-1]
+            self._expanded += 1
             if any(id(link) in self._motions_not_found for link in branch.chain()):
                 self._waiting.append(branch)
             elif branch.rest:
@@ -163,6 +180,7 @@ class TaskSearch:
 
         The straight motion is tried first.
         """
+        self._motions += 1
         before = link.before
         world = link.setting.world
         assert before is not None, "it comes after another"

@@ -8,10 +8,12 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from rrtik_ompl.base.arrays import Vector
-from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.errors import InputError, listed
 from rrtik_ompl.description.catalog import robot_from_entry
+from rrtik_ompl.model.goal_kind import TaskRegion
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import Scene, Touching
@@ -127,6 +129,18 @@ class Setting:
         setting = Setting(self._first_world, self.robot, self.scene.detaching(stage.object, pose), grasp_pairs)
         touching = touching_at(setting.world, q, stage.object)
         return setting.with_contacts(each.going_on() for each in touching if each.distance >= -EXTRA_DEPTH)
+
+
+def placed_constraints(
+    world: World, start: ArrayLike | str, constraints: Iterable[TaskRegion]
+) -> tuple[TaskRegion, ...]:
+    """Return path constraints with regions placed as seen from a start, for stages that begin elsewhere.
+
+    Raises:
+        ProblemError: If the start violates them, or cannot be used.
+    """
+    regions = listed(constraints, "path constraints")
+    return Problem(world, start, start, constraints=regions).constraints if regions else ()
 
 
 def world_of_motion(path: JointPath, world: World, stage: Stage) -> World:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal, TypeAlias, get_args
 
 import numpy as np
@@ -40,9 +40,7 @@ class MoveTo:
     constraints: tuple[TaskRegion, ...] = ()
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "constraints", listed(self.constraints, "constraints of MoveTo"))
-        for region in self.constraints:
-            require(region, TaskRegion, "each constraint of MoveTo", "use upright, on_plane, on_line or inside")
+        object.__setattr__(self, "constraints", checked_regions(self.constraints, "MoveTo"))
 
         goal = self.goal
         if isinstance(goal, pin.SE3) or (not isinstance(goal, Goal | str) and dimensions(goal) == 2):
@@ -224,6 +222,31 @@ def checked_stages(stages: object, what: str) -> tuple[Stage, ...]:
     if not row:
         raise InputError(f"{what}: needs at least one stage, such as MoveTo(goal)")
     return row
+
+
+def checked_regions(constraints: object, what: str) -> tuple[TaskRegion, ...]:
+    """Check path constraints and return them.
+
+    Raises:
+        InputError: If they are no list of regions.
+    """
+    regions = listed(constraints, f"constraints of {what}")
+    for region in regions:
+        require(region, TaskRegion, f"each constraint of {what}", "use upright, on_plane, on_line or inside")
+    return regions
+
+
+def holding(stages: Iterable[Stage], regions: tuple[TaskRegion, ...]) -> tuple[Stage, ...]:
+    """Return the same stages, with every `MoveTo` also holding some placed regions."""
+    changed: list[Stage] = []
+    for stage in stages:
+        if isinstance(stage, Alternatives):
+            changed.append(Alternatives([holding(row, regions) for row in stage.options]))
+        elif isinstance(stage, MoveTo):
+            changed.append(replace(stage, constraints=(*stage.constraints, *regions)))
+        else:
+            changed.append(stage)
+    return tuple(changed)
 
 
 def _row(stages: object) -> tuple[Stage, ...]:

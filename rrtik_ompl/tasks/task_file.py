@@ -39,9 +39,8 @@ from rrtik_ompl.problem_files.robot import RobotEntry, robot_data
 from rrtik_ompl.problem_files.scene import SceneEntry, scene_data
 from rrtik_ompl.tasks import Task
 from rrtik_ompl.tasks.program import check_program, steps_of
-from rrtik_ompl.tasks.setting import Setting
-from rrtik_ompl.tasks.stages import Alternatives, Attach, Detach, Gripper, MoveTo, Stage, Straight
-from rrtik_ompl.tasks.through import placed_constraints
+from rrtik_ompl.tasks.setting import Setting, placed_constraints
+from rrtik_ompl.tasks.stages import Alternatives, Attach, Detach, Gripper, MoveTo, Stage, Straight, holding
 from rrtik_ompl.world.problem import usable_configuration
 from rrtik_ompl.world.world import World
 
@@ -253,7 +252,8 @@ def write_task(task: Task, file: str | os.PathLike[str]) -> None:
     data: dict[str, Any] = {"version": 1, "robot": robot_data(world.robot.source, folder)}
     scene = scene_data(world.scene, folder)
     data |= {"scene": scene} if scene else {}
-    data |= {"start": start, **world_data(world.settings), "task": [stage_data(stage) for stage in task.stages]}
+    stages = holding(task.stages, placed_constraints(world, task.start, task.constraints))
+    data |= {"start": start, **world_data(world.settings), "task": [stage_data(stage) for stage in stages]}
     write_yaml(file, data)
 
 

@@ -38,7 +38,6 @@ CALLS = {
     "plan": lambda seed: rrtik.plan(PROBLEM, seed=seed),
     "plan_batch": lambda seed: rrtik.plan_batch(["planar3_boxes"], seed=seed),
     "plan_many": lambda seed: rrtik.plan_many(WORLD, [START], [END], seed=seed),
-    "plan_through": lambda seed: rrtik.plan_through(WORLD, START, [END], seed=seed),
     "replan": lambda seed: rrtik.replan(PROBLEM, step=0.2, rate=20.0, seconds=0.2, seed=seed),
     "replanning.plan_in_time": lambda seed: rrtik.replanning.plan_in_time(PROBLEM, rate=5.0, speed=1.0, seed=seed),
     "shorten": lambda seed: rrtik.shorten(PATH, PROBLEM, seed=seed),

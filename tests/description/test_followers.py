@@ -17,7 +17,7 @@ from rrtik_ompl.ik.solve import solve_ik
 from rrtik_ompl.model.goal import PoseGoal, joint_difference
 from rrtik_ompl.planning.plan import plan
 from rrtik_ompl.planning.search.roadmap import Roadmap
-from rrtik_ompl.tasks.through import plan_through
+from rrtik_ompl.tasks import MoveTo, Task
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
 
@@ -204,9 +204,8 @@ def _planned(robot, q):
     return found.path.end
 
 
-def _through(robot, q):
-    found = plan_through(World(robot), [0.3], [q], seed=1, seconds=2.0)
-    return found.path.waypoints[found.reached[0]]
+def _by_task(robot, q):
+    return Task([MoveTo(q)]).plan(World(robot), [0.3], seed=1, seconds=2.0).require().end
 
 
 def _by_kinematics(robot, q):
@@ -231,7 +230,7 @@ ALIKE = {  # what the library gives for the posture q, which it then calls the s
     ),
     "shortest difference": _difference,
     "end of a plan": _planned,
-    "end of a plan through goals": _through,
+    "end of a task": _by_task,
     "inverse kinematics": _by_kinematics,
     "a roadmap": _joined_on_a_roadmap,
     "folded solutions": _folded,

@@ -16,7 +16,7 @@ from rrtik_ompl.model.result import PathResult, Result
 Kind = TypeVar("Kind")
 QUESTIONS = ("found", "reason", "seconds", "statistics", "require")
 ARRAYS = {"ik.IkBatch"}  # arrays of results, whose ``found`` is a mask
-AWAITED = {"Plan", "PlanThrough", "TaskPlan", "replanning.TimedPlan"}
+AWAITED = {"Plan", "replanning.TimedPlan"}
 HERE = np.array([0.0, -1.6, 1.8, -0.2, 1.6, 0.0])
 FAR = rrtik.PositionGoal([9.0, 0.0, 0.0])
 UR5 = rrtik.load_robot("ur5")
@@ -36,7 +36,13 @@ def ik_trajectory(found: bool) -> rrtik.ik.IkTrajectory:
     return rrtik.ik.solve_trajectory(UR5, np.linspace([0.4, 0.1, 0.4], end, 4), seconds=2.0)
 
 
+def task_plan(found: bool) -> rrtik.TaskPlan:
+    goals = [HERE + 0.1, HERE if found else FAR]
+    return rrtik.Task([rrtik.MoveTo(goal) for goal in goals]).plan(WORLD, HERE, seed=1)
+
+
 MAKERS: dict[str, Callable[[bool], Any]] = {
+    "TaskPlan": task_plan,
     "ik.IkResult": ik_result,
     "ik.IkTrajectory": ik_trajectory,
     "tip.TipMotion": tip_motion,
@@ -105,6 +111,6 @@ def test_type_checkers_know_what_a_result_gives() -> None:
     path: rrtik.JointPath = wanted(tip_motion(True))
     q: np.ndarray[Any, np.dtype[np.float64]] = wanted(ik_result(True))
     rows: np.ndarray[Any, np.dtype[np.float64]] = wanted(ik_trajectory(True))
-    moved: PathResult[rrtik.JointPath] = tip_motion(True)
-    assert moved.path is not None
+    moves: list[PathResult[rrtik.JointPath]] = [tip_motion(True), task_plan(True)]
+    assert all(each.path is not None and each.proven for each in moves)
     assert (path.waypoints.shape[1], q.shape, rows.shape) == (6, (6,), (4, 6))

@@ -240,9 +240,10 @@ def test_goals_in_order_are_the_tour_that_python_plans(tmp_path, capsys):
     assert plan.found, plan.reason
     goals = [np.add(loaded.start, [0.8, 0, 0, 0, 0, 0]), rrtik.PositionGoal([0.3, 0.3, 0.4]), loaded.start]
     cup = rrtik.constraints.upright(loaded.world.robot, "y", tolerance_deg=20.0)
-    tour = rrtik.plan_through(loaded.world, loaded.start, goals, constraints=[cup], seed=2)
-    rows = [plan.paths[0].waypoints, *(path.waypoints[1:] for path in plan.paths[1:])]
-    assert np.array_equal(np.vstack(rows), tour.path.waypoints)
+    tour = rrtik.Task([rrtik.MoveTo(goal) for goal in goals], constraints=[cup])
+    assert np.array_equal(plan.path, tour.plan(loaded.world, loaded.start, seed=2).path)
+    rrtik.Task(tour.stages, loaded.world, loaded.start, constraints=[cup]).save(tmp_path / "again.yaml")
+    assert np.array_equal(plan.path, rrtik.Task.load(tmp_path / "again.yaml").plan(seed=2).path)
     plan.save(tmp_path / "plan.json")
     assert len(rrtik.TaskPlan.load(tmp_path / "plan.json").paths) == 3
     assert run(["task", str(file), "--seed", "2", "--trajectory", str(tmp_path / "tour.json")]) == 0

@@ -203,8 +203,8 @@ def test_the_page_of_a_plan_shows_its_first_world_whatever_world_it_is_shown_wit
 
 def test_a_tour_shows_what_stands_and_what_is_held(arm: rrtik.Robot) -> None:
     world = rrtik.World(arm, scene("hand"))
-    tour = rrtik.plan_through(world, [0.0, 0.0], [A, B], seed=1)
-    page = Page.of(subject_of(world, tour.path))
+    tour = Task([MoveTo(A), MoveTo(B)]).plan(world, [0.0, 0.0], seed=1).require()
+    page = Page.of(subject_of(world, tour))
     rows = np.array(page.story["waypoints"])
     for number, q in enumerate(rows):
         for name, place in true_places(world, q):

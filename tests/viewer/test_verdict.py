@@ -100,8 +100,8 @@ def of_constraints(good: bool) -> Case:
 
 
 def of_tour(good: bool) -> Case:
-    tour = rrtik.plan_through(world(), FAR, [NEAR], seed=1)
-    path = tour.path if good else tour.path.with_waypoints(np.vstack([tour.path.waypoints, IN]))
+    tour = Task([MoveTo(NEAR)]).plan(world(), FAR, seed=1).require()
+    path = tour if good else tour.with_waypoints(np.vstack([tour, IN]))
     return page(world(), path), {}, path.proved(world()).proven
 
 
@@ -139,7 +139,7 @@ def of_task(good: bool) -> Case:
     if not good:
         through = plan.paths[0].with_waypoints([FAR, IN, NEAR])
         plan = replace(plan, paths=(through, *plan.paths[1:]))
-    return page(world(), plan.played()), {}, plan.proven and not plan.violations()
+    return page(world(), plan.played()), {}, bool(plan.proven) and not plan.violations()
 
 
 def crossed() -> rrtik.Problem:
@@ -313,7 +313,6 @@ def timed_task() -> TimedTask:
 
 NOT_PLAYED: dict[str, tuple[Callable[[], Any], str]] = {
     "Plan": (lambda: rrtik.plan(problem(), seed=1), "give its path"),
-    "PlanThrough": (lambda: rrtik.plan_through(world(), FAR, [NEAR], seed=1), "give its path"),
     "TimedTask": (timed_task, "give its trajectory"),
     "TimedPlan": (lambda: rrtik.replanning.plan_in_time(crossed(), seed=1), "give its run"),
     "Roadmap": (lambda: rrtik.Roadmap(world(), vertices=20), "expected numbers"),

@@ -64,7 +64,7 @@ def timed_task(kept):
 
 def task(kept):
     plan = rrtik.Task([rrtik.MoveTo(rrtik.JointGoal(THERE))]).plan(kept, HERE, seed=1)
-    return np.vstack([each.waypoints for each in plan.paths])
+    return plan.require().waypoints
 
 
 def straight_stage(kept):
@@ -89,7 +89,6 @@ def in_time(kept):
 ACROSS = {  # motions around a post between two configurations
     "plan": lambda kept: path(kept).waypoints,
     "plan_many": lambda kept: rrtik.plan_many(kept, [HERE], [THERE])[0].path.waypoints,
-    "plan_through": lambda kept: rrtik.plan_through(kept, HERE, [THERE], seed=1).path.waypoints,
     "shorten": lambda kept: rrtik.shorten(path(kept), across(kept), seed=1).waypoints,
     "one_joint_moves": lambda kept: rrtik.one_joint_moves(path(kept), kept).waypoints,
     "Roadmap": lambda kept: roadmap(kept).waypoints,
