@@ -5,9 +5,12 @@ import importlib.util
 import inspect
 import json
 import re
+import runpy
+import shutil
 from pathlib import Path
 from pkgutil import resolve_name
 
+import numpy as np
 import pytest
 import yaml
 
@@ -89,6 +92,42 @@ def test_the_examples_of_tasks_run(tmp_path, monkeypatch):
     file = blocks("tasks", "yaml")[0]
     Path("task.yaml").write_text(file)
     assert run(["task", "task.yaml"]) == 0
+
+
+@pytest.mark.kernels
+def test_the_thirty_wishes_come_true(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    _write_arms()
+    _write_part()
+    names = {}
+    for block in blocks("wishes", "python"):
+        exec(compile(block, "wishes", "exec"), names)
+    assert names["proof"].proven
+    assert names["task"].found
+    assert names["run"].arrived
+    assert len(re.findall(r"^### \d+\. ", PAGES["wishes"], re.MULTILINE)) == len(blocks("wishes", "python")) == 30
+
+
+def _write_arms():
+    """An arm as a URDF, in a MoveIt folder, and one as an MJCF."""
+    exec(blocks_of((ROOT / "docs/tutorials/own_robot.md").read_text())[0], {})
+    runpy.run_path(str(ROOT / "examples/mjcf_arm.py"))
+    Path("ur5.xml").rename("arm.xml")
+    config = Path("arm_moveit_config/config")
+    config.mkdir(parents=True)
+    shutil.copy("arm.urdf", config)
+    group = '<group name="arm"><chain base_link="base" tip_link="tool"/></group>'
+    (config / "arm.srdf").write_text(f'<robot name="mine">{group}</robot>')
+
+
+def _write_part():
+    """A tetrahedron as an STL file."""
+    corners = 0.1 * np.vstack([np.zeros(3), np.eye(3)])
+    lines = ["solid part"]
+    for face in corners[[[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]]:
+        points = ["vertex {:g} {:g} {:g}".format(*point) for point in face]
+        lines += ["facet normal 0 0 0", "outer loop", *points, "endloop", "endfacet"]
+    Path("part.stl").write_text("\n".join([*lines, "endsolid part"]))
 
 
 def test_the_examples_of_own_ompl_code_run_in_their_order(tmp_path, monkeypatch, quiet_ompl):
