@@ -26,13 +26,13 @@ if TYPE_CHECKING:
     from rrtik_ompl.base.errors import ProblemError as ProblemError
     from rrtik_ompl.base.errors import RrtikError as RrtikError
     from rrtik_ompl.base.poses import pose as pose
-    from rrtik_ompl.benchmark.batch import plan_batch as plan_batch
     from rrtik_ompl.description.catalog import list_problems as list_problems
     from rrtik_ompl.description.catalog import list_robots as list_robots
     from rrtik_ompl.description.catalog import load_robot as load_robot
     from rrtik_ompl.files.kinds import load as load
     from rrtik_ompl.ik.batch import solve_ik_many as solve_ik_many
     from rrtik_ompl.ik.solve import solve_ik as solve_ik
+    from rrtik_ompl.many import plan_many as plan_many
     from rrtik_ompl.model.certificate import Certificate as Certificate
     from rrtik_ompl.model.goal import GoalSet as GoalSet
     from rrtik_ompl.model.goal import JointGoal as JointGoal
@@ -59,7 +59,6 @@ if TYPE_CHECKING:
     from rrtik_ompl.motion.trajectory import RateLimits as RateLimits
     from rrtik_ompl.motion.trajectory import Trajectory as Trajectory
     from rrtik_ompl.motion.trajectory import time_parameterize as time_parameterize
-    from rrtik_ompl.planning.many import plan_many as plan_many
     from rrtik_ompl.planning.moves.staircase import one_joint_moves as one_joint_moves
     from rrtik_ompl.planning.plan import Plan as Plan
     from rrtik_ompl.planning.plan import list_planners as list_planners
@@ -137,8 +136,7 @@ else:
             "list_planners",
             "plan",
         ),
-        "planning.many": ("plan_many",),
-        "benchmark.batch": ("plan_batch",),
+        "many": ("plan_many",),
         "planning.shortening": (
             "MoveRules",
             "shorten",

@@ -17,7 +17,7 @@ from bench.robustness.spoilt_files import Drawn
 from rrtik_ompl.base.lazy import public_values
 
 Function = Callable[..., Any]
-RARE = {"plan_batch": 0.1, "replan": 0.3, "plan_many": 0.5, "reach_map": 0.3}  # processes, or many searches, each call
+RARE = {"replan": 0.3, "plan_many": 0.2, "reach_map": 0.3}  # processes, or many searches, each call
 
 
 def viewed(*args: Any, on_ready: Any = values.anything, **options: Any) -> Any:

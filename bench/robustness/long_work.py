@@ -138,9 +138,9 @@ def _session(name: str) -> Callable[[], int]:
     return work
 
 
-def _batch() -> int:
-    rows = rrtik.plan_batch(["planar3_a", "planar3_boxes"], "bicrdt", seed=1)
-    return FOUND if [row["status"] for row in rows] == ["solved", "solved"] else NOT_FOUND
+def _many() -> int:
+    plans = rrtik.plan_many(["planar3_a", "planar3_boxes"], "bicrdt", seed=1, processes=2)
+    return FOUND if all(plan.found for plan in plans) else NOT_FOUND
 
 
 PLAN = ("plan", "planar3_boxes", "--planner", "bicrdt", "--seed", "1")
@@ -182,7 +182,7 @@ WORK: dict[str, LongWork] = {
         waits=True,
         grows=(f"out/{NAME}",),
     ),
-    "plan_batch": LongWork(_batch, waits=True),
+    "plan_many": LongWork(_many, waits=True),
 }  # fmt: skip
 WHOLE: dict[str, Reader] = {
     f"out/{NAME}": _whole_campaign,

@@ -38,7 +38,7 @@ def on_workers(workers: int) -> Measured:
     """A batch on workers of this machine."""
     from distributed import Client
 
-    from rrtik_ompl import plan_batch
+    from rrtik_ompl import plan_many
 
     with closing(socket.create_server(("127.0.0.1", 0))) as free:
         port = free.getsockname()[1]
@@ -52,17 +52,17 @@ def on_workers(workers: int) -> Measured:
         try:
             with Client(address, timeout=120) as client:
                 client.wait_for_workers(workers, timeout=120)
-            plan_batch([PROBLEM] * workers, "fastrrtconnect", seed=1, scheduler=address)  # kernels are loaded
+            plan_many([PROBLEM] * workers, "fastrrtconnect", seed=1, scheduler=address)  # kernels are loaded
             before, begin = of_process(scheduler.pid), time.perf_counter()
-            rows = plan_batch([PROBLEM] * TASKS, "fastrrtconnect", seed=1, scheduler=address)
+            plans = plan_many([PROBLEM] * TASKS, "fastrrtconnect", seed=1, scheduler=address)
             wall = time.perf_counter() - begin
             booked = (of_process(scheduler.pid) - before) / TASKS
         finally:
             for process in started:
                 process.kill()
                 process.wait()
-    plain = float(np.mean([row.get("plan_seconds", 0.0) for row in rows]))
-    return Measured(workers, wall, booked, plain, sum(row["status"] == "solved" for row in rows))
+    plain = float(np.mean([plan.seconds for plan in plans]))
+    return Measured(workers, wall, booked, plain, sum(plan.found for plan in plans))
 
 
 @dataclass(frozen=True)

@@ -15,8 +15,9 @@ from typing import Any
 import numpy as np
 
 from rrtik_ompl.base.errors import InputError
-from rrtik_ompl.benchmark import records, spread
+from rrtik_ompl.benchmark import records, run
 from rrtik_ompl.benchmark.suite import Suite
+from rrtik_ompl.many import spread
 
 LIBRARIES = ("ompl", "pin", "coal", "numpy", "numba")
 
@@ -96,6 +97,7 @@ def all_jobs(suite: Suite) -> Iterator[dict[str, Any]]:
                         "run": number,
                         "seed": seed,
                     },
+                    "module": run.__name__,
                     "source": source.plain(),
                     "planner": entrant.name,
                     "parameters": entrant.parameters,

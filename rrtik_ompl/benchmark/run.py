@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -13,6 +15,7 @@ from rrtik_ompl.base.choices import ShorteningMethod, SuiteShortening
 from rrtik_ompl.base.errors import RrtikError
 from rrtik_ompl.benchmark.sources import build, from_plain
 from rrtik_ompl.benchmark.suite import BY_KIND, NONE
+from rrtik_ompl.many.guard import CRASH, HANG, OUT_OF_MEMORY
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.world_settings import FINEST_RESOLUTION
 from rrtik_ompl.ompl_bridge.planner_names import AUTO
@@ -23,18 +26,16 @@ from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
 
 SOLVED, NOT_FOUND, INVALID, ERROR = "solved", "not found", "invalid", "error"
-OUT_OF_MEMORY, CRASH, HANG = "out of memory", "crash", "hang"
 STRICT = 4.0  # factor of checks over a planner's; OMPL's own value for "strictly correct"
 LOOKED_AT = 8  # largest number of waypoints whose clearance is measured
 STATUSES = (SOLVED, NOT_FOUND, INVALID, ERROR, OUT_OF_MEMORY, CRASH, HANG)
 
 
-def prepare(job: Mapping[str, Any]) -> Problem | None:
-    """Build the problem of a job, which is not part of the run; None if that fails, as the run will report why."""
-    try:
-        return build(from_plain(job["source"]))
-    except (RrtikError, MemoryError):
-        return None
+def prepared(job: Mapping[str, Any]) -> Callable[[], dict[str, Any]]:
+    """Build the problem of a job, which is not part of the run, and return what runs the job."""
+    with suppress(RrtikError, MemoryError):  # the run will report why the problem cannot be built
+        build(from_plain(job["source"]))
+    return partial(execute, job)
 
 
 def execute(job: Mapping[str, Any]) -> dict[str, Any]:

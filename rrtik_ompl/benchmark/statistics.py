@@ -9,7 +9,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rrtik_ompl.benchmark.run import CRASH, ERROR, INVALID, SOLVED
+from rrtik_ompl.benchmark.run import ERROR, INVALID, SOLVED
+from rrtik_ompl.many.guard import CRASH
 
 # Key, displayed name and unit of each quantity. Lengths are Euclidean in joint space; moves are called transitions.
 QUANTITIES: Mapping[str, tuple[str, str]] = MappingProxyType(

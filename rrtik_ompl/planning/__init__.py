@@ -1,1 +1,1 @@
-"""Planning: `plan()` and `plan_many()`, their attempts, the second check, improvement and generated problems."""
+"""Planning: `plan()`, many queries together, attempts, the second check, improvement and generated problems."""

@@ -1,4 +1,4 @@
-"""`plan_many()`: plan many queries in one world, on all cores of this machine.
+"""Many queries: those in one world, and with one planner, are planned together where that is possible.
 
 For each query `plan()` makes a brief attempt on what the kernels can prove, and accepts its path if all of it is proven
 with the clearance of its ends. :func:`plans_together` does this for many queries in a few calls: the ends of all
@@ -9,158 +9,189 @@ there; `plan()` then plans it from the beginning.
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from types import MappingProxyType
-from typing import Any, Protocol, runtime_checkable
+from typing import Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from rrtik_ompl.base.arrays import Mask, Matrix, Vector, dimensions, finite_array, seed_of
-from rrtik_ompl.base.budget import Budget
-from rrtik_ompl.base.choices import ProofMode, one_of
-from rrtik_ompl.base.errors import InputError, ProblemError, require
+from rrtik_ompl.base.arrays import Mask, Matrix, Vector
+from rrtik_ompl.base.choices import ShorteningMethod
+from rrtik_ompl.base.errors import InputError, PlannerError, ProblemError
 from rrtik_ompl.kernels.threads import in_threads
 from rrtik_ompl.model.goal import Goal, JointGoal
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.proof import Proof
-from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.ompl_bridge.attempt import ITERATION_LIMIT, attempt_seeds
-from rrtik_ompl.ompl_bridge.planner_names import AUTO, find_planner, is_auto
+from rrtik_ompl.ompl_bridge.planner_names import AUTO, is_auto
 from rrtik_ompl.ompl_bridge.planner_options import is_safe, reseed, safe_planner
 from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory, traits_of
 from rrtik_ompl.ompl_bridge.results import SearchResult
 from rrtik_ompl.ompl_bridge.safe_planner import SafePlanner
 from rrtik_ompl.ompl_bridge.setup import shared_space
 from rrtik_ompl.planning.attempts import EFFORT_ITERATIONS, load_kernels_for
+from rrtik_ompl.planning.finish import finished
 from rrtik_ompl.planning.outcome import NamedPlanner, Plan, Request
-from rrtik_ompl.planning.plan import PROOF_MODES, named_planner, planned, time_limit
+from rrtik_ompl.planning.plan import named_planner, planned_and_finished
 from rrtik_ompl.world.clearances import Clearances, clearances_of_pairs
 from rrtik_ompl.world.problem import Problem, known_problem, problem_in
 from rrtik_ompl.world.world import World, form_of
 
-Ends = ArrayLike | Sequence[Goal]
 TOGETHER = 32  # queries at a time, whatever the number of threads
 
-
-def plan_many(
-    world: World,
-    starts: ArrayLike,
-    goals: Ends,
-    planner: str | None = None,
-    *,
-    seconds: float = 5.0,
-    seed: int | None = 0,
-    parameters: Mapping[str, Any] | None = None,
-    proof: ProofMode = "preferred",
-    threads: int | None = None,
-) -> list[Plan]:
-    """Plan from starts to goals in one world, in threads; the paths do not depend on the number of threads.
-
-    Args:
-        world: Robot and scene.
-        starts: Shape (m, dof), or (dof,) for one start of all queries [rad; m].
-        goals: Shape (m, dof), or m goals.
-        planner: As for :func:`rrtik_ompl.plan`. OMPL's planners, and third-party ones in Python, share one generator of
-            random numbers among all threads, so they plan one query after the other.
-        seconds: Limit of wall time for each query [s].
-        seed: Seed of all queries; the k-th query has a seed of its own that depends on this and k alone. None draws
-            one.
-        parameters: Options of the planner.
-        proof: As for :func:`rrtik_ompl.plan`.
-        threads: Number of queries at a time; None for the number of cores.
-
-    Returns:
-        One plan for each query, in their order. If a start or goal cannot be used, the plan has no path, and its
-        ``reason`` says why.
-
-    Raises:
-        UnknownNameError: If there is no planner of that name.
-        InputError: If starts or goals have the wrong shape, or a number or a parameter is invalid.
-        PlannerError: If the planner broke.
-
-    Example:
-        >>> problem = rrtik.load_problem("planar3_boxes")
-        >>> plans = rrtik.plan_many(problem.world, problem.start, [problem.goal] * 3, "fastrrtconnect")
-        >>> [each.found for each in plans]
-        [True, True, True]
-    """
-    require(world, World, "world of plan_many", "use World(robot, scene)")
-    one_of(PROOF_MODES, proof, "proof")
-    require(parameters, Mapping | None, "parameters of a planner", "use {name of an option: value}")
-    request = Request(Budget(seconds=time_limit(seconds)), parameters=parameters or {}, proof=proof)
-
-    # Bring starts and goals into the form of one row and one goal for each query.
-    dof = world.robot.dof
-    wanted = _goals(goals, world.robot)
-    rows = finite_array(starts, (dof,) if dimensions(starts) == 1 else (None, dof), "starts")
-    rows = np.broadcast_to(rows, (len(wanted), dof)) if rows.ndim == 1 else rows
-    if len(rows) != len(wanted):
-        raise InputError(f"plan_many: as many starts as goals are needed, got {len(rows)} and {len(wanted)}")
-
-    # Give each query its own seed.
-    seeds = np.random.SeedSequence(seed_of(seed)).generate_state(max(len(rows), 1), np.uint32).tolist()
-    queries = list(zip(rows, wanted, seeds[: len(rows)], strict=True))
-
-    # Plan in batches of a fixed size, so that the results do not depend on the number of threads.
-    alone = planner is not None and not is_auto(planner) and not is_safe(find_planner(planner))
-    batches = [queries[first : first + TOGETHER] for first in range(0, len(queries), TOGETHER)]
-    made = in_threads(partial(_batch, world, planner, request), batches, 1 if alone else threads)
-    return [each for batch in made for each in batch]
-
-
-def _goals(given: Ends, robot: Robot) -> list[Goal]:
-    """Return goals as they are given; rows of configurations, shape (m, dof), become joint goals."""
-    if not isinstance(given, Sequence) or not all(isinstance(goal, Goal) for goal in given):
-        rows: Any = given
-        return [JointGoal(row) for row in finite_array(rows, (None, robot.dof), "goals")]
-
-    goals = [goal for goal in given if isinstance(goal, Goal)]
-    for number, goal in enumerate(goals):
-        if goal.q is not None:
-            robot.configuration(goal.q, f"goals[{number}]")
-    return goals
-
-
-def _batch(
-    world: World, planner: str | None, request: Request, queries: Sequence[tuple[Vector, Goal, int]]
-) -> list[Plan]:
-    """Plan some queries: together where that is possible, the others one after the other.
-
-    Args:
-        world: Where they are.
-        planner: Name of the planner; None for "auto".
-        request: What is asked for each query, but for the seed.
-        queries: Start, shape (dof,), goal and seed of each query.
-    """
-    known: dict[int, Plan | None] = {}
-    if planner is not None and not is_auto(planner) and request.proof != "off":
-        joints = {k: Query(q, goal, seed) for k, (q, goal, seed) in enumerate(queries) if isinstance(goal, JointGoal)}
-        found = plans_together(world, named_planner(planner), list(joints.values()), request)
-        known = dict(zip(joints, found, strict=True))
-
-    return [known.get(k) or _planned(world, planner or AUTO, request, query) for k, query in enumerate(queries)]
-
-
-def _planned(world: World, planner: str, request: Request, query: tuple[Vector, Goal, int]) -> Plan:
-    """Plan one query as `plan()` does; an unusable start or goal becomes the reason of a plan without path."""
-    start, goal, seed = query
-    try:
-        problem = Problem(world, start, goal)
-    except ProblemError as error:
-        return Plan(False, None, str(error), 0.0, planner, seed, MappingProxyType({}))
-    return planned(problem, planner, replace(request, budget=replace(request.budget, seed=seed)))
+# A plan, or why the arguments do not fit a query or how the planner broke.
+Answer: TypeAlias = Plan | InputError | PlannerError
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Query:
-    """One query: start configuration, shape (dof,), goal, and the seed of all random numbers."""
+    """One query.
 
-    start: Matrix
-    goal: JointGoal
+    Attributes:
+        world: Where it is.
+        start: Start configuration, shape (dof,), which may be unusable unless there is a ``problem``.
+        goal: The goal, to which the same applies.
+        seed: The seed of all random numbers.
+        problem: The problem that it is, which has been checked; None if that has not been made.
+    """
+
+    world: World
+    start: Vector
+    goal: Goal
     seed: int
+    problem: Problem | None = None
+
+    @property
+    def end(self) -> Vector:
+        """Configuration of a joint goal, shape (dof,)."""
+        assert self.goal.q is not None
+        return self.goal.q
+
+    @classmethod
+    def of(cls, problem: Problem, seed: int) -> Query:
+        """Return the query for a problem."""
+        return cls(problem.world, problem.start, problem.goal, seed, problem)
+
+    def checked_problem(self) -> Problem:
+        """Return its problem, made and checked if there is none.
+
+        Raises:
+            ProblemError: If start or goal is unusable.
+        """
+        return Problem(self.world, self.start, self.goal) if self.problem is None else self.problem
+
+    def planner(self, named: str | PlannerFactory | None) -> str | PlannerFactory:
+        """Return the planner that plans it: the one that is named, or its problem's, or "auto"."""
+        if named is not None:
+            return named
+        return (None if self.problem is None else self.problem.planner) or AUTO
+
+
+def plans_in_threads(
+    queries: Sequence[Query | Callable[[], Query | Answer]],
+    planner: str | PlannerFactory | None,
+    request: Request,
+    method: ShorteningMethod | None,
+    threads: int | None,
+) -> list[Answer]:
+    """Plan queries in threads of this process; the answers do not depend on the number of threads.
+
+    Args:
+        queries: The queries, or functions that make them, which are called in the threads.
+        planner: The planner; None for that of each problem, or else "auto".
+        request: What is asked for each query, but for the seed.
+        method: How the paths are shortened; None leaves them as they are.
+        threads: Number of threads; None for the number of cores.
+
+    Raises:
+        InputError: If the number of threads is invalid.
+    """
+    # The size of the batches is fixed, so that the answers do not depend on the number of threads.
+    batches = [queries[first : first + TOGETHER] for first in range(0, len(queries), TOGETHER)]
+    made = in_threads(partial(_batch, planner, request, method), batches, threads)
+    return [each() if callable(each) else each for batch in made for each in batch]
+
+
+def _batch(
+    planner: str | PlannerFactory | None,
+    request: Request,
+    method: ShorteningMethod | None,
+    asked: Sequence[Query | Callable[[], Query | Answer]],
+) -> list[Answer | Callable[[], Answer]]:
+    """Answer some queries: together where that is possible, the others one after the other.
+
+    All planners but ours, and OMPL's method of shortening, share one generator of random numbers. For a query with one
+    of them, the function that answers it is returned, to be called when no thread is at work.
+    """
+    answers = dict[int, Answer | Callable[[], Answer]]()
+    at_once = dict[int, Query]()
+    groups: dict[tuple[int, NamedPlanner], dict[int, Query]] = {}
+    for k, each in enumerate(asked):
+        query = each() if callable(each) else each
+        if not isinstance(query, Query):
+            answers[k] = query
+            continue
+
+        name = query.planner(planner)
+        answers[k] = partial(answer_alone, query, name, request, method)
+        named = _named(name)
+        if method == "ompl":
+            continue
+        if named is None:
+            at_once[k] = query
+        elif is_safe(named.factory):
+            at_once[k] = query
+            groups.setdefault((id(query.world), named), {})[k] = query
+
+    for (_, named), group in groups.items():
+        with suppress(InputError):  # of an option; each query will get this error
+            found = plans_together(named, list(group.values()), request)
+            answers |= {
+                k: _finished(plan, request, method) for k, plan in zip(group, found, strict=True) if plan is not None
+            }
+
+    return [each() if k in at_once and callable(each) else each for k, each in sorted(answers.items())]
+
+
+def _named(planner: str | PlannerFactory) -> NamedPlanner | None:
+    """Return a planner with its name; None for "auto", and where there is no planner of that name."""
+    try:
+        return None if isinstance(planner, str) and is_auto(planner) else named_planner(planner)
+    except InputError:
+        return None
+
+
+def answer_alone(
+    query: Query, planner: str | PlannerFactory, request: Request, method: ShorteningMethod | None
+) -> Answer:
+    """Plan one query as `plan()` does; an unusable start or goal becomes the reason of a plan without a path."""
+    try:
+        problem = query.checked_problem()
+        return planned_and_finished(problem, planner, _with_seed(request, query.seed), method)
+    except ProblemError as error:
+        return no_plan(str(error), planner, query.seed)
+    except (InputError, PlannerError) as error:
+        return error
+
+
+def _with_seed(request: Request, seed: int) -> Request:
+    return replace(request, budget=replace(request.budget, seed=seed))
+
+
+def _finished(plan: Plan, request: Request, method: ShorteningMethod | None) -> Plan:
+    """Return a plan with its path shortened, as `plan()` does it."""
+    if method is None or plan.problem is None:
+        return plan
+    return finished(plan.problem, plan, _with_seed(request, plan.seed), method)
+
+
+def no_plan(reason: str, planner: str | PlannerFactory, seed: int, *, seconds: float = 0.0) -> Plan:
+    """Return a plan without a path, for a query that could not be asked, or was lost."""
+    name = planner if isinstance(planner, str) else planner.__name__
+    return Plan(False, None, reason, seconds, name, seed, MappingProxyType({}))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -172,25 +203,24 @@ class _Found:
     counts: Mapping[str, int | float]
 
 
-def plans_together(
-    world: World, planner: NamedPlanner, queries: Sequence[Query], request: Request
-) -> list[Plan | None]:
-    """Plan queries by one planner together; None for each query that `plan()` has to plan alone.
+def plans_together(planner: NamedPlanner, queries: Sequence[Query], request: Request) -> list[Plan | None]:
+    """Plan queries in one world by one planner together; None for each query that `plan()` has to plan alone.
 
     The steps are: select the queries whose start and goal the kernels prove free, determine the clearance of these
     ends, search for each query, and prove all paths with the clearances of their ends. A query that fails a step gets
     None.
 
     Args:
-        world: Where they are.
         planner: The planner that searches for each.
         queries: Their configurations may be outside the limits.
         request: What is asked for each query, but for the seed.
     """
     plans: list[Plan | None] = [None] * len(queries)
-    if not (queries and serves(world, planner.factory)):
+    numbers = [k for k, query in enumerate(queries) if isinstance(query.goal, JointGoal)]
+    world = queries[0].world
+    if not (numbers and request.proof != "off" and serves(world, planner.factory)):
         return plans
-    ends = np.array([[query.start, query.goal.q] for query in queries])
+    ends = np.array([[queries[k].start, queries[k].end] for k in numbers])
     any_problem = known_problem(world, *ends[0])
     load_kernels_for(any_problem, planner.factory)
 
@@ -198,12 +228,12 @@ def plans_together(
     began = time.perf_counter()
     usable = _usable(world, ends)
     clearances_of = dict(
-        zip(np.flatnonzero(usable).tolist(), clearances_of_pairs(world, ends[usable], None), strict=True)
+        zip(np.array(numbers)[usable].tolist(), clearances_of_pairs(world, ends[usable], None), strict=True)
     )
     searcher = _Searcher(any_problem, planner, request)
     found = searcher.paths({k: queries[k] for k, clearances in clearances_of.items() if clearances is not None})
     proofs = _proofs(world, {k: (found_path.path.waypoints, clearances_of[k]) for k, found_path in found.items()})
-    seconds_per_query = (time.perf_counter() - began) / len(queries)
+    seconds_per_query = (time.perf_counter() - began) / len(numbers)
 
     # Only queries with a proven path get a plan.
     for k, proof in proofs.items():
@@ -212,7 +242,7 @@ def plans_together(
         counts = {"attempts": 1, "rejected": 0, **found[k].counts}
         # This counts rejected paths. Some planners count something else by that name.
         counts["rejected"] = 0
-        problem = known_problem(world, path.start, query.goal)
+        problem = query.problem or known_problem(world, path.start, query.goal)
         plans[k] = Plan(
             True, path, "", seconds_per_query, planner.name, query.seed, MappingProxyType(counts), problem=problem
         )
@@ -280,7 +310,7 @@ class _Searcher:
         seeds = [attempt_seeds(query.seed, self._request.restarts)[0] for query in queries.values()]
         quick: Sequence[SearchResult | None] = [None] * len(seeds)
         if isinstance(self._planner, SolvesEach) and queries:
-            ends = np.array([(query.start, query.goal.q) for query in queries.values()])
+            ends = np.array([(query.start, query.end) for query in queries.values()])
             quick = self._planner.solve_each(ends, seeds, self._bounds)
 
         made = dict[int, _Found]()
@@ -293,7 +323,7 @@ class _Searcher:
     def _search_one(self, query: Query, seed: int) -> SearchResult:
         """Search for one query with its own seed."""
         reseed(self._planner, seed)
-        ends = query.start[None], query.goal.q[None]
+        ends = query.start[None], query.end[None]
         budget = self._request.budget.begun_now()
         _, rows = self._planner.solve_rows(*ends, self._bounds, budget.over, checked=True)
         return SearchResult(rows, self._planner.statistics)
@@ -303,7 +333,7 @@ class _Searcher:
         if result.path is None:
             return None
         path = JointPath.of(self._robot, result.path)
-        if len(path.waypoints) < 2 or (path.start != query.start).any() or (path.end != query.goal.q).any():
+        if len(path.waypoints) < 2 or (path.start != query.start).any() or (path.end != query.end).any():
             return None
         return _Found(query, path, result.statistics)
 

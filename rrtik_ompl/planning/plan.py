@@ -116,7 +116,7 @@ def plan(
         raise InputError(f"restarts must be a whole number from 0 to {MAX_RESTARTS}, got {restarts!r}")
     require(parameters, Mapping | None, "parameters of a planner", "use {name of an option: value}")
     one_of(PROOF_MODES, proof, "proof")
-    method = _shortening_method(shorten)
+    method = shortening_method(shorten)
     problem = problem if accuracy is None else problem.with_accuracy(accuracy)
     check_clearance(problem.world, clearance, fixed_ends(problem))
     how = Improvement(
@@ -126,11 +126,7 @@ def plan(
     )
     request = Request(Budget(seed_of(seed), limit), restarts, parameters or {}, proof, clearance)
 
-    found = _searched(problem, planner, request, finish_follows=method is not None)
-    if method is not None:
-        from rrtik_ompl.planning.finish import finished  # with shortening, which many plans do without
-
-        found = finished(problem, found, request, method)
+    found = planned_and_finished(problem, planner, request, method)
     if found.found and how.seconds > 0.0:
         from rrtik_ompl.planning.improving import improved
 
@@ -139,7 +135,7 @@ def plan(
     return found
 
 
-def _shortening_method(shorten: ShorteningMethod | bool) -> ShorteningMethod | None:
+def shortening_method(shorten: ShorteningMethod | bool) -> ShorteningMethod | None:
     """Return the method of shortening that a caller asks for; None for no shortening."""
     if isinstance(shorten, bool):
         return "auto" if shorten else None
@@ -156,6 +152,25 @@ def time_limit(seconds: float) -> float:
     if limit > MAX_SECONDS:
         raise InputError(f"seconds must be {MAX_SECONDS:g} or less, got {limit:g}")
     return limit
+
+
+def planned_and_finished(
+    problem: Problem, planner: str | PlannerFactory, request: Request, method: ShorteningMethod | None
+) -> Plan:
+    """Search as :func:`plan` does, and shorten the path, if there is a method of shortening.
+
+    Raises:
+        UnknownNameError: If there is no planner of that name.
+        InputError: If the planner does not take a parameter.
+        PlannerError: If the planner broke.
+    """
+    found = _searched(problem, planner, request, finish_follows=method is not None)
+    if method is None:
+        return found
+
+    from rrtik_ompl.planning.finish import finished  # with shortening, which many plans do without
+
+    return finished(problem, found, request, method)
 
 
 def planned(problem: Problem, planner: str | PlannerFactory, request: Request) -> Plan:

@@ -201,20 +201,24 @@ class Problem:
         return bool(self.goal.satisfied(self.robot, self.robot.configuration(q)[None])[0])
 
 
-def known_problem(world: World, start: Vector, goal: JointGoal | Vector) -> Problem:
+def known_problem(
+    world: World, start: Vector, goal: Goal | Vector, *, name: str = "problem", planner: str | None = None
+) -> Problem:
     """Create a problem from a start and a goal that are known to be valid, without any checks.
 
     Args:
-        world: The world; the robot must not have continuous joints.
+        world: The world.
         start: Shape (dof,).
-        goal: A goal, or its configuration, shape (dof,).
+        goal: A goal, or its configuration, shape (dof,); values of continuous joints must be nearest to the start.
+        name: Name of the problem.
+        planner: Name of its planner.
     """
     values = {
         "settings": world.settings,
         "start": frozen(start),
-        "goal": goal if isinstance(goal, JointGoal) else JointGoal(goal),
-        "name": "problem",
-        "planner": None,
+        "goal": goal if isinstance(goal, Goal) else JointGoal(goal),
+        "name": name,
+        "planner": planner,
         "world": world,
     }
 

@@ -30,13 +30,11 @@ NEAR, NEARER, ABOVE = (TIP.translation + np.array(by) for by in ([0.1, 0.0, 0.0]
 CALLS = {
     "Roadmap": lambda seed: rrtik.Roadmap(WORLD, vertices=3, seed=seed),
     "Task.plan": lambda seed: rrtik.Task([rrtik.MoveTo(END)]).plan(WORLD, START, seed=seed),
-    "benchmark.plan_batch": lambda seed: rrtik.benchmark.plan_batch(["planar3_boxes"], seed=seed),
     "ik.reach_map": lambda seed: rrtik.ik.reach_map(ROBOT, samples=50, seed=seed),
     "ik.solve_trajectory": lambda seed: rrtik.ik.solve_trajectory(ARM.robot, [TIP.homogeneous] * 2, seed=seed),
     "ompl.GoalSampler": lambda seed: rrtik.ompl.GoalSampler(MARK, seed=seed),
     "ompl.simple_setup": lambda seed: rrtik.ompl.simple_setup(MARK, seed=seed),
     "plan": lambda seed: rrtik.plan(PROBLEM, seed=seed),
-    "plan_batch": lambda seed: rrtik.plan_batch(["planar3_boxes"], seed=seed),
     "plan_many": lambda seed: rrtik.plan_many(WORLD, [START], [END], seed=seed),
     "replan": lambda seed: rrtik.replan(PROBLEM, step=0.2, rate=20.0, seconds=0.2, seed=seed),
     "replanning.plan_in_time": lambda seed: rrtik.replanning.plan_in_time(PROBLEM, rate=5.0, speed=1.0, seed=seed),

@@ -215,7 +215,7 @@ ODD_CALLS = {
     "a seed that is a time": lambda: rrtik.plan(PROBLEM, seed=np.timedelta64(1, "s")),
     "payload": lambda: rrtik.time_parameterize(PATH, ROBOT, payload=np.zeros(3)),
     "title": lambda: rrtik.view(ROBOT, html="page.html", title=3),
-    "problems": lambda: rrtik.plan_batch(range(10**12)),
+    "problems": lambda: rrtik.plan_many(range(10**12)),
     "axis of a set": lambda: rrtik.GoalSet([rrtik.pose([1, 1, 0])], np.array(["x", "y"])),
     "no feed": lambda: rrtik.replan(PROBLEM, np.array(True), step=0.1, rate=1.0),
     "a clock that stands": lambda: rrtik.replan(PROBLEM, step=0.1, rate=1.0, clock=nothing),

@@ -99,7 +99,7 @@ def test_every_public_name_is_drawn():
     drawn = {name for name, *_ in calls.functions()}
     named = {name for name, value in public_values(rrtik).items() if callable(value)}
     assert named <= drawn
-    assert {"plan_batch", "view", "replan", "ompl.GoalSampler"} <= drawn
+    assert {"plan_many", "view", "replan", "ompl.GoalSampler"} <= drawn
 
 
 def test_spoilt_files_are_most_often_refused(tmp_path):

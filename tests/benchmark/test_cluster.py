@@ -20,7 +20,7 @@ def test_a_scheduler_that_does_not_answer_is_one_line(suite, tmp_path, capsys, m
     monkeypatch.setattr("rrtik_ompl.benchmark.spread.CONNECT", 0.3)
     assert run(["bench", str(suite), "--out", str(tmp_path), "--scheduler", "tcp://127.0.0.1:9"]) == 2
     last = capsys.readouterr().err.splitlines()[-1]
-    assert last.startswith("rrtik: --scheduler tcp://127.0.0.1:9: no Dask scheduler answers")
+    assert last.startswith("rrtik: scheduler tcp://127.0.0.1:9: no Dask scheduler answers")
 
 
 def test_a_worker_of_a_cluster_is_killed_and_no_run_is_lost(campaign, suite, tmp_path):

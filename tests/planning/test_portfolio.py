@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import rrtik_planners
-from rrtik_ompl import Problem, load_problem, plan, plan_batch
+from rrtik_ompl import Problem, load_problem, plan, plan_many
 from rrtik_ompl.base.errors import InputError, PlannerError, UnknownNameError
 from rrtik_ompl.description import catalog
 from rrtik_ompl.ompl_bridge import SafePlanner, SearchResult
@@ -192,9 +192,9 @@ def test_a_problem_names_its_planner(boxes, tmp_path):
     again = load_problem(file)
     assert again.planner == "bicrdt"
     assert np.array_equal(plan(again, seed=1).path.waypoints, plan(named, seed=1).path.waypoints)
-    (record,) = plan_batch([file], seed=1)
-    assert record["status"] == "solved"
-    assert record["transitions"] <= len(record["waypoints"])  # moves of one joint, as that planner's are
+    (one_of_many,) = plan_many([file], seed=1)
+    assert one_of_many.planner == "bicrdt"
+    assert one_of_many.path.one_joint_at_a_time
 
 
 def test_a_planner_that_there_is_not_is_named_with_its_line(boxes, tmp_path):

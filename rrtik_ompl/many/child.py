@@ -1,4 +1,4 @@
-"""The process in which runs take place: it reads one job a line, and writes one record a line.
+"""The process in which runs take place: it reads pickled jobs, and writes a pickled record for each.
 
 Planners in C++ may crash, hang or exhaust the memory, so this process is expendable. A hang is ended by an alarm of the
 operating system, which depends neither on Python, whose lock may never be released, nor on the parent, which may have
@@ -7,15 +7,17 @@ ended.
 
 from __future__ import annotations
 
-import json
 import os
+import pickle
 import resource
 import signal
 import sys
+from collections.abc import Mapping
+from importlib import import_module
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any, BinaryIO
 
-from rrtik_ompl.benchmark.run import execute, prepare
+from rrtik_ompl.many.guard import PARCEL
 
 BUILDING = 600.0  # [s]; time limit for building a problem
 MEGABYTE = 2**20
@@ -27,14 +29,25 @@ def main() -> None:
         from rrtik_ompl.kernels import warm_up
 
         warm_up(lambda _: None)
-        for line in sys.stdin:
-            print(json.dumps(guarded(json.loads(line))), file=answers, flush=True)
+        parcel = None
+        while True:
+            try:
+                job = pickle.load(sys.stdin.buffer)
+            except EOFError:
+                return
+            parcel = parcel if job.get(PARCEL) is None else job[PARCEL]
+            pickle.dump(guarded({**job, PARCEL: parcel}), answers)
+            answers.flush()
 
 
-def guarded(job: dict[str, Any]) -> dict[str, Any]:
-    """Run one job under its limits of time and memory."""
+def guarded(job: Mapping[str, Any]) -> dict[str, Any]:
+    """Run one job under its limits of time and memory.
+
+    The function ``prepared`` of the job's module takes the job, does what these limits do not count, and returns a
+    function that runs the job and returns its record.
+    """
     _alarm(BUILDING)
-    prepare(job)
+    run = import_module(job["module"]).prepared(job)
     _alarm(job["patience"])
 
     limits = resource.getrlimit(resource.RLIMIT_DATA)
@@ -43,7 +56,7 @@ def guarded(job: dict[str, Any]) -> dict[str, Any]:
     try:
         if held is not None:
             resource.setrlimit(resource.RLIMIT_DATA, (held + int(job["memory_mb"] * MEGABYTE), limits[1]))
-        record = execute(job)
+        record: dict[str, Any] = run()
     finally:
         resource.setrlimit(resource.RLIMIT_DATA, limits)
         _alarm(0.0)
@@ -51,9 +64,9 @@ def guarded(job: dict[str, Any]) -> dict[str, Any]:
     return record | {"memory_mb": _resident()}
 
 
-def _answers() -> TextIO:
+def _answers() -> BinaryIO:
     """Return a stream to the parent; redirect everything that is printed to the file of errors."""
-    stream = os.fdopen(os.dup(1), "w", encoding="utf-8")
+    stream = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
     return stream
 

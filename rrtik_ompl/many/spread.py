@@ -1,14 +1,13 @@
-"""Distribute jobs with joblib: over threads and processes of this machine, or over the workers of a Dask cluster."""
+"""Distribute jobs with joblib: over guarded processes of this machine, or over the workers of a Dask cluster."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
+from collections.abc import Generator, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from rrtik_ompl.base.errors import InputError, RrtikError
-from rrtik_ompl.benchmark.guard import Closed, Guards
-from rrtik_ompl.benchmark.run import execute
+from rrtik_ompl.many.guard import PARCEL, Closed, Guards
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -22,15 +21,12 @@ Job = Mapping[str, Any]
 Done = dict[str, Any]
 
 
-def local(
-    jobs: Iterable[Job], count: int, beside: Callable[[Job], bool] = lambda _: False
-) -> Generator[Done, None, None]:
-    """Run jobs on this machine, and yield their records as they are finished.
+def local(jobs: Iterable[Job], count: int) -> Generator[Done, None, None]:
+    """Run jobs in guarded processes of this machine, and yield their records as they are finished.
 
     Args:
         jobs: The jobs.
         count: Number of concurrent jobs.
-        beside: Whether a job runs in a thread of this process; for others a thread waits for a guarded process.
     """
     from joblib import Parallel, delayed
 
@@ -38,7 +34,7 @@ def local(
 
     def one(job: Job) -> Done | None:
         try:
-            return {**job["run"], **(execute(job) if beside(job) else guards.run(job))}
+            return {**job["run"], **guards.run(job)}
         except Closed:
             return None
 
@@ -61,7 +57,7 @@ def cluster(jobs: Iterable[Job], address: str) -> Generator[Done, None, None]:
     try:
         import distributed
     except ImportError:
-        raise InputError("--scheduler needs Dask, which is not installed: pip install 'rrtik-ompl[cluster]'") from None
+        raise InputError("scheduler: needs Dask, which is not installed: pip install 'rrtik-ompl[cluster]'") from None
 
     from joblib import Parallel, delayed, parallel_config
 
@@ -69,22 +65,26 @@ def cluster(jobs: Iterable[Job], address: str) -> Generator[Done, None, None]:
         client: Any = distributed.Client(address, timeout=CONNECT)
     except (OSError, ValueError, TypeError) as error:
         said = str(error) or type(error).__name__
-        raise InputError(f"--scheduler {address}: no Dask scheduler answers: {said}") from None
+        raise InputError(f"scheduler {address}: no Dask scheduler answers: {said}") from None
 
     with client, _one_line(address):
         _check_workers(client, address)
         with parallel_config(backend="dask", client=client):
-            yield from Parallel(return_as="generator_unordered", batch_size=1)(delayed(_remote)(job) for job in jobs)
+            # joblib sends an array that many calls have as an argument to each worker only once.
+            apart = (({**job, PARCEL: None}, job.get(PARCEL)) for job in jobs)
+            yield from Parallel(return_as="generator_unordered", batch_size=1)(
+                delayed(_remote)(*each) for each in apart
+            )
 
 
 def _check_workers(client: Client, address: str) -> None:
     here = _version()
     versions = client.run(_version)
     if not versions:
-        raise InputError(f"--scheduler {address}: the scheduler has no workers; start some with: dask worker {address}")
+        raise InputError(f"scheduler {address}: the scheduler has no workers; start some with: dask worker {address}")
     for worker, version in versions.items():
         if version != here:
-            raise InputError(f"--scheduler {address}: worker {worker} has rrtik-ompl {version}, here is {here}")
+            raise InputError(f"scheduler {address}: worker {worker} has rrtik-ompl {version}, here is {here}")
 
 
 def _version() -> str:
@@ -101,8 +101,8 @@ def _one_line(address: str) -> Iterator[None]:
     except RrtikError:
         raise
     except Exception as error:
-        raise InputError(f"--scheduler {address}: {type(error).__name__}: {error}") from error
+        raise InputError(f"scheduler {address}: {type(error).__name__}: {error}") from error
 
 
-def _remote(job: Job) -> Done:
-    return {**job["run"], **_here.run(job)}
+def _remote(job: Job, parcel: object) -> Done:
+    return {**job["run"], **_here.run({**job, PARCEL: parcel})}

@@ -3,24 +3,27 @@
 from __future__ import annotations
 
 import inspect
-import json
 import os
+import pickle
 import re
 import signal
 import subprocess
 import sys
 import tempfile
 import threading
+import time
 from collections.abc import Mapping
 from pathlib import Path
 from typing import IO, Any
 
 from rrtik_ompl.base.errors import RrtikError
-from rrtik_ompl.benchmark.run import CRASH, HANG, OUT_OF_MEMORY
 from rrtik_ompl.ompl_bridge.ownership import PLAIN_HINT, is_plain
 from rrtik_ompl.ompl_bridge.planner_names import find_planner, is_auto, label_of
 
-COMMAND = (sys.executable, "-m", "rrtik_ompl.benchmark.child")
+COMMAND = (sys.executable, "-m", "rrtik_ompl.many.child")
+OUT_OF_MEMORY, CRASH, HANG = "out of memory", "crash", "hang"  # statuses of lost runs
+# Key of what is large in a job: a process gets it only once as long as consecutive jobs have the same object.
+PARCEL = "parcel"
 MEMORY_WORDS = ("bad_alloc", "MemoryError", "Cannot allocate memory")
 TAIL = 4000  # bytes of a lost process's output that are examined
 LINES_OF_CODE = re.compile(r'^  File "(.+)", line (\d+) in ', re.MULTILINE)
@@ -34,8 +37,9 @@ class Guard:
     """A process that is started on demand, reused from run to run, and replaced when it is lost."""
 
     def __init__(self) -> None:
-        self._process: subprocess.Popen[str] | None = None
+        self._process: subprocess.Popen[bytes] | None = None
         self._errors: IO[bytes] | None = None
+        self._sent: object = None  # the parcel that the process has
         self._closed = False
 
     def run(self, job: Mapping[str, Any]) -> dict[str, Any]:
@@ -46,17 +50,19 @@ class Guard:
         """
         process = self._started()
         self._forget_words()
-        answer = _asked(process, json.dumps(job) + "\n")
+        began = time.perf_counter()
+        parcel = job.get(PARCEL)
+        record = _asked(process, {**job, PARCEL: None if parcel is self._sent else parcel})
 
         if self._closed:
             raise Closed("the guard was closed")
+        if record is None:
+            return self._lost(process, job) | {"seconds": time.perf_counter() - began}
 
-        if answer.endswith("\n"):
-            record: dict[str, Any] = json.loads(answer)
-            if record["status"] == OUT_OF_MEMORY:  # its state may be corrupt
-                self._end(process)
-            return record
-        return self._lost(process, job)
+        self._sent = self._sent if parcel is None else parcel
+        if record["status"] == OUT_OF_MEMORY:  # its state may be corrupt
+            self._end(process)
+        return record
 
     def close(self) -> None:
         """End the process, also in the middle of a run."""
@@ -65,23 +71,23 @@ class Guard:
             self._process.kill()
             self._process.wait()
 
-    def _started(self) -> subprocess.Popen[str]:
+    def _started(self) -> subprocess.Popen[bytes]:
         """Return the process, started if there is none."""
         if self._closed:
             raise Closed("the guard was closed")
         if self._process is None:
             self._errors = tempfile.TemporaryFile()  # noqa: SIM115 - kept open
+            self._sent = None
             self._process = subprocess.Popen(
                 COMMAND,
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=self._errors,
-                text=True,
                 start_new_session=True,  # Ctrl-C must reach only the parent, which writes the records
             )
         return self._process
 
-    def _lost(self, process: subprocess.Popen[str], job: Mapping[str, Any]) -> dict[str, Any]:
+    def _lost(self, process: subprocess.Popen[bytes], job: Mapping[str, Any]) -> dict[str, Any]:
         """Return the record of a job whose process was lost, with the cause by exit code and output."""
         code = self._end(process)
         said = self._last_words()
@@ -98,7 +104,7 @@ class Guard:
         last = next((line.strip() for line in reversed(said.splitlines()) if line.strip()), "")
         return {"status": CRASH, "reason": f"{ended}: {last}".rstrip(": ")}
 
-    def _end(self, process: subprocess.Popen[str]) -> int:
+    def _end(self, process: subprocess.Popen[bytes]) -> int:
         """Kill the process, which may have closed only its output, and return its exit code."""
         self._process = None
         process.kill()
@@ -118,16 +124,17 @@ class Guard:
             return file.read().decode(errors="replace")
 
 
-def _asked(process: subprocess.Popen[str], question: str) -> str:
-    """Send a line to a process, and return its answer; "" if it is lost."""
+def _asked(process: subprocess.Popen[bytes], job: Mapping[str, Any]) -> dict[str, Any] | None:
+    """Send a job to a process, and return its record; None if the process is lost."""
     if process.stdin is None or process.stdout is None:
-        return ""
+        return None
     try:
-        process.stdin.write(question)
+        pickle.dump(job, process.stdin)
         process.stdin.flush()
-        return process.stdout.readline()
-    except OSError:
-        return ""
+        record: dict[str, Any] = pickle.load(process.stdout)
+    except (OSError, EOFError, pickle.UnpicklingError):
+        return None
+    return record
 
 
 def _why_plain_planners_crash(name: str | None, said: str) -> str:
