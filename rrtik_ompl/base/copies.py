@@ -127,6 +127,12 @@ def restored(kind: type[Thing], state: dict[str, Any]) -> Thing:
     return thing
 
 
+def set_fields(thing: object, **values: object) -> None:
+    """Set fields of a frozen dataclass, in its constructor."""
+    for name, value in values.items():
+        object.__setattr__(thing, name, value)
+
+
 def changed(thing: Thing, **values: object) -> Thing:
     """Return a frozen dataclass with some fields replaced, without validation, unlike ``dataclasses.replace``.
 

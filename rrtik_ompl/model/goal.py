@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from typing import Any, TypeAlias, get_args
+from typing import TypeAlias, get_args
 
 import numpy as np
 import pinocchio as pin
@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.base.arrays import Mask, Vector, finite_array, frozen, positive, rows_of
 from rrtik_ompl.base.choices import FrameAxis, one_of
-from rrtik_ompl.base.copies import as_value
+from rrtik_ompl.base.copies import as_value, set_fields
 from rrtik_ompl.base.errors import InputError, listed, require
-from rrtik_ompl.base.poses import rigid, rotation_angles
+from rrtik_ompl.base.poses import PoseLike, rigid, rotation_angles
 from rrtik_ompl.base.units import wrapped
 from rrtik_ompl.model.goal_kind import Goal as Goal
 from rrtik_ompl.model.goal_kind import GoalPart as GoalPart
@@ -128,16 +128,21 @@ class PositionGoal(Target):
 class PoseGoal(Target):
     """Bring the tip frame to T_world_tip, within ``position_tolerance`` [m] and ``orientation_tolerance`` [rad]."""
 
-    T_world_tip: Any
-    position_tolerance: float = 1e-3
-    orientation_tolerance: float = 1e-2
+    T_world_tip: pin.SE3
+    position_tolerance: float
+    orientation_tolerance: float
 
     __reduce__ = as_value
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "T_world_tip", rigid(self.T_world_tip, "goal pose"))
-        positive(self.position_tolerance, "goal position_tolerance")
-        positive(self.orientation_tolerance, "goal orientation_tolerance")
+    def __init__(
+        self, T_world_tip: PoseLike, position_tolerance: float = 1e-3, orientation_tolerance: float = 1e-2
+    ) -> None:
+        set_fields(
+            self,
+            T_world_tip=rigid(T_world_tip, "goal pose"),
+            position_tolerance=positive(position_tolerance, "goal position_tolerance"),
+            orientation_tolerance=positive(orientation_tolerance, "goal orientation_tolerance"),
+        )
 
     @property
     def title(self) -> str:
@@ -187,6 +192,7 @@ class PoseGoal(Target):
         return pose_errors(tips, self.T_world_tip)
 
 
+GoalLike: TypeAlias = Goal | PoseLike | str  # a goal, a configuration, a pose, or the name of a posture
 AnyPart: TypeAlias = GoalPart | pin.SE3 | NDArray[np.float64]
 
 

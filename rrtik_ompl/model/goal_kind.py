@@ -12,8 +12,8 @@ for an example. The names of the kinds in files are defined in ``rrtik_ompl.prob
 from __future__ import annotations
 
 from abc import abstractmethod
-from dataclasses import dataclass, field, replace
-from typing import Any, ClassVar
+from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 import pinocchio as pin
@@ -32,7 +32,7 @@ from rrtik_ompl.base.arrays import (
     whole_number,
 )
 from rrtik_ompl.base.choices import FrameAxis
-from rrtik_ompl.base.copies import as_value
+from rrtik_ompl.base.copies import as_value, set_fields
 from rrtik_ompl.base.errors import InputError, name_of, require
 from rrtik_ompl.base.poses import PoseLike, rigid, rotation_angles, rpy_matrices, turned_z, unit_vector
 from rrtik_ompl.model.robot import Robot, metres_per_radian
@@ -256,36 +256,52 @@ class TaskRegion(GoalPart):
         True
     """
 
-    T_world_w: Any
+    T_world_w: pin.SE3
     bounds: Matrix
-    T_w_tip: Any = field(default_factory=pin.SE3.Identity)
-    position_tolerance: float = 1e-3
-    orientation_tolerance: float = 1e-2
-    frame: str | None = None
-    from_start: bool = False
-    position_allowance: float = 0.0
-    orientation_allowance: float = 0.0
+    T_w_tip: pin.SE3
+    position_tolerance: float
+    orientation_tolerance: float
+    frame: str | None
+    from_start: bool
+    position_allowance: float
+    orientation_allowance: float
 
     __reduce__ = as_value
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "T_world_w", rigid(self.T_world_w, "goal region: T_world_w"))
-        object.__setattr__(self, "T_w_tip", rigid(self.T_w_tip, "goal region: T_w_tip"))
-
-        bounds = finite_array(self.bounds, (6, 2), "goal region: bounds")
-        for name, bound in zip(COORDINATES, bounds, strict=True):
+    def __init__(
+        self,
+        T_world_w: PoseLike,
+        bounds: ArrayLike,
+        T_w_tip: PoseLike = (0.0, 0.0, 0.0),
+        position_tolerance: float = 1e-3,
+        orientation_tolerance: float = 1e-2,
+        *,
+        frame: str | None = None,
+        from_start: bool = False,
+        position_allowance: float = 0.0,
+        orientation_allowance: float = 0.0,
+    ) -> None:
+        ranges = finite_array(bounds, (6, 2), "goal region: bounds")
+        for name, bound in zip(COORDINATES, ranges, strict=True):
             _range(bound, f"goal region: {name}")
-        object.__setattr__(self, "bounds", frozen(bounds))
 
-        for name in ("position_tolerance", "orientation_tolerance"):
-            object.__setattr__(self, name, positive(getattr(self, name), f"goal region: {name}"))
-        for name in ("position_allowance", "orientation_allowance"):
-            object.__setattr__(self, name, not_negative(getattr(self, name), f"path constraint: {name}"))
+        require(frame, str | None, "frame of a region", "name a link or an attached object")
+        if frame is not None:
+            name_of(frame, "the frame of a region")
+        require(from_start, bool, "from_start of a region")
 
-        require(self.frame, str | None, "frame of a region", "name a link or an attached object")
-        if self.frame is not None:
-            name_of(self.frame, "the frame of a region")
-        require(self.from_start, bool, "from_start of a region")
+        set_fields(
+            self,
+            T_world_w=rigid(T_world_w, "goal region: T_world_w"),
+            bounds=frozen(ranges),
+            T_w_tip=rigid(T_w_tip, "goal region: T_w_tip"),
+            position_tolerance=positive(position_tolerance, "goal region: position_tolerance"),
+            orientation_tolerance=positive(orientation_tolerance, "goal region: orientation_tolerance"),
+            frame=frame,
+            from_start=from_start,
+            position_allowance=not_negative(position_allowance, "path constraint: position_allowance"),
+            orientation_allowance=not_negative(orientation_allowance, "path constraint: orientation_allowance"),
+        )
 
     @classmethod
     def about_axis(

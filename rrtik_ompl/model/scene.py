@@ -6,7 +6,7 @@ import os
 import re
 from collections import Counter
 from collections.abc import Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 import numpy as np
@@ -14,9 +14,9 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from rrtik_ompl.base.arrays import LARGEST, Vector, bounded_array, finite_array, finite_number, frozen
-from rrtik_ompl.base.copies import as_value, changed
+from rrtik_ompl.base.copies import as_value, changed, set_fields
 from rrtik_ompl.base.errors import InputError, UnknownNameError, at_most, listed, name_of, require
-from rrtik_ompl.base.poses import rigid
+from rrtik_ompl.base.poses import PoseLike, rigid
 from rrtik_ompl.files.kinds import read, write
 from rrtik_ompl.model.shapes import SHAPES, Shape
 
@@ -66,7 +66,7 @@ class TimedPoses:
 
     __reduce__ = as_value
 
-    def __init__(self, times: ArrayLike, poses: Iterable[pin.SE3]) -> None:
+    def __init__(self, times: ArrayLike, poses: Iterable[PoseLike]) -> None:
         stamps = finite_array(times, (None,), "motion times")
         stations = tuple(
             rigid(pose, f"motion: pose {k}") for k, pose in enumerate(listed(poses, "poses of a motion"), start=1)
@@ -124,14 +124,22 @@ class Obstacle:
 
     name: str
     shape: Shape
-    pose: pin.SE3 = field(default_factory=pin.SE3.Identity)
-    motion: Motion | None = None
-    margin: float = 0.0
+    pose: pin.SE3
+    motion: Motion | None
+    margin: float
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "pose", _checked_solid(self.name, self.shape, self.pose))
-        require(self.motion, Motion | None, f"motion of '{self.name}'")
-        object.__setattr__(self, "margin", _room(self.margin, f"margin of '{self.name}'"))
+    def __init__(
+        self,
+        name: str,
+        shape: Shape,
+        pose: PoseLike = (0.0, 0.0, 0.0),
+        motion: Motion | None = None,
+        margin: float = 0.0,
+    ) -> None:
+        placement = _checked_solid(name, shape, pose)
+        require(motion, Motion | None, f"motion of '{name}'")
+        room = _room(margin, f"margin of '{name}'")
+        set_fields(self, name=name, shape=shape, pose=placement, motion=motion, margin=room)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -152,24 +160,33 @@ class AttachedObject:
     name: str
     link: str
     shape: Shape
-    pose: pin.SE3 = field(default_factory=pin.SE3.Identity)
-    allow: tuple[str, ...] = ()
-    padding: float | None = None
-    margin: float = 0.0
+    pose: pin.SE3
+    allow: tuple[str, ...]
+    padding: float | None
+    margin: float
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "pose", _checked_solid(self.name, self.shape, self.pose))
-        if self.padding is not None:
-            object.__setattr__(self, "padding", _room(self.padding, f"padding of '{self.name}'"))
-        object.__setattr__(self, "margin", _room(self.margin, f"margin of '{self.name}'"))
-        name_of(self.link, f"the link of '{self.name}'")
-        object.__setattr__(self, "allow", listed(self.allow, f"allow of '{self.name}'"))
-        for name in self.allow:
-            name_of(name, f"what '{self.name}' may touch")
+    def __init__(
+        self,
+        name: str,
+        link: str,
+        shape: Shape,
+        pose: PoseLike = (0.0, 0.0, 0.0),
+        allow: Iterable[str] = (),
+        padding: float | None = None,
+        margin: float = 0.0,
+    ) -> None:
+        name_of(link, f"the link of '{name}'")
+        placement = _checked_solid(name, shape, pose)
+        touchable = tuple(name_of(each, f"what '{name}' may touch") for each in listed(allow, f"allow of '{name}'"))
+        own_padding = None if padding is None else _room(padding, f"padding of '{name}'")
+        room = _room(margin, f"margin of '{name}'")
 
-        if not self.shape.movable:
-            kind = re.sub("(?<=[a-z])(?=[A-Z])", "-", type(self.shape).__name__).lower()
-            raise InputError(f"a {kind} cannot be attached to a link: '{self.name}'")
+        if not shape.movable:
+            kind = re.sub("(?<=[a-z])(?=[A-Z])", "-", type(shape).__name__).lower()
+            raise InputError(f"a {kind} cannot be attached to a link: '{name}'")
+
+        set_fields(self, name=name, link=link, shape=shape, pose=placement)
+        set_fields(self, allow=touchable, padding=own_padding, margin=room)
 
 
 def _checked_solid(name: object, shape: object, pose: object) -> pin.SE3:
@@ -183,6 +200,16 @@ def _checked_solid(name: object, shape: object, pose: object) -> pin.SE3:
         found = f"must be of type {kinds}, got {type(shape).__name__}"
         raise InputError(f"shape of '{name}' {found}; use rrtik_ompl.model.shapes")
     return rigid(pose, f"pose of '{name}'")
+
+
+def _pairs(allowed: Iterable[Iterable[str]]) -> tuple[tuple[str, ...], ...]:
+    """Validate the allowed collisions of a scene: pairs of names."""
+    what = "allowed_collisions of a scene"
+    pairs = tuple(tuple(map(str, listed(pair, f"each of the {what}"))) for pair in listed(allowed, what))
+    for pair in pairs:
+        if len(pair) != 2:
+            raise InputError(f"{what} must be pairs of names, got {pair}")
+    return pairs
 
 
 def _room(value: float, what: str) -> float:
@@ -249,14 +276,25 @@ class Scene:
         contacts: Pairs that are in contact, with the depth to which they may overlap.
     """
 
-    obstacles: tuple[Obstacle, ...] = ()
-    attached: tuple[AttachedObject, ...] = ()
-    allowed_collisions: tuple[tuple[str, str], ...] = ()
-    contacts: tuple[Touching, ...] = ()
+    obstacles: tuple[Obstacle, ...]
+    attached: tuple[AttachedObject, ...]
+    allowed_collisions: tuple[tuple[str, str], ...]
+    contacts: tuple[Touching, ...]
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "obstacles", listed(self.obstacles, "obstacles of a scene"))
-        object.__setattr__(self, "attached", listed(self.attached, "attached objects of a scene"))
+    def __init__(
+        self,
+        obstacles: Iterable[Obstacle] = (),
+        attached: Iterable[AttachedObject] = (),
+        allowed_collisions: Iterable[Iterable[str]] = (),
+        contacts: Iterable[Touching] = (),
+    ) -> None:
+        set_fields(
+            self,
+            obstacles=listed(obstacles, "obstacles of a scene"),
+            attached=listed(attached, "attached objects of a scene"),
+            allowed_collisions=_pairs(allowed_collisions),
+            contacts=listed(contacts, "contacts of a scene"),
+        )
         at_most(len(self.obstacles) + len(self.attached), MOST_SOLIDS, "obstacles of a scene", "join some in a mesh")
 
         for obstacle in self.obstacles:
@@ -264,14 +302,6 @@ class Scene:
         for held in self.attached:
             require(held, AttachedObject, "each attached object of a scene")
 
-        pairs = tuple(
-            tuple(map(str, pair)) for pair in listed(self.allowed_collisions, "allowed_collisions of a scene")
-        )
-        if any(len(pair) != 2 for pair in pairs):
-            raise InputError(f"allowed_collisions of a scene must be pairs of names, got {list(pairs)}")
-        object.__setattr__(self, "allowed_collisions", pairs)
-
-        object.__setattr__(self, "contacts", listed(self.contacts, "contacts of a scene"))
         for contact in self.contacts:
             require(contact, Touching, "each contact of a scene")
         in_contact = Counter(contact.pair for contact in self.contacts)
@@ -360,7 +390,7 @@ class Scene:
         link: str,
         allow: Iterable[str] = (),
         *,
-        pose: ArrayLike | pin.SE3 | None = None,
+        pose: PoseLike | None = None,
         padding: float | None = None,
     ) -> Scene:
         """Return the scene in which an obstacle has become an attached object; allowed pairs stay allowed.

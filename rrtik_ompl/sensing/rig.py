@@ -7,7 +7,7 @@ of two poses of a single square is correct. Poses that contradict each other by 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -16,8 +16,9 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Matrix, Vector, frozen, not_negative
+from rrtik_ompl.base.copies import set_fields
 from rrtik_ompl.base.errors import InputError, listed, require
-from rrtik_ompl.base.poses import rigid
+from rrtik_ompl.base.poses import PoseLike, rigid
 from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.markers.corner_pose import CornerPose
 from rrtik_ompl.sensing.markers.detection import SeenMarker
@@ -50,24 +51,31 @@ class Rig:
 
     cameras: tuple[Camera, ...]
     poses: tuple[pin.SE3, ...]
-    position_sigma: float = 0.0
-    rotation_sigma: float = 0.0
+    position_sigma: float
+    rotation_sigma: float
 
-    def __post_init__(self) -> None:
-        for word in ("cameras", "poses"):
-            object.__setattr__(self, word, listed(getattr(self, word), f"{word} of a rig"))
-        for camera in self.cameras:
+    def __init__(
+        self,
+        cameras: Iterable[Camera],
+        poses: Iterable[PoseLike],
+        position_sigma: float = 0.0,
+        rotation_sigma: float = 0.0,
+    ) -> None:
+        eyes = listed(cameras, "cameras of a rig")
+        for camera in eyes:
             require(camera, Camera, "camera of a rig", "use load_camera(file)")
-        if len(self.cameras) < 2 or len(self.poses) != len(self.cameras):
-            raise InputError(
-                f"a rig has two cameras or more, each with its pose; got {len(self.cameras)} and {len(self.poses)}"
-            )
-        poses = tuple(rigid(T, f"pose of camera {k}") for k, T in enumerate(self.poses, start=1))
-        if not poses[0].isIdentity(1e-9):
+        places = tuple(rigid(T, f"pose of camera {k}") for k, T in enumerate(listed(poses, "poses of a rig"), start=1))
+        if len(eyes) < 2 or len(places) != len(eyes):
+            raise InputError(f"a rig has two cameras or more, each with its pose; got {len(eyes)} and {len(places)}")
+        if not places[0].isIdentity(1e-9):
             raise InputError("poses of a rig are in the frame of its first camera, whose own pose is the identity")
-        object.__setattr__(self, "poses", poses)
-        for name in ("position_sigma", "rotation_sigma"):
-            object.__setattr__(self, name, not_negative(getattr(self, name), f"{name} of a rig"))
+        set_fields(
+            self,
+            cameras=eyes,
+            poses=places,
+            position_sigma=not_negative(position_sigma, "position_sigma of a rig"),
+            rotation_sigma=not_negative(rotation_sigma, "rotation_sigma of a rig"),
+        )
 
 
 def detect_in_rig(pictures: Sequence[NDArray[np.uint8]], rig: Rig, marker_map: MarkerMap) -> tuple[Sighting, ...]:

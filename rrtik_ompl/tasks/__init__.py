@@ -286,7 +286,7 @@ class Task:
 
     def __init__(
         self,
-        stages: Sequence[Stage],
+        stages: Iterable[Stage],
         world: World | None = None,
         start: ArrayLike | str | None = None,
         *,

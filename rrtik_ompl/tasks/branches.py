@@ -24,7 +24,7 @@ from rrtik_ompl.tasks.finger_motion import finger_motion
 from rrtik_ompl.tasks.handling import contacts_on_arrival, fault_of_setting_down, handled, may_touch
 from rrtik_ompl.tasks.program import Step, options_of
 from rrtik_ompl.tasks.setting import Setting
-from rrtik_ompl.tasks.stages import Alternatives, Gripper, MoveTo, Straight
+from rrtik_ompl.tasks.stages import Alternatives, Attach, Detach, Gripper, MoveTo, Straight
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
 
@@ -140,7 +140,7 @@ class Expander:
                 yield from self._after_line(branch, step, stage)
             elif isinstance(stage, Gripper):
                 yield from self._after_gripper(branch, step, stage)
-            else:
+            elif isinstance(stage, Attach | Detach):
                 yield _following_branch(branch, step, branch.after.after(stage, branch.q), branch.q)
         except (ProblemError, InputError) as error:
             self.failures.append((branch, step, str(error)))

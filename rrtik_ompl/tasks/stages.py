@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any, Literal, TypeAlias, get_args
 
@@ -12,9 +12,10 @@ from numpy.typing import ArrayLike
 
 from rrtik_ompl.base.arrays import Vector, dimensions, finite_array, frozen, not_negative
 from rrtik_ompl.base.choices import one_of
+from rrtik_ompl.base.copies import set_fields
 from rrtik_ompl.base.errors import InputError, listed, require
-from rrtik_ompl.base.poses import rigid
-from rrtik_ompl.model.goal import Goal, PoseGoal
+from rrtik_ompl.base.poses import PoseLike, rigid
+from rrtik_ompl.model.goal import Goal, GoalLike, PoseGoal
 from rrtik_ompl.model.goal_kind import TaskRegion
 
 LineFrame: TypeAlias = Literal["world", "tip"]
@@ -22,8 +23,14 @@ GripperState: TypeAlias = Literal["open", "close"]
 NO_LENGTH = 1e-9  # [m] A shorter shift counts as none.
 
 
+class Stage:
+    """A stage of a task: MoveTo, Straight, Attach, Detach, Gripper or Alternatives."""
+
+    __slots__ = ()
+
+
 @dataclass(frozen=True, slots=True, eq=False)
-class MoveTo:
+class MoveTo(Stage):
     """Move to a goal along any free path.
 
     Attributes:
@@ -37,12 +44,11 @@ class MoveTo:
     """
 
     goal: Any
-    constraints: tuple[TaskRegion, ...] = ()
+    constraints: tuple[TaskRegion, ...]
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "constraints", checked_regions(self.constraints, "MoveTo"))
+    def __init__(self, goal: GoalLike, constraints: Iterable[TaskRegion] = ()) -> None:
+        regions = checked_regions(constraints, "MoveTo")
 
-        goal = self.goal
         if isinstance(goal, pin.SE3) or (not isinstance(goal, Goal | str) and dimensions(goal) == 2):
             goal = PoseGoal(rigid(goal, "goal of MoveTo"))
         elif not isinstance(goal, Goal | str):
@@ -50,14 +56,14 @@ class MoveTo:
                 kinds = "a goal such as PoseGoal, the name of a posture, a configuration, or a pose of the tip"
                 raise InputError(f"goal of MoveTo: expected {kinds}, got {type(goal).__name__}")
             goal = frozen(finite_array(goal, (None,), "goal of MoveTo"))
-        object.__setattr__(self, "goal", goal)
+        set_fields(self, goal=goal, constraints=regions)
 
     def __str__(self) -> str:
         return "MoveTo"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Straight:
+class Straight(Stage):
     """Move the tip in a straight line: by a shift, or to a pose.
 
     Attributes:
@@ -74,9 +80,7 @@ class Straight:
     to: Any = None
     frame: LineFrame = "world"
 
-    def __init__(
-        self, by: ArrayLike | None = None, to: ArrayLike | pin.SE3 | None = None, frame: LineFrame = "world"
-    ) -> None:
+    def __init__(self, by: ArrayLike | None = None, to: PoseLike | None = None, frame: LineFrame = "world") -> None:
         if (by is None) == (to is None):
             raise InputError("Straight: give its end, by=[dx, dy, dz] or to=POSE, and only one of them")
 
@@ -103,7 +107,7 @@ class Straight:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Attach:
+class Attach(Stage):
     """Attach an obstacle to a link, with which it moves from now on.
 
     Attributes:
@@ -120,22 +124,21 @@ class Attach:
 
     object: str
     link: str
-    allow: tuple[str, ...] = ()
-    padding: float | None = None
+    allow: tuple[str, ...]
+    padding: float | None
 
-    def __post_init__(self) -> None:
-        require(self.object, str, "object of Attach")
-        require(self.link, str, "link of Attach")
-        object.__setattr__(self, "allow", _names(self.allow, "allow of Attach"))
-        if self.padding is not None:
-            object.__setattr__(self, "padding", not_negative(self.padding, "padding of Attach"))
+    def __init__(self, object: str, link: str, allow: str | Iterable[str] = (), padding: float | None = None) -> None:
+        require(object, str, "object of Attach")
+        require(link, str, "link of Attach")
+        own_padding = None if padding is None else not_negative(padding, "padding of Attach")
+        set_fields(self, object=object, link=link, allow=_names(allow, "allow of Attach"), padding=own_padding)
 
     def __str__(self) -> str:
         return f"Attach '{self.object}'"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Detach:
+class Detach(Stage):
     """Detach an object, which stays where it is from now on.
 
     Attributes:
@@ -156,7 +159,7 @@ class Detach:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Gripper:
+class Gripper(Stage):
     """Open or close the gripper.
 
     The motion of the fingers is checked against the scene and what is held, like any other motion. Fingers may press on
@@ -185,7 +188,7 @@ class Gripper:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Alternatives:
+class Alternatives(Stage):
     """Do any one of several rows of stages.
 
     Attributes:
@@ -209,7 +212,7 @@ class Alternatives:
         return f"Alternatives ({len(self.options)})"
 
 
-Stage: TypeAlias = MoveTo | Straight | Attach | Detach | Gripper | Alternatives
+KINDS = MoveTo | Straight | Attach | Detach | Gripper | Alternatives
 
 
 def checked_stages(stages: object, what: str) -> tuple[Stage, ...]:
@@ -250,11 +253,10 @@ def holding(stages: Iterable[Stage], regions: tuple[TaskRegion, ...]) -> tuple[S
 
 
 def _row(stages: object) -> tuple[Stage, ...]:
-    if isinstance(stages, Stage) or not isinstance(stages, Sequence):
-        raise InputError(f"stages: expected a list of stages, got {type(stages).__name__}")
-    for stage in stages:
-        require(stage, Stage, "each stage of a task")
-    return tuple(stages)
+    row = listed(stages, "stages of a task")
+    for stage in row:
+        require(stage, KINDS, "each stage of a task")
+    return row
 
 
 def _names(names: str | Iterable[str], what: str) -> tuple[str, ...]:

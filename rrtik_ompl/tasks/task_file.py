@@ -306,6 +306,7 @@ def stage_data(stage: Stage) -> dict[str, Any]:
         return {"attach": {"object": stage.object, "link": stage.link, "allow": list(stage.allow), **padding}}
     if isinstance(stage, Detach):
         return {"detach": stage.object}
+    assert isinstance(stage, Gripper)
     return {"gripper": stage.state} | ({} if stage.width is None else {"width": stage.width})
 
 

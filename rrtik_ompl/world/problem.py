@@ -19,7 +19,7 @@ from rrtik_ompl.base.poses import rigid
 from rrtik_ompl.constraints.held_regions import HeldRegions, goal_regions, held_regions
 from rrtik_ompl.constraints.residuals import contradiction
 from rrtik_ompl.files.kinds import read, write
-from rrtik_ompl.model.goal import Goal, JointGoal, PoseGoal
+from rrtik_ompl.model.goal import Goal, GoalLike, JointGoal, PoseGoal
 from rrtik_ompl.model.goal_kind import TaskRegion
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.world_settings import WorldSettings
@@ -74,7 +74,7 @@ class Problem:
         self,
         world: World,
         start: ArrayLike | str,
-        goal: Goal | ArrayLike | pin.SE3 | str,
+        goal: GoalLike,
         *,
         name: str = "problem",
         planner: str | None = None,
@@ -322,7 +322,7 @@ def _check_held(robot: Robot, constraints: HeldRegions, q: Vector, what: str) ->
         raise ProblemError(f"{what} breaks {fault}; {remedy}", part=what)
 
 
-def _goal_of(goal: Goal | ArrayLike | pin.SE3) -> Goal:
+def _goal_of(goal: GoalLike) -> Goal:
     """Convert a goal given by a user: a pose, as ``pinocchio.SE3`` or shape (4, 4), is for the tip.
 
     Everything else that is not a goal already is taken for a configuration.

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Iterable
 from dataclasses import replace
-from inspect import Signature, signature
-from typing import Any, Concatenate, ParamSpec
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -15,44 +14,23 @@ from numpy.typing import ArrayLike
 from rrtik_ompl.base.arrays import MOST_NUMBERS, Mask, Matrix, Vector, finite_array, not_negative, positive
 from rrtik_ompl.base.choices import Accuracy
 from rrtik_ompl.base.copies import ThreadOwn, changed, in_notebook, restored
-from rrtik_ompl.base.errors import DescriptionWarning, InputError, MeshWarning, require
+from rrtik_ompl.base.errors import DescriptionWarning, InputError, MeshWarning, listed, require
 from rrtik_ompl.constraints.held_regions import HeldRegions
 from rrtik_ompl.geometry.collision.bodies import Body, Pairs
 from rrtik_ompl.kernels import FastWorld
 from rrtik_ompl.kernels.search.motions.motion_table import FastMotions, motions_of, step_counts
 from rrtik_ompl.model.certificate import Certificate
+from rrtik_ompl.model.goal_kind import TaskRegion
 from rrtik_ompl.model.judgement import Contact, Judge, Judged, Violation
 from rrtik_ompl.model.proof import Proof
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import Scene
-from rrtik_ompl.model.world_settings import WorldSettings, checked_settings
+from rrtik_ompl.model.world_settings import MOTION_RESOLUTION, WorldSettings, checked_settings
 from rrtik_ompl.world.certificates import HasWaypoints, certificate_for, fault_of
 from rrtik_ompl.world.judgement import judged_path
 from rrtik_ompl.world.proof import Prover
 from rrtik_ompl.world.route_check import violations_of
 from rrtik_ompl.world.row_checks import RowChecks, checks_of
-
-P = ParamSpec("P")
-
-
-def _with_arguments_of(
-    settings: Callable[P, WorldSettings],
-) -> Callable[[Callable[..., None]], Callable[Concatenate[Any, P], None]]:
-    """Decorate a constructor that takes ``**settings`` so that its signature lists the settings one by one.
-
-    `inspect.signature`, `help` and type checkers then show the parameters of ``settings`` in place of ``**settings``.
-    Parameters that the constructor names itself are not repeated.
-    """
-
-    def declared(constructor: Callable[Concatenate[Any, ...], None]) -> Callable[Concatenate[Any, P], None]:
-        named = {
-            name: each for name, each in signature(constructor).parameters.items() if each.kind != each.VAR_KEYWORD
-        }
-        others = [each for name, each in signature(settings).parameters.items() if name not in named]
-        constructor.__signature__ = Signature([*named.values(), *others])  # type: ignore[attr-defined]
-        return constructor
-
-    return declared
 
 
 class World(Judge):
@@ -85,8 +63,8 @@ class World(Judge):
     Args:
         robot: The arm.
         scene: Its surroundings; empty if None. Moving obstacles are where they are at time 0.
-        **settings: The other fields of :class:`~rrtik_ompl.model.world_settings.WorldSettings`, where each is
-            described: ``accuracy``, ``motion_resolution``, ``clearance``, ``constraints`` and so on.
+        accuracy, motion_resolution, self_margin, clearance, proving, inflation, constraints: The other fields of
+            :class:`~rrtik_ompl.model.world_settings.WorldSettings`, where each is described.
 
     Raises:
         InputError: If the scene names links that do not exist, a length makes no sense, or a region cannot be held.
@@ -97,9 +75,30 @@ class World(Judge):
     # Where the sphere covers leave a motion undecided, kernels also compare the solids.
     resolves = True
 
-    @_with_arguments_of(WorldSettings)
-    def __init__(self, robot: Robot, scene: Scene | None = None, **settings: Any) -> None:
-        self._settings = WorldSettings(robot, Scene() if scene is None else scene, **settings)
+    def __init__(
+        self,
+        robot: Robot,
+        scene: Scene | None = None,
+        *,
+        accuracy: Accuracy = "exact",
+        motion_resolution: float = MOTION_RESOLUTION,
+        self_margin: float = 0.0,
+        clearance: float = 0.0,
+        proving: float | None = None,
+        inflation: float = 0.0,
+        constraints: Iterable[TaskRegion] = (),
+    ) -> None:
+        self._settings = WorldSettings(
+            robot,
+            Scene() if scene is None else scene,
+            accuracy=accuracy,
+            motion_resolution=motion_resolution,
+            self_margin=self_margin,
+            clearance=clearance,
+            proving=proving,
+            inflation=inflation,
+            constraints=listed(constraints, "path constraints"),
+        )
         self.checks = checks_of(self._settings)
 
     @classmethod

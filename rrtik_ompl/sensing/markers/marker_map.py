@@ -9,8 +9,9 @@ from dataclasses import dataclass, field
 import pinocchio as pin
 
 from rrtik_ompl.base.arrays import Matrix, finite_number, frozen, not_negative
+from rrtik_ompl.base.copies import set_fields
 from rrtik_ompl.base.errors import InputError, UnknownNameError, listed, require
-from rrtik_ompl.base.poses import rigid
+from rrtik_ompl.base.poses import PoseLike, rigid
 from rrtik_ompl.model.scene import Obstacle
 from rrtik_ompl.sensing.markers.corner_pose import square_corners
 
@@ -144,14 +145,14 @@ class MarkerMap:
 
     dictionary: str
     objects: tuple[MarkedObject, ...]
-    T_base_camera: pin.SE3 | None = None
+    T_base_camera: pin.SE3 | None
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "objects", listed(self.objects, "objects of a marker map"))
-        for marked_object in self.objects:
+    def __init__(self, dictionary: str, objects: Iterable[MarkedObject], T_base_camera: PoseLike | None = None) -> None:
+        things = listed(objects, "objects of a marker map")
+        for marked_object in things:
             require(marked_object, MarkedObject, "object of a marker map")
-        if self.T_base_camera is not None:
-            object.__setattr__(self, "T_base_camera", rigid(self.T_base_camera, "pose of the camera"))
+        place = None if T_base_camera is None else rigid(T_base_camera, "pose of the camera")
+        set_fields(self, dictionary=dictionary, objects=things, T_base_camera=place)
 
         for what, names in (
             ("object", [o.name for o in self.objects]),
