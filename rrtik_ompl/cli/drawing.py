@@ -204,14 +204,14 @@ def overlay(
 
     from rrtik_ompl import JointPath, load_problem
     from rrtik_ompl.pilot.overlay.film import ArmInPictures, rate_of, write_film
-    from rrtik_ompl.sensing.camera_file import load_camera
+    from rrtik_ompl.sensing.cameras.camera import Camera
     from rrtik_ompl.sensing.cameras.pictures import pictures_from, write_picture
-    from rrtik_ompl.sensing.markers.marker_map_file import load_marker_map
+    from rrtik_ompl.sensing.markers.marker_map import MarkerMap
     from rrtik_ompl.sensing.sensor import Sensor
 
     task = load_problem(problem)
     rows = [task.start] if path is None else JointPath.load(path, task.robot).waypoints
-    sensor = Sensor(load_camera(camera), load_marker_map(marker_map))
+    sensor = Sensor(Camera.load(camera), MarkerMap.load(marker_map))
     arm = ArmInPictures(task.robot, sensor, rows, seconds=seconds, ghosts=ghosts)
     rate, pictures = rate_of(islice(pictures_from(source), frames or None))
 

@@ -99,7 +99,6 @@ def calibrate_camera(
     check_target(out, SCENES)
 
     from rrtik_ompl.sensing.calibration import calibrate
-    from rrtik_ompl.sensing.camera_file import save_camera
     from rrtik_ompl.sensing.cameras.pictures import pictures_from
     from rrtik_ompl.sensing.markers.chessboard import Chessboard
     from rrtik_ompl.sensing.markers.detection import charuco_board
@@ -114,7 +113,7 @@ def calibrate_camera(
     with progress("detecting the board"):
         taken = list(pictures_from(photographs[0]))
         found = calibrate([picture.pixels for picture in taken], board)
-    save_camera(found, out)
+    found.save(out)
 
     _tell(found, [picture.name for picture in taken])
     say(f"error {found.error:.3f} px over {sum(not r for r in found.unused)} photographs; wrote {out}")
@@ -127,13 +126,13 @@ def _calibrate_rig(photographs: list[Path], out: Path, board: Board) -> int:
     from pinocchio.rpy import matrixToRpy
 
     from rrtik_ompl.sensing.rig_calibration import calibrate_rig
-    from rrtik_ompl.sensing.rig_file import pictures_together, save_rig
+    from rrtik_ompl.sensing.rig_file import pictures_together
 
     with progress("detecting the board"):
         moments = list(pictures_together([str(each) for each in photographs]))
         found = calibrate_rig([[each[k].pixels for each in moments] for k in range(len(photographs))], board)
 
-    files = save_rig(found.rig, out)
+    files = found.rig.save(out)
     rig = found.rig
     for k, (each, file) in enumerate(zip(found.cameras, files, strict=True)):
         _tell(each, [f"{photographs[k].name}/{pictures[k].name}" for pictures in moments])
@@ -203,12 +202,12 @@ def sense(
     check_target(picture, PICTURES)
 
     goal = _task_goal(task, problem, grasp)
-    from rrtik_ompl.sensing.markers.marker_map_file import load_marker_map
+    from rrtik_ompl.sensing.markers.marker_map import MarkerMap
     from rrtik_ompl.sensing.sensor import Sensor
 
     alone = os.path.isdir(source[0]) if independent is None else independent
     eye = _camera_or_rig(source, camera, rig)
-    sensor = Sensor(eye, load_marker_map(marker_map), smooth=not alone, sigmas=sigmas)
+    sensor = Sensor(eye, MarkerMap.load(marker_map), smooth=not alone, sigmas=sigmas)
 
     view = None
     for view in _views(sensor, source, frames):
@@ -244,14 +243,14 @@ def _task_goal(task: Path | None, problem: str | None, grasp: str | None) -> tup
 
 def _camera_or_rig(sources: list[str], camera: Path | None, rig: Path | None) -> Camera | Rig:
     """Load the camera or the rig that took the pictures."""
-    from rrtik_ompl.sensing.camera_file import load_camera
-    from rrtik_ompl.sensing.rig_file import load_rig
+    from rrtik_ompl.sensing.cameras.camera import Camera
+    from rrtik_ompl.sensing.rig import Rig
 
     if (camera is None) == (rig is None):
         raise InputError("give --camera FILE, or --rig FILE for several cameras that take pictures at the same time")
 
     if rig is not None:
-        found = load_rig(rig)
+        found = Rig.load(rig)
         if len(sources) != len(found.cameras):
             raise InputError(
                 f"--rig {rig} has {len(found.cameras)} cameras and needs as many sources, got {len(sources)}"
@@ -260,7 +259,7 @@ def _camera_or_rig(sources: list[str], camera: Path | None, rig: Path | None) ->
 
     if len(sources) > 1:
         raise InputError(f"{len(sources)} sources need --rig FILE, which says how their cameras stand to each other")
-    return load_camera(str(camera))
+    return Camera.load(str(camera))
 
 
 def _views(sensor: Sensor, sources: list[str], frames: int) -> Iterator[View]:

@@ -130,6 +130,7 @@ KINDS = MappingProxyType(
             "description.catalog:load_robot",
             words=("dh",),
             endings=(".urdf", ".xacro", ".mjcf", ".xml"),
+            also=("Camera",),
         ),
         "Roadmap": Kind(
             "a roadmap",
@@ -164,6 +165,26 @@ KINDS = MappingProxyType(
             endings=(".tif", ".tiff", ".pgm", ".png"),
             needs="cell=[m]",
         ),
+        "Camera": Kind(
+            "a camera",
+            "sensing.cameras.camera:Camera",
+            "sensing.camera_file:read_camera",
+            "sensing.camera_file:write_camera",
+            words=("camera", "camera_matrix"),
+        ),
+        "Rig": Kind(
+            "a rig of cameras",
+            "sensing.rig:Rig",
+            "sensing.rig_file:read_rig",
+            "sensing.rig_file:write_rig",
+            words=("cameras",),
+        ),
+        "MarkerMap": Kind(
+            "a marker map",
+            "sensing.markers.marker_map:MarkerMap",
+            "sensing.markers.marker_map_file:read_marker_map",
+            words=("dictionary",),
+        ),
     }
 )
 
@@ -179,7 +200,8 @@ def load(file: FilePath) -> Any:  # noqa: ANN401 - whatever the file holds
 
     Returns:
         A `Robot`, `Problem`, `Scene`, `JointPath`, `Trajectory`, `Certificate`, `Task`, `TaskPlan`, `Mesh`,
-        `PointCloud`, `Octree`, ``rrtik.replanning.Scenario``, ``rrtik.replanning.ReplanRun`` or ``rrtik.ik.ReachMap``.
+        `PointCloud`, `Octree`, ``rrtik.replanning.Scenario``, ``rrtik.replanning.ReplanRun``, ``rrtik.ik.ReachMap``,
+        ``rrtik.sensing.Camera``, ``rrtik.sensing.Rig`` or ``rrtik.sensing.MarkerMap``.
 
     Raises:
         InputError: If the file cannot be read, its kind cannot be told, or it needs further arguments, as a `Roadmap`

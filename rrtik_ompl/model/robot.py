@@ -150,8 +150,9 @@ class Robot:
         xacro_args: Mapping[str, object] | None = None,
         xacro_limits: Mapping[str, float] | None = None,
         trust_xacro: bool = False,
+        parameters: Mapping[str, object] | None = None,
     ) -> Robot:
-        """Load a robot from a file, or by name, as `load_robot` does, which also takes options of shipped robots.
+        """Load a robot from a file, or by name, as `load_robot` does.
 
         Args:
             file: A name from `list_robots`; or the path of a URDF (``.urdf``, ``.xml``; ``.xacro`` needs the package
@@ -175,6 +176,7 @@ class Robot:
             xacro_limits: Limits for the expansion of macros: ``{"seconds": 10, "gigabytes": 1}``, or one of these.
             trust_xacro: Whether macros are evaluated by xacro's own evaluator, which can run any code, and may read
                 files anywhere. Otherwise expressions that are not on a list of allowed ones are refused.
+            parameters: What a shipped robot has of its own, such as ``{"limits": "envelope"}`` of titan4.
 
         Raises:
             UnknownNameError: If there is no robot of that name.
@@ -184,7 +186,7 @@ class Robot:
             Robot, file, tip=tip, group=group, joints=joints, locked=locked, base_pose=base_pose, padding=padding,
             scale=scale, joint_ranges=joint_ranges, joint_weights=joint_weights, srdf=srdf, urdf=urdf,
             joint_limits=joint_limits, packages=packages, strict=strict, xacro_args=xacro_args,
-            xacro_limits=xacro_limits, trust_xacro=trust_xacro,
+            xacro_limits=xacro_limits, trust_xacro=trust_xacro, parameters=parameters,
         )  # fmt: skip
 
     @property

@@ -24,11 +24,11 @@ from rrtik_ompl.pilot.replay import RecordedArm, RecordedPerception, entries_for
 from rrtik_ompl.pilot.session import Session
 from rrtik_ompl.pilot.surroundings import Structure
 from rrtik_ompl.problem_files.problem import load_problem
-from rrtik_ompl.sensing.camera_file import load_camera
 from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.cameras.pictures import Picture, pictures_from
-from rrtik_ompl.sensing.markers.marker_map_file import load_marker_map
-from rrtik_ompl.sensing.rig_file import load_rig, pictures_together
+from rrtik_ompl.sensing.markers.marker_map import MarkerMap
+from rrtik_ompl.sensing.rig import Rig
+from rrtik_ompl.sensing.rig_file import pictures_together
 from rrtik_ompl.sensing.scene_from_view import SIGMAS
 from rrtik_ompl.sensing.sensor import Sensor
 from rrtik_ompl.sensing.sight import check_size
@@ -183,7 +183,7 @@ def _perception(
         sensor = Sensor(vehicle.camera, vehicle.marker_map, sigmas=options.sigmas)
         return LivePerception(sensor, simulated, arm_in_picture=True)
 
-    eye = None if options.rig is None else load_rig(options.rig)
+    eye = None if options.rig is None else Rig.load(options.rig)
     for name, file in (("--camera-file", options.rig or options.camera_file), ("--map", options.map_file)):
         if file is None:
             raise InputError(f"pictures need {name} FILE (see: rrtik markers --help)")
@@ -192,11 +192,11 @@ def _perception(
     second = options.second
     if source is None:
         raise InputError("there is no source of pictures")
-    marker_map = load_marker_map(str(options.map_file))
+    marker_map = MarkerMap.load(str(options.map_file))
     paced = not isinstance(source, int)
 
     if eye is None:
-        camera = load_camera(str(options.camera_file))
+        camera = Camera.load(str(options.camera_file))
         sensor = Sensor(camera, marker_map, sigmas=options.sigmas)
         return LivePerception(sensor, Feed(lambda: _fitting(pictures_from(source), (camera,)), paced=paced))
 
@@ -238,8 +238,8 @@ def _recorded(options: SessionOptions, problem: Problem) -> SimulatedVehicle:
     if options.camera_file is None or options.map_file is None:
         return _vehicle(options, problem)
 
-    camera = load_camera(options.camera_file)
-    marker_map = load_marker_map(options.map_file)
+    camera = Camera.load(options.camera_file)
+    marker_map = MarkerMap.load(options.map_file)
     return SimulatedVehicle(
         camera, marker_map, {}, marker_map.T_base_camera or orbit_pose(np.zeros(3), *DEFAULT_CAMERA_POSE)
     )

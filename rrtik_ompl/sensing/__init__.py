@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from rrtik_ompl.sensing.rig import Rig as Rig
     from rrtik_ompl.sensing.rig import detect_in_rig as detect_in_rig
     from rrtik_ompl.sensing.rig_calibration import calibrate_rig as calibrate_rig
-    from rrtik_ompl.sensing.rig_file import load_rig as load_rig
     from rrtik_ompl.sensing.rig_file import pictures_together as pictures_together
     from rrtik_ompl.sensing.scene_feed import scenes_of_pictures as scenes_of_pictures
     from rrtik_ompl.sensing.sensor import Sensor as Sensor
@@ -39,10 +38,7 @@ else:
             "detect_in_rig",
         ),
         "sensing.rig_calibration": ("calibrate_rig",),
-        "sensing.rig_file": (
-            "load_rig",
-            "pictures_together",
-        ),
+        "sensing.rig_file": ("pictures_together",),
         "sensing.scene_feed": ("scenes_of_pictures",),
         "sensing.sensor": ("Sensor",),
         "sensing.sight": ("detect_objects",),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Matrix, Vector, frozen
 from rrtik_ompl.base.errors import InputError, listed, require
+from rrtik_ompl.files.kinds import KINDS, found
 from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.markers.alignment import Look, look_of
 from rrtik_ompl.sensing.markers.chessboard import Chessboard
@@ -44,6 +46,14 @@ class Calibration:
     error: float
     view_errors: Vector
     unused: tuple[str, ...]
+
+    def save(self, file: str | os.PathLike[str]) -> None:
+        """Write the camera with the errors of its calibration, as a file that :meth:`Camera.load` reads.
+
+        Raises:
+            InputError: If the file cannot be written.
+        """
+        found(KINDS["Camera"].writer)(self, file)
 
 
 def board_corners(gray: NDArray[np.uint8], board: Board) -> tuple[Matrix, Matrix]:

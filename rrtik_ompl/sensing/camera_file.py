@@ -62,17 +62,17 @@ class CameraFile(Section):
     camera: CameraEntry
 
 
-def load_camera(path: str | os.PathLike[str]) -> Camera:
-    """Read a camera file: our own format, the files of OpenCV's tools, or a camera_info file of ROS.
+def read_camera(file: str | os.PathLike[str]) -> Camera:
+    """Read a camera; see :meth:`Camera.load`.
 
     Raises:
         InputError: If the file cannot be used; one line with file, line, key, what was found and the remedy.
     """
-    text = read_text(path)
+    text = read_text(file)
     if is_of_opencv(text):
-        return camera_from_opencv(text, str(path))
+        return camera_from_opencv(text, str(file))
 
-    document = read_yaml(path)
+    document = read_yaml(file)
     if is_of_ros(document):
         return camera_from_ros(document)
 
@@ -81,15 +81,12 @@ def load_camera(path: str | os.PathLike[str]) -> Camera:
         return entry.build()
 
 
-def save_camera(camera: Camera | Calibration, path: str | os.PathLike[str]) -> None:
+def write_camera(camera: Camera | Calibration, file: str | os.PathLike[str]) -> None:
     """Write a camera; for a `Calibration`, its errors are written, too.
 
     Raises:
         InputError: If the file cannot be written.
     """
-    if not isinstance(camera, Camera | Calibration):
-        raise InputError(f"camera to save must be a Camera or a Calibration, got {type(camera).__name__}")
-
     lens = camera.camera if isinstance(camera, Calibration) else camera
     (fx, _, cx), (_, fy, cy), _ = lens.matrix.tolist()
     data: dict[str, Any] = {"size": [lens.width, lens.height], "fx": fx, "fy": fy, "cx": cx, "cy": cy}
@@ -105,7 +102,7 @@ def save_camera(camera: Camera | Calibration, path: str | os.PathLike[str]) -> N
         data["error_px"] = camera.error
         data["view_errors_px"] = [e for e in camera.view_errors.tolist() if e == e]
 
-    write_yaml(path, {"version": 1, "camera": data})
+    write_yaml(file, {"version": 1, "camera": data})
 
 
 class MatrixEntry(Section):

@@ -30,7 +30,7 @@ def cloud_from_depth(
     Args:
         depth: Depth along the camera's axis, shape (height, width). Values that are not finite, or not between
             ``nearest`` and ``farthest``, are left out.
-        camera: Intrinsics of the camera, as :func:`rrtik_ompl.sensing.camera_file.load_camera` reads them.
+        camera: Intrinsics of the camera, as :meth:`rrtik_ompl.sensing.Camera.load` reads them.
         pose: T_world_camera (x right, y down, z away from it); None for points in the camera frame.
         radius: Radius of the ball that represents each point [m].
         scale: Metres per unit of the picture; 0.001 for millimetres.
@@ -47,7 +47,7 @@ def cloud_from_depth(
         >>> rrtik.sensing.cloud_from_depth(np.full((3, 3), 2.0), camera).points[0].tolist()
         [-0.019999999552965164, -0.019999999552965164, 2.0]
     """
-    require(camera, Camera, "camera", "use load_camera(file)")
+    require(camera, Camera, "camera", "use Camera.load(file)")
     try:
         picture = np.asarray(depth, dtype=np.float64)
     except (TypeError, ValueError, OverflowError) as error:

@@ -7,9 +7,11 @@ of two poses of a single square is correct. Poses that contradict each other by 
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
+from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
@@ -19,6 +21,7 @@ from rrtik_ompl.base.arrays import Matrix, Vector, frozen, not_negative
 from rrtik_ompl.base.copies import set_fields
 from rrtik_ompl.base.errors import InputError, listed, require
 from rrtik_ompl.base.poses import PoseLike, rigid
+from rrtik_ompl.files.kinds import read, write
 from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.markers.corner_pose import CornerPose
 from rrtik_ompl.sensing.markers.detection import SeenMarker
@@ -63,7 +66,7 @@ class Rig:
     ) -> None:
         eyes = listed(cameras, "cameras of a rig")
         for camera in eyes:
-            require(camera, Camera, "camera of a rig", "use load_camera(file)")
+            require(camera, Camera, "camera of a rig", "use Camera.load(file)")
         places = tuple(rigid(T, f"pose of camera {k}") for k, T in enumerate(listed(poses, "poses of a rig"), start=1))
         if len(eyes) < 2 or len(places) != len(eyes):
             raise InputError(f"a rig has two cameras or more, each with its pose; got {len(eyes)} and {len(places)}")
@@ -76,6 +79,27 @@ class Rig:
             position_sigma=not_negative(position_sigma, "position_sigma of a rig"),
             rotation_sigma=not_negative(rotation_sigma, "rotation_sigma of a rig"),
         )
+
+    def save(self, file: str | os.PathLike[str]) -> list[Path]:
+        """Write the rig, and its cameras to files beside it: for ``rig.yaml`` these are ``rig_1.yaml`` and so on.
+
+        Returns:
+            The files of the cameras.
+
+        Raises:
+            InputError: If a file cannot be written.
+        """
+        files: list[Path] = write(self, file)
+        return files
+
+    @staticmethod
+    def load(file: str | os.PathLike[str]) -> Rig:
+        """Read a rig and the camera files that it names.
+
+        Raises:
+            InputError: If a file cannot be used; one line with file, line, key, what was found and the remedy.
+        """
+        return read(Rig, file)
 
 
 def detect_in_rig(pictures: Sequence[NDArray[np.uint8]], rig: Rig, marker_map: MarkerMap) -> tuple[Sighting, ...]:
@@ -93,7 +117,7 @@ def detect_in_rig(pictures: Sequence[NDArray[np.uint8]], rig: Rig, marker_map: M
     Raises:
         InputError: If there are not as many pictures as cameras, or one does not have its camera's size.
     """
-    require(rig, Rig, "rig", "use load_rig(file)")
+    require(rig, Rig, "rig", "use Rig.load(file)")
     pictures = listed(pictures, "pictures of a rig")
     if len(pictures) != len(rig.cameras):
         raise InputError(f"a rig of {len(rig.cameras)} cameras needs as many pictures, got {len(pictures)}")

@@ -12,12 +12,12 @@ import numpy as np
 import pinocchio as pin
 from pydantic import Field
 
-from rrtik_ompl.base.errors import InputError, listed, require
+from rrtik_ompl.base.errors import InputError, listed
 from rrtik_ompl.files.pose_entry import PoseEntry, pose_data
 from rrtik_ompl.files.sections import Name, NotNegative, Section, Version, parse
 from rrtik_ompl.files.strict_yaml import read_yaml, write_yaml
 from rrtik_ompl.files.text import file_name
-from rrtik_ompl.sensing.camera_file import load_camera, save_camera
+from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.cameras.pictures import Picture, pictures_from
 from rrtik_ompl.sensing.rig import Rig
 
@@ -44,13 +44,13 @@ class RigFile(Section):
     rotation_sigma_deg: NotNegative = Field(0.0, description="of how they are turned [deg]")
 
 
-def load_rig(path: str | os.PathLike[str]) -> Rig:
-    """Read a rig and the camera files that it names.
+def read_rig(file: str | os.PathLike[str]) -> Rig:
+    """Read a rig; see :meth:`Rig.load`.
 
     Raises:
         InputError: If a file cannot be used; one line with file, line, key, what was found and the remedy.
     """
-    document = read_yaml(path)
+    document = read_yaml(file)
     entry = parse(document, RigFile)
 
     cameras = []
@@ -61,32 +61,28 @@ def load_rig(path: str | os.PathLike[str]) -> Rig:
                 raise InputError("needs a pose in the frame of the first camera")
             poses.append(each.build())
         with document.at(("cameras", k, "file")):
-            cameras.append(load_camera(document.path.parent / each.file))
+            cameras.append(Camera.load(document.path.parent / each.file))
 
     with document.at(("cameras",)):
         turn = float(np.deg2rad(entry.rotation_sigma_deg))
         return Rig(tuple(cameras), tuple(poses), entry.position_sigma, turn)
 
 
-def save_rig(rig: Rig, path: str | os.PathLike[str]) -> list[Path]:
-    """Write a rig, and its cameras to files beside it: for ``rig.yaml`` these are ``rig_1.yaml`` and so on.
-
-    Returns:
-        The files of the cameras.
+def write_rig(rig: Rig, file: str | os.PathLike[str]) -> list[Path]:
+    """Write a rig; see :meth:`Rig.save`.
 
     Raises:
         InputError: If a file cannot be written.
     """
-    require(rig, Rig, "rig to save", "use calibrate_rig(pictures, board)")
-    target = file_name(path)
+    target = file_name(file)
     if not target.name:
-        raise InputError(f"{path}: is not the name of a file")
+        raise InputError(f"{file}: is not the name of a file")
     files = [target.with_name(f"{target.stem}_{k}.yaml") for k in range(1, len(rig.cameras) + 1)]
 
     entries: list[dict[str, Any]] = []
-    for camera, T, file in zip(rig.cameras, rig.poses, files, strict=True):
-        save_camera(camera, file)
-        entries.append({"file": file.name} | ({"pose": pose_data(T)} if entries else {}))
+    for camera, T, beside in zip(rig.cameras, rig.poses, files, strict=True):
+        camera.save(beside)
+        entries.append({"file": beside.name} | ({"pose": pose_data(T)} if entries else {}))
 
     sigmas = {"position_sigma": rig.position_sigma, "rotation_sigma_deg": float(np.rad2deg(rig.rotation_sigma))}
     write_yaml(target, {"version": 1, "cameras": entries} | sigmas)

@@ -109,8 +109,8 @@ class Sensor:
         Raises:
             InputError: If ``sigmas`` is not 0 or more.
         """
-        require(camera, Camera | Rig, "camera of a sensor", "use load_camera(file) or load_rig(file)")
-        require(marker_map, MarkerMap, "marker map", "use load_marker_map(file)")
+        require(camera, Camera | Rig, "camera of a sensor", "use Camera.load(file) or Rig.load(file)")
+        require(marker_map, MarkerMap, "marker map", "use MarkerMap.load(file)")
         self._rig = camera if isinstance(camera, Rig) else None
         self.camera = camera.cameras[0] if isinstance(camera, Rig) else camera
         self.marker_map = marker_map

@@ -101,8 +101,8 @@ def detect_objects(
     Raises:
         InputError: If the picture does not have the camera's size, or is invalid.
     """
-    require(camera, Camera, "camera", "use load_camera(file)")
-    require(marker_map, MarkerMap, "marker map", "use load_marker_map(file)")
+    require(camera, Camera, "camera", "use Camera.load(file)")
+    require(marker_map, MarkerMap, "marker map", "use MarkerMap.load(file)")
     gray = as_gray(picture)
     check_size(gray, camera)
 

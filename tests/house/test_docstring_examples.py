@@ -45,7 +45,6 @@ WITHOUT = {
     "sensing.calibrate_rig",
     "sensing.detect_in_rig",
     "sensing.detect_objects",
-    "sensing.load_rig",
     "sensing.pictures_together",
     "sensing.scenes_of_pictures",
     "solve_ik",

@@ -12,7 +12,6 @@ import pytest
 from rrtik_ompl.base.errors import InputError, RrtikError
 from rrtik_ompl.sensing import rig_file
 from rrtik_ompl.sensing.calibration import calibrate
-from rrtik_ompl.sensing.camera_file import load_camera, save_camera
 from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.cameras.pan_tilt_zoom import PanTiltZoom
 from rrtik_ompl.sensing.cameras.pictures import Picture, pictures_from, read_picture
@@ -20,11 +19,10 @@ from rrtik_ompl.sensing.depth import cloud_from_depth
 from rrtik_ompl.sensing.markers.chessboard import Chessboard
 from rrtik_ompl.sensing.markers.detection import charuco_board, marker_cells
 from rrtik_ompl.sensing.markers.marker_map import GraspType, MarkedObject, MarkerMap, MountedMarker
-from rrtik_ompl.sensing.markers.marker_map_file import load_marker_map
 from rrtik_ompl.sensing.markers.sheets import print_board, print_markers
 from rrtik_ompl.sensing.rig import Rig, detect_in_rig
 from rrtik_ompl.sensing.rig_calibration import calibrate_rig
-from rrtik_ompl.sensing.rig_file import load_rig, pictures_together, save_rig
+from rrtik_ompl.sensing.rig_file import pictures_together
 from rrtik_ompl.sensing.scene_feed import scenes_of_pictures
 from rrtik_ompl.sensing.scene_from_view import scene_from_image
 from rrtik_ompl.sensing.sensor import Sensor
@@ -87,9 +85,9 @@ DOORS = {
     ),
     "detect_in_rig": (detect_in_rig, [[GRAY, GRAY], RIG, MAP], {}),
     "detect_objects": (detect_objects, [GRAY, CAMERA, MAP], {}),
-    "load_camera": (load_camera, ["camera.yaml"], {}),
-    "load_marker_map": (load_marker_map, ["map.yaml"], {}),
-    "load_rig": (load_rig, ["rig.yaml"], {}),
+    "Camera.load": (Camera.load, ["camera.yaml"], {}),
+    "MarkerMap.load": (MarkerMap.load, ["map.yaml"], {}),
+    "Rig.load": (Rig.load, ["rig.yaml"], {}),
     "marker_cells": (marker_cells, ["4x4_50", 1], {}),
     "pictures_from": (first_picture, ["a.png"], {}),
     "pictures_together": (first_pictures, [["a.png", "b.png"]], {}),
@@ -114,8 +112,8 @@ DOORS = {
     "project": (CAMERA.project, [np.ones((1, 3))], {}),
     "rays": (CAMERA.rays, [np.ones((1, 2))], {}),
     "read_picture": (read_picture, ["a.png"], {}),
-    "save_camera": (save_camera, [CAMERA, "c.yaml"], {}),
-    "save_rig": (save_rig, [RIG, "r.yaml"], {}),
+    "Camera.save": (CAMERA.save, ["c.yaml"], {}),
+    "Rig.save": (RIG.save, ["r.yaml"], {}),
     "scenes_of_pictures": (all_views, [[], Sensor(CAMERA, MAP), None], {}),
     "scene_from_image": (scene_from_image, [GRAY, CAMERA, MAP], {"sigmas": 3.0}),
 }
@@ -169,7 +167,7 @@ REFUSED = {
     "no picture in a feed": (lambda: all_views([GRAY], Sensor(CAMERA, MAP)), "picture of a scene feed must be"),
     "a rig of no board": (lambda: calibrate_rig([[GRAY], [GRAY]], None), "board must be"),
     "a rig of one picture": (lambda: calibrate_rig([5, 5], BOARD), "pictures of a camera must be a list"),
-    "a path of bytes": (lambda: load_camera(OnlyFspath(b"c.yaml")), "name of a file"),
+    "a path of bytes": (lambda: Camera.load(OnlyFspath(b"c.yaml")), "name of a file"),
 }
 
 

@@ -11,8 +11,7 @@ from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.markers import sheets
 from rrtik_ompl.sensing.markers.corner_pose import pose_of_square, square_corners
 from rrtik_ompl.sensing.markers.detection import SeenMarker, find_markers, marker_cells
-from rrtik_ompl.sensing.markers.marker_map import MarkedObject, MountedMarker
-from rrtik_ompl.sensing.markers.marker_map_file import load_marker_map
+from rrtik_ompl.sensing.markers.marker_map import MarkedObject, MarkerMap, MountedMarker
 from rrtik_ompl.sensing.sight import sighting
 from rrtik_tests.marker_views import CAMERA, SIDE, facing
 
@@ -134,7 +133,7 @@ def test_a_map_states_the_uncertainty_of_a_side(tmp_path):
     text = "version: 1\ndictionary: 4x4_50\ncamera_pose: {xyz: [0, 0, 0]}\nobjects:\n- name: a\n  role: target\n"
     file = tmp_path / "map.yaml"
     file.write_text(text + "  markers:\n  - {id: 1, side: 0.08, side_sigma: 0.0004}\n")
-    assert load_marker_map(file).objects[0].markers[0].side_sigma == 0.0004
+    assert MarkerMap.load(file).objects[0].markers[0].side_sigma == 0.0004
     file.write_text(text + "  markers:\n  - {id: 1, side: 0.08, side_sigma: 0.1}\n")
     with pytest.raises(InputError, match=r"side_sigma.*below side"):
-        load_marker_map(file)
+        MarkerMap.load(file)

@@ -7,7 +7,6 @@ import pytest
 from rrtik_bench.sensing.synthetic_camera import Print, clean_picture, marker_print, photograph
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.sensing.calibration import calibrate
-from rrtik_ompl.sensing.camera_file import load_camera, save_camera
 from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.markers.chessboard import Chessboard
 from rrtik_ompl.sensing.markers.corner_pose import pose_of_square
@@ -49,7 +48,7 @@ def test_a_camera_that_opencv_stored_is_read_to_the_bit(tmp_path, ending, lens):
     storage.write("camera_matrix", CAMERA.matrix)
     storage.write("distortion_coefficients", np.array(lens)[None])
     storage.release()
-    found = load_camera(file)
+    found = Camera.load(file)
     assert np.array_equal(found.matrix, CAMERA.matrix)
     assert np.array_equal(found.distortion, (*lens, 0.0)[:5])
     assert (found.width, found.height) == (640, 480)
@@ -58,7 +57,7 @@ def test_a_camera_that_opencv_stored_is_read_to_the_bit(tmp_path, ending, lens):
 def test_a_camera_info_of_ros_is_read(tmp_path):
     file = tmp_path / "ost.yaml"
     file.write_text(ROS)
-    found = load_camera(file)
+    found = Camera.load(file)
     assert found.matrix[[0, 1, 0, 1], [0, 1, 2, 2]] == pytest.approx([438.78, 437.35, 305.59, 243.73])
     assert found.distortion == pytest.approx([-0.361976, 0.110510, 0.001014, 0.000505, 0.0])
 
@@ -79,7 +78,7 @@ def test_what_is_no_camera_of_this_kind_is_refused_in_one_line(tmp_path, text, s
     file = tmp_path / "c.yaml"
     file.write_text(text)
     with pytest.raises(InputError, match=said) as refused:
-        load_camera(file)
+        Camera.load(file)
     assert "c.yaml" in str(refused.value)
     assert "\n" not in str(refused.value)
 
@@ -90,7 +89,7 @@ def test_a_file_of_opencv_without_the_pictures_size_says_what_is_missing(tmp_pat
     storage.write("M1", CAMERA.matrix)
     storage.release()
     with pytest.raises(InputError, match="image_width"):
-        load_camera(file)
+        Camera.load(file)
 
 
 def views(sheet, count, far=(0.3, 0.42), tone=0.0):
@@ -127,8 +126,8 @@ def test_a_chessboard_tells_the_tone_of_its_photographs(far, tone, turned):
 
 def test_a_camera_whose_tone_a_chessboard_told_places_markers_as_well_as_it_says(tmp_path):
     camera = calibrate(list(views(chessboard(), 5, (0.5, 0.6), 1.0)), Chessboard(8, 7, 0.03)).camera
-    save_camera(camera, tmp_path / "c.yaml")
-    tone = load_camera(tmp_path / "c.yaml").tone
+    camera.save(tmp_path / "c.yaml")
+    tone = Camera.load(tmp_path / "c.yaml").tone
     sheet, squares = marker_print(marker_cells("4x4_50", 7), SIDE), []
     for seed, place in enumerate(([0.1, -0.05, 0.7], [0.05, 0.1, 1.0], [-0.1, 0.0, 1.4])):
         T, rng = facing([0.5, 0.3 - 0.3 * seed, 0.2], place), np.random.default_rng(seed)
@@ -155,6 +154,6 @@ def test_a_calibration_keeps_the_tone_of_the_camera(tmp_path):
     sheet = Print(np.pad(drawn, 9, constant_values=255), 0.03 / 27)
     found = calibrate(list(views(sheet, 5, tone=1.0)), board).camera
     assert found.tone == pytest.approx(1.0, abs=0.2)
-    save_camera(found, tmp_path / "c.yaml")
-    assert load_camera(tmp_path / "c.yaml").tone == found.tone
+    found.save(tmp_path / "c.yaml")
+    assert Camera.load(tmp_path / "c.yaml").tone == found.tone
     assert Camera(CAMERA.matrix, 640, 480).tone is None

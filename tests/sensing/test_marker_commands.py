@@ -8,7 +8,6 @@ import pinocchio as pin
 import pytest
 
 from rrtik_ompl.problem_files.scene import load_scene
-from rrtik_ompl.sensing.camera_file import save_camera
 from rrtik_tests.command_line import rrtik
 from rrtik_tests.marker_files import CAMERA, MAP
 
@@ -17,7 +16,7 @@ from rrtik_tests.marker_files import CAMERA, MAP
 def folder(tmp_path, taken):
     cv2.imwrite(str(tmp_path / "view.png"), taken[0])
     (tmp_path / "map.yaml").write_text(MAP)
-    save_camera(CAMERA, tmp_path / "camera.yaml")
+    CAMERA.save(tmp_path / "camera.yaml")
     return tmp_path
 
 

@@ -7,18 +7,18 @@ import pytest
 from rrtik_bench.sensing.synthetic_camera import Print, clean_picture, photograph
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.sensing.calibration import calibrate
-from rrtik_ompl.sensing.camera_file import load_camera, save_camera
+from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.cameras.pictures import pictures_from, read_picture
 from rrtik_ompl.sensing.markers.detection import charuco_board, find_markers
-from rrtik_ompl.sensing.markers.marker_map_file import load_marker_map
+from rrtik_ompl.sensing.markers.marker_map import MarkerMap
 from rrtik_ompl.sensing.markers.sheets import print_board, print_markers
 from rrtik_tests.marker_files import CAMERA, MAP
 from rrtik_tests.marker_views import facing
 
 
 def test_a_camera_file_gives_back_the_camera(tmp_path):
-    save_camera(CAMERA, tmp_path / "c.yaml")
-    again = load_camera(tmp_path / "c.yaml")
+    CAMERA.save(tmp_path / "c.yaml")
+    again = Camera.load(tmp_path / "c.yaml")
     assert np.array_equal(again.matrix, CAMERA.matrix)
     assert np.array_equal(again.distortion, CAMERA.distortion)
     assert (again.width, again.height) == (640, 480)
@@ -28,10 +28,10 @@ def test_a_camera_file_gives_back_the_camera(tmp_path):
     ("word", "instead", "place"), [("fx:", "fz:", "fz"), ("size: [640, 480]", "size: [640]", "size")]
 )
 def test_a_slip_in_a_camera_file_is_named(tmp_path, word, instead, place):
-    save_camera(CAMERA, tmp_path / "c.yaml")
+    CAMERA.save(tmp_path / "c.yaml")
     (tmp_path / "c.yaml").write_text((tmp_path / "c.yaml").read_text().replace(word, instead, 1))
     with pytest.raises(InputError, match=place):
-        load_camera(tmp_path / "c.yaml")
+        Camera.load(tmp_path / "c.yaml")
 
 
 @pytest.mark.parametrize(
@@ -48,7 +48,7 @@ def test_a_slip_in_a_camera_file_is_named(tmp_path, word, instead, place):
 def test_a_slip_in_a_marker_map_is_named(tmp_path, word, instead, message):
     (tmp_path / "m.yaml").write_text(MAP.replace(word, instead, 1))
     with pytest.raises(InputError, match=message) as error:
-        load_marker_map(tmp_path / "m.yaml")
+        MarkerMap.load(tmp_path / "m.yaml")
     assert "m.yaml" in str(error.value)
 
 
@@ -98,8 +98,8 @@ def test_a_camera_is_found_out_from_photographs_of_a_board(tmp_path):
     assert (found.sigmas < 10.0).all()
     assert "corners of the board" in found.unused[-1]
     assert np.isnan(found.view_errors[-1])
-    save_camera(found, tmp_path / "c.yaml")
-    assert np.array_equal(load_camera(tmp_path / "c.yaml").matrix, found.camera.matrix)
+    found.save(tmp_path / "c.yaml")
+    assert np.array_equal(Camera.load(tmp_path / "c.yaml").matrix, found.camera.matrix)
     with pytest.raises(InputError, match="at least 5"):
         calibrate([*views[:4], blank], board)
 

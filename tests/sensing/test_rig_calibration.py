@@ -10,8 +10,8 @@ from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.base.poses import pose_from_rpy
 from rrtik_ompl.sensing.markers.chessboard import Chessboard
 from rrtik_ompl.sensing.markers.detection import charuco_board
+from rrtik_ompl.sensing.rig import Rig
 from rrtik_ompl.sensing.rig_calibration import calibrate_rig
-from rrtik_ompl.sensing.rig_file import load_rig, save_rig
 from rrtik_tests.command_line import rrtik
 from rrtik_tests.marker_views import CAMERA, facing
 from rrtik_tests.sizes import how_many
@@ -80,8 +80,8 @@ def test_a_board_with_markers_that_is_seen_in_part_will_do():
 
 def test_a_rig_is_written_and_read_again(tmp_path, found):
     rig = found.rig
-    assert [file.name for file in save_rig(rig, tmp_path / "rig.yaml")] == ["rig_1.yaml", "rig_2.yaml"]
-    again = load_rig(tmp_path / "rig.yaml")
+    assert [file.name for file in rig.save(tmp_path / "rig.yaml")] == ["rig_1.yaml", "rig_2.yaml"]
+    again = Rig.load(tmp_path / "rig.yaml")
     assert np.allclose(again.poses[1].homogeneous, rig.poses[1].homogeneous, atol=1e-12)
     assert np.array_equal(again.cameras[1].matrix, rig.cameras[1].matrix)
     assert again.cameras[0].tone == rig.cameras[0].tone
@@ -119,7 +119,7 @@ def test_a_rig_is_calibrated_by_a_command_and_taken_by_sense(capsys, tmp_path, t
     code, out, err = rrtik(capsys, "markers", "calibrate", *folders, *options)
     assert (code, err) == (0, "")
     assert "camera 2 in the frame of camera 1: xyz 0.1" in out
-    assert away(load_rig(tmp_path / "rig.yaml").poses[1])[0] < 3e-3
+    assert away(Rig.load(tmp_path / "rig.yaml").poses[1])[0] < 3e-3
     (tmp_path / "right" / "6.png").unlink()
     code, _, err = rrtik(capsys, "markers", "calibrate", *folders, *options)
     assert (code, err.count("\n")) == (2, 1)

@@ -8,7 +8,6 @@ import pytest
 
 from rrtik_bench.sensing.synthetic_camera import clean_picture, marker_print, photograph
 from rrtik_ompl.base.poses import pose_from_rpy
-from rrtik_ompl.sensing.camera_file import save_camera
 from rrtik_ompl.sensing.markers.corner_pose import square_corners
 from rrtik_ompl.sensing.markers.detection import marker_cells
 from rrtik_tests.command_line import rrtik
@@ -42,7 +41,7 @@ def photo(T, seed):
 def folder(tmp_path):
     for side, eye in (("left", pose_from_rpy([0, 0, 0], [0, 0, 0])), ("right", ASIDE)):
         (tmp_path / side).mkdir()
-        save_camera(CAMERA, tmp_path / f"{side}.yaml")
+        CAMERA.save(tmp_path / f"{side}.yaml")
         for k, T in enumerate(PLACES):
             cv2.imwrite(str(tmp_path / side / f"{k}.png"), photo(eye.actInv(T), k + 100 * (side == "right")))
     (tmp_path / "rig.yaml").write_text(RIG)

@@ -20,10 +20,8 @@ from rrtik_ompl.files.strict_yaml import read_yaml
 from rrtik_ompl.pilot.devices.simulation import BaseMotion, Mount
 from rrtik_ompl.pilot.devices.wrong_arm import Faults
 from rrtik_ompl.pilot.interlock import UNSEEN_SECONDS
-from rrtik_ompl.sensing.camera_file import load_camera
 from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.markers.marker_map import MarkerMap
-from rrtik_ompl.sensing.markers.marker_map_file import load_marker_map
 
 FOLDER = "pilot"  # folder beside the shipped problems
 
@@ -129,7 +127,7 @@ def load_vehicle(path: str | os.PathLike[str]) -> SimulatedVehicle:
     entry = parse(document, VehicleFile)
     folder = document.path.parent
 
-    marker_map = load_marker_map(folder / entry.map)
+    marker_map = MarkerMap.load(folder / entry.map)
     poses = {}
     for number, place in enumerate(entry.places):
         with document.at(("places", number, "name")):
@@ -156,7 +154,7 @@ def load_vehicle(path: str | os.PathLike[str]) -> SimulatedVehicle:
         patience = UNSEEN_SECONDS  # what a moving vehicle saw some time ago may be elsewhere now
 
     return SimulatedVehicle(
-        camera=load_camera(folder / entry.camera),
+        camera=Camera.load(folder / entry.camera),
         marker_map=marker_map,
         places=poses,
         T_base_camera=entry.camera_pose.build(),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,6 +13,7 @@ from numpy.typing import ArrayLike
 from rrtik_ompl.base.arrays import Matrix, Vector, finite_array, finite_number, frozen
 from rrtik_ompl.base.copies import as_value
 from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.files.kinds import read, write
 
 ORIGIN = np.zeros(3)
 UNDISTORT: Any = getattr(cv2, "undistortPointsIter", cv2.undistortPoints)  # OpenCV 5 has merged the two functions
@@ -74,6 +76,23 @@ class Camera:
         object.__setattr__(self, "tone", None if tone is None else finite_number(tone, "camera tone"))
         object.__setattr__(self, "width", int(width))
         object.__setattr__(self, "height", int(height))
+
+    def save(self, file: str | os.PathLike[str]) -> None:
+        """Write the camera as YAML; if writing fails, no incomplete file is left.
+
+        Raises:
+            InputError: If the file cannot be written.
+        """
+        write(self, file)
+
+    @staticmethod
+    def load(file: str | os.PathLike[str]) -> Camera:
+        """Read a camera file: our own format, the files of OpenCV's tools, or a camera_info file of ROS.
+
+        Raises:
+            InputError: If the file cannot be used; one line with file, line, key, what was found and the remedy.
+        """
+        return read(Camera, file)
 
     def project(self, points: ArrayLike) -> Matrix:
         """Project points in the camera frame, shape (m, 3) [m], to pixels, shape (m, 2)."""

@@ -68,7 +68,7 @@ class PanTiltZoom:
     ) -> None:
         self.cameras = listed(cameras, "cameras of a zoom lens")
         for camera in self.cameras:
-            require(camera, Camera, "camera of a zoom lens", "use load_camera(file)")
+            require(camera, Camera, "camera of a zoom lens", "use Camera.load(file)")
         self.zooms: Vector = frozen(finite_array(zooms, (len(self.cameras),), "zooms"))
         if not self.cameras or (np.diff(self.zooms) <= 0.0).any():
             raise InputError("a zoom lens needs a camera for each of its zooms, which increase")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -12,6 +13,7 @@ from rrtik_ompl.base.arrays import Matrix, finite_number, frozen, not_negative
 from rrtik_ompl.base.copies import set_fields
 from rrtik_ompl.base.errors import InputError, UnknownNameError, listed, require
 from rrtik_ompl.base.poses import PoseLike, rigid
+from rrtik_ompl.files.kinds import read
 from rrtik_ompl.model.scene import Obstacle
 from rrtik_ompl.sensing.markers.corner_pose import square_corners
 
@@ -167,6 +169,15 @@ class MarkerMap:
             raise InputError(f"two objects are the base: {bases[0]} and {bases[1]}; there is one arm")
         if not bases and self.T_base_camera is None:
             raise InputError("nothing says where the base is: give an object the role base, or say camera_pose")
+
+    @staticmethod
+    def load(file: str | os.PathLike[str]) -> MarkerMap:
+        """Read a marker map (YAML).
+
+        Raises:
+            InputError: If the file cannot be used; one line with file, line, key, what was found and the remedy.
+        """
+        return read(MarkerMap, file)
 
     @property
     def base(self) -> MarkedObject | None:

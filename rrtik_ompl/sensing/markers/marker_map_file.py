@@ -89,11 +89,11 @@ class MarkerMapFile(Section):
             )
 
 
-def load_marker_map(path: str | os.PathLike[str]) -> MarkerMap:
-    """Read a marker map.
+def read_marker_map(file: str | os.PathLike[str]) -> MarkerMap:
+    """Read a marker map; see :meth:`MarkerMap.load`.
 
     Raises:
         InputError: If the file cannot be used; one line with file, line, key, what was found and the remedy.
     """
-    document = read_yaml(path)
+    document = read_yaml(file)
     return parse(document, MarkerMapFile).build(document)

@@ -12,9 +12,9 @@ import rrtik_robots
 from rrtik_ompl import JointPath, load_problem, load_robot
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.pilot.overlay.film import ArmInPictures, write_film
-from rrtik_ompl.sensing.camera_file import load_camera
+from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.cameras.pictures import Picture, pictures_from, read_picture
-from rrtik_ompl.sensing.markers.marker_map_file import load_marker_map
+from rrtik_ompl.sensing.markers.marker_map import MarkerMap
 from rrtik_ompl.sensing.sensor import Sensor
 from rrtik_tests.command_line import rrtik
 from rrtik_tests.places import ROOT
@@ -36,7 +36,7 @@ def film_of(path, count=4, picture=PHOTOGRAPH):
 
 
 def arm_in_pictures(waypoints, map_file=SHIPPED / "titan4_panel_markers.yaml", **how):
-    sensor = Sensor(load_camera(SHIPPED / "camera_640.yaml"), load_marker_map(map_file))
+    sensor = Sensor(Camera.load(SHIPPED / "camera_640.yaml"), MarkerMap.load(map_file))
     return ArmInPictures(load_robot("titan4"), sensor, waypoints, **({"seconds": 2.0} | how))
 
 
