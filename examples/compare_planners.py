@@ -10,5 +10,5 @@ for name in ("auto", "fastrrtconnect", "bicrdt", "RRTConnect", "BKPIECE1", "KPIE
     begin = time.process_time()
     plan = rrtik.plan(problem, name, seconds=2.0, seed=1)
     spent = 1e3 * (time.process_time() - begin)
-    result = f"{plan.path.length:6.2f} {plan.path.transitions:6}" if plan.found else plan.reason
+    result = f"{plan.path.length:6.2f} {plan.path.transitions:6}" if plan.path else plan.reason
     print(f"{name:>16} {spent:8.1f} {result}")

@@ -57,7 +57,7 @@ class Stub:
 
     def getActualQ(self) -> list[float]:
         """Where it is."""
-        return self.q
+        return list(self.q)
 
 
 def interfaces(host: str | None) -> tuple[Any, Any]:

@@ -8,21 +8,21 @@ import rrtik_ompl as rrtik
 class Reach:
     """Gymnasium's reset() and step(); an action is how far the joints shall turn [rad]."""
 
-    def __init__(self, world, step=0.2, length=300):
+    def __init__(self, world: rrtik.World, step: float = 0.2, length: int = 300) -> None:
         self.world, self.most, self.length = world, step, length
 
-    def reset(self, seed=None):
+    def reset(self, seed: int | None = None) -> tuple[np.ndarray, dict[str, bool]]:
         """Begin between two free configurations."""
         rows = np.random.default_rng(seed).uniform(*self.world.robot.finite_range(), (1000, self.world.robot.dof))
         (self.q, self.goal), self.count = rows[self.world.valid_batch(rows)][:2], 0
         return np.concatenate([self.q, self.goal]), {}
 
-    def step(self, action):
+    def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, bool]]:
         """Turn the joints, at most as far as a step goes, if that is free."""
         target = self.q + min(1.0, self.most / max(np.abs(action).max(), 1e-12)) * action
         free, self.count = self.world.motion_valid(self.q, target), self.count + 1
         self.q = target if free else self.q
-        away = np.linalg.norm(self.goal - self.q)
+        away = float(np.linalg.norm(self.goal - self.q))
         return np.concatenate([self.q, self.goal]), -away, away < self.most, self.count >= self.length, {"free": free}
 
 
@@ -30,8 +30,9 @@ posts = [rrtik.Obstacle(f"post {k}", rrtik.Cylinder(0.03, 1.0), [np.cos(k) / 2, 
 reach = Reach(rrtik.World(rrtik.load_robot("ur5"), rrtik.Scene(posts)))
 ends = np.array([reach.reset(seed=k)[0] for k in range(3)])
 for k, plan in enumerate(rrtik.plan_many(reach.world, ends[:, :6], ends[:, 6:], "fastrrtconnect", seed=1)):
-    _, done = reach.reset(seed=k), not plan.found
-    for target in plan.path.waypoints[1:] if plan.found else ():
+    reach.reset(seed=k)
+    done, reward = False, 0.0
+    for target in plan.path[1:] if plan.path else ():
         while not done and np.abs(target - reach.q).max() > 1e-9:
             _, reward, ended, cut, _ = reach.step(target - reach.q)
             done = ended or cut

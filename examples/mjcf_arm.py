@@ -8,7 +8,7 @@ import pinocchio as pin
 import rrtik_ompl as rrtik
 
 
-def write_mjcf(robot, file, thickness=0.04):
+def write_mjcf(robot: rrtik.Robot, file: str, thickness: float = 0.04) -> None:
     """The joints of a serial arm as an MJCF file of MuJoCo, with a capsule from each joint to the next one."""
     chain, lines = robot.chain, [f'<mujoco model="{robot.name}"><compiler angle="radian"/><worldbody>']
     tip = robot.model.frames[robot.model.getFrameId(robot.tip)].placement
@@ -22,7 +22,8 @@ def write_mjcf(robot, file, thickness=0.04):
         lines.append(f'<joint name="{robot.joint_names[k]}" type="hinge" axis="{text["axis"]}" {limits}/>')
         if np.linalg.norm(end) > 2.0 * thickness:
             lines.append(f'<geom type="capsule" size="{thickness}" fromto="0 0 0 {text["to"]}"/>')
-    lines.append(f'<site name="tip" pos="{text["to"]}"/>' + "</body>" * len(ends) + "</worldbody></mujoco>")
+    x, y, z = tip.translation
+    lines.append(f'<site name="tip" pos="{x:.9g} {y:.9g} {z:.9g}"/>' + "</body>" * len(ends) + "</worldbody></mujoco>")
     Path(file).write_text("\n".join(lines))
 
 

@@ -10,9 +10,9 @@ quick = rrtik.plan(problem, "bicrdt").require()
 print(f"bicrdt: {own.transitions} moves; shortened: {quick.transitions}")
 
 best = rrtik.plan(problem, "fewest-moves", seed=1)
-print(f"fewest-moves: {best.path.transitions}, and no path has fewer than {best.statistics['lower_bound']}")
-for move in best.path.moves():
+print(f"fewest-moves: {best.require().transitions}, and no path has fewer than {best.statistics['lower_bound']}")
+for move in best.require().moves():
     print(f"  {move.joint:>16} from {np.degrees(move.start):7.1f} to {np.degrees(move.end):7.1f} degrees")
 
-smooth = rrtik.plan(problem, "RRTConnect", seed=1).path  # any path can be had in single-joint moves
+smooth = rrtik.plan(problem, "RRTConnect", seed=1).require()  # any path can be had in single-joint moves
 print(f"RRTConnect, then one_joint_moves: {rrtik.one_joint_moves(smooth, problem).transitions} moves")

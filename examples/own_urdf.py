@@ -4,16 +4,17 @@ from pathlib import Path
 
 import rrtik_ompl as rrtik
 
-LINK = """<link name="{name}"><collision><origin xyz="0 0 {half}"/><geometry>{shape}</geometry></collision></link>
-<joint name="{joint}" type="revolute"><parent link="{parent}"/><child link="{name}"/><origin xyz="0 0 {offset}"/>
-<axis xyz="{axis}"/><limit lower="-2.6" upper="2.6" velocity="2" effort="50"/></joint>"""
-PARTS = [
-    {"name": "shoulder", "parent": "base", "joint": "turn", "axis": "0 0 1", "offset": 0.1, "half": 0.1},
-    {"name": "upper", "parent": "shoulder", "joint": "lift", "axis": "0 1 0", "offset": 0.25, "half": 0.2},
-    {"name": "fore", "parent": "upper", "joint": "elbow", "axis": "0 1 0", "offset": 0.45, "half": 0.2},
-    {"name": "hand", "parent": "fore", "joint": "wrist", "axis": "0 1 0", "offset": 0.45, "half": 0.05},
+LINK = """<link name="{0}"><collision><origin xyz="0 0 {5}"/>
+<geometry><cylinder radius="0.04" length="{length}"/></geometry></collision></link>
+<joint name="{2}" type="revolute"><parent link="{1}"/><child link="{0}"/><origin xyz="0 0 {4}"/>
+<axis xyz="{3}"/><limit lower="-2.6" upper="2.6" velocity="2" effort="50"/></joint>"""
+PARTS = [  # name, parent, joint, its axis, where it is, half the length
+    ("shoulder", "base", "turn", "0 0 1", 0.1, 0.1),
+    ("upper", "shoulder", "lift", "0 1 0", 0.25, 0.2),
+    ("fore", "upper", "elbow", "0 1 0", 0.45, 0.2),
+    ("hand", "fore", "wrist", "0 1 0", 0.45, 0.05),
 ]
-links = "".join(LINK.format(shape=f'<cylinder radius="0.04" length="{1.6 * p["half"]}"/>', **p) for p in PARTS)
+links = "".join(LINK.format(*part, length=1.6 * part[-1]) for part in PARTS)
 Path("arm.urdf").write_text(f'<robot name="mine"><link name="base"/>{links}</robot>')
 
 robot = rrtik.load_robot("arm.urdf", tip="hand")

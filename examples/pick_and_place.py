@@ -12,14 +12,14 @@ cup = rrtik.Obstacle("cup", rrtik.Box([0.05, 0.05, 0.1]), [0.5, 0.25, 0.25])  # 
 world = rrtik.World(robot, rrtik.Scene([table, cup]))
 
 
-def grasp(yaw):
+def grasp(yaw: float) -> list[rrtik.Stage]:
     """From above, the hand turned by an angle."""
     above = rrtik.PoseGoal([0.5, 0.25, 0.39, np.pi, 0.0, yaw])
     return [MoveTo(above), Straight(by=[0, 0, -0.12]), Attach("cup", "panda_hand"), Gripper("close", width=0.05)]
 
 
 place = rrtik.PoseGoal([0.5, -0.25, 0.39, np.pi, 0.0, 0.0])
-stages = [Alternatives([grasp(0.0), grasp(np.pi / 2)]), Straight(by=[0, 0, 0.12])]
+stages: list[rrtik.Stage] = [Alternatives([grasp(0.0), grasp(np.pi / 2)]), Straight(by=[0, 0, 0.12])]
 stages += [MoveTo(place), Straight(by=[0, 0, -0.12]), Detach("cup"), Gripper("open"), Straight(by=[0, 0, 0.12])]
 plan = Task(stages).plan(world, "ready", seed=1)
 assert plan.found, plan.reason

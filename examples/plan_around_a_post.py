@@ -1,4 +1,4 @@
-"""A Panda reaches around a post: plan, shorten, give it times, save, draw."""
+"""A Panda reaches around a post: plan, give it times, save, draw."""
 
 import rrtik_ompl as rrtik
 
@@ -8,13 +8,11 @@ world = rrtik.World(robot, rrtik.Scene([post]))
 goal = rrtik.PoseGoal([0.3, 0.5, 0.4, 3.1416, 0.0, 0.0])  # x, y, z [m], roll, pitch, yaw [rad]
 problem = rrtik.Problem(world, robot.posture("default"), goal, name="around a post")
 
-plan = rrtik.plan(problem, seed=1)
-assert plan.found, plan.reason
-print(f"{len(plan.path.waypoints)} waypoints, {plan.path.length:.2f} rad, proven free: {plan.proven}")
+path = rrtik.plan(problem, seed=1).require()  # shortened; an error says why if there is none
+print(f"{len(path)} waypoints, {path.length:.2f} rad, proven free: {path.proven}")
 
-path = rrtik.shorten(plan.path, problem)
 motion = rrtik.time_parameterize(path, robot, blend=0.2, world=world)
-print(f"{path.length:.2f} rad after shortening, {motion.duration:.2f} s")
+print(f"{motion.duration:.2f} s")
 path.save("path.json")
 motion.save("motion.csv", rate=250.0)
 rrtik.view(problem, motion, html="motion.html")

@@ -3,10 +3,13 @@
 import rrtik_ompl as rrtik
 
 problem = rrtik.load_problem("planar3_boxes")
-path = rrtik.plan(problem, seed=1).path
-print(f"proven: {path.proven}, {1e3 * path.proof.clearance:.1f} mm are kept on the whole way")
+path = rrtik.plan(problem, seed=1).require()
+proof = problem.world.prove(path)
+print(f"proven: {proof.proven}, {1e3 * proof.clearance:.1f} mm are kept on the whole way")
 path.save("path.json")
-problem.world.certificate(path, path.proof.clearance).save("proof.json")
+written = problem.world.certificate(path, proof.clearance)
+assert written, "what is not proven has no certificate"
+written.save("proof.json")
 
 certificate = rrtik.Certificate.load("proof.json")
 fault = problem.world.verify(certificate, rrtik.JointPath.load("path.json").waypoints)

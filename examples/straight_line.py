@@ -9,7 +9,7 @@ ready = [0.0, -1.6, 1.8, -0.2, 1.6, 0.0]
 tip = world.robot.fk(ready).translation
 
 up = rrtik.tip.straight(world, ready, tip + np.array([0.0, 0.0, 0.2]))  # a position keeps the orientation
-print(f"up: {up.fraction:.0%}, {len(up.path.waypoints)} waypoints, within 0.1 mm of the line")
+print(f"up: {up.fraction:.0%}, {len(up.require())} waypoints, within 0.1 mm of the line")
 
 over = rrtik.tip.arc(world, ready, tip + np.array([0.0, 0.2, 0.0]), through=tip + np.array([0.0, 0.1, 0.1]))
 print(f"over: {over.fraction:.0%}")
@@ -17,5 +17,5 @@ print(f"over: {over.fraction:.0%}")
 far = rrtik.tip.straight(world, ready, tip + np.array([2.0, 0.0, 0.0]))
 print(f"far: {far.fraction:.0%}: {far.reason}")
 
-motion = rrtik.time_parameterize(up.path, world.robot, blend=0.05, world=world, tip_speed=0.1)
+motion = rrtik.time_parameterize(up.require(), world.robot, blend=0.05, world=world, tip_speed=0.1)
 print(f"{motion.duration:.2f} s at 0.1 m/s at most")

@@ -74,6 +74,7 @@ if TYPE_CHECKING:
     from rrtik_ompl.tasks import Detach as Detach
     from rrtik_ompl.tasks import Gripper as Gripper
     from rrtik_ompl.tasks import MoveTo as MoveTo
+    from rrtik_ompl.tasks import Stage as Stage
     from rrtik_ompl.tasks import Straight as Straight
     from rrtik_ompl.tasks import Task as Task
     from rrtik_ompl.tasks import TaskPlan as TaskPlan
@@ -157,6 +158,7 @@ else:
             "Detach",
             "Gripper",
             "MoveTo",
+            "Stage",
             "Straight",
             "Task",
             "TaskPlan",

@@ -9,6 +9,7 @@ if TYPE_CHECKING:
     from rrtik_ompl.ompl_bridge.benchmark_notes import BenchmarkNotes as BenchmarkNotes
     from rrtik_ompl.ompl_bridge.contract import check_planner as check_planner
     from rrtik_ompl.ompl_bridge.goal_sampler import GoalSampler as GoalSampler
+    from rrtik_ompl.ompl_bridge.motion_checker import MotionChecker as MotionChecker
     from rrtik_ompl.ompl_bridge.region_constraint import RegionConstraint as RegionConstraint
     from rrtik_ompl.ompl_bridge.results import SearchResult as SearchResult
     from rrtik_ompl.ompl_bridge.safe_planner import SafePlanner as SafePlanner
@@ -24,6 +25,7 @@ else:
         "ompl_bridge.benchmark_notes": ("BenchmarkNotes",),
         "ompl_bridge.contract": ("check_planner",),
         "ompl_bridge.goal_sampler": ("GoalSampler",),
+        "ompl_bridge.motion_checker": ("MotionChecker",),
         "ompl_bridge.region_constraint": ("RegionConstraint",),
         "ompl_bridge.results": ("SearchResult",),
         "ompl_bridge.safe_planner": ("SafePlanner",),

@@ -76,12 +76,6 @@ def safe_planner(
         raise InputError(f"planner {name}: {error}") from None
 
 
-def reseed(planner: SafePlanner, seed: int) -> None:
-    """Give a planner another seed, so that it acts as one made with it; for planners with the trait ``reseeded``."""
-    planner.seed = seed
-    planner.__dict__.pop("rng", None)  # it is made again when it is first used
-
-
 def other_planner(
     factory: PlannerFactory,
     name: str,

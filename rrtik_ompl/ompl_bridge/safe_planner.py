@@ -12,7 +12,7 @@ import json
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from functools import cached_property, lru_cache, wraps
+from functools import lru_cache, wraps
 from types import MappingProxyType
 from typing import Any, ClassVar
 
@@ -119,16 +119,24 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         self.reason = ""
         self.progress: tuple[tuple[float, float], ...] = ()
         self.graph_wanted = False
+        self._rng: np.random.Generator | None = None
         self._graph: PlannerGraph | None = None
         self._world = world
         self._second_check_world: World | None = None  # during `solve` a path has to pass its second check
         self._states: StateIO | None = None
         self._bounds: tuple[Vector, Vector] | None = None
 
-    @cached_property
+    @property
     def rng(self) -> np.random.Generator:
         """The random generator; made when it is first used, because that takes as long as an easy search."""
-        return np.random.default_rng(self.seed)
+        if self._rng is None:
+            self._rng = np.random.default_rng(self.seed)
+        return self._rng
+
+    def reseed(self, seed: int) -> None:
+        """Give the planner another seed, so that it acts as one made with it, if it has the trait ``reseeded``."""
+        self.seed = seed
+        self._rng = None
 
     @classmethod
     def default_options(cls) -> dict[str, Any]:
@@ -489,7 +497,7 @@ def change(planner: ob.Planner, name: str, value: object) -> None:
 
     # Take over everything that depends on options, but neither the state of the random generator nor objects of the
     # space.
-    settings = {key: each for key, each in vars(made).items() if key not in ("rng", "_states")}
+    settings = {key: each for key, each in vars(made).items() if key not in ("_rng", "_states")}
     planner.__dict__.update(settings)
     planner.__dict__[GIVEN] = given
 

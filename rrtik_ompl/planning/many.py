@@ -27,7 +27,7 @@ from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.proof import Proof
 from rrtik_ompl.ompl_bridge.attempt import ITERATION_LIMIT, attempt_seeds
 from rrtik_ompl.ompl_bridge.planner_names import AUTO, is_auto
-from rrtik_ompl.ompl_bridge.planner_options import is_safe, reseed, safe_planner
+from rrtik_ompl.ompl_bridge.planner_options import is_safe, safe_planner
 from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory, traits_of
 from rrtik_ompl.ompl_bridge.results import SearchResult
 from rrtik_ompl.ompl_bridge.safe_planner import SafePlanner
@@ -322,7 +322,7 @@ class _Searcher:
 
     def _search_one(self, query: Query, seed: int) -> SearchResult:
         """Search for one query with its own seed."""
-        reseed(self._planner, seed)
+        self._planner.reseed(seed)
         ends = query.start[None], query.end[None]
         budget = self._request.budget.begun_now()
         _, rows = self._planner.solve_rows(*ends, self._bounds, budget.over, checked=True)

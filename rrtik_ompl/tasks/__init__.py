@@ -34,8 +34,9 @@ from rrtik_ompl.tasks.stages import Attach as Attach
 from rrtik_ompl.tasks.stages import Detach as Detach
 from rrtik_ompl.tasks.stages import Gripper as Gripper
 from rrtik_ompl.tasks.stages import MoveTo as MoveTo
-from rrtik_ompl.tasks.stages import Stage, checked_regions, checked_stages, holding
+from rrtik_ompl.tasks.stages import Stage as Stage
 from rrtik_ompl.tasks.stages import Straight as Straight
+from rrtik_ompl.tasks.stages import checked_regions, checked_stages, holding
 from rrtik_ompl.tasks.standing import standing_faults
 from rrtik_ompl.world.problem import usable_configuration
 from rrtik_ompl.world.world import World

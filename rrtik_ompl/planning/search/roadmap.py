@@ -20,6 +20,7 @@ from rrtik_ompl.files.text import known_ending, write_bytes
 from rrtik_ompl.geometry.collision.digests import robot_digest, world_digest
 from rrtik_ompl.kernels.search.roadmap.graph import KernelGraph
 from rrtik_ompl.kernels.search.roadmap.layout import BLOCKED, KERNELS, UNKNOWN
+from rrtik_ompl.model.goal import Goal
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.planning.search.roadmap_in_python import PythonGraph
@@ -177,12 +178,12 @@ class Roadmap:
         self.graph.check(lambda: time.perf_counter() > deadline)
         return added
 
-    def path(self, start: ArrayLike, goal: ArrayLike, *, seconds: float = 1.0) -> JointPath | None:
+    def path(self, start: ArrayLike, goal: ArrayLike | Goal, *, seconds: float = 1.0) -> JointPath | None:
         """Return the shortest path on the roadmap between two configurations, its motions checked in steps.
 
         Args:
             start: Shape (dof,) [rad or m].
-            goal: Shape (dof,) [rad or m].
+            goal: Shape (dof,) [rad or m], or a joint goal.
             seconds: Wall time after which to give up [s].
 
         Returns:
@@ -192,7 +193,10 @@ class Roadmap:
             ProblemError: If start or goal is not free.
             InputError: If one of them is no configuration of the robot.
         """
-        ends = usable_configurations(self.world, {"start": start, "goal": goal})
+        end = goal.q if isinstance(goal, Goal) else goal
+        if end is None:
+            raise InputError(f"goal of a roadmap: expected a configuration, got a {type(goal).__name__}; use solve_ik")
+        ends = usable_configurations(self.world, {"start": start, "goal": end})
         deadline = time.perf_counter() + positive(seconds, "seconds")
         rows = self.route(ends["start"][None], ends["goal"][None], lambda: time.perf_counter() > deadline)
         return None if rows is None else JointPath.of(self.world.robot, rows)
