@@ -43,7 +43,7 @@ GOOD: dict[tuple[str, ...], tuple[str, ...]] = {
     ("replan",): ("replan_walls",),
     ("ik",): ("planar3", "--position", "1", "1", "0"),
     ("reach",): ("planar3",),
-    ("overlay",): ("none.png", "planar3_a", "--camera", "none.yaml", "--map", "none.yaml", "--out", "out.png"),
+    ("overlay",): ("none.png", "planar3_a", "--camera-file", "none.yaml", "--map", "none.yaml", "--out", "out.png"),
     ("pilot",): ("titan4_sdu", "--simulated", "--no-browser"),
     ("reproduce",): ("drrt-con-arm", "--quick"),
     ("bench",): ("suite.yaml", "--out", "runs", "--views", "0"),
@@ -52,7 +52,7 @@ GOOD: dict[tuple[str, ...], tuple[str, ...]] = {
     ("convert",): ("problem.yaml", "other.yaml"),
     ("markers", "print"): ("sheet.pdf",),
     ("markers", "calibrate"): ("photographs", "--out", "camera.yaml"),
-    ("markers", "sense"): ("none.png", "--camera", "none.yaml", "--map", "none.yaml"),
+    ("markers", "sense"): ("none.png", "--camera-file", "none.yaml", "--map", "none.yaml"),
 }
 NO_NUMBERS = {int: ("x", "", "1.5", "nan", "1e3", "0x10"), float: ("x", "", "nan", "inf", "-inf", "1e999", "1,5")}
 NO_NAMES = ("nowhere/none.xyz", "\ud800", "\x00")

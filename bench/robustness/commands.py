@@ -20,7 +20,7 @@ from rrtik_ompl.cli.app import command_line, run
 
 # Servers and minutes: a page that is served, sessions, campaigns and tables that are measured.
 NEEDED = {"show": ("--html", "page.html"), "reproduce": ("--list",)}
-FORBIDDEN = {"pilot": ("--simulated", "--scenario", "--camera"), "reproduce": ("--all",), "bench": ("--scheduler",)}
+FORBIDDEN = {"pilot": ("--simulated", "--vehicle", "--camera"), "reproduce": ("--all",), "bench": ("--scheduler",)}
 SHORT = ("0.2", "0", "-1", "nan", "x", "", "3")  # where a good number means work
 WORKING = {"--seconds", "--samples", "--runs", "--restarts", "--frames", "--views", "--jobs", "--ghosts", "--improve"}
 WORKING |= {"--columns", "--rows", "--rate", "--cell"}

@@ -33,7 +33,9 @@ PathFile = Annotated[
 def check(
     problem: ProblemName,
     path: PathFile = None,
-    proof: Annotated[Path | None, typer.Option(help="Verify this certificate of the path, and nothing else.")] = None,
+    certificate: Annotated[
+        Path | None, typer.Option(help="Verify this certificate of the path, and nothing else.")
+    ] = None,
 ) -> int:
     """Check a problem, and a path, a motion or a run for it.
 
@@ -48,11 +50,11 @@ def check(
     from rrtik_ompl.files.kinds import kind_of
 
     if kind_of(problem) == "TaskPlan":
-        if path is not None or proof is not None:
-            raise typer.BadParameter("the plan of a task holds its paths; leave the path and '--proof' out.")
+        if path is not None or certificate is not None:
+            raise typer.BadParameter("the plan of a task holds its paths; leave the path and '--certificate' out.")
         return _check_task_plan(problem)
-    if proof is not None and path is None:
-        raise typer.BadParameter("'--proof' needs the path that the certificate is for.")
+    if certificate is not None and path is None:
+        raise typer.BadParameter("'--certificate' needs the path that the certificate is for.")
 
     from rrtik_ompl import JointPath, load_problem
     from rrtik_ompl.model.certificate import Certificate
@@ -62,8 +64,8 @@ def check(
     question = load_problem(problem)
     world = question.world
 
-    if path is not None and proof is not None:
-        return _say_certified(question, JointPath.load(path, world.robot), Certificate.load(proof), proof)
+    if path is not None and certificate is not None:
+        return _say_certified(question, JointPath.load(path, world.robot), Certificate.load(certificate), certificate)
     if _is_record(path):
         return _check_run(question, path)
 

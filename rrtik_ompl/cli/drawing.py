@@ -185,7 +185,7 @@ def overlay(
     problem: Annotated[str, typer.Argument(help="Its arm is drawn, at its start: a shipped problem or a YAML file.")],
     path: Annotated[Path | None, typer.Argument(help="A path that the arm follows: .json, .csv or .txt.")] = None,
     *,
-    camera: Annotated[Path, typer.Option(help="Camera file (see: rrtik markers calibrate).")],
+    camera_file: Annotated[Path, typer.Option(help="Camera file (see: rrtik markers calibrate).")],
     marker_map: Annotated[Path, typer.Option("--map", help="Marker map: which marker is on which object: .yaml.")],
     out: Annotated[Path, typer.Option(help="Film (.mp4, .avi), or the last picture (.png, .jpg).")],
     seconds: Annotated[float, typer.Option(help="Duration of the whole path [s].")] = 10.0,
@@ -211,7 +211,7 @@ def overlay(
 
     task = load_problem(problem)
     rows = [task.start] if path is None else JointPath.load(path, task.robot).waypoints
-    sensor = Sensor(Camera.load(camera), MarkerMap.load(marker_map))
+    sensor = Sensor(Camera.load(camera_file), MarkerMap.load(marker_map))
     arm = ArmInPictures(task.robot, sensor, rows, seconds=seconds, ghosts=ghosts)
     rate, pictures = rate_of(islice(pictures_from(source), frames or None))
 

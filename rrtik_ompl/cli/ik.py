@@ -63,7 +63,7 @@ def inverse_kinematics(
     position: Annotated[
         Triple | None, typer.Option(metavar="X Y Z", help="Position of the tip in the world [m].")
     ] = None,
-    quaternion: Annotated[
+    quat_xyzw: Annotated[
         tuple[float, float, float, float] | None,
         typer.Option(metavar="X Y Z W", help="Orientation; any if left out."),
     ] = None,
@@ -85,8 +85,10 @@ def inverse_kinematics(
         typer.Option("--all", help="All solutions, not just one; those that differ by full turns are listed once."),
     ] = False,
     method: Annotated[str, typer.Option(help="auto, or see: rrtik list ik.")] = "auto",
-    tolerance_mm: Annotated[float | None, typer.Option(help="Tolerance of the position [mm]; 1 if left out.")] = None,
-    tolerance_deg: Annotated[
+    position_tolerance: Annotated[
+        float | None, typer.Option(help="Tolerance of the position [m]; 0.001 if left out.")
+    ] = None,
+    orientation_tolerance_deg: Annotated[
         float | None, typer.Option(help="Tolerance of the orientation [deg]; 0.57 if left out.")
     ] = None,
     seconds: Annotated[
@@ -106,21 +108,21 @@ def inverse_kinematics(
         raise InputError("give one of --json and --csv, not both")
     if trajectory and poses is None:
         raise InputError("--trajectory follows the rows of a file: give --poses FILE too")
-    if poses is not None and (position or quaternion or rpy_deg or everything):
+    if poses is not None and (position or quat_xyzw or rpy_deg or everything):
         raise InputError("--poses brings its own poses, one answer each: leave out --position, orientation and --all")
 
     check_target(html, PAGE_FORMATS)
     given = _setting(robot, problem, scene, near, near_deg)
     output = Output(as_json, as_csv, html)
 
-    tolerances = _tolerances(tolerance_mm, tolerance_deg)
+    tolerances = _tolerances(position_tolerance, orientation_tolerance_deg)
     common: dict[str, Any] = {"method": method, "near": given.near, "world": given.world, "seed": seed}
     common |= {} if seconds is None else {"seconds": seconds}
 
     if poses is not None:
         return _many(given, poses, trajectory, tolerances, common, output)
 
-    goal = _goal(given, position, quaternion, rpy_deg, tolerances)
+    goal = _goal(given, position, quat_xyzw, rpy_deg, tolerances)
     return _one(given, goal, everything, common, output)
 
 
@@ -145,15 +147,15 @@ def _setting(
     return given._replace(near=_posture(given, near, near_deg))
 
 
-def _tolerances(millimetres: float | None, degrees: float | None) -> dict[str, float]:
+def _tolerances(metres: float | None, degrees: float | None) -> dict[str, float]:
     """Return the given tolerances by the parameter names of `PoseGoal`, in metres and radians."""
     from rrtik_ompl.base.arrays import positive
 
-    for option, value in (("--tolerance-mm", millimetres), ("--tolerance-deg", degrees)):
+    for option, value in (("--position-tolerance", metres), ("--orientation-tolerance-deg", degrees)):
         if value is not None:
             positive(value, option)
 
-    found = {} if millimetres is None else {"position_tolerance": 1e-3 * millimetres}
+    found = {} if metres is None else {"position_tolerance": metres}
     return found if degrees is None else {**found, "orientation_tolerance": math.radians(degrees)}
 
 
@@ -170,7 +172,7 @@ def _posture(given: Setting, near: str | None, near_deg: str | None) -> Vector |
 def _goal(
     given: Setting,
     position: Triple | None,
-    quaternion: tuple[float, float, float, float] | None,
+    quat_xyzw: tuple[float, float, float, float] | None,
     rpy_deg: Triple | None,
     tolerances: dict[str, float],
 ) -> TipGoal:
@@ -181,22 +183,22 @@ def _goal(
     from rrtik_ompl.base.poses import placed, pose_from_rpy
     from rrtik_ompl.model.goal import TipGoal
 
-    if quaternion and rpy_deg:
-        raise InputError("give one of --quaternion and --rpy-deg, not both")
+    if quat_xyzw and rpy_deg:
+        raise InputError("give one of --quat-xyzw and --rpy-deg, not both")
 
     if position is None:
-        if quaternion or rpy_deg or given.goal is None:
+        if quat_xyzw or rpy_deg or given.goal is None:
             raise InputError("where to? give --position X Y Z, --problem NAME with a goal, or --poses FILE")
         if given.goal.q is not None:
             return PoseGoal(given.robot.fk(given.goal.q), **tolerances)
         if not isinstance(given.goal, TipGoal):
             raise InputError("the goal of --problem is of several tips: rrtik plan finds configurations for them")
         if tolerances:
-            raise InputError("the goal of --problem has tolerances of its own: leave out --tolerance-mm and -deg")
+            raise InputError("the goal of --problem has tolerances of its own: leave both tolerances out")
         return given.goal
 
-    if quaternion:
-        return PoseGoal(placed(position, "--position, --quaternion", quat_xyzw=quaternion), **tolerances)
+    if quat_xyzw:
+        return PoseGoal(placed(position, "--position, --quat-xyzw", quat_xyzw=quat_xyzw), **tolerances)
     if rpy_deg:
         return PoseGoal(pose_from_rpy(position, np.radians(rpy_deg), "--position, --rpy-deg"), **tolerances)
     return _point(position, tolerances)
@@ -206,14 +208,14 @@ def _point(position: ArrayLike, tolerances: dict[str, float]) -> PositionGoal:
     """Return a goal for the position of the tip, without orientation."""
     from rrtik_ompl import PositionGoal
 
-    _refuse_orientation(tolerances, "give --quaternion or --rpy-deg, or leave it out")
+    _refuse_orientation(tolerances, "give --quat-xyzw or --rpy-deg, or leave it out")
     return PositionGoal(position, tolerances.get("position_tolerance", 1e-3))
 
 
 def _refuse_orientation(tolerances: dict[str, float], remedy: str) -> None:
     """Raise an error if a tolerance of orientation is given for a goal without orientation."""
     if "orientation_tolerance" in tolerances:
-        raise InputError(f"--tolerance-deg is of an orientation, and a point has none: {remedy}")
+        raise InputError(f"--orientation-tolerance-deg is of an orientation, and a point has none: {remedy}")
 
 
 def _one(given: Setting, goal: TipGoal, everything: bool, common: dict[str, Any], output: Output) -> int:

@@ -43,12 +43,11 @@ class Kind(str, Enum):
 def print_sheet(
     out: Annotated[Path, typer.Argument(help="Where to: .pdf (true to size) or .png.")],
     kind: Annotated[Kind, typer.Option(help="Single markers, or a ChArUco board for calibration.")] = Kind.markers,
-    ids: Annotated[str, typer.Option(help="Numbers: 0,1,7 or 0-5.")] = "0-3",
-    side: Annotated[
-        float, typer.Option(help="Side of a marker's black square; on a board, of a chess square [mm].")
-    ] = 80.0,
-    marker: Annotated[
-        float | None, typer.Option(help="On a board: side of its markers [mm]; 0.73 of a square if left out.")
+    numbers: Annotated[str, typer.Option(help="Numbers: 0,1,7 or 0-5.")] = "0-3",
+    side_mm: Annotated[float, typer.Option(help="Side of a single marker's black square [mm].")] = 80.0,
+    square_mm: Annotated[float, typer.Option(help="Side of a board's chess square [mm].")] = 30.0,
+    marker_mm: Annotated[
+        float | None, typer.Option(help="Side of a board's markers [mm]; 0.73 of a square if left out.")
     ] = None,
     columns: Annotated[int, typer.Option(help="Chess squares of a board across.")] = 6,
     rows: Annotated[int, typer.Option(help="Chess squares of a board down.")] = 8,
@@ -62,15 +61,14 @@ def print_sheet(
     from rrtik_ompl.sensing.markers import sheets
 
     if kind is Kind.board:
-        small = BOARD_MARKER * side if marker is None else marker
-        square = 1e-3 * side
-        inner = 1e-3 * small
+        square = 1e-3 * square_mm
+        inner = BOARD_MARKER * square if marker_mm is None else 1e-3 * marker_mm
         sheets.print_board(
             out, columns=columns, rows=rows, square=square, marker=inner, dictionary=dictionary, paper=paper
         )
         count = 1
     else:
-        count = sheets.print_markers(out, _numbers(ids), side=1e-3 * side, dictionary=dictionary, paper=paper)
+        count = sheets.print_markers(out, _numbers(numbers), side=1e-3 * side_mm, dictionary=dictionary, paper=paper)
 
     say(f"wrote {out}: {plural(count, 'sheet')}; print at 100 % and measure the rule")
     return FOUND
@@ -84,8 +82,8 @@ def calibrate_camera(
     out: Annotated[Path, typer.Option(help="The camera file to write; for a rig, the rig's file: .yaml.")],
     columns: Annotated[int, typer.Option(help="Chess squares of the board across.")] = 6,
     rows: Annotated[int, typer.Option(help="Chess squares of the board down.")] = 8,
-    square: Annotated[float, typer.Option(help="Side of a chess square as printed [mm].")] = 30.0,
-    marker: Annotated[
+    square_mm: Annotated[float, typer.Option(help="Side of a chess square as printed [mm].")] = 30.0,
+    marker_mm: Annotated[
         float | None, typer.Option(help="Side of a marker as printed [mm]; 0.73 of a square if left out.")
     ] = None,
     dictionary: Dictionary = "4x4_50",
@@ -103,10 +101,11 @@ def calibrate_camera(
     from rrtik_ompl.sensing.markers.chessboard import Chessboard
     from rrtik_ompl.sensing.markers.detection import charuco_board
 
-    board: Any = Chessboard(columns, rows, 1e-3 * square)
+    square = 1e-3 * square_mm
+    board: Any = Chessboard(columns, rows, square)
     if not chessboard:
-        small = BOARD_MARKER * square if marker is None else marker
-        board = charuco_board(columns, rows, 1e-3 * square, 1e-3 * small, dictionary)
+        inner = BOARD_MARKER * square if marker_mm is None else 1e-3 * marker_mm
+        board = charuco_board(columns, rows, square, inner, dictionary)
     if len(photographs) > 1:
         return _calibrate_rig(photographs, out, board)
 
@@ -169,10 +168,10 @@ def sense(
         typer.Argument(help="An image, a folder of images, a video, or a camera's number; with --rig one per camera."),
     ],
     marker_map: Annotated[Path, typer.Option("--map", help="Marker map: which marker is on which object: .yaml.")],
-    camera: Annotated[Path | None, typer.Option(help="Camera file (see: rrtik markers calibrate).")] = None,
+    camera_file: Annotated[Path | None, typer.Option(help="Camera file (see: rrtik markers calibrate).")] = None,
     rig: Annotated[
         Path | None,
-        typer.Option(help="File of a rig, in place of --camera: cameras that take pictures together: .yaml."),
+        typer.Option(help="File of a rig, in place of --camera-file: cameras that take pictures together: .yaml."),
     ] = None,
     frames: Annotated[int, typer.Option(help="Largest number of pictures; 0: all (of a camera device: 1).", min=0)] = 0,
     scene: Annotated[Path | None, typer.Option(help="Write the scene in the frame of the base: .yaml.")] = None,
@@ -187,11 +186,11 @@ def sense(
         Path | None, typer.Option(help="Write the last picture with the detected objects: .png, .jpg.")
     ] = None,
     sigmas: Annotated[float, typer.Option(help="Margins of obstacles, in standard deviations; 0: none.")] = 3.0,
-    independent: Annotated[
+    smooth: Annotated[
         bool | None,
         typer.Option(
-            "--independent/--over-time",
-            help="Each picture by itself (default for a folder), or smoothed over time as a film.",
+            "--smooth/--no-smooth",
+            help="Follow objects over time, as through a film, or take each picture by itself (default for a folder).",
         ),
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object per picture.")] = False,
@@ -205,9 +204,9 @@ def sense(
     from rrtik_ompl.sensing.markers.marker_map import MarkerMap
     from rrtik_ompl.sensing.sensor import Sensor
 
-    alone = os.path.isdir(source[0]) if independent is None else independent
-    eye = _camera_or_rig(source, camera, rig)
-    sensor = Sensor(eye, MarkerMap.load(marker_map), smooth=not alone, sigmas=sigmas)
+    following = not os.path.isdir(source[0]) if smooth is None else smooth
+    eye = _camera_or_rig(source, camera_file, rig)
+    sensor = Sensor(eye, MarkerMap.load(marker_map), smooth=following, sigmas=sigmas)
 
     view = None
     for view in _views(sensor, source, frames):
@@ -247,7 +246,7 @@ def _camera_or_rig(sources: list[str], camera: Path | None, rig: Path | None) ->
     from rrtik_ompl.sensing.rig import Rig
 
     if (camera is None) == (rig is None):
-        raise InputError("give --camera FILE, or --rig FILE for several cameras that take pictures at the same time")
+        raise InputError("give --camera-file FILE, or --rig FILE for several cameras that take pictures together")
 
     if rig is not None:
         found = Rig.load(rig)
@@ -278,8 +277,8 @@ def _numbers(text: str) -> list[int]:
     for word in text.split(","):
         first, dash, last = word.strip().partition("-")
         if not first.isdecimal() or (dash and not last.isdecimal()):
-            raise InputError(f"--ids {text}: expected numbers like 0,1,7 or ranges like 0-5")
+            raise InputError(f"--numbers {text}: expected numbers like 0,1,7 or ranges like 0-5")
         found.extend(range(int(first), int(last or first) + 1))
         if len(found) > 1000:
-            raise InputError(f"--ids {text}: more than 1000 markers")
+            raise InputError(f"--numbers {text}: more than 1000 markers")
     return found

@@ -25,7 +25,7 @@ def pilot(
     video: Annotated[Path | None, typer.Option(help="A video file in place of a camera.")] = None,
     images: Annotated[Path | None, typer.Option(help="A folder of images, one a second.")] = None,
     simulated: Annotated[bool, typer.Option("--simulated", help="A simulated vehicle and camera.")] = False,
-    scenario: Annotated[
+    vehicle: Annotated[
         Path | None, typer.Option(help="File of the simulated vehicle; a shipped one if left out.")
     ] = None,
     camera_file: Annotated[Path | None, typer.Option(help="Camera file (see: rrtik markers calibrate).")] = None,
@@ -59,7 +59,7 @@ def pilot(
 
     It shows the camera with the arm drawn in, grasps, routes and moves. Ctrl-C ends it.
     """
-    given = (camera is not None, video is not None, images is not None, simulated or bool(scenario), replay is not None)
+    given = (camera is not None, video is not None, images is not None, simulated or bool(vehicle), replay is not None)
     if sum(given) != 1 and not (sum(given) == 2 and given[3] and given[4]):
         named = [name for name, there in zip(SOURCES, given, strict=True) if there]
         raise InputError(f"one of {', '.join(SOURCES)} says where pictures come from; got {', '.join(named) or 'none'}")
@@ -73,7 +73,7 @@ def pilot(
     options = SessionOptions(
         problem,
         source=source,
-        vehicle=scenario,
+        vehicle=vehicle,
         camera_file=camera_file,
         map_file=map_file,
         record=record,

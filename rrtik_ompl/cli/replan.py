@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 PLANNER = "drrt-con"
 REMEDIES = {  # remedies of plan_in_time(), and their replacements in this command
-    "raise horizon": "raise --seconds, or call plan_in_time(), which has more options",
+    "raise horizon": "raise --horizon, or call plan_in_time(), which has more options",
     "raise rate": "lower --clearance or the scenario's margin, or call plan_in_time(), which has a rate",
 }
 Scenario = Annotated[str, typer.Argument(help="A problem with a run: section, shipped or a YAML file.")]
@@ -41,7 +41,10 @@ def replan_scenario(
         float | None, typer.Option(help="Distance that moves are proven to keep from obstacles on top of margins [m].")
     ] = None,
     seconds: Annotated[
-        float | None, typer.Option(help="Largest simulated time [s]; with --foreseen the latest arrival.")
+        float | None, typer.Option(help="Largest simulated time [s]; with --foreseen the limit of wall time; 20.")
+    ] = None,
+    horizon: Annotated[
+        float | None, typer.Option(help="With --foreseen: latest arrival [s]; the scenario's seconds if left out.")
     ] = None,
     record: Annotated[Path | None, typer.Option(help="Write the record of the run, on Ctrl-C too: .json.")] = None,
     replay: Annotated[Path | None, typer.Option(help="Show this record instead of a new run.")] = None,
@@ -60,6 +63,7 @@ def replan_scenario(
         "lookahead_ticks": lookahead_ticks,
         "clearance": clearance,
         "seconds": seconds,
+        "horizon": horizon,
         "record": record,
         "foreseen": foreseen or None,
     }
@@ -69,6 +73,9 @@ def replan_scenario(
         raise InputError(
             f"--replay shows a run that is over: leave out --{next(iter(given)).replace('_', '-')}, or --replay"
         )
+
+    if horizon is not None and not foreseen:
+        raise InputError("--horizon is for --foreseen: give both, or --seconds alone")
 
     from rrtik_ompl.replanning.scenario import Scenario
 
@@ -125,18 +132,19 @@ def _foreseen(chosen: Chosen, seed: int, given: Mapping[str, Any]) -> ReplanRun 
     if chosen.goal_feed is not None:
         raise InputError("--foreseen: the goal of this scenario moves; leave out --foreseen")
 
-    changes = {name: given[name] for name in ("seconds", "clearance") if name in given}
-    settings = replace(chosen.settings, **changes)  # reports invalid values by the names of the options
+    changes = {name: given[name] for name in ("clearance",) if name in given}
+    settings = replace(chosen.settings, **changes)
+    limits = {"horizon": settings.seconds, **{name: given[name] for name in ("seconds", "horizon") if name in given}}
 
     with progress(f"{chosen.problem.name}, planned in time"):
         plan = plan_in_time(
             chosen.problem,
-            horizon=settings.seconds,
             speed=settings.step * settings.rate,
             margin=settings.margin,
             clearance=settings.clearance,
             limits=settings.limits,
             seed=seed,
+            **limits,
         )
 
     if plan.run is not None and "record" in given:

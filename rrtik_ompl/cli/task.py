@@ -28,7 +28,7 @@ def straight(
     ] = None,
     through: Annotated[Three | None, typer.Option(help="Go along the circle through this point [m].")] = None,
     deviation: Annotated[float, typer.Option(help="Largest deviation of the tip from the line [m].")] = 1e-4,
-    turn_deviation_deg: Annotated[float, typer.Option(help="Largest deviation of its orientation [deg].")] = 1.0,
+    turn_deviation_deg: Annotated[float, typer.Option(help="Largest deviation of its orientation [deg].")] = 0.1,
     clearance: Annotated[
         float | None,
         typer.Option(help="Distance to keep from obstacles on top of margins [m]; that of the problem if left out."),

@@ -229,7 +229,7 @@ def _vehicle(options: SessionOptions, problem: Problem) -> SimulatedVehicle:
     if options.camera_file is None and options.map_file is None:
         return vehicle
     raise InputError(
-        "--simulated takes camera and map from its file (see --scenario): leave out --camera-file and --map"
+        "--simulated takes camera and map from its file (see --vehicle): leave out --camera-file and --map"
     )
 
 

@@ -236,7 +236,7 @@ COMMAND_LINE = {
     "foreseen replay": ({}, ("replan", "replan_ur5", "--replay", "a.json", "--foreseen"), ["leave out --foreseen"]),
     "foreseen ticks": ({}, ("replan", "replan_ur5", "--foreseen", "--lookahead-ticks", "3"), ["--foreseen"]),
     "foreseen planner": ({}, ("replan", "replan_ur5", "--foreseen", "--planner", "drrt"), ["--planner", "leave out"]),
-    "foreseen seconds": ({}, ("replan", "replan_ur5", "--foreseen", "--seconds", "nan"), ["seconds", "nan"]),
+    "foreseen seconds": ({}, ("replan", "replan_ur5", "--foreseen", "--horizon", "nan"), ["horizon", "nan"]),
     "planner of a replay": ({}, ("replan", "replan_ur5", "--replay", "a.json", "--planner", "drrt"), ["leave out"]),
     "negative seed of a pilot": ({}, ("pilot", "titan4_sdu", "--simulated", "--seed", "-1"), ["--seed", "0"]),
     "out of unknown kind": (task(), ("plan", "task.yaml", "--out", "path.xls"), ["path.xls", ".json"]),

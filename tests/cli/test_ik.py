@@ -18,7 +18,7 @@ Q = np.radians([40.0, 60.0, -120.0, 30.0, 40.0, 20.0])
 
 def asked_pose(robot, q=Q):
     tip = robot.fk(q)
-    return ["--position", *tip.translation, "--quaternion", *quaternion_xyzw(tip)]
+    return ["--position", *tip.translation, "--quat-xyzw", *quaternion_xyzw(tip)]
 
 
 def test_all_solutions_of_a_pose_are_named_by_their_branch_and_reach_it(capsys):
@@ -46,7 +46,7 @@ def test_roll_pitch_yaw_say_the_same_as_a_quaternion(capsys):
     robot = load_robot("puma560")
     turn = pose_from_rpy([0.4, 0.2, 0.9], np.radians([10.0, 80.0, -30.0]))
     one = rrtik(capsys, "ik", "puma560", "--position", 0.4, 0.2, 0.9, "--rpy-deg", 10, 80, -30, "--json")
-    two = rrtik(capsys, "ik", "puma560", "--position", 0.4, 0.2, 0.9, "--quaternion", *quaternion_xyzw(turn), "--json")
+    two = rrtik(capsys, "ik", "puma560", "--position", 0.4, 0.2, 0.9, "--quat-xyzw", *quaternion_xyzw(turn), "--json")
     q = [json.loads(out)["solutions"][0] for _, out, _ in (one, two)]
     np.testing.assert_allclose(q[0], q[1], atol=1e-9)
     np.testing.assert_allclose(robot.fk(q[0]).homogeneous, turn.homogeneous, atol=1e-9)
@@ -71,7 +71,7 @@ def test_a_problem_brings_robot_obstacles_start_and_goal(capsys):
     assert "10.00" in out
     blocked = problem.robot.fk(np.radians([0.0, 20.0, -60.0, 40.0, 0.0, 0.0]))
     assert not problem.world.valid(np.radians([0.0, 20.0, -60.0, 40.0, 0.0, 0.0]))
-    arguments = ["--position", *blocked.translation, "--quaternion", *quaternion_xyzw(blocked)]
+    arguments = ["--position", *blocked.translation, "--quat-xyzw", *quaternion_xyzw(blocked)]
     code, _, err = rrtik(capsys, "ik", "--problem", "titan4_sdu", *arguments)
     assert code == 1
     assert "no solution, collision:" in err
@@ -192,8 +192,8 @@ def test_the_page_of_one_solution_plans_to_it(capsys, tmp_path):
         (["puma560"], "give --position X Y Z"),
         (["pumma560", "--position", 1, 0, 0], "did you mean 'puma560'"),
         (["puma560", "--position", 1, 0, "nan"], "finite"),
-        (["puma560", "--position", 1, 0, 0, "--quaternion", 0, 0, 0, 2], "must have length 1, but has 2"),
-        (["puma560", "--position", 1, 0, 0, "--quaternion", 0, 0, 0, 1, "--rpy-deg", 0, 0, 0], "not both"),
+        (["puma560", "--position", 1, 0, 0, "--quat-xyzw", 0, 0, 0, 2], "must have length 1, but has 2"),
+        (["puma560", "--position", 1, 0, 0, "--quat-xyzw", 0, 0, 0, 1, "--rpy-deg", 0, 0, 0], "not both"),
         (["puma560", "--position", 1, 0, 0, "--near-deg", "1,2"], "has 6 joints"),
         (["puma560", "--position", 1, 0, 0, "--near-deg", "1,b"], "numbers with commas"),
         (["puma560", "--position", 1, 0, 0, "--near", "reddy"], "did you mean 'ready'"),
@@ -201,10 +201,16 @@ def test_the_page_of_one_solution_plans_to_it(capsys, tmp_path):
         (["ur5", "--position", 0.4, 0, 0.4, "--method", "closed-form"], "brings no closed form; what fits: numeric"),
         (["puma560", "--position", 1, 0, 0, "--seed", -1], "neither a whole number of at least 0 nor"),
         (["puma560", "--position", 1, 0, 0, "--seconds", -1], "seconds must not be negative"),
-        (["puma560", "--position", 1, 0, 0, "--tolerance-mm", -1], "--tolerance-mm: must be greater than 0, got -1"),
-        (["puma560", "--position", 1, 0, 0, "--tolerance-deg", 1], "--tolerance-deg is of an orientation"),
-        (["puma560", "--poses", "points.csv", "--tolerance-deg", 1], "a point has none: leave it out"),
-        (["--problem", "puma_pose", "--tolerance-mm", 1], "has tolerances of its own"),
+        (
+            ["puma560", "--position", 1, 0, 0, "--position-tolerance", -1],
+            "tolerance: must be greater than 0, got -1",
+        ),
+        (
+            ["puma560", "--position", 1, 0, 0, "--orientation-tolerance-deg", 1],
+            "tolerance-deg is of an orientation",
+        ),
+        (["puma560", "--poses", "points.csv", "--orientation-tolerance-deg", 1], "a point has none: leave it out"),
+        (["--problem", "puma_pose", "--position-tolerance", 1], "has tolerances of its own"),
         (["puma560", "--position", 1, 0, 0, "--trajectory"], "give --poses FILE too"),
         (["puma560", "--position", 1, 0, 0, "--poses", "x.csv"], "brings its own poses"),
         (["puma560", "--problem", "titan4_sdu"], "one of the two"),

@@ -47,7 +47,7 @@ COMMANDS = {
     "plan": ["plan", "problem.yaml", "--seed", "1"],
     "check a path": ["check", "problem.yaml", "bare.json"],
     "check a motion": ["check", "problem.yaml", "motion.json"],
-    "check a certificate": ["check", "problem.yaml", "bare.json", "--proof", "path.json"],
+    "check a certificate": ["check", "problem.yaml", "bare.json", "--certificate", "path.json"],
     "check the plan of a task": ["check", "task_plan.json"],
     "task": ["task", "task.yaml"],
     "straight": ["straight", "problem.yaml", "--by", "0", "0", "0.02"],

@@ -29,7 +29,7 @@ def files(tmp_path, capsys):
 
 
 def test_a_certificate_that_plan_writes_is_verified_in_one_line(files, capsys):
-    code, out, err = rrtik(capsys, "check", "titan4_prisms", files[0], "--proof", files[1])
+    code, out, err = rrtik(capsys, "check", "titan4_prisms", files[0], "--certificate", files[1])
     assert (code, err) == (0, "")
     (line,) = out.splitlines()
     assert line.startswith(f"{files[1]}: holds: ")
@@ -57,7 +57,7 @@ def test_a_certificate_that_does_not_hold_is_refused_with_the_fault(files, capsy
     row = next(row for row in motion if len(row) > 6)
     row[6:] = [-x for x in row[6:]]
     proof.write_text(json.dumps(document))
-    code, out, _ = rrtik(capsys, "check", "titan4_prisms", path, "--proof", proof)
+    code, out, _ = rrtik(capsys, "check", "titan4_prisms", path, "--certificate", proof)
     assert code == 1
     assert f"does not hold: motion {number + 1}: " in out
     assert len(out.splitlines()) == 1
@@ -68,15 +68,15 @@ def test_another_path_and_another_problem_are_refused(files, capsys):
     rows = np.array(JointPath.load(path).waypoints)
     rows[1] += 1e-6
     JointPath.load(path).with_waypoints(rows).save(path.with_name("other.json"))
-    code, out, _ = rrtik(capsys, "check", "titan4_prisms", path.with_name("other.json"), "--proof", proof)
+    code, out, _ = rrtik(capsys, "check", "titan4_prisms", path.with_name("other.json"), "--certificate", proof)
     assert (code, "another path" in out) == (1, True)
-    code, out, _ = rrtik(capsys, "check", "titan4_sdu", path, "--proof", proof)
+    code, out, _ = rrtik(capsys, "check", "titan4_sdu", path, "--certificate", proof)
     assert (code, "another scene" in out) == (1, True)
 
 
 def test_bad_input_is_one_line_and_exit_code_2(files, capsys):
     path, proof = files
-    for arguments in ((path, "--proof", path), (path, "--proof", "none.json"), ("--proof", proof)):
+    for arguments in ((path, "--certificate", path), (path, "--certificate", "none.json"), ("--certificate", proof)):
         code, out, err = rrtik(capsys, "check", "titan4_prisms", *arguments)
         assert (code, out, len(err.splitlines())) == (2, "", 1)
     code, _, err = rrtik(capsys, "plan", "titan4_prisms", "--certificate", "proof.txt")

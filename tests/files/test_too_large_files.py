@@ -66,7 +66,7 @@ def test_names_that_are_too_long_are_said_to_be(name, tmp_path, monkeypatch, cap
     from rrtik_ompl.cli.app import run
 
     monkeypatch.chdir(tmp_path)
-    for words in (["check", name], ["markers", "sense", name, "--camera", name, "--map", name], ["bench", name],
+    for words in (["check", name], ["markers", "sense", name, "--camera-file", name, "--map", name], ["bench", name],
                   ["plan", "planar3_a", "--out", name.replace(".yaml", ".json")]):  # fmt: skip
         assert run(words) == BAD_INPUT
         said = capsys.readouterr().err

@@ -353,7 +353,7 @@ def test_a_record_that_does_not_fit_is_refused_before_anything_is_shown(tmp_path
         (["--video", "missing.mp4"], "--camera-file"),
         (["--camera", "99", "--camera-file", CAMERA, "--map", MAP], "camera 99 cannot be opened"),
         (["--simulated", "--record", "/nowhere/r.jsonl"], "cannot be written"),
-        (["--scenario", "missing.yaml"], "missing.yaml"),
+        (["--vehicle", "missing.yaml"], "missing.yaml"),
     ],
 )
 def test_bad_options_are_said_in_one_line(arguments, word, capsys):
@@ -365,7 +365,7 @@ def test_bad_options_are_said_in_one_line(arguments, word, capsys):
 
 def test_a_problem_without_a_scenario_is_named(tmp_path, capsys):
     assert run(["pilot", "env_e", "--no-browser", "--simulated"]) == 2
-    assert "--scenario" in capsys.readouterr().err
+    assert "--vehicle" in capsys.readouterr().err
     for name in ("camera_640.yaml", "titan4_panel_markers.yaml"):
         (tmp_path / name).write_text((FOLDER / name).read_text())
     text = (FOLDER / "titan4_sdu.yaml").read_text().replace("name: valve", "name: ship")

@@ -118,12 +118,13 @@ def test_the_command_plans_in_time_and_says_when_there_is_no_way(tmp_path, capsy
     assert run_command(["replan", "replan_planar_arm", "--foreseen", "--record", str(record)]) == 0
     assert rrtik.replanning.ReplanRun.load(record).planner == "in-time"
     assert "moves proven" in capsys.readouterr().out
-    assert run_command(["replan", "replan_planar_arm", "--foreseen", "--seconds", "0.5", "--json"]) == 1
+    assert run_command(["replan", "replan_planar_arm", "--foreseen", "--horizon", "0.5", "--json"]) == 1
     reason = json.loads(capsys.readouterr().out)["reason"]
     assert "speeds allow no arrival" in reason
-    assert "raise --seconds" in reason  # there is no --horizon
+    assert "raise --horizon" in reason
     assert run_command(["replan", "replan_planar_arm", "--foreseen", "--clearance", "5"]) == 1
-    assert "lower --clearance" in capsys.readouterr().out
+    assert "lower --clearance" in capsys.readouterr().err
+    assert run_command(["replan", "replan_planar_arm", "--horizon", "5"]) == 2
 
 
 def test_the_way_of_an_obstacle_bounds_every_point_of_it():

@@ -22,7 +22,7 @@ def folder(tmp_path, taken):
 
 def sense(capsys, folder, source, *more):
     return rrtik(
-        capsys, "markers", "sense", source, "--camera", folder / "camera.yaml", "--map", folder / "map.yaml", *more
+        capsys, "markers", "sense", source, "--camera-file", folder / "camera.yaml", "--map", folder / "map.yaml", *more
     )
 
 

@@ -115,7 +115,7 @@ def test_a_rig_is_calibrated_by_a_command_and_taken_by_sense(capsys, tmp_path, t
         for k, picture in enumerate(pictures):
             cv2.imwrite(str(tmp_path / name / f"{k}.png"), picture)
     folders = tmp_path / "left", tmp_path / "right"
-    options = ("--chessboard", "--columns", 8, "--rows", 7, "--square", 30, "--out", tmp_path / "rig.yaml")
+    options = ("--chessboard", "--columns", 8, "--rows", 7, "--square-mm", 30, "--out", tmp_path / "rig.yaml")
     code, out, err = rrtik(capsys, "markers", "calibrate", *folders, *options)
     assert (code, err) == (0, "")
     assert "camera 2 in the frame of camera 1: xyz 0.1" in out

@@ -58,7 +58,7 @@ def test_two_folders_are_sensed_together_and_better_than_one(capsys, folder):
     code, out, err = sense(capsys, folder, *both, *rig, "--json", "--picture", folder / "seen.png")
     assert (code, err) == (0, "")
     together = [json.loads(line)["objects"][0] for line in out.splitlines()]
-    code, out, _ = sense(capsys, folder, folder / "left", "--camera", folder / "left.yaml", "--json")
+    code, out, _ = sense(capsys, folder, folder / "left", "--camera-file", folder / "left.yaml", "--json")
     alone = [json.loads(line)["objects"][0] for line in out.splitlines()]
     assert code == 0
     assert len(together) == len(alone) == len(PLACES)
@@ -78,7 +78,7 @@ def test_a_marker_that_only_the_second_camera_sees_is_in_the_frame_of_the_first(
     for k in range(len(PLACES)):
         cv2.imwrite(str(folder / "left" / f"{k}.png"), np.full((480, 640), 90, dtype=np.uint8))
     code, out, _ = sense(
-        capsys, folder, folder / "left", folder / "right", "--rig", folder / "rig.yaml", "--json", "--over-time",
+        capsys, folder, folder / "left", folder / "right", "--rig", folder / "rig.yaml", "--json", "--smooth",
         "--picture", folder / "seen.png",
     )  # fmt: skip
     assert code == 0
@@ -114,11 +114,11 @@ def test_what_no_rig_can_sense_is_one_line(capsys, folder, prepare, sources, mes
 
 
 def test_a_rig_or_a_camera_is_needed_and_not_both(capsys, folder):
-    for options in ((), ("--rig", folder / "rig.yaml", "--camera", folder / "left.yaml")):
+    for options in ((), ("--rig", folder / "rig.yaml", "--camera-file", folder / "left.yaml")):
         code, _, err = sense(capsys, folder, folder / "left", folder / "right", *options)
         assert (code, err.count("\n")) == (2, 1)
-        assert "--camera FILE, or --rig FILE" in err
-    code, _, err = sense(capsys, folder, folder / "left", folder / "right", "--camera", folder / "left.yaml")
+        assert "--camera-file FILE, or --rig FILE" in err
+    code, _, err = sense(capsys, folder, folder / "left", folder / "right", "--camera-file", folder / "left.yaml")
     assert code == 2
     assert "need --rig FILE" in err
 

@@ -176,7 +176,7 @@ def find_vehicle(problem: str) -> Path:
     if problem not in file_of_problem:
         known_problems = ", ".join(sorted(file_of_problem)) or "no problem"
         raise InputError(
-            f"no simulated vehicle ships for '{problem}' (but for {known_problems}); give one with --scenario FILE, or "
+            f"no simulated vehicle ships for '{problem}' (but for {known_problems}); give one with --vehicle FILE, or "
             "show a record with its own --camera-file and --map"
         )
     return file_of_problem[problem]

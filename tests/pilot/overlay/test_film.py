@@ -21,7 +21,7 @@ from rrtik_tests.places import ROOT
 
 SHIPPED = Path(rrtik_robots.__file__).parent / "problems" / "pilot"
 PHOTOGRAPH = read_picture(SHIPPED / "photographs" / "panel_1.jpg")
-LENS = ["--camera", SHIPPED / "camera_640.yaml", "--map", SHIPPED / "titan4_panel_markers.yaml"]
+LENS = ["--camera-file", SHIPPED / "camera_640.yaml", "--map", SHIPPED / "titan4_panel_markers.yaml"]
 BASE_MAP = """version: 1
 dictionary: 4x4_50
 objects: [{name: stand, role: base, markers: [{id: 40, side: 0.08}]}]
