@@ -13,7 +13,7 @@ from rrtik_ompl.ik.ikurt.search import BatchedSearch, IkurtValidity, Options
 from rrtik_ompl.model.goal import Goal
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SearchResult, Stop
 from rrtik_ompl.world.world import World
-from rrtik_planners.tip_seeker import TipSeeker, misses
+from rrtik_planners.tip_seeker import TipSeeker, closest
 
 STEP = 0.15  # first step of CONNECT [rad]
 STRIDE = 0.6  # longest step of the exploration [rad]
@@ -96,6 +96,4 @@ class IKURT(TipSeeker):
         if len(search.blocked) and isinstance(self._world, World):
             what = self._world.explain(search.blocked[0]) or "outside the bounds"
             return f"all configurations found at the goal are in collision: for instance {what}"
-        return (
-            f"no configuration found at the goal, is it in reach? {misses(metric, search.nearest, 'the nearest one')}"
-        )
+        return f"goal not reached: {closest(metric, search.nearest)}"

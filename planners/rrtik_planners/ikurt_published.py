@@ -12,7 +12,7 @@ from rrtik_ompl.ik.ikurt.published import PublishedSearch, Steps
 from rrtik_ompl.model.goal import Goal
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SearchResult, Stop
 from rrtik_ompl.world.world import World
-from rrtik_planners.tip_seeker import TipSeeker, misses
+from rrtik_planners.tip_seeker import TipSeeker, closest
 
 STEP = 0.15  # [rad]
 THRESHOLD_ANGLE = 0.5  # [rad] in the metric of poses
@@ -77,5 +77,5 @@ class IKURTPublished(TipSeeker):
         result = self.result(metric, search.tree, path, counts, checker)
         if vertex is None and isinstance(metric, TipMetric):
             nearest = search.tree.q[search.tree.distance.argmin()]
-            return replace(result, reason=f"the goal was not reached; {misses(metric, nearest, 'the nearest vertex')}")
+            return replace(result, reason=f"goal not reached: {closest(metric, nearest)}")
         return result

@@ -9,6 +9,7 @@ from ompl import base as ob
 
 from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.units import closest_configuration
 from rrtik_ompl.ik.ikurt.metric import ConfigurationMetric, TipMetric
 from rrtik_ompl.ik.ikurt.tree import IkurtTree
 from rrtik_ompl.ik.targets import targets
@@ -85,11 +86,10 @@ class TipSeeker(SafePlanner):
         )
 
 
-def misses(metric: TipMetric, q: Vector, what: str) -> str:
-    """Return a line that says by how much a configuration, shape (n,), misses the goal; ``what`` is its subject."""
+def closest(metric: TipMetric, q: Vector) -> str:
+    """Return a line that says how near the closest configuration, shape (n,), came to the goal."""
     away, angle = metric.errors(q)
-    turned = f" and {np.degrees(angle):.3g} deg" if any(t.oriented for t in metric.targets) else ""
-    return f"{what} misses it by {away:.4g} m{turned}"
+    return closest_configuration(away, angle if any(t.oriented for t in metric.targets) else 0.0)
 
 
 def _ended(path: Matrix, goals: Matrix, checker: MotionChecker) -> tuple[Matrix, bool]:

@@ -11,6 +11,7 @@ import numpy as np
 from rrtik_ompl.base.arrays import TAU, Matrix, Vector, frozen
 from rrtik_ompl.base.choices import IkMethod
 from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.units import closest_configuration
 from rrtik_ompl.constraints.held_region import held_region
 from rrtik_ompl.constraints.held_regions import HeldRegions
 from rrtik_ompl.description.joint_weights import weighted_difference
@@ -215,24 +216,22 @@ class GoalSearch:
 
     @property
     def reason(self) -> str:
-        """A line that says why there is no free configuration; "" if there is one."""
+        """A line that says why there is no free configuration; "" if there is one, or nothing was searched yet."""
         goal = self._problem.goal
-        if len(self.rows):
+        if len(self.rows) or self._rounds == 0:
             return ""
         if len(self._all_at_goal):
             why = self._problem.world.explain(self._all_at_goal[0])
             return f"{len(self._all_at_goal)} configurations reach the goal, all in collision: for instance {why}"
         if not isinstance(goal, TipGoal):
             tips = " and ".join(f"'{frame}'" for frame in goal.frames)
-            return f"no configuration with {tips} at their goals was found in {self._rounds} rounds; are they in reach?"
+            return f"goals out of reach: no configuration has {tips} at their goals"
         rounds = f"{self._rounds} round{'s' * (self._rounds != 1)}"
         if self._problem.constraints:
             fault = f"no configuration was found in {rounds} that is at the goal and keeps the path constraints"
             breach = self._smallest_breach()
             return f"{fault}; the nearest one breaks {breach}" if breach else fault
-        return (
-            f"inverse kinematics found no configuration at the goal in {rounds}; {_explain_miss(self._problem, goal)}"
-        )
+        return _explain_miss(self._problem, goal, rounds)
 
     def _smallest_breach(self) -> str:
         """Return how the configuration at the goal that violates path constraints least violates them, or ""."""
@@ -367,8 +366,8 @@ def _spread_out(problem: Problem, rows: Matrix, known: Matrix) -> Matrix:
     return turned[sorted(chosen, key=lambda k: (distance[k], k))]
 
 
-def _explain_miss(problem: Problem, goal: TipGoal) -> str:
-    """Return a line that says how near the arm came to a goal within its limits."""
+def _explain_miss(problem: Problem, goal: TipGoal, rounds: str) -> str:
+    """Return a line that says how near the arm came to a goal within its limits, in so many rounds."""
     robot = problem.world.robot
     regions = [part.region() for part in goal.parts]
     starts = np.random.default_rng(0).uniform(*robot.finite_range(), (STARTS, robot.dof))
@@ -385,6 +384,6 @@ def _explain_miss(problem: Problem, goal: TipGoal) -> str:
     best = np.argmin(goal.distance(robot, ends))
 
     if goal.satisfied(robot, ends[best : best + 1])[0]:
-        return "walks from other starts do reach it, so that another seed may find one"
-    miss = f"{1e3 * distance[best]:.1f} mm and {np.degrees(angle[best]):.1f} degrees"
-    return f"the nearest one misses it by {miss}; is it in reach?"
+        return f"inverse kinematics found no configuration at the goal in {rounds}; another seed may find one"
+    closest = closest_configuration(distance[best], angle[best] if goal.oriented else 0.0)
+    return f"goal out of reach: {closest}"

@@ -109,7 +109,7 @@ def solve_all_tips(
             detail = f"{len(found)} configurations reach the goals, all in collision"
 
     tips = " and ".join(f"'{frame}'" for frame in goal.frames)
-    detail = detail or f"no configuration with {tips} at their goals in {rounds} rounds; are they in reach?"
+    detail = detail or f"goals out of reach: no configuration has {tips} at their goals"
     return _result(np.zeros((0, robot.dof)), np.zeros((0, 2)), reason, detail, rounds, budget.elapsed)
 
 

@@ -8,10 +8,11 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.base.arrays import Mask, Matrix, Vector, frozen, not_negative
+from rrtik_ompl.base.arrays import Mask, Matrix, frozen, not_negative
 from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.choices import IkMethod, one_of
 from rrtik_ompl.base.errors import InputError, require
+from rrtik_ompl.base.units import closest_configuration
 from rrtik_ompl.description.joint_weights import weighted_difference
 from rrtik_ompl.ik.method_interface import (
     IkRequest,
@@ -35,7 +36,6 @@ SECONDS = 1.0  # default time limit of a numeric method [s]
 METHOD = "inverse kinematics method"  # in messages
 DRAWS = 32  # targets drawn from a goal that leaves freedom; one for each part if it has more parts
 COMPARED = 1_000_000  # rows times parts of a goal that are compared at once, which takes some tenths of a second
-DIGITS = 9  # digits of metres and degrees in a message; further ones are rounding
 
 
 def list_methods() -> tuple[IkMethod, ...]:
@@ -321,10 +321,11 @@ def _why(request: IkRequest, answer: IkResponse, name: str, q: Matrix) -> tuple[
     if reached:
         return "limits", f"the arm could reach the goal, but {fault}"
 
-    nearest_posture = f"the nearest posture is {_distance_in_words(robot, goal, answer.nearest)}"
+    ((distance,), (angle,)) = goal.errors(robot, answer.nearest[None])
+    closest = closest_configuration(distance, angle if goal.oriented else 0.0)
     if answer.timed_out and not all(_out_of_reach(robot, target) for target in request.targets):
-        return "time", f"no solution in time; {nearest_posture}"
-    return "unreachable", f"{nearest_posture} from the goal"
+        return "time", f"no solution in time; {closest}"
+    return "unreachable", closest
 
 
 def _out_of_reach(robot: Robot, target: Target) -> bool:
@@ -332,10 +333,3 @@ def _out_of_reach(robot: Robot, target: Target) -> bool:
     from rrtik_ompl.ik.mb_rrt.search import out_of_reach  # It is loaded here, since only failures need it.
 
     return out_of_reach(robot, target)
-
-
-def _distance_in_words(robot: Robot, goal: TipGoal, q: Vector) -> str:
-    """Return how far a configuration is from a goal, in words: metres and, unless it is a position, degrees."""
-    ((distance,), (angle,)) = goal.errors(robot, q[None])
-    turned = f" and {round(np.degrees(angle), DIGITS):.4g} deg" if goal.oriented else ""
-    return f"{round(distance, DIGITS):.4g} m{turned} away"

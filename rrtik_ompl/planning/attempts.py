@@ -130,6 +130,8 @@ class Turn:
         seconds: Wall time of all attempts together [s].
         totals: Counts, added up over all attempts.
         error: The error that broke the planner, or None.
+        goal_fault: One line that says why no configuration is at the goal, if that is why there is no path; else "".
+        out_of_time: Whether the time was up before there was a path.
 
     Args:
         problem: The problem to solve.
@@ -146,6 +148,8 @@ class Turn:
         self.seconds = 0.0
         self.totals: dict[str, int | float] = {"attempts": 0, "rejected": 0}
         self.error: PlannerError | None = None
+        self.goal_fault = ""
+        self.out_of_time = False
 
         traits = traits_of(planner.factory)
         seeds = attempt_seeds(self.budget.seed, request.restarts)
@@ -228,15 +232,15 @@ class Turn:
 
         if not self.reason:
             self.path = self._check.best
-            if self.path is None:
-                self.reason = self._check.reason or self._goal_choice.reason
+            self.goal_fault = "" if self._goal_choice.planner_finds_goals else self._goal_choice.reason
+            self.reason = self.goal_fault or self._check.reason
+        if self.path is not None or self.goal_fault:
+            return
 
-        if self.path is None and self.seconds >= self.budget.seconds:
-            attempts = self.totals["attempts"]
-            tried = f"{attempts} attempt{'s' * (attempts != 1)}"
+        self.out_of_time = self.seconds >= self.budget.seconds
+        if self.out_of_time:
             last = self.reason or "out of time"
-            seconds = self._request.budget.seconds  # of which others may need a part
-            self.reason = f"no path within {seconds:g} s of wall time ({tried}; the last one: {last})"
+            self.reason = no_path_within(self._request.budget.seconds, self.totals["attempts"], f"the last one: {last}")
 
     def plan(self) -> Plan:
         """Return the result of the turn as a `Plan`."""
@@ -400,6 +404,11 @@ class Turn:
         if self.budget.iterations is None or not self._traits.supports_iteration_limit:
             return None
         return self.budget.iterations - int(self.totals.get("iterations", 0))
+
+
+def no_path_within(seconds: float, attempts: float, more: str) -> str:
+    """Return a line that says how many attempts were not enough in a time [s], and more about them."""
+    return f"no path within {seconds:g} s of wall time ({attempts:.0f} attempt{'s' * (attempts != 1)}; {more})"
 
 
 def load_kernels_for(problem: Problem, factory: PlannerFactory) -> None:

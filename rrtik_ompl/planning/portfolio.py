@@ -10,7 +10,7 @@ from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.description.catalog import portfolio
 from rrtik_ompl.model.goal import TipGoal
 from rrtik_ompl.ompl_bridge.planner_names import AUTO, find_planner, refuse_options
-from rrtik_ompl.planning.attempts import Turn, walk
+from rrtik_ompl.planning.attempts import Turn, no_path_within, walk
 from rrtik_ompl.planning.outcome import NamedPlanner, Plan, Request
 from rrtik_ompl.world.problem import Problem
 
@@ -39,9 +39,10 @@ def run_portfolio(problem: Problem, request: Request) -> Plan:
             break
 
     best = _best(turns)
-    reason = "" if best.found else "; ".join(_reason(turn) for turn in turns if turn.path is None)
+    totals = _totals(turns)
+    reason = "" if best.found else _most_telling(turns, request.budget.seconds, totals["attempts"])
     seconds = sum(turn.seconds for turn in turns)
-    return replace(best, reason=reason, seconds=seconds, statistics=MappingProxyType(_totals(turns)))
+    return replace(best, reason=reason, seconds=seconds, statistics=MappingProxyType(totals))
 
 
 def members(problem: Problem) -> tuple[str, ...]:
@@ -87,8 +88,13 @@ def _best(turns: Sequence[Turn]) -> Plan:
     return min(found, key=lambda plan: plan.proven is False, default=plans[-1])
 
 
-def _reason(turn: Turn) -> str:
-    return f"{turn.planner.name}: {turn.reason}" if turn.error is None else str(turn.error)
+def _most_telling(turns: Sequence[Turn], seconds: float, attempts: float) -> str:
+    """Return one line that says why there is no path: a fault of the goal, or why a turn ended early, or the time."""
+    whole = [turn for turn in turns if turn.error is None]
+    faults = [turn.goal_fault for turn in whole if turn.goal_fault]
+    others = [turn.reason for turn in whole if not turn.out_of_time]
+    names = [turn.planner.name if turn.error is None else f"{turn.planner.name}, which broke" for turn in turns]
+    return next(iter(faults + others), no_path_within(seconds, attempts, " and ".join(names)))
 
 
 def _totals(turns: Sequence[Turn]) -> dict[str, int | float]:

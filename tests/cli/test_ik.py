@@ -55,7 +55,7 @@ def test_roll_pitch_yaw_say_the_same_as_a_quaternion(capsys):
 def test_a_pose_out_of_reach_is_exit_1_with_the_reason_and_by_how_much(capsys):
     code, out, err = rrtik(capsys, "ik", "titan4", "--position", 3, 0, 0.1, "--rpy-deg", 0, 90, 0)
     assert (code, out) == (1, "")
-    assert "no solution, unreachable: the nearest posture is 1." in err
+    assert "no solution, unreachable: the closest configuration is 1." in err
     code, out, err = rrtik(capsys, "ik", "titan4", "--position", 3, 0, 0.1, "--rpy-deg", 0, 90, 0, "--csv")
     assert code == 1
     assert len(out.splitlines()) == 1
@@ -109,11 +109,11 @@ def test_a_file_of_poses_is_answered_row_by_row_and_one_without_solution_is_exit
     assert float(rows[0]["off [mm]"]) < 1e-6
     assert rows[2]["joint1 [deg]"] == ""
     out = rrtik(capsys, "ik", "puma560", "--poses", file)[1]
-    assert "2 of 3 poses solved, off by at most 0 mm and 0 deg; no. 3: the nearest posture is 8." in out
+    assert "2 of 3 poses solved, off by at most 0 mm and 0 deg; no. 3: the closest configuration is 8." in out
     told = json.loads(rrtik(capsys, "ik", "puma560", "--poses", file, "--json")[1])
     assert [bool(detail) for detail in told["details"]] == [False, False, True]
     followed = json.loads(rrtik(capsys, "ik", "puma560", "--poses", file, "--trajectory", "--json")[1])
-    assert followed["details"][2].startswith("the nearest posture is 8.")
+    assert followed["details"][2].startswith("the closest configuration is 8.")
 
 
 def test_a_trajectory_is_followed_without_jumps_and_played_in_a_page(capsys, tmp_path):

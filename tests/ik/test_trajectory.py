@@ -108,7 +108,7 @@ def test_points_out_of_reach_are_gaps_with_a_reason_and_the_rest_is_solved(metho
     answer = rrtik.ik.solve_trajectory(robot, points, method=method)
     assert [k for k, reason in enumerate(answer.reasons) if reason] == [10, 11]
     assert set(answer.reasons[10:12]) == {"unreachable"}
-    assert answer.detail.startswith("point 10: the nearest posture is ")
+    assert answer.detail.startswith("point 10: the closest configuration is ")
     assert answer.jumps == (12,)
     assert np.isnan(answer.q[10:12]).all()
     assert not answer.found

@@ -78,8 +78,8 @@ def test_the_postures_of_a_green_lamp_reach_its_stages():
 def test_a_grasp_that_cannot_be_made_says_by_how_much_or_what_would_touch():
     far, _ = session()
     far.see([seen_at(pin.SE3(PLACE.rotation, np.array([3.0, 0.0, 0.0])))], 0.1)
-    assert "m and" in far.command("grasp", 0.2, type="front", level=0)
-    assert "away from the goal" in far.fault()
+    assert " m away" in far.command("grasp", 0.2, type="front", level=0)
+    assert "the closest configuration is " in far.fault()
     inside, _ = session()
     inside.see([seen_at(pin.SE3(PLACE.rotation, np.array([1.45, 0.17, 0.09])))], 0.1)  # within the panel
     assert inside.lamps()[0].color == AMBER

@@ -1,13 +1,15 @@
 """The planner "auto": who tries, in what order, what becomes of the path; and the planner that a problem names."""
 
+import re
 import time
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+import rrtik_ompl
 import rrtik_planners
-from rrtik_ompl import Problem, load_problem, plan, plan_many
+from rrtik_ompl import Box, Obstacle, PositionGoal, Problem, Scene, World, load_problem, load_robot, plan, plan_many
 from rrtik_ompl.base.errors import InputError, PlannerError, UnknownNameError
 from rrtik_ompl.description import catalog
 from rrtik_ompl.ompl_bridge import SafePlanner, SearchResult
@@ -135,12 +137,11 @@ def test_the_next_planner_tries_where_one_finds_nothing_or_breaks(boxes, monkeyp
         assert found.proven
 
 
-def test_where_nobody_finds_a_path_the_reason_names_everybody(boxes, monkeypatch):
+def test_where_nobody_finds_a_path_one_reason_is_given(boxes, monkeypatch):
     replaced(monkeypatch, fastrrtconnect=Idle, bicrdt=Idle)
     nothing = plan(boxes, seed=1, seconds=1.0)
     assert not nothing.found
-    assert "fastrrtconnect: " in nothing.reason
-    assert "bicrdt: " in nothing.reason
+    assert nothing.reason == "fastrrtconnect ended with 'Timeout'"  # there was time left
     assert nothing.planner == members(boxes)[-1]  # the one that tried last
     assert nothing.statistics["attempts"] >= 2
     replaced(monkeypatch, fastrrtconnect=Broken, bicrdt=Broken)
@@ -164,6 +165,21 @@ def test_what_a_planner_took_until_it_broke_counts(boxes, monkeypatch):
     nothing = plan(boxes, seed=1, seconds=2.0)
     assert not nothing.found
     assert nothing.seconds > 0.9
+
+
+def test_a_goal_out_of_reach_is_one_sentence_whoever_tried(pose):
+    far = Problem(pose.world, pose.start, PositionGoal([9.0, 0.0, 0.0]))
+    nothing = plan(far, seconds=2.0)
+    assert re.fullmatch(r"goal out of reach: the closest configuration is \S+ m away", nothing.reason)
+    assert nothing.statistics["attempts"] > 1
+
+
+def test_where_the_time_is_up_it_is_told_with_who_tried():
+    wall = Obstacle("wall", Box([1.0, 20.0, 2.0]), rrtik_ompl.pose([5.0, 5.0, 0.0]))
+    robot = load_robot("point2d", parameters={"radius": 0.3, "bounds": [[0, 10], [0, 10]]})
+    closed = Problem(World(robot, Scene([wall])), [2, 2], [8, 2])
+    reason = plan(closed, seconds=0.4).reason
+    assert reason == "no path within 0.4 s of wall time (2 attempts; fastrrtconnect and bicrdt)"
 
 
 def test_the_portfolio_takes_no_options(boxes):

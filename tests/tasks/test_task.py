@@ -132,7 +132,7 @@ def test_a_failure_names_the_stage_and_the_reason_of_each_alternative(kitchen):
     assert "stage 1.1.2 (Straight)" in plan.reason
     assert "'cup'" in plan.reason
     assert "stage 1.2.1 (MoveTo)" in plan.reason
-    assert "is it in reach?" in plan.reason
+    assert "goal out of reach: the closest configuration is 2" in plan.reason
     assert "\n" not in plan.reason
 
 

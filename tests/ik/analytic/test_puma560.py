@@ -119,7 +119,7 @@ def test_five_joints_do_not_reach_a_pose_that_is_turned_about_its_approach_axis(
     assert not solutions(robot, pose.homogeneous[None]).real.any()
     result = solve_ik(robot, PoseGoal(pose))
     assert (result.method, result.reason) == ("closed-form", "unreachable")
-    assert re.search(r"the nearest posture is .* and [01]\.\d* deg away", result.detail)
+    assert re.search(r"the closest configuration is [\d.]+ mm and [01]\.\d* degrees away", result.detail)
     assert solve_ik(robot, PoseGoal(pose, orientation_tolerance=0.03)).found
 
 
