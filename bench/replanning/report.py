@@ -83,8 +83,8 @@ def triangle_rows(report: Report, count: int) -> None:
             found = [plane_run(p, seed, planner=planner) for seed, p in enumerate(some)]
             rows.append([f"{ratio:g}", planner, *cells(some, found)])
             if planner == "drrt-con":
-                arrived[ratio] = np.mean([r.arrived for r in found])
-                p95.append(np.percentile(np.concatenate([r.seconds("all") for r in found]), 95))
+                arrived[ratio] = np.mean([r.found for r in found])
+                p95.append(np.percentile(np.concatenate([r.tick_seconds("all") for r in found]), 95))
                 sound += [runs.executed_valid(p, r) for p, r in zip(problems[::3], found[::3], strict=True)]
                 bounded += [calls_bounded(p, r) for p, r in zip(problems, found, strict=True)]
                 plain = found
@@ -150,7 +150,7 @@ def goal_rows(report: Report, count: int) -> None:
         problem = scenes.covered(seed)
         run = plane_run(problem, seed)
         waited.append(run.count("wait") > 0)
-        arrived.append(run.arrived and run.ticks[-1].time * scenes.RATE <= 83 + 60)
+        arrived.append(run.found and run.ticks[-1].time * scenes.RATE <= 83 + 60)
         verdict = check_contacts(problem.robot, run, problem.world.scene)
         clean.append(not verdict.contacts)
     shares = [float(np.mean(values)) for values in (waited, arrived, clean)]
@@ -161,7 +161,7 @@ def goal_rows(report: Report, count: int) -> None:
     caught = []
     for seed in range(count):
         problem, goal = scenes.moving_goal(seed)
-        caught.append(plane_run(problem, seed, goal_feed=goal).arrived)
+        caught.append(plane_run(problem, seed, goal_feed=goal).found)
     report.bar(
         "moving goal, 0.6 of the robot's speed: captured", ">= 95 %", f"{np.mean(caught):.0%}", np.mean(caught) >= 0.95
     )

@@ -70,8 +70,8 @@ def outcome(run: ReplanRun, report: ContactReport | None = None) -> Outcome:
         {} if report is None else {"contacts": tuple(c[1] for c in report.contacts), "nearest": report.nearest}
     )
     counts = {event: run.count(event) for event in ("repair", "wait", "evade")}
-    times = run.seconds("repair", "repair").tolist(), run.seconds("all").tolist()
-    return Outcome(run.arrived, run.length, counts, *times, **seen)
+    times = run.tick_seconds("repair", "repair").tolist(), run.tick_seconds("all").tolist()
+    return Outcome(run.found, run.length, counts, *times, **seen)
 
 
 def arm_outcome(name: str, seed: int, planner: str, slot: float, seconds: float) -> Outcome:

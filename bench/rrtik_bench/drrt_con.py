@@ -51,7 +51,7 @@ def triangles(quick: bool) -> list[Row]:
     """Six triangles that wander: new routes, arrival, no contact; and what the printed loop would do."""
     scenario, count = Scenario.load("replan_triangles"), 3 if quick else 30
     runs = _runs(scenario, count)
-    arrived, repairs = sum(run.arrived for run in runs), [run.count("repair") for run in runs]
+    arrived, repairs = sum(run.found for run in runs), [run.count("repair") for run in runs]
     clean = sum(_kept_free(scenario, run) for run in runs)
     untouched, bounded = _untouched(scenario, runs), _untouched(scenario, _runs(scenario, count, speed_bound=FASTEST))
     lengths = [len(run.ticks) for run in runs]
@@ -101,7 +101,7 @@ def pockets(quick: bool) -> list[Row]:
         for a, b in zip(run.ticks[:-1], run.ticks[1:], strict=True)
         if a.path is not None and b.path is not None and b.event == "walk"
     ]
-    arrived, share = sum(run.arrived for run in runs), float(np.mean(shrinking))
+    arrived, share = sum(run.found for run in runs), float(np.mean(shrinking))
     return [
         judged("arrival", "in the sixth frame", f"{arrived} of {count}", arrived / count, all_of(), SCENE),
         judged("the path ahead becomes shorter", "at every step shown", f"in {share:.0%} of the steps", share,

@@ -56,7 +56,7 @@ def unannounced(quick: bool) -> list[Row]:
     count, rows = 2 if quick else 30, []
     for name, changes in (("a box appears on the way", False), ("it becomes a longer one", True)):
         pairs = [appearing(seed, changes=changes) for seed in range(count)]
-        arrived = sum(run.arrived for _, run in pairs)
+        arrived = sum(run.found for _, run in pairs)
         repairs = [run.count("repair") for _, run in pairs]
         clean = sum(_kept_free(scenario, run) for scenario, run in pairs)
         reading = "scene chosen here; a solid that changes is one that leaves and one that comes"

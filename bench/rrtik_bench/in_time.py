@@ -51,7 +51,7 @@ class Beside:
     @property
     def both(self) -> bool:
         """Whether both arrive."""
-        return self.planned is not None and self.replanned.arrived
+        return self.planned is not None and self.replanned.found
 
 
 def _beside(problem: Problem, planned: ReplanRun | None, replanned: ReplanRun) -> Beside:
@@ -72,7 +72,7 @@ def shipped(name: str, seed: int) -> Beside:
         limits=settings.limits, seconds=SECONDS, seed=seed,
     )  # fmt: skip
     run = scenario.run(seed=seed, repair_budget=REPAIR_SECONDS, speed_bound=BOUNDS[name])
-    return _beside(problem, plan.run, run)
+    return _beside(problem, plan.motion, run)
 
 
 @cache
@@ -87,7 +87,7 @@ def fast(seed: int) -> Beside:
         problem, rate=2.0 * RATE, horizon=FAST_SECONDS, speed=FAST_STEP * FAST_RATE, margin=FAST_MARGIN,
         seconds=SECONDS, seed=seed,
     )  # fmt: skip
-    return _beside(problem, plan.run, replan_with(settings, problem))
+    return _beside(problem, plan.motion, replan_with(settings, problem))
 
 
 def in_time(quick: bool) -> list[Row]:
@@ -97,7 +97,7 @@ def in_time(quick: bool) -> list[Row]:
         rows += _rows(what, [shipped(name, seed) for seed in range(count)])
     fast_ones = [fast(seed) for seed in range(2 if quick else 15)]
     rows += _rows(FAST, fast_ones)
-    arrived = sum(each.replanned.arrived and each.replanned_clean for each in fast_ones)
+    arrived = sum(each.replanned.found and each.replanned_clean for each in fast_ones)
     planned = sum(each.planned is not None and each.planned_clean for each in fast_ones)
     rows.append(judged(f"{FAST}: arrived without contact, DRRT-Con's share of the plans' in time", "not in the print",
                        f"{arrived} beside {planned}", arrived / max(planned, 1), Bar((0.0, 1e4), held=(0.0, 1.0)),

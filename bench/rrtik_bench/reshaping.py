@@ -210,7 +210,7 @@ def loop(quick: bool) -> list[Row]:
                     f"{_acts(each)}; {longer:.2f} of the ticks; bar: 1 and two standard errors; {LOOP}",
                 )
             )
-        arrived, clean = sum(each.run.arrived for each in runs), sum(each.untouched for each in runs)
+        arrived, clean = sum(each.run.found for each in runs), sum(each.untouched for each in runs)
         rows += [
             judged(f"{what}: arrival", "implied", f"{arrived} of {len(runs)}", arrived / len(runs), all_of(), LOOP),
             judged(f"{what}: runs without contact, in continuous time", "implied", f"{clean} of {len(runs)}",

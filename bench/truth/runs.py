@@ -227,7 +227,7 @@ def _run(problem: Problem, feed: str, number: int) -> ReplanRun | None:
         plan = plan_in_time(
             problem, rate=10.0, horizon=2.5 * SECONDS, margin=MARGIN, iterations=1500, seconds=60.0, seed=1
         )
-        return plan.run
+        return plan.motion
     source = FEEDS[feed](problem.world.scene)
     return replan(
         problem, source, step=0.03, rate=RATE, margin=MARGIN, speed_bound=SPEED, seconds=SECONDS, repair_budget=1.0,

@@ -99,11 +99,17 @@ def replan_scenario(
             view(chosen.problem, run=run, html=html)
 
     if as_json:
-        print(json.dumps(run.figures()))
+        print(json.dumps(_document(run)))
     else:
         say(run.summary())
         say(*(f"wrote {file}" for file in (record, html) if file is not None))
-    return FOUND if run.arrived else NOT_FOUND
+    return FOUND if run.found else NOT_FOUND
+
+
+def _document(run: ReplanRun) -> dict[str, Any]:
+    """Return a run as plain values for JSON."""
+    names = ("problem", "robot", "planner", "seed", "outcome", "found", "reason", "proven", "seconds")
+    return {**{name: getattr(run, name) for name in names}, **run.statistics}
 
 
 def _new_run(chosen: Chosen, seed: int, given: Mapping[str, Any]) -> ReplanRun:
@@ -147,9 +153,9 @@ def _foreseen(chosen: Chosen, seed: int, given: Mapping[str, Any]) -> ReplanRun 
             **limits,
         )
 
-    if plan.run is not None and "record" in given:
-        plan.run.save(given["record"])
-    return _in_options(plan.reason) if plan.run is None else plan.run
+    if plan.motion is not None and "record" in given:
+        plan.motion.save(given["record"])
+    return _in_options(plan.reason) if plan.motion is None else plan.motion
 
 
 def _in_options(reason: str) -> str:

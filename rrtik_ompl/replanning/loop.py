@@ -17,7 +17,7 @@ from rrtik_ompl.model.goal import JOINT_TOLERANCE
 from rrtik_ompl.model.scene import Scene, pairs_that_may_touch
 from rrtik_ompl.replanning.evading import evasion
 from rrtik_ompl.replanning.feed import SILENCE_SECONDS, Snapshot, Watch
-from rrtik_ompl.replanning.record import ReplanRun
+from rrtik_ompl.replanning.record import ReplanRun, joints_of
 from rrtik_ompl.replanning.settings import PREDICTED_PLACES, ReplanSettings, make_planner
 from rrtik_ompl.replanning.start_and_goals import GoalFeed, check_start, every_goal, goal_now, held_pairs, sampling_box
 from rrtik_ompl.replanning.tick import Tick
@@ -92,6 +92,7 @@ class Loop:
         self.run = ReplanRun(
             problem.name, robot.name, robot.joint_names, settings.planner, settings.seed, settings.step, settings.rate,
             settings.margin, settings.speed_bound, clearance=self._proven_clearance,
+            prismatic=joints_of(robot, robot.prismatic), continuous=joints_of(robot, robot.continuous),
         )  # fmt: skip
 
         self._read_scene(0.0)

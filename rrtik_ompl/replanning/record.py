@@ -18,15 +18,27 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.base.arrays import Matrix, Vector, finite_array, finite_number, not_negative, positive, whole_number
+from rrtik_ompl.base.arrays import (
+    Mask,
+    Matrix,
+    Vector,
+    finite_array,
+    finite_number,
+    not_negative,
+    positive,
+    whole_number,
+)
 from rrtik_ompl.base.choices import RunOutcome, TickEvent, one_of
 from rrtik_ompl.base.copies import in_one_line
-from rrtik_ompl.base.errors import InputError, in_file, require
+from rrtik_ompl.base.errors import InputError, in_file, listed, require
 from rrtik_ompl.base.poses import pose_from_xyzw, pose_row
 from rrtik_ompl.files.kinds import read
 from rrtik_ompl.files.tables import json_object
 from rrtik_ompl.files.text import read_text, write_text
 from rrtik_ompl.model.judgement import Contact, Judged, PathContact, Verdict
+from rrtik_ompl.model.path import JointPath
+from rrtik_ompl.model.result import required
+from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import AttachedObject, ConstantVelocity, Motion, Obstacle, Scene, TimedPoses, Touching
 from rrtik_ompl.model.shapes import SHAPES, PointCloud, Shape
 from rrtik_ompl.model.transitions import route_length
@@ -59,6 +71,8 @@ class ReplanRun:
             were kept.
         outcome: One of ``OUTCOMES``; "no scene" means that the feed had nothing new for too long.
         reason: Why the robot has not arrived, or "".
+        prismatic, continuous: Names of the joints that slide, and of those that turn without limits; both empty in old
+            records.
 
     Example:
         >>> scenario = rrtik.replanning.Scenario.load("replan_walls")
@@ -85,6 +99,8 @@ class ReplanRun:
     __repr__ = in_one_line
     outcome: RunOutcome = "interrupted"
     reason: str = ""
+    prismatic: tuple[str, ...] = ()
+    continuous: tuple[str, ...] = ()
 
     def see(self, seen: Snapshot) -> None:
         """Add a snapshot to ``scenes`` if it is new.
@@ -161,9 +177,51 @@ class ReplanRun:
         return Judged(Verdict(made > 0 and proven == made and not violations, text, drawn), None, contacts)
 
     @property
-    def arrived(self) -> bool:
+    def found(self) -> bool:
         """Whether the goal was reached."""
         return self.outcome == "arrived"
+
+    @property
+    def path(self) -> JointPath | None:
+        """The configurations from tick to tick, as far as the robot came; None without a tick.
+
+        The path has no proof: its motions are proven for the time at which they were made, see :attr:`proven`.
+        """
+        if not self.ticks:
+            return None
+        sliding, endless = ([name in some for name in self.joint_names] for some in (self.prismatic, self.continuous))
+        return JointPath(self.configurations, self.joint_names, sliding, self.robot, endless)
+
+    @property
+    def proven(self) -> bool | None:
+        """Whether all moves are proven; None if there are none, or unproven ones and no bound of the obstacles' speed.
+
+        Without a bound, moves near obstacles whose motion is not stated cannot be proven.
+        """
+        made, proven = self.moves
+        if made == 0 or (proven < made and self.speed_bound is None):
+            return None
+        return proven == made
+
+    @property
+    def seconds(self) -> float:
+        """Wall time of all ticks [s]; the time of the run itself is that of its last tick."""
+        return float(self.tick_seconds("all").sum())
+
+    def require(self) -> JointPath:
+        """Return the path to the goal, without its times.
+
+        Raises:
+            NotFoundError: If the goal was not reached.
+
+        Example:
+            >>> scenario = rrtik.replanning.Scenario.load("replan_planar_arm")
+            >>> scenario.run(seconds=0.1, seed=1).require()
+            Traceback (most recent call last):
+            rrtik_ompl.base.errors.NotFoundError: the goal was not reached: out of time: still on its way
+        """
+        why = ": ".join(filter(None, (self.outcome, self.reason)))
+        return required(self.path if self.found else None, "the goal was not reached", why)
 
     @property
     def times(self) -> Vector:
@@ -190,7 +248,7 @@ class ReplanRun:
         made = [tick.proven for tick in self.ticks if tick.proven is not None]
         return len(made), sum(made)
 
-    def seconds(self, part: str, *events: TickEvent) -> NDArray[np.float64]:
+    def tick_seconds(self, part: str, *events: TickEvent) -> NDArray[np.float64]:
         """Return the wall times of a part of the ticks [s], shape (m,), for the ticks that have this part.
 
         Args:
@@ -207,7 +265,7 @@ class ReplanRun:
             number = self.count(event)
             return f"{number} {noun}{'s' * (number != 1)}"
 
-        repairs = self.seconds("repair", "repair")
+        repairs = self.tick_seconds("repair", "repair")
         longest = f", the longest {1e3 * repairs.max():.1f} ms" if len(repairs) else ""
         reason = f" ({self.reason})" if self.reason else ""
         end = f"{self.problem}: {self.outcome}{reason} after {self.ticks[-1].time:.2f} s"
@@ -217,18 +275,17 @@ class ReplanRun:
         events = f"{counted('repair', 'repair')}{longest}, {counted('wait', 'wait')}, {counted('evade', 'evasion')}"
         return f"{end}: {events}, length {self.length:.2f}{proven_moves}"
 
-    def figures(self) -> dict[str, Any]:
-        """Return the run in numbers, for JSON.
+    @property
+    def statistics(self) -> dict[str, Any]:
+        """The run in numbers.
 
-        Returns:
-            Names, seed, outcome and reason; "seconds", the time at the last tick [s]; "length" of the motion; the
-            number of ticks for each event; "moves" and "moves_proven"; "repair_median" and "repair_p95", the wall times
-            of repairs [s], None without any.
+        "duration" is the time of the last tick [s], "length" that of the motion. For each event there is the number of
+        its ticks. "moves" and "moves_proven" are counts; "repair_median" and "repair_p95" are wall times of repairs
+        [s], None without any.
         """
-        repairs = self.seconds("repair", "repair")
+        repairs = self.tick_seconds("repair", "repair")
         return {
-            **{name: getattr(self, name) for name in ("problem", "robot", "planner", "seed", "outcome", "reason")},
-            "seconds": self.ticks[-1].time if self.ticks else 0.0,
+            "duration": self.ticks[-1].time if self.ticks else 0.0,
             "length": self.length,
             **{event: self.count(event) for event in EVENTS},
             **dict(zip(("moves", "moves_proven"), self.moves, strict=True)),
@@ -242,7 +299,7 @@ class ReplanRun:
         Raises:
             InputError: If the file cannot be written.
         """
-        heads = {name: getattr(self, name) for name in _HEADS}
+        heads = {name: getattr(self, name) for name in (*_HEADS, *_JOINTS)}
         if self.scenes_end < float("inf"):
             heads["scenes_end"] = self.scenes_end
         ticks = [_tick_data(tick) for tick in self.ticks]
@@ -266,6 +323,12 @@ class ReplanRun:
         return read(ReplanRun, file)
 
 
+def joints_of(robot: Robot, chosen: Mask) -> tuple[str, ...]:
+    """Return the names of a robot's joints that a mask, shape (n,), chooses."""
+    return tuple(name for name, taken in zip(robot.joint_names, chosen, strict=True) if taken)
+
+
+_JOINTS = ("prismatic", "continuous")  # not in older records
 _HEADS: tuple[str, ...] = ("problem", "robot", "joint_names", "planner", "seed", "step", "rate", "margin")
 _HEADS += ("speed_bound", "outcome", "reason")
 
@@ -314,6 +377,8 @@ def _heads(document: Mapping[str, Any]) -> dict[str, Any]:
     heads["clearance"] = None if clearance is None else not_negative(clearance, "clearance")
     if "scenes_end" in document:
         heads["scenes_end"] = finite_number(document["scenes_end"], "scenes_end")
+    for name in _JOINTS:
+        heads[name] = tuple(listed(document.get(name, ()), f"{name} joints"))
     return {**heads, "outcome": outcome, "joint_names": tuple(heads["joint_names"])}
 
 

@@ -5,7 +5,10 @@ from __future__ import annotations
 import os
 import time
 from dataclasses import dataclass, replace
+from typing import Any
 
+from rrtik_ompl.base.arrays import seed_of
+from rrtik_ompl.base.choices import Replanner
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.files.kinds import read
 from rrtik_ompl.files.sections import parse
@@ -43,28 +46,50 @@ class Scenario:
     settings: ReplanSettings
     goal_feed: GoalFeed | None = None
 
-    def run(
+    def run(  # noqa: D417 - the settings are described in one place
         self,
         scene_feed: Source | None = None,
         *,
+        step: float | None = None,
+        rate: float | None = None,
+        planner: Replanner | None = None,
+        max_edge: float | None = None,
+        margin: float | None = None,
+        clearance: float | None = None,
+        speed_bound: float | None = None,
+        limits: RateLimits | None = None,
+        lookahead_ticks: int | None = None,
+        seconds: float | None = None,
+        repair_budget: float | None = None,
+        seed: int | None = 0,
         record: str | os.PathLike[str] | None = None,
         clock: Clock = time.perf_counter,
         feed_patience: float | None = None,
-        **changes: object,
     ) -> ReplanRun:
-        """Replan, with some settings changed; see :func:`rrtik_ompl.replan`.
+        """Replan as :func:`rrtik_ompl.replan`, with the scenario's settings in place of those that are None.
 
         Args:
-            scene_feed: See :func:`rrtik_ompl.replan`.
-            record: See :func:`rrtik_ompl.replan`.
-            clock: See :func:`rrtik_ompl.replan`.
-            feed_patience: See :func:`rrtik_ompl.replan`.
-            changes: Attributes of :class:`.settings.ReplanSettings` that differ from the scenario's.
+            scene_feed: The scene over time; this and all other arguments are described there.
+            seed: The same seed gives the same run, as long as no repair is cut short by its budget. None draws one.
 
         Raises:
             InputError: See :func:`rrtik_ompl.replan`.
         """
-        settings = replace(self.settings, **changes)  # type: ignore[arg-type]
+        given = {
+            "step": step,
+            "rate": rate,
+            "planner": planner,
+            "max_edge": max_edge,
+            "margin": margin,
+            "clearance": clearance,
+            "speed_bound": speed_bound,
+            "limits": limits,
+            "lookahead_ticks": lookahead_ticks,
+            "seconds": seconds,
+            "repair_budget": repair_budget,
+        }
+        changes: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
+        settings = replace(self.settings, seed=seed_of(seed), **changes)
         return replan_with(
             settings, self.problem, scene_feed, goal_feed=self.goal_feed, record=record, clock=clock,
             feed_patience=feed_patience,

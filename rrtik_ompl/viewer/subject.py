@@ -113,7 +113,7 @@ class Subject:
         q = None if self.goal is None else self.goal.q
         if self.ghosts is not None:
             return q if q is not None and (self.ghosts == q).all(axis=1).any() else None
-        if not self.is_path or (self.run is not None and not self.run.arrived):
+        if not self.is_path or (self.run is not None and not self.run.found):
             return q
 
         end: Vector = self.waypoints[-1]
@@ -250,7 +250,7 @@ def _moving(subject: Subject, world: object, path: ShownPath) -> Subject:
 def _path(robot: Robot, path: ShownPath) -> JointPath:
     """Return a path of a robot; if it names its joints, these must be the robot's."""
     given: Any = path
-    for part in ("path", "trajectory", "run"):
+    for part in ("motion", "path", "trajectory"):
         if isinstance(getattr(given, part, None), JointPath | Trajectory | ReplanRun):
             raise InputError(f"view: cannot play a {type(given).__name__}; give its {part}")
 

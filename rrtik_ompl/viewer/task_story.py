@@ -11,7 +11,7 @@ from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.base.poses import pose_row
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import AttachedObject, Obstacle, Scene
-from rrtik_ompl.replanning.record import ReplanRun
+from rrtik_ompl.replanning.record import ReplanRun, joints_of
 from rrtik_ompl.replanning.tick import Tick
 from rrtik_ompl.tasks import TaskPlan
 from rrtik_ompl.tasks.played import PlayedTask
@@ -82,6 +82,8 @@ def run_of(played: PlayedTask) -> ReplanRun:
         speed_bound=None,
         ticks=ticks,
         outcome="arrived",
+        prismatic=joints_of(robot, robot.prismatic),
+        continuous=joints_of(robot, robot.continuous),
     )
 
 

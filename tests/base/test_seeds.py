@@ -37,6 +37,7 @@ CALLS = {
     "plan": lambda seed: rrtik.plan(PROBLEM, seed=seed),
     "plan_many": lambda seed: rrtik.plan_many(WORLD, [START], [END], seed=seed),
     "replan": lambda seed: rrtik.replan(PROBLEM, step=0.2, rate=20.0, seconds=0.2, seed=seed),
+    "replanning.Scenario.run": lambda seed: rrtik.replanning.Scenario.load("replan_walls").run(seconds=0.1, seed=seed),
     "replanning.plan_in_time": lambda seed: rrtik.replanning.plan_in_time(PROBLEM, rate=5.0, speed=1.0, seed=seed),
     "shorten": lambda seed: rrtik.shorten(PATH, PROBLEM, seed=seed),
     "solve_ik": lambda seed: rrtik.solve_ik(ROBOT, POINT, seed=seed),

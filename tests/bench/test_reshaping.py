@@ -64,5 +64,5 @@ def test_a_motion_is_slowed_in_proportion_and_never_longer_than_patience():
     assert steps[slowed].min() < 0.9 * steps.max()
     longest = max(len(run) for run in "".join("x" if each else " " for each in slowed).split())
     assert longest <= patience
-    assert found.run.arrived
+    assert found.run.found
     assert found.untouched

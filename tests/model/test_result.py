@@ -16,11 +16,11 @@ from rrtik_ompl.model.result import PathResult, Result
 Kind = TypeVar("Kind")
 QUESTIONS = ("found", "reason", "seconds", "statistics", "require")
 ARRAYS = {"ik.IkBatch"}  # arrays of results, whose ``found`` is a mask
-AWAITED = {"Plan", "replanning.TimedPlan"}
 HERE = np.array([0.0, -1.6, 1.8, -0.2, 1.6, 0.0])
 FAR = rrtik.PositionGoal([9.0, 0.0, 0.0])
 UR5 = rrtik.load_robot("ur5")
 WORLD = rrtik.World(UR5)
+SCENARIO = rrtik.replanning.Scenario.load("replan_planar_arm")
 
 
 def tip_motion(found: bool) -> rrtik.tip.TipMotion:
@@ -41,7 +41,25 @@ def task_plan(found: bool) -> rrtik.TaskPlan:
     return rrtik.Task([rrtik.MoveTo(goal) for goal in goals]).plan(WORLD, HERE, seed=1)
 
 
+def plan(found: bool) -> rrtik.Plan:
+    if found:
+        return rrtik.plan(rrtik.Problem(WORLD, HERE, HERE + 0.1))
+    return rrtik.plan(rrtik.load_problem("planar3_boxes"), "rrt", seconds=1e-3, restarts=0)
+
+
+def run(found: bool) -> rrtik.replanning.ReplanRun:
+    return SCENARIO.run(seconds=20.0 if found else 0.1, speed_bound=4.0, repair_budget=30.0)
+
+
+def timed_plan(found: bool) -> rrtik.replanning.TimedPlan:
+    horizon = 30.0 if found else 0.4
+    return rrtik.replanning.plan_in_time(SCENARIO.problem, rate=5.0, speed=1.6, horizon=horizon, seed=1)
+
+
 MAKERS: dict[str, Callable[[bool], Any]] = {
+    "Plan": plan,
+    "replanning.ReplanRun": run,
+    "replanning.TimedPlan": timed_plan,
     "TaskPlan": task_plan,
     "ik.IkResult": ik_result,
     "ik.IkTrajectory": ik_trajectory,
@@ -61,7 +79,7 @@ def results() -> set[str]:
 
 
 def test_every_public_result_is_examined_here() -> None:
-    assert results() == set(MAKERS) | ARRAYS | AWAITED
+    assert results() == set(MAKERS) | ARRAYS
 
 
 @pytest.mark.parametrize("name", sorted(MAKERS))
@@ -111,6 +129,8 @@ def test_type_checkers_know_what_a_result_gives() -> None:
     path: rrtik.JointPath = wanted(tip_motion(True))
     q: np.ndarray[Any, np.dtype[np.float64]] = wanted(ik_result(True))
     rows: np.ndarray[Any, np.dtype[np.float64]] = wanted(ik_trajectory(True))
-    moves: list[PathResult[rrtik.JointPath]] = [tip_motion(True), task_plan(True)]
-    assert all(each.path is not None and each.proven for each in moves)
+    moves: list[PathResult[rrtik.JointPath]] = [plan(True), tip_motion(True), task_plan(True), run(True)]
+    assert all(each.path is not None for each in moves)
+    timed: PathResult[rrtik.replanning.ReplanRun] = timed_plan(True)
+    assert timed.require().found
     assert (path.waypoints.shape[1], q.shape, rows.shape) == (6, (6,), (4, 6))

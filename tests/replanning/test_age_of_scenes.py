@@ -62,7 +62,7 @@ def nearest(run):
 
 def test_a_stream_that_is_never_silent_keeps_the_margin():
     run = judged(replan(ball(), stream(), **OPTIONS, **KEPT), ball(), at)
-    assert run.arrived
+    assert run.found
     assert nearest(run) >= MARGIN
 
 
@@ -79,7 +79,7 @@ def test_a_gap_costs_time_and_no_margin(silent):
         warnings.simplefilter("error", SpeedWarning)  # the plate was no faster
         run = replan(ball(), stream(silent=silent), **OPTIONS, **KEPT)
     judged(run, ball(), at)
-    assert run.arrived
+    assert run.found
     assert nearest(run) >= MARGIN
 
 
@@ -94,7 +94,7 @@ def test_one_scene_a_second_costs_time_and_no_margin():
 def test_a_stream_that_ends_stops_the_arm_with_a_reason(end, bound):
     options = OPTIONS | {"margin": MARGIN, "speed_bound": bound}
     run = replan(ball(), stream(end=end), **options, feed_patience=0.6)
-    assert (run.outcome, run.arrived) == ("no scene", False)
+    assert (run.outcome, run.found) == ("no scene", False)
     assert run.reason == run.ticks[-1].reason
     assert f"no scene since {end:g} s" in run.reason
     assert "feed_patience (0.6 s)" in run.reason
@@ -106,7 +106,7 @@ def test_a_stream_that_ends_stops_the_arm_with_a_reason(end, bound):
 @pytest.mark.parametrize("end", [0.2, 0.3, 0.5, 0.7])
 def test_after_the_end_of_a_stream_no_way_leads_through_where_the_obstacle_may_be(end):
     run = replan(ball(), stream(end=end), **OPTIONS, **KEPT)  # there may be a way around all of it
-    assert run.arrived or (run.outcome == "no scene" and "feed_patience (2 s)" in run.reason)
+    assert run.found or (run.outcome == "no scene" and "feed_patience (2 s)" in run.reason)
     judged(run, ball(), at)
     assert nearest(run) >= MARGIN
 
@@ -214,7 +214,7 @@ def test_what_one_scene_allows_is_not_allowed_by_the_next(given):
     problem = Problem(World(ball().robot, scenes[0]), [-0.6, 0.0], [0.6, 0.0])
     source = feed if given == "feed" else ((0.02 * k, feed(0.02 * k)) for k in range(400))
     run = judged(replan(problem, source, **OPTIONS, **KEPT), problem, feed)
-    assert run.arrived
+    assert run.found
     assert np.abs(run.configurations[:, 1]).max() > 0.25  # around the wall
 
 

@@ -111,7 +111,7 @@ def test_a_moving_goal_that_is_none_is_refused(goal, words):
 def test_snapshots_are_a_feed_too():
     scene = crossing().world.scene
     run = replan(crossing(), ((0.1 * k, scene.at(0.1 * k)) for k in range(200)), **OPTIONS)
-    assert run.arrived
+    assert run.found
 
 
 def test_an_obstacle_that_begins_inside_the_robot_is_refused_with_its_name():
@@ -140,9 +140,9 @@ def test_a_floor_that_slides_has_a_speed_like_any_obstacle():
     floor = Obstacle("floor", HalfSpace([0.0, 1.0, 0.0], -5.0), tilted, TimedPoses([0.0, 8.0], [tilted, slid]))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        assert replan(plane(floor), speed_bound=0.6, **OPTIONS).arrived
+        assert replan(plane(floor), speed_bound=0.6, **OPTIONS).found
     with pytest.warns(SpeedWarning, match="'floor' moves at 0.5 m/s"):
-        assert replan(plane(floor), speed_bound=0.4, **OPTIONS).arrived
+        assert replan(plane(floor), speed_bound=0.4, **OPTIONS).found
 
 
 @pytest.mark.parametrize("seen", [0.0, 0.2])

@@ -44,7 +44,7 @@ def test_a_ball_that_touches_the_base_between_the_middles_of_slots_ends_all_that
     plan = plan_in_time(beside_pedestal(tmp_path, meets), seed=1)
     assert not plan.found
     assert "'ball' reaches 'base' at 0.49" in plan.reason
-    assert plan.iterations == 0
+    assert plan.statistics == {"iterations": 0}
     late = ball((0.0, 1.0), (2.0, 1.0), (2.5, 0.2), (3.0, 1.0))
     plan = plan_in_time(beside_pedestal(tmp_path, late), seed=1)
     assert plan.arrival == pytest.approx(2.0)  # before the ball is there
@@ -99,7 +99,7 @@ def test_a_search_ends_in_the_midst_of_what_takes_long(monkeypatch):
     for seconds in (100.0, 3000.0, 5000.0):
         asked.clear()
         plan = plan_in_time(problem, speed=5.0, limits=FAST, rate=20.0, seconds=seconds, seed=1)
-        kept = len(plan.run.ticks) if plan.found else 0  # the record says of every move whether it is proven
+        kept = len(plan.motion.ticks) if plan.found else 0  # the record says of every move whether it is proven
         assert len(asked) <= seconds + kept + 2
 
 

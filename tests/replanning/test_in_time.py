@@ -53,18 +53,18 @@ def test_a_crossing_box_is_not_met_at_any_time():
     problem = crossing()
     plan = plan_in_time(problem, seed=1, **PLANE)
     assert plan.found, plan.reason
-    assert faults_of(problem, plan.run, 1e3, 5.0) == ([], ())
-    assert plan.run.moves[0] == plan.run.moves[1] > 0
-    assert plan.run.configurations[0].tolist() == problem.start.tolist()
-    assert plan.run.configurations[-1].tolist() == problem.goal.q.tolist()
+    assert faults_of(problem, plan.motion, 1e3, 5.0) == ([], ())
+    assert plan.motion.moves[0] == plan.motion.moves[1] > 0
+    assert plan.motion.configurations[0].tolist() == problem.start.tolist()
+    assert plan.motion.configurations[-1].tolist() == problem.goal.q.tolist()
 
 
 def test_a_door_is_waited_for_and_passed_when_it_opens():
     problem = gate(6.0)
     plan = plan_in_time(problem, seed=1, **PLANE)
     assert plan.found, plan.reason
-    assert faults_of(problem, plan.run, 1e3, 5.0) == ([], ())
-    crossing_time = plan.run.times[np.flatnonzero(plan.run.configurations[:, 0] > 10.0)[0]]
+    assert faults_of(problem, plan.motion, 1e3, 5.0) == ([], ())
+    crossing_time = plan.motion.times[np.flatnonzero(plan.motion.configurations[:, 0] > 10.0)[0]]
     assert crossing_time > 6.0
     assert plan.arrival >= plan.least_seconds
     assert plan.arrival < 6.5 + 18.0 / 5.0  # it does not begin only when the door is open
@@ -99,8 +99,8 @@ def test_arms_among_what_moves_are_free_at_every_time_with_margin(name):
     plan = plan_in_time(problem, speed=speed, margin=settings.margin, limits=settings.limits, seed=2)
     assert plan.found, plan.reason
     velocity = settings.max_change(problem.robot) * settings.rate
-    assert faults_of(problem, plan.run, velocity, speed) == ([], ())
-    nearest = check_contacts(problem.robot, plan.run, problem.world.scene, samples_per_tick=40).nearest
+    assert faults_of(problem, plan.motion, velocity, speed) == ([], ())
+    nearest = check_contacts(problem.robot, plan.motion, problem.world.scene, samples_per_tick=40).nearest
     assert nearest >= settings.margin
 
 

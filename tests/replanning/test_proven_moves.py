@@ -92,11 +92,11 @@ def test_a_thin_plate_between_two_steps_is_found():
 def test_a_run_says_which_moves_are_proven(planner, tmp_path):
     run = replan(crossing(), planner=planner, speed_bound=3.0, seed=1, record=tmp_path / "run.json", **OPTIONS)
     moves, proven = run.moves
-    assert run.arrived
+    assert run.found
     assert moves == sum((a.q != b.q).any() for a, b in zip(run.ticks, run.ticks[1:], strict=False))
     assert proven >= 0.9 * moves
     assert f"{proven} of {moves} moves proven" in run.summary()
-    assert (run.figures()["moves"], run.figures()["moves_proven"]) == (moves, proven)
+    assert (run.statistics["moves"], run.statistics["moves_proven"]) == (moves, proven)
     again = ReplanRun.load(tmp_path / "run.json")
     assert [tick.proven for tick in again.ticks] == [tick.proven for tick in run.ticks]
 
@@ -104,7 +104,7 @@ def test_a_run_says_which_moves_are_proven(planner, tmp_path):
 def test_proven_moves_keep_margin_and_clearance_from_where_obstacles_are_within_the_tick():
     problem, kept = crossing(), 0.3
     run = replan(problem, margin=0.1, clearance=kept, speed_bound=3.0, seed=2, **OPTIONS)
-    assert run.arrived
+    assert run.found
     lift = problem.world.scene.obstacle("lift")
     half = 0.5 * np.asarray(lift.shape.size)[:2]
     checked = 0

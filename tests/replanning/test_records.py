@@ -16,7 +16,7 @@ def test_a_record_reads_back_as_the_same_run(tmp_path):
     run = replan(crossing(), record=tmp_path / "run.json", **OPTIONS)
     again = ReplanRun.load(tmp_path / "run.json")
     assert (again.configurations == run.configurations).all()
-    assert again.figures() == run.figures()
+    assert again.statistics == run.statistics
     assert again.ticks[3].poses["lift"] == pytest.approx(run.ticks[3].poses["lift"])
 
 

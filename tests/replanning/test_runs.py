@@ -31,7 +31,7 @@ from rrtik_tests.run_judge import judged
 def test_every_planner_arrives_without_contact(planner):
     problem = crossing()
     run = replan(problem, planner=planner, seed=1, speed_bound=3.0, **OPTIONS)
-    assert run.arrived
+    assert run.found
     assert run.count("repair") > 0
     assert run.configurations[-1] == pytest.approx(problem.goal.q, abs=1e-6)
     judged(run, problem)
@@ -46,7 +46,7 @@ def test_the_same_seed_gives_the_same_run():
 
 def test_a_robot_walks_while_things_move_elsewhere():
     run = replan(plane(box("far", 10.0, 18.0, 1.0, 1.0, ConstantVelocity([0.05, 0.0, 0.0]))), **OPTIONS)
-    assert run.arrived
+    assert run.found
     assert run.count("wait") == run.count("repair") == 0
     assert run.length == pytest.approx(18.0)
 
@@ -148,7 +148,7 @@ def test_a_moving_goal_is_caught():
     run = replan(
         plane(box("block", 10.0, 10.0)), goal_feed=lambda t: np.array([16.0, 8.0 + 2.0 * min(t, 3.0)]), **OPTIONS
     )
-    assert run.arrived
+    assert run.found
     assert run.configurations[-1] == pytest.approx([16.0, 8.0 + 2.0 * min(run.ticks[-2].time, 3.0)])
 
 
@@ -161,22 +161,22 @@ def test_another_branch_is_taken_where_the_goal_configuration_is_blocked():
     ]
     problem = Problem(World(robot, Scene(poles)), [0.0, 0.4], PositionGoal([1.0, 1.2, 0.0], 1e-3))
     run = replan(problem, step=0.05, rate=20.0, max_edge=0.3, seconds=20.0, repair_budget=30.0, limits=FAST)
-    assert run.arrived
+    assert run.found
     assert problem.goal.satisfied(robot, run.configurations[-1:])[0]
 
 
 def test_predicted_places_are_heeded():
     problem = crossing(3.0)
     plain, ahead = (replan(problem, lookahead_ticks=k, seed=2, **OPTIONS) for k in (0, 20))
-    assert plain.arrived
-    assert ahead.arrived
+    assert plain.found
+    assert ahead.found
     assert (plain.configurations[:5] != ahead.configurations[:5]).any()
 
 
 def test_a_six_joint_arm_arrives_among_wandering_obstacles_without_contact():
     problem = moving_problem(load_robot("titan4"), 8, 0.1, 2, seconds=12.0)
     run = replan(problem, step=0.04, rate=25.0, margin=0.02, speed_bound=0.1, seconds=20.0, repair_budget=30.0)
-    assert run.arrived
+    assert run.found
     judged(run, problem)
 
 
@@ -222,7 +222,7 @@ def test_a_run_waits_while_an_obstacle_stands_in_the_base_and_says_so(lookahead_
     problem = Problem(World(robot, scene), q, q + np.array([1.5, 0.0, 0.0, 0.0, 0.0, 0.0]))
     run = replan(problem, step=0.01, rate=50, lookahead_ticks=lookahead_ticks, seconds=10.0)
     waits = [t for t in run.ticks if t.event == "wait"]
-    assert run.arrived
+    assert run.found
     assert waits
     assert all("'ball'" in t.reason and "base" in t.reason and 0.4 < t.time < 1.0 for t in waits)
 

@@ -47,5 +47,5 @@ def test_a_file_and_the_arguments_make_the_same_settings(tmp_path):
     for name in ReplanSettings.__dataclass_fields__:
         assert getattr(scenario.settings, name) == getattr(made, name)
     one, other = scenario.run(seed=1), replan_with(made, scenario.problem)
-    assert one.arrived
+    assert one.found
     assert np.array_equal(one.configurations, other.configurations)

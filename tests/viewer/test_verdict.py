@@ -162,7 +162,7 @@ def of_run(good: bool) -> Case:
 
 def of_run_in_time(good: bool) -> Case:
     asked = crossed()
-    run = rrtik.replanning.plan_in_time(asked, seed=1).run
+    run = rrtik.replanning.plan_in_time(asked, seed=1).motion
     return _run_page(asked, run if good else through_the_ball(run))
 
 
@@ -314,7 +314,7 @@ def timed_task() -> TimedTask:
 NOT_PLAYED: dict[str, tuple[Callable[[], Any], str]] = {
     "Plan": (lambda: rrtik.plan(problem(), seed=1), "give its path"),
     "TimedTask": (timed_task, "give its trajectory"),
-    "TimedPlan": (lambda: rrtik.replanning.plan_in_time(crossed(), seed=1), "give its run"),
+    "TimedPlan": (lambda: rrtik.replanning.plan_in_time(crossed(), seed=1), "give its motion"),
     "Roadmap": (lambda: rrtik.Roadmap(world(), vertices=20), "expected numbers"),
     "Proof": (lambda: world().prove(np.array([FAR, NEAR])), "expected numbers"),
     "Problem": (problem, "expected numbers"),

@@ -82,8 +82,7 @@ def steered(kept):
 
 def in_time(kept):
     made = rrtik.replanning.plan_in_time(across(kept), seed=1, rate=10.0, limits=LIMITS)
-    assert made.found, made.reason
-    return np.array([tick.q for tick in made.run.ticks])
+    return made.require().path.waypoints
 
 
 ACROSS = {  # motions around a post between two configurations

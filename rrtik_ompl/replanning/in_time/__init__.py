@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,13 +14,15 @@ from rrtik_ompl.base.copies import in_one_line
 from rrtik_ompl.base.errors import at_most, require
 from rrtik_ompl.base.poses import pose_row
 from rrtik_ompl.kernels.simd.library import library
+from rrtik_ompl.model.path import JointPath
+from rrtik_ompl.model.result import required
 from rrtik_ompl.model.scene import Scene
 from rrtik_ompl.motion.trajectory.limits import RateLimits
 from rrtik_ompl.replanning.drrt_con import without_points_between
 from rrtik_ompl.replanning.feed import Snapshot
 from rrtik_ompl.replanning.in_time.foreseen import ForeseenWorlds
 from rrtik_ompl.replanning.in_time.search import Ends, Pace, TimeSearch
-from rrtik_ompl.replanning.record import ReplanRun
+from rrtik_ompl.replanning.record import ReplanRun, joints_of
 from rrtik_ompl.replanning.start_and_goals import every_goal, held_pairs, refuse_constraints, sampling_box
 from rrtik_ompl.replanning.tick import Tick
 from rrtik_ompl.replanning.travels import refuse_endless_turns
@@ -39,12 +42,12 @@ class TimedPlan:
     """A motion among obstacles whose motion is known, or the reason why there is none.
 
     Attributes:
-        run: The motion, one tick for each slot of time, as :func:`rrtik_ompl.replan` records it: it can be saved, drawn
-            and judged. None if no motion was found.
+        motion: The motion, one tick for each slot of time, as :func:`rrtik_ompl.replan` records it: it can be saved,
+            drawn and judged. None if no motion was found.
         reason: Why no motion was found, or "".
         least_seconds: Lower bound on the time of arrival by the speed limits alone [s].
-        iterations: Number of iterations of the search.
         seconds: Wall time of the search [s].
+        statistics: "iterations", the number of iterations of the search.
 
     Example:
         >>> scenario = rrtik.replanning.Scenario.load("replan_planar_arm")
@@ -53,23 +56,46 @@ class TimedPlan:
         (False, True)
     """
 
-    run: ReplanRun | None
+    motion: ReplanRun | None
     reason: str
     least_seconds: float
-    iterations: int
     seconds: float
+    statistics: Mapping[str, int]
 
     __repr__ = in_one_line
 
     @property
     def found(self) -> bool:
         """Whether a motion was found."""
-        return self.run is not None
+        return self.motion is not None
+
+    @property
+    def path(self) -> JointPath | None:
+        """The configurations of the motion from slot to slot, without their times; None if no motion was found."""
+        return None if self.motion is None else self.motion.path
+
+    @property
+    def proven(self) -> bool | None:
+        """Whether all of the motion is proven free, as it always is; None if there is none, or it never moves."""
+        return None if self.motion is None else self.motion.proven
 
     @property
     def arrival(self) -> float:
         """When the goal is reached [s]; inf if no motion was found."""
-        return float("inf") if self.run is None else self.run.ticks[-1].time
+        return float("inf") if self.motion is None else self.motion.ticks[-1].time
+
+    def require(self) -> ReplanRun:
+        """Return the motion.
+
+        Raises:
+            NotFoundError: If there is none.
+
+        Example:
+            >>> scenario = rrtik.replanning.Scenario.load("replan_planar_arm")
+            >>> rrtik.replanning.plan_in_time(scenario.problem, rate=5.0, speed=1.6, seed=1).require().outcome
+            'arrived'
+        """
+        return required(self.motion, "no motion in time", self.reason)
 
 
 def plan_in_time(
@@ -122,7 +148,7 @@ def plan_in_time(
     Example:
         >>> scenario = rrtik.replanning.Scenario.load("replan_planar_arm")
         >>> plan = rrtik.replanning.plan_in_time(scenario.problem, rate=5.0, speed=1.6, seed=1)
-        >>> plan.found and len(set(plan.run.moves)) == 1  # all moves are proven
+        >>> plan.found and len(set(plan.motion.moves)) == 1  # all moves are proven
         True
     """
     require(problem, Problem, "problem to plan in time", "use Problem(world, start, goal) or Scenario.load(name)")
@@ -149,8 +175,9 @@ def plan_in_time(
     if rows is None and not reason:
         reason = _why_not_found(search, reaches_base)
 
-    run = None if rows is None else _record(problem, search, rows, options)
-    return TimedPlan(run, reason, options.slot * search.least_slots, search.iterations, options.budget.elapsed)
+    motion = None if rows is None else _record(problem, search, rows, options)
+    counts = {"iterations": search.iterations}
+    return TimedPlan(motion, reason, options.slot * search.least_slots, options.budget.elapsed, counts)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -231,7 +258,8 @@ def _record(problem: Problem, search: TimeSearch, rows: Matrix, options: _Option
 
     run = ReplanRun(
         problem.name, robot.name, robot.joint_names, NAME, options.budget.seed, step, 1.0 / slot, options.margin, None,
-        clearance=options.clearance,
+        clearance=options.clearance, prismatic=joints_of(robot, robot.prismatic),
+        continuous=joints_of(robot, robot.continuous),
     )  # fmt: skip
 
     run.see(Snapshot(0.0, search.worlds.scene_at(0.0), stated=True))
