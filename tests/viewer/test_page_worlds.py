@@ -240,7 +240,7 @@ def test_a_run_in_time_shows_obstacles_where_they_are_then(arm: rrtik.Robot) -> 
     motion = rrtik.replanning.ConstantVelocity([0.0, 0.1, 0.0])
     ball = rrtik.Obstacle("ball", rrtik.Sphere(0.05), rrtik.pose([0.0, -1.0, 0.5]), motion)
     problem = rrtik.Problem(rrtik.World(arm, rrtik.Scene([ball], scene("hand").attached)), [0.0, 0.0], A)
-    run = rrtik.replanning.plan_in_time(problem, seed=1).run
+    run = rrtik.replanning.plan_in_time(problem, seed=1).motion
     assert run is not None
     page = Page.of(subject_of_run(problem, run))
     for number, tick in enumerate(run.ticks):
