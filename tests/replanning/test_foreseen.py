@@ -137,7 +137,7 @@ def test_the_slowest_speeds_are_too_slow_and_nothing_else():
 def test_obstacles_are_recorded_where_they_are_not_where_the_scene_has_written_them():
     ends = [place(16.0, 3.0), place(10.0, 3.0)]
     stated = Obstacle("lift", Box([1.0, 1.0, 1.0]), ends[1], TimedPoses([0.0, 0.5], ends))  # its pose is its last one
-    run = plan_in_time(plane(stated), speed=5.0, limits=FAST, seed=1).run
+    run = plan_in_time(plane(stated), speed=5.0, limits=FAST, seed=1).motion
     assert "lift" not in run.ticks[0].poses
     for tick in run.ticks[1:]:
         assert tick.poses["lift"][0] == pytest.approx(max(16.0 - 12.0 * tick.time, 10.0))
@@ -146,7 +146,7 @@ def test_obstacles_are_recorded_where_they_are_not_where_the_scene_has_written_t
 def test_a_slot_in_which_the_arm_stands_is_a_wait(tmp_path):
     low, high = (pin.SE3(np.eye(3), np.array([0.5 * np.cos(0.85), -0.5 * np.sin(0.85), z])) for z in (0.1, 0.5))
     leaves = Obstacle("leaves", Sphere(0.03), low, TimedPoses([0.0, 1.0, 3.0], [low, low, high]))
-    run = plan_in_time(beside_pedestal(tmp_path, leaves), seed=1).run
+    run = plan_in_time(beside_pedestal(tmp_path, leaves), seed=1).motion
     assert run.ticks[0].event == "wait"
     for tick in run.ticks[:-1]:
         assert (tick.event == "wait") == (tick.proven is None)

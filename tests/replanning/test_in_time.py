@@ -105,7 +105,7 @@ def test_arms_among_what_moves_are_free_at_every_time_with_margin(name):
 
 
 def test_the_same_seed_gives_the_same_motion_and_a_record_keeps_it(tmp_path):
-    one, two = (plan_in_time(crossing(), seed=3, seconds=600.0, **PLANE).run for _ in range(2))
+    one, two = (plan_in_time(crossing(), seed=3, seconds=600.0, **PLANE).motion for _ in range(2))
     assert (one.configurations == two.configurations).all()
     one.save(tmp_path / "run.json")
     back = rrtik.replanning.ReplanRun.load(tmp_path / "run.json")
