@@ -143,7 +143,8 @@ def require(value: object, kind: type | UnionType, what: str, remedy: str = "") 
     if not isinstance(value, kind):
         wanted = " or ".join(each.__name__ for each in get_args(kind) or (kind,))
         hint = f"; {remedy}" if remedy else ""
-        raise InputError(f"{what} must be of type {wanted}, got {type(value).__name__}{hint}")
+        found = f"the class {value.__name__}" if isinstance(value, type) else type(value).__name__
+        raise InputError(f"{what} must be of type {wanted}, got {found}{hint}")
 
 
 def called(value: object, what: str, *arguments: str) -> None:

@@ -1,12 +1,19 @@
-"""Public names of a package that are imported when they are first used, so that importing the package costs little."""
+"""Public names of a package that are imported when they are first used, so that importing the package costs little.
+
+Constructors of public classes say how they are called, see :func:`guided`.
+"""
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterable, Mapping
+from functools import wraps
 from importlib import import_module
-from types import ModuleType
+from inspect import Signature, signature
+from types import FunctionType, ModuleType
 from typing import Any
+
+from rrtik_ompl.base.errors import InputError
 
 
 def lazy_names(
@@ -34,6 +41,8 @@ def lazy_names(
         value = (
             import_module(f"{package}.{name}") if home is None else getattr(import_module(f"rrtik_ompl.{home}"), name)
         )
+        if isinstance(value, type):
+            guided(value)
         setattr(sys.modules[package], name, value)
         return value
 
@@ -41,6 +50,60 @@ def lazy_names(
         return [*public, *(name for name in vars(sys.modules[package]) if name.startswith("__"))]
 
     return get, names, public
+
+
+def guided(kind: type) -> None:
+    """Have the constructor of a class answer a wrong number or name of arguments with the call that is meant.
+
+    Python's own message counts ``self`` and does not name what is wanted.
+
+    Example:
+        >>> class Ball:
+        ...     def __init__(self, radius: float, margin: float = 0.0) -> None: ...
+        >>> guided(Ball)
+        >>> Ball(diameter=0.1)
+        Traceback (most recent call last):
+        rrtik_ompl.base.errors.InputError: Ball: there is no argument 'diameter'; write Ball(radius, margin=0.0)
+    """
+    made = vars(kind).get("__init__")
+    if not isinstance(made, FunctionType) or hasattr(made, "__wrapped__"):
+        return
+
+    @wraps(made)
+    def constructor(self: object, *args: Any, **options: Any) -> None:
+        try:
+            made(self, *args, **options)
+        except TypeError as error:
+            within = error.__traceback__
+            if within is None or within.tb_next is not None:  # raised inside of the constructor
+                raise
+            raise InputError(_wrong_call(kind, args, options)) from None
+
+    kind.__init__ = constructor  # type: ignore[misc]
+
+
+def _wrong_call(kind: type, args: tuple[Any, ...], options: dict[str, Any]) -> str:
+    """Return what is wrong with the arguments of a constructor and which are meant, in one line."""
+    unknown = [name for name in options if name not in signature(kind).parameters]
+    fault = f"there is no argument '{unknown[0]}'" if unknown else "wrong arguments"
+    try:
+        signature(kind).bind(*args, **options)
+    except TypeError as error:
+        fault = fault if unknown else str(error)
+    if "positional" in fault:
+        fault += f" ({', '.join(type(each).__name__ for each in args)})"
+
+    whole = "missing" not in fault
+    forms = [getattr(kind, "call", "") or _form(kind, kind.__name__, whole=whole)]
+    others = (name for name in ("of", "load") if hasattr(kind, name))
+    forms += [_form(getattr(kind, name), f"{kind.__name__}.{name}", whole=False) for name in others]
+    return f"{kind.__name__}: {fault}; write {' or '.join(forms)}"
+
+
+def _form(call: Callable[..., Any], name: str, *, whole: bool) -> str:
+    """Return a call as one writes it; only ``whole`` with arguments that are given by name alone."""
+    named = [each.replace(annotation=each.empty) for each in signature(call).parameters.values()]
+    return name + str(Signature([each for each in named if whole or each.kind is not each.KEYWORD_ONLY]))
 
 
 def public_values(package: ModuleType) -> dict[str, Any]:

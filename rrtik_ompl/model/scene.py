@@ -195,10 +195,8 @@ def _checked_solid(name: object, shape: object, pose: object) -> pin.SE3:
     A pose that is not finite would compare as farther away than anything, so the solid would be ignored.
     """
     name_of(name, "an obstacle or attached object")
-    if not isinstance(shape, Shape):
-        kinds = " or ".join(kind.__name__ for kind in SHAPES.values())
-        found = f"must be of type {kinds}, got {type(shape).__name__}"
-        raise InputError(f"shape of '{name}' {found}; use rrtik_ompl.model.shapes")
+    kinds = ", ".join(kind.__name__ for kind in SHAPES.values())
+    require(shape, Shape, f"shape of '{name}'", f"use Box(x, y, z), Sphere(radius) or another of {kinds}")
     return rigid(pose, f"pose of '{name}'")
 
 

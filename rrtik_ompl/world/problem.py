@@ -64,6 +64,8 @@ class Problem:
         (7,)
     """
 
+    call = "Problem(World(robot, scene), start, goal)"
+
     settings: WorldSettings
     start: Vector
     goal: Goal
@@ -260,7 +262,7 @@ def usable_configurations(world: World, ends: Mapping[str, ArrayLike]) -> dict[s
     for what, values in ends.items():
         q = robot.configuration(values, what)
         if fault := robot.limit_fault(q):
-            raise ProblemError(f"{what}: {fault}", part=what)
+            raise ProblemError(f"{what}: {fault}{_unit_doubt(robot, q)}", part=what)
         configurations[what] = robot.onto_limits(q)
 
     rows = np.array(list(configurations.values()))
@@ -272,6 +274,12 @@ def usable_configurations(world: World, ends: Mapping[str, ArrayLike]) -> dict[s
             if not free:
                 raise _not_free_error(world, q, what)
     return configurations
+
+
+def _unit_doubt(robot: Robot, q: Vector) -> str:
+    """Return a hint at units where a joint is more than a turn outside its limits; "" if none is."""
+    turns = (np.abs(q - robot.clamp(q)) > TAU) & ~robot.prismatic
+    return "; joint values are radians: for degrees write np.radians([..]), in files joints_deg" if turns.any() else ""
 
 
 def _not_free_error(world: World, q: Vector, what: str) -> ProblemError:

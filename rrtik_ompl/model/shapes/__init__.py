@@ -8,6 +8,7 @@ the others.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -57,10 +58,13 @@ MOST_SEGMENTS = 2_000  # largest number of segments, which gives half a million 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Box(Shape):
-    """A box centred on its frame. ``size``: full side lengths, shape (3,), metres.
+    """A box centred on its frame: ``Box(x, y, z)`` or ``Box([x, y, z])``, full side lengths in metres.
+
+    Attributes:
+        size: Full side lengths [m], shape (3,).
 
     Example:
-        >>> rrtik.Box([0.1, 0.2, 0.3]).size
+        >>> rrtik.Box(0.1, 0.2, 0.3).size
         array([0.1, 0.2, 0.3])
     """
 
@@ -74,8 +78,17 @@ class Box(Shape):
 
     __reduce__ = as_value
 
-    def __init__(self, size: ArrayLike) -> None:
-        sides = bounded_array(size, (3,), "box size")
+    call = "Box(x, y, z) or Box([x, y, z])"
+
+    @overload
+    def __init__(self, size: ArrayLike) -> None: ...
+    @overload
+    def __init__(self, size: float, y: float, z: float) -> None: ...
+    def __init__(self, size: ArrayLike, y: float | None = None, z: float | None = None) -> None:
+        given: list[Any] = [each for each in (size, y, z) if each is not None]
+        if len(given) == 2 or (len(given) == 1 and isinstance(size, int | float)):
+            raise InputError(f"box size: three lengths are needed, write {self.call}, got {given}")
+        sides = bounded_array(given[0] if len(given) == 1 else given, (3,), "box size")
         if (sides <= 0.0).any():
             raise InputError(f"box size must be three numbers greater than 0, got {sides.tolist()}")
         object.__setattr__(self, "size", frozen(sides))
