@@ -13,14 +13,12 @@ from rrtik_ompl.base.lazy import lazy_names
 os.environ.setdefault("OPENCV_LOG_LEVEL", "ERROR")
 
 if TYPE_CHECKING:
-    from rrtik_ompl.sensing.calibration import calibrate as calibrate
     from rrtik_ompl.sensing.cameras.camera import Camera as Camera
     from rrtik_ompl.sensing.cameras.pan_tilt_zoom import PanTiltZoom as PanTiltZoom
     from rrtik_ompl.sensing.depth import cloud_from_depth as cloud_from_depth
     from rrtik_ompl.sensing.markers.marker_map import MarkerMap as MarkerMap
     from rrtik_ompl.sensing.rig import Rig as Rig
     from rrtik_ompl.sensing.rig import detect_in_rig as detect_in_rig
-    from rrtik_ompl.sensing.rig_calibration import calibrate_rig as calibrate_rig
     from rrtik_ompl.sensing.rig_file import pictures_together as pictures_together
     from rrtik_ompl.sensing.scene_feed import scenes_of_pictures as scenes_of_pictures
     from rrtik_ompl.sensing.sensor import Sensor as Sensor
@@ -28,7 +26,6 @@ if TYPE_CHECKING:
     from rrtik_ompl.world.robot_points import without_robot as without_robot
 else:
     _HOMES = {
-        "sensing.calibration": ("calibrate",),
         "sensing.cameras.camera": ("Camera",),
         "sensing.cameras.pan_tilt_zoom": ("PanTiltZoom",),
         "sensing.depth": ("cloud_from_depth",),
@@ -37,7 +34,6 @@ else:
             "Rig",
             "detect_in_rig",
         ),
-        "sensing.rig_calibration": ("calibrate_rig",),
         "sensing.rig_file": ("pictures_together",),
         "sensing.scene_feed": ("scenes_of_pictures",),
         "sensing.sensor": ("Sensor",),

@@ -6,6 +6,7 @@ import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -18,7 +19,7 @@ from rrtik_ompl.base.errors import InputError, ProblemError, listed, require
 from rrtik_ompl.base.poses import rigid
 from rrtik_ompl.constraints.held_regions import HeldRegions, goal_regions, held_regions
 from rrtik_ompl.constraints.residuals import contradiction
-from rrtik_ompl.files.kinds import read, write
+from rrtik_ompl.files.kinds import found, read, write
 from rrtik_ompl.model.goal import Goal, GoalLike, JointGoal, PoseGoal
 from rrtik_ompl.model.goal_kind import TaskRegion
 from rrtik_ompl.model.robot import Robot
@@ -163,6 +164,17 @@ class Problem:
             ProblemError: If start or goal is in collision or outside the limits.
         """
         return read(Problem, file, robot=robot, trust_xacro=trust_xacro)
+
+    @staticmethod
+    def schema() -> dict[str, Any]:
+        """Return the JSON schema of problem files, for editors and validators.
+
+        Example:
+            >>> sorted(rrtik.Problem.schema()["required"])
+            ['goal', 'robot', 'start', 'version']
+        """
+        schema: dict[str, Any] = found("problem_files.problem_values:problem_schema")()
+        return schema
 
     def save(self, file: str | os.PathLike[str]) -> None:
         """Write the problem as YAML; if writing fails, no incomplete file is left.

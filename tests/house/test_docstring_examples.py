@@ -41,8 +41,6 @@ WITHOUT = {
     "sensing.MarkerMap",
     "sensing.Rig",
     "sensing.Sensor",
-    "sensing.calibrate",
-    "sensing.calibrate_rig",
     "sensing.detect_in_rig",
     "sensing.detect_objects",
     "sensing.pictures_together",
