@@ -25,6 +25,11 @@ if TYPE_CHECKING:
     from rrtik_ompl.sensing.cameras.pictures import Picture
 
 ROBOT_FILES = (".urdf", ".xml", ".xacro")
+WITH_PROBLEM = {  # what cannot be shown alone, and what to do, by the kind of the file
+    "JointPath": "give its problem too: rrtik show PROBLEM {}",
+    "Trajectory": "give its problem too: rrtik show PROBLEM {}",
+    "ReplanRun": "give its scenario too: rrtik replan SCENARIO --replay {} --html page.html",
+}
 FILM_SECONDS = 4.0  # duration of the film of a path
 LONGEST_FILM = 48.0  # [s] of a task; longer ones play faster
 ENDINGS = (".mp4", ".avi", ".png", ".jpg")
@@ -63,10 +68,16 @@ def show(
     check_target(html, PAGE_FORMATS)
     check_target(film, (".gif", ".mp4", ".png"))
 
-    from rrtik_ompl.files.kinds import kind_of
+    from rrtik_ompl.files.kinds import KINDS, kind_of
     from rrtik_ompl.viewer import view
 
-    drawn = _of_task if kind_of(problem) == "TaskPlan" else _of_problem
+    kind = kind_of(problem)
+    if kind in WITH_PROBLEM:
+        raise InputError(f"{problem}: {KINDS[kind].what}; {WITH_PROBLEM[kind].format(problem)}")
+    if path is not None and kind_of(path) == "ReplanRun":
+        raise InputError(f"{path}: {KINDS['ReplanRun'].what}; {WITH_PROBLEM['ReplanRun'].format(path)}")
+
+    drawn = _of_task if kind == "TaskPlan" else _of_problem
     question, route, earlier, fault, title, duration = drawn(problem, path, scene, before)
 
     if film is not None:

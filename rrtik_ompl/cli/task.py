@@ -9,7 +9,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rrtik_ompl.cli import FOUND, NOT_FOUND
-from rrtik_ompl.cli.terminal import PAGE_FORMATS, TRAJECTORY_FORMATS, Seed, command, note, progress, say, suggest
+from rrtik_ompl.cli.terminal import (
+    PAGE_FORMATS,
+    TRAJECTORY_FORMATS,
+    Seed,
+    command,
+    note,
+    plural,
+    progress,
+    say,
+    suggest,
+)
 from rrtik_ompl.files.tables import FORMATS as PATH_FORMATS
 from rrtik_ompl.files.text import check_target
 
@@ -130,7 +140,7 @@ def task(
         from rrtik_ompl.viewer import view
 
         with progress("drawing"):
-            view(loaded.world, plan.played(), html=html, title=f"{loaded.name}: {len(plan.paths)} motions")
+            view(loaded.world, plan.played(), html=html, title=f"{loaded.name}: {plural(len(plan.paths), 'motion')}")
 
     if as_json:
         print(json.dumps({**_document(plan), "seed": seed, "duration": duration}))
@@ -158,7 +168,8 @@ def plan_lines(name: str, plan: TaskPlan, wrong: frozenset[int] = frozenset()) -
     from rrtik_ompl.world.route_check import as_it_stands
 
     chosen = f", alternatives {', '.join(str(k + 1) for k in plan.chosen)}" if plan.chosen else ""
-    lines = [f"{name}: {len(plan.paths)} motions{chosen}{as_it_stands(plan.worlds[0].scene)}"]
+    count = plural(len(plan.paths), "motion")
+    lines = [f"{name}: {count}{chosen}{as_it_stands(plan.worlds[0].scene)}"]
 
     for number, (stage, path, world) in enumerate(zip(plan.stages, plan.paths, plan.worlds, strict=True)):
         names = ", ".join(item.name for item in world.scene.attached)

@@ -119,6 +119,23 @@ def test_a_path_in_place_of_a_problem_is_told_what_is_missing(capsys, tmp_path, 
     assert "no such file" in rrtik(capsys, "check", str(tmp_path / f"other{ending}"))[2]
 
 
+@pytest.mark.parametrize("ending", [".json", ".csv"])
+def test_what_cannot_be_shown_alone_is_told_what_is_missing(capsys, tmp_path, ending):
+    from rrtik_ompl import JointPath, load_problem
+
+    file, problem = tmp_path / f"path{ending}", load_problem("planar3_a")
+    JointPath.of(problem.robot, [problem.start, problem.goal.q]).save(file)
+    said = f"rrtik: {file}: a path; give its problem too: rrtik show PROBLEM {file}\n"
+    assert rrtik(capsys, "show", str(file)) == (2, "", said)
+
+    run_file = tmp_path / "run.json"
+    run_file.write_text('{"kind": "replan_run"}')
+    replayed = f"give its scenario too: rrtik replan SCENARIO --replay {run_file} --html page.html\n"
+    said = f"rrtik: {run_file}: a record of a run; {replayed}"
+    assert rrtik(capsys, "show", str(run_file)) == (2, "", said)
+    assert rrtik(capsys, "show", "replan_planar_arm", str(run_file)) == (2, "", said)
+
+
 @pytest.fixture(scope="module")
 def several(tmp_path_factory):
     """A path of the subsea unit that moves several joints at once."""
