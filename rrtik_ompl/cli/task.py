@@ -99,7 +99,7 @@ def straight(
         say(*(f"wrote {file}" for file in written))
         if made.path is not None:
             suggest("see it: --html line.html" if html is None else f"open {html}")
-    return FOUND if made.fraction == 1.0 else NOT_FOUND
+    return FOUND if made.found else NOT_FOUND
 
 
 def task(
