@@ -84,7 +84,9 @@ def replan_scenario(
         made = _foreseen(chosen, seed, given) if foreseen else _new_run(chosen, seed, given)
         if isinstance(made, str):
             if as_json:
-                print(json.dumps({"problem": chosen.problem.name, "outcome": "not found", "reason": made}))
+                print(
+                    json.dumps({"problem": chosen.problem.name, "outcome": "not found", "found": False, "reason": made})
+                )
             else:
                 note(f"{chosen.problem.name}: not found: {made}")
             return NOT_FOUND

@@ -91,7 +91,8 @@ def straight(
 
     waypoints = 0 if made.path is None else len(made.path.waypoints)
     if as_json:
-        print(json.dumps({"fraction": made.fraction, "reason": made.reason, "waypoints": waypoints}))
+        names = ("found", "fraction", "reason", "proven", "seconds")
+        print(json.dumps({**{name: getattr(made, name) for name in names}, "waypoints": waypoints}))
     else:
         still = as_it_stands(question.world.scene)
         why = f": {made.reason}" if made.reason else f", {waypoints} waypoints, proven free{still}"
@@ -159,8 +160,8 @@ def task(
 def _document(plan: TaskPlan) -> dict[str, Any]:
     """Return a plan as plain values for JSON."""
     motions = [{"stage": str(s), "waypoints": len(p.waypoints)} for s, p in zip(plan.stages, plan.paths, strict=True)]
-    kept = {"found": plan.found, "reason": plan.reason, "chosen": list(plan.chosen), "notes": list(plan.notes)}
-    return {**kept, "motions": motions}
+    said = {name: getattr(plan, name) for name in ("found", "reason", "proven", "seconds", "statistics")}
+    return {**said, "chosen": list(plan.chosen), "notes": list(plan.notes), "motions": motions}
 
 
 def plan_lines(name: str, plan: TaskPlan, wrong: frozenset[int] = frozenset()) -> list[str]:

@@ -123,7 +123,8 @@ def test_the_commands_write_what_they_say(small, tmp_path, capsys):
     assert "motion 2 of 4: MoveTo" in story
     assert "walk (" not in story
     assert run(["straight", "titan4_sdu", "--by", "0", "0", "0.02", "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["fraction"] == 1.0
+    said = json.loads(capsys.readouterr().out)
+    assert (said["found"], said["fraction"], said["proven"]) == (True, 1.0, True)
     assert run(["straight", "titan4_sdu", "--by", "1", "0", "0", "--out", str(tmp_path / "part.json")]) == 1
     said = capsys.readouterr().out
     assert "contact" in said or "limit" in said or "singular" in said
