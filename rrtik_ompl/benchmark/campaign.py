@@ -58,6 +58,13 @@ def run_campaign(
     Raises:
         InputError: If there are runs and ``resume`` is not set, they are of another suite, or cannot be read or
             written; if the scheduler cannot be used.
+
+    Example:
+        >>> from pathlib import Path
+        >>> text = "{version: 1, problems: [planar3_boxes], planners: [bicrdt], runs: 1, seconds: 2}"
+        >>> _ = Path("suite.yaml").write_text(text)
+        >>> rrtik.benchmark.run_campaign(rrtik.benchmark.load_suite("suite.yaml"), Path("runs")).name
+        'runs.jsonl'
     """
     file = folder / records.NAME
     about = machine(jobs, scheduler)

@@ -46,6 +46,15 @@ def write_report(file: Path, *, views: int = VIEWS) -> tuple[list[Result], list[
 
     Raises:
         InputError: If the records cannot be read, or there are none, or a file cannot be written.
+
+    Example:
+        >>> from pathlib import Path
+        >>> text = "{version: 1, problems: [planar3_boxes], planners: [bicrdt], runs: 1, seconds: 2}"
+        >>> _ = Path("suite.yaml").write_text(text)
+        >>> records = rrtik.benchmark.run_campaign(rrtik.benchmark.load_suite("suite.yaml"), Path("runs"))
+        >>> results, files = rrtik.benchmark.write_report(records, views=0)
+        >>> "summary.md" in [file.name for file in files]
+        True
     """
     folder = file.parent
     head, found = read_campaign(file)

@@ -89,6 +89,11 @@ def load_suite(name_or_file: str | os.PathLike[str], *, folder: Path | None = No
 
     Raises:
         InputError: One line with file, line, key and remedy.
+
+    Example:
+        >>> suite = rrtik.benchmark.load_suite("quick", runs=2)
+        >>> suite.runs
+        2
     """
     path = file_name(name_or_file)
     if not path.suffix and len(path.parts) == 1 and not os.path.isfile(path):

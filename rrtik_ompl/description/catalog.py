@@ -55,7 +55,12 @@ MOUNTING = ("base_pose", "tip", *COMMON_OPTIONS)  # keys beside the group of a p
 
 
 def list_robots() -> tuple[str, ...]:
-    """Return the names that `load_robot` knows."""
+    """Return the names that `load_robot` knows.
+
+    Example:
+        >>> "panda" in rrtik.list_robots()
+        True
+    """
     return tuple(sorted(_offers("robots")))
 
 
@@ -110,7 +115,12 @@ def find_workspace(robot: str) -> Callable[[], Any]:
 
 
 def list_problems() -> tuple[str, ...]:
-    """Return the names of the problems that packages ship."""
+    """Return the names of the problems that packages ship.
+
+    Example:
+        >>> "panda_shelf" in rrtik.list_problems()
+        True
+    """
     return tuple(sorted(_problem_files()))
 
 

@@ -109,6 +109,11 @@ class IkResult:
         iterations: Number of steps of a numeric method.
         method: The method that answered.
         seconds: Time taken [s].
+
+    Example:
+        >>> result = rrtik.solve_ik(rrtik.load_robot("planar3"), rrtik.PositionGoal([9.0, 0.0, 0.0]))
+        >>> result.found, result.reason
+        (False, 'unreachable')
     """
 
     solutions: Matrix

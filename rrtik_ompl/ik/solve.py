@@ -39,7 +39,12 @@ COMPARED = 1_000_000  # rows times parts of a goal that are compared at once, wh
 
 
 def list_methods() -> tuple[IkMethod, ...]:
-    """Return the names that `solve_ik` takes as a method, apart from "auto"."""
+    """Return the names that `solve_ik` takes as a method, apart from "auto".
+
+    Example:
+        >>> {"closed-form", "numeric", "genetic"} <= set(rrtik.ik.list_methods())
+        True
+    """
     return tuple(METHODS)
 
 
@@ -79,6 +84,12 @@ def solve_ik(
     Raises:
         UnknownNameError: If there is no such method.
         InputError: If the method does not fit the robot and the goal, or an argument makes no sense.
+
+    Example:
+        >>> robot = rrtik.load_robot("panda")
+        >>> q = rrtik.solve_ik(robot, [0.4, 0.2, 0.5, np.pi, 0.0, 0.0], seed=1).require()
+        >>> robot.fk(q).translation.round(2)
+        array([0.4, 0.2, 0.5])
     """
     check_world(world, robot)
     one_of(get_args(IkMethod), method, METHOD)

@@ -51,6 +51,13 @@ class IkTrajectory:
         method: The method that answered.
         iterations: Generations of a genetic algorithm, steps of a numeric method, or 0 for a closed form.
         seconds: Time taken [s].
+
+    Example:
+        >>> robot = rrtik.load_robot("planar3")
+        >>> poses = robot.fk_batch(np.linspace([0.0, 0.3, 0.3], [0.3, 0.6, 0.3], 5))
+        >>> tracked = rrtik.ik.solve_trajectory(robot, poses, near=[0.0, 0.3, 0.3])
+        >>> tracked.found, tracked.q.shape, len(tracked.jumps)
+        (True, (5, 3), 0)
     """
 
     q: Matrix
@@ -164,6 +171,12 @@ def solve_trajectory(
     Raises:
         UnknownNameError: If there is no such method or preset.
         InputError: If the method does not fit the robot, a matrix is no pose, or an argument is out of range.
+
+    Example:
+        >>> robot = rrtik.load_robot("planar3")
+        >>> poses = robot.fk_batch(np.linspace([0.0, 0.3, 0.3], [0.3, 0.6, 0.3], 5))
+        >>> rrtik.ik.solve_trajectory(robot, poses, near=[0.0, 0.3, 0.3]).require().shape
+        (5, 3)
     """
     check_world(world, robot)
     load_kernels(robot)

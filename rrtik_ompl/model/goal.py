@@ -48,7 +48,13 @@ def has_continuous(robot: Robot) -> bool:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointGoal(Goal):
-    """Reach a configuration ``q``, shape (dof,) [rad or m], within ``tolerance`` of each joint value."""
+    """Reach a configuration ``q``, shape (dof,) [rad or m], within ``tolerance`` of each joint value.
+
+    Example:
+        >>> goal = rrtik.JointGoal([1.0, 0.5, 0.0], tolerance=0.01)
+        >>> rrtik.Problem(rrtik.World(rrtik.load_robot("planar3")), [0.0, 0.0, 0.0], goal).goal.tolerance
+        0.01
+    """
 
     q: Vector = field()  # replaces the property of Goal
     tolerance: float = JOINT_TOLERANCE
@@ -77,7 +83,13 @@ class JointGoal(Goal):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PositionGoal(Target):
-    """Bring the tip to a point of the world [m] in any orientation, within ``tolerance`` [m]."""
+    """Bring the tip to a point of the world [m] in any orientation, within ``tolerance`` [m].
+
+    Example:
+        >>> goal = rrtik.PositionGoal([0.4, 0.2, 0.5], tolerance=0.005)
+        >>> rrtik.solve_ik(rrtik.load_robot("panda"), goal, seed=1).found
+        True
+    """
 
     oriented = False
 
@@ -126,7 +138,13 @@ class PositionGoal(Target):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PoseGoal(Target):
-    """Bring the tip frame to T_world_tip, within ``position_tolerance`` [m] and ``orientation_tolerance`` [rad]."""
+    """Bring the tip frame to T_world_tip, within ``position_tolerance`` [m] and ``orientation_tolerance`` [rad].
+
+    Example:
+        >>> goal = rrtik.PoseGoal([0.4, 0.2, 0.5, np.pi, 0.0, 0.0])
+        >>> rrtik.solve_ik(rrtik.load_robot("panda"), goal, seed=1).found
+        True
+    """
 
     T_world_tip: pin.SE3
     position_tolerance: float
@@ -206,6 +224,13 @@ class GoalSet(TipGoal):
         free_rotation_axis: "x", "y" or "z" of the goal frame, about which poses may be turned, or None.
         box: Full side lengths of the box, in the goal frame, in which the position of poses is free [m], shape (3,).
         parts: The members, with poses that have freedom converted to task-space regions.
+
+    Example:
+        >>> robot = rrtik.load_robot("panda")
+        >>> goal = rrtik.GoalSet([rrtik.PositionGoal([0.3, y, 0.5]) for y in (-0.4, 0.4)])
+        >>> plan = rrtik.plan(rrtik.Problem(rrtik.World(robot), robot.posture("default"), goal), seed=1)
+        >>> plan.found, plan.member in (0, 1)
+        (True, True)
     """
 
     members: tuple[GoalPart, ...]

@@ -95,6 +95,11 @@ class Robot:
         closed_form: The robot's own inverse kinematics, if it has one.
         gripper: The joints that open and close its gripper, `rrtik_ompl.description.gripper.GripperJoints`, or None.
         padding, joint_weights: By name; options of :func:`rrtik_ompl.load_robot`.
+
+    Example:
+        >>> robot = rrtik.load_robot("planar3")
+        >>> robot.dof, robot.fk([0.0, 0.0, 0.0]).translation
+        (3, array([3., 0., 0.]))
     """
 
     name: str

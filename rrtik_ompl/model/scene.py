@@ -25,7 +25,14 @@ MOST_SOLIDS = 10_000  # largest number of obstacles and attached objects of a sc
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ConstantVelocity:
-    """A straight motion: at time t the obstacle is displaced by ``velocity * t`` [m/s, world axes] from its pose."""
+    """A straight motion: at time t the obstacle is displaced by ``velocity * t`` [m/s, world axes] from its pose.
+
+    Example:
+        >>> motion = rrtik.replanning.ConstantVelocity([0.1, 0.0, 0.0])
+        >>> ball = rrtik.Obstacle("ball", rrtik.Sphere(0.1), [1.0, 0.0, 0.0], motion=motion)
+        >>> motion.pose_at(ball.pose, 5.0).translation
+        array([1.5, 0. , 0. ])
+    """
 
     velocity: Vector
 
@@ -59,6 +66,11 @@ class TimedPoses:
     """A motion through poses in the world at given times [s].
 
     In between the obstacle moves on straight lines with shortest rotations; before and after it is at rest.
+
+    Example:
+        >>> motion = rrtik.replanning.TimedPoses([0.0, 2.0], [rrtik.pose([0, 0, 0]), rrtik.pose([1, 0, 0])])
+        >>> motion.pose_at(rrtik.pose(), 1.0).translation
+        array([0.5, 0. , 0. ])
     """
 
     times: Vector
@@ -120,6 +132,11 @@ class Obstacle:
         pose: T_world_obstacle.
         motion: Its motion over time; None if it is at rest.
         margin: Distance that the moving parts of the arm must keep from it [m]; the fixed parts must only not touch it.
+
+    Example:
+        >>> post = rrtik.Obstacle("post", rrtik.Cylinder(0.05, 1.0), [0.4, 0.0, 0.5], margin=0.02)
+        >>> post.pose.translation
+        array([0.4, 0. , 0.5])
     """
 
     name: str
@@ -155,6 +172,11 @@ class AttachedObject:
         padding: Distance of the grasp [m]: kept from everything that it must not touch, in addition to margins. That of
             the holding link (``padding`` of :func:`rrtik_ompl.load_robot`) if None.
         margin: Its own margin [m], kept likewise; it becomes the margin of the obstacle again when it is detached.
+
+    Example:
+        >>> rod = rrtik.AttachedObject("rod", "panda_hand", rrtik.Cylinder(0.01, 0.2), [0.0, 0.0, 0.15])
+        >>> rrtik.Scene(attached=[rod]).names
+        ('rod',)
     """
 
     name: str
@@ -272,6 +294,12 @@ class Scene:
         attached: Solids held by links.
         allowed_collisions: Pairs of names that are never checked against each other.
         contacts: Pairs that are in contact, with the depth to which they may overlap.
+
+    Example:
+        >>> post = rrtik.Obstacle("post", rrtik.Cylinder(0.05, 1.0), [0.4, 0.0, 0.5])
+        >>> scene = rrtik.Scene([post], allowed_collisions=[("panda_link0", "post")])
+        >>> scene.without("post").names
+        ()
     """
 
     obstacles: tuple[Obstacle, ...]

@@ -35,6 +35,10 @@ class SearchResult:
         graph: The grown graph, by :meth:`SafePlanner.grown`, if it is wanted.
         progress: Pairs of a time since the search began [s] and the length of the best path at that time; for searches
             that improve their path.
+
+    Example:
+        >>> rrtik.ompl.SearchResult(None, {"tries": 3}, reason="no free configuration").reason
+        'no free configuration'
     """
 
     path: Matrix | None

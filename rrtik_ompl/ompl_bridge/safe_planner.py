@@ -76,6 +76,18 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         reason: Why the last ``solve`` found no path, if the search could say it; else "".
         progress: Pairs of a time since the last ``solve`` began [s] and the length of the best path at that time.
         graph_wanted: For :meth:`search`: whether the graph can be asked for afterwards.
+
+    Example:
+        >>> class Direct(rrtik.ompl.SafePlanner):
+        ...     def __init__(self, si, *, world=None, seed=None):
+        ...         super().__init__(si, "Direct", world=world, seed=seed)
+        ...
+        ...     def search(self, starts, goals, checker, ptc):
+        ...         free = checker.motion_valid(starts[0], goals[0])
+        ...         return rrtik.ompl.SearchResult(np.array([starts[0], goals[0]]) if free else None)
+        >>> problem = rrtik.Problem(rrtik.World(rrtik.load_robot("planar3")), [0.0, 0.0, 0.0], [1.0, 0.5, 0.0])
+        >>> rrtik.plan(problem, Direct, seed=1).found
+        True
     """
 
     anytime: ClassVar[bool] = False

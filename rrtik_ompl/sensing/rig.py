@@ -50,6 +50,13 @@ class Rig:
 
     Raises:
         InputError: If there are fewer than two cameras, the numbers of cameras and poses differ, or one is invalid.
+
+    Example:
+        >>> camera = rrtik.sensing.Camera([[600.0, 0.0, 320.0], [0.0, 600.0, 240.0], [0.0, 0.0, 1.0]], 640, 480)
+        >>> rig = rrtik.sensing.Rig([camera, camera], [rrtik.pose(), rrtik.pose([0.3, 0.0, 0.0])])
+        >>> cameras = rig.save("rig.yaml")
+        >>> len(rrtik.sensing.Rig.load("rig.yaml").cameras)
+        2
     """
 
     cameras: tuple[Camera, ...]

@@ -96,6 +96,12 @@ def pictures_together(sources: Sequence[str | os.PathLike[str] | int]) -> Iterat
 
     Raises:
         InputError: If a source cannot be read or ends before the others, or its pictures are of other times.
+
+    Example:
+        >>> import rrtik_robots
+        >>> folder = f"{rrtik_robots.__path__[0]}/problems/pilot/photographs"
+        >>> [len(moment) for moment in rrtik.sensing.pictures_together([folder, folder])]
+        [2, 2, 2]
     """
     sources = listed(sources, "sources of pictures")
     films = not any(str(source).isdecimal() for source in sources)

@@ -31,6 +31,16 @@ def scenes_of_pictures(pictures: Iterable[Picture], sensor: Sensor, scene: Scene
 
     Raises:
         InputError: If the pictures end before everything was seen; it names what was not. If a picture cannot be used.
+
+    Example:
+        >>> import rrtik_robots
+        >>> shipped = f"{rrtik_robots.__path__[0]}/problems/pilot"
+        >>> camera = rrtik.sensing.Camera.load(f"{shipped}/camera_640.yaml")
+        >>> marker_map = rrtik.sensing.MarkerMap.load(f"{shipped}/titan4_panel_markers.yaml")
+        >>> pictures = [picture for (picture,) in rrtik.sensing.pictures_together([f"{shipped}/photographs"])]
+        >>> feed = rrtik.sensing.scenes_of_pictures(pictures, rrtik.sensing.Sensor(camera, marker_map))
+        >>> next(feed).time
+        0.0
     """
     try:
         stream = iter(pictures)

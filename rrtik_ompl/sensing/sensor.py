@@ -92,7 +92,19 @@ class View:
 
 
 class Sensor:
-    """Detect and track objects in a sequence of pictures."""
+    """Detect and track objects in a sequence of pictures.
+
+    Example:
+        >>> import rrtik_robots
+        >>> shipped = f"{rrtik_robots.__path__[0]}/problems/pilot"
+        >>> camera = rrtik.sensing.Camera.load(f"{shipped}/camera_640.yaml")
+        >>> marker_map = rrtik.sensing.MarkerMap.load(f"{shipped}/titan4_panel_markers.yaml")
+        >>> sensor = rrtik.sensing.Sensor(camera, marker_map)
+        >>> for (picture,) in rrtik.sensing.pictures_together([f"{shipped}/photographs"]):
+        ...     view = sensor.view(picture)
+        >>> "valve" in [each.object.name for each in view.placed]
+        True
+    """
 
     def __init__(
         self, camera: Camera | Rig, marker_map: MarkerMap, *, smooth: bool = True, sigmas: float = SIGMAS

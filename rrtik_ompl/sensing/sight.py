@@ -100,6 +100,16 @@ def detect_objects(
 
     Raises:
         InputError: If the picture does not have the camera's size, or is invalid.
+
+    Example:
+        >>> import rrtik_robots
+        >>> shipped = f"{rrtik_robots.__path__[0]}/problems/pilot"
+        >>> camera = rrtik.sensing.Camera.load(f"{shipped}/camera_640.yaml")
+        >>> marker_map = rrtik.sensing.MarkerMap.load(f"{shipped}/titan4_panel_markers.yaml")
+        >>> (picture,) = next(rrtik.sensing.pictures_together([f"{shipped}/photographs"]))
+        >>> seen = rrtik.sensing.detect_objects(picture.pixels, camera, marker_map)
+        >>> "valve" in [each.object.name for each in seen]
+        True
     """
     require(camera, Camera, "camera", "use Camera.load(file)")
     require(marker_map, MarkerMap, "marker map", "use MarkerMap.load(file)")

@@ -24,7 +24,13 @@ NO_LENGTH = 1e-9  # [m] A shorter shift counts as none.
 
 
 class Stage:
-    """A stage of a task: MoveTo, Straight, Attach, Detach, Gripper or Alternatives."""
+    """A stage of a task: MoveTo, Straight, Attach, Detach, Gripper or Alternatives.
+
+    Example:
+        >>> stages: list[rrtik.Stage] = [rrtik.MoveTo("ready"), rrtik.Straight(by=[0.0, 0.0, 0.1])]
+        >>> all(isinstance(stage, rrtik.Stage) for stage in stages)
+        True
+    """
 
     __slots__ = ()
 

@@ -69,6 +69,12 @@ class World(Judge):
     Raises:
         InputError: If the scene names links that do not exist, a length makes no sense, or a region cannot be held.
         UnknownNameError: If there is no such accuracy.
+
+    Example:
+        >>> post = rrtik.Obstacle("post", rrtik.Box([0.2, 0.2, 0.2]), [2.0, 1.0, 0.0])
+        >>> world = rrtik.World(rrtik.load_robot("planar3"), rrtik.Scene([post]))
+        >>> world.valid([0.0, 0.0, 0.0]), round(world.clearance([0.0, 0.0, 0.0]), 3)
+        (True, 0.9)
     """
 
     checks: ThreadOwn[RowChecks] = ThreadOwn()

@@ -22,7 +22,7 @@ from rrtik_ompl.ik.solve import solve_ik
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.problem_files.problem import load_problem
 from rrtik_ompl.problem_files.run import RunSection
-from rrtik_tests.pages import blocks_of
+from rrtik_tests.pages import EXAMPLES, MARKDOWN, NOTEBOOKS, blocks_of
 from rrtik_tests.places import ROOT
 
 LIBRARY = ROOT / "rrtik_ompl"
@@ -296,6 +296,24 @@ def test_every_public_name_is_in_one_table_of_the_page_of_names():
     named = [name for names in groups.values() for name in names]
     assert sorted(named) == sorted(public_values(rrtik_ompl))
     assert next(iter(groups.values()))[0] == "plan"
+
+
+def test_every_public_name_is_shown_outside_of_these_tables():
+    texts = [page.read_text() for page in MARKDOWN if page.name not in ("python.md", "CONTRIBUTING.md")]
+    texts.append(PAGES["python"].partition("\n## Names\n")[0] + PAGES["python"].partition("\n## Conventions\n")[2])
+    code = [span for text in texts for span in re.findall(r"^```.*?^```|`[^`\n]+`", text, re.MULTILINE | re.DOTALL)]
+    code += [page.read_text() for page in (*EXAMPLES, *NOTEBOOKS)]
+    words = set(re.findall(r"\w+", "\n".join(code)))
+    assert [name for name in public_values(rrtik_ompl) if name.split(".")[-1] not in words] == []
+
+
+@pytest.mark.parametrize("page", [*MARKDOWN, *EXAMPLES, *NOTEBOOKS], ids=lambda page: page.stem)
+def test_a_page_for_users_names_nothing_internal(page):
+    if page.name in ("CONTRIBUTING.md", "kernels.md", "paper.md"):
+        pytest.skip("it is about the inside")
+    public = set(public_values(rrtik_ompl))
+    public |= {name.partition(".")[0] for name in public}
+    assert set(re.findall(r"\brrtik_ompl\.(\w+(?:\.\w+)*)", page.read_text())) <= public
 
 
 # --- the ladder --------------------------------------------------------------------------------------------------

@@ -80,6 +80,14 @@ class Trajectory:
         robot_name: Name of the robot that the motion is for, or "".
         set_points: Indices of the knots that are set points of a file at a control rate, see :meth:`load`;
             None if the motion is known between its knots too.
+
+    Example:
+        >>> path = rrtik.JointPath.of(rrtik.load_robot("planar3"), [[0.0, 0.0, 0.0], [0.5, 0.2, 0.0]])
+        >>> motion = rrtik.time_parameterize(path, rrtik.RateLimits(1.0, 4.0, 40.0))
+        >>> motion(motion.duration).positions.round(6)
+        array([0.5, 0.2, 0. ])
+        >>> len(motion.sample(rate=100.0)) > 50
+        True
     """
 
     times: Vector

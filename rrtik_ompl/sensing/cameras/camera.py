@@ -31,6 +31,11 @@ class Camera:
         sigmas: Standard deviations of fx, fy, cx, cy [pixels] and of the five distortion coefficients, shape (9,);
             0 where the calibration gives none.
         tone: How the camera codes light as grey values (`markers.lighting`); None to estimate it for each marker.
+
+    Example:
+        >>> camera = rrtik.sensing.Camera([[600.0, 0.0, 320.0], [0.0, 600.0, 240.0], [0.0, 0.0, 1.0]], 640, 480)
+        >>> camera.project([[0.1, 0.0, 1.0]])
+        array([[380., 240.]])
     """
 
     matrix: Matrix

@@ -143,6 +143,13 @@ class MarkerMap:
         objects: The objects.
         T_base_camera: Pose of the camera, if one body carries arm and camera (as on a vehicle); None if the base has
             markers of its own and the camera may be anywhere.
+
+    Example:
+        >>> import rrtik_robots
+        >>> shipped = f"{rrtik_robots.__path__[0]}/problems/pilot"
+        >>> marker_map = rrtik.sensing.MarkerMap.load(f"{shipped}/titan4_panel_markers.yaml")
+        >>> [each.name for each in marker_map.objects if each.role == "target"]
+        ['valve']
     """
 
     dictionary: str
