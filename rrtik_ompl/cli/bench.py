@@ -71,7 +71,7 @@ def bench(
         print(json.dumps({"runs": total, "outcomes": dict(outcomes), "files": [str(each) for each in files]}))
     else:
         counts = ", ".join(f"{number} {status}" for status, number in outcomes.items())
-        table = Table(*OVERVIEW, right=range(2, len(OVERVIEW)))
+        table = Table(*OVERVIEW, right=range(2, len(OVERVIEW)), keys=2)
         for row in overview(results):
             table.add_row(*row)
         say(table, f"this round: {counts or 'no runs were left'}")

@@ -158,7 +158,7 @@ def _peaks_table(trajectory: Trajectory, limits: RateLimits) -> Table:
     from rrtik_ompl.base.units import shown_unit
 
     title, names = joint_labels(trajectory.joint_names, trajectory.prismatic)
-    quantities = [head for what in ("velocity", "acceleration", "jerk") for head in (what, "limit")]
+    quantities = ("velocity", "limit", "acceleration", "limit", "jerk", "jerk limit")
     table = Table(title, *quantities, "switches/s", right=range(1, 8))
 
     often = trajectory.report(limits).switches

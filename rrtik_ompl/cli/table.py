@@ -93,15 +93,17 @@ class Table:
     """A table of text that is as wide as its contents, or as the terminal.
 
     Where the terminal is narrower, gaps shrink, then headings are broken at words, then columns of text, and then the
-    table is folded into blocks of columns, each with the first column.
+    table is folded into blocks of columns, each with the first ones.
 
     Args:
         heads: Headings of the columns.
         right: Numbers of the columns of figures: these are aligned to the right, and never broken.
+        keys: How many first columns tell what a row is: each block of a folded table has them.
     """
 
-    def __init__(self, *heads: str, right: Collection[int] = ()) -> None:
+    def __init__(self, *heads: str, right: Collection[int] = (), keys: int = 1) -> None:
         self._heads = heads
+        self._keys = keys
         self._rows: list[tuple[str, ...]] = []
         self._right = right
 
@@ -120,16 +122,17 @@ class Table:
             for number, (head, column) in enumerate(zip(self._heads, cells, strict=True))
         ]
 
-        key, *rest = columns
+        keys = columns[: self._keys]
+        rest = columns[self._keys :]
         if _layout(columns, width, WHOLE) is not None or not rest:
             return "\n".join(["", *_drawn(columns, width, WHOLE), ""])
 
         lines = [""]
         while rest:
             count = len(rest)
-            while count > 1 and _layout([key, *rest[:count]], width, BLOCK) is None:
+            while count > 1 and _layout([*keys, *rest[:count]], width, BLOCK) is None:
                 count -= 1
-            lines += [*_drawn([key, *rest[:count]], width, BLOCK), ""]
+            lines += [*_drawn([*keys, *rest[:count]], width, BLOCK), ""]
             rest = rest[count:]
         return "\n".join(lines)
 

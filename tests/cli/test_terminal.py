@@ -79,6 +79,14 @@ def test_headings_are_broken_before_text_and_text_before_the_table_is_folded():
     assert table.fitted(15).count("no.") == 2
 
 
+def test_each_block_of_a_folded_table_says_what_its_rows_are():
+    table = Table("problem", "planner", "seconds", "iterations", right=(2, 3), keys=2)
+    table.add_row("panda_shelf", "bicrdt", "1.2345", "12345")
+    blocks = table.fitted(36).split("\n\n")
+    assert len(blocks) == 2
+    assert all("panda_shelf  bicrdt" in block for block in blocks)
+
+
 @pytest.mark.parametrize(
     ("names", "title", "short"),
     [
