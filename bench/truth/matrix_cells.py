@@ -271,13 +271,9 @@ def _with_scene(case: Case) -> Judged:
     return alike(case.at_first().with_scene(case.after), case.truth, case)
 
 
-def _with_settings(case: Case) -> Judged:
-    world = case.at_first(self_margin=0.01)
-    return alike(world.with_settings(scene=case.after, self_margin=0.0), case.truth, case)
-
-
 def _of(case: Case) -> Judged:
-    return alike(World.of(case.fresh().settings), case.truth, case)
+    settings = case.at_first(self_margin=0.01).settings
+    return alike(World.of(replace(settings, scene=case.after, self_margin=0.0)), case.truth, case)
 
 
 def _proving(case: Case) -> Judged:
@@ -543,7 +539,6 @@ WAYS: dict[str, Way] = {
     "World.with_clearance": _with_clearance,
     "World.with_resolution": _with_resolution,
     "World.with_scene": _with_scene,
-    "World.with_settings": _with_settings,
     "World.of": _of,
     "World.proving": _proving,
     "World.moved": _moved,

@@ -189,7 +189,6 @@ WAYS: dict[str, Remade] = {
     "World.with_clearance": Remade(lambda world: world.with_clearance(0.02), "clearance", same=False),
     "World.with_resolution": Remade(lambda world: world.with_resolution(0.05), "motion_resolution", same=False),
     "World.with_scene": Remade(lambda world: world.with_scene(world.scene)),
-    "World.with_settings": Remade(lambda world: world.with_settings(self_margin=0.02), "self_margin", same=False),
     "World.of": Remade(lambda world: World.of(world.settings)),
     "World.proving": Remade(lambda world: world.proving(0.03), "proving", same=False),
     "World.moved": Remade(lambda world: world.moved("ball", world.scene.obstacle("ball").pose)),

@@ -217,30 +217,13 @@ class World(Judge):
         """The same world without path constraints."""
         return self if self.constraints is None else form_of(self, constraints=())
 
-    def with_settings(self, **changes: Any) -> World:
-        """Return the same world with some settings changed; all data that does not depend on them is shared.
-
-        Args:
-            **changes: New values of fields of :class:`~rrtik_ompl.model.world_settings.WorldSettings`.
-
-        Raises:
-            InputError: If a value makes no sense.
-            UnknownNameError: If there is no setting with a given name.
-
-        Example:
-            >>> world = rrtik.World(rrtik.load_robot("planar3")).with_settings(clearance=0.05, self_margin=0.01)
-            >>> world
-            World(planar3, Scene(empty), self_margin=0.01 m, clearance=0.05 m)
-        """
-        return form_of(self, **checked_settings(changes))
-
     def with_scene(self, scene: Scene) -> World:
         """Return a world of the same robot in another scene, with the same settings.
 
         Raises:
             InputError: If it is not a scene, or does not fit the robot or the path constraints.
         """
-        return self.with_settings(scene=scene)
+        return _changed(self, scene=scene)
 
     def with_accuracy(self, accuracy: Accuracy) -> World:
         """Return the same world with another accuracy, "exact" or "conservative"; everything else is shared.
@@ -248,7 +231,7 @@ class World(Judge):
         Raises:
             UnknownNameError: If there is no such accuracy.
         """
-        return self.with_settings(accuracy=accuracy)
+        return _changed(self, accuracy=accuracy)
 
     def with_resolution(self, motion_resolution: float) -> World:
         """Return the same world with another motion resolution [m]; everything else is shared.
@@ -256,7 +239,7 @@ class World(Judge):
         Raises:
             InputError: If the resolution is not a number, or less than 0.01 mm.
         """
-        return self.with_settings(motion_resolution=motion_resolution)
+        return _changed(self, motion_resolution=motion_resolution)
 
     def with_clearance(self, clearance: float) -> World:
         """Return the same world with a clearance [m] that is kept from obstacles on top of their margins.
@@ -267,7 +250,7 @@ class World(Judge):
         Raises:
             InputError: If the clearance is negative or infinite.
         """
-        return self.with_settings(clearance=clearance)
+        return _changed(self, clearance=clearance)
 
     def proving(self, clearance: float | None = 0.0) -> World:
         """Return the same world, in which motions are valid only if proven free with a clearance [m].
@@ -278,7 +261,7 @@ class World(Judge):
         Raises:
             InputError: If the clearance is negative or infinite.
         """
-        return self.with_settings(proving=clearance)
+        return _changed(self, proving=clearance)
 
     def moved(self, name: str, pose: ArrayLike | pin.SE3) -> World:
         """Return the world with one obstacle at another pose, at a cost that hardly depends on the number of obstacles.
@@ -522,10 +505,15 @@ class World(Judge):
         return np.atleast_2d(rows)
 
 
+def _changed(world: World, **settings: Any) -> World:
+    """Return the same world with some settings changed, whose values are checked; the data of the others is shared."""
+    return form_of(world, **checked_settings(settings))
+
+
 def form_of(world: World, **known: Any) -> World:
     """Return the same world with some settings changed, which the caller knows to be valid.
 
-    As :meth:`World.with_settings`, but without checks of the values. Nothing is made anew if nothing changes.
+    Nothing is made anew if nothing changes.
     """
     settings = world.settings
     if all(getattr(settings, name) == value for name, value in known.items()):

@@ -37,6 +37,8 @@ SHORT_OF_AN_EXAMPLE = {
     "ompl.BenchmarkNotes": "from ompl import tools\n"
     "setup = rrtik.ompl.simple_setup(rrtik.load_problem('planar3_boxes'))\n"
     "rrtik.ompl.BenchmarkNotes(tools.Benchmark(setup))",
+    "Stage": "rrtik.MoveTo('ready')",
+    "ompl.MotionChecker": "rrtik.plan(rrtik.load_problem('planar3_boxes'), 'fastrrtconnect', seed=1)",
     "ompl.SafePlanner": "rrtik.plan(rrtik.load_problem('planar3_boxes'), 'fastrrtconnect', seed=1)",
     "ompl.SearchResult": "rrtik.ompl.SearchResult(np.zeros((2, 3)))",
     "sensing.Camera": CAMERA,

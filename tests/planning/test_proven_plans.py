@@ -215,7 +215,8 @@ def test_worlds_with_a_clearance_share_everything_else():
     assert not wide.certify(ends).all(), "a second opinion keeps it too"
     assert problem.world.valid(problem.start)
     assert wide.clearance(problem.start) == problem.world.clearance(problem.start)
-    assert problem.world.with_settings(inflation=0.2).certify(ends).all(), "what searches keep on top is theirs alone"
+    roomy = rrtik.World.of(dataclasses.replace(problem.world.settings, inflation=0.2))
+    assert roomy.certify(ends).all(), "what searches keep on top is theirs alone"
     assert problem.world.proving(0.01).fast is None
     assert dataclasses.is_dataclass(problem.world.prove([problem.start]))
 

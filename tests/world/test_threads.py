@@ -161,7 +161,7 @@ def another_form(world, draw):
     if way == 1:
         return world.with_clearance(float(draw.choice([0.0, 0.01, 0.05])))
     if way == 2:
-        return world.with_settings(self_margin=float(draw.choice([0.0, 0.01])))
+        return rrtik.World.of(replace(world.settings, self_margin=float(draw.choice([0.0, 0.01]))))
     if way == 3:
         return world.proving(float(draw.choice([0.0, 0.005])))
     if way == 4:

@@ -267,7 +267,8 @@ def _first_links(world: World, later: set[int]) -> World:
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DescriptionWarning)  # The whole world has warned already.
-        return world.unheld.with_settings(robot=replace(robot, collision=early_geometry), scene=early_scene)
+        early_robot = replace(robot, collision=early_geometry)
+        return World.of(replace(world.unheld.settings, robot=early_robot, scene=early_scene))
 
 
 def _moves(robot: Robot, joint: int, later: set[int]) -> bool:
