@@ -190,7 +190,7 @@ def test_every_published_example_is_solved_and_the_error_of_the_tip_reported(nam
     away = np.linalg.norm(tip.translation - problem.goal.point)
     assert plan.statistics["position_error"] == pytest.approx(away, abs=1e-12)
     assert away < 1e-6
-    (line,) = (line for line in summary(problem, plan, plan.path, 0.0) if "the tip ends" in line)
+    (line,) = (line for line in summary(problem, plan, plan.path) if "the tip ends" in line)
     assert ("deg" in line) == isinstance(problem.goal, PoseGoal)
 
 
