@@ -5,6 +5,7 @@ import pytest
 
 import rrtik_ompl as rrtik
 from rrtik_ompl.base.errors import InputError, PlannerError
+from rrtik_tests.clusters import cluster
 
 BAD_PLANNERS = """\
 import ctypes, numpy as np
@@ -226,3 +227,17 @@ def test_what_makes_no_sense_is_refused_in_one_line(boxes, given, options, words
     with pytest.raises(InputError, match=words) as refused:
         rrtik.plan_many(*given, **options)
     assert "\n" not in str(refused.value)
+
+
+@pytest.mark.slow
+def test_workers_of_a_cluster_find_the_paths_of_threads(boxes, tmp_path):
+    pytest.importorskip("distributed", reason="needs Dask: pip install 'rrtik-ompl[cluster]'")
+    starts, goals = ends(boxes)
+    with cluster(tmp_path) as (address, _):
+        in_world = rrtik.plan_many(boxes.world, starts, goals, "fastrrtconnect", seed=3, scheduler=address)
+        of_problems = rrtik.plan_many([boxes, "planar3_boxes"], "RRTConnect", scheduler=address)
+    here = rrtik.plan_many(boxes.world, starts, goals, "fastrrtconnect", seed=3)
+    here += rrtik.plan_many([boxes, "planar3_boxes"], "RRTConnect")
+    assert all(same(one, other) for one, other in zip(in_world + of_problems, here, strict=True))
+    with pytest.raises(InputError, match="scheduler nowhere: no Dask scheduler answers"):
+        rrtik.plan_many([boxes], scheduler="nowhere")
