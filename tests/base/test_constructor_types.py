@@ -60,3 +60,31 @@ def test_a_world_declares_the_settings_with_their_defaults():
     assert list(of_world) == list(of_settings)
     for name in list(of_world)[2:]:
         assert of_world[name].default == of_settings[name].default
+
+
+def test_usual_calls_pass_the_type_checker() -> None:
+    """The function has types, so that mypy checks the calls in it when it checks the tests."""
+    robot = rrtik.load_robot("planar3")
+    region = rrtik.TaskRegion([1, 0, 0], [[-9, 9]] * 6)
+    ball = rrtik.Obstacle("ball", rrtik.Sphere(0.1), [3, 3, 0], margin=0.1)
+    box = rrtik.Obstacle("box", rrtik.Box(0.1, 0.2, 0.3), [[1, 0, 0, 9], [0, 1, 0, 9], [0, 0, 1, 9], [0, 0, 0, 1]])
+    held = rrtik.AttachedObject("cup", "tip", rrtik.Sphere(0.01), [0, 0, 1], allow=["ball"])
+    scene = rrtik.Scene([ball, box], [held], [("cup", "planar3")])
+    assert rrtik.Scene({ball}).with_(box).obstacles == (ball, box)
+
+    world = rrtik.World(robot, None, clearance=0.01)
+    path = rrtik.JointPath.of(robot, [[0, 0, 0], [1, 0, 0]])
+    goals = rrtik.GoalSet([rrtik.PoseGoal([1, 0, 0]), rrtik.PositionGoal([1, 0, 0]), region])
+    for goal in (path[-1], [0, 0, 0], rrtik.pose([1, 0, 0], rpy=[0, 0, 1]), np.eye(4), goals):
+        assert rrtik.Problem(world, path[0], goal, constraints=iter([])).world is world
+
+    grasp = [rrtik.MoveTo([0, 0, 0]), rrtik.Straight(by=[0, 0, 1]), rrtik.Attach("ball", "tip", allow="box")]
+    task = rrtik.Task([rrtik.Alternatives([grasp, [rrtik.MoveTo("ready")]]), rrtik.Gripper("open")])
+    assert len(task.stages) == 2
+    assert len(rrtik.Task(rrtik.MoveTo(q) for q in path).stages) == 2
+
+    rules = rrtik.MoveRules(iter("abc"), joint_costs=np.ones(3), frozen_joints=np.array([1]), last_joints=("c",))
+    assert rules.frozen_joints == [1]
+    motion = rrtik.time_parameterize(path, rrtik.RateLimits(1, [1, 2, 3], np.inf))
+    assert all(world.valid(q) for q in motion.sample(10))
+    assert scene.attaching("ball", "tip", ["box"], pose=[0, 0, 1]).attached[-1].name == "ball"

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from typing import TypeAlias
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from rrtik_ompl.base.arrays import Matrix, Vector, finite_array, whole_number
+from rrtik_ompl.base.arrays import Matrix, Vector, dimensions, finite_array, whole_number
 from rrtik_ompl.base.errors import InputError, UnknownNameError, at_most, listed, name_of, require
 from rrtik_ompl.description.joint_weights import weights_as_costs
 from rrtik_ompl.model.robot import Robot
@@ -15,8 +17,8 @@ from rrtik_ompl.model.transitions import merge_moves
 MOST_JOINTS = 1_000  # largest number of joints of an arm
 OPTIONS = ("joint_costs", "frozen_joints", "last_joints", "smallest_move")  # of planners, as of MoveRules
 
-Joints = Sequence[int | str]
-PerJoint = float | Sequence[float]
+Joints: TypeAlias = Iterable[int | str]
+PerJoint: TypeAlias = ArrayLike  # one number for all joints, or one for each
 
 
 class MoveRules:
@@ -48,7 +50,7 @@ class MoveRules:
 
     def __init__(
         self,
-        names: Sequence[str],
+        names: Iterable[str],
         *,
         joint_costs: PerJoint | None = None,
         frozen_joints: Joints = (),
@@ -156,7 +158,7 @@ def smallest_moves(size: PerJoint, dof: int) -> Vector:
 
 def _per_joint(value: PerJoint, dof: int, what: str) -> Vector:
     """Return one number for each joint, shape (dof,), from one number for all joints or one for each."""
-    shape = () if isinstance(value, int | float) else (dof,)
+    shape = () if dimensions(value) == 0 else (dof,)
     return np.broadcast_to(finite_array(value, shape, what), dof).astype(np.float64)
 
 
@@ -167,17 +169,14 @@ def joint_numbers(joints: Joints, names: Sequence[str], dof: int, option: str) -
         InputError: If they are not a list of joint numbers.
         UnknownNameError: If there is no joint of a name.
     """
-    if isinstance(joints, str) or not isinstance(joints, Sequence):
-        raise InputError(f"{option}: expected a list of joints, got {joints!r}")
-
     numbers = {}
-    for joint in joints:
+    for joint in listed(joints, f"{option}: joints"):
         if isinstance(joint, str):
             if joint not in names:
                 raise UnknownNameError(f"{option}: joint", joint, names)
             numbers[list(names).index(joint)] = True
-        elif isinstance(joint, bool) or not isinstance(joint, int) or not 0 <= joint < dof:
+        elif isinstance(joint, bool) or not isinstance(joint, int | np.integer) or not 0 <= joint < dof:
             raise InputError(f"{option}: expected joint numbers from 0 to {dof - 1}, got {joint!r}")
         else:
-            numbers[joint] = True
+            numbers[int(joint)] = True
     return list(numbers)
