@@ -34,6 +34,6 @@ for k, plan in enumerate(rrtik.plan_many(reach.world, ends[:, :6], ends[:, 6:], 
     done, reward = False, 0.0
     for target in plan.path[1:] if plan.path else ():
         while not done and np.abs(target - reach.q).max() > 1e-9:
-            _, reward, ended, cut, _ = reach.step(target - reach.q)
+            reward, ended, cut = reach.step(target - reach.q)[1:4]
             done = ended or cut
     print(f"episode {k}: {reach.count} steps, reward {reward:.2f}" if plan.found else plan.reason)

@@ -46,7 +46,7 @@ def shown(tmp_path_factory):
     return folder, pages
 
 
-@pytest.mark.xfail(reason="being mended")
+@pytest.mark.slow
 def test_it_passes_mypy_strict(shown):
     folder, pages = shown
     command = [sys.executable, "-m", "mypy", *MYPY, f"--cache-dir={ROOT / '.mypy_cache' / 'pages'}"]
@@ -58,7 +58,7 @@ def test_it_passes_mypy_strict(shown):
     assert run.returncode == 0, run.stdout + run.stderr
 
 
-@pytest.mark.xfail(reason="being mended")
+@pytest.mark.slow
 def test_it_passes_pyright(shown):
     folder, pages = shown
     (folder / "pyrightconfig.json").write_text(json.dumps(PYRIGHT))
