@@ -10,8 +10,6 @@ from itertools import takewhile
 from typing import NamedTuple, TextIO, TypeAlias
 from unicodedata import east_asian_width
 
-from rrtik_ompl.base.units import shown_unit
-
 USUAL_WIDTH = 80  # width of a table where no terminal and no COLUMNS says how much room there is
 LEAST_WIDTH = 20  # narrower terminals are treated as if they were this wide
 NOTHING, HEADS, TEXTS = range(3)  # what is broken at words: nothing, headings, or also the cells of columns of text
@@ -82,6 +80,8 @@ def _beginning(names: Sequence[str]) -> str:
 
 def joint_labels(names: Sequence[str], prismatic: Iterable[bool]) -> tuple[str, list[str]]:
     """Return the heading of a column of joints, and their short names; the unit stands once if all have the same."""
+    from rrtik_ompl.base.units import shown_unit  # loads numpy, which not every command needs
+
     title, short = short_names(names)
     units = [shown_unit(slides)[1] for slides in prismatic]
     if len(set(units)) == 1:
