@@ -36,7 +36,7 @@ class Kind:
         writer: Function that takes a value and a file and writes it; "" if the class does that itself, or nothing does.
         words: What a file of this kind says: its "kind", or keys (columns, arrays), one of which is sufficient.
         endings: Endings that only this kind has.
-        also: Names of other classes whose ``load`` accepts such a file.
+        also: Names of other classes whose ``load`` accepts such a file, or says best what it lacks.
         needs: Arguments without which ``load`` cannot read the file.
         command: Command that takes such a file.
     """
@@ -114,7 +114,7 @@ KINDS = MappingProxyType(
             "problem_files.problem:load_problem",
             "problem_files.problem:write_problem",
             words=("goal", "start", "goal_constraints", "robot_model_name"),
-            also=("Scene",),
+            also=("Scene", "Scenario"),
             command="rrtik plan {}",
         ),
         "Scene": Kind(
