@@ -6,9 +6,8 @@ a file is read. A new kind of file is a new row.
 
 from __future__ import annotations
 
-import json
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib import import_module
@@ -16,8 +15,9 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, TypeAlias, TypeVar
 
-from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.errors import InputError, in_file
 from rrtik_ompl.files.named_arrays import NamedArrays
+from rrtik_ompl.files.tables import json_value
 from rrtik_ompl.files.text import file_name, read_text
 
 FilePath: TypeAlias = str | os.PathLike[str]
@@ -34,7 +34,9 @@ class Kind:
         value: Class of the value, "module:name".
         reader: Function that reads it, "module:name"; its arguments are those of ``load`` of the class.
         writer: Function that takes a value and a file and writes it; "" if the class does that itself, or nothing does.
-        words: What a file of this kind says: its "kind", or keys (columns, arrays), one of which is sufficient.
+        kind: What a file of this kind states as its "kind".
+        words: Keys (or arrays) of a file that states none, one of which is sufficient.
+        without: A key that such a file does not have.
         endings: Endings that only this kind has.
         also: Names of other classes whose ``load`` accepts such a file, or says best what it lacks.
         needs: Arguments without which ``load`` cannot read the file.
@@ -45,7 +47,9 @@ class Kind:
     value: str
     reader: str
     writer: str = ""
+    kind: str = ""
     words: tuple[str, ...] = ()
+    without: str = ""
     endings: tuple[str, ...] = ()
     also: tuple[str, ...] = ()
     needs: str = ""
@@ -59,13 +63,15 @@ KINDS = MappingProxyType(
             "a certificate of a path",
             "model.certificate:Certificate",
             "model.certificate:read_certificate",
-            words=("path_certificate", "motions"),
+            kind="path_certificate",
+            words=("motions",),
         ),
         "JointPath": Kind(
             "a path",
             "model.path:JointPath",
             "model.path:read_path",
-            words=("joint_path", "waypoints"),
+            kind="joint_path",
+            words=("waypoints",),
             endings=(".txt",),
             also=("Certificate", "HeightField"),
             command="rrtik check PROBLEM {}",
@@ -74,14 +80,16 @@ KINDS = MappingProxyType(
             "a timed motion",
             "motion.trajectory:Trajectory",
             "motion.trajectory.load:read_trajectory",
-            words=("joint_trajectory", "points"),
+            kind="joint_trajectory",
+            words=("points",),
             command="rrtik show PROBLEM {}",
         ),
         "ReplanRun": Kind(
             "a record of a run",
             "replanning.record:ReplanRun",
             "replanning.record:read_run",
-            words=("replan_run", "ticks"),
+            kind="replan_run",
+            words=("ticks",),
             command="rrtik check PROBLEM {}",
         ),
         "TaskPlan": Kind(
@@ -89,7 +97,7 @@ KINDS = MappingProxyType(
             "tasks:TaskPlan",
             "tasks.plan_file:read_task_plan",
             "tasks.plan_file:write_task_plan",
-            words=("task_plan",),
+            kind="task_plan",
             command="rrtik check {}",
         ),
         "Task": Kind(
@@ -113,7 +121,7 @@ KINDS = MappingProxyType(
             "world.problem:Problem",
             "problem_files.problem:load_problem",
             "problem_files.problem:write_problem",
-            words=("goal", "start", "goal_constraints", "robot_model_name"),
+            words=("goal", "goal_constraints", "robot_model_name"),
             also=("Scene", "Scenario"),
             command="rrtik plan {}",
         ),
@@ -123,6 +131,7 @@ KINDS = MappingProxyType(
             "problem_files.scene:load_scene",
             "problem_files.scene:write_scene",
             words=("scene",),
+            without="robot",
         ),
         "Robot": Kind(
             "a robot",
@@ -267,22 +276,26 @@ def kind_of(file: FilePath) -> str | None:
         InputError: If the file cannot be read.
     """
     path = file_name(file)
-    if os.path.isdir(path):  # which takes names of any length
+    if os.path.isdir(file):  # which takes names of any length
         return "Robot"
     ending = path.suffix.lower()
     words = _words(path, ending)
-    said = (name for name, kind in KINDS.items() if not words.isdisjoint(kind.words))
+    if "kind" in words:
+        told = (name for name, kind in KINDS.items() if kind.kind and kind.kind == words["kind"])
+    else:
+        having = (name for name, kind in KINDS.items() if not words.keys().isdisjoint(kind.words))
+        told = (name for name in having if KINDS[name].without not in words)
     ended = (name for name, kind in KINDS.items() if ending in kind.endings)
-    return next(said, None) or next(ended, None)
+    return next(told, None) or next(ended, None)
 
 
-def _words(path: Path, ending: str) -> set[str]:
-    """Return the words that tell what a file is: its kind if it states that, or else its keys, or nothing."""
+def _words(path: Path, ending: str) -> Mapping[str, object]:
+    """Return the keys of a file, with their values where it is JSON or YAML; none if its ending tells more."""
     if ending == ".csv":
         first = read_text(path).partition("\n")[0]
-        return {"points" if first.startswith("time,") else "waypoints"}
+        return {"points" if first.startswith("time,") else "waypoints": None}
     if ending == ".npz":
-        return set(NamedArrays(path).names)
+        return dict.fromkeys(NamedArrays(path).names)
     if ending == ".json":
         document = _json(path)
     elif ending in (".yaml", ".yml"):
@@ -290,19 +303,15 @@ def _words(path: Path, ending: str) -> set[str]:
 
         document = read_yaml(path).data
     else:
-        return set()
-
-    keys = document if isinstance(document, dict) else {}
-    return {str(keys["kind"])} if "kind" in keys else set(keys)
+        return {}
+    return document if isinstance(document, dict) else {}
 
 
 def _json(path: Path) -> object:
     try:
-        return json.loads(read_text(path, MAX_BYTES))
-    except json.JSONDecodeError as error:
-        raise InputError(f"{path}: line {error.lineno}: not JSON: {error.msg}") from None
-    except (RecursionError, ValueError):
-        raise InputError(f"{path}: not JSON that can be read") from None
+        return json_value(read_text(path, MAX_BYTES))
+    except InputError as error:
+        raise in_file(path, error) from None
 
 
 def found(name: str) -> Any:  # noqa: ANN401 - a class or a function

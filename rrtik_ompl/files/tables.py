@@ -59,16 +59,23 @@ def json_object(text: str, kind: str, key: str) -> dict[str, Any]:
     Raises:
         InputError: If the text is something else; the message names the line or the key.
     """
-    file = _asked(kind)
+    return checked_object(json_value(text), kind, key)
+
+
+def json_value(text: str) -> object:
+    """Parse any JSON.
+
+    Raises:
+        InputError: If it is malformed; the message names the line.
+    """
     try:
-        document = json.loads(text)
+        return json.loads(text)
     except json.JSONDecodeError as error:
         raise InputError(f"line {error.lineno}: not JSON: {error.msg}") from None
     except RecursionError:
-        raise InputError(f"lists are nested too deeply; {file}") from None
+        raise InputError("lists are nested too deeply; is it a file of rrtik?") from None
     except ValueError:
-        raise InputError(f"holds a number of thousands of digits; {file}") from None
-    return checked_object(document, kind, key)
+        raise InputError("holds a number of thousands of digits; is it a file of rrtik?") from None
 
 
 def checked_object(document: object, kind: str, key: str) -> dict[str, Any]:

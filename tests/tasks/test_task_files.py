@@ -280,7 +280,7 @@ def test_a_list_of_goals_is_no_problem_and_says_what_it_is(tmp_path, capsys):
     file = tmp_path / "tour.yaml"
     file.write_text(TOUR)
     assert run(["plan", str(file)]) == 2
-    assert "it has several goals, to be reached in order; use rrtik task tour.yaml" in capsys.readouterr().err
+    assert "a task, not a problem; use Task.load(file) or rrtik task tour.yaml" in capsys.readouterr().err
     file.write_text(TOUR.replace("goals:", "task:").replace("- {", "- move_to: {", 3))
     assert run(["task", str(file)]) == 2
     assert "path_constraints of a task stand beside its move_to stages" in capsys.readouterr().err
