@@ -5,7 +5,7 @@ import numpy as np
 import rrtik_ompl as rrtik
 
 robot = rrtik.load_robot("ur5_limited")
-post = rrtik.Obstacle("post", rrtik.Box([0.1, 0.1, 0.9]), [0.5, 0.0, 0.45])
+post = rrtik.Obstacle("post", rrtik.Box(0.1, 0.1, 0.9), [0.5, 0.0, 0.45])
 world = rrtik.World(robot, rrtik.Scene([post]))
 start = [-0.91, -1.19, 1.98, -2.36, -1.57, -0.91]
 goal = [0.42, -1.19, 1.98, -2.36, -1.57, 0.42]

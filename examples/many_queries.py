@@ -7,7 +7,7 @@ import numpy as np
 import rrtik_ompl as rrtik
 
 robot = rrtik.load_robot("ur5")
-shelf = rrtik.Obstacle("shelf", rrtik.Box([0.3, 0.8, 0.04]), [0.6, 0.0, 0.4])
+shelf = rrtik.Obstacle("shelf", rrtik.Box(0.3, 0.8, 0.04), [0.6, 0.0, 0.4])
 world = rrtik.World(robot, rrtik.Scene([shelf]))
 roadmap = rrtik.Roadmap(world, seed=1)
 roadmap.grow(500)

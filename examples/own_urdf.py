@@ -19,7 +19,7 @@ Path("arm.urdf").write_text(f'<robot name="mine"><link name="base"/>{links}</rob
 
 robot = rrtik.load_robot("arm.urdf", tip="hand")
 print(robot.name, robot.joint_names, "tip at zero:", robot.fk([0, 0, 0, 0]).translation)
-table = rrtik.Obstacle("table", rrtik.Box([0.4, 0.8, 0.05]), [0.55, 0, 0.35])
+table = rrtik.Obstacle("table", rrtik.Box(0.4, 0.8, 0.05), [0.55, 0, 0.35])
 world = rrtik.World(robot, rrtik.Scene([table]))
 plan = rrtik.plan(rrtik.Problem(world, [0.9, 0.6, 1.2, 0.4], [-0.9, 0.6, 1.2, 0.4]), seed=1)
 print("found" if plan.found else plan.reason, plan.path)

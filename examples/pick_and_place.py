@@ -7,8 +7,8 @@ from rrtik_ompl import Alternatives, Attach, Detach, Gripper, MoveTo, Straight, 
 
 hand = rrtik.load_robot("panda").gripper
 robot = rrtik.load_robot("panda", locked=hand.posture("open"))
-table = rrtik.Obstacle("table", rrtik.Box([0.7, 1.2, 0.04]), [0.55, 0.0, 0.18])
-cup = rrtik.Obstacle("cup", rrtik.Box([0.05, 0.05, 0.1]), [0.5, 0.25, 0.25])  # it stands on the table
+table = rrtik.Obstacle("table", rrtik.Box(0.7, 1.2, 0.04), [0.55, 0.0, 0.18])
+cup = rrtik.Obstacle("cup", rrtik.Box(0.05, 0.05, 0.1), [0.5, 0.25, 0.25])  # it stands on the table
 world = rrtik.World(robot, rrtik.Scene([table, cup]))
 
 

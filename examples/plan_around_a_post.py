@@ -3,7 +3,7 @@
 import rrtik_ompl as rrtik
 
 robot = rrtik.load_robot("panda")
-post = rrtik.Obstacle("post", rrtik.Box([0.1, 0.1, 1.0]), [0.35, 0.25, 0.5], margin=0.02)
+post = rrtik.Obstacle("post", rrtik.Box(0.1, 0.1, 1.0), [0.35, 0.25, 0.5], margin=0.02)
 world = rrtik.World(robot, rrtik.Scene([post]))
 goal = rrtik.PoseGoal([0.3, 0.5, 0.4, 3.1416, 0.0, 0.0])  # x, y, z [m], roll, pitch, yaw [rad]
 problem = rrtik.Problem(world, robot.posture("default"), goal, name="around a post")
