@@ -347,7 +347,7 @@ def test_a_record_that_does_not_fit_is_refused_before_anything_is_shown(tmp_path
         (["--simulated", "--arm", "nowhere"], "HOST:PORT"),
         (["--simulated", "--arm", "127.0.0.1:99999"], "HOST:PORT"),
         (["--simulated", "--host", "192.0.2.1"], "--token"),
-        (["--simulated", "--map", "m.yaml"], "scenario"),
+        (["--simulated", "--map", "m.yaml"], "--vehicle"),
         (["--replay", "missing.jsonl"], "missing.jsonl"),
         (["--simulated", "--replay", "x", "--record", "y"], "--record"),
         (["--video", "missing.mp4"], "--camera-file"),
