@@ -130,7 +130,7 @@ def plan_many(  # type: ignore[misc]  # the second argument is `planner` after p
         >>> plans = rrtik.plan_many(problem.world, problem.start, [problem.goal] * 3, "fastrrtconnect")
         >>> [each.found for each in plans]
         [True, True, True]
-        >>> [each.found for each in rrtik.plan_many(["planar3_boxes", "titan4_prisms"], "bicrdt")]
+        >>> [each.found for each in rrtik.plan_many(["planar3_boxes", "titan4_prisms"], "fastrrtconnect")]
         [True, True]
     """
     _check_way(threads, processes, scheduler, memory_mb)

@@ -71,22 +71,25 @@ def ends(boxes):
 @pytest.mark.parametrize("planner", [None, "fastrrtconnect", "RRTConnect"])
 def test_problems_and_ends_in_their_world_give_the_same_plans_in_threads_and_processes(boxes, planner):
     starts, goals = ends(boxes)
-    world = rrtik.plan_many(boxes.world, starts, goals, planner, seed=3)
+    world = rrtik.plan_many(boxes.world, starts, goals, planner, seconds=60.0, seed=3)
     usable = [0, 1, 3]
     problems = [rrtik.Problem(boxes.world, starts[k], goals[k]) for k in usable]
     assert [each.found for each in world] == [True, True, False, True]
     assert "outside its limits" in world[2].reason
 
-    in_processes = rrtik.plan_many(boxes.world, starts, goals, planner, seed=3, processes=2)
+    in_processes = rrtik.plan_many(boxes.world, starts, goals, planner, seconds=60.0, seed=3, processes=2)
     assert all(same(one, other) for one, other in zip(world, in_processes, strict=True))
     assert in_processes[0].statistics["memory_mb"] > 10.0
 
-    alone = [rrtik.plan(problem, planner, seed=world[k].seed) for k, problem in zip(usable, problems, strict=True)]
+    alone = [
+        rrtik.plan(problem, planner, seconds=60.0, seed=world[k].seed)
+        for k, problem in zip(usable, problems, strict=True)
+    ]
     assert all(same(one, world[k]) for one, k in zip(alone, usable, strict=True))
-    first = rrtik.plan_many(problems[:2], planner, seed=3)
+    first = rrtik.plan_many(problems[:2], planner, seconds=60.0, seed=3)
     assert all(same(one, other) for one, other in zip(first, world, strict=False))
-    of_problems = rrtik.plan_many(problems, planner=planner, seed=3, threads=2)
-    elsewhere = rrtik.plan_many(iter(problems), planner, seed=3, processes=1)
+    of_problems = rrtik.plan_many(problems, planner=planner, seconds=60.0, seed=3, threads=2)
+    elsewhere = rrtik.plan_many(iter(problems), planner, seconds=60.0, seed=3, processes=1)
     assert all(same(one, other) for one, other in zip(of_problems, elsewhere, strict=True))
     assert [each.problem for each in of_problems] == [each.problem for each in elsewhere] == problems
 
@@ -96,12 +99,12 @@ def test_names_files_and_problems_stand_side_by_side_and_one_that_is_broken_is_l
     boxes.save(tmp_path / "boxes.yaml")
     given = ["titan4_prisms", tmp_path / "boxes.yaml", boxes, str(tmp_path / "broken.yaml"), "planar3_boxes"]
     plans, elsewhere = (
-        rrtik.plan_many(given, "RRTConnect", seed=3, **way) for way in ({"threads": 2}, {"processes": 2})
+        rrtik.plan_many(given, "RRTConnect", seconds=60.0, seed=3, **way) for way in ({"threads": 2}, {"processes": 2})
     )
     assert [each.found for each in plans] == [True, True, True, False, True]
     assert "robot" in plans[3].reason
     assert all(same(one, other) for one, other in zip(plans, elsewhere, strict=True))
-    assert same(plans[4], rrtik.plan(boxes, "RRTConnect", seed=plans[4].seed))
+    assert same(plans[4], rrtik.plan(boxes, "RRTConnect", seconds=60.0, seed=plans[4].seed))
     with pytest.raises(InputError, match="robot"):
         rrtik.plan_many(given[3:4])
 
@@ -112,10 +115,11 @@ def test_problems_name_their_planners(boxes):
         for name in ("bicrdt", "RRTConnect", None, "RRTConnect", "nobody")
     ]
     for way in ({"threads": 1}, {"threads": 3}, {"processes": 1}):
-        plans = rrtik.plan_many(named, seed=1, **way)
+        plans = rrtik.plan_many(named, seed=1, seconds=60.0, shorten=False, **way)
         assert [each.planner for each in plans[:4]] == ["bicrdt", "RRTConnect", "fastrrtconnect", "RRTConnect"]
         assert all(
-            same(each, rrtik.plan(problem, seed=each.seed)) for each, problem in zip(plans[:4], named, strict=False)
+            same(each, rrtik.plan(problem, seed=each.seed, seconds=60.0, shorten=False))
+            for each, problem in zip(plans[:4], named, strict=False)
         )
         assert "no planner 'nobody'" in plans[4].reason
 
@@ -159,18 +163,18 @@ def test_paths_are_finished_as_plan_finishes_them(shorten):
     rows = np.random.default_rng(5).uniform(-2.0, 2.0, (60, 6))
     rows = rows[world.valid_batch(rows)]
     starts, goals = rows[:8], rows[8:16]
-    plans = rrtik.plan_many(world, starts, goals, "fastrrtconnect", seed=4, shorten=shorten, threads=2)
+    plans = rrtik.plan_many(world, starts, goals, "fastrrtconnect", seconds=60.0, seed=4, shorten=shorten, threads=2)
     assert sum(each.found for each in plans) > 4
     for start, goal, each in zip(starts, goals, plans, strict=True):
         problem = rrtik.Problem(world, start, goal)
-        alone = rrtik.plan(problem, "fastrrtconnect", seed=each.seed, shorten=shorten)
+        alone = rrtik.plan(problem, "fastrrtconnect", seconds=60.0, seed=each.seed, shorten=shorten)
         assert same(each, alone)
         assert (each.proven, each.unshortened is None) == (alone.proven, alone.unshortened is None)
 
 
 def test_a_seed_that_is_drawn_is_named(boxes):
-    (drawn,) = rrtik.plan_many([boxes], "fastrrtconnect", seed=None)
-    assert same(drawn, rrtik.plan(boxes, "fastrrtconnect", seed=drawn.seed))
+    (drawn,) = rrtik.plan_many([boxes], "fastrrtconnect", seconds=60.0, seed=None)
+    assert same(drawn, rrtik.plan(boxes, "fastrrtconnect", seconds=60.0, seed=drawn.seed))
 
 
 def test_nothing_is_planned_for_nothing(boxes):
@@ -234,10 +238,12 @@ def test_workers_of_a_cluster_find_the_paths_of_threads(boxes, tmp_path):
     pytest.importorskip("distributed", reason="needs Dask: pip install 'rrtik-ompl[cluster]'")
     starts, goals = ends(boxes)
     with cluster(tmp_path) as (address, _):
-        in_world = rrtik.plan_many(boxes.world, starts, goals, "fastrrtconnect", seed=3, scheduler=address)
-        of_problems = rrtik.plan_many([boxes, "planar3_boxes"], "RRTConnect", scheduler=address)
-    here = rrtik.plan_many(boxes.world, starts, goals, "fastrrtconnect", seed=3)
-    here += rrtik.plan_many([boxes, "planar3_boxes"], "RRTConnect")
+        in_world = rrtik.plan_many(
+            boxes.world, starts, goals, "fastrrtconnect", seconds=60.0, seed=3, scheduler=address
+        )
+        of_problems = rrtik.plan_many([boxes, "planar3_boxes"], "RRTConnect", seconds=60.0, scheduler=address)
+    here = rrtik.plan_many(boxes.world, starts, goals, "fastrrtconnect", seconds=60.0, seed=3)
+    here += rrtik.plan_many([boxes, "planar3_boxes"], "RRTConnect", seconds=60.0)
     assert all(same(one, other) for one, other in zip(in_world + of_problems, here, strict=True))
     with pytest.raises(InputError, match="scheduler nowhere: no Dask scheduler answers"):
         rrtik.plan_many([boxes], scheduler="nowhere")
