@@ -204,6 +204,15 @@ def test_a_name_that_is_shipped_is_no_file():
         rrtik.load("absent.json")
 
 
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("odd", [None, 3, b"a.json", ["a"]])
+def test_what_is_no_name_of_a_file_is_refused(kind, odd):
+    with pytest.raises(rrtik.InputError, match="name of a file"):
+        found(KINDS[kind].value).load(odd, **NEEDS.get(kind, dict)())
+    with pytest.raises(rrtik.InputError, match="name of a file"):
+        rrtik.load(odd)
+
+
 def test_a_folder_is_a_configuration_of_moveit(tmp_path):
     assert kind_of(tmp_path) == "Robot"
 
