@@ -19,6 +19,8 @@ PLACED = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEY
 def is_made_by_users(name, kind):
     if not inspect.isclass(kind) or issubclass(kind, Exception) or getattr(kind, "_is_protocol", False):
         return False
+    if kind.__init__ is object.__init__:  # a kind of values that users name, but do not make
+        return False
     return name not in MADE and not inspect.signature(kind).parameters.keys() & {"reason", "reasons"}
 
 
