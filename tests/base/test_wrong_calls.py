@@ -12,7 +12,7 @@ from bench.robustness.values import ODD, good
 from rrtik_ompl.base.lazy import guided, public_values
 
 # Made by the library, not by users, as are results, which have a reason or reasons.
-MADE = {"Robot", "ik.ReachMap", "ompl.BenchmarkNotes", "ompl.RegionConstraint"}
+MADE = {"Robot", "Stage", "ik.ReachMap", "ompl.BenchmarkNotes", "ompl.RegionConstraint"}
 PLACED = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
 
 
