@@ -10,7 +10,6 @@ import rrtik_ompl as rrtik
 from rrtik_ompl.base.lazy import public_values
 
 OPEN = {
-    "World.with_settings",  # any field of WorldSettings
     "following.RobotLink",  # a protocol, which nobody calls
     "ompl.MotionChecker",  # of OMPL's bindings
 }

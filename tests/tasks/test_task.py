@@ -189,7 +189,7 @@ def test_a_robot_without_gripper_joints_and_a_start_in_collision(titan):
         (lambda: Alternatives([[]]), "none of them empty"),
         (lambda: Task([]), "at least one stage"),
         (lambda: Task([MoveTo("ready"), "open"]), "each stage of a task"),
-        (lambda: Task(MoveTo("ready")), "expected a list of stages"),
+        (lambda: Task(MoveTo("ready")), "stages of a task must be a list, got MoveTo"),
         (lambda: Attach("cup", 3), "link of Attach"),
         (lambda: Attach("cup", "panda_hand", padding=-0.01), "padding of Attach must not be negative"),
         (lambda: MoveTo(np.diag([1.0, 1.0, -1.0, 1.0])), "mirrors"),
