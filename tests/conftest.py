@@ -19,6 +19,9 @@ from rrtik_tests.programs import NO_CHROMIUM, NO_NODE
 settings.register_profile("rrtik", deadline=None, derandomize=bool(os.environ.get("CI")))
 settings.load_profile("rrtik")
 
+# Workers of pytest are told a width of the terminal, at which messages of the command line would fold.
+os.environ.pop("COLUMNS", None)
+
 # A shell ignores SIGINT in what it starts in the background, and children inherit that; tests of Ctrl-C send it.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
