@@ -19,8 +19,9 @@ from rrtik_tests.programs import NO_CHROMIUM, NO_NODE
 settings.register_profile("rrtik", deadline=None, derandomize=bool(os.environ.get("CI")))
 settings.load_profile("rrtik")
 
-# Workers of pytest are told a width of the terminal, at which messages of the command line would fold.
+# The module readline, which pytest imports, tells child processes a width, at which messages would fold.
 os.environ.pop("COLUMNS", None)
+os.unsetenv("COLUMNS")
 
 # A shell ignores SIGINT in what it starts in the background, and children inherit that; tests of Ctrl-C send it.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:

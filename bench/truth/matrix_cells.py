@@ -568,6 +568,7 @@ NO_WAYS = {
     "MotionQueries": "a protocol, and what those share who keep to it",
     "Task.load": "its world is made as that of a problem is; tests/tasks compares them",
     "TaskPlan.load": "likewise, of each motion",
+    "ReplanRun.load": "it holds a record of what was done, and no world",
     "Scenario.load": "it holds a problem, read as one",
 }
 

@@ -212,6 +212,7 @@ WAYS: dict[str, Remade] = {
 }
 
 NOT_OF_WORLDS = {
+    "ReplanRun.load": "holds a record of what was done, and no world",
     "Scenario.load": "holds a problem, read as one",
     "Roadmap.moved_to": "has the world that it is given",
 }

@@ -74,7 +74,7 @@ def show(
     kind = kind_of(problem)
     if kind in WITH_PROBLEM:
         raise InputError(f"{problem}: {KINDS[kind].what}; {WITH_PROBLEM[kind].format(problem)}")
-    if path is not None and kind_of(path) == "ReplanRun":
+    if kind != "TaskPlan" and path is not None and kind_of(path) == "ReplanRun":
         raise InputError(f"{path}: {KINDS['ReplanRun'].what}; {WITH_PROBLEM['ReplanRun'].format(path)}")
 
     drawn = _of_task if kind == "TaskPlan" else _of_problem

@@ -259,7 +259,7 @@ def refusing_others(file: FilePath, name: str) -> Iterator[None]:
         yield
     except InputError as error:
         try:
-            other = kind_of(file) if os.path.exists(file_name(file)) else None
+            other = kind_of(file) if os.path.isfile(file_name(file)) else None
         except InputError:  # it is what the reader says
             other = None
         if other is None or other == name or name in KINDS[other].also:

@@ -366,7 +366,7 @@ API = {
     "a file as scene": (lambda: rrtik.World(robot(), "scene.yaml"), ["scene of a world", "load_scene"]),
     "scene of shapes": (lambda: rrtik.Scene([Sphere(1)]), ["each obstacle", "Obstacle", "Sphere"]),
     "three names that may touch": (lambda: rrtik.Scene([], [], [("a", "b", "c")]), ["allowed_collisions", "pairs"]),
-    "obstacle of text": (lambda: rrtik.Obstacle("a", "box"), ["shape of 'a'", "Sphere or Cylinder", "str"]),
+    "obstacle of text": (lambda: rrtik.Obstacle("a", "box"), ["shape of 'a'", "Sphere, Cylinder", "str"]),
     "obstacle at no place": (lambda: rrtik.Obstacle("a", Sphere(1), [1, 2]), ["pose of 'a'", "SE3", "not 2 numbers"]),
     "obstacle without name": (lambda: rrtik.Obstacle(None, Sphere(1)), ["name", "str", "NoneType"]),
     "motion of numbers": (lambda: rrtik.Obstacle("a", Sphere(1), motion=[1, 0, 0]), ["motion of 'a'", "TimedPoses"]),

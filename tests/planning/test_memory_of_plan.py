@@ -17,7 +17,7 @@ from rrtik_ompl.model.shapes import Box
 def resident():
     return int(open("/proc/self/statm").read().split()[1]) * 4096 / 2**20
 
-robot = load_robot("point2d", parameters={"radius": 0.3, "bounds": [[0, 10], [0, 10]]})
+robot = load_robot("point2d", parameters=dict(radius=0.3, bounds=[[0, 10], [0, 10]]))
 wall = Obstacle("wall", Box([1, 7, 2]), pin.SE3(np.eye(3), np.array([5.0, 3.5, 0.0])))
 world = World(robot, Scene([wall]), motion_resolution=0.5)
 problem = Problem(world, [2, 2], [8, 2])

@@ -182,7 +182,7 @@ BROKEN = {
     "unit.dae": (dae("0"), "unit must be greater than 0"),
     "units.dae": (dae("centimetre"), "not a usable mesh"),
     "page.dae": (b"<html><body>404</body></html>", "not a usable mesh"),
-    "part.ply": (b"ply\n", "unknown kind of mesh"),
+    "part.ply": (b"ply\n", "a point cloud, not a mesh"),
     "part": (obj(), "unknown kind of mesh"),
 }
 

@@ -233,7 +233,7 @@ def test_a_message_of_ros_is_read_even_if_its_points_are_joined_by_other_curves(
 @pytest.mark.parametrize(
     ("name", "text", "words"),
     [
-        ("a.txt", "", "unknown ending"),
+        ("a.txt", "", "a path, not a timed motion"),
         ("a.json", "[1]", "trajectory file"),
         ("a.json", '{"points": [1]}', "list of objects"),
         ("a.json", '{"points": [{"positions": [0], "time_from_start": 0}]}', "point 1: no velocities"),
