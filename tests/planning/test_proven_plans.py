@@ -65,7 +65,7 @@ def test_a_preference_gives_way_where_no_path_keeps_it(planner):
     world = disc_world((5.0, 5.0 + 2.5 + 0.3004, 0.2, 5.0), (5.0, 5.0 - 2.5 - 0.3004, 0.2, 5.0))
     problem = rrtik.Problem(world, [2.0, 5.0], [8.0, 5.0])
     assert clearances_between(world, np.array([problem.start, problem.goal.q]), None).proven_clearance == CLEARANCE
-    found = plan(problem, planner, seed=1, seconds=60.0)
+    found = plan(problem, planner, seed=1, seconds=20.0)
     assert found.proven
     assert found.path.proof.clearance == 0.0
     assert not world.prove(found.path.waypoints, clearance=0.0005).proven
