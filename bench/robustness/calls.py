@@ -34,7 +34,8 @@ def functions() -> tuple[tuple[str, Function, tuple[inspect.Parameter, ...]], ..
     found: dict[str, Function] = dict(public_values(rrtik))
     for thing in values.good():
         if type(thing).__module__.startswith("rrtik_ompl"):
-            names = [name for name in dir(thing) if not name.startswith("_")]  # of Python 3.10 some others raise
+            kind = type(thing)  # properties of a value may raise
+            names = [name for name in dir(kind) if name[0] != "_" and callable(getattr(kind, name, None))]
             methods = [(name, each) for name in names if inspect.ismethod(each := getattr(thing, name, None))]
             found |= {f"{type(thing).__name__}.{name}": each for name, each in methods}
     return tuple(
