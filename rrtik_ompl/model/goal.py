@@ -133,6 +133,7 @@ class PositionGoal(Target):
 
     def tip_errors(self, tips: NDArray[np.float64]) -> tuple[Vector, Vector]:
         """Compute distances [m] and angles, always 0, of tip poses: (m, 4, 4) -> (m,) each."""
+        _check_tips(tips)
         return np.linalg.norm(tips[:, :3, 3] - self.position, axis=1), np.zeros(len(tips))
 
 
@@ -207,6 +208,7 @@ class PoseGoal(Target):
 
     def tip_errors(self, tips: NDArray[np.float64]) -> tuple[Vector, Vector]:
         """Compute position errors [m] and rotation angles [rad] of tip poses: (m, 4, 4) -> (m,) each."""
+        _check_tips(tips)
         return pose_errors(tips, self.T_world_tip)
 
 
@@ -399,6 +401,13 @@ TIP_GOALS = PARTS | GoalSet
 def _with_tip(robot: Robot, frame: str) -> Robot:
     """Return the same robot with another link as its tip, without its closed-form inverse kinematics."""
     return replace(robot, tip=frame, closed_form=None)
+
+
+def _check_tips(tips: NDArray[np.float64]) -> None:
+    """Raise an InputError if tip poses are no array of shape (m, 4, 4)."""
+    require(tips, np.ndarray, "tip poses", "use robot.fk_batch(Q)")
+    if tips.ndim != 3 or tips.shape[1:] != (4, 4) or tips.dtype.kind != "f":
+        raise InputError(f"tip poses: expected floats of shape (m, 4, 4), got {tips.dtype} of shape {tips.shape}")
 
 
 def pose_errors(tips: NDArray[np.float64], target: pin.SE3) -> tuple[Vector, Vector]:

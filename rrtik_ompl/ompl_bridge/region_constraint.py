@@ -6,7 +6,7 @@ import numpy as np
 from ompl import base as ob
 
 from rrtik_ompl.base.arrays import Matrix, Vector
-from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.errors import InputError, require
 from rrtik_ompl.constraints.equations import equation_count, equations
 from rrtik_ompl.ompl_bridge.setup import bounded_space
 from rrtik_ompl.ompl_bridge.states import StateIO
@@ -35,6 +35,7 @@ class RegionConstraint(ob.Constraint):  # type: ignore[misc]  # OMPL has no type
     """
 
     def __init__(self, problem: Problem) -> None:
+        require(problem, Problem, "problem of a constraint", "use Problem(world, start, goal, constraints=[...])")
         constraints = problem.world.constraints
         if constraints is None:
             raise InputError("problem: it has no path constraints")

@@ -9,6 +9,7 @@ from typing import Any
 from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.choices import ImproveStrategy, PathObjective, ProofMode
 from rrtik_ompl.base.copies import as_value, in_notebook, in_one_line
+from rrtik_ompl.base.errors import require
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.result import required
 from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory
@@ -102,6 +103,7 @@ class Plan:
     _repr_html_ = in_notebook
 
     def __post_init__(self) -> None:
+        require(self.path, JointPath | None, "path of a plan")
         if self.path is not None:
             gaps = () if self.path.proof is None else self.path.proof.unproven
             said = f"not proven free: {gaps[0]}" if gaps else ""
