@@ -17,7 +17,7 @@ from typer import Option
 from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.description.catalog import list_robots, load_robot
 from rrtik_ompl.files.cache import FOLDER_VARIABLE
-from rrtik_ompl.geometry.covers import cache
+from rrtik_ompl.kernels.covers import cache
 from rrtik_ompl.world.world import World
 
 

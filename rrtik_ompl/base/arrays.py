@@ -19,7 +19,9 @@ TAU = 2.0 * np.pi  # [rad] a full turn
 MOST_NUMBERS = 100_000_000  # largest size of one array, 0.8 GB
 BLOCK_ROWS = 16_384  # number of rows that are computed at a time
 MOST_ROWS = 1_000_000  # largest number of waypoints of a path, or of times of a motion
+_HASH_FACTORS = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], dtype=np.uint64)  # odd
 _LISTS = frozenset((list, tuple))
+QUIET_PRODUCT = 262_144  # multiplications; for more, OpenBLAS wakes threads, which then spin for longer than they work
 LARGEST = 1e6  # [m] or [rad]; larger numbers are mistakes, and too large for the kernels' float32
 
 
@@ -111,6 +113,59 @@ def distinct(values: ArrayLike) -> NDArray[Any]:
     first = np.ones(len(ordered), dtype=bool)
     np.not_equal(ordered[1:], ordered[:-1], out=first[1:])
     return ordered[first]
+
+
+def products(points: Matrix, vectors: Matrix) -> Matrix:
+    """Return the dot product of each point with each vector, shape (n, k), in one thread.
+
+    Args:
+        points: Shape (n, 3).
+        vectors: Shape (k, 3).
+
+    Example:
+        >>> products(np.eye(3), np.array([[1.0, 2.0, 3.0]])).ravel().tolist()
+        [1.0, 2.0, 3.0]
+    """
+    found = np.empty((len(points), len(vectors)), dtype=points.dtype)
+    rows = max(QUIET_PRODUCT // max(vectors.size, 1), 1)
+    for begin in range(0, len(points), rows):
+        np.matmul(points[begin : begin + rows], vectors.T, out=found[begin : begin + rows])
+    return found
+
+
+def welded(points: NDArray[Any]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Find points at the same place, many times faster than ``numpy.unique`` along an axis.
+
+    Args:
+        points: Shape (n, 3), of numbers of 64 bits.
+
+    Returns:
+        The index of the first point at each place, shape (k,), and for each point the number of its place in these,
+        shape (n,).
+
+    Example:
+        >>> first, place = welded(np.array([[0.0, 0.0, 1.0], [2.0, 0.0, 0.0], [-0.0, 0.0, 1.0]]))
+        >>> points = np.array([[0.0, 0.0, 1.0], [2.0, 0.0, 0.0]])
+        >>> sorted(first.tolist()), bool(place[0] == place[2] != place[1])
+        ([0, 1], True)
+    """
+    plain = np.ascontiguousarray(points + 0)  # -0.0 becomes 0.0
+    bits = plain.view(np.uint64)
+    keys = np.zeros(len(plain), dtype=np.uint64)
+    for column, factor in zip(bits.T, _HASH_FACTORS, strict=True):
+        keys = (keys ^ column) * factor
+        keys ^= keys >> np.uint64(29)
+
+    order = np.argsort(keys, kind="stable")
+    is_new = np.ones(len(order), dtype=bool)
+    np.not_equal(keys[order[1:]], keys[order[:-1]], out=is_new[1:])
+    first = order[is_new]
+    place = np.empty(len(order), dtype=np.int64)
+    place[order] = np.cumsum(is_new) - 1
+
+    if not (plain[first[place]] == plain).all():  # two places with one key, or what is not a number
+        _, first, place = np.unique(plain, axis=0, return_index=True, return_inverse=True)
+    return first, np.asarray(place).ravel()
 
 
 def finite_array(values: ArrayLike, shape: tuple[int | None, ...], what: str) -> NDArray[np.float64]:

@@ -17,8 +17,8 @@ from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.geometry.collision.bodies import Body, link_bodies
 from rrtik_ompl.geometry.collision.bodies import Pairs as Pairs
 from rrtik_ompl.geometry.collision.solids import of_each
-from rrtik_ompl.geometry.covers.cache import cached_inner_spheres, cached_outer_cover
 from rrtik_ompl.kernels import FastWorld, needs_covers
+from rrtik_ompl.kernels.covers.cache import cached_inner_spheres, cached_outer_cover
 from rrtik_ompl.kernels.tables.solid_tables import convex_solids
 from rrtik_ompl.model.robot import Robot
 

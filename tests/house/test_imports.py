@@ -87,7 +87,7 @@ def test_what_plan_needs_is_imported_without_what_checks_files():
 
 
 def test_a_world_is_loaded_without_a_compiler_and_without_what_covers_are_made_with():
-    code = "import sys, rrtik_ompl.world.world, rrtik_ompl.geometry.covers.cache, rrtik_ompl.kernels.checks.fast_world"
+    code = "import sys, rrtik_ompl.world.world, rrtik_ompl.kernels.covers.cache, rrtik_ompl.kernels.checks.fast_world"
     code += "; print([m for m in ('numba', 'scipy') if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"

@@ -11,8 +11,8 @@ from ompl import base as ob
 from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.description.urdf import robot_from_urdf_text
-from rrtik_ompl.geometry.covers.spheres import inner_spheres, outer_cover
 from rrtik_ompl.kernels import FastWorld, needs_covers
+from rrtik_ompl.kernels.covers.spheres import inner_spheres, outer_cover
 from rrtik_ompl.kernels.search import connect
 from rrtik_ompl.kernels.search.connect import ConnectSearch
 from rrtik_ompl.kernels.search.motions.motion_table import FastMotions

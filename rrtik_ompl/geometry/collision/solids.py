@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import weakref
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from functools import lru_cache, wraps
 from typing import Any, TypeAlias, TypeVar, cast
 
@@ -11,9 +11,10 @@ import coal
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.base.arrays import LARGEST, Matrix, Vector, distinct
+from rrtik_ompl.base.arrays import LARGEST, Matrix, Vector, distinct, products, welded
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.shapes.point_tree import curve_places
 
 Found = TypeVar("Found")
 # Two placed geometries: the first geometry, its coal.Transform3s, the second geometry, its coal.Transform3s.
@@ -24,6 +25,8 @@ Ends: TypeAlias = tuple[Any, Any, Any, Any]
 DEEPEST_DENT = 1e-6
 CONVEX_VOLUME_RATIO = 0.999
 COMPARED_AT_ONCE = 20_000  # pairs of a triangle and a face of the hull that are compared in one step
+BOX_POINTS = 32  # points of a box, in the search for those that are farthest along directions
+NEAREST_FACES = 8  # faces of the hull, of normals like its own, that a triangle is compared with first
 MOST_COMPARED = 400_000_000  # A mesh with more pairs of a triangle and a face of the hull stays a mesh.
 
 SMALLEST_AREA = 1e-18  # [m^2] twice the area below which a triangle has no usable normal
@@ -92,7 +95,61 @@ def _thickness(points: Matrix) -> float:
 
     It is the smallest singular value of the centred points, shape (n, 3).
     """
-    return float(np.linalg.svd(points - points.mean(axis=0), compute_uv=False)[-1])
+    return float(principal_axes(points)[0][-1])
+
+
+def principal_axes(points: Matrix) -> tuple[Vector, Matrix]:
+    """Return the singular values of centred points, shape (n, 3), descending, and the axes that go with them as rows.
+
+    The points are reduced to a triangular matrix first, by Gram and Schmidt's method, whose factor is accurate to
+    rounding [72]: a decomposition of all points would wake the threads of the library of linear algebra.
+    """
+    columns = [column.copy() for column in (points - points.mean(axis=0)).T]
+    triangle = np.zeros((3, 3))
+    for row in range(3):
+        triangle[row, row] = length = float(np.sqrt((columns[row] ** 2).sum()))
+        unit = columns[row] / max(length, 1e-300)
+        for other in range(row + 1, 3):
+            triangle[row, other] = share = float((unit * columns[other]).sum())
+            columns[other] -= share * unit
+    _, sizes, axes = np.linalg.svd(triangle)
+    return sizes, axes
+
+
+def farthest_along(points: Matrix, normals: Matrix) -> Vector:
+    """Return the largest dot product of any of the points with each normal, shape (k,).
+
+    Only boxes of points that may hold the farthest one are looked into, so that many points and normals take little
+    more time than a tenth of their number.
+
+    Args:
+        points: Shape (n, 3).
+        normals: Shape (k, 3).
+    """
+    if len(points) <= 4 * BOX_POINTS:
+        return np.asarray(products(normals, points).max(axis=1))
+
+    boxes = _boxes_of_points(points)
+    centres = 0.5 * (boxes.min(axis=1) + boxes.max(axis=1))
+    halves = 0.5 * np.ptp(boxes, axis=1)
+    found = np.empty(len(normals))
+    step = max(COMPARED_AT_ONCE * 10 // len(boxes), 1)
+    for begin in range(0, len(normals), step):
+        part = normals[begin : begin + step]
+        bounds = products(part, centres) + products(np.abs(part), halves)
+        best = np.einsum("npj,nj->np", boxes[bounds.argmax(axis=1)], part).max(axis=1)
+        rows, may_hold = np.nonzero(bounds > best[:, None])
+        heights = np.einsum("npj,nj->np", boxes[may_hold], part[rows]).max(axis=1, initial=-np.inf)
+        np.maximum.at(best, rows, heights)
+        found[begin : begin + step] = best
+    return found
+
+
+def _boxes_of_points(points: Matrix) -> NDArray[np.float64]:
+    """Return points in groups that are close together, shape (g, BOX_POINTS, 3); the last group repeats one point."""
+    ordered = points[np.argsort(curve_places(points.astype(np.float32)), kind="stable")]
+    missing = -len(points) % BOX_POINTS
+    return np.concatenate([ordered, np.repeat(ordered[-1:], missing, axis=0)]).reshape(-1, BOX_POINTS, 3)
 
 
 def convexified(geometry: coal.CollisionGeometry) -> coal.CollisionGeometry:
@@ -105,7 +162,7 @@ def convexified(geometry: coal.CollisionGeometry) -> coal.CollisionGeometry:
 
     if len(triangles) * hull_solid.num_polygons > MOST_COMPARED:
         return geometry
-    return hull_solid if _depth(vertices, triangles, hull_solid) <= DEEPEST_DENT else geometry
+    return geometry if _has_dent(vertices, triangles, hull_solid) else hull_solid
 
 
 def fills_its_hull(geometry: coal.CollisionGeometry) -> bool:
@@ -125,11 +182,12 @@ def _fills_its_hull(geometry: coal.CollisionGeometry) -> bool:
     return bool(volume >= CONVEX_VOLUME_RATIO * hull_solid.computeVolume())
 
 
-def _depth(vertices: Matrix, triangles: NDArray[np.int64], solid: coal.Convex) -> float:
-    """Return an upper bound on how far triangles lie below the surface of their convex hull [m].
+def _has_dent(vertices: Matrix, triangles: NDArray[np.int64], solid: coal.Convex) -> bool:
+    """Check whether a triangle may lie deeper below the surface of the convex hull than ``DEEPEST_DENT``.
 
-    Each triangle is compared with one face of the hull, the one nearest to the triangle's middle: no point of the
-    triangle is farther from that face's plane than the farthest of its corners.
+    No point of a triangle is farther from the plane of a face than the farthest of its corners, whichever face it is.
+    So it is enough to find one face that all three corners are near to: among those whose normals are most like the
+    triangle's own, or else the one that is nearest to the triangle's middle.
 
     Args:
         vertices: Vertices of the mesh, shape (n, 3).
@@ -137,14 +195,40 @@ def _depth(vertices: Matrix, triangles: NDArray[np.int64], solid: coal.Convex) -
         solid: The convex hull.
     """
     normals, _ = face_normals(*convex_arrays(solid))
+    offsets = farthest_along(vertices, normals)
     corners = vertices[triangles]
 
-    part_count = 1 + len(triangles) * len(normals) // COMPARED_AT_ONCE
-    hull_offsets = np.concatenate([(vertices @ part.T).max(axis=0) for part in np.array_split(normals, part_count)])
-    middle_parts = np.array_split(corners.mean(axis=1), part_count)
-    nearest = np.concatenate([(hull_offsets - part @ normals.T).argmin(axis=1) for part in middle_parts])
+    own = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    own /= np.maximum(np.linalg.norm(own, axis=1), 1e-300)[:, None]
+    outward = np.einsum("ij,ij->i", own, corners.mean(axis=1) - vertices.mean(axis=0))
+    own *= np.where(outward < 0.0, -1.0, 1.0)[:, None]
 
-    return float((hull_offsets[nearest, None] - np.einsum("tcj,tj->tc", corners, normals[nearest])).max())
+    depth = np.full(len(triangles), np.inf)
+    for faces in _similar(normals, own):
+        below = offsets[faces, None] - np.einsum("tcj,tj->tc", corners, normals[faces])
+        depth = np.minimum(depth, below.max(axis=1))
+
+    doubtful = corners[depth > DEEPEST_DENT]
+    step = max(COMPARED_AT_ONCE // len(normals), 1)
+    for begin in range(0, len(doubtful), step):
+        part = doubtful[begin : begin + step]
+        nearest = (offsets - products(part.mean(axis=1), normals)).argmin(axis=1)
+        depth = offsets[nearest, None] - np.einsum("tcj,tj->tc", part, normals[nearest])
+        if (depth > DEEPEST_DENT).any():
+            return True
+    return False
+
+
+def _similar(normals: Matrix, wanted: Matrix) -> Iterator[NDArray[np.int64]]:
+    """Yield ``NEAREST_FACES`` times the index of a normal that is mostly much like each of the wanted ones, shape (m,).
+
+    They are neighbours along a curve through the normals.
+    """
+    places = curve_places(np.concatenate([normals, wanted]).astype(np.float32))
+    order = np.argsort(places[: len(normals)], kind="stable")
+    at = np.searchsorted(places[order], places[len(normals) :])
+    for step in range(-(NEAREST_FACES // 2), NEAREST_FACES // 2):
+        yield order[np.clip(at + step, 0, len(order) - 1)]
 
 
 def is_mesh(geometry: coal.CollisionGeometry) -> bool:
@@ -261,8 +345,8 @@ def outward_planes(solid: coal.Convex) -> Matrix | None:
 
     # The largest of several almost parallel faces comes first and represents them.
     normals = normals[np.argsort(-areas)]
-    normals = normals[np.sort(np.unique(np.round(normals, 6), axis=0, return_index=True)[1])]
-    return np.column_stack([normals, (points @ normals.T).max(axis=0)])
+    normals = normals[np.sort(welded(np.round(normals, 6))[0])]
+    return np.column_stack([normals, farthest_along(points, normals)])
 
 
 def most_different(planes: Matrix, count: int) -> Matrix:
@@ -289,8 +373,7 @@ def is_closed(geometry: coal.CollisionGeometry) -> bool:
     """
     vertices, triangles = mesh_arrays(geometry)
     # Vertices at the same place are merged, as many files give each triangle its own vertices.
-    _, welded = np.unique(vertices, axis=0, return_inverse=True)
-    corners = np.asarray(welded).ravel()[triangles]
+    corners = welded(vertices)[1][triangles]
 
     start = corners.ravel()
     end = np.roll(corners, -1, axis=1).ravel()

@@ -18,7 +18,7 @@ from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.geometry.collision.cloud_solid import CloudSolid
 from rrtik_ompl.geometry.collision.shape_table import core_of
 from rrtik_ompl.geometry.collision.solids import is_mesh, once_per_geometry
-from rrtik_ompl.geometry.covers.cache import cached_convex_pieces
+from rrtik_ompl.kernels.covers.cache import cached_convex_pieces
 from rrtik_ompl.kernels.layout import (
     AROUND_END,
     AROUND_FIRST,

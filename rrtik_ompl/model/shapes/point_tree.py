@@ -62,7 +62,7 @@ def point_tree(points: NDArray[np.float32]) -> PointTree:
     """Build the tree of one or more points, shape (n, 3)."""
     # Sort the points along the curve and repeat the last one to fill its block.
     count = -(-len(points) // LEAF)
-    order = np.argsort(_places(points))
+    order = np.argsort(curve_places(points))
     order = np.append(order, np.full(count * LEAF - len(points), order[-1]))
     blocks = points[order.reshape(count, LEAF).T]  # shape (LEAF, blocks, 3)
 
@@ -92,7 +92,7 @@ def point_tree(points: NDArray[np.float32]) -> PointTree:
     return PointTree(packed, np.concatenate(levels), np.array(firsts, dtype=np.int32))
 
 
-def _places(points: NDArray[np.float32]) -> NDArray[np.uint32]:
+def curve_places(points: NDArray[np.float32]) -> NDArray[np.uint32]:
     """Compute the positions of points along the Morton curve, which interleaves the bits of coordinates, shape (n,)."""
     low, high = extremes(points)
     extent = float((high - low).max())

@@ -14,7 +14,7 @@ import pytest
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.geometry.collision.shape_table import core_of, pieces, shape_of, sizes_of
 from rrtik_ompl.geometry.collision.solids import mesh_arrays
-from rrtik_ompl.geometry.covers.spheres import outer_cover, protrusion_bound
+from rrtik_ompl.kernels.covers.spheres import outer_cover, protrusion_bound
 from rrtik_ompl.model.scene import Obstacle, Scene
 from rrtik_ompl.model.shapes import (
     SHAPES,

@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from rrtik_ompl.base.arrays import Matrix, Vector
-from rrtik_ompl.geometry.covers.cells import Elements
-from rrtik_ompl.geometry.covers.solids import Triangles
+from rrtik_ompl.base.arrays import QUIET_PRODUCT, Matrix, Vector
+from rrtik_ompl.kernels.covers.cells import Elements
+from rrtik_ompl.kernels.covers.solids import Triangles
 
 CANDIDATES = 400
 LEAST_ON_SURFACE = 80  # least number of candidates at the surface, for thin or open parts of the solid
@@ -28,7 +28,6 @@ RECENTRING_STEPS = 10  # steps by which each ball is moved in a round
 MAX_RELOCATIONS = 4  # largest number of balls that are moved elsewhere in a round
 # A ball is moved elsewhere if the protrusion that results without it is below this share of the largest one.
 RELOCATION_GAIN = 0.95
-CHUNK = 64  # centres whose radii are computed in one step
 
 CentreElementTable = NDArray[np.float32]  # shape (centres, elements)
 
@@ -123,8 +122,9 @@ def reaches(elements: Elements, centres: Matrix) -> CentreElementTable:
     ball_radii = elements.radii.astype(np.float32)
     radii = np.empty((len(centres), len(elements.start)), dtype=np.float32)
 
-    for k in range(0, len(centres), CHUNK):
-        chunk = centres[k : k + CHUNK].astype(np.float32)
+    rows = max(QUIET_PRODUCT // points.size, 1)
+    for k in range(0, len(centres), rows):
+        chunk = centres[k : k + rows].astype(np.float32)
         # Compute |p - c|^2 = |p|^2 - 2 p c + |c|^2 in place, to save memory.
         distances = chunk @ points
         distances *= -2.0
@@ -133,7 +133,7 @@ def reaches(elements: Elements, centres: Matrix) -> CentreElementTable:
         np.maximum(distances, 0.0, out=distances)
         np.sqrt(distances, out=distances)
         distances += ball_radii
-        np.maximum.reduceat(distances, elements.start, axis=1, out=radii[k : k + CHUNK])
+        np.maximum.reduceat(distances, elements.start, axis=1, out=radii[k : k + rows])
 
     return radii
 

@@ -18,7 +18,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
 
-from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.base.arrays import Matrix, Vector, products, welded
 from rrtik_ompl.geometry.collision.enclosure import enclosure
 from rrtik_ompl.geometry.collision.solids import inside_mesh, is_closed, mesh_arrays, most_different
 
@@ -65,7 +65,8 @@ class _Cell:
     def points(self) -> Matrix:
         """Return the corners of the surface's triangles and of the boxes, each once, shape (n, 3)."""
         box_corners = np.where(CORNER_IS_HIGH, self.boxes[:, None, 1], self.boxes[:, None, 0])
-        return np.unique(np.concatenate([self.surface.reshape(-1, 3), box_corners.reshape(-1, 3)]), axis=0)
+        corners = np.concatenate([self.surface.reshape(-1, 3), box_corners.reshape(-1, 3)])
+        return np.asarray(corners[welded(corners)[0]])
 
     @cached_property
     def volume(self) -> float:
@@ -185,8 +186,7 @@ def _closed_pieces(shells: list[Triangles]) -> tuple[list[Matrix], list[Matrix],
 
 def _shells(vertices: Matrix, triangles: NDArray[np.int64]) -> list[Triangles]:
     """Divide a surface into its connected parts; if there are too many, return the whole surface as one."""
-    _, welded = np.unique(vertices, axis=0, return_inverse=True)
-    corners = np.asarray(welded).ravel()[triangles]
+    corners = welded(vertices)[1][triangles]
 
     edge_ends = corners.ravel(), np.roll(corners, 1, axis=1).ravel()
     size = int(corners.max()) + 1
@@ -236,7 +236,7 @@ def _sketch(surface: Triangles) -> Triangles:
 
     grid_points = np.round((surface - low) / grid_step).astype(np.int64)
     corner_numbers = np.sort(grid_points @ ((GRID + 1) ** np.arange(3)), axis=1)
-    distinct_rows = np.unique(corner_numbers, axis=0, return_index=True)[1]
+    distinct_rows, _ = welded(corner_numbers)
     has_area = (corner_numbers[distinct_rows, 1:] != corner_numbers[distinct_rows, :-1]).all(axis=1)
     return np.asarray(low + grid_step * grid_points[distinct_rows[has_area]])
 
@@ -336,7 +336,7 @@ def _convex_body_inside(planes: Matrix, cell: _Cell) -> Matrix | None:
     all_planes = np.concatenate([cell_planes, most_different(planes, MAX_PLANES)])
 
     # Least coordinate of each triangle along each normal, shape (triangles, planes).
-    lowest = np.min([cell.surface[:, k] @ all_planes[:, :3].T for k in range(3)], axis=0)
+    lowest = np.min([products(cell.surface[:, k], all_planes[:, :3]) for k in range(3)], axis=0)
     nearest = (all_planes[:, 3] - lowest).argmin(axis=1)
     offsets = all_planes[:, 3].copy()
     np.minimum.at(offsets, nearest, lowest[np.arange(len(nearest)), nearest])
@@ -359,7 +359,7 @@ def _convex_body_inside(planes: Matrix, cell: _Cell) -> Matrix | None:
 
 def _extreme_points(points: Matrix) -> Matrix:
     """Return the points that lie farthest in one of a fixed set of directions, each once."""
-    return points[np.unique((points @ _unit_directions().T).argmax(axis=0))] if len(points) else points
+    return points[np.unique(products(points, _unit_directions()).argmax(axis=0))] if len(points) else points
 
 
 def _unit_directions() -> Matrix:

@@ -1,7 +1,7 @@
 """Compute balls whose union contains a solid (outer covers) and balls inside it (inner spheres), for any coal geometry.
 
 An outer cover is guaranteed, not sampled: the solid is cut into convex elements without gaps
-(``geometry/covers/cells.py``), and each element lies wholly inside one ball (``geometry/covers/search.py``). Capsules,
+(``kernels/covers/cells.py``), and each element lies wholly inside one ball (``kernels/covers/search.py``). Capsules,
 cylinders and boxes have covers by formula too. Inner spheres leave little room between themselves and the surface: a
 body that reaches deeper into the solid than that room meets an inner sphere. They are chosen greedily, each as the one
 that reduces that room most, averaged over points of the surface.
@@ -21,9 +21,9 @@ from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.geometry.collision.enclosure import enclosure
 from rrtik_ompl.geometry.collision.shape_table import Core, box_corners, core_of
 from rrtik_ompl.geometry.collision.solids import is_closed, is_mesh, mesh_arrays, vertices_of
-from rrtik_ompl.geometry.covers.cells import elements, lattice_inside
-from rrtik_ompl.geometry.covers.search import random_subset, smallest_cover, surface_points
-from rrtik_ompl.geometry.covers.solids import (
+from rrtik_ompl.kernels.covers.cells import elements, lattice_inside
+from rrtik_ompl.kernels.covers.search import random_subset, smallest_cover, surface_points
+from rrtik_ompl.kernels.covers.solids import (
     ROUNDING,
     Frame,
     MeshSolid,

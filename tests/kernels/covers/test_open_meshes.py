@@ -9,10 +9,10 @@ from scipy.spatial import ConvexHull
 
 from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.geometry.collision.solids import bvh, inside_mesh, mesh_arrays, robot_solids
-from rrtik_ompl.geometry.covers import spheres as covers
-from rrtik_ompl.geometry.covers.solids import rim_caps
-from rrtik_ompl.geometry.covers.spheres import inner_spheres, outer_cover
 from rrtik_ompl.kernels import COLLIDING, FREE, FastWorld, needs_covers
+from rrtik_ompl.kernels.covers import spheres as covers
+from rrtik_ompl.kernels.covers.solids import rim_caps
+from rrtik_ompl.kernels.covers.spheres import inner_spheres, outer_cover
 from rrtik_ompl.model.scene import Obstacle, Scene
 from rrtik_ompl.model.shapes import Mesh
 from rrtik_ompl.world.world import World

@@ -15,8 +15,8 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull
 
-from rrtik_ompl.base.arrays import TAU, Matrix, Vector
-from rrtik_ompl.geometry.collision.solids import inside_mesh
+from rrtik_ompl.base.arrays import TAU, Matrix, Vector, products, welded
+from rrtik_ompl.geometry.collision.solids import farthest_along, inside_mesh, principal_axes
 
 # Allowance for rounding, relative to the extent of the solid: far above float64's, far below any length that matters.
 ROUNDING = 1e-12
@@ -36,7 +36,8 @@ class Frame:
 
     def to_local(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Convert points of the geometry's frame, shape (..., 3), to the frame of the unit-sized solid."""
-        return np.asarray((points - self.centre) @ self.rotation / self.scale)
+        moved = products((points - self.centre).reshape(-1, 3), self.rotation.T) / self.scale
+        return np.asarray(moved.reshape(points.shape))
 
     def spheres_out(self, spheres: Matrix, slack: float) -> Matrix:
         """Convert spheres, shape (n, 4), to the geometry's frame.
@@ -46,7 +47,7 @@ class Frame:
             slack: Length relative to the solid's extent that is added to each radius, together with an allowance for
                 rounding; negative to shrink the spheres.
         """
-        centres = self.centre + self.scale * spheres[:, :3] @ self.rotation.T
+        centres = self.centre + self.scale * products(spheres[:, :3], self.rotation)
         rounding = 4e-15 * float(np.abs(self.centre).max())
         grow = slack * self.scale + np.sign(slack) * rounding
         return np.column_stack([centres, self.scale * spheres[:, 3] + grow])
@@ -91,7 +92,7 @@ class ConvexSolid:
 
     def depth(self, points: Matrix) -> Vector:
         """Return the smallest distance of each point, shape (n, 3), to one of the planes, negative outside."""
-        return np.asarray((self.offsets - points @ self.normals.T).min(axis=1) - self.slack)
+        return np.asarray((self.offsets - products(points, self.normals)).min(axis=1) - self.slack)
 
     def distance(self, points: Matrix) -> Vector:
         """Return the same as ``depth``."""
@@ -164,8 +165,8 @@ def convex_solid(points: Matrix) -> tuple[ConvexSolid, Frame]:
         ValueError: If the points lie in a plane.
     """
     middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
-    _, _, axes = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)
-    in_axes = (points - middle) @ axes.T
+    _, axes = principal_axes(points)
+    in_axes = products(points - middle, axes)
     centre = middle + 0.5 * (in_axes.min(axis=0) + in_axes.max(axis=0)) @ axes
     extent = np.ptp(in_axes, axis=0)
     frame = Frame(centre, axes.T, float(np.linalg.norm(extent)))
@@ -186,7 +187,7 @@ def convex_solid(points: Matrix) -> tuple[ConvexSolid, Frame]:
     outward = np.einsum("ij,ij->i", np.cross(b - a, c - a), normals)
     triangles[outward < 0.0] = triangles[outward < 0.0][:, ::-1]
 
-    points_beyond_planes = float((local @ normals.T - offsets).max())
+    points_beyond_planes = float((farthest_along(local, normals) - offsets).max())
     planes_beyond_triangles = float((offsets[:, None] - np.einsum("ijk,ik->ij", triangles, normals)).max())
     return ConvexSolid(
         triangles, normals, offsets, max(points_beyond_planes, 0.0) + max(planes_beyond_triangles, 0.0) + ROUNDING
@@ -232,7 +233,8 @@ def mesh_solid(vertices: Matrix, triangles: NDArray[np.int64], boxes: tuple[Matr
         boxes: Lowest and highest corners of boxes that an open mesh encloses, shape (k, 3) each.
     """
     used_vertices, point_of_corner = np.unique(triangles, return_inverse=True)
-    points, welded = np.unique(vertices[used_vertices], axis=0, return_inverse=True)
+    first, place = welded(vertices[used_vertices])
+    points = vertices[used_vertices[first]]
 
     low = points.min(axis=0)
     high = points.max(axis=0)
@@ -240,7 +242,7 @@ def mesh_solid(vertices: Matrix, triangles: NDArray[np.int64], boxes: tuple[Matr
 
     enclosed = np.where(CORNERS[None] == 1, boxes[1][:, None], boxes[0][:, None])
     local = frame.to_local(enclosed.reshape(-1, 3)).reshape(-1, 8, 3)
-    return MeshSolid(frame.to_local(points), welded.ravel()[point_of_corner.reshape(-1, 3)], local), frame
+    return MeshSolid(frame.to_local(points), place[point_of_corner.reshape(-1, 3)], local), frame
 
 
 def _bounding_balls(triangles: Triangles) -> tuple[Matrix, Vector]:
@@ -286,7 +288,7 @@ def _loop_centres(ends: NDArray[np.float64]) -> Matrix:
     Args:
         ends: Both ends of each edge, shape (b, 2, 3).
     """
-    _, number = np.unique(ends.reshape(-1, 3), axis=0, return_inverse=True)
+    _, number = welded(ends.reshape(-1, 3))
     start, end = number.reshape(-1, 2).T
     size = int(number.max()) + 1
     links = coo_matrix((np.ones(len(start)), (start, end)), shape=(size, size))

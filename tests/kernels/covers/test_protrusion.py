@@ -4,7 +4,7 @@ import coal
 import numpy as np
 import pytest
 
-from rrtik_ompl.geometry.covers.spheres import inner_spheres, outer_cover, protrusion_bound
+from rrtik_ompl.kernels.covers.spheres import inner_spheres, outer_cover, protrusion_bound
 from rrtik_tests.covered_solids import SOLIDS, TOLERANCE, gap_outside, mesh_solid, points_of
 from rrtik_tests.sizes import how_many
 

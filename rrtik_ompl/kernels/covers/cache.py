@@ -25,8 +25,8 @@ from rrtik_ompl.geometry.collision.shape_table import numbers_of
 from rrtik_ompl.geometry.collision.solids import around, fills_its_hull, is_mesh
 
 LAYOUT = 1
-ALGORITHM = 3  # counts up when rrtik_ompl.geometry.covers.spheres makes other spheres of the same geometry
-PIECES = 2  # counts up when rrtik_ompl.geometry.covers.mesh_pieces makes other pieces of the same mesh
+ALGORITHM = 3  # counts up when rrtik_ompl.kernels.covers.spheres makes other spheres of the same geometry
+PIECES = 2  # counts up when rrtik_ompl.kernels.covers.mesh_pieces makes other pieces of the same mesh
 STORE = Path(__file__).with_name("shipped.npz")
 COLUMNS = 4  # numbers in a row of a cover
 
@@ -40,7 +40,7 @@ def cached_outer_cover(geometry: coal.CollisionGeometry, *, protrusion: float | 
 
     def make() -> Matrix:
         # Imported late, as it loads scipy, which takes longer than reading covers from the cache.
-        from rrtik_ompl.geometry.covers.spheres import outer_cover
+        from rrtik_ompl.kernels.covers.spheres import outer_cover
 
         return outer_cover(solid, protrusion=protrusion)
 
@@ -51,7 +51,7 @@ def cached_inner_spheres(geometry: coal.CollisionGeometry, *, count: int | None 
     """Return the ``inner_spheres`` of a geometry, from the cache if they are there."""
 
     def make() -> Matrix:
-        from rrtik_ompl.geometry.covers.spheres import inner_spheres
+        from rrtik_ompl.kernels.covers.spheres import inner_spheres
 
         return inner_spheres(geometry, count=count)
 
@@ -66,7 +66,7 @@ def cached_convex_pieces(mesh: coal.BVHModelBase) -> tuple[list[Matrix], ...]:
     """
 
     def make() -> Matrix:
-        from rrtik_ompl.geometry.covers.mesh_pieces import convex_pieces
+        from rrtik_ompl.kernels.covers.mesh_pieces import convex_pieces
 
         kinds = convex_pieces(mesh)
         rows = [np.empty((0, 4))]

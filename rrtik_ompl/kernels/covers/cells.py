@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Matrix, Vector
-from rrtik_ompl.geometry.covers.solids import CORNERS, Solid, Triangles
+from rrtik_ompl.kernels.covers.solids import CORNERS, Solid, Triangles
 
 MAX_CELLS = 120_000
 MAX_CELLS_ALONG_AXIS = 160.0  # limited, as a long triangle is cut into many more pieces than there are cells

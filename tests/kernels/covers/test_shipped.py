@@ -8,9 +8,9 @@ from rrtik_ompl.files import notice
 from rrtik_ompl.files.cache import FOLDER_VARIABLE
 from rrtik_ompl.geometry.collision.bodies import link_bodies
 from rrtik_ompl.geometry.collision.solids import is_mesh, mesh_arrays
-from rrtik_ompl.geometry.covers import cache
-from rrtik_ompl.geometry.covers.cache import cached_convex_pieces, cached_inner_spheres, cached_outer_cover
-from rrtik_ompl.geometry.covers.spheres import inner_spheres, outer_cover
+from rrtik_ompl.kernels.covers import cache
+from rrtik_ompl.kernels.covers.cache import cached_convex_pieces, cached_inner_spheres, cached_outer_cover
+from rrtik_ompl.kernels.covers.spheres import inner_spheres, outer_cover
 from rrtik_ompl.world.world import World
 from rrtik_tests.covered_solids import SOLIDS, mesh_solid
 

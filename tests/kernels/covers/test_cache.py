@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from rrtik_ompl.files.cache import FOLDER_VARIABLE
-from rrtik_ompl.geometry.covers import cache as cover_cache
-from rrtik_ompl.geometry.covers import spheres as covers
-from rrtik_ompl.geometry.covers.cache import cached_inner_spheres, cached_outer_cover
+from rrtik_ompl.kernels.covers import cache as cover_cache
+from rrtik_ompl.kernels.covers import spheres as covers
+from rrtik_ompl.kernels.covers.cache import cached_inner_spheres, cached_outer_cover
 from rrtik_tests.covered_solids import SOLIDS, mesh_solid
 
 

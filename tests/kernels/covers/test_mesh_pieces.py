@@ -6,7 +6,7 @@ from scipy.spatial import ConvexHull
 
 from rrtik_ompl.geometry.collision.enclosure import enclosure
 from rrtik_ompl.geometry.collision.solids import bvh, inside_mesh, mesh_arrays
-from rrtik_ompl.geometry.covers.mesh_pieces import convex_pieces
+from rrtik_ompl.kernels.covers.mesh_pieces import convex_pieces
 from rrtik_tests.bent_meshes import KINDS
 
 

@@ -1,4 +1,0 @@
-"""Compute sphere covers and convex pieces of solids, once per geometry, and cache them.
-
-No kernel depends on the source of these modules, so that an edit recompiles none.
-"""
