@@ -14,6 +14,7 @@ from types import FunctionType, ModuleType
 from typing import Any
 
 from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.floors import fitting_packages
 
 
 def lazy_names(
@@ -38,9 +39,9 @@ def lazy_names(
         if name not in public:
             raise AttributeError(f"module '{package}' has no attribute '{name}'")
         home = home_of.get(name)
-        value = (
-            import_module(f"{package}.{name}") if home is None else getattr(import_module(f"rrtik_ompl.{home}"), name)
-        )
+        with fitting_packages():
+            module = import_module(f"{package}.{name}" if home is None else f"rrtik_ompl.{home}")
+        value = module if home is None else getattr(module, name)
         if isinstance(value, type):
             guided(value)
         setattr(sys.modules[package], name, value)

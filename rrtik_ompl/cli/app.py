@@ -13,6 +13,7 @@ from typing import Annotated, Any
 import typer
 
 from rrtik_ompl.base.errors import RrtikError
+from rrtik_ompl.base.floors import fitting_packages
 from rrtik_ompl.cli import BAD_INPUT, FOUND, INTERRUPTED, NOT_FOUND
 from rrtik_ompl.cli.bench import bench
 from rrtik_ompl.cli.check import check
@@ -180,7 +181,7 @@ def run(arguments: list[str] | None = None) -> int:
                 command_line(given)(args=["--help"], prog_name="rrtik", standalone_mode=False)
             return BAD_INPUT
 
-        with stoppable():
+        with fitting_packages(), stoppable():
             code = command_line(given)(args=given, prog_name="rrtik", standalone_mode=False)
         sys.stdout.flush()
         if code == INTERRUPTED:  # typer converts KeyboardInterrupt to this exit code

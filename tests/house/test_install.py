@@ -7,6 +7,7 @@ import pytest
 import yaml
 
 import rrtik_ompl
+from rrtik_ompl.base.floors import FLOORS
 from rrtik_tests.places import ROOT
 
 PROJECT = (ROOT / "pyproject.toml").read_text()
@@ -30,9 +31,11 @@ def bounds():
     return dict(re.findall(r'"([\w-]+)>=([\w.]+)', section))
 
 
-def floor():
-    """Versions of the floor job, by name."""
-    return dict(re.findall(r"^([\w-]+)==(\S+)$", (ROOT / "tests" / "constraints" / "floor.txt").read_text(), re.M))
+def floors():
+    """The lowest of the versions of the floor job, by name."""
+    files = [(ROOT / "tests" / "constraints" / f"{name}.txt").read_text() for name in ("floor", "placo")]
+    found = [pair for text in files for pair in re.findall(r"^([\w-]+)==(\S+)$", text, re.M)]
+    return dict(sorted(found, key=lambda pair: [int(part) for part in pair[1].split(".")], reverse=True))
 
 
 def pythons():
@@ -42,7 +45,12 @@ def pythons():
 
 def test_the_floor_job_has_the_lowest_versions_that_are_admitted():
     assert len(bounds()) > 10
-    assert bounds().items() <= floor().items()
+    assert bounds().items() <= floors().items()
+
+
+def test_what_is_refused_as_too_old_is_below_the_bounds():
+    assert len(FLOORS) > 10
+    assert [(name, version) for name, version in FLOORS.values() if not bounds()[name].startswith(version)] == []
 
 
 def test_the_hook_that_makes_kernels_takes_the_same_numba():

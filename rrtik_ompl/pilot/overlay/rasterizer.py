@@ -1,8 +1,8 @@
-"""Convert solids to triangles, place them in front of a camera, and draw them with OpenCV's rasteriser.
+"""Convert solids to triangles, place them in front of a camera, and draw them with OpenCV's rasteriser, or in numpy.
 
 A `Surface` holds the triangles of one solid. A `Figure` joins many surfaces in one set of arrays, sorted by the frame
 that carries them. `placed` transforms a figure to the frame of a camera in a few array operations; this is the work of
-every picture. A `Canvas` holds the colours and depths of a picture. The rasteriser accepts only an opening angle:
+every picture. A `Canvas` holds the colours and depths of a picture. OpenCV's rasteriser accepts only an opening angle:
 focal lengths, the principal point and half a pixel are folded into the view matrix.
 """
 
@@ -24,6 +24,7 @@ from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import Obstacle
 from rrtik_ompl.model.shapes import Shape
 from rrtik_ompl.model.shapes.surfaces import Faces
+from rrtik_ompl.pilot.overlay.triangle_raster import rasterize
 from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.viewer.drawing import palette
 from rrtik_ompl.viewer.drawing.triangles import split_creases, thin_out
@@ -298,13 +299,21 @@ class Canvas:
         if len(figure.faces) == 0:
             return
 
+        points = np.ascontiguousarray(_bent(figure.points, self.camera), dtype=np.float32)
+        if not hasattr(cv2, "triangleRasterize"):  # before OpenCV 5
+            picture = self.colors, self.depths
+            depth_range = NEAREST_DRAWN, FARTHEST_DRAWN
+            rasterize(
+                points, figure.faces, figure.colors, picture, self.camera.matrix, depth_range, both_sides=both_sides
+            )
+            return
+
         culling = cv2.RASTERIZE_CULLING_NONE if both_sides else cv2.RASTERIZE_CULLING_CW
         settings: Any = cv2.TriangleRasterizeSettings()
         settings = settings.setShadingType(cv2.RASTERIZE_SHADING_SHADED).setCullingMode(culling)
 
-        points = np.ascontiguousarray(_bent(figure.points, self.camera), dtype=np.float32)
-        rasterize: Any = cv2.triangleRasterize
-        self.colors, self.depths = rasterize(
+        rasterizer: Any = cv2.triangleRasterize
+        self.colors, self.depths = rasterizer(
             points,
             figure.faces,
             figure.colors,

@@ -17,6 +17,7 @@ from rrtik_ompl.pilot.overlay.augment import MAX_LAYERS, Augmenter, Ghost
 from rrtik_ompl.pilot.overlay.rasterizer import (
     FARTHEST_DRAWN,
     Canvas,
+    Placed,
     figure_of,
     obstacle_surfaces,
     placed,
@@ -30,6 +31,14 @@ BENT = published_camera((0.05, -0.12, 0.0005, -0.0007, 0.03))
 EYE = orbit_pose([0.8, 0.0, 0.2], 2.2, np.radians(-50.0), np.radians(25.0))
 
 
+@pytest.fixture(params=["of this OpenCV", "in numpy"])
+def rasterizer(request, monkeypatch):
+    """OpenCV's rasteriser if it has one, which came with version 5, and ours without it."""
+    if request.param == "in numpy":
+        monkeypatch.delattr(cv2, "triangleRasterize", raising=False)
+
+
+@pytest.mark.usefixtures("rasterizer")
 @pytest.mark.parametrize("name", ["titan4", "ur5"])
 def test_silhouette_and_depth_are_those_of_a_z_buffer(name):
     robot = load_robot(name)
@@ -44,6 +53,7 @@ def test_silhouette_and_depth_are_those_of_a_z_buffer(name):
     assert np.abs(canvas.depths - truth)[canvas.drawn].max() < 1e-4
 
 
+@pytest.mark.usefixtures("rasterizer")
 @pytest.mark.parametrize("camera", [CAMERA, BENT], ids=["pinhole", "lens"])
 def test_what_is_drawn_lies_where_the_camera_sees_it(camera):
     rng = np.random.default_rng(0)
@@ -54,6 +64,25 @@ def test_what_is_drawn_lies_where_the_camera_sees_it(camera):
         canvas.draw(placed(ball, pose(centre).homogeneous[None]))
         v, u = np.nonzero(canvas.drawn)
         assert np.array([u.mean(), v.mean()]) == pytest.approx(camera.project(centre[None])[0], abs=0.5)
+
+
+def test_colours_are_mixed_in_space_and_a_floor_may_reach_behind_the_camera(monkeypatch):
+    monkeypatch.delattr(cv2, "triangleRasterize", raising=False)
+    points = np.array([[0.0, 0.5, 40.0], [-30.0, 0.5, -10.0], [30.0, 0.5, -10.0]], np.float32)  # half a metre below
+    shades = 0.5 + 0.01 * points[:, 2:] * np.ones(3, np.float32)  # linear in the depth
+    canvas = Canvas(CAMERA)
+    for faces in ([[0, 1, 2]], [[0, 2, 1]]):
+        canvas.draw(Placed(points, np.array(faces, np.int32), shades))  # one of them is seen from inside
+
+    (_, _, cx), (_, fy, cy), _ = CAMERA.matrix
+    rows = np.arange(CAMERA.height)
+    depths = 0.5 * fy / np.maximum(rows - cy, 1e-9)  # of the floor in each row
+    middle = round(cx)
+    shown = depths < 39.0
+    assert shown.sum() > 200
+    assert not canvas.drawn[: int(cy)].any()
+    assert canvas.depths[shown, middle] == pytest.approx(depths[shown], rel=1e-5)
+    assert canvas.colors[shown, middle, 1] == pytest.approx(0.5 + 0.01 * depths[shown], abs=1e-5)
 
 
 @pytest.mark.parametrize(

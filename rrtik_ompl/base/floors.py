@@ -1,0 +1,82 @@
+"""The lowest versions of the packages below, so that an older one is named before something of it is found missing."""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Collection, Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any
+
+from rrtik_ompl.base.errors import RrtikError
+
+# By the name of the module: the name of the package and its lowest version. Others do not tell their version.
+FLOORS = {
+    "numpy": ("numpy", "2.0.2"),
+    "pinocchio": ("pin", "3.4.0"),
+    "coal": ("coal", "3.0.1"),
+    "numba": ("numba", "0.62.1"),
+    "scipy": ("scipy", "1.13.1"),
+    "cv2": ("opencv-python-headless", "4.10.0"),
+    "pydantic": ("pydantic", "2.7.4"),
+    "yaml": ("PyYAML", "6.0.1"),
+    "typer": ("typer", "0.15.4"),
+    "matplotlib": ("matplotlib", "3.9.0"),
+    "joblib": ("joblib", "1.4.2"),
+    "PIL": ("pillow", "10.4.0"),
+    "tornado": ("tornado", "6.5"),
+    "umsgpack": ("u-msgpack-python", "2.8.0"),
+}
+EVERYWHERE = ("numpy", "pinocchio", "coal")  # in all that this package does
+# Libraries that the wheels of pin 3 were linked with, though they admit newer ones, which then are not found.
+OLD_LIBRARIES = ("liburdfdom", "libtinyxml2")
+
+
+class DependencyError(RrtikError, ImportError):
+    """A package that this one stands on is too old, or does not fit to another."""
+
+
+@contextmanager
+def fitting_packages() -> Iterator[None]:
+    """Refuse packages that are loaded inside a ``with`` block and are older than their floor.
+
+    What the program loaded before for itself is blamed only if something goes wrong.
+
+    Raises:
+        DependencyError: The message names the package, its version, and how to install one that fits.
+    """
+    others = {module for module in FLOORS if module in sys.modules} - set(EVERYWHERE)
+    try:
+        yield
+    except Exception as error:
+        if reason := too_old(sys.modules) or _unlinked(error):
+            raise DependencyError(reason) from error
+        raise
+    if reason := too_old(sys.modules, others):
+        raise DependencyError(reason)
+
+
+def too_old(modules: Mapping[str, Any], but: Collection[str] = ()) -> str:
+    """Return what is wrong with the first module that is older than its floor, in a line; "" if none is.
+
+    Example:
+        >>> from types import SimpleNamespace
+        >>> too_old({"scipy": SimpleNamespace(__version__="1.9.3")})
+        "scipy 1.9.3 is too old; pip install 'scipy>=1.13.1'"
+    """
+    for module, (package, floor) in FLOORS.items():
+        if module in modules and module not in but:
+            found = getattr(modules[module], "__version__", None) or getattr(modules[module], "version", "")
+            if _numbers(found) and _numbers(found) < _numbers(floor):
+                return f"{package} {found} is too old; pip install '{package}>={floor}'"
+    return ""
+
+
+def _numbers(version: object) -> tuple[int, ...]:
+    return tuple(map(int, re.findall(r"\d+", version)[:3])) if isinstance(version, str) else ()
+
+
+def _unlinked(error: Exception) -> str:
+    """Return which packages pin 3 lacks if it could not be loaded for want of them, in a line; else ""."""
+    lacks = isinstance(error, ImportError) and any(library in str(error) for library in OLD_LIBRARIES)
+    return f"pin 3 {error}; pip install 'cmeel-urdfdom<5' 'cmeel-tinyxml2<11', or 'pin>=4'" if lacks else ""
