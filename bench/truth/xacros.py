@@ -19,7 +19,7 @@ from typer import Argument
 from xacro import substitution_args
 
 from rrtik_ompl.base.errors import InputError
-from rrtik_ompl.description.package_path import package_folder
+from rrtik_ompl.description.package_path import Packages
 from rrtik_ompl.description.xacro_text import robot_text
 
 REFUSALS = ("is not on the list", "not one of the functions", "outside the folders", "two underscores", "more than")
@@ -55,7 +55,7 @@ def _by_xacro(file: Path, packages: list[Path]) -> str | None:
     """What the package makes of a file; None if it fails."""
 
     def find(name: str) -> str:
-        found = package_folder(name, file.parent, packages)
+        found = Packages(packages, file.parent).find(name)
         if found is None:
             raise LookupError(name)
         return str(found)

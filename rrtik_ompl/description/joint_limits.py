@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from rrtik_ompl.base.errors import UnknownNameError, few
+from rrtik_ompl.description.faults import nearest_name, not_read
 from rrtik_ompl.description.robot_build import RATES, JointLimits
 from rrtik_ompl.files.strict_yaml import Location, YamlDocument, describe, read_yaml
 
@@ -21,19 +23,32 @@ _KEYS = (*(f"has_{flag}_limits" for flag in _FLAGS), *_NUMBERS, *_UNUSED, *_SOFT
 ROS = ("/**", "ros__parameters")  # keys that enclose the parameters of a node in ROS 2
 
 
-def read_joint_limits(path: str | os.PathLike[str], joints: Iterable[str]) -> dict[str, JointLimits]:
+@dataclass(frozen=True, slots=True)
+class LimitsFile:
+    """What a file says of the joints of a robot.
+
+    Attributes:
+        limits: The limits by joint.
+        faults: A line for each joint in it that the robot does not have, and one about limits in it that are not used.
+    """
+
+    limits: Mapping[str, JointLimits] = field(default_factory=dict)
+    faults: tuple[str, ...] = ()
+
+
+def read_joint_limits(path: str | os.PathLike[str], joints: Iterable[str]) -> LimitsFile:
     """Read the limits of a robot's joints.
 
     A limit counts unless its ``has_..._limits`` is false; ``has_velocity_limits: false`` removes the URDF's own limit.
 
     Args:
         path: The file.
-        joints: Names of the robot's joints; any other name in the file is an error.
+        joints: Names of the robot's joints; others are not read, as the file may be for several robots.
 
     Raises:
-        InputError: If the file cannot be read, or a name, key or value in it is not valid; with its line.
+        InputError: If the file cannot be read, or a key or value in it is not valid; with its line.
     """
-    document = read_yaml(path)
+    document = read_yaml(path, ros=True)
     joint_names = tuple(joints)
     top, section = parameters(document, "robot_description_planning")
     table = section.get("joint_limits")
@@ -41,15 +56,18 @@ def read_joint_limits(path: str | os.PathLike[str], joints: Iterable[str]) -> di
         raise document.error((*top, "joint_limits"), "expected 'joint_limits:' with one group of keys per joint")
 
     limits = {}
+    unknown = []
     for joint, values in table.items():
         location: Location = (*top, "joint_limits", joint)
         if joint not in joint_names:
-            raise UnknownNameError("joint", joint, joint_names, where=document.place(location))
+            unknown.append(f"{document.place(location)}: no joint '{joint}'{nearest_name(joint, joint_names)}")
+            continue
         if not isinstance(values, Mapping):
             raise document.error(location, f"expected keys such as max_velocity, found {describe(values)}")
         limits[joint] = _joint(document, location, values)
 
-    return limits
+    unread = _unread({joint: table[joint] for joint in limits})
+    return LimitsFile(limits, (*unknown, *not_read(str(path), unread)))
 
 
 def _joint(document: YamlDocument, location: Location, values: Mapping[str, Any]) -> JointLimits:
@@ -85,11 +103,10 @@ def _number(document: YamlDocument, location: Location, value: object, *, positi
         raise document.error(location, f"must be greater than 0, got {value:g}")
 
 
-def unread_limits(path: str | os.PathLike[str]) -> list[str]:
-    """Return the limits in a file of :func:`read_joint_limits` that are not read, such as "max_deceleration of 'a'"."""
-    _, section = parameters(read_yaml(path), "robot_description_planning")
+def _unread(table: Mapping[str, Mapping[str, Any]]) -> list[str]:
+    """Return the limits of joints that are not used."""
     joints_of_key: dict[str, list[str]] = {}
-    for joint, values in section["joint_limits"].items():
+    for joint, values in table.items():
         for key, flag in _NARROWING.items():
             if values.get(key) is not None and values.get(f"has_{flag}_limits") is not False:
                 joints_of_key.setdefault(key, []).append(f"'{joint}'")

@@ -7,18 +7,19 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from rrtik_ompl.base.errors import InputError, UnknownNameError
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.description.faults import nearest_name, tell
 from rrtik_ompl.description.joint_limits import parameters
-from rrtik_ompl.description.package_path import package_folder
+from rrtik_ompl.description.package_path import ASSISTANT, Packages
 from rrtik_ompl.description.srdf import Srdf, read_srdf
 from rrtik_ompl.description.tree import Tree
 from rrtik_ompl.description.urdf import URDF_OPTIONS, package_roots, robot_from_urdf
 from rrtik_ompl.description.urdf_read import read_urdf
 from rrtik_ompl.description.xacro_text import is_xacro, robot_text
 from rrtik_ompl.files.strict_yaml import read_yaml
+from rrtik_ompl.files.text import read_text
 from rrtik_ompl.model.robot import Robot
 
-ASSISTANT = ".setup_assistant"  # file in which MoveIt's setup assistant states the URDF of a folder
 CHOOSING_FILES = (ASSISTANT, "kinematics.yaml", "config/kinematics.yaml", ".", "config")  # which URDF, which group
 SIMULATED = "gazebo_"  # prefix of the URDF that the assistant writes for Gazebo, which may be out of date
 CONFIG_OPTIONS = tuple(sorted({*URDF_OPTIONS, "urdf"}))
@@ -65,7 +66,7 @@ def config_files(folder: FilePath, given: Mapping[str, Any]) -> dict[str, Any]:
 
     files: dict[str, Any] = {"urdf": urdf, "srdf": Path(srdf)}
     arguments = dict(given.get("xacro_args") or {})
-    if is_xacro(urdf) and not given.get("urdf"):
+    if not given.get("urdf") and is_xacro(urdf, read_text(urdf)):
         arguments = _xacro_args(home, assistant) | arguments
     if arguments:
         files["xacro_args"] = arguments
@@ -75,7 +76,7 @@ def config_files(folder: FilePath, given: Mapping[str, Any]) -> dict[str, Any]:
         files["joint_limits"] = Path(limits)
 
     if given.get("group") is None and given.get("joints") is None:
-        files["group"] = _group(home, config, files, packages)
+        files["group"] = _group(home, config, files, packages, bool(given.get("strict")))
 
     return files
 
@@ -86,7 +87,7 @@ def _assistant(home: Path, config: Path) -> Mapping[str, Any]:
     if file is None:
         return {}
 
-    document = read_yaml(file)
+    document = read_yaml(file, ros=True)
     top = document.data.get("moveit_setup_assistant_config")
     if not isinstance(top, Mapping):
         raise document.error(("moveit_setup_assistant_config",), "expected a group of keys of MoveIt's setup assistant")
@@ -134,7 +135,7 @@ def _urdf(home: Path, config: Path, assistant: Mapping[str, Any], packages: Iter
         return urdf
 
     package, relative = (assistant.get("urdf", {}).get(key) for key in ("package", "relative_path"))
-    package_home = package_folder(package, home.resolve(), packages) if isinstance(package, str) else None
+    package_home = Packages(packages, home.resolve()).find(package) if isinstance(package, str) else None
     if package_home is not None and isinstance(relative, str) and os.path.isfile(package_home / relative):
         return package_home / relative
 
@@ -165,7 +166,7 @@ def _xacro_args(home: Path, assistant: Mapping[str, Any]) -> dict[str, str]:
     return arguments
 
 
-def _group(home: Path, config: Path, files: Mapping[str, Any], packages: list[Path]) -> str:
+def _group(home: Path, config: Path, files: Mapping[str, Any], packages: list[Path], strict: bool) -> str:
     """Return the group that is the arm: the only one with a solver, or the only one that moves, grippers aside."""
     semantics = read_srdf(robot_text(files["srdf"], packages), str(files["srdf"]))
     urdf = files["urdf"]
@@ -174,7 +175,7 @@ def _group(home: Path, config: Path, files: Mapping[str, Any], packages: list[Pa
 
     sizes = {name: _size(semantics, name, tree) for name in semantics.groups}
     moving = [name for name, size in sizes.items() if size > 0]
-    with_solver = _solved(config, semantics)
+    with_solver = _solved(config, semantics, strict)
     grippers = _grippers(semantics, sizes, with_solver)
     arms = [name for name in moving if name not in grippers] or moving
 
@@ -194,17 +195,20 @@ def _size(semantics: Srdf, group: str, tree: Tree) -> int:
         return 1
 
 
-def _solved(config: Path, semantics: Srdf) -> set[str]:
+def _solved(config: Path, semantics: Srdf, strict: bool) -> set[str]:
     """Return the groups for which ``kinematics.yaml`` names a solver."""
     file = config / "kinematics.yaml"
     if not os.path.isfile(file):
         return set()
-    document = read_yaml(file)
+    document = read_yaml(file, ros=True)
     top, section = parameters(document, "robot_description_kinematics")
-    for name in section:
-        if name not in semantics.groups:
-            raise UnknownNameError("group", name, semantics.groups, where=document.place((*top, name)))
-    return set(section)
+    faults = [
+        f"{document.place((*top, name))}: no group '{name}'{nearest_name(name, semantics.groups)}"
+        for name in section
+        if name not in semantics.groups
+    ]
+    tell(faults, strict)
+    return set(section) & set(semantics.groups)
 
 
 def _grippers(semantics: Srdf, sizes: Mapping[str, int], solved: set[str]) -> set[str]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import warnings
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -13,12 +14,13 @@ import pinocchio as pin
 
 from rrtik_ompl.base.arrays import bounded_array
 from rrtik_ompl.base.copies import Once
-from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.errors import InputError, MeshWarning, few
 from rrtik_ompl.description.shapes.mesh import MAX_BYTES, finite_numbers, stated_unit
-from rrtik_ompl.description.tree import Joint, Link, MeshFile, Tree
+from rrtik_ompl.description.tree import Joint, Link, MeshFile, Solid, Tree
 from rrtik_ompl.files.text import read_bytes
 from rrtik_ompl.geometry.collision.shape_table import pieces
 
+MOST_UNDRAWN = 2  # most meshes in one line that are not drawn
 GREY = (0.7, 0.7, 0.7, 1.0)
 
 
@@ -62,10 +64,10 @@ def build_models(tree: Tree, T_world_base: pin.SE3 | None = None) -> tuple[Any, 
         _add_link(model, links[joint.child], places)
 
     meshes: dict[MeshFile, Any] = {}
-    hard = _geometry(tree, places, meshes, "collision")
+    hard = _geometry(tree, places, meshes, {link.name: link.collision for link in tree.links})
     drawn = (solid.shape for link in tree.links for solid in link.visual)
     files = tuple(str(shape.path) for shape in drawn if isinstance(shape, MeshFile))
-    return model, hard, Looks(partial(_geometry, tree, places, meshes, "visual"), files)
+    return model, hard, Looks(partial(_looks, tree, places, meshes), files)
 
 
 @dataclass(slots=True, eq=False)
@@ -138,12 +140,34 @@ def _add_link(model: pin.Model, link: Link, places: dict[str, _Place]) -> None:
         model.appendBodyToJoint(place.joint, link.inertia, place.T_joint_link)
 
 
-def _geometry(tree: Tree, places: dict[str, _Place], meshes: dict[MeshFile, Any], which: str) -> coal.CollisionGeometry:
-    """Return the collision or visual geometry of a tree (``which``); meshes that were loaded before are shared."""
+def _looks(tree: Tree, places: dict[str, _Place], meshes: dict[MeshFile, Any]) -> pin.GeometryModel:
+    """Return the visual geometry of a tree. What cannot be read is not drawn: a link then looks like its collision."""
+    undrawn = []
+    readable: dict[str, tuple[Solid, ...]] = {}
+    for link in tree.links:
+        solids = []
+        for solid in link.visual:
+            try:
+                if isinstance(solid.shape, MeshFile):
+                    _load(solid.shape, meshes, f"link '{link.name}'")
+                solids.append(solid)
+            except InputError as error:
+                undrawn.append(str(error))
+        readable[link.name] = tuple(solids) or link.collision
+
+    if undrawn:
+        warnings.warn(MeshWarning(f"{tree.where}: not drawn: {few(undrawn, MOST_UNDRAWN)}"), stacklevel=2)
+    return _geometry(tree, places, meshes, readable)
+
+
+def _geometry(
+    tree: Tree, places: dict[str, _Place], meshes: dict[MeshFile, Any], solids: Mapping[str, Iterable[Solid]]
+) -> pin.GeometryModel:
+    """Return solids of links as the geometry of a tree; meshes that were loaded before are shared."""
     geometry = pin.GeometryModel()
     for link in tree.links:
         place = places[link.name]
-        for number, solid in enumerate(getattr(link, which)):
+        for number, solid in enumerate(solids[link.name]):
             shape = solid.shape
             is_file = isinstance(shape, MeshFile)
             item = pin.GeometryObject(

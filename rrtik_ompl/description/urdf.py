@@ -22,6 +22,7 @@ from rrtik_ompl.description.xacro_text import robot_text
 from rrtik_ompl.model.robot import LIMIT_TOLERANCE, Robot
 
 if TYPE_CHECKING:
+    from rrtik_ompl.description.joint_limits import LimitsFile
     from rrtik_ompl.description.robot_source import BasePose
 
 
@@ -127,7 +128,7 @@ def robot_from_urdf_text(
     if tip is None and group is not None and group in semantics.groups:
         end = semantics.group_tip(group, tree)
     actuated = _actuated(description, semantics, group, joints, tip)
-    from_file, unread_limits = ({}, []) if joint_limits is None else _limits_of_file(joint_limits, tree)
+    limits_file = None if joint_limits is None else _limits_of_file(joint_limits, tree)
 
     with located(where):
         robot = build_robot(
@@ -138,7 +139,7 @@ def robot_from_urdf_text(
             locked=locked,
             tip=end,
             base_pose=base_pose,
-            limits=merge_limits(from_file, limits or {}),
+            limits=merge_limits({} if limits_file is None else limits_file.limits, limits or {}),
             postures=semantics.postures(group) | {key: dict(value) for key, value in (postures or {}).items()},
             allowed_collisions=[*semantics.allowed_pairs(tree), *allowed_collisions],
             checked_collisions=semantics.checked,
@@ -156,8 +157,9 @@ def robot_from_urdf_text(
             *semantics.short_states(group, actuated),
             *_outside(robot, postures or {}, semantics, group),
             *_hand_outside(robot.gripper, tree, semantics),
+            *description.mended,
             *not_read(where, description.unread),
-            *not_read(str(joint_limits), unread_limits),
+            *(() if limits_file is None else limits_file.faults),
         ],
         strict,
     )
@@ -193,11 +195,11 @@ def _actuated(
     return movable
 
 
-def _limits_of_file(file: FilePath, tree: Tree) -> tuple[dict[str, JointLimits], list[str]]:
-    """Return the limits in a file by joint, and the statements about limits in it that are not used."""
-    from rrtik_ompl.description.joint_limits import read_joint_limits, unread_limits  # Most robots need no YAML.
+def _limits_of_file(file: FilePath, tree: Tree) -> LimitsFile:
+    """Return what a file says of the limits of a robot's joints."""
+    from rrtik_ompl.description.joint_limits import read_joint_limits  # Most robots need no YAML.
 
-    return read_joint_limits(file, [joint.name for joint in tree.joints]), unread_limits(file)
+    return read_joint_limits(file, [joint.name for joint in tree.joints])
 
 
 def _outside(robot: Robot, others: Collection[str], semantics: Srdf, group: str | None) -> Iterator[str]:

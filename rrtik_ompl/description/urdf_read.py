@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,28 +14,38 @@ from xml.parsers import expat
 import numpy as np
 import pinocchio as pin
 
-from rrtik_ompl.base.errors import InputError, MeshWarning, MissingFileError, RrtikError, UnknownNameError, few
+from rrtik_ompl.base.errors import InputError, MeshWarning, RrtikError, UnknownNameError, few
 from rrtik_ompl.base.poses import pose_from_rpy
-from rrtik_ompl.description.package_path import resolve_mesh
+from rrtik_ompl.description.package_path import Packages, resolve_mesh
 from rrtik_ompl.description.robot_build import Mimic
 from rrtik_ompl.description.tree import JOINT_KINDS, Joint, Link, MeshFile, Solid, Tree
+from rrtik_ompl.description.tree_model import MOST_UNDRAWN
 from rrtik_ompl.model.shapes import SHAPES, Cylinder, Measure, Shape
 
 Colour = tuple[float, float, float, float]
+XACRO = "{http://www.ros.org/wiki/xacro}"  # namespace of macros
+HELD_KINDS = ("floating", "planar")  # types of joints that are held still
+THIN = 1e-4  # [m] thickness of solids that the file gives none
 _TENSOR = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class UrdfDescription:
-    """The contents of a URDF: its name, its tree, and which joints follow others, with chains of followers resolved.
+    """The contents of a URDF.
 
-    ``unread`` lists things in it about shapes, joints and limits that are not used.
+    Attributes:
+        name: Its name.
+        tree: Its links and joints.
+        mimics: Which joints follow others, with chains of followers resolved.
+        unread: Things in it about shapes, joints and limits that are not used.
+        mended: What it says that could not be used as it is, and what was done instead, a sentence each.
     """
 
     name: str
     tree: Tree
     mimics: tuple[Mimic, ...]
     unread: tuple[str, ...] = ()
+    mended: tuple[str, ...] = ()
 
 
 def read_urdf(
@@ -53,22 +63,23 @@ def read_urdf(
         InputError: If anything in the text cannot be used.
     """
     robot = parse_xml(text, "robot", where)
-    if robot.find(".//{http://www.ros.org/wiki/xacro}*") is not None:
-        raise InputError(f"{where}: holds xacro macros; name it .xacro, or expand them first: xacro FILE > robot.urdf")
+    if robot.find(f".//{XACRO}*") is not None:
+        raise InputError(f"{where}: holds xacro macros; load it as a file, or expand it: xacro FILE > robot.urdf")
 
-    reader = _Reader(where, folder, tuple(packages), {})
+    reader = _Reader(where, Packages(packages, folder), {})
     for material in robot.iter("material"):
         reader.learn_material(material)
     links = [reader.link(element) for element in robot.findall("link")]
 
     if reader.undrawn:
-        message = f"{where}: {len(reader.undrawn)} visual meshes are missing ({reader.undrawn[0]} and so on)"
-        warnings.warn(MeshWarning(f"{message}; collision shapes are drawn instead"), stacklevel=2)
+        warnings.warn(MeshWarning(f"{where}: not drawn: {few(reader.undrawn, MOST_UNDRAWN)}"), stacklevel=2)
 
     joints = [reader.joint(element) for element in robot.findall("joint")]
     mimics = [tie for element in robot.findall("joint") for tie in reader.mimics(element)]
-    tree = Tree(where, links, joints)
-    return UrdfDescription(robot.get("name", ""), tree, flattened(where, joints, mimics), tuple(unread_of_urdf(robot)))
+    held, following = _held(reader.held, joints, mimics)
+    tree = Tree(where, links, joints).hold(held)
+    ties = flattened(where, tree.joints, following)
+    return UrdfDescription(robot.get("name", ""), tree, ties, tuple(unread_of_urdf(robot)), tuple(reader.mended()))
 
 
 def parse_xml(text: str, root: str | None, where: str) -> Element:
@@ -158,22 +169,66 @@ def located(where: str) -> Iterator[None]:
         raise
 
 
-# Reads the elements of a URDF; materials and missing meshes are collected on the way.
 @dataclass(slots=True, eq=False)
 class _Reader:
+    """Reads the elements of a URDF, and collects what it could not use on the way.
+
+    Attributes:
+        where: File name for messages.
+        packages: The packages, and the folder of the file.
+        materials: Colours by name of the material.
+        undrawn: Why visual shapes are not drawn, each with its link.
+        held: Joints whose two limits are equal, and that value [rad or m].
+        floating: Joints of a type that is held still.
+        pointlike, thin: Links with collision shapes whose sizes are all 0, or partly.
+        odd: Colours and inertias that are not usable, each with where it is.
+    """
+
     where: str
-    folder: Path | None
-    packages: tuple[Path, ...]
+    packages: Packages
     materials: dict[str, Colour]
-    undrawn: list[str] = field(default_factory=list)  # links whose visual mesh does not exist
+    undrawn: list[str] = field(default_factory=list)
+    held: dict[str, float] = field(default_factory=dict)
+    floating: list[str] = field(default_factory=list)
+    pointlike: list[str] = field(default_factory=list)
+    thin: list[str] = field(default_factory=list)
+    odd: list[str] = field(default_factory=list)
+
+    def mended(self) -> Iterator[str]:
+        """Yield a line for each kind of thing that could not be used as it is."""
+        for found, words in (
+            (self.held, "held still, as its limits are equal: joint {}"),
+            (self.floating, "held still, as only joints with one axis are moved: joint {}"),
+            (self.pointlike, "ignored, as its size is 0: a collision shape of {}"),
+            (self.thin, f"taken {1e3 * THIN:g} mm thick, as one of its sizes is 0: a collision shape of {{}}"),
+            (self.odd, "not usable and left out: {}"),
+        ):
+            if found:
+                yield f"{self.where}: {words.format(few(dict.fromkeys(found)))}"
+        for package, folder in self.packages.renamed.items():
+            yield f"{self.where}: package '{package}' is not found; its files are taken from {folder}"
 
     def learn_material(self, material: Element) -> None:
         """Store the colour of a named material; the first definition counts."""
-        colour = material.find("color")
+        colour = self.rgba(material, f"material '{material.get('name', '')}'")
         if colour is not None:
-            where = f"{self.where}: material '{material.get('name', '')}'"
-            red, green, blue, opacity = numbers(colour, "rgba", 4, None, where)
-            self.materials.setdefault(material.get("name", ""), (red, green, blue, opacity))
+            self.materials.setdefault(material.get("name", ""), colour)
+
+    def rgba(self, material: Element, what: str) -> Colour | None:
+        """Return the colour that a material states, opaque if it is of three numbers; None if it is none."""
+        element = material.find("color")
+        if element is None:
+            return None
+        try:
+            values = [float(word) for word in element.get("rgba", "").split()]
+        except ValueError:
+            values = []
+
+        if len(values) not in (3, 4) or not np.isfinite(values).all():
+            self.odd.append(f"the colour of {what}")
+            return None
+        red, green, blue, opacity = (*values, 1.0)[:4]
+        return red, green, blue, opacity
 
     def link(self, element: Element) -> Link:
         """Read a link.
@@ -184,60 +239,89 @@ class _Reader:
         where = f"{self.where}: link '{name}'"
         capsules = {c.get("name", "") for c in element.findall("collision_checking/capsule")}
         with located(where):
-            collision = tuple(self.solid(item, where, capsules) for item in element.findall("collision"))
-            visual = tuple(self.visuals(element, name, where))
-            return Link(name, collision, visual or collision, _inertia(element.find("inertial"), where))
+            solids = [self.solid(item, where, capsules) for item in element.findall("collision")]
+            collision = tuple(solid for solid in solids if solid is not None)
+            return Link(name, collision, tuple(self.visuals(element, where)) or collision, self.inertia(element, where))
 
-    def visuals(self, element: Element, link: str, where: str) -> Iterator[Solid]:
-        """Yield the visual solids. A missing visual mesh is noted, not refused, as planning does not need it."""
+    def visuals(self, element: Element, where: str) -> Iterator[Solid]:
+        """Yield the visual solids. One that cannot be drawn is noted, not refused, as planning does not need it."""
         for item in element.findall("visual"):
             try:
-                yield self.solid(item, where, set())
-            except MissingFileError:
-                self.undrawn.append(f"link '{link}'")
+                with located(where):
+                    solid = self.solid(item, where, set())
+            except InputError as error:
+                self.undrawn.append(str(error).removeprefix(f"{self.where}: "))
+            else:
+                if solid is not None:
+                    yield solid
 
-    def solid(self, element: Element, where: str, capsules: set[str]) -> Solid:
+    def solid(self, element: Element, where: str, capsules: set[str]) -> Solid | None:
+        """Read a visual or collision solid; None if it is a point."""
         geometry = element.find("geometry")
         shapes = [] if geometry is None else list(geometry)
         if len(shapes) != 1:
             raise InputError(f"{where}: <{element.tag}> must hold one <geometry> with one shape")
-        shape = self.shape(shapes[0], where)
+
+        shape = self.shape(shapes[0], where, [] if element.tag == "visual" else self.thin)
+        if shape is None:
+            if element.tag == "collision":
+                self.pointlike.append(where.removeprefix(f"{self.where}: "))
+            return None
+
         if isinstance(shape, Cylinder) and element.get("name", "") in capsules:
             shape = shape.capped()
         return Solid(shape, _origin(element, where), self.colour(element.find("material"), where))
 
-    def shape(self, element: Element, where: str) -> Shape | MeshFile:
-        """Read a shape or the reference to a mesh file."""
+    def shape(self, element: Element, where: str, thin: list[str]) -> Shape | MeshFile | None:
+        """Read a shape or the reference to a mesh file; None if all sizes of a shape are 0.
+
+        A single size of 0 is replaced by a small one, as the others may be large; the link is then added to ``thin``.
+        """
         kind = SHAPES.get(element.tag)
         if kind is not None and kind.in_urdf:
-            return kind(**{measure.name: _measured(element, measure, where) for measure in kind.measures})
+            sizes = {measure.name: _measured(element, measure, where) for measure in kind.measures}
+            if not any(np.any(size) for size in sizes.values()):
+                return None
+            if not all(np.all(size) for size in sizes.values()):
+                thin.append(where.removeprefix(f"{self.where}: "))
+                sizes = {name: np.where(np.equal(size, 0.0), THIN, size).tolist() for name, size in sizes.items()}
+            return kind(**sizes)
 
         if element.tag == "mesh":
             uri = attribute(element, "mesh", "filename", where)
             x, y, z = numbers(element, "scale", 3, (1.0, 1.0, 1.0), where)
             if x * y * z == 0.0:
                 raise InputError(f"{where}: mesh '{uri}' has a scale of 0; every axis needs another number")
-            return MeshFile(resolve_mesh(uri, self.folder, self.packages, where), (x, y, z))
+            return MeshFile(resolve_mesh(uri, self.packages, where), (x, y, z))
 
         in_urdf = (key for key, kind in SHAPES.items() if kind.in_urdf)
         raise UnknownNameError("shape", element.tag, (*in_urdf, "mesh"), where=where)
 
     def colour(self, material: Element | None, where: str) -> Colour | None:
+        """Return the colour of a solid: its own, or that of the named material."""
         if material is None:
             return None
-        colour = material.find("color")
-        if colour is None:
-            return self.materials.get(material.get("name", ""))
-        red, green, blue, opacity = numbers(colour, "rgba", 4, None, where)
-        return red, green, blue, opacity
+        own = self.rgba(material, where.removeprefix(f"{self.where}: "))
+        return own or self.materials.get(material.get("name", ""))
+
+    def inertia(self, element: Element, where: str) -> pin.Inertia | None:
+        """Return the inertia of a link; None if it has none that is usable, as planning does not need it."""
+        try:
+            return _inertia(element.find("inertial"), where)
+        except InputError:
+            self.odd.append(f"the inertia of {where.removeprefix(f'{self.where}: ')}")
+            return None
 
     def joint(self, element: Element) -> Joint:
         """Read a joint with its limits."""
         name = attribute(element, "joint", "name", self.where)
         where = f"{self.where}: joint '{name}'"
         kind = attribute(element, "joint", "type", where)
+        if kind in HELD_KINDS:
+            self.floating.append(f"'{name}' ({kind})")
+            kind = "fixed"
         if kind not in JOINT_KINDS:
-            raise UnknownNameError("usable joint type", kind, JOINT_KINDS, where=where)
+            raise UnknownNameError("usable joint type", kind, (*JOINT_KINDS, *HELD_KINDS), where=where)
 
         parent = attribute(element.find("parent"), "parent", "link", where)
         child = attribute(element.find("child"), "child", "link", where)
@@ -247,6 +331,12 @@ class _Reader:
         bounds = _limits(element.find("limit"), kind, where)
         if not JOINT_KINDS[kind].moves:
             axis = [1.0, 0.0, 0.0]  # The axis of a fixed joint means nothing, and may be zero.
+
+        if bounds["lower"] == bounds["upper"]:
+            if element.find("mimic") is None:
+                self.held[name] = bounds["lower"]
+            else:  # Files often state no range for what follows.
+                bounds |= {"lower": -np.inf, "upper": np.inf}
 
         with located(self.where):
             return Joint(name, kind, parent, child, _origin(element, where), axis, **bounds)
@@ -319,6 +409,18 @@ def _inertia(inertial: Element | None, where: str) -> pin.Inertia | None:
     if mass_value < 0.0 or np.linalg.eigvalsh(in_link)[0] < 0.0:
         return None  # Such files are common, and planning does not need inertias.
     return pin.Inertia(mass_value, placement.translation, in_link)
+
+
+def _held(
+    held: Mapping[str, float], joints: Sequence[Joint], mimics: Sequence[Mimic]
+) -> tuple[dict[str, float], list[Mimic]]:
+    """Return the values of joints that are held still, with those that follow them, and the other followers."""
+    still = {joint.name: 0.0 for joint in joints if not joint.moves} | dict(held)
+    following = list(mimics)
+    while stopped := [tie for tie in following if tie.source in still]:
+        still |= {tie.joint: tie.multiplier * still[tie.source] + tie.offset for tie in stopped}
+        following = [tie for tie in following if tie.joint not in still]
+    return {joint.name: still[joint.name] for joint in joints if joint.moves and joint.name in still}, following
 
 
 def flattened(where: str, joints: Sequence[Joint], mimics: Sequence[Mimic]) -> tuple[Mimic, ...]:

@@ -23,6 +23,7 @@ READABLE = (".xacro", ".urdf", ".srdf", ".xml", ".yaml", ".yml")
 MACRO_FUNCTIONS = (
     "abs_filename", "arg", "dotify", "error", "fatal", "load_yaml", "message", "print_location", "tokenize", "warning",
 )  # fmt: skip
+UNDEFINED = re.compile(r"Undefined substitution argument (\w+)")  # xacro's words for an argument without a value
 FORBIDDEN = re.compile(
     r"os\.(exec|fork|forkpty|posix_spawn|spawn|startfile|system|kill|remove|rename|rmdir|mkdir|link|symlink|truncate"
     r"|chmod|chown|putenv)|subprocess\.|shutil\.|socket\.|ctypes\.|pty\.|webbrowser\.|urllib\.|ftplib\."
@@ -37,11 +38,14 @@ class Places:
     """
 
     def __init__(self, file: str, packages: Iterable[str]) -> None:
+        from rrtik_ompl.description.package_path import Packages
+
         resolved = Path(file).resolve()
         own_package = _package_of(resolved)
         self.folder = resolved.parent
-        self.packages = [Path(folder) for folder in packages]
-        self.roots = [*self.packages] if own_package is None else [own_package, *self.packages]
+        given = [Path(folder) for folder in packages]
+        self.packages = Packages(given, self.folder)
+        self.roots = given if own_package is None else [own_package, *given]
         self.folders_of_file = [self.folder, Path(file).absolute().parent]
 
         home = own_package or self.folder
@@ -53,10 +57,8 @@ class Places:
 
     def find(self, name: str, usual: Callable[[str], Any]) -> str:
         """Return the folder of a package, for ``$(find NAME)``; ``usual`` is xacro's own search, the last resort."""
-        from rrtik_ompl.description.package_path import package_folder
-
         plain = re.fullmatch(r"\w[\w.-]*", name) is not None
-        found = package_folder(name, self.folder, self.packages) if plain else None
+        found = self.packages.find(name) if plain else None
 
         if found is None:
             try:
@@ -248,9 +250,11 @@ def _error_answer(error: BaseException, job: Mapping[str, Any]) -> dict[str, Any
             message = f"expression '{shown(expression)}': {message}; write it otherwise, or {TRUST}"
         return {"where": location, "error": message}
 
-    message = " ".join(str(error).split()) or type(error).__name__
-    # Xacro puts this prefix in front of the message of a LookupError.
-    return {"where": location, "error": message.removeprefix("<class 'LookupError'>: ")}
+    # Xacro says a LookupError twice, of which it is the cause.
+    message = " ".join(str(innermost if type(innermost) is LookupError else error).split()) or type(error).__name__
+    if lacking := UNDEFINED.search(message):
+        message += f'; give xacro_args={{"{lacking[1]}": ...}}'
+    return {"where": location, "error": message}
 
 
 def _limit(seconds: float, memory: float) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -23,6 +24,7 @@ from rrtik_ompl.files.text import MAX_BYTES, read_text
 
 CHILD = Path(__file__).with_name("xacro_child.py")
 MORE = 'give xacro_limits={"seconds": .., "gigabytes": ..}'
+_MACRO = re.compile(r"<xacro:\w")
 MAX_CACHED = 32  # most expanded texts that are kept
 
 
@@ -85,13 +87,13 @@ def expanding(*, trusted: bool = False, limits: Mapping[str, float] | None = Non
         _expansion.reset(token)
 
 
-def is_xacro(path: Path) -> bool:
-    """Check whether a file contains macros, by its name."""
-    return path.suffix.lower() == ".xacro"
+def is_xacro(path: Path, text: str) -> bool:
+    """Check whether a file contains macros: by its name, or by elements of xacro in it."""
+    return path.suffix.lower() == ".xacro" or _MACRO.search(text) is not None
 
 
 def robot_text(path: Path, packages: Iterable[Path] = (), arguments: Mapping[str, object] | None = None) -> str:
-    """Return the text of a URDF or SRDF file, with its macros expanded if it is named ``.xacro``.
+    """Return the text of a URDF or SRDF file, with its macros expanded if it has any.
 
     ``$(find NAME)`` is a folder of that name in ``packages``, or in a folder above the file, or what ROS finds. A file
     is expanded in a separate process, with the settings of `expanding`; the result is reused until a file changes.
@@ -105,12 +107,11 @@ def robot_text(path: Path, packages: Iterable[Path] = (), arguments: Mapping[str
         InputError: If the file cannot be read or expanded, contains an expression that is not on the list, reads a file
             elsewhere, takes too long or too much memory, or the package xacro is not installed.
     """
-    if not is_xacro(path):
+    text = read_text(path)
+    if not is_xacro(path, text):
         if arguments:
-            raise InputError(f"{path}: xacro_args are for files named .xacro; leave them out")
-        return read_text(path)
-
-    read_text(path)  # This reports faults of the file itself.
+            raise InputError(f"{path}: xacro_args are for macros, and there are none in it (.xacro); leave them out")
+        return text
 
     argument_texts = {str(key): str(value) for key, value in (arguments or {}).items()}
     roots = [str(each) for each in packages]
@@ -121,7 +122,8 @@ def robot_text(path: Path, packages: Iterable[Path] = (), arguments: Mapping[str
         return cached.text
 
     if find_spec("xacro") is None:
-        expanded = f"{path.stem.removesuffix('.urdf')}.urdf"  # A file with this ending can be read.
+        stem = path.name.removesuffix(".xacro").removesuffix(".urdf")
+        expanded = f"{stem}.urdf" if path.name.endswith(".xacro") else f"{stem}_expanded.urdf"
         raise InputError(
             f"{path}: holds macros, and the package xacro is not installed: pip install xacro, "
             f"or expand it by hand: xacro {path.name} > {expanded}"

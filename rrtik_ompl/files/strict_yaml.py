@@ -1,13 +1,18 @@
 """A strict YAML reader: no duplicate keys, no tags, limited size; errors name file, line, key and remedy.
 
+Files of ROS are read as ROS reads them: of a key that stands there twice the last one counts, with a warning, and
+``!degrees 90`` is an angle.
+
 Plain scalars are read as in YAML 1.2 (``1e-3`` is a number, ``yes`` and ``12:30`` are text). Events come from libyaml
 if PyYAML has it. Locations of values are only computed when an error needs them.
 """
 
 from __future__ import annotations
 
+import math
 import os
 import re
+import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -16,7 +21,7 @@ from typing import Any, TypeAlias
 
 import yaml
 
-from rrtik_ompl.base.errors import InputError, RrtikError
+from rrtik_ompl.base.errors import DescriptionWarning, InputError, RrtikError, few
 from rrtik_ompl.files.text import file_name, read_text, write_text
 
 Location: TypeAlias = tuple[str | int, ...]  # keys and list indices from the top: ("start", "joints", 2)
@@ -29,6 +34,7 @@ _LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _INTEGER = re.compile(r"[-+]?[0-9]{1,4000}")
 _FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
 _NUMBER_STARTS = frozenset("+-.0123456789")
+ANGLES = {"!degrees": math.pi / 180.0, "!radians": 1.0}  # tags of ROS, and how many radians one of them is
 _WORDS: dict[str, bool | float | None] = {"": None, "~": None}
 _WORDS |= {form: value for word, value in {"null": None, "true": True, "false": False}.items()
            for form in (word, word.capitalize(), word.upper())}  # fmt: skip
@@ -95,12 +101,16 @@ class Builder:
 
     Attributes:
         path: The file, for errors.
+        ros: Whether it is a file of ROS.
+        doubled: What is to be said of keys that stand there twice.
         top: The value of the document.
         group: The group of ``top`` if it is a list or mapping.
         documents: Number of documents that have begun.
     """
 
     path: Path
+    ros: bool = False
+    doubled: list[str] = field(default_factory=list)
     top: Any = None
     group: Group | None = None
     documents: int = 0
@@ -135,25 +145,39 @@ class Builder:
 
     def _scalar(self, event: yaml.ScalarEvent) -> None:
         # A scalar is a key where a mapping expects one, otherwise a value.
-        if event.tag is not None:
-            raise self._error(event, f"tag '{event.tag}' cannot be used; write the value alone")
-
         parent = self._stack[-1] if self._stack else None
         text = event.value
         if parent is not None and parent.key is None and type(parent.value) is dict:
+            self._check_untagged(event)
             if text in parent.lines:
-                first = f"first in line {parent.lines[text]}"
-                raise self._error(event, f"key '{text}' stands here twice ({first}); delete one")
+                said = f"key '{text}' stands here twice (first in line {parent.lines[text]})"
+                if not self.ros:
+                    raise self._error(event, f"{said}; delete one")
+                self.doubled.append(f"{self.path}:{_line(event)}: {said}; the last one counts")
+                parent.groups.pop(text, None)
             parent.key = text
             parent.lines[text] = _line(event)
         else:
-            self._add(plain_value(text) if event.implicit[0] else text, 1, 1, event.anchor, event)
+            self._add(self._value(event), 1, 1, event.anchor, event)
 
-    def _open(self, event: yaml.CollectionStartEvent, value: object) -> None:
-        # Push a list or mapping that begins; it is added to its parent when it ends.
+    def _value(self, event: yaml.ScalarEvent) -> object:
+        """Return the value of a scalar: an angle [rad] if ROS's tag says so."""
+        if not self.ros or event.tag not in ANGLES:
+            self._check_untagged(event)
+            return plain_value(event.value) if event.implicit[0] else event.value
+
+        angle = plain_value(event.value)
+        if isinstance(angle, bool) or not isinstance(angle, (int, float)):
+            raise self._error(event, f"{event.tag} needs a number, found {describe(angle)}")
+        return angle * ANGLES[event.tag]
+
+    def _check_untagged(self, event: yaml.ScalarEvent | yaml.CollectionStartEvent) -> None:
         if event.tag is not None:
             raise self._error(event, f"tag '{event.tag}' cannot be used; write the value alone")
 
+    def _open(self, event: yaml.CollectionStartEvent, value: object) -> None:
+        # Push a list or mapping that begins; it is added to its parent when it ends.
+        self._check_untagged(event)
         parent = self._stack[-1] if self._stack else None
         group = Group(value, _line(event), event.anchor)
         if parent is None:
@@ -271,8 +295,16 @@ class YamlDocument:
             raise
 
 
-def read_yaml(path: str | os.PathLike[str]) -> YamlDocument:
+def read_yaml(path: str | os.PathLike[str], *, ros: bool = False) -> YamlDocument:
     """Read a YAML file whose top level is a mapping.
+
+    Args:
+        path: The file.
+        ros: Whether it is a file of ROS: ``!degrees`` and ``!radians`` are angles in it, and of a key that stands there
+            twice the last one counts.
+
+    Warns:
+        DescriptionWarning: If a key stands in a file of ROS twice.
 
     Raises:
         InputError: If the file cannot be read, is not valid YAML, is empty, is not a mapping, holds a key twice, uses
@@ -280,7 +312,7 @@ def read_yaml(path: str | os.PathLike[str]) -> YamlDocument:
     """
     file = file_name(path)
     text = read_text(path)
-    builder = Builder(file)
+    builder = Builder(file, ros)
 
     try:
         builder.read(text)
@@ -296,6 +328,8 @@ def read_yaml(path: str | os.PathLike[str]) -> YamlDocument:
     if builder.group is None or not isinstance(builder.top, dict):
         raise InputError(f"{path}:1: the top level must be 'key: value' lines, found {describe(builder.top)}")
 
+    if builder.doubled:
+        warnings.warn(DescriptionWarning(few(builder.doubled, 2)), stacklevel=2)
     return YamlDocument(file, builder.top, builder.group)
 
 

@@ -91,8 +91,8 @@ def test_parameters_may_stand_within_their_names_on_the_parameter_server(folder,
     robot = load_robot(folder)  # which group has a solver is said in kinematics.yaml
     assert robot.tip == "panda_link8"
     assert robot.velocity[:2].tolist() == [1.5, 1.25]
-    broken(folder, "joint_limits.yaml", "panda_joint2", "panda_joint99")
-    with pytest.raises(InputError, match=r"joint_limits.yaml:\d: robot_description_planning|no joint 'panda_joint99'"):
+    broken(folder, "joint_limits.yaml", "max_velocity: 1.25", "max_velocity: fast")
+    with pytest.raises(InputError, match=r"joint_limits.yaml:\d: .*joint2.max_velocity: expected a finite number"):
         load_robot(folder)
 
 
@@ -185,8 +185,6 @@ FAULTS = {
     "no URDF": (lambda f: (f / ".setup_assistant").unlink(), r"config: no URDF in this folder; .* give urdf=FILE"),
     "assistant": (lambda f: broken(f, ".setup_assistant", "moveit_", "m_"), r"\.setup_assistant.*setup assistant"),
     "assistant no YAML": (lambda f: broken(f, ".setup_assistant", ":", "["), r"\.setup_assistant:\d"),
-    "group of kinematics": (lambda f: broken(f, "kinematics.yaml", "panda_arm", "arm"), r"yaml:1: arm: no group 'arm'"),
-    "joint of a limit": (lambda f: broken(f, "joint_limits.yaml", "t1", "t99"), r"joint_limits.yaml:4: .*no joint"),
     "joint of the arm": (
         lambda f: broken(f, "panda.srdf", 'tip_link="panda_link8"', 'tip_link="link8"'),
         r"panda.urdf: no link 'link8'",
@@ -219,6 +217,33 @@ def test_what_is_missing_or_wrong_is_one_line_with_the_remedy(folder, fault):
     assert "\n" not in str(error.value)
 
 
+IGNORED = {
+    "group of kinematics": (lambda f: broken(f, "kinematics.yaml", "panda_arm", "arm"), r"yaml:1: arm: no group 'arm'"),
+    "joint of a limit": (lambda f: broken(f, "joint_limits.yaml", "t1", "t99"), r"joint_limits.yaml:4: .*no joint"),
+    "a key twice": (
+        lambda f: broken(f, "kinematics.yaml", "panda_arm", "panda_arm: {}\npanda_arm"),
+        r"kinematics.yaml:2: key 'panda_arm' stands here twice \(first in line 1\); the last one counts",
+    ),
+}
+
+
+@pytest.mark.parametrize("fault", IGNORED)
+def test_what_moveit_ignores_is_a_warning(folder, fault):
+    spoil, said = IGNORED[fault]
+    spoil(folder)
+    with pytest.warns(DescriptionWarning, match=said):
+        assert list(load_robot(folder).joint_names) == ARM
+
+
+@pytest.mark.parametrize(("written", "value"), [("!degrees 90", np.pi / 2), ("!radians 1.5", 1.5)])
+def test_limits_may_be_angles_with_a_unit(folder, written, value):
+    broken(folder, "joint_limits.yaml", "max_velocity: 1.25", f"max_velocity: {written}")
+    assert load_robot(folder).velocity[1] == pytest.approx(value, abs=1e-15)
+    broken(folder, "joint_limits.yaml", written, "!degrees fast")
+    with pytest.raises(InputError, match=r"joint_limits.yaml:\d: .*max_velocity: !degrees needs a number"):
+        load_robot(folder)
+
+
 def test_a_solver_tells_the_arm_among_several_groups(folder):
     more = '<group name="turret"><joint name="panda_joint1"/></group></robot>'
     broken(folder, "panda.srdf", "</robot>", more)
@@ -231,7 +256,7 @@ def test_a_limit_that_is_switched_off_may_say_anything(tmp_path):
     with pytest.raises(InputError, match=r"max_velocity.* 0"):
         read_joint_limits(tmp_path / "l.yaml", ["a"])
     (tmp_path / "l.yaml").write_text("joint_limits: {a: {has_jerk_limits: false, max_jerk: 0}}\n")
-    assert read_joint_limits(tmp_path / "l.yaml", ["a"])["a"].jerk == np.inf
+    assert read_joint_limits(tmp_path / "l.yaml", ["a"]).limits["a"].jerk == np.inf
 
 
 XACRO = """<robot name="arm" xmlns:xacro="http://www.ros.org/wiki/xacro">

@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from rrtik_ompl.base.errors import DescriptionWarning, InputError, TipWarning
+from rrtik_ompl.base.errors import DescriptionWarning, InputError, MeshWarning, TipWarning
 from rrtik_ompl.description.urdf import robot_from_urdf, robot_from_urdf_text
 from rrtik_robots.example_arms import data_folder
 
@@ -144,13 +144,42 @@ def test_materials_may_be_defined_after_use_and_twice():
     assert robot.visual.geometryObjects[0].meshColor.tolist() == [1, 0, 0, 1]
 
 
-def test_a_mesh_that_is_only_drawn_is_read_when_somebody_looks(tmp_path):
+def test_a_mesh_that_is_only_drawn_is_read_when_somebody_looks(tmp_path, capfd):
     (tmp_path / "broken.obj").write_bytes(b"v 0 0 nan\n")
-    (tmp_path / "arm.urdf").write_text(solid("<mesh filename='broken.obj'/>", "visual"))
+    text = solid("<mesh filename='broken.obj'/>", "visual")
+    (tmp_path / "arm.urdf").write_text(
+        text.replace("</visual>", "</visual><collision><geometry><box size='1 1 1'/></geometry></collision>")
+    )
     robot = robot_from_urdf(tmp_path / "arm.urdf")
     assert robot.fk(np.zeros(2)).translation[2] == 0.5  # planning does not need it
-    with pytest.raises(InputError, match=r"broken\.obj.*finite"):
-        robot.visual  # noqa: B018
+    with pytest.warns(MeshWarning, match=r"arm\.urdf: not drawn: link 'upper': .*broken\.obj.*finite"):
+        drawn = robot.visual
+    assert [type(item.geometry).__name__ for item in drawn.geometryObjects] == ["Box"]
+    assert capfd.readouterr() == ("", "")
+
+
+UNDRAWN = {
+    "missing": "<mesh filename='none.dae'/>",
+    "missing package": "<mesh filename='package://arm/none.glb'/>",
+    "of no kind": "<mesh filename='a.step'/>",
+    "of the web": "<mesh filename='https://a.b/none.stl'/>",
+    "unknown shape": "<cone radius='1'/>",
+    "no shape": "",
+    "scale of 0": "<mesh filename='a.step' scale='0 0 0'/>",
+    "negative size": "<box size='1 -1 1'/>",
+}
+
+
+@pytest.mark.parametrize("case", UNDRAWN)
+def test_what_is_only_drawn_never_refuses_a_robot(tmp_path, case):
+    (tmp_path / "a.step").write_bytes(b"ISO-10303-21;")
+    (tmp_path / "arm.urdf").write_text(solid(UNDRAWN[case], "visual"))
+    with pytest.warns(MeshWarning, match=r"arm\.urdf: not drawn: link 'upper'") as said:
+        robot = robot_from_urdf(tmp_path / "arm.urdf")
+    assert len(said) == 1
+    assert robot.visual.ngeoms == 0
+    with pytest.raises(InputError, match="link 'upper'"):  # what is not known cannot be kept clear of
+        robot_from_urdf_text(solid(UNDRAWN[case]), folder=tmp_path)
 
 
 SRDF = """<robot name="arm">
@@ -238,10 +267,9 @@ BAD_TEXTS = {
     "no root": (arm("<joint name='back' type='fixed'><parent link='hand'/><child link='base'/></joint>"), "loop"),
     "no limit": (arm(shoulder=" "), "needs <limit"),
     "limits swapped": (arm(shoulder='<limit lower="2" upper="1" velocity="1"/>'), "lower limit 2 is above upper"),
-    "limits equal": (arm(shoulder='<limit lower="1" upper="1" velocity="1"/>'), "lower must be below upper"),
     "NaN limit": (arm(shoulder='<limit lower="nan" upper="1" velocity="1"/>'), "finite"),
     "negative speed": (arm(shoulder='<limit lower="0" upper="1" velocity="-1"/>'), "negative"),
-    "floating": (arm().replace('type="revolute"', 'type="floating"', 1), "no usable joint type 'floating'"),
+    "ball": (arm().replace('type="revolute"', 'type="ball"', 1), "no usable joint type 'ball'"),
     "no type": (arm().replace('type="revolute"', "", 1), "<joint type"),
     "no joint moves": ("<robot name='r'><link name='base'/></robot>", "no movable joint"),
     "unknown mimic": (arm(elbow=BOUNDS + "<mimic joint='sholder'/>"), "did you mean 'shoulder'"),
@@ -253,20 +281,15 @@ BAD_TEXTS = {
     "axis of zeros": (arm().replace("0 1 0", "0 0 0"), "axis is the zero vector"),
     "axis of words": (arm().replace("0 1 0", "up"), "3 finite numbers"),
     "origin of two numbers": (arm().replace("0.4 0 0", "0.4 0"), "3 finite numbers"),
-    "flat box": (solid("<box size='1 0 1'/>"), "box size"),
+    "box turned inside out": (solid("<box size='1 -1 1'/>"), "box size"),
     "no size": (solid("<box/>"), "has no size"),
-    "no radius": (solid("<sphere radius='0'/>"), "sphere radius"),
+    "negative radius": (solid("<sphere radius='-1'/>"), "sphere radius"),
     "NaN length": (solid("<cylinder radius='1' length='nan'/>"), "1 finite number"),
     "cone": (solid("<cone radius='1'/>"), "no shape 'cone'"),
     "no shape": (solid(""), "one shape"),
     "mesh missing": (solid("<mesh filename='package://arm/none.stl'/>"), "packages=[the folder that holds 'arm']"),
     "mesh of the web": (solid("<mesh filename='https://a.b/none.stl'/>"), "is not a file"),
     "scale of zero": (solid("<mesh filename='a.stl' scale='1 0 1'/>"), "scale of 0"),
-    "colour of words": (arm("<material name='m'><color rgba='red'/></material>"), "material 'm'"),
-    "xacro": (
-        arm("<xacro:macro name='x' xmlns:xacro='http://www.ros.org/wiki/xacro'/>"),
-        "xacro macros; name it .xacro, or expand them first",
-    ),
 }
 
 
@@ -282,6 +305,66 @@ def test_a_bad_urdf_gets_one_line_that_names_file_and_cause(case, tmp_path, capf
     assert expected in message
     assert "\n" not in message
     assert capfd.readouterr() == ("", "")
+
+
+ODD_TEXTS = {
+    "limits equal": (arm(shoulder='<limit lower="1" upper="1" velocity="1"/>'), "held still.*joint shoulder"),
+    "no limits": (arm(shoulder='<limit effort="1" velocity="1"/>'), "held still.*joint shoulder"),
+    "floating": (arm().replace('type="revolute"', 'type="floating"', 1), r"held still.*'shoulder' \(floating\)"),
+    "planar": (arm().replace('type="revolute"', 'type="planar"', 1), r"held still.*'shoulder' \(planar\)"),
+    "box of size 0": (solid("<box size='0 0 0'/>"), "ignored.*link 'upper'"),
+    "sphere of size 0": (solid("<sphere radius='0'/>"), "ignored.*link 'upper'"),
+    "flat box": (solid("<box size='1 0 1'/>"), "0.1 mm thick.*link 'upper'"),
+    "colour of words": (arm("<material name='m'><color rgba='red'/></material>"), "colour of material 'm'"),
+    "empty colour": (arm("<material name='m'><color rgba=''/></material>"), "colour of material 'm'"),
+    "mass of words": (
+        arm(links=LINKS.replace("'base'/>", "'base'><inertial><mass value='x'/><inertia/></inertial></link>")),
+        "inertia of link 'base'",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", ODD_TEXTS)
+def test_what_planning_can_do_without_is_told_and_strict_refuses_it(case):
+    text, expected = ODD_TEXTS[case]
+    with pytest.warns(DescriptionWarning, match=f"URDF text: .*{expected}"):
+        robot = robot_from_urdf_text(text)
+    assert "elbow" in robot.joint_names
+    with pytest.raises(InputError, match=expected):
+        robot_from_urdf_text(text, strict=True)
+
+
+def test_a_joint_whose_limits_are_equal_is_held_there_and_so_is_what_follows_it():
+    equal = '<limit lower="0.7" upper="0.7" velocity="1" effort="1"/>'
+    with pytest.warns(DescriptionWarning, match="held still"):
+        held = robot_from_urdf_text(arm(shoulder=equal))
+    assert held.joint_names == ("elbow",)
+    np.testing.assert_allclose(
+        held.fk([0.2]).homogeneous, robot_from_urdf_text(arm()).fk([0.7, 0.2]).homogeneous, atol=1e-15
+    )
+    follower = (
+        "<link name='tail'/><joint name='wag' type='revolute'><parent link='hand'/><child link='tail'/>"
+        f"<axis xyz='0 0 1'/>{BOUNDS}<mimic joint='shoulder' multiplier='2' offset='0.1'/></joint>"
+    )
+    with pytest.warns(DescriptionWarning, match="held still"):
+        followed = robot_from_urdf_text(arm(follower, shoulder=equal), tip="tail")
+    turn = followed.fk([0.2], "hand").rotation.T @ followed.fk([0.2], "tail").rotation
+    np.testing.assert_allclose(turn, pin.exp3(np.array([0, 0, 1.5])), atol=1e-14)
+
+
+def test_a_follower_without_a_range_does_not_hold_its_leader():
+    """Grippers in files often have no limits but for the finger that is driven."""
+    no_range = '<limit effort="1" velocity="1"/><mimic joint="shoulder"/>'
+    robot = robot_from_urdf_text(arm(elbow=no_range))
+    assert robot.joint_names == ("shoulder",)
+    assert robot.upper - robot.lower > 1.0
+
+
+def test_a_colour_of_three_numbers_is_opaque():
+    text = solid("<sphere radius='1'/>", "visual").replace(
+        "</visual>", "<material name='m'><color rgba='1 0.5 0'/></material></visual>"
+    )
+    assert robot_from_urdf_text(text).visual.geometryObjects[0].meshColor.tolist() == [1, 0.5, 0, 1]
 
 
 BAD_MESHES = {
@@ -360,7 +443,6 @@ def test_a_bad_srdf_gets_one_line(tmp_path, text, expected):
     [
         ("joint_limits: 3", "joint_limits"),
         ("limits: {}", "joint_limits"),
-        ("joint_limits: {knee: {max_velocity: 1}}", "no joint 'knee'"),
         ("joint_limits: {elbow: 3}", "found 3"),
         ("joint_limits: {elbow: {max_velocty: 1}}", "did you mean 'max_velocity'"),
         ("joint_limits: {elbow: {max_velocity: fast}}", "finite number, found text 'fast'"),

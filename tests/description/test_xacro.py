@@ -244,3 +244,22 @@ def test_trust_ends_with_its_block(write):
         assert 'upper="2"' in robot_text(file)
     with pytest.raises(InputError, match="a lambda is not on the list"):
         robot_text(write("", "${(lambda: 3)()}"))
+
+
+def test_macros_in_a_file_called_urdf_are_expanded_too(write):
+    file = write('<xacro:property name="p" value="2"/>', "${p}", name="arm.urdf")
+    assert load_robot(file).upper[0] == 2.0
+    assert load_robot(file, xacro_args={"unused": 1}).upper[0] == 2.0
+
+
+def test_an_argument_without_a_value_is_named_with_the_remedy(write):
+    file = write("\n<xacro:arg name='ur_type' default='x'/>", "$(arg reach)")
+    with pytest.raises(InputError, match=r'Undefined substitution argument reach; give xacro_args=\{"reach": \.\.\.\}'):
+        load_robot(file)
+    assert load_robot(file, xacro_args={"reach": 1.5}).upper[0] == 1.5
+
+
+def test_a_package_that_is_not_found_is_said_once(write):
+    with pytest.raises(InputError, match="'nowhere'") as error:
+        robot_text(write('<xacro:include filename="$(find nowhere)/a.xacro"/>'))
+    assert str(error.value).count("nowhere") == 1

@@ -2,12 +2,13 @@
 
 import os
 
+import numpy as np
 import pytest
 import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rrtik_ompl.base.errors import InputError, ProblemError
+from rrtik_ompl.base.errors import DescriptionWarning, InputError, ProblemError
 from rrtik_ompl.files import strict_yaml
 from rrtik_ompl.files.strict_yaml import key_path, plain_value, read_yaml, write_yaml
 from rrtik_ompl.files.text import read_text, write_text
@@ -222,3 +223,20 @@ def test_libyaml_and_the_parser_in_python_build_the_same(tmp_path, monkeypatch, 
             said = str(error).partition(" (")[0]  # the parsers' own words for what is no YAML differ
             found.append(said if "nested deeper" not in said else "nested deeper")  # libyaml may not say where
     assert found[0] == found[1]
+
+
+def test_in_files_of_ros_the_last_of_two_keys_counts_and_angles_have_units(tmp_path):
+    file = tmp_path / "a.yaml"
+    file.write_text("a: {x: 1}\nb: !degrees -180\na: {y: !radians 2}\n")
+    with pytest.warns(DescriptionWarning, match=r"a\.yaml:3: key 'a' stands here twice \(first in line 1\); the last"):
+        document = read_yaml(file, ros=True)
+    assert document.data == {"a": {"y": 2.0}, "b": -np.pi}
+    assert document.lines["a", "y"] == 3
+    assert ("a", "x") not in document.lines
+
+
+@pytest.mark.parametrize("text", ["a: !degrees x\n", "a: !degrees {b: 1}\n", "a: !metres 1\n", "!degrees 3: 1\n"])
+def test_other_tags_are_refused_in_files_of_ros_too(tmp_path, text):
+    (tmp_path / "a.yaml").write_text(text)
+    with pytest.raises(InputError, match=r"a\.yaml:1: "):
+        read_yaml(tmp_path / "a.yaml", ros=True)

@@ -42,7 +42,7 @@ def two_titan4(*, apart: float = APART, tip: str = "left_grip_point", base_pose:
     """
     single = read_srdf(read_text(FOLDER / "titan4.srdf"), "titan4.srdf")
     states = single.postures(None)
-    rates = read_joint_limits(FOLDER / "joint_limits.yaml", JOINTS)
+    rates = read_joint_limits(FOLDER / "joint_limits.yaml", JOINTS).limits
     limits: dict[str, JointLimits] = {f"{side}{joint}": rates[joint] for side in SIDES for joint in JOINTS}
     return robot_from_urdf_text(
         two_titan4_urdf(length(apart, "apart")),

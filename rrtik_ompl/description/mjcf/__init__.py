@@ -8,7 +8,7 @@ from pathlib import Path
 
 from rrtik_ompl.base.errors import InputError, few
 from rrtik_ompl.description.faults import not_read, postures_outside, tell
-from rrtik_ompl.description.joint_limits import read_joint_limits, unread_limits
+from rrtik_ompl.description.joint_limits import LimitsFile, read_joint_limits
 from rrtik_ompl.description.mjcf.read import WORLD, Mjcf, read_mjcf
 from rrtik_ompl.description.robot_build import build_robot
 from rrtik_ompl.description.robot_source import BasePose, source_entry
@@ -65,7 +65,8 @@ def robot_from_mjcf(
     """
     mjcf = read_mjcf(Path(path))
     options = {"joints": joints, "tip": tip, "joint_limits": joint_limits, "locked": locked, "base_pose": base_pose}
-    limits = {} if joint_limits is None else read_joint_limits(joint_limits, [j.name for j in mjcf.tree.joints])
+    joint_names = [joint.name for joint in mjcf.tree.joints]
+    limits_file = LimitsFile() if joint_limits is None else read_joint_limits(joint_limits, joint_names)
     actuated = _actuated(mjcf, joints, tip)
 
     with located(str(path)):
@@ -77,7 +78,7 @@ def robot_from_mjcf(
             locked=locked,
             tip=next((site for site in TIP_SITES if site in mjcf.sites), None) if tip is None else tip,
             base_pose=base_pose,
-            limits=limits,
+            limits=limits_file.limits,
             postures=mjcf.postures,
             allowed_collisions=mjcf.excluded,
             checked_collisions=mjcf.touchable,
@@ -89,7 +90,7 @@ def robot_from_mjcf(
         [
             *(f"{path}: key '{name}': {fault}" for name, fault in postures_outside(robot, mjcf.postures)),
             *not_read(str(path), [*mjcf.unread, *_other_trees(mjcf, actuated, locked or {})]),
-            *not_read(str(joint_limits), [] if joint_limits is None else unread_limits(joint_limits)),
+            *limits_file.faults,
         ],
         strict,
     )
