@@ -19,6 +19,7 @@ from rrtik_ompl.description.shapes.mesh import MAX_BYTES, finite_numbers, stated
 from rrtik_ompl.description.tree import Joint, Link, MeshFile, Solid, Tree
 from rrtik_ompl.files.text import read_bytes
 from rrtik_ompl.geometry.collision.shape_table import pieces
+from rrtik_ompl.model.shapes import Shape
 
 MOST_UNDRAWN = 2  # most meshes in one line that are not drawn
 GREY = (0.7, 0.7, 0.7, 1.0)
@@ -148,8 +149,7 @@ def _looks(tree: Tree, places: dict[str, _Place], meshes: dict[MeshFile, Any]) -
         solids = []
         for solid in link.visual:
             try:
-                if isinstance(solid.shape, MeshFile):
-                    _load(solid.shape, meshes, f"link '{link.name}'")
+                _loaded(solid.shape, meshes, f"link '{link.name}'")
                 solids.append(solid)
             except InputError as error:
                 undrawn.append(str(error))
@@ -169,15 +169,15 @@ def _geometry(
         place = places[link.name]
         for number, solid in enumerate(solids[link.name]):
             shape = solid.shape
-            is_file = isinstance(shape, MeshFile)
+            mesh = shape if isinstance(shape, MeshFile) else None
             item = pin.GeometryObject(
                 f"{link.name}_{number}",
                 place.joint,
                 place.frame,
                 place.T_joint_link * solid.T_link_solid,
-                _load(shape, meshes, f"{tree.where}: link '{link.name}'") if is_file else pieces(shape)[0].geometry,
-                str(shape.path) if is_file else "",
-                np.array(shape.scale if is_file else (1.0, 1.0, 1.0)),
+                _loaded(shape, meshes, f"{tree.where}: link '{link.name}'"),
+                "" if mesh is None else str(mesh.path),
+                np.array((1.0, 1.0, 1.0) if mesh is None else mesh.scale),
                 solid.colour is not None,
                 np.array(solid.colour or GREY),
             )
@@ -185,8 +185,11 @@ def _geometry(
     return geometry
 
 
-def _load(mesh: MeshFile, meshes: dict[MeshFile, Any], where: str) -> coal.CollisionGeometry:
-    """Load a mesh file as a coal geometry, checked; each file is loaded once."""
+def _loaded(shape: Shape | MeshFile, meshes: dict[MeshFile, Any], where: str) -> coal.CollisionGeometry:
+    """Return a shape as a coal geometry; each mesh file is loaded, and checked, once."""
+    if not isinstance(shape, MeshFile):
+        return pieces(shape)[0].geometry
+    mesh = shape
     if mesh in meshes:
         return meshes[mesh]
 
@@ -199,10 +202,11 @@ def _load(mesh: MeshFile, meshes: dict[MeshFile, Any], where: str) -> coal.Colli
         raise InputError(f"{where}: {error}") from error
 
     try:
-        meshes[mesh] = coal.MeshLoader().load(str(mesh.path), scale)
+        loaded = coal.MeshLoader().load(str(mesh.path), scale)
     except (ValueError, RuntimeError) as error:
         raise InputError(
             f"{where}: mesh {mesh.path} cannot be read as triangles; export it again as STL, OBJ or DAE"
         ) from error
-    bounded_array(meshes[mesh].vertices(), (None, 3), f"{where}: mesh {mesh.path}: vertices")
-    return meshes[mesh]
+    bounded_array(loaded.vertices(), (None, 3), f"{where}: mesh {mesh.path}: vertices")
+    meshes[mesh] = loaded
+    return loaded
