@@ -2,8 +2,8 @@
 
     python -m rrtik_ompl.kernels.shipped FOLDER [PART PARTS]
 
-The bitcode of all kernels for all kinds of machine, and the WebAssembly module of pages that plan. Several processes
-may share the work, each with a part of the kernels; the first one makes the module.
+The bitcode of all kernels, the same for all kinds of machine, and the WebAssembly module of pages that plan. Several
+processes may share the work, each with a part of the kernels; the first one makes the module.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ from rrtik_ompl.kernels.wasm.page_kernels import write_page_kernels
 def write_bitcode(folder: Path, names: Sequence[str]) -> None:
     """Make files of kernel modules that :mod:`rrtik_ompl.kernels.simd.library` takes instead of compiling.
 
-    There is one file a module and kind of machine that has this width.
+    There is one file a module, written as for the first kind of machine that has this width, and checked for all.
     """
     for name in names:
         code = own_bitcode(name)
-        for target in targets_of_this_width():
-            write_code(folder / bitcode_name(name, target), bitcode_key(name, target), retargeted(code, target))
+        forms = [retargeted(code, target) for target in targets_of_this_width()]
+        write_code(folder / bitcode_name(name), bitcode_key(name), forms[0])
 
 
 if __name__ == "__main__":

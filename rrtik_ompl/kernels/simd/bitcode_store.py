@@ -17,13 +17,11 @@ from rrtik_ompl.kernels.simd.code_files import (
     machine_key,
     read_code,
 )
-from rrtik_ompl.kernels.simd.targets import this_target
 
 
 def packaged_bitcode(name: str) -> Code | None:
-    """The bitcode that the package brings for this kind of machine; None if there is none for these sources."""
-    target = this_target()
-    return read_code(FOLDER / bitcode_name(name, target), bitcode_key(name, target))
+    """The bitcode that the package brings for this width; None if there is none for these sources."""
+    return read_code(FOLDER / bitcode_name(name), bitcode_key(name))
 
 
 def has_bitcode(name: str) -> bool:

@@ -15,7 +15,6 @@ from pathlib import Path
 from rrtik_ompl.files.cache import nobody_else_s, one_at_a_time, write_whole
 from rrtik_ompl.files.digest import sha256
 from rrtik_ompl.kernels.simd.processor import WIDTH, processor_identity
-from rrtik_ompl.kernels.simd.targets import Target
 
 LAYOUT = 3
 CHECK_BYTES = 32
@@ -103,9 +102,9 @@ def _contents(name: str) -> str:
     return f"layout {LAYOUT} {name} {WIDTH} lanes sources {sources_digest(name)}"
 
 
-def bitcode_key(name: str, target: Target) -> str:
-    """What the bitcode of a kernel module depends on; the same for every processor of a kind."""
-    return f"{_contents(name)} {target.name}"
+def bitcode_key(name: str) -> str:
+    """What the bitcode of a kernel module depends on; the same for every kind of machine."""
+    return f"{_contents(name)} bitcode"
 
 
 def machine_key(name: str) -> str:
@@ -118,9 +117,9 @@ def file_name(name: str, key: str, ending: str = "code") -> str:
     return f"{name}-{sha256(key.encode()).hexdigest()[:24]}.{ending}"
 
 
-def bitcode_name(name: str, target: Target) -> str:
-    """Name of the file of the bitcode that the package may bring for a kind of machine."""
-    return f"{name}-{target.name}-{WIDTH}.bitcode"
+def bitcode_name(name: str) -> str:
+    """Name of the file of the bitcode that the package may bring, for this process's number of lanes."""
+    return f"{name}-{WIDTH}.bitcode"
 
 
 def read_code(file: Path, key: str) -> Code | None:

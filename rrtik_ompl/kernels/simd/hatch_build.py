@@ -1,11 +1,11 @@
 """What hatch does when it builds a wheel: kernels go along as LLVM bitcode, so that nobody who installs it compiles.
 
 A wheel that is made to be installed at once has the bitcode of this machine's width. With ``RRTIK_KERNELS=1`` in the
-environment it has that of every kind of machine (:mod:`rrtik_ompl.kernels.simd.targets`), wherever it is built, and it
-is an error if one is missing: so wheels are published. Both have what pages run. ``RRTIK_KERNELS=0`` goes without. That
-takes minutes of all cores and numba, which the built package needs anyway. Whatever goes wrong without the setting,
-there is a wheel: kernels are then compiled when they are first used. Editable installs compile at first use too,
-because their sources change.
+environment it has that of both widths, which fits every kind of machine (:mod:`rrtik_ompl.kernels.simd.targets`),
+wherever it is built, and it is an error if one is missing: so wheels are published. Both have what pages run.
+``RRTIK_KERNELS=0`` goes without. That takes minutes of all cores and numba, which the built package needs anyway.
+Whatever goes wrong without the setting, there is a wheel: kernels are then compiled when they are first used. Editable
+installs compile at first use too, because their sources change.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ PORTABLE = {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""}  # nothing th
 
 
 class KernelBitcode(BuildHookInterface):  # type: ignore[misc]
-    """Adds the bitcode of all kernels, for all kinds of machine and widths, to a wheel."""
+    """Adds the bitcode of all kernels, of both widths, to a wheel."""
 
     PLUGIN_NAME = "custom"
 

@@ -116,7 +116,7 @@ def _made(name: str) -> Library:
 
 
 def machine_code(bitcode: Code) -> Code | None:
-    """Bitcode as code of this processor; None if it was made for another kind of machine or a newer LLVM."""
+    """Bitcode of any kind of machine as code of this processor; None if a newer LLVM or an unknown kind made it."""
     import llvmlite.binding as llvm
 
     machine = target_machine()
@@ -124,9 +124,9 @@ def machine_code(bitcode: Code) -> Code | None:
         module = llvm.parse_bitcode(bitcode.code)
     except RuntimeError:
         return None
-    if target_of(module.triple) != this_target():
+    if target_of(module.triple) is None:
         return None
-    module.triple = machine.triple  # versions of LLVM spell them anew
+    module.triple = machine.triple  # as the text at the head of `targets` says
     module.data_layout = str(machine.target_data)
     return Code(bitcode.entries, machine.emit_object(module))
 

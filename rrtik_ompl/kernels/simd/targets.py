@@ -1,7 +1,7 @@
-"""The kinds of machine that kernels run on, each with a name of its own; a wheel brings bitcode for all of them.
+"""The kinds of machine that kernels run on, each with a name of its own; a wheel brings bitcode that fits all of them.
 
 Kernels use LLVM's portable vectors and call nothing but C's mathematics, so the bitcode that numba makes on one kind is
-retargeted to the others by naming their triple and data layout.
+that of all others of the same number of lanes once their triple and data layout are named in it.
 """
 
 from __future__ import annotations

@@ -19,7 +19,6 @@ from rrtik_ompl.files import notice
 from rrtik_ompl.files.cache import cache_folder, one_at_a_time
 from rrtik_ompl.kernels import shipped, warm_up
 from rrtik_ompl.kernels.simd import bitcode, bitcode_store, code_files, compiled, library
-from rrtik_ompl.kernels.simd.targets import this_target
 
 # kernels are compiled anew here, which takes minutes on a busy machine
 pytestmark = [pytest.mark.kernels, pytest.mark.timeout(3600)]
@@ -326,7 +325,7 @@ def packaged(written, cached, tmp_path, monkeypatch):
     monkeypatch.setattr(bitcode_store, "FOLDER", folder)
     monkeypatch.setattr(bitcode, "compiled_module", fail)
     monkeypatch.setattr(library, "_said", set())
-    return folder / code_files.bitcode_name(KERNELS, this_target())
+    return folder / code_files.bitcode_name(KERNELS)
 
 
 def test_bitcode_of_the_package_saves_compiling(world, packaged, cached):

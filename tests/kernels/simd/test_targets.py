@@ -1,4 +1,4 @@
-"""Bitcode for every kind of machine is made on any of them; what is foreign, or for no known kind, is never used."""
+"""Bitcode of one kind of machine is that of all of them; what was made for no known kind is never used."""
 
 import warnings
 
@@ -48,10 +48,9 @@ def test_a_triple_names_a_kind_of_machine(triple, name):
     assert target_of(triple) == (None if name is None else BY_NAME[name])
 
 
-def test_kinds_have_names_triples_and_files_of_their_own():
+def test_kinds_have_names_and_triples_of_their_own():
     assert [target_of(target.triple) for target in TARGETS] == [*TARGETS]
-    assert len({code_files.bitcode_name(KERNELS, target) for target in TARGETS}) == len(TARGETS)
-    assert len({code_files.bitcode_key(KERNELS, target) for target in TARGETS}) == len(TARGETS)
+    assert len(BY_NAME) == len(TARGETS)
 
 
 def checked_object(name, code, target, effort):
@@ -90,10 +89,16 @@ def test_missing_names_are_seen(code):
 
 
 @pytest.mark.parametrize("target", FOREIGN, ids=[target.name for target in FOREIGN])
-def test_foreign_bitcode_is_never_used(code, target, tmp_path, monkeypatch):
-    foreign = bitcode.retargeted(code, target)
-    assert library.machine_code(bitcode.retargeted(code, this_target())) is not None
-    assert library.machine_code(foreign) is None
+def test_bitcode_of_another_kind_gives_the_same_code_of_this_processor(code, target):
+    assert library.machine_code(bitcode.retargeted(code, target)).code == library.machine_code(code).code
+
+
+@pytest.mark.parametrize("triple", ["x86_64-pc-windows-msvc", "riscv64-unknown-linux-gnu"])
+def test_bitcode_of_no_known_kind_is_never_used(code, triple, tmp_path, monkeypatch):
+    module = llvm.parse_bitcode(code.code)
+    module.triple = triple
+    unknown = code_files.Code(code.entries, module.as_bitcode())
+    assert library.machine_code(unknown) is None
 
     def fail(name):
         raise ValueError(f"{name} is compiled")
@@ -101,11 +106,9 @@ def test_foreign_bitcode_is_never_used(code, target, tmp_path, monkeypatch):
     monkeypatch.setenv("RRTIK_CACHE", "")
     monkeypatch.setattr(bitcode_store, "FOLDER", tmp_path)
     monkeypatch.setattr(bitcode, "compiled_module", fail)
-    for key in (code_files.bitcode_key(KERNELS, target), code_files.bitcode_key(KERNELS, this_target())):
-        for place in TARGETS:  # also in the place, and with the key, of this machine's own
-            code_files.write_code(tmp_path / code_files.bitcode_name(KERNELS, place), key, foreign)
-        with pytest.raises(ValueError, match="is compiled"):
-            library._made(KERNELS)
+    code_files.write_code(tmp_path / code_files.bitcode_name(KERNELS), code_files.bitcode_key(KERNELS), unknown)
+    with pytest.raises(ValueError, match="is compiled"):
+        library._made(KERNELS)
 
 
 def test_a_machine_of_no_known_kind_takes_the_reference_path_and_says_so_once(monkeypatch):
@@ -148,7 +151,7 @@ def test_every_kernel_that_does_not_compile_is_told_in_one_line_with_its_name(mo
         library.library("b")  # the same reason
 
 
-def test_a_build_makes_every_file_that_any_machine_asks_for():
+def test_a_build_makes_every_width_that_any_machine_asks_for():
     names = {(target.name, width) for target in TARGETS for width in target.lanes}
     assert names == {("x86_64-linux", 8), ("x86_64-linux", 16), ("aarch64-linux", 8), ("arm64-macos", 8)}
     assert set(targets.targets_of_this_width()) == {t for t in TARGETS if targets.WIDTH in t.lanes}
