@@ -24,7 +24,7 @@ from rrtik_ompl.ik.numeric.restarts import numeric_ik
 from rrtik_ompl.ik.solve import DRAWS, solve_ik
 from rrtik_ompl.ik.targets import leaves_freedom, skip_targets, targets
 from rrtik_ompl.model.goal import GoalPart, GoalSet, Target, TipGoal, has_continuous, joint_difference
-from rrtik_ompl.model.robot import Robot, poses
+from rrtik_ompl.model.robot import Robot, inside_limits, poses
 from rrtik_ompl.world.problem import Problem
 
 STARTS = 48  # random configurations of one round
@@ -143,6 +143,8 @@ class GoalSearch:
         checks = self._problem.world.checks
         free = found[checks.free(found)]
         free = free[checks.certified(free)]
+        if self._first_round_is_deterministic and self._rounds == 1:
+            free = _with_full_turns(self._problem, free)
         self._all_at_goal = np.vstack([self._all_at_goal, found])
         self.rows = frozen(np.vstack([self.rows, _spread_out(self._problem, free, self.rows)])[:MAX_TOTAL])
         self.exhausted |= self._rounds >= LAST_ROUND or len(self.rows) >= MAX_TOTAL
@@ -255,6 +257,23 @@ def _with_long_ways(problem: Problem, q: Vector) -> Matrix:
         other[joint] += -TAU if other[joint] > problem.start[joint] else TAU
         rows.append(other)
     return np.array(rows)
+
+
+def _with_full_turns(problem: Problem, rows: Matrix) -> Matrix:
+    """Return configurations, shape (k, dof), and behind them the same postures with one joint a full turn away.
+
+    A closed form gives each posture in the turns nearest to the start, but the way there may be blocked. Continuous
+    joints are left out. Where the posture is free, it is free in every turn. Shape (m, dof).
+    """
+    robot = problem.world.robot
+    spans = robot.upper - robot.lower
+    turned = [rows]
+    for joint in np.flatnonzero(robot.chain.whole_turns() & ~robot.continuous & (spans >= TAU)):
+        for turn in (-TAU, TAU):
+            other = rows.copy()
+            other[:, joint] += turn
+            turned.append(other[inside_limits(robot, other)])
+    return np.vstack(turned)
 
 
 def _move_into_regions(problem: Problem, goal: TipGoal, found: Matrix, rng: np.random.Generator) -> Matrix:

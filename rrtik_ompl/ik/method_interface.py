@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector, frozen, seed_of
 from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.choices import IkMethod
-from rrtik_ompl.base.copies import as_value, in_one_line
+from rrtik_ompl.base.copies import as_value, in_one_line, set_fields
 from rrtik_ompl.description.joint_weights import weighted_difference
 from rrtik_ompl.model.goal import Target, TipGoal, has_continuous, joint_difference
 from rrtik_ompl.model.result import required
@@ -21,6 +21,7 @@ from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.world.world import World
 
 SAME_POSTURE = 1e-3  # [rad] or [m]: solutions of a numeric method this near to each other count as one
+SLACK_SHARE = 0.4  # of the smaller tolerance: a target this near to a singular one is solved as if it were singular
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -94,8 +95,23 @@ def fits_all(robot: Robot, target: Target) -> str:
     return ""
 
 
+class _Deferred:
+    """A value of which some fields are made when one of them is first read."""
+
+    __slots__ = ("_later",)
+
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> object:
+            if name.startswith("_"):
+                raise AttributeError(name)
+            make, *given = self._later
+            set_fields(self, **make(name, *given))
+            return object.__getattribute__(self, name)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
-class IkResult:
+class IkResult(_Deferred):
     """The result of inverse kinematics.
 
     Attributes:
@@ -127,6 +143,16 @@ class IkResult:
     __reduce__ = as_value
     __repr__ = in_one_line
 
+    @classmethod
+    def later(cls, make: Callable[..., dict[str, Any]], *given: object) -> IkResult:
+        """Return a result whose fields are made when they are read: ``make(name, *given)`` for the first that is.
+
+        It returns this field and any others by their names.
+        """
+        result = object.__new__(cls)
+        _set_later(result, (make, *given))
+        return result
+
     @property
     def found(self) -> bool:
         """Whether there is a solution."""
@@ -154,6 +180,9 @@ class IkResult:
     def nearest(self) -> IkResult:
         """Return the result with only its nearest solution."""
         return replace(self, solutions=self.solutions[:1], residuals=self.residuals[:1])
+
+
+_set_later: Callable[[IkResult, tuple[Any, ...]], None] = vars(_Deferred)["_later"].__set__
 
 
 def nearest_first(robot: Robot, rows: Matrix, near: Vector) -> NDArray[np.intp]:

@@ -12,7 +12,7 @@ from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.base.choices import IkMethod
 from rrtik_ompl.ik.analytic.branches import tip_fault, valid_branches
 from rrtik_ompl.ik.analytic.closed_form import branches_of, family, form_of, has_closed_form
-from rrtik_ompl.ik.method_interface import IkRequest, IkResponse, Method, fits_all
+from rrtik_ompl.ik.method_interface import SLACK_SHARE, IkRequest, IkResponse, Method, fits_all
 from rrtik_ompl.ik.numeric.projection import projection
 from rrtik_ompl.ik.numeric.restarts import numeric
 from rrtik_ompl.kernels.ik import branch_layout, ik_layout
@@ -88,8 +88,8 @@ def leaves_a_curve(robot: Robot, targets: Sequence[Target]) -> bool:
 
 
 def _slack(target: Target) -> float:
-    """Return how far from singular a target may be to be treated as singular: 0.4 times its smaller tolerance."""
-    return 0.4 * min(target.tolerances)
+    """Return how far from singular a target may be to be treated as singular."""
+    return SLACK_SHARE * min(target.tolerances)
 
 
 def _matrix(target: Target) -> Matrix:

@@ -25,6 +25,7 @@ from rrtik_ompl.ik.method_interface import (
 from rrtik_ompl.ik.method_interface import IkResult as IkResult
 from rrtik_ompl.ik.methods import METHODS, load_kernels
 from rrtik_ompl.ik.multi_goals import PROJECTION, solve_all_tips
+from rrtik_ompl.ik.one_pose import solve_one_pose
 from rrtik_ompl.ik.residual import error_of_one
 from rrtik_ompl.ik.targets import leaves_freedom, targets
 from rrtik_ompl.model.goal import TIP_GOALS, MultiGoal, PoseGoal, Target, TipGoal, has_continuous, joint_difference
@@ -73,8 +74,9 @@ def solve_ik(
             form gives the nearest solution (for a singular pose the nearest of its representatives), by the weighted
             distance if joints have weights; a numeric method gives the first that it finds from there.
         all: Whether to return every solution that the method finds, not just one. A closed form gives all branches (for
-            a singular pose representatives), each in the turns nearest to ``near``; a numeric method gives those that
-            it comes across, and solutions that differ by full turns of a joint count as different.
+            a singular pose representatives), each in the turns nearest to ``near``, so a UR arm has at most eight; a
+            numeric method gives those that it comes across, and solutions that differ by full turns of a joint count
+            as different.
         world: If given, solutions in collision are left out. Its robot must be this one.
         seconds: Wall time that a numeric method may take [s]. The clock is read between rounds, and the first round is
             always done.
@@ -91,6 +93,25 @@ def solve_ik(
         >>> robot.fk(q).translation.round(2)
         array([0.4, 0.2, 0.5])
     """
+    if method == "auto" and world is None and (all is False or all is True):
+        quick = solve_one_pose(robot, goal, near, all, seconds, seed, solve_in_any_way)
+        if quick is not None:
+            return quick
+    return solve_in_any_way(robot, goal, method=method, near=near, all=all, world=world, seconds=seconds, seed=seed)
+
+
+def solve_in_any_way(
+    robot: Robot,
+    goal: TipGoal | MultiGoal | ArrayLike | pin.SE3,
+    *,
+    method: IkMethod = "auto",
+    near: ArrayLike | None = None,
+    all: bool = False,
+    world: World | None = None,
+    seconds: float = SECONDS,
+    seed: int | None = 0,
+) -> IkResult:
+    """Find configurations at any goal, by any method, as `solve_ik`."""
     check_world(world, robot)
     one_of(get_args(IkMethod), method, METHOD)
     require(all, bool, "all")

@@ -76,5 +76,5 @@ def test_a_batch_says_by_how_much_a_pose_is_out_of_reach():
     far[0, 3] = 3.0
     batch = solve_ik_many(rrtik.load_robot("ur5"), far[None])
     assert batch.reasons == ("unreachable",)
-    assert "m and" in batch.details[0]
+    assert batch.details[0].endswith(" m away")
     assert 1.5 < float(batch.details[0].split("configuration is ")[1].split(" m")[0]) < 2.5

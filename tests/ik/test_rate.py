@@ -115,7 +115,7 @@ def test_manipulability_is_the_determinant_of_a_square_jacobian():
 
 
 def test_an_arm_without_a_closed_form_still_has_a_rank():
-    robot = load_robot("ur5")
-    report = singularity_report(robot, np.zeros(6))
+    robot = load_robot("xarm7")
+    report = singularity_report(robot, np.zeros(7))
     assert report.rank < 6
     assert dict(report.nearness) == {}

@@ -82,7 +82,7 @@ def test_a_search_in_kept_memory_finds_what_a_new_one_finds():
 
 
 @pytest.mark.kernels
-@pytest.mark.parametrize("name", ["titan4", "puma560"])
+@pytest.mark.parametrize("name", ["titan4", "puma560", "ur5"])
 def test_branches_in_kept_memory_are_those_of_a_new_call(name):
     robot = rrtik.load_robot(name)
     form, near = form_of(robot), drawn(robot, 1, 1)
@@ -110,7 +110,8 @@ def test_a_pose_is_solved_while_another_is_being_accepted(name, monkeypatch):
 
     monkeypatch.setattr(RowChecks, "free", judged)
     monkeypatch.setattr(RowChecks, "certified", lambda self, Q: np.ones(len(Q), dtype=bool))
-    np.testing.assert_array_equal(solve_ik(robot, first, world=world).solutions, expected[0])
+    found = solve_ik(robot, first, world=world).solutions
+    np.testing.assert_allclose(found, expected[0], rtol=0, atol=ROUNDING)  # a world is another kernel's, or the same
     assert len(inner) > 0
     for found in inner:
         np.testing.assert_array_equal(found, expected[1])
@@ -129,7 +130,7 @@ def test_the_error_of_one_configuration_is_that_of_many(name):
 
 def test_an_answer_that_misses_the_goal_is_not_returned(monkeypatch):
     """The solver's own word is not enough: the tip is placed anew, by Pinocchio."""
-    robot = rrtik.load_robot("ur5")
+    robot = rrtik.load_robot("panda")
     advance = SearchOfOne.advance
     monkeypatch.setattr(SearchOfOne, "advance", lambda self: advance(self) + 0.1)
-    assert not solve_ik(robot, poses(robot, 1)[0]).found
+    assert not solve_ik(robot, poses(robot, 1)[0], method="numeric").found

@@ -14,7 +14,7 @@ from rrtik_ompl.model.shapes import Sphere
 METHODS_OF = {
     "titan4": ("closed-form", "numeric", "genetic"),
     "puma560": ("closed-form", "numeric", "genetic"),
-    "ur5": ("numeric", "genetic"),
+    "ur5": ("closed-form", "numeric", "genetic"),
     "panda": ("numeric", "genetic"),
 }
 CASES = [(name, method) for name, methods in METHODS_OF.items() for method in methods]

@@ -83,13 +83,15 @@ def test_the_room_of_a_joint_names_what_ends_it_and_where_the_arm_is_singular():
 
 
 def test_an_arm_without_named_singular_postures_is_warned_by_its_jacobian():
-    robot = load_robot("ur5")
+    robot = load_robot("xarm7")
     world = World(robot, Scene())
-    q = np.array([0.0, -1.2, 1.0, -1.4, 1.0, 0.0])
-    stretches = joint_range(world, q, 2).singular
-    assert any(low <= 0.0 <= high for low, high, _ in stretches)  # the elbow straight
-    assert "near a singular posture" in check_move(world, q, 2, 0.0).warnings
-    assert not check_move(world, q, 2, 1.2).warnings
+    q = np.array([0.0, 0.4, 0.0, 1.2, 0.4, 0.9, 0.2])
+    low, high, case = joint_range(world, q, 3).singular[0]
+    middle = 0.5 * (low + high)
+    assert case == ""
+    assert np.linalg.svd(robot.jacobian([*q[:3], middle, *q[4:]]), compute_uv=False)[-1] < 0.05
+    assert "near a singular posture" in check_move(world, q, 3, middle).warnings
+    assert not check_move(world, q, 3, 1.0).warnings
 
 
 def test_an_arm_that_touches_something_may_go_out_of_it_and_no_deeper():

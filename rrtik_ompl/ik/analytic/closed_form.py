@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import combinations_with_replacement
 
 import numpy as np
@@ -13,6 +14,7 @@ from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.base.poses import LAST_ROW, LAST_ROW_TOLERANCE, NOT_RIGID, left_handed
 from rrtik_ompl.ik.analytic.analytic_solver import AnalyticSolver
 from rrtik_ompl.ik.analytic.branches import kernel_branches, reference_branches, tip_fault
+from rrtik_ompl.ik.analytic.parallel_arm import parallel_form
 from rrtik_ompl.ik.analytic.planar import planar_form
 from rrtik_ompl.model.robot import Robot
 
@@ -43,25 +45,31 @@ class ClosedForm:
 
 
 def form_of(robot: Robot) -> AnalyticSolver:
-    """Return the closed form that the robot brings, or that of planar arms if it is one.
+    """Return the closed form that the robot brings, or one that fits its description.
 
     Raises:
         InputError: If there is none; the message names a method that fits.
     """
-    if isinstance(robot.closed_form, AnalyticSolver):
-        return robot.closed_form
-    form = planar_form(robot)
+    form = _form_of(robot)
     if form is None:
         raise InputError(
-            f"robot '{robot.name}' brings no closed-form inverse kinematics and is no planar arm of two or three "
-            "joints; the method that fits every robot is 'numeric'"
+            f"robot '{robot.name}' brings no closed-form inverse kinematics, is no planar arm of two or three joints, "
+            "and has not six joints of which 2, 3, 4 are parallel and 5, 6 meet; the method that fits every robot is "
+            "'numeric'"
         )
     return form
 
 
 def has_closed_form(robot: Robot) -> bool:
     """Check whether `form_of` finds a closed form."""
-    return isinstance(robot.closed_form, AnalyticSolver) or planar_form(robot) is not None
+    return _form_of(robot) is not None
+
+
+@lru_cache(maxsize=64)
+def _form_of(robot: Robot) -> AnalyticSolver | None:
+    if isinstance(robot.closed_form, AnalyticSolver):
+        return robot.closed_form
+    return planar_form(robot) or parallel_form(robot)
 
 
 def solutions(

@@ -1,4 +1,4 @@
-"""Closed forms in kernels: all eight branches of many poses, one pose per lane, for two kinds of six-joint arms.
+"""Closed forms in kernels: all eight branches of many poses, one pose per lane, for kinds of six-joint arms.
 
 Each gives what the readable form in a robot's folder gives, to rounding. A pose that is singular, or so nearly so that
 rounding decides, is only marked as odd: that form answers it.
@@ -11,6 +11,7 @@ from typing import Any
 from rrtik_ompl.kernels.ik import branch_layout
 from rrtik_ompl.kernels.ik.branch_checks import answer, check_branches, load, placed_entry, placed_origin
 from rrtik_ompl.kernels.ik.branch_layout import ArmTable, CallTable
+from rrtik_ompl.kernels.ik.parallel_axes import elbow, joints_of, shoulder, wrist, wrist_of
 from rrtik_ompl.kernels.simd.compiled import WIDTH, entry, inlined, kernel
 from rrtik_ompl.kernels.simd.lanes import (
     absolute,
@@ -52,9 +53,14 @@ def two_links(first: float, second: float, x: Any, y: Any) -> Any:
 
 
 @inlined
-def put(call: CallTable, branch: int, block: int, raw: Any, q: Any) -> None:
-    """Write a branch: its joint values, and which targets it reaches by the cosine of the elbow's turn."""
-    real = absolute(raw) <= 1.0 + branch_layout.REACH_TOLERANCE
+def closes(raw: Any) -> Any:
+    """Which targets are in reach, by the cosine of the elbow's turn."""
+    return absolute(raw) <= 1.0 + branch_layout.REACH_TOLERANCE
+
+
+@inlined
+def put(call: CallTable, branch: int, block: int, real: Any, q: Any) -> None:
+    """Write a branch: which targets it reaches, and its joint values."""
     out = call.q
     set_truths(call.real, WIDTH * answer(call, 0, branch, block), real)
     set_wide_lanes(out, answer(call, 0, branch, block), q[0])
@@ -100,8 +106,9 @@ def parallel_side(arm: ArmTable, call: CallTable, block: int, side: int, theta1:
         height = placed_origin(call, 2) - d6 * wz - a4 * sine
         up, down, turn, raw = two_links(a2, a3, radius - a1 - a4 * cosine, height)
         missed = missed | (absolute(raw) > 1.0 + branch_layout.REACH_TOLERANCE)
-        put(call, branch, block, raw, (theta1, up, turn, within_half_turn(psi - up - turn), theta5, theta6))
-        put(call, branch + 1, block, raw, (theta1, down, -turn, within_half_turn(psi - down + turn), theta5, theta6))
+        real = closes(raw)
+        put(call, branch, block, real, (theta1, up, turn, within_half_turn(psi - up - turn), theta5, theta6))
+        put(call, branch + 1, block, real, (theta1, down, -turn, within_half_turn(psi - down + turn), theta5, theta6))
     return h, missed
 
 
@@ -130,6 +137,35 @@ def solve_parallel(arm: ArmTable, call: CallTable, block: int) -> None:
     set_truths(call.odd, WIDTH * block, odd)
 
 
+@kernel
+def solve_parallel_arm(arm: ArmTable, call: CallTable, block: int) -> None:
+    """All branches of a block for any arm whose axes 2, 3, 4 are parallel and whose axes 5, 6 meet.
+
+    Branches are (shoulder +, -) x (wrist +, -) x (elbow +, -).
+    """
+    numbers = arm.numbers
+    least = max(branch_layout.SINGULAR, call.slack)
+    turn, place = wrist_of(
+        numbers,
+        (placed_entry(call, 0, 0), placed_entry(call, 0, 1), placed_entry(call, 0, 2)),
+        (placed_entry(call, 1, 0), placed_entry(call, 1, 1), placed_entry(call, 1, 2)),
+        (placed_entry(call, 2, 0), placed_entry(call, 2, 1), placed_entry(call, 2, 2)),
+        (placed_origin(call, 0), placed_origin(call, 1), placed_origin(call, 2)),
+    )
+    odd = spread_wide(0.0) > 0.0  # none yet
+    for side in range(2):
+        first, seen, near, away = shoulder(numbers, turn, place, 1.0 - 2.0 * side)
+        odd = odd | (away < least)
+        for way in range(2):
+            fifth, middle, sixth, bent, size = wrist(numbers, seen, 1.0 - 2.0 * way)
+            odd = odd | (near & bent & (size < least))
+            for bend in range(2):
+                second, third, real = elbow(numbers, seen[0], middle, 1.0 - 2.0 * bend)
+                q = joints_of(numbers, first, second, third, middle, fifth, sixth)
+                put(call, 4 * side + 2 * way + bend, block, near & bent & real, q)
+    set_truths(call.odd, WIDTH * block, odd)
+
+
 @inlined
 def ball_wrist(call: CallTable, block: int, branch: int, raw: Any, arm_angles: Any, c: Any, s: Any) -> Any:
     """Two branches of an arm with a ball wrist, its first three joints known; the sine of joint 5."""
@@ -151,8 +187,9 @@ def ball_wrist(call: CallTable, block: int, branch: int, raw: Any, arm_angles: A
         ax * placed_entry(call, 0, 0) + ay * placed_entry(call, 1, 0) + az * placed_entry(call, 2, 0),
         ax * placed_entry(call, 0, 1) + ay * placed_entry(call, 1, 1) + az * placed_entry(call, 2, 1),
     )
-    put(call, branch, block, raw, (theta1, theta2, theta3, theta4, theta5, theta6))
-    put(call, branch + 1, block, raw, (theta1, theta2, theta3, opposite(theta4), -theta5, opposite(theta6)))
+    real = closes(raw)
+    put(call, branch, block, real, (theta1, theta2, theta3, theta4, theta5, theta6))
+    put(call, branch + 1, block, real, (theta1, theta2, theta3, opposite(theta4), -theta5, opposite(theta6)))
     return sine
 
 
@@ -199,6 +236,16 @@ def parallel_axes(arm: ArmTable, call: CallTable) -> int:
     for block in range(call.blocks):
         load(arm, call, block)
         solve_parallel(arm, call, block)
+        check_branches(arm, call, block)
+    return 0
+
+
+@entry
+def parallel_arm(arm: ArmTable, call: CallTable) -> int:
+    """Answer all targets of a call; see :func:`solve_parallel_arm`."""
+    for block in range(call.blocks):
+        load(arm, call, block)
+        solve_parallel_arm(arm, call, block)
         check_branches(arm, call, block)
     return 0
 

@@ -48,6 +48,9 @@ class CallTable(Record):
 
 # Numbers of an arm of parallel axes: of its DH table.
 A1, A2, A3, A4, D6 = range(5)
+# Numbers of any arm of parallel axes: six axes, signs of the joints, ways from axis to axis, the tip's turn and lever.
+H1, H2, H5, H6, SIGNS = 0, 3, 12, 15, 18
+P01, P12, P23, P34, P45, TURN, LEVER = 24, 27, 30, 33, 36, 39, 48
 # Numbers of an arm with a ball wrist: height of the shoulder, a2, d3 of the DH table, and the forearm from elbow to
 # wrist, its length and the angle that it is bent by.
 SHOULDER, UPPER_ARM, ASIDE, FOREARM, BEND = range(5)

@@ -17,7 +17,7 @@ def axes_and_offsets(robot):
     return np.einsum("kij,kj->ki", frames[:, :3, :3], robot.chain.axis), np.diff(points, axis=0)
 
 
-@pytest.mark.parametrize("name", ["titan4", "puma560"])
+@pytest.mark.parametrize("name", ["titan4", "puma560", "ur5", "ur10_limited", "z1"])
 def test_both_find_the_same_solutions(name):
     robot = load_robot(name)
     other, at_zero = eaik.HPRobot(*axes_and_offsets(robot)), robot.fk(np.zeros(6)).rotation

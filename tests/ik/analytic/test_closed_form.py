@@ -45,7 +45,7 @@ def test_a_tip_that_the_last_joint_does_not_carry_is_refused():
         solutions(robot, robot.fk_batch(np.zeros((1, 6))))
 
 
-@pytest.mark.parametrize("name", ["panda", "ur5", "planar6", "point2d"])
+@pytest.mark.parametrize("name", ["panda", "kinova", "planar6", "point2d"])
 def test_a_robot_without_a_closed_form_is_told_what_fits(name):
     robot = load_robot(name)
     assert not has_closed_form(robot)

@@ -21,7 +21,7 @@ from rrtik_tests.sizes import how_many
 
 pytestmark = pytest.mark.kernels
 
-ARMS = ("titan4", "puma560")
+ARMS = ("titan4", "puma560", "ur5")
 ROUNDING = 1e-12
 COUNT = how_many(100_000, 20_000)
 BASE = pose_from_rpy([1.0, -2.0, 0.5], [0.4, -0.7, 2.0])
@@ -77,6 +77,10 @@ def test_arc_sines_and_opposite_angles_are_those_of_numpy():
 def configurations(name, count):
     """Half of them random, the others of every singular family."""
     robot, rng, parts = rrtik.load_robot(name), np.random.default_rng(5), []
+    if name == "ur5":
+        Q = rng.uniform(robot.lower, robot.upper, (count, 6))
+        Q[-count // 200 :, 4] = 0.0  # few, as numpy alone answers these
+        return robot, Q
     samples = titan_samples if name == "titan4" else puma_samples
     for case in samples.CASES:
         share = count // 2 if case == "generic" else -(-count // 2 // (len(samples.CASES) - 1))
