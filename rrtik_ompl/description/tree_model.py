@@ -12,12 +12,10 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from rrtik_ompl.base.arrays import bounded_array
 from rrtik_ompl.base.copies import Once
 from rrtik_ompl.base.errors import InputError, MeshWarning, few
-from rrtik_ompl.description.shapes.mesh import MAX_BYTES, finite_numbers, stated_unit
+from rrtik_ompl.description.shapes.mesh import load_surface
 from rrtik_ompl.description.tree import Joint, Link, MeshFile, Solid, Tree
-from rrtik_ompl.files.text import read_bytes
 from rrtik_ompl.geometry.collision.shape_table import pieces
 from rrtik_ompl.model.shapes import Shape
 
@@ -193,20 +191,8 @@ def _loaded(shape: Shape | MeshFile, meshes: dict[MeshFile, Any], where: str) ->
     if mesh in meshes:
         return meshes[mesh]
 
-    data = read_bytes(mesh.path, MAX_BYTES)
-    if not finite_numbers(data):
-        raise InputError(f"{where}: mesh {mesh.path} holds numbers that are not finite; export it again")
     try:
-        scale = np.array(mesh.scale) * stated_unit(mesh.path, data)
+        meshes[mesh] = load_surface(mesh.path, np.array(mesh.scale))
     except InputError as error:
         raise InputError(f"{where}: {error}") from error
-
-    try:
-        loaded = coal.MeshLoader().load(str(mesh.path), scale)
-    except (ValueError, RuntimeError) as error:
-        raise InputError(
-            f"{where}: mesh {mesh.path} cannot be read as triangles; export it again as STL, OBJ or DAE"
-        ) from error
-    bounded_array(loaded.vertices(), (None, 3), f"{where}: mesh {mesh.path}: vertices")
-    meshes[mesh] = loaded
-    return loaded
+    return meshes[mesh]

@@ -165,7 +165,10 @@ KINDS = MappingProxyType(
             also=("PointCloud",),
         ),
         "Mesh": Kind(
-            "a mesh", "model.shapes:Mesh", "description.shapes.mesh:read_mesh", endings=(".stl", ".obj", ".dae")
+            "a mesh",
+            "model.shapes:Mesh",
+            "description.shapes.mesh:read_mesh",
+            endings=(".stl", ".obj", ".dae", ".glb", ".gltf"),
         ),
         "HeightField": Kind(
             "a grid of heights",

@@ -32,6 +32,7 @@ from rrtik_ompl.geometry.collision.shape_table import pieces
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import Obstacle, Scene, exchanged, pose_at
 from rrtik_ompl.model.shapes import Mesh
+from rrtik_ompl.model.shapes.mesh import open_edges_told
 from rrtik_ompl.model.world_settings import WorldSettings
 from rrtik_ompl.world.arm_cache import Spheres, arm_cache
 
@@ -238,4 +239,4 @@ def _doubts(robot: Robot, scene: Scene) -> Iterator[str]:
         yield f"robot '{robot.name}' has no collision geometry: all is free"
     for name, shape in ((item.name, item.shape) for items in (scene.obstacles, scene.attached) for item in items):
         if isinstance(shape, Mesh) and not (shape.closed or shape.source):
-            yield f"the mesh of '{name}' has {shape.open_edges} open edges; it is treated as a surface, not as a solid"
+            yield f"the mesh of '{name}' has {open_edges_told(shape)}"

@@ -1,28 +1,34 @@
-"""Read mesh files (STL text and binary, OBJ, DAE) as `shapes.Mesh`, by assimp through coal."""
+"""Read mesh files: STL, OBJ, DAE, PLY, GLB and glTF, by assimp through coal; STL that it would refuse by ourselves."""
 
 from __future__ import annotations
 
 import os
 import re
+import tempfile
 import warnings
 from io import BytesIO
 from pathlib import Path
-from typing import Any
 from xml.etree import ElementTree
 
 import coal
 import numpy as np
-from numpy.typing import NDArray
 
-from rrtik_ompl.base.arrays import Matrix, positive
+from rrtik_ompl.base.arrays import Vector, bounded_array, positive
 from rrtik_ompl.base.errors import InputError, MeshWarning
+from rrtik_ompl.description.package_path import MESH_SUFFIXES
 from rrtik_ompl.files.notice import tell_once
 from rrtik_ompl.files.text import file_name, read_bytes
+from rrtik_ompl.geometry.collision.solids import bvh, mesh_arrays
 from rrtik_ompl.model.shapes import Mesh
+from rrtik_ompl.model.shapes.mesh import open_edges_told
 
-SUFFIXES = (".stl", ".obj", ".dae")
 MAX_BYTES = 256 * 1024 * 1024
 LONG_BYTES = 20e6  # size of a file above which the user is told to wait
+COARSEST = 1e-5  # [m] largest distance of neighbouring numbers of single precision with which a shape is read
+AGAIN = "export it again as STL, OBJ or DAE"
+_BINARY_TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("rest", "<u2")])
+_CORNER = re.compile(rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)", re.IGNORECASE)
+_VERTEX = re.compile(rb"^([ \t]*v[ \t]+)(\S+)[ \t]+(\S+)[ \t]+(\S+)", re.MULTILINE)
 # Matches nan, inf, and numbers that overflow float32 (in which assimp reads), in a text file.
 _NOT_FINITE = re.compile(
     rb"[\s>][-+]?(?:(?:nan|inf)(?:inity)?|[0-9.]+e\+?0*(?:[0-9]{3,}|[4-9][0-9]|39)|[0-9]{39,}[0-9.]*)(?=[\s<]|$)",
@@ -37,47 +43,124 @@ def read_mesh(file: str | os.PathLike[str], scale: float = 1.0) -> Mesh:
         InputError: If the file cannot be read, is broken, or holds no triangle.
     """
     factor = positive(scale, f"{file_name(file)}: scale")
-    if Path(file).suffix.lower() not in SUFFIXES:
-        raise InputError(f"{file}: unknown kind of mesh; have {', '.join(SUFFIXES)}; export it as STL")
+    path = Path(file)
+    if path.suffix.lower() not in MESH_SUFFIXES:
+        raise InputError(f"{file}: unknown kind of mesh; have {', '.join(MESH_SUFFIXES)}; export it as STL")
 
-    data = read_bytes(file, MAX_BYTES)
-    if not data:
-        raise InputError(f"{file}: the file is empty; export the mesh again")
-    if not finite_numbers(data):
-        raise InputError(f"{file}: not a usable mesh: it holds numbers that are not finite; export it again")
-
-    if len(data) > LONG_BYTES:
-        tell_once(f"reading {os.fspath(file)}, {len(data) / 1e6:.0f} MB: about ten seconds for a million triangles")
-
-    vertices, triangles = _read(file, factor * stated_unit(file, data))
+    vertices, triangles = mesh_arrays(load_surface(path, np.full(3, factor)))
     mesh = Mesh(vertices, triangles, source=os.path.abspath(file), scale=factor)
     if not mesh.closed:
-        message = f"{file}: {mesh.open_edges} open edges; the mesh is treated as a surface, not as a solid"
-        warnings.warn(message, MeshWarning, stacklevel=2)
+        warnings.warn(f"{file}: {open_edges_told(mesh)}", MeshWarning, stacklevel=2)
     elif _volume(mesh) < 0.0:
         mesh = Mesh(mesh.vertices, mesh.triangles[:, ::-1], source=mesh.source, scale=factor)
     return mesh
 
 
-def _read(path: str | os.PathLike[str], scale: float) -> tuple[Matrix, NDArray[np.int64]]:
-    try:
-        model = coal.MeshLoader().load(os.fspath(path), np.full(3, scale))
-    except (ValueError, RuntimeError) as error:
-        raise InputError(f"{path}: not a usable mesh: {_reason(error)}; export it again as STL, OBJ or DAE") from error
+def load_surface(path: Path, scale: Vector) -> coal.BVHModelBase:
+    """Read a mesh file as a coal mesh, in metres.
 
-    corners: list[Any] = [model.tri_indices(k) for k in range(model.num_tris)]
-    triangles = np.array([(t[0], t[1], t[2]) for t in corners], dtype=np.int64).reshape(-1, 3)
-    return np.array(model.vertices(), dtype=np.float64), triangles
+    Args:
+        path: The file.
+        scale: Metres per unit of the file along each axis, shape (3,), where the file states no unit.
+
+    Raises:
+        InputError: If the file cannot be read, is broken, holds no triangle, or lies so far from its origin that single
+            precision does not keep its shape.
+    """
+    data = read_bytes(path, MAX_BYTES)
+    if not data:
+        raise InputError(f"{path}: the file is empty; export the mesh again")
+    if len(data) > LONG_BYTES:
+        tell_once(f"reading {path}, {len(data) / 1e6:.0f} MB: about ten seconds for a million triangles")
+
+    kind = path.suffix.lower()
+    if kind == ".stl" and len(data) != _length_of_stl(data):
+        return _by_ourselves(path, data, scale)
+    if not _finite(data, kind):
+        raise InputError(f"{path}: not a usable mesh: it holds numbers that are not finite; export it again")
+
+    scale = scale * stated_unit(path, data)
+    surface = _by_assimp(path, scale)
+    size = np.abs(bounded_array(surface.vertices(), (None, 3), f"{path}: vertices")).max(axis=0) / np.abs(scale)
+    coarse = float((np.spacing(size.astype(np.float32)) * np.abs(scale)).max())
+    if coarse <= COARSEST:
+        return surface
+    if kind == ".obj":
+        return _from_afar(data, scale)
+    raise InputError(
+        f"{path}: not a usable mesh: so far from its origin its points lie on a grid of {1e3 * coarse:.2g} mm; "
+        "move it there, and give its place by the pose of the obstacle"
+    )
+
+
+def _by_assimp(path: Path, scale: Vector) -> coal.BVHModelBase:
+    try:
+        return coal.MeshLoader().load(os.fspath(path), scale)
+    except (ValueError, RuntimeError) as error:
+        raise InputError(f"{path}: not a usable mesh: {_reason(error)}; {AGAIN}") from error
 
 
 def _reason(error: Exception) -> str:
     """Return assimp's message without paths, hints and places in its source."""
+    if isinstance(error, UnicodeError):
+        return "its name, or that of its folder, is not UTF-8"
     lines = [line.strip().removeprefix("message: ") for line in str(error).splitlines() if line.strip()]
     noise = ("From file:", "in function:", "at line:", "Could not load resource", "Hint:")
     said = [line for line in lines if not line.startswith(noise)]
     if not said or any("No meshes" in line for line in lines):
         return "no triangles in it"
     return said[-1].rstrip(".")
+
+
+def _length_of_stl(data: bytes) -> int:
+    """Return the length that a file has if it is a binary STL: a header, a count, and the triangles."""
+    return 84 + _BINARY_TRIANGLE.itemsize * int.from_bytes(data[80:84], "little")
+
+
+def _by_ourselves(path: Path, data: bytes, scale: Vector) -> coal.BVHModelBase:
+    """Read an STL of text, in double precision, or a binary one whose length is not the usual one.
+
+    Programs write bytes after the last triangle, and leave the count at 0 or -1.
+    """
+    if data.lstrip()[:5].lower() == b"solid" and _CORNER.search(data):
+        found = _CORNER.findall(data)
+        facets = len(re.findall(rb"\bendfacet\b", data, re.IGNORECASE))
+        if len(found) != 3 * facets:
+            raise InputError(f"{path}: not a usable mesh: {len(found)} corners of {facets} triangles; is it cut off?")
+        try:
+            corners = np.array(found).astype(np.float64)
+        except ValueError:
+            raise InputError(f"{path}: not a usable mesh: a corner is not of three numbers; export it again") from None
+    else:
+        there = max(0, len(data) - 84) // _BINARY_TRIANGLE.itemsize
+        stated = int.from_bytes(data[80:84], "little")
+        count = there if stated in (0, 2**32 - 1) else stated
+        if not 0 < count <= there:
+            said = f"it states {count} triangles and holds {there}" if count else "no triangles in it"
+            raise InputError(f"{path}: not a usable mesh: {said}; {AGAIN}")
+        corners = np.frombuffer(data, _BINARY_TRIANGLE, count, 84)["corners"].reshape(-1, 3).astype(np.float64)
+
+    if not np.isfinite(corners).all():
+        raise InputError(f"{path}: not a usable mesh: it holds numbers that are not finite; export it again")
+    points, number = np.unique(corners * scale, axis=0, return_inverse=True)
+    bounded_array(points, (None, 3), f"{path}: vertices")
+    return bvh(points, np.asarray(number, dtype=np.int64).reshape(-1, 3))
+
+
+def _from_afar(data: bytes, scale: Vector) -> coal.BVHModelBase:
+    """Read an OBJ that is far from its origin: it is moved there, in double precision, and back once it is read."""
+    rows = [match.groups()[1:] for match in _VERTEX.finditer(data)]
+    offset: Vector = np.array(rows[:1]).astype(np.float64)[0]
+
+    def moved(match: re.Match[bytes]) -> bytes:
+        values = np.array(match.groups()[1:]).astype(np.float64) - offset
+        return match[1] + b" ".join(repr(float(value)).encode() for value in values)
+
+    with tempfile.TemporaryDirectory() as folder:
+        copy = Path(folder) / "moved.obj"
+        copy.write_bytes(_VERTEX.sub(moved, data))
+        vertices, triangles = mesh_arrays(_by_assimp(copy, np.ones(3)))
+    return bvh((vertices + offset) * scale, triangles)
 
 
 def stated_unit(path: str | os.PathLike[str], data: bytes) -> float:
@@ -100,7 +183,7 @@ def stated_unit(path: str | os.PathLike[str], data: bytes) -> float:
         unit = None if asset is None else asset.find("{*}unit")
         metres = 1.0 if unit is None else float(unit.get("meter", "1"))
     except (ElementTree.ParseError, ValueError, LookupError) as error:  # LookupError: an encoding nobody knows
-        raise InputError(f"{path}: not a usable mesh: {error}; export it again as STL, OBJ or DAE") from error
+        raise InputError(f"{path}: not a usable mesh: {error}; {AGAIN}") from error
 
     if not 0.0 < metres < float("inf"):
         raise InputError(f"{path}: its unit must be greater than 0 metres, found {metres:g}; export it again")
@@ -127,13 +210,15 @@ def _volume(mesh: Mesh) -> float:
     return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0)
 
 
-def finite_numbers(data: bytes) -> bool:
+def _finite(data: bytes, kind: str) -> bool:
     """Check whether a mesh file is free of NaN and infinity, which would make the C++ library write to the terminal.
 
-    Normals of a binary STL are ignored: some programs write NaN for triangles without area.
+    Normals of a binary STL are ignored: some programs write NaN for triangles without area. Of an OBJ only vertices are
+    looked at, as names and comments may be any words. Formats of bytes are checked once they are read.
     """
-    count = int.from_bytes(data[80:84], "little")
-    if len(data) == 84 + 50 * count:  # A binary STL has twelve floats and two bytes per triangle.
-        rows = np.frombuffer(data, dtype=[("normal", "<f4", 3), ("corners", "<f4", 9), ("rest", "<u2")], offset=84)
-        return bool(np.isfinite(rows["corners"]).all())
-    return _NOT_FINITE.search(data) is None
+    if kind == ".stl":
+        return bool(np.isfinite(np.frombuffer(data, _BINARY_TRIANGLE, offset=84)["corners"]).all())
+    if kind in (".glb", ".gltf", ".ply") or _NOT_FINITE.search(data) is None:
+        return True
+    vertices = _VERTEX.finditer(data) if kind == ".obj" else ()
+    return kind == ".obj" and not any(_NOT_FINITE.search(b" " + b" ".join(row.groups()[1:])) for row in vertices)

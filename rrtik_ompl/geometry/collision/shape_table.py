@@ -17,7 +17,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from rrtik_ompl.base.arrays import Matrix, Vector, frozen
+from rrtik_ompl.base.arrays import Mask, Matrix, Vector, frozen
 from rrtik_ompl.geometry.collision.cloud_solid import CloudSolid, cloud_solid
 from rrtik_ompl.geometry.collision.solids import (
     bvh,
@@ -136,8 +136,18 @@ def _extruded(polygon: Matrix, height: float) -> Matrix:
 
 
 def _mesh(mesh: Mesh) -> list[Any]:
-    surface = bvh(mesh.vertices, mesh.triangles)
-    return [convexified(surface) if mesh.closed else surface]
+    """Return the closed parts of a mesh, which have an inside, as one coal geometry, and the open ones as another."""
+    if mesh.closed:
+        return [convexified(bvh(mesh.vertices, mesh.triangles))]
+    is_closed_part = mesh.in_closed_parts
+    solid = [convexified(_surface(mesh, is_closed_part))] if is_closed_part.any() else []
+    return [*solid, _surface(mesh, ~is_closed_part)]
+
+
+def _surface(mesh: Mesh, chosen: Mask) -> coal.BVHModelBase:
+    """Return the chosen triangles of a mesh, and the vertices that they use, as a coal mesh."""
+    used, renumbered = np.unique(mesh.triangles[chosen], return_inverse=True)
+    return bvh(mesh.vertices[used], np.asarray(renumbered).reshape(-1, 3))
 
 
 def _solids_of_pile(pile: BoxPile) -> list[Any]:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.base.arrays import (
+    Mask,
     Matrix,
     bounded_array,
     dimensions,
@@ -22,6 +22,7 @@ from rrtik_ompl.base.arrays import (
 from rrtik_ompl.base.copies import as_value, in_one_line
 from rrtik_ompl.base.errors import InputError, at_most, require
 from rrtik_ompl.files.kinds import read
+from rrtik_ompl.model.shapes.mesh_repair import edges_of, in_closed_parts, repaired
 from rrtik_ompl.model.shapes.shape import Shape
 from rrtik_ompl.model.shapes.surfaces import Triangles
 
@@ -31,11 +32,15 @@ SAME_DIGITS = 12  # decimals of metres in which vertices differ if they are not 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Mesh(Shape):
-    """A triangle mesh. A closed mesh counts as a solid, an open one as a surface.
+    """A triangle mesh. Parts of it that are closed count as solids, open ones as surfaces.
+
+    Equal vertices are merged and triangles without area dropped. Where the surface is open, triangles that are there
+    twice are dropped, triangles are cut at vertices that lie on their edges, and turned like those around them.
 
     Attributes:
         vertices: Shape (n, 3), metres.
         triangles: Vertex indices, shape (m, 3).
+        open_edges: Number of edges that triangles do not pass equally often in both directions.
         source: Path of the file it was read from, or "".
         scale: Factor that was applied to the file's numbers; it is written back with the scene.
 
@@ -75,6 +80,7 @@ class Mesh(Shape):
             raise InputError(f"{what}: a triangle names vertex {int(faces.max())}, but there are only {len(points)}")
 
         points, faces = _welded(points, faces)
+        faces = faces if len(faces) == 0 else repaired(points, faces)
         if len(faces) == 0:
             raise InputError(f"{what}: every triangle has zero area; check its scale and export it again")
 
@@ -82,7 +88,7 @@ class Mesh(Shape):
         object.__setattr__(self, "triangles", frozen(faces, np.int64))
         object.__setattr__(self, "source", source)
         object.__setattr__(self, "scale", positive(scale, f"{what}: scale"))
-        object.__setattr__(self, "open_edges", _open_edges(faces))
+        object.__setattr__(self, "open_edges", int(edges_of(faces).open.sum()))
 
     @staticmethod
     def load(file: str | os.PathLike[str], scale: float = 1.0) -> Mesh:
@@ -93,15 +99,14 @@ class Mesh(Shape):
         not.
 
         Args:
-            file: File whose name ends in .stl, .obj or .dae.
+            file: File whose name ends in .stl, .obj, .dae, .ply, .glb or .gltf.
             scale: Metres per unit of the file.
 
         Raises:
             InputError: If the file cannot be read, is broken, or holds no triangle.
 
         Warns:
-            MeshWarning: If the surface is not closed (or not manifold): it is then treated as a surface, not as a
-                solid.
+            MeshWarning: If a part is not closed: it is then treated as a surface, not as a solid.
 
         Example:
             >>> rrtik.Mesh.load("part.stl", scale=0.001)  # a file in millimetres  # doctest: +SKIP
@@ -110,8 +115,13 @@ class Mesh(Shape):
 
     @property
     def closed(self) -> bool:
-        """Whether every edge is shared by exactly two triangles of opposite orientation, so that it has an inside."""
+        """Whether triangles pass every edge equally often in both directions, so that it has an inside."""
         return self.open_edges == 0
+
+    @property
+    def in_closed_parts(self) -> Mask:
+        """Which triangles belong to a closed part, shape (m,); parts have no vertex in common."""
+        return in_closed_parts(self.triangles)
 
     @property
     def bounding_radius(self) -> float:
@@ -123,6 +133,12 @@ class Mesh(Shape):
         return Triangles(self.vertices, self.triangles)
 
 
+def open_edges_told(mesh: Mesh) -> str:
+    """Return what messages say of the open edges of a mesh, and of what follows from them."""
+    part = "the part of it that has them" if mesh.in_closed_parts.any() else "it"
+    return f"{mesh.open_edges} open edges; {part} is treated as a surface, not as a solid"
+
+
 def _welded(points: Matrix, faces: NDArray[np.int64]) -> tuple[Matrix, NDArray[np.int64]]:
     """Merge equal vertices (STL repeats them for each triangle) and drop triangles of zero area.
 
@@ -131,7 +147,7 @@ def _welded(points: Matrix, faces: NDArray[np.int64]) -> tuple[Matrix, NDArray[n
     """
     unique, merged = _merged(points, points, faces)
     sides = unique[merged] - unique[np.roll(merged, 1, axis=1)]
-    if (np.abs(sides).max(axis=2) < 10.0**-SAME_DIGITS).any() or _open_edges(merged) > 0:
+    if (np.abs(sides).max(axis=2) < 10.0**-SAME_DIGITS).any() or edges_of(merged).open.any():
         # Neighbours that fall on different sides of a rounding boundary are merged with the shifted one.
         for shift in (0.0, 0.37 * 10.0**-SAME_DIGITS):
             unique, merged = _merged(np.round(unique + shift, SAME_DIGITS) + 0.0, unique, merged)
@@ -148,12 +164,3 @@ def _merged(keys: Matrix, points: Matrix, faces: NDArray[np.int64]) -> tuple[Mat
     """
     _, first, index = np.unique(keys, axis=0, return_index=True, return_inverse=True)
     return points[first], np.asarray(index).reshape(-1)[faces]
-
-
-def _open_edges(faces: NDArray[np.int64]) -> int:
-    """Count directed edges without exactly one opposite partner: 0 for a closed, consistently oriented surface."""
-    edges: NDArray[Any] = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
-    size = int(faces.max()) + 1
-    forward, count = np.unique(edges[:, 0] * size + edges[:, 1], return_counts=True)
-    backward = distinct(edges[:, 1] * size + edges[:, 0])  # ten times faster than numpy.unique here
-    return int((count > 1).sum() + np.setxor1d(forward, backward, assume_unique=True).size)

@@ -1,6 +1,7 @@
 """Mesh files: every format and its scale, closed or open, and that a broken one is one line and never a crash."""
 
 import os
+import warnings
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -13,6 +14,8 @@ from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.description.shapes import mesh as mesh_files
 from rrtik_ompl.description.urdf import robot_from_urdf_text
 from rrtik_ompl.files import notice
+from rrtik_ompl.geometry.collision.shape_table import pieces
+from rrtik_ompl.geometry.collision.solids import is_closed, mesh_arrays
 from rrtik_ompl.model.scene import Obstacle, Scene
 from rrtik_ompl.model.shapes import Mesh
 from rrtik_ompl.world.world import World
@@ -43,8 +46,8 @@ def stl_text(faces=FACES):
     return ("solid part\n" + "".join(facets) + "endsolid part\n").encode()
 
 
-def stl_binary(faces=FACES, header=b"made by a test"):
-    body = b"".join(np.r_[np.zeros(3), CORNERS[f].ravel()].astype("<f4").tobytes() + b"\0\0" for f in faces)
+def stl_binary(faces=FACES, header=b"made by a test", corners=CORNERS):
+    body = b"".join(np.r_[np.zeros(3), corners[f].ravel()].astype("<f4").tobytes() + b"\0\0" for f in faces)
     return header.ljust(80, b" ") + len(faces).to_bytes(4, "little") + body
 
 
@@ -125,7 +128,7 @@ def test_an_inside_out_solid_is_turned(tmp_path, name, data):
 
 def test_an_open_surface_is_loaded_with_a_warning_that_counts_its_edges(tmp_path):
     (tmp_path / "open.stl").write_bytes(stl_binary(FACES[:3]))
-    with pytest.warns(MeshWarning, match=r"open\.stl: 6 open edges.*surface"):
+    with pytest.warns(MeshWarning, match=r"open\.stl: 3 open edges.*surface"):
         mesh = Mesh.load(tmp_path / "open.stl")
     assert not mesh.closed
 
@@ -145,14 +148,135 @@ def test_a_solid_whose_seam_differs_by_rounding_is_closed_and_holds_what_is_insi
 
 def test_a_world_warns_of_a_mesh_of_the_memory_that_is_open():
     leaf = Obstacle("leaf", Mesh(CORNERS, FACES[:3]), [3.0, 0.0, 0.0])
-    with pytest.warns(MeshWarning, match="'leaf'.*6 open edges.*surface"):
+    with pytest.warns(MeshWarning, match="'leaf'.*3 open edges.*surface"):
         World(load_robot("xarm7"), Scene([leaf]))
 
 
-def test_a_mesh_with_a_triangle_of_the_wrong_sense_is_not_a_solid(tmp_path):
-    (tmp_path / "bent.obj").write_bytes(obj([FACES[0][::-1], *FACES[1:]]))
-    with pytest.warns(MeshWarning):
-        assert not Mesh.load(tmp_path / "bent.obj").closed
+def boxes(change):
+    """Three boxes half a metre apart, of which the triangles of the first are changed."""
+    side = np.array([[0, 2, 1], [1, 2, 3], [4, 5, 6], [5, 7, 6], [0, 1, 4], [1, 5, 4],
+                     [2, 6, 3], [3, 6, 7], [0, 4, 2], [2, 4, 6], [1, 3, 5], [3, 7, 5]])  # fmt: skip
+    corner = np.array([[x, y, z] for z in (0.0, 0.4) for y in (0.0, 0.3) for x in (0.0, 0.2)])
+    vertices = np.concatenate([corner + np.array([0.5 * k, 0.0, 0.0]) for k in range(3)])
+    faces = [face for k in range(1, 3) for face in (side + 8 * k).tolist()]
+    first, extra = change(side.tolist())
+    return np.vstack([vertices, *extra]), np.array(first + faces)
+
+
+def cut_in_a_t(faces):
+    """Divide one of two triangles at an edge, so that the other one has a vertex on its side."""
+    a, b, c = faces[0]  # the edge from c to a is that from (0.2, 0, 0) to (0, 0, 0)
+    return [[a, b, 24], [24, b, c], *faces[1:]], [[[0.1, 0.0, 0.0]]]
+
+
+REPAIRED = {
+    "twice": lambda faces: ([*faces, faces[3]], []),
+    "twice and turned": lambda faces: ([*faces, faces[3][::-1]], []),
+    "turned": lambda faces: ([faces[0][::-1], *faces[1:]], []),
+    "five turned": lambda faces: ([face[::-1] for face in faces[:5]] + faces[5:], []),
+    "a T": cut_in_a_t,
+}
+
+
+@pytest.mark.parametrize("case", REPAIRED)
+def test_a_bad_triangle_does_not_make_boxes_hollow(case):
+    mesh = Mesh(*boxes(REPAIRED[case]))
+    assert mesh.closed
+    assert abs(volume(mesh)) == pytest.approx(3 * 0.2 * 0.3 * 0.4, rel=1e-12)
+    edges = np.sort(np.concatenate([mesh.triangles[:, [0, 1]], mesh.triangles[:, [1, 2]], mesh.triangles[:, [2, 0]]]))
+    assert (np.unique(edges, axis=0, return_counts=True)[1] == 2).all()
+
+
+def test_a_triangle_that_is_missing_opens_its_own_box_alone():
+    vertices, faces = boxes(lambda faces: (faces[1:], []))
+    mesh = Mesh(vertices, faces)
+    assert mesh.open_edges == 3
+    assert mesh.in_closed_parts.sum() == 24
+    solid, surface = (piece.geometry for piece in pieces(mesh))
+    assert is_closed(solid)
+    assert not is_closed(surface)
+    assert (mesh_arrays(solid)[0][:, 0].min(), mesh_arrays(surface)[0][:, 0].max()) == (0.5, 0.2)
+
+
+def test_a_ball_is_free_only_in_the_box_that_is_open():
+    ball = """<robot name="ball"><link name="base"/><link name="ball"><collision><geometry><sphere radius="0.02"/>
+        </geometry></collision></link><joint name="x" type="prismatic"><parent link="base"/><child link="ball"/>
+        <origin xyz="0 0.15 0.2"/><limit lower="-1" upper="2" velocity="1" effort="1"/></joint></robot>"""
+    places = [[0.1], [0.35], [0.6], [1.1]]
+    for change, in_first in ((REPAIRED["twice"], False), (lambda faces: (faces[1:], []), True)):
+        scene = Scene([Obstacle("boxes", Mesh(*boxes(change), source="boxes.stl"))])
+        world = World(robot_from_urdf_text(ball), scene)
+        assert world.valid_batch(places).tolist() == [in_first, True, False, False]
+
+
+def test_boards_that_share_a_face_are_closed_and_not_said_to_be_open(tmp_path):
+    """As most shelves: four triangles meet at an edge, which all agree on what is inside."""
+    vertices, faces = boxes(lambda faces: (faces, []))
+    vertices[8:16, 0] -= 0.3  # the second box touches the first one
+    rows = [f"v {x} {y} {z}" for x, y, z in vertices] + ["f " + " ".join(str(k + 1) for k in face) for face in faces]
+    (tmp_path / "shelf.obj").write_text("\n".join(rows))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        mesh = Mesh.load(tmp_path / "shelf.obj")
+    assert mesh.closed == is_closed(pieces(mesh)[0].geometry) == True  # noqa: E712
+
+
+@pytest.mark.parametrize("place", [1e4, 1e5, 5e5, 9e5])
+def test_a_mesh_far_from_its_origin_keeps_its_shape_or_is_refused(tmp_path, place):
+    shift = np.array([place + 0.123456, -place, 0.0])
+    rows = obj().decode().splitlines()
+    moved = ["v " + " ".join(map(repr, (CORNERS[k] * 0.1 + shift).tolist())) for k in range(4)]
+    (tmp_path / "far.obj").write_text("\n".join(moved + rows[4:]))
+    text = stl_text().decode()
+    for corner, row in zip(CORNERS, moved, strict=True):
+        text = text.replace("vertex {} {} {}\n".format(*corner), f"vertex {row[2:]}\n")
+    (tmp_path / "far.stl").write_text(text)
+    for name in ("far.obj", "far.stl"):
+        mesh = Mesh.load(tmp_path / name)
+        assert mesh.closed
+        np.testing.assert_allclose(np.ptp(mesh.vertices, axis=0), [0.1, 0.2, 0.3], atol=1e-9)
+    (tmp_path / "far.stl").write_bytes(stl_binary(corners=CORNERS * 0.1 + shift))
+    with pytest.raises(InputError, match=r"so far from its origin its points lie on a grid of .* mm; move it there"):
+        Mesh.load(tmp_path / "far.stl")
+    assert Mesh.load(tmp_path / "far.stl", scale=1e-6).closed is not None  # in micrometres it is near
+
+
+ODD_STL = {
+    "bytes after the last triangle": stl_binary() + b"\r\nthe end",
+    "a count of 0": stl_binary()[:80] + bytes(4) + stl_binary()[84:],
+    "a count of -1": stl_binary()[:80] + b"\xff" * 4 + stl_binary()[84:],
+    "capitals": stl_text().upper(),
+    "blank first lines": b"\n \n" + stl_text(),
+    "words after solid": stl_text().replace(b"solid part\n", b"solid made by nan inf\n"),
+}
+
+
+@pytest.mark.parametrize("case", ODD_STL)
+def test_stl_is_read_as_programs_write_it(tmp_path, case):
+    (tmp_path / "part.stl").write_bytes(ODD_STL[case])
+    mesh = Mesh.load(tmp_path / "part.stl")
+    assert mesh.closed
+    assert volume(mesh) == pytest.approx(1.0)
+
+
+def test_names_and_comments_of_an_obj_may_be_any_words(tmp_path):
+    (tmp_path / "part.obj").write_bytes(b"# from inf to nan\no nan\n" + obj())
+    assert Mesh.load(tmp_path / "part.obj").closed
+
+
+@pytest.mark.parametrize("kind", ["ply", "glb", "gltf"])
+def test_formats_of_other_programs_are_read(tmp_path, kind):
+    trimesh = pytest.importorskip("trimesh")
+    scene = trimesh.Scene(trimesh.Trimesh(CORNERS, FACES, process=False))
+    scene.apply_transform(trimesh.transformations.translation_matrix([0.0, 0.0, 5.0]))
+    if kind == "gltf":
+        for name, data in trimesh.exchange.gltf.export_gltf(scene).items():
+            (tmp_path / name.replace("model.", "part.")).write_bytes(data)
+    else:
+        (scene if kind == "glb" else scene.to_mesh()).export(tmp_path / f"part.{kind}")
+    mesh = Mesh.load(tmp_path / f"part.{kind}")
+    assert volume(mesh) == pytest.approx(1.0)
+    np.testing.assert_allclose(mesh.vertices.max(axis=0), [1, 2, 8])
 
 
 def test_polygons_are_cut_into_triangles(tmp_path):
@@ -168,7 +292,7 @@ BROKEN = {
     "empty.stl": (b"", "empty"),
     "words.stl": (b"this is not a mesh, only text\n" * 10, "not a usable mesh"),
     "short.stl": (stl_binary()[:-30], "not a usable mesh"),
-    "count.stl": (b"x" * 80 + (2**32 - 1).to_bytes(4, "little") + b"\0" * 50, "not a usable mesh"),
+    "count.stl": (b"x" * 80 + (2**32 - 1).to_bytes(4, "little") + b"\0" * 50, "zero area"),
     "cut.stl": (stl_text()[:70], "not a usable mesh"),
     "flat.stl": (b"x" * 80 + (2).to_bytes(4, "little") + bytes(100), "no triangles"),
     "nan.stl": (NAN, "finite"),
@@ -183,6 +307,9 @@ BROKEN = {
     "units.dae": (dae("centimetre"), "not a usable mesh"),
     "page.dae": (b"<html><body>404</body></html>", "not a usable mesh"),
     "part.ply": (b"ply\n", "a point cloud, not a mesh"),
+    "cut.glb": (b"glTF\2\0\0\0", "not a usable mesh"),
+    "cut_off.stl": (stl_text()[:-60], "is it cut off"),
+    "words_for_numbers.stl": (stl_text().replace(b"vertex 1.0", b"vertex one", 1), "not of three numbers"),
     "part": (obj(), "unknown kind of mesh"),
 }
 
@@ -240,7 +367,7 @@ def test_numbers_that_are_not_finite_are_refused_before_c_sees_them(tmp_path, ca
     urdf = f"""<robot name="arm"><link name="a"><collision><geometry><mesh filename="{file}"/></geometry></collision>
         </link><link name="b"/><joint name="j" type="continuous"><parent link="a"/><child link="b"/></joint></robot>"""
     for load in (lambda: Mesh.load(file), lambda: robot_from_urdf_text(urdf)):
-        with pytest.raises(InputError, match="not finite"):
+        with pytest.raises(InputError, match=r"not finite|check units"):
             load()
     assert capfd.readouterr().err == ""
 
