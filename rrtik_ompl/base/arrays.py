@@ -133,6 +133,18 @@ def products(points: Matrix, vectors: Matrix) -> Matrix:
     return found
 
 
+def box_of(points: NDArray[np.float64]) -> tuple[Vector, Vector]:
+    """Return the lowest and the highest coordinates of points, shape (n, 3); many times faster than along their axis.
+
+    Example:
+        >>> low, high = box_of(np.array([[0.0, 1.0, 2.0], [3.0, 0.0, 2.0]]))
+        >>> low.tolist(), high.tolist()
+        ([0.0, 0.0, 2.0], [3.0, 1.0, 2.0])
+    """
+    columns = np.ascontiguousarray(points.T)
+    return np.asarray(columns.min(axis=1)), np.asarray(columns.max(axis=1))
+
+
 def welded(points: NDArray[Any]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Find points at the same place, many times faster than ``numpy.unique`` along an axis.
 

@@ -5,13 +5,14 @@ from __future__ import annotations
 import weakref
 from collections.abc import Callable, Iterable, Iterator
 from functools import lru_cache, wraps
+from operator import itemgetter
 from typing import Any, TypeAlias, TypeVar, cast
 
 import coal
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.base.arrays import LARGEST, Matrix, Vector, distinct, products, welded
+from rrtik_ompl.base.arrays import LARGEST, Matrix, Vector, box_of, distinct, products, welded
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.shapes.point_tree import curve_places
@@ -25,6 +26,7 @@ Ends: TypeAlias = tuple[Any, Any, Any, Any]
 DEEPEST_DENT = 1e-6
 CONVEX_VOLUME_RATIO = 0.999
 COMPARED_AT_ONCE = 20_000  # pairs of a triangle and a face of the hull that are compared in one step
+_CORNERS = itemgetter(0, 1, 2)  # of one of coal's triangles
 BOX_POINTS = 32  # points of a box, in the search for those that are farthest along directions
 NEAREST_FACES = 8  # faces of the hull, of normals like its own, that a triangle is compared with first
 MOST_COMPARED = 400_000_000  # A mesh with more pairs of a triangle and a face of the hull stays a mesh.
@@ -81,13 +83,13 @@ def hull(points: Matrix) -> coal.Convex:
         )
 
     cloud = coal.StdVec_Vec3s()
-    for point in points:
-        cloud.append(np.array(point))
+    cloud.extend(list(points))
     return coal.Convex.convexHull(cloud, True, "Qt")
 
 
 def _extent(points: Matrix) -> float:
-    return float(np.ptp(points, axis=0).max())
+    low, high = box_of(points)
+    return float((high - low).max())
 
 
 def _thickness(points: Matrix) -> float:
@@ -282,8 +284,8 @@ def _hull_of_mesh(mesh: coal.CollisionGeometry) -> coal.CollisionGeometry | None
 def mesh_arrays(geometry: coal.CollisionGeometry) -> tuple[Matrix, NDArray[np.int64]]:
     """Return the vertices, shape (n, 3), and the triangles, shape (m, 3), of a coal mesh, both read-only."""
     vertices = np.array(geometry.vertices(), dtype=np.float64).reshape(-1, 3)
-    corners = (geometry.tri_indices(k) for k in range(geometry.num_tris))
-    triangles = np.array([(t[0], t[1], t[2]) for t in corners], dtype=np.int64).reshape(-1, 3)
+    corners = map(_CORNERS, map(geometry.tri_indices, range(geometry.num_tris)))
+    triangles = np.array(list(corners), dtype=np.int64).reshape(-1, 3)
     vertices.flags.writeable = False
     triangles.flags.writeable = False
     return vertices, triangles

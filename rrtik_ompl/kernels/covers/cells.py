@@ -17,8 +17,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.base.arrays import Matrix, Vector, box_of
+from rrtik_ompl.kernels.covers.cell_layout import EDGE_TOLERANCE, KERNELS, MOST_DOUBT, POLYGON, POLYGONS
+from rrtik_ompl.kernels.covers.memory import called
 from rrtik_ompl.kernels.covers.solids import CORNERS, Solid, Triangles
+from rrtik_ompl.kernels.simd.library import library
 
 MAX_CELLS = 120_000
 MAX_CELLS_ALONG_AXIS = 160.0  # limited, as a long triangle is cut into many more pieces than there are cells
@@ -26,8 +29,7 @@ LATTICE_CROSSED = 1500  # number of cells that the surface crosses, in the first
 MOST_LATTICE_CROSSED = 25_000
 LATTICE_LEAST = 4  # fewest cells along an axis of a lattice, so that even a thin solid has points inside
 MARGINS = (0.0171, 0.0233, 0.0197)  # [cells] shift of the grid that keeps faces of axis-aligned solids off its planes
-# [cells] Points closer than this to an edge or a plane are doubtful; elements take them as inside.
-EDGE_TOLERANCE = 1e-9
+MOST_IN_TABLE = 50_000  # cells with points, from which on the points are sorted, as a table would be too large
 
 Flags = NDArray[np.bool_]
 Shape = tuple[int, int, int]
@@ -89,9 +91,9 @@ def elements(solid: Solid, crossed: int, detail: int = 4) -> Elements:
             by one small ball around them.
     """
     grid = _grid(solid.triangles, crossed)
-    surface_pieces, cell_of_piece = _cut_at_planes(grid.to_cells(solid.triangles), grid.shape)
+    surface_points, cell_of_surface = _in_cells(grid.to_cells(solid.triangles), grid.shape)
     crossed_cells = np.zeros(grid.shape, dtype=bool)
-    crossed_cells.ravel()[cell_of_piece] = True
+    crossed_cells.ravel()[cell_of_surface] = True
 
     winding_numbers, doubtful = winding(grid.to_cells(np.concatenate([solid.triangles, solid.rim])), grid.shape)
     corner_inside = ((winding_numbers != 0) | doubtful) & (len(solid.rim) == 0)
@@ -100,8 +102,8 @@ def elements(solid: Solid, crossed: int, detail: int = 4) -> Elements:
     boxes = np.concatenate([_boxes(*level) for level in _blocks(~crossed_cells & all_corners(corner_inside))])
     boxes = np.concatenate([boxes, grid.to_cells(solid.enclosed)])
 
-    points = np.concatenate([surface_pieces.reshape(-1, 3), corner_points])
-    cell_of_point = np.concatenate([np.repeat(cell_of_piece, 3), cell_of_corner])
+    points = np.concatenate([surface_points, corner_points])
+    cell_of_point = np.concatenate([cell_of_surface, cell_of_corner])
     points, radii, cell_of_point = _merged_within_cells(points, cell_of_point, detail, grid)
 
     return _as_elements(grid, points, radii, cell_of_point, boxes, np.argwhere((winding_numbers != 0) & ~doubtful))
@@ -128,8 +130,7 @@ def _grid(triangles: Triangles, crossed: int, min_cells: int = 1) -> Grid:
 
     The number of cells is bounded, and the grid is shifted by ``MARGINS`` against the bounding box.
     """
-    low = triangles.min(axis=(0, 1))
-    high = triangles.max(axis=(0, 1))
+    low, high = box_of(triangles.reshape(-1, 3))
     extent = np.maximum(high - low, 1e-9)
 
     a, b, c = (triangles[:, k] for k in range(3))
@@ -164,6 +165,14 @@ def winding(triangles: Triangles, shape: Shape) -> tuple[NDArray[np.int64], Flag
         corner lies close to the surface; both of shape (nx + 1, ny + 1, nz + 1).
     """
     corners = (shape[0] + 1, shape[1] + 1, shape[2] + 1)
+    kernels = library(KERNELS)
+    if kernels is not None:
+        signs, near_surface = (np.zeros(corners, dtype=np.int32) for _ in range(2))
+        near_edge = np.zeros(corners[1:], dtype=np.int32)
+        surface = np.ascontiguousarray(triangles)
+        called(kernels.winding_numbers, surface, len(surface), np.array(corners), signs, near_surface, near_edge)
+        return np.asarray(signs[::-1].cumsum(axis=0, dtype=np.int64)[::-1]), (near_surface != 0) | (near_edge != 0)
+
     crossings = np.zeros(corners, dtype=np.int64)
     doubtful = np.zeros(corners, dtype=bool)
 
@@ -192,7 +201,7 @@ def winding(triangles: Triangles, shape: Shape) -> tuple[NDArray[np.int64], Flag
             (np.abs(x - nearest_corner) <= uncertainty) & (nearest_corner >= 0) & (nearest_corner < corners[0])
         )
         doubtful[nearest_corner[is_at_corner].astype(np.int64), y[is_at_corner], z[is_at_corner]] = True
-        doubtful[:, y[uncertainty > 0.1], z[uncertainty > 0.1]] = True
+        doubtful[:, y[uncertainty > MOST_DOUBT], z[uncertainty > MOST_DOUBT]] = True
 
     return np.asarray(crossings[::-1].cumsum(axis=0)[::-1]), doubtful
 
@@ -245,6 +254,35 @@ def _line_crossings(a: Matrix, b: Matrix, c: Matrix, line: Matrix) -> tuple[Vect
     x = a[:, 0] - ((line - a[:, 1:]) * normal[:, 1:]).sum(axis=1) / normal[:, 0]
     slope = np.abs(normal[:, 0]) / np.linalg.norm(normal, axis=1)
     return x, EDGE_TOLERANCE / np.maximum(slope, 1e-12)
+
+
+def _in_cells(triangles: Triangles, shape: Shape) -> tuple[Matrix, NDArray[np.int64]]:
+    """Cut triangles along all planes between cells.
+
+    Args:
+        triangles: Triangles in grid coordinates, shape (m, 3, 3).
+        shape: Number of cells along each axis.
+
+    Returns:
+        The corners of the pieces, shape (k, 3), and for each the number of its cell, shape (k,). A piece that lies in
+        the plane between two cells belongs to both.
+    """
+    kernels = library(KERNELS)
+    if kernels is None:
+        pieces, cell_of_piece = _cut_at_planes(triangles, shape)
+        return pieces.reshape(-1, 3), np.repeat(cell_of_piece, 3)
+
+    surface = np.ascontiguousarray(triangles)
+    polygons = np.empty(POLYGONS * POLYGON + POLYGON)
+    most = 8 * len(triangles) + 20_000
+    while True:
+        points = np.empty((most, 3))
+        cells = np.empty(most, dtype=np.int64)
+        numbers = np.array(shape)
+        count = called(kernels.cut_at_planes, surface, len(surface), numbers, polygons, points, cells, most)
+        if count <= most:
+            return points[:count], cells[:count]
+        most = count
 
 
 def _cut_at_planes(triangles: Triangles, shape: Shape) -> tuple[Triangles, NDArray[np.int64]]:
@@ -385,6 +423,11 @@ def _merged_within_cells(
         Centres of the balls in grid coordinates, shape (k, 3), their radii in the solid's frame, shape (k,), and the
         number of the cell of each, shape (k,), ascending.
     """
+    kernels = library(KERNELS)
+    occupied = np.flatnonzero(np.bincount(owner, minlength=int(np.prod(grid.shape))))
+    if kernels is not None and len(occupied) <= MOST_IN_TABLE:
+        return _merged_in_table(points, owner, detail, grid, occupied)
+
     cell = np.column_stack(np.unravel_index(owner, grid.shape))
     subcell = np.clip(np.floor((points - cell) * detail).astype(np.int64), 0, detail - 1)
     subcell_key = ((owner * detail + subcell[:, 0]) * detail + subcell[:, 1]) * detail + subcell[:, 2]
@@ -398,6 +441,28 @@ def _merged_within_cells(
     centres = 0.5 * (np.minimum.reduceat(sorted_points, start) + np.maximum.reduceat(sorted_points, start))
     distances = np.linalg.norm((sorted_points - centres[group]) * grid.size, axis=1)
     return centres, np.maximum.reduceat(distances, start), owner[order][start]
+
+
+def _merged_in_table(
+    points: Matrix, owner: NDArray[np.int64], detail: int, grid: Grid, occupied: NDArray[np.int64]
+) -> tuple[Matrix, Vector, NDArray[np.int64]]:
+    """Do the same by a table of all parts of the ``occupied`` cells, which are numbers of cells, ascending."""
+    kernels = library(KERNELS)
+    assert kernels is not None
+    places = np.full(int(np.prod(grid.shape)), -1)
+    places[occupied] = np.arange(len(occupied))
+    bounds = np.full((len(occupied) * detail**3, 2, 3), np.inf)
+    bounds[:, 1] = -np.inf
+    radii = np.zeros(len(bounds))
+
+    parts = np.empty(len(points), dtype=np.int32)
+    cells = np.ascontiguousarray(owner)
+    corners = np.ascontiguousarray(points)
+    shape = np.array(grid.shape)
+    called(kernels.merge, corners, cells, len(points), places, bounds, grid.size, shape, detail, parts, radii)
+
+    used = np.flatnonzero(bounds[:, 0, 0] < np.inf)
+    return 0.5 * (bounds[used, 0] + bounds[used, 1]), radii[used], occupied[used // detail**3]
 
 
 def _as_elements(

@@ -8,19 +8,20 @@ the surface within the cell and of the cell's corners inside the solid contains 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linprog
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
 
-from rrtik_ompl.base.arrays import Matrix, Vector, products, welded
+from rrtik_ompl.base.arrays import Matrix, Vector, box_of, products, welded
 from rrtik_ompl.geometry.collision.enclosure import enclosure
 from rrtik_ompl.geometry.collision.solids import inside_mesh, is_closed, mesh_arrays, most_different
+from rrtik_ompl.kernels.covers.cuts import cut_volumes, has_kernels, hull_volume
+from rrtik_ompl.kernels.covers.points import IN_DOUBT, bounds_of, extreme_points, inside_by_rays
 
 if TYPE_CHECKING:
     import coal
@@ -34,7 +35,7 @@ GRID = 24  # steps along the longest side of the grid to which the sketch of a m
 MAX_PLANES = 90  # most planes of the hull that are used to bound an inner piece
 SHRINKAGE = 1e-6  # distance that an inner piece keeps from the surface, as a share of the cell's size
 THINNEST = 1e-3  # [m] Inner pieces that do not contain a ball of this radius are dropped.
-UNBOUNDED = [(None, None)] * 4  # linprog's bounds of a ball's centre and radius: there are none
+MOST_EXCHANGES = 200  # steps in the search for the largest ball in a body
 DIRECTIONS = 100  # number of directions in which extreme points are sought
 NO_BOXES = np.empty((0, 2, 3))
 # For each of a box's 8 corners, whether it is at the upper end along each axis, shape (8, 3).
@@ -73,6 +74,8 @@ class _Cell:
         """Return the approximate volume of the convex hull of the points [m^3]; 0 if they lie in a plane."""
         if not len(self.points):
             return 0.0
+        if has_kernels():
+            return hull_volume(_extreme_points(self.points))
         try:
             return float(ConvexHull(_extreme_points(self.points)).volume)
         except (QhullError, ValueError):  # flat
@@ -81,13 +84,23 @@ class _Cell:
     @cached_property
     def halves(self) -> tuple[_Cell, _Cell]:
         """Return the lower and the upper cell of the best cut, whose hulls have the least total volume."""
+        if has_kernels():
+            axis, number = np.unravel_index(self._volumes.argmin(), self._volumes.shape)
+            return self._cut(int(axis), SHARES[number])
         cuts = [self._cut(axis, share) for axis in range(3) for share in SHARES]
         return min(cuts, key=lambda pair: pair[0].volume + pair[1].volume)
 
     @property
     def gain(self) -> float:
         """Return the volume that the best cut removes from the hulls [m^3]."""
+        if has_kernels():
+            return self.volume - float(self._volumes.min())
         return self.volume - self.halves[0].volume - self.halves[1].volume
+
+    @cached_property
+    def _volumes(self) -> Matrix:
+        """Return the approximate volume of both hulls of each possible cut [m^3], shape (3, len(SHARES))."""
+        return cut_volumes(self.surface, self.points, self.boxes, (self.low, self.high), SHARES, _unit_directions())
 
     def _cut(self, axis: int, share: float) -> tuple[_Cell, _Cell]:
         """Divide the cell by a plane at a share of its length along an axis; return the lower and the upper cell."""
@@ -126,7 +139,8 @@ def convex_pieces(mesh: coal.BVHModelBase) -> tuple[list[Matrix], list[Matrix], 
 
     if not 0 < len(surface) <= MAX_TRIANGLES or not np.isfinite(surface).all():
         return [], [], []
-    if not np.ptp(surface, axis=(0, 1)).max() > 0.0:
+    low, high = box_of(surface.reshape(-1, 3))
+    if not (high > low).any():
         return [], [], []
 
     if not is_closed(mesh):
@@ -164,7 +178,7 @@ def _closed_pieces(shells: list[Triangles]) -> tuple[list[Matrix], list[Matrix],
         shell = shells[cell.shell]
         cell_with_surface = _with_whole_surface(cell, shell)
         corners = np.where(CORNER_IS_HIGH, cell.high, cell.low)
-        corner_is_inside = np.array([_shell_contains(shell, corner) for corner in corners])
+        corner_is_inside = _inside(shell, corners)
         planes, hull_corners = _hull(np.concatenate([cell_with_surface.points, corners[corner_is_inside]]))
         outer_pieces.append(hull_corners)
         # Only points of the surface are used, as a corner of the cell may lie in the cavity of another shell.
@@ -177,8 +191,8 @@ def _closed_pieces(shells: list[Triangles]) -> tuple[list[Matrix], list[Matrix],
         body_corners = _convex_body_inside(planes, replace(cell, surface=obstacles))
         if body_corners is None:
             continue
-        centre = body_corners.mean(axis=0)
-        if _shell_contains(shell, centre) and not any(_shell_contains(cavity, centre) for cavity in cavities):
+        centre = body_corners.mean(axis=0)[None]
+        if _inside(shell, centre)[0] and not any(_inside(cavity, centre)[0] for cavity in cavities):
             inner_pieces.append(body_corners)
 
     return _without_empty(outer_pieces), inner_pieces, _without_empty(surface_points)
@@ -202,14 +216,18 @@ def _signed_volume(shell: Triangles) -> float:
     return float(np.einsum("ij,ij->i", shell[:, 0], np.cross(shell[:, 1], shell[:, 2])).sum()) / 6.0
 
 
-def _shell_contains(shell: Triangles, point: Vector) -> bool:
-    return inside_mesh(shell.reshape(-1, 3), np.arange(3 * len(shell)).reshape(-1, 3), point)
+def _inside(shell: Triangles, points: Matrix) -> NDArray[np.bool_]:
+    """Check which points, shape (n, 3), are inside a closed surface: by rays, or by angles where these are in doubt."""
+    is_inside = inside_by_rays(shell, points)
+    for k in np.flatnonzero(is_inside == IN_DOUBT):
+        is_inside[k] = inside_mesh(shell.reshape(-1, 3), np.arange(3 * len(shell)).reshape(-1, 3), points[k])
+    return np.asarray(is_inside == 1)
 
 
 def _first_cell(surface: Triangles, boxes: NDArray[np.float64], shell: int = 0) -> _Cell:
     """Return the cell around a whole surface and some boxes, which holds a coarse sketch of the surface."""
     bounds = np.concatenate([surface.reshape(-1, 3), boxes.reshape(-1, 3)])
-    return _Cell(bounds.min(axis=0), bounds.max(axis=0), _sketch(surface), boxes, shell)
+    return _Cell(*box_of(bounds), _sketch(surface), boxes, shell)
 
 
 def _with_whole_surface(cell: _Cell, surface: Triangles) -> _Cell:
@@ -231,8 +249,8 @@ def _split_into_cells(cells: list[_Cell]) -> list[_Cell]:
 
 def _sketch(surface: Triangles) -> Triangles:
     """Return a coarse version of a surface: corners rounded to a grid, without flat and repeated triangles."""
-    low = surface.min(axis=(0, 1))
-    grid_step = max(float(np.ptp(surface, axis=(0, 1)).max()) / GRID, 1e-12)
+    low, high = box_of(surface.reshape(-1, 3))
+    grid_step = max(float((high - low).max()) / GRID, 1e-12)
 
     grid_points = np.round((surface - low) / grid_step).astype(np.int64)
     corner_numbers = np.sort(grid_points @ ((GRID + 1) ** np.arange(3)), axis=1)
@@ -243,8 +261,9 @@ def _sketch(surface: Triangles) -> Triangles:
 
 def _clipped_to_box(surface: Triangles, low: Vector, high: Vector) -> Triangles:
     """Return the parts of triangles inside a box, as triangles, shape (m, 3, 3)."""
-    overlaps_box = (surface.min(axis=1) <= high) & (surface.max(axis=1) >= low)
-    surface = surface[overlaps_box.all(axis=1)]
+    lowest, highest = bounds_of(surface)
+    x, y, z = ((lowest[:, axis] <= high[axis]) & (highest[:, axis] >= low[axis]) for axis in range(3))
+    surface = surface[x & y & z]
     for axis in range(3):
         _, surface = clipped(surface, axis, float(low[axis]))
         surface, _ = clipped(surface, axis, float(np.nextafter(high[axis], np.inf)))
@@ -266,7 +285,7 @@ def clipped(surface: Triangles, axis: int, coordinate: float) -> tuple[Triangles
         The triangles below the plane and those above it, shape (k, 3, 3) each.
     """
     above = surface[:, :, axis] >= coordinate
-    count = above.sum(axis=1)
+    count = above[:, 0].astype(np.int8) + above[:, 1] + above[:, 2]
     crossing = (count == 1) | (count == 2)
     lone_above = count[crossing] == 1
     lone_corner = np.where(lone_above[:, None], above[crossing], ~above[crossing]).argmax(axis=1)
@@ -336,32 +355,67 @@ def _convex_body_inside(planes: Matrix, cell: _Cell) -> Matrix | None:
     all_planes = np.concatenate([cell_planes, most_different(planes, MAX_PLANES)])
 
     # Least coordinate of each triangle along each normal, shape (triangles, planes).
-    lowest = np.min([products(cell.surface[:, k], all_planes[:, :3]) for k in range(3)], axis=0)
+    a, b, c = (products(cell.surface[:, k], all_planes[:, :3]) for k in range(3))
+    lowest = np.minimum(np.minimum(a, b), c)
     nearest = (all_planes[:, 3] - lowest).argmin(axis=1)
     offsets = all_planes[:, 3].copy()
     np.minimum.at(offsets, nearest, lowest[np.arange(len(nearest)), nearest])
     offsets -= SHRINKAGE * float((cell.high - cell.low).max())
 
     # Qhull needs a point inside the body: the centre of the largest ball that is behind all planes.
-    largest_ball = linprog(
-        [0.0, 0.0, 0.0, -1.0], np.column_stack([all_planes[:, :3], np.ones(len(all_planes))]), offsets, bounds=UNBOUNDED
-    )
-    if largest_ball.status != 0 or not largest_ball.x[3] > THINNEST:
+    largest_ball = _largest_ball(all_planes[:, :3], offsets)
+    if largest_ball is None or not largest_ball[3] > THINNEST:
         return None
 
     try:
         return np.asarray(
-            HalfspaceIntersection(np.column_stack([all_planes[:, :3], -offsets]), largest_ball.x[:3]).intersections
+            HalfspaceIntersection(np.column_stack([all_planes[:, :3], -offsets]), largest_ball[:3]).intersections
         )
     except (QhullError, ValueError):
         return None
 
 
+def _largest_ball(normals: Matrix, offsets: Vector) -> Vector | None:
+    """Return centre and radius of the largest ball behind all planes, shape (4,); None if it is not found.
+
+    This is a linear program of four unknowns, solved by the dual simplex method: the ball that touches four planes, and
+    cannot grow between them, is replaced by the one that touches the plane that it violates most, while there is one.
+
+    Args:
+        normals: Unit vectors, shape (n, 3): first those along the axes, then their opposites.
+        offsets: Of the planes, shape (n,).
+    """
+    rows = np.column_stack([normals, np.ones(len(normals))])
+    axis = int((offsets[:3] + offsets[3:6]).argmin())
+    touched = np.array([axis, axis + 3, (axis + 1) % 3, (axis + 2) % 3])
+    shares = np.array([0.5, 0.5, 0.0, 0.0])  # of the touched planes' normals, which add up to nothing
+
+    for _ in range(MOST_EXCHANGES):
+        try:
+            ball = np.linalg.solve(rows[touched], offsets[touched])
+            violation = rows @ ball - offsets
+            worst = int(violation.argmax())
+            if violation[worst] <= 1e-12 * (1.0 + np.abs(offsets).max()):
+                return np.asarray(ball)
+            change = np.linalg.solve(rows[touched].T, rows[worst])
+        except np.linalg.LinAlgError:
+            return None
+        ratios = np.where(change > 1e-12, shares / np.where(change > 1e-12, change, 1.0), np.inf)
+        leaving = int(ratios.argmin())
+        if not np.isfinite(ratios[leaving]):
+            return None
+        shares = shares - ratios[leaving] * change
+        shares[leaving] = ratios[leaving]
+        touched[leaving] = worst
+    return None
+
+
 def _extreme_points(points: Matrix) -> Matrix:
     """Return the points that lie farthest in one of a fixed set of directions, each once."""
-    return points[np.unique(products(points, _unit_directions()).argmax(axis=0))] if len(points) else points
+    return extreme_points(points, _unit_directions())
 
 
+@cache
 def _unit_directions() -> Matrix:
     """Return unit vectors that are spread evenly over all directions, shape (DIRECTIONS, 3)."""
     z = (2.0 * np.arange(DIRECTIONS) + 1.0) / DIRECTIONS - 1.0

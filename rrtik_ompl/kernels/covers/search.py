@@ -10,15 +10,18 @@ solid.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
-from rrtik_ompl.base.arrays import QUIET_PRODUCT, Matrix, Vector
+from rrtik_ompl.base.arrays import Matrix
+from rrtik_ompl.kernels.covers import search_in_numpy
 from rrtik_ompl.kernels.covers.cells import Elements
-from rrtik_ompl.kernels.covers.solids import Triangles
+from rrtik_ompl.kernels.covers.memory import called, room
+from rrtik_ompl.kernels.covers.search_in_numpy import CentreElementTable
+from rrtik_ompl.kernels.covers.search_layout import CENTRE, DEPTH, KERNELS, MOVED
+from rrtik_ompl.kernels.covers.surface import Places, Surface
+from rrtik_ompl.kernels.simd.library import library
+from rrtik_ompl.kernels.simd.processor import WIDTH
 
 CANDIDATES = 400
 LEAST_ON_SURFACE = 80  # least number of candidates at the surface, for thin or open parts of the solid
@@ -29,31 +32,15 @@ MAX_RELOCATIONS = 4  # largest number of balls that are moved elsewhere in a rou
 # A ball is moved elsewhere if the protrusion that results without it is below this share of the largest one.
 RELOCATION_GAIN = 0.95
 
-CentreElementTable = NDArray[np.float32]  # shape (centres, elements)
-
-
-@dataclass(slots=True, eq=False)
-class Places:
-    """Centres of balls, shape (n, 3), and their estimated depths inside the solid, shape (n,).
-
-    A depth that is not positive marks a centre at or beyond the surface, which is not moved.
-    """
-
-    centres: Matrix
-    depth: Vector
-
-    def __getitem__(self, rows: NDArray[np.int64] | NDArray[np.bool_] | slice) -> Places:
-        return Places(self.centres[rows], self.depth[rows])
-
 
 def smallest_cover(
-    elements: Elements, surface: cKDTree, limit: int, target: float | None, *, lenient: bool = False
+    elements: Elements, surface: Surface, limit: int, target: float | None, *, lenient: bool = False
 ) -> Matrix:
     """Find balls that contain all elements, shape (n, 4), at most ``limit`` of them.
 
     Args:
         elements: The elements to contain.
-        surface: Points spread over the solid's surface (``surface_points``).
+        surface: Points spread over the solid's surface .
         limit: Largest number of balls, unless the ``target`` takes more.
         target: Protrusion that is good enough; None to look for the smallest.
         lenient: Whether to subtract from each element's protrusion the part that no candidate avoids. Otherwise a
@@ -79,24 +66,7 @@ def smallest_cover(
     return _fitted_to_elements(elements, improved)
 
 
-def surface_points(triangles: Triangles, count: int) -> Matrix:
-    """Return points spread evenly over triangles, always the same ones, and corners of the triangles.
-
-    About ``count`` points are spread by area. All corners are added if there are at most ``count`` triangles, otherwise
-    those of every k-th triangle.
-    """
-    a, b, c = (triangles[:, k] for k in range(3))
-    sizes = np.cumsum(np.linalg.norm(np.cross(b - a, c - a), axis=1))
-    which = np.searchsorted(sizes, (np.arange(count) + 0.5) / count * sizes[-1]).clip(0, len(triangles) - 1)
-
-    u, v = ((np.arange(count) * step) % 1.0 for step in (0.7548776662466927, 0.5698402909980532))  # Roberts' sequence
-    u, v = (np.where(u + v > 1.0, 1.0 - w, w)[:, None] for w in (u, v))
-
-    spread = a[which] + u * (b - a)[which] + v * (c - a)[which]
-    return np.concatenate([spread, triangles[:: -(-len(triangles) // count)].reshape(-1, 3)])
-
-
-def candidates(elements: Elements, surface: cKDTree) -> Places:
+def candidates(elements: Elements, surface: Surface) -> Places:
     """Return candidate centres: lattice points inside, and points at the surface for thin or open parts.
 
     Their depths are distances to the nearest of the surface's points, negative for candidates at the surface.
@@ -117,25 +87,21 @@ def random_subset(points: Matrix, count: int) -> Matrix:
 
 def reaches(elements: Elements, centres: Matrix) -> CentreElementTable:
     """Return the radius that a ball about each centre needs to contain each element, shape (centres, elements)."""
-    points = elements.points.astype(np.float32).T
-    squared_norms = (points**2).sum(axis=0)
-    ball_radii = elements.radii.astype(np.float32)
-    radii = np.empty((len(centres), len(elements.start)), dtype=np.float32)
+    kernels = library(KERNELS)
+    if kernels is None:
+        return search_in_numpy.reaches(elements, centres)
 
-    rows = max(QUIET_PRODUCT // points.size, 1)
-    for k in range(0, len(centres), rows):
-        chunk = centres[k : k + rows].astype(np.float32)
-        # Compute |p - c|^2 = |p|^2 - 2 p c + |c|^2 in place, to save memory.
-        distances = chunk @ points
-        distances *= -2.0
-        distances += squared_norms
-        distances += (chunk**2).sum(axis=1)[:, None]
-        np.maximum(distances, 0.0, out=distances)
-        np.sqrt(distances, out=distances)
-        distances += ball_radii
-        np.maximum.reduceat(distances, elements.start, axis=1, out=radii[k : k + rows])
+    blocks = -(-len(centres) // WIDTH)
+    lanes = room(3 * blocks * WIDTH).reshape(3, -1)
+    lanes[:, len(centres) :] = 0.0
+    lanes[:, : len(centres)] = centres.T
 
-    return radii
+    count = len(elements.start)
+    balls = np.column_stack([elements.points, elements.radii]).astype(np.float32)
+    ends = np.r_[elements.start, len(elements.points)]
+    table = room(count * blocks * WIDTH)
+    called(kernels.reach_table, balls, ends, count, lanes, blocks, table)
+    return np.asarray(table.reshape(count, -1)[:, : len(centres)].T)
 
 
 def _cover_by_bisection(protrusions: CentreElementTable, limit: int, target: float | None) -> NDArray[np.int64]:
@@ -153,15 +119,15 @@ def _cover_by_bisection(protrusions: CentreElementTable, limit: int, target: flo
     high = float(protrusions.max(axis=1).min())
 
     if target is not None:
-        rows = _greedy_set_cover(protrusions <= max(low, target))
-        if len(rows) <= limit:
+        rows = _greedy_set_cover(protrusions, max(low, target), limit)
+        if rows is not None:
             return rows
 
     best = np.array([int(protrusions.max(axis=1).argmin())])
     for _ in range(BISECTIONS):
         middle = 0.5 * (low + high)
-        rows = _greedy_set_cover(protrusions <= middle)
-        if len(rows) <= limit:
+        rows = _greedy_set_cover(protrusions, middle, limit)
+        if rows is not None:
             best = rows
             high = min(middle, float(protrusions[rows].min(axis=0).max()))
         else:
@@ -170,31 +136,27 @@ def _cover_by_bisection(protrusions: CentreElementTable, limit: int, target: flo
     return best
 
 
-def _greedy_set_cover(holds: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Return rows that together hold every column, by greedy set cover: the row that adds most columns comes next.
+def _greedy_set_cover(protrusions: CentreElementTable, allowed: float, limit: int) -> NDArray[np.int64] | None:
+    """Return at most ``limit`` centres whose balls together hold every element and protrude little enough.
 
-    Args:
-        holds: Whether each row holds each column, shape (rows, columns).
+    By greedy set cover: the centre whose ball adds most elements comes next. None if it takes more of them.
     """
-    not_held = np.ones(holds.shape[1], dtype=bool)
-    chosen = []
-    columns = np.array(holds.T, dtype=np.float32, order="C")
-    # Gains are counts, so their float32 sums are exact.
-    gains = columns.sum(axis=0)
+    kernels = library(KERNELS)
+    if kernels is None:
+        rows = search_in_numpy.greedy_set_cover(protrusions <= allowed)
+        return rows if len(rows) <= limit else None
 
-    while not_held.any():
-        row = int(gains.argmax())
-        chosen.append(row)
-        newly_held = np.flatnonzero(not_held & holds[row])
-        not_held[newly_held] = False
-        gains -= columns[newly_held].sum(axis=0)
-
-    return np.array(chosen)
+    of_elements = np.ascontiguousarray(protrusions.T)
+    count, width = of_elements.shape
+    gains, held, chosen = (np.empty(n, dtype=np.int32) for n in (width, count, limit))
+    most = np.array([allowed], dtype=np.float32)
+    found = called(kernels.greedy_cover, of_elements, count, width, most, gains, held, chosen, limit)
+    return chosen[:found].astype(np.int64) if found <= limit else None
 
 
 def _improved(
     elements: Elements,
-    surface: cKDTree,
+    surface: Surface,
     candidate_places: Places,
     candidate_protrusions: CentreElementTable,
     unavoidable: NDArray[np.float32],
@@ -288,7 +250,7 @@ def _relocated(
     return Places(centres, depth), protrusions
 
 
-def _recentred(elements: Elements, surface: cKDTree, places: Places, owner: NDArray[np.int64]) -> Places:
+def _recentred(elements: Elements, surface: Surface, places: Places, owner: NDArray[np.int64]) -> Places:
     """Move each ball to where it protrudes least while it contains its points.
 
     A centre moves away from the nearest surface point and towards its farthest point, in ever shorter steps
@@ -300,47 +262,46 @@ def _recentred(elements: Elements, surface: cKDTree, places: Places, owner: NDAr
         places: Centres of the balls and their depths.
         owner: Index of the ball that must contain each point of the elements, shape (p,).
     """
+    kernels = library(KERNELS)
+    if kernels is None:
+        return search_in_numpy.recentred(elements, surface, places, owner, RECENTRING_STEPS)
+
+    count = len(places.centres)
+    points, first = _in_lanes(elements, owner, count)
+    balls = np.empty((count, MOVED))
+    balls[:, CENTRE : CENTRE + 3] = places.centres
+    balls[:, DEPTH] = places.depth
+    reach = room(int(np.diff(first).max()) * WIDTH)
+    called(kernels.recentre, balls, count, first, points, reach, *surface.arrays, RECENTRING_STEPS)
+    return Places(balls[:, CENTRE : CENTRE + 3].copy(), balls[:, DEPTH].copy())
+
+
+def _in_lanes(
+    elements: Elements, owner: NDArray[np.int64], count: int
+) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
+    """Return the points of each ball in blocks, and the first block of each ball.
+
+    A block has the x, y, z and radii of ``WIDTH`` points. The last point of a ball fills up its last block.
+
+    Returns:
+        The blocks, shape (b, 4, WIDTH), and the number of the first block of each ball, with b at the end, shape
+        (count + 1,).
+    """
     order = np.argsort(owner, kind="stable")
-    points = elements.points[order]
-    radii = elements.radii[order]
-    owner = owner[order]
-    first = np.flatnonzero(np.r_[True, np.diff(owner) > 0])
+    points_of = np.bincount(owner, minlength=count)
+    ends = np.cumsum(points_of)
+    first = np.r_[0, np.cumsum(-(-points_of // WIDTH))]
 
-    centres = places.centres
-    best = places
-    best_protrusion = np.full(len(places.centres), np.inf)
-    sign = np.where(places.depth > 0.0, 1.0, -1.0)
-    stride = 0.0
+    ball_of_block = np.repeat(np.arange(count), np.diff(first))
+    block = np.arange(first[-1]) - first[ball_of_block]
+    begin = (ends - points_of)[ball_of_block] + block * WIDTH
+    rows = order[np.minimum(begin[:, None] + np.arange(WIDTH), ends[ball_of_block, None] - 1)]
 
-    for step in range(RECENTRING_STEPS + 1):
-        distance, nearest = surface.query(centres)
-        offsets = points - centres[owner]
-        reach = np.sqrt(np.einsum("ij,ij->i", offsets, offsets)) + radii
-        radius = np.maximum.reduceat(reach, first)
-
-        is_better = radius - sign * distance < best_protrusion
-        best_protrusion = np.where(is_better, radius - sign * distance, best_protrusion)
-        best = Places(
-            np.where(is_better[:, None], centres, best.centres), np.where(is_better, sign * distance, best.depth)
-        )
-
-        outermost = np.flatnonzero(reach >= radius[owner])
-        farthest = np.empty(len(first), dtype=np.int64)
-        farthest[owner[outermost]] = outermost
-        if step == 0:
-            stride = 0.5 * np.maximum(best_protrusion, 0.0)
-
-        outward = points[farthest] - centres
-        inward = centres - surface.data[nearest]
-        direction = _unit(outward) + _unit(inward)
-        length = np.minimum(stride / (step + 2.0), 0.25 * np.maximum(sign * distance, 0.0))
-        centres = centres + length[:, None] * direction
-
-    return best
-
-
-def _unit(vectors: Matrix) -> Matrix:
-    return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=1), 1e-300)[:, None])
+    blocks = room(4 * rows.size).reshape(-1, 4, WIDTH)
+    for axis in range(3):
+        blocks[:, axis] = elements.points[rows, axis]
+    blocks[:, 3] = elements.radii[rows]
+    return blocks, first
 
 
 def _fitted_to_elements(elements: Elements, places: Places) -> Matrix:

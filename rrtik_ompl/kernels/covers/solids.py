@@ -15,8 +15,9 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull
 
-from rrtik_ompl.base.arrays import TAU, Matrix, Vector, products, welded
+from rrtik_ompl.base.arrays import TAU, Matrix, Vector, box_of, products, welded
 from rrtik_ompl.geometry.collision.solids import farthest_along, inside_mesh, principal_axes
+from rrtik_ompl.kernels.covers.points import bounds_of, distances_to_nearest
 
 # Allowance for rounding, relative to the extent of the solid: far above float64's, far below any length that matters.
 ROUNDING = 1e-12
@@ -147,13 +148,7 @@ class MeshSolid:
 
     def distance(self, points: Matrix) -> Vector:
         """Return the distance of each point, shape (n, 3), to the surface and its caps."""
-        return np.asarray(np.array([self._distance(p) for p in points]) - ROUNDING)
-
-    def _distance(self, point: Vector) -> float:
-        to_centre = np.linalg.norm(self._centres - point, axis=1)
-        may_be_nearest = to_centre - self._reach <= (to_centre + self._reach).min()
-        rows = self._closed[may_be_nearest]
-        return float(distance_to_triangles(np.broadcast_to(point, (len(rows), 3)), rows).min())
+        return distances_to_nearest(points, self._closed, self._centres, self._reach) - ROUNDING
 
 
 def convex_solid(points: Matrix) -> tuple[ConvexSolid, Frame]:
@@ -236,8 +231,7 @@ def mesh_solid(vertices: Matrix, triangles: NDArray[np.int64], boxes: tuple[Matr
     first, place = welded(vertices[used_vertices])
     points = vertices[used_vertices[first]]
 
-    low = points.min(axis=0)
-    high = points.max(axis=0)
+    low, high = box_of(points)
     frame = Frame(0.5 * (low + high), np.eye(3), float(np.linalg.norm(high - low)))
 
     enclosed = np.where(CORNERS[None] == 1, boxes[1][:, None], boxes[0][:, None])
@@ -247,8 +241,10 @@ def mesh_solid(vertices: Matrix, triangles: NDArray[np.int64], boxes: tuple[Matr
 
 def _bounding_balls(triangles: Triangles) -> tuple[Matrix, Vector]:
     """Return a ball around each triangle: centres, shape (m, 3), and radii, shape (m,)."""
-    centres = 0.5 * (triangles.min(axis=1) + triangles.max(axis=1))
-    return centres, np.linalg.norm(triangles - centres[:, None], axis=2).max(axis=1)
+    low, high = bounds_of(triangles)
+    centres = 0.5 * (low + high)
+    squares = [((triangles[:, k] - centres) ** 2).sum(axis=1) for k in range(3)]
+    return centres, np.sqrt(np.maximum(np.maximum(squares[0], squares[1]), squares[2]))
 
 
 def rim_caps(vertices: Matrix, faces: NDArray[np.int64]) -> Triangles:
@@ -299,30 +295,3 @@ def _loop_centres(ends: NDArray[np.float64]) -> Matrix:
     middles = ends.mean(axis=1)
     sums = np.column_stack([np.bincount(loop_of_edge, weights=middles[:, k]) for k in range(3)])
     return np.asarray((sums / np.maximum(edge_counts, 1)[:, None])[loop_of_edge])
-
-
-def distance_to_triangles(points: Matrix, triangles: Triangles) -> Vector:
-    """Return the distance of each point, shape (n, 3), to the triangle of the same index, shape (n, 3, 3).
-
-    It is the distance to the plane if the point projects into the triangle, otherwise the distance to the nearest edge.
-    Degenerate triangles are allowed.
-    """
-    a = triangles[:, 0]
-    b = triangles[:, 1]
-    c = triangles[:, 2]
-    normal = np.cross(b - a, c - a)
-    area = np.einsum("ij,ij->i", normal, normal)
-    projects_inside = np.ones(len(points), dtype=bool)
-    nearest = np.full(len(points), np.inf)
-
-    for p, q in ((a, b), (b, c), (c, a)):
-        side = q - p
-        offset = points - p
-        length = np.einsum("ij,ij->i", side, side)
-        fraction = np.clip(np.einsum("ij,ij->i", offset, side) / np.maximum(length, 1e-300), 0.0, 1.0)
-        to_nearest = offset - fraction[:, None] * side
-        nearest = np.minimum(nearest, np.einsum("ij,ij->i", to_nearest, to_nearest))
-        projects_inside &= np.einsum("ij,ij->i", np.cross(side, offset), normal) >= 0.0
-
-    plane = np.einsum("ij,ij->i", points - a, normal) ** 2 / np.maximum(area, 1e-300)
-    return np.asarray(np.sqrt(np.where(projects_inside & (area > 0.0), np.minimum(nearest, plane), nearest)))

@@ -12,17 +12,23 @@ holds within 1e-9 of the size of the solid [m per m].
 
 from __future__ import annotations
 
+import weakref
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
 import coal
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import QhullError, cKDTree
+from scipy.spatial import QhullError
 
-from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.base.arrays import Matrix, Vector, box_of, products
 from rrtik_ompl.geometry.collision.enclosure import enclosure
 from rrtik_ompl.geometry.collision.shape_table import Core, box_corners, core_of
 from rrtik_ompl.geometry.collision.solids import is_closed, is_mesh, mesh_arrays, vertices_of
 from rrtik_ompl.kernels.covers.cells import elements, lattice_inside
-from rrtik_ompl.kernels.covers.search import random_subset, smallest_cover, surface_points
+from rrtik_ompl.kernels.covers.points import chosen_balls
+from rrtik_ompl.kernels.covers.search import random_subset, smallest_cover
 from rrtik_ompl.kernels.covers.solids import (
     ROUNDING,
     Frame,
@@ -32,6 +38,7 @@ from rrtik_ompl.kernels.covers.solids import (
     cylinder_solid,
     mesh_solid,
 )
+from rrtik_ompl.kernels.covers.surface import Surface, surface_points
 
 BALLS_PER_METRE = 70.0
 MIN_BALLS = 2
@@ -76,12 +83,12 @@ def outer_cover(geometry: coal.CollisionGeometry, *, protrusion: float | None = 
     if known_solid is None:
         return _bounding_ball(geometry, swept_radius)
 
-    solid, frame = known_solid
+    solid, frame = known_solid.solid, known_solid.frame
     target = None if protrusion is None else max(protrusion, 0.0) / frame.scale
     usual_count = balls_for(frame.scale) * (BALLS_OF_OPEN if len(solid.rim) else 1)
     limit = usual_count if protrusion is None else MAX_BALLS_ON_REQUEST
 
-    searched = _searched_cover(solid, limit, target)
+    searched = _searched_cover(solid, known_solid.surface, limit, target)
     regular = None if core is None else regular_cover(core, limit, protrusion)
     cover = frame.spheres_out(searched, solid.slack + ROUNDING)
     if regular is not None and _better(geometry, regular, cover, protrusion):
@@ -101,14 +108,12 @@ def inner_spheres(geometry: coal.CollisionGeometry, *, count: int | None = None)
         return _round_inner(core, count)
 
     known_solid = _solid(geometry)
-    if known_solid is None or not _closed(geometry, known_solid[0]):
+    if known_solid is None or not _closed(geometry, known_solid.solid):
         return np.empty((0, 4))
 
-    solid, frame = known_solid
+    solid, frame = known_solid.solid, known_solid.frame
     wanted_count = round(INNER_SHARE * balls_for(frame.scale)) if count is None else count
-    spheres = frame.spheres_out(
-        inscribed(solid, cKDTree(surface_points(solid.triangles, SURFACE_POINTS)), wanted_count), -ROUNDING
-    )
+    spheres = frame.spheres_out(inscribed(solid, known_solid.surface, wanted_count), -ROUNDING)
     return np.asarray(spheres[spheres[:, 3] > 0.0], dtype=np.float64)
 
 
@@ -134,7 +139,7 @@ def protrusion_bound(geometry: coal.CollisionGeometry, spheres: Matrix) -> float
     if known_solid is None:
         return np.inf
 
-    solid, frame = known_solid
+    solid, frame = known_solid.solid, known_solid.frame
     depth = frame.scale * solid.depth(frame.to_local(spheres[:, :3]))
     return max(float((spheres[:, 3] - depth).max()), 0.0)
 
@@ -204,11 +209,36 @@ def row_on_z(heights: Vector, radius: float) -> Matrix:
     return spheres
 
 
-def _solid(geometry: coal.CollisionGeometry) -> tuple[Solid, Frame] | None:
-    """Return a geometry as a solid scaled to unit size, and the frame that leads back to the geometry's own.
+@dataclass(frozen=True, eq=False)
+class _KnownSolid:
+    """A geometry as a solid scaled to unit size, and the frame that leads back to the geometry's own."""
 
-    The answer is None if the kind is unknown or the geometry has no volume worth mentioning.
-    """
+    solid: Solid
+    frame: Frame
+
+    @cached_property
+    def surface(self) -> Surface:
+        """Return points spread over the solid's surface."""
+        return Surface(surface_points(self.solid.triangles, SURFACE_POINTS))
+
+
+# The geometry that was asked for last, and its solid: both covers of a geometry need it, one after the other.
+_latest: list[tuple[weakref.ref[Any], _KnownSolid | None]] = []
+
+
+def _solid(geometry: coal.CollisionGeometry) -> _KnownSolid | None:
+    """Return a geometry as a solid; None if the kind is unknown or the geometry has no volume worth mentioning."""
+    for reference, known in tuple(_latest):
+        if reference() is geometry:
+            return known
+    made = _made_solid(geometry)
+    known = None if made is None else _KnownSolid(*made)
+    _latest[:] = [(weakref.ref(geometry), known)]
+    return known
+
+
+def _made_solid(geometry: coal.CollisionGeometry) -> tuple[Solid, Frame] | None:
+    """Make a solid and its frame of a geometry; None as for `_solid`."""
     core = core_of(geometry)
     if core is not None and core.disc is not None:
         sizes = core.disc, core.half_length
@@ -236,7 +266,7 @@ def _mesh(geometry: coal.CollisionGeometry) -> tuple[Solid, Frame] | None:
     if (
         not len(used_vertices)
         or not np.isfinite(used_vertices).all()
-        or not np.ptp(used_vertices, axis=0).max() > SMALLEST
+        or not np.subtract(*box_of(used_vertices)[::-1]).max() > SMALLEST
     ):
         return None
 
@@ -274,17 +304,17 @@ def _finite(geometry: coal.CollisionGeometry) -> bool:
     return vertices is None or bool(np.isfinite(vertices).all())
 
 
-def _searched_cover(solid: Solid, limit: int, target: float | None) -> Matrix:
+def _searched_cover(solid: Solid, surface: Surface, limit: int, target: float | None) -> Matrix:
     """Compute the cover of a solid by search.
 
     If a target is given and the first cut of the solid into cells does not reach it, a finer cut is tried.
 
     Args:
         solid: The solid, of unit size.
+        surface: Points spread over its surface.
         limit: Largest number of balls, unless the target takes more.
         target: Protrusion that is good enough, in units of the solid's frame; None to look for the smallest.
     """
-    surface = cKDTree(surface_points(solid.triangles, SURFACE_POINTS))
     # The search works with estimated depths, so it aims a little below the target.
     search_target = None if target is None else 0.9 * target
     cuts = [CROSSED_CELLS, 4 * CROSSED_CELLS]
@@ -386,7 +416,7 @@ def _round_inner(core: Core, count: int | None) -> Matrix:
     return row_on_z(spread(half_length, number if count is None else min(count, number)), radius)
 
 
-def inscribed(solid: Solid, surface: cKDTree, count: int) -> Matrix:
+def inscribed(solid: Solid, surface: Surface, count: int) -> Matrix:
     """Compute at most ``count`` balls inside a closed solid, the most useful first, shape (n, 4).
 
     The largest ball about a point that is known to be inside reaches to the surface. Starting from such points, centres
@@ -413,7 +443,7 @@ def inscribed(solid: Solid, surface: cKDTree, count: int) -> Matrix:
     return np.asarray(np.column_stack([centres[chosen], radii])[trusted])
 
 
-def _moved_inwards(points: Matrix, surface: cKDTree) -> tuple[Matrix, Vector, Vector]:
+def _moved_inwards(points: Matrix, surface: Surface) -> tuple[Matrix, Vector, Vector]:
     """Move points away from the nearest surface point for as long as that makes them deeper.
 
     Args:
@@ -444,7 +474,7 @@ def _moved_inwards(points: Matrix, surface: cKDTree) -> tuple[Matrix, Vector, Ve
     return centres, start_depth, depth
 
 
-def _greedy_choice(centres: Matrix, radii: Vector, samples: Matrix, count: int) -> list[int]:
+def _greedy_choice(centres: Matrix, radii: Vector, samples: Matrix, count: int) -> NDArray[np.int64]:
     """Choose balls greedily: each time the one that reduces the samples' distances to the nearest ball most.
 
     Args:
@@ -454,20 +484,11 @@ def _greedy_choice(centres: Matrix, radii: Vector, samples: Matrix, count: int) 
         count: Largest number of balls.
 
     Returns:
-        Indices of the chosen balls, in the order of the choice.
+        Indices of the chosen balls, in the order of the choice, shape (k,).
     """
-    gap_to_ball = np.linalg.norm(samples[:, None] - centres, axis=2).astype(np.float32) - radii.astype(np.float32)
+    squared = (samples**2).sum(axis=1)[:, None] - 2.0 * products(samples, centres) + (centres**2).sum(axis=1)
+    gap_to_ball = np.sqrt(np.maximum(squared, 0.0)).T.astype(np.float32) - radii.astype(np.float32)[:, None]
     # Distances are negative inside a ball. The first value exceeds all of them, so that some ball is an improvement.
     farthest = float(gap_to_ball.max())
     gap = np.full(len(samples), farthest + abs(farthest) + 1.0, dtype=np.float32)
-    chosen: list[int] = []
-
-    while len(chosen) < count:
-        gain = np.maximum(gap[:, None] - gap_to_ball, 0.0).sum(axis=0)
-        best = int(gain.argmax())
-        if gain[best] <= 0.0:
-            break
-        chosen.append(best)
-        gap = np.minimum(gap, gap_to_ball[:, best])
-
-    return chosen
+    return chosen_balls(gap_to_ball, gap, count)

@@ -13,7 +13,7 @@ from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.geometry.collision.shape_table import pieces
 from rrtik_ompl.geometry.collision.solids import bvh, hull, inside_mesh, is_closed, is_mesh, mesh_arrays, robot_solids
 from rrtik_ompl.kernels.covers import spheres as covers
-from rrtik_ompl.kernels.covers.solids import distance_to_triangles
+from rrtik_ompl.kernels.covers.points import distance_to_triangles
 from rrtik_ompl.kernels.covers.spheres import inner_spheres, outer_cover, protrusion_bound
 from rrtik_ompl.model.shapes import Prism
 from rrtik_tests.covered_solids import (

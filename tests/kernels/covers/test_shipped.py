@@ -10,7 +10,7 @@ from rrtik_ompl.geometry.collision.bodies import link_bodies
 from rrtik_ompl.geometry.collision.solids import is_mesh, mesh_arrays
 from rrtik_ompl.kernels.covers import cache
 from rrtik_ompl.kernels.covers.cache import cached_convex_pieces, cached_inner_spheres, cached_outer_cover
-from rrtik_ompl.kernels.covers.spheres import inner_spheres, outer_cover
+from rrtik_ompl.kernels.covers.spheres import inner_spheres, outer_cover, protrusion_bound
 from rrtik_ompl.world.world import World
 from rrtik_tests.covered_solids import SOLIDS, mesh_solid
 
@@ -22,13 +22,18 @@ def test_nothing_of_a_shipped_robot_is_made(name, tmp_path, monkeypatch):
     assert {folder.name for folder in tmp_path.iterdir()} <= {"kernels"}  # what is made is kept, in other folders
 
 
-def test_a_cover_made_anew_is_the_shipped_one():
+def test_a_cover_made_anew_is_as_good_as_the_shipped_one():
+    """Not the same one: processors round differently, and a search goes on from what is rounded."""
     meshes = [body.geometry for body in link_bodies(load_robot("ur5")) if is_mesh(body.geometry)]
     smallest = min(meshes, key=lambda mesh: len(mesh_arrays(mesh)[1]))
-    for parameters, make in (("outer None", outer_cover), ("inner None", inner_spheres)):
-        stored = cache.shipped_cover(cache.cover_key(smallest, parameters))
-        assert stored is not None
-        np.testing.assert_array_equal(stored, make(smallest))
+    outer, inner = (cache.shipped_cover(cache.cover_key(smallest, f"{kind} None")) for kind in ("outer", "inner"))
+
+    made = outer_cover(smallest)
+    assert abs(len(made) - len(outer)) <= 1
+    assert protrusion_bound(smallest, made) == pytest.approx(protrusion_bound(smallest, outer), rel=0.15)
+    made = inner_spheres(smallest)
+    assert len(made) == len(inner)
+    assert made[:, 3].sum() == pytest.approx(inner[:, 3].sum(), rel=0.05)
 
 
 def test_the_store_gives_back_what_was_written_and_is_always_the_same(tmp_path):

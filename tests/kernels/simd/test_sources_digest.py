@@ -54,8 +54,8 @@ def test_an_edit_of_covers_makes_nothing_anew(tmp_path):
         return subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True)
 
     before = keys().stdout
-    (copy / "geometry" / "covers" / "spheres.py").write_text(
-        "# changed\n" + (copy / "geometry" / "covers" / "spheres.py").read_text()
+    (copy / "kernels" / "covers" / "spheres.py").write_text(
+        "# changed\n" + (copy / "kernels" / "covers" / "spheres.py").read_text()
     )
     assert keys().stdout == before
     (copy / "kernels" / "checks" / "gjk.py").write_text(
