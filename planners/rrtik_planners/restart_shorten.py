@@ -14,7 +14,6 @@ from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.kernels.search.connect_layout import KERNELS
 from rrtik_ompl.kernels.search.shortcut_layout import KERNELS as SHORTCUTS
-from rrtik_ompl.kernels.search.taut.layout import KERNELS as TAUT
 from rrtik_ompl.model.transitions import route_length
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SearchResult, Stop
 from rrtik_ompl.planning.improving import GAIN, PATIENCE, QUICK_CHECKS, SETTLED, WORTH
@@ -31,7 +30,7 @@ class RestartShorten(FastRRTConnect):
     such as OMPL's Benchmark. ``progress`` has the length of the best path over time.
     """
 
-    kernels: ClassVar[tuple[str, ...]] = (KERNELS, SHORTCUTS, TAUT)
+    kernels: ClassVar[tuple[str, ...]] = (KERNELS, SHORTCUTS)
     anytime: ClassVar[bool] = True
     supports_iteration_limit: ClassVar[bool] = False
     proof_iterations: ClassVar[int] = 0

@@ -10,8 +10,7 @@ from typing import Any
 
 from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.choices import ShorteningMethod
-from rrtik_ompl.kernels.search.shortcut_layout import KERNELS as SHORTCUT_KERNELS
-from rrtik_ompl.kernels.search.taut.layout import KERNELS as TAUT_KERNELS
+from rrtik_ompl.kernels.search.contacts.layout import KERNELS as PULL_KERNELS
 from rrtik_ompl.kernels.warming import load_together
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.robot import Robot
@@ -21,8 +20,6 @@ from rrtik_ompl.planning.shortening import Wishes, shorten, shortened
 from rrtik_ompl.world.clearances import possible_clearance
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.proven_motions import KERNELS as PROVEN_KERNELS
-
-BRIEF_CHECKS = 600  # motions, about 10 ms; a count, so that the result depends on the seed alone
 
 
 def finished(problem: Problem, found: Plan, request: Request, method: ShorteningMethod) -> Plan:
@@ -71,7 +68,7 @@ def finished(problem: Problem, found: Plan, request: Request, method: Shortening
 
 
 def briefly_shortened(problem: Problem, found: Plan, request: Request) -> Plan:
-    """Return a plan whose path is shortened by a small, fixed number of checked motions, as far as there is time."""
+    """Return a plan whose path is shortened by "auto", as far as there is time, without the care of ``shorten()``."""
     path = found.path
     if path is None or len(path.waypoints) < 3:
         return found
@@ -80,7 +77,7 @@ def briefly_shortened(problem: Problem, found: Plan, request: Request) -> Plan:
         return found
 
     clearance = possible_clearance(problem.world, request.clearance, path.waypoints)
-    shorter = shortened(path, problem, Wishes(replace(budget, iterations=BRIEF_CHECKS), clearance=clearance))
+    shorter = shortened(path, problem, Wishes(Budget(budget.seed, stop=budget.over), clearance=clearance))
     return replace(found, path=_as_proven_as_asked(shorter, request), seconds=found.seconds + budget.elapsed)
 
 
@@ -93,7 +90,7 @@ def rules_among(options: Mapping[str, Any], robot: Robot) -> MoveRules | None:
 def _time_left(problem: Problem, found: Plan, request: Request) -> Budget:
     """Return the budget of what follows a search, which begins when the kernels of shortening are loaded."""
     if problem.world.fast is not None:
-        load_together((SHORTCUT_KERNELS, PROVEN_KERNELS, TAUT_KERNELS))
+        load_together((PULL_KERNELS, PROVEN_KERNELS))
     return replace(request.budget, seconds=request.budget.seconds - found.seconds).begun_now()
 
 

@@ -174,7 +174,7 @@ def planned_and_finished(
 
 
 def planned(problem: Problem, planner: str | PlannerFactory, request: Request) -> Plan:
-    """Search as :func:`plan` does, with arguments that have been checked; a path of "auto" is shortened a little.
+    """Search as :func:`plan` does, with arguments that have been checked; a path of "auto" is shortened.
 
     For callers that plan many times, or shorten in a way of their own.
 

@@ -121,11 +121,11 @@ def shorten(
     Args:
         path: A valid path of the problem.
         problem: Its world checks the new motions.
-        method: The method of shortening. "auto" pulls several cut paths taut and is the best choice for straight
-            motions; it leaves single-joint moves to "fewest-moves". "axis" is the published double axis cut: fewer
-            moves of one joint at a time. "axis-rounds" continues with twenty passes in random joint orders: fewer moves
-            still, in several times the time. Both return a path that moves several joints at once as it is, with a
-            warning. "fewest-moves" accepts single-joint moves and looks for the fewest, with the least travel among
+        method: The method of shortening. "auto" pulls the path taut along what it touches and is the best choice for
+            straight motions; it leaves single-joint moves to "fewest-moves". "axis" is the published double axis cut:
+            fewer moves of one joint at a time. "axis-rounds" continues with twenty passes in random joint orders: fewer
+            moves still, in several times the time. Both return a path that moves several joints at once as it is, with
+            a warning. "fewest-moves" accepts single-joint moves and looks for the fewest, with the least travel among
             these. "sequential", "random" and "retraction" are the published methods for straight motions: quick,
             simple, and near the shortest path of the same homotopy class. "corners" pulls every bend to the corner that
             it goes round: this comes nearer to that shortest path than the finest steps of "retraction", with fewer
@@ -134,7 +134,7 @@ def shorten(
         seconds: Limit of wall time [s]. With a limit, random methods continue until nothing more is gained; without one
             they make a fixed number of tries, so that a seed always gives the same path.
         checks: Limit of the checked motions (of the tries, in random methods), which always gives the same path; 100
-            take some milliseconds. None for no such limit; "ompl" and "fewest-moves" are limited by time only.
+            take about a millisecond. None for no such limit; "ompl" and "fewest-moves" are limited by time only.
         seed: Seed of the random methods; None draws one.
         one_joint: Whether a path of single-joint moves stays one; fewer moves come first then, length second. None
             stands for True with "auto" and such a path.
@@ -215,7 +215,7 @@ def shortened(
     delegated = chosen.delegates_moves and wishes.one_joint
     for candidate in _SINGLE_JOINT if delegated else (chosen,):
         found = _shorten_in_forms(path, problem, candidate, (head, tail), wishes)
-        if not chosen.delegates_moves or found.length <= path.length:
+        if not delegated or found.length <= path.length:
             return found
     return _with_proof(path, problem)
 

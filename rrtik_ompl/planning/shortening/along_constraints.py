@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.ik.held_tables import held_tables
 from rrtik_ompl.kernels.search.constrained.search import ConstrainedSearch
 from rrtik_ompl.model.transitions import route_length
-from rrtik_ompl.planning.shortening.task import Task
-from rrtik_ompl.world.motion_queries import HoldingQueries, decider, keeps_constraints
+from rrtik_ompl.planning.shortening.task import Task, box_around
+from rrtik_ompl.world.motion_queries import decider, keeps_constraints
 from rrtik_ompl.world.problem import Problem
 
 TRIES = 200  # limit of the tries
@@ -32,7 +32,7 @@ def along_constraints(route: Matrix, task: Task, problem: Problem) -> Matrix:
     if tables is None:
         return route
 
-    lower, upper = _box(world, route)
+    lower, upper = box_around(world, route)
     search = ConstrainedSearch(motions, tables.held, lower, upper, shortest=tables.shortest)
     ask = decider(world, world.motion_valid_batch)
     rng = np.random.default_rng(task.seed)
@@ -57,10 +57,3 @@ def along_constraints(route: Matrix, task: Task, problem: Problem) -> Matrix:
         first, second = rng.integers(len(route), size=2)
         pair = int(min(first, second)), int(max(first, second))
     return route
-
-
-def _box(world: HoldingQueries, route: Matrix) -> tuple[Vector, Vector]:
-    """Return finite bounds around a route, within the limits, shapes (n,)."""
-    lower = np.maximum(world.robot.lower, route.min(axis=0) - np.pi)
-    upper = np.minimum(world.robot.upper, route.max(axis=0) + np.pi)
-    return lower, upper

@@ -1,88 +1,110 @@
-"""The method "auto": pull a few cut routes taut, then alternate random shortcuts and pulling.
+"""The method "auto": pull a route taut along what it touches; with a limit, cut and pull again as long as that gains.
 
-A route with few bends is pulled taut in a few dozen checks, so every start is first cut to a handful of waypoints. Only
-new bends can make a taut route shorter; random shortcuts make them. All limits count checks, not time.
+Without a limit there is one pull, of bounded work. Only other cuts can make a taut route much shorter: they lead to
+other homotopy classes and make new bends. All limits count work, not time.
 """
 
 from __future__ import annotations
 
+import math
+
+import numpy as np
+
 from rrtik_ompl.base.arrays import Matrix
-from rrtik_ompl.kernels.search.taut import layout
-from rrtik_ompl.kernels.search.taut.tightening import Tightening
+from rrtik_ompl.kernels.search.contacts.layout import KERNELS
+from rrtik_ompl.kernels.search.contacts.pulling import Pulling
 from rrtik_ompl.model.transitions import length_of, route_length
 from rrtik_ompl.planning.moves.axis_cut import axis_cut_rounds
-from rrtik_ompl.planning.shortening.cuts import PULLS, WAYPOINTS, kernel_search, random_cut, run, sequential_cut
+from rrtik_ompl.planning.shortening.cuts import random_cut, sequential_cut, shortcut
 from rrtik_ompl.planning.shortening.retraction import STEPS, retract
-from rrtik_ompl.planning.shortening.task import Task
+from rrtik_ompl.planning.shortening.task import Task, box_around
 from rrtik_ompl.world.motion_queries import KernelWorld, has_kernels
 
-STARTS = 3  # starts; random shortcuts lead to different homotopy classes of routes
-START_TRIES = 20  # tries of random shortcuts for a start
-START_CHECKS = 60  # limit of the motions checked to pull a start taut
-ROUND_TRIES = 60  # tries of random shortcuts in a round
-ROUND_CHECKS = 60  # limit of the motions checked to pull it taut
-ROUNDS_WITHOUT_LIMIT = 4  # rounds if neither time nor checks are limited
-LEAST_GAIN = 1e-4  # share of the length that counts as a gain
+STARTS = 3  # pulls of the given route; other cuts lead to other homotopy classes
+START_CUTS = 20  # random cuts before a pull of the given route
+START_WORK = 130  # limit of the work of a pull, in proofs of free motions
+START_GAIN = 1e-2  # share of the length that a step gains, or the pull comes to its end
+ROUND_CUTS = 60  # the same of the best route
+ROUND_WORK = 300
+ROUND_GAIN = 3e-3
+LEAST_GAIN = 1e-4  # share of the length that counts as a gain of a round
 IDLE_ROUNDS = 6  # rounds in a row without a gain that end the work
 FINEST = 16  # factor by which the last retraction is finer if there are no kernels
 
 
 def best_in_time(route: Matrix, task: Task) -> Matrix:
-    """Shorten a route, shape (k, n), by several starts and rounds until time, checks or patience run out."""
+    """Shorten a route, shape (k, n), by one pull; if time or checks are limited, until these or patience run out."""
     if task.one_joint:
         return task.better(route, axis_cut_rounds(route, task.free_batch, budget=task.rest))
     world = task.kernel_world
-    if len(route) < 3 or world is None or not has_kernels(world, layout.KERNELS):
+    if len(route) < 3 or world is None or not has_kernels(world, KERNELS):
         return _without_kernels(route, task)
+    if not world.motions.proves:
+        return task.better(route, shortcut(route, task))
 
-    best = _best_start(route, task, world)
-    rounds = rounds_without_gain = 0
-    while not task.expired() and rounds_without_gain < IDLE_ROUNDS and (task.bounded or rounds < ROUNDS_WITHOUT_LIMIT):
-        seed = STARTS + rounds
-        found = _taut(_cut(best, task, seed, ROUND_TRIES, PULLS), task, world, seed, ROUND_CHECKS)
+    best = route
+    for start in range(STARTS if task.bounded else 1):
+        if task.expired():
+            break
+        best = task.better(best, _pulled(route, task, world, start, START_CUTS, START_WORK, START_GAIN))
+        task.report(best)
+
+    idle = 0
+    rounds = STARTS
+    while task.bounded and len(best) > 2 and idle < IDLE_ROUNDS and not task.expired():
+        found = _pulled(best, task, world, rounds, ROUND_CUTS, ROUND_WORK, ROUND_GAIN)
         rounds += 1
-        rounds_without_gain = rounds_without_gain + 1 if length_of(found) > (1.0 - LEAST_GAIN) * length_of(best) else 0
+        idle = idle + 1 if length_of(found) > (1.0 - LEAST_GAIN) * length_of(best) else 0
         best = task.better(best, found)
         task.report(best)
     return best
 
 
-def _best_start(route: Matrix, task: Task, world: KernelWorld) -> Matrix:
-    """Return the best of several starts, each pulled taut: the sequential cut, and random shortcuts."""
-    first = sequential_cut(route, task)
-    best = task.better(route, _taut(first, task, world, 0, ROUND_CHECKS))
-    task.report(best)
-    for start in range(1, STARTS):
-        if task.expired():
-            break
-        best = task.better(best, _taut(_cut(route, task, start, START_TRIES, 0.0), task, world, start, START_CHECKS))
-        task.report(best)
-    return best
+def _pulled(route: Matrix, task: Task, world: KernelWorld, number: int, cuts: int, work: int, gain: float) -> Matrix:
+    """Return a route, shape (k, n), after random cuts and a pull.
 
+    Where a motion of it cannot be proven by kernels and cannot be cut off either, what lies between such motions is
+    pulled.
 
-def _cut(route: Matrix, task: Task, seed: int, tries: int, pull: float) -> Matrix:
-    """Return the route after some random shortcuts."""
-    search = kernel_search(route, task, seed=_seed(task, seed), share=WAYPOINTS, pull=pull, asking=False)
-    run(search, task, tries)
-    return search.waypoints
-
-
-def _taut(route: Matrix, task: Task, world: KernelWorld, seed: int, checks: int) -> Matrix:
-    """Pull a route taut with at most ``checks`` checked motions."""
-    work = Tightening(world.motions, route, seed=_seed(task, seed))
+    Args:
+        route: The route.
+        task: Counts the work.
+        world: Its motions are proven.
+        number: Of the pull, which selects the seed of its cuts.
+        cuts: How many.
+        work: Limit of the work, in proofs of free motions.
+        gain: See :class:`Pulling`.
+    """
+    pull = Pulling(
+        world.motions,
+        route,
+        *box_around(world, route),
+        seed=1000 * task.seed + number,
+        cuts=cuts,
+        work=min(work, task.checks_left),
+        least_gain=gain,
+    )
     before = task.asked
 
     def stop() -> bool:
-        task.asked = before + work.checks
+        task.asked = before + math.ceil(pull.work)
         return task.expired()
 
-    work.run(int(min(checks, task.checks_left)), stop=stop)
-    task.asked = before + work.checks
-    return work.waypoints
+    pull.run(stop=stop)
+    task.asked = before + math.ceil(pull.work)
+    found = pull.waypoints
+    if pull.proven:
+        return found
 
-
-def _seed(task: Task, number: int) -> int:
-    return 1000 * task.seed + number
+    is_proven = world.motion_valid_batch(found[:-1], found[1:])
+    borders = np.flatnonzero(~is_proven) + 1
+    if len(borders) == 0:
+        return found
+    pieces = [
+        piece if len(piece) < 3 else _pulled(piece, task, world, number, cuts, work, gain)
+        for piece in np.split(found, borders)
+    ]
+    return np.concatenate(pieces)
 
 
 def _without_kernels(route: Matrix, task: Task) -> Matrix:

@@ -13,7 +13,7 @@ from rrtik_ompl.kernels.search.shortcut_layout import KERNELS
 from rrtik_ompl.model.transitions import edge_keys, length_of, transitions
 from rrtik_ompl.planning.moves.axis_cut import axis_moves
 from rrtik_ompl.planning.moves.rules import MoveRules
-from rrtik_ompl.world.motion_queries import KernelWorld, MotionQueries, has_kernels
+from rrtik_ompl.world.motion_queries import HoldingQueries, KernelWorld, MotionQueries, has_kernels
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -181,3 +181,10 @@ class Task:
         if self.wishes.on_better is not None and self.rank(route) < self._reported:
             self._reported = self.rank(route)
             self.wishes.on_better(route)
+
+
+def box_around(world: HoldingQueries | KernelWorld, route: Matrix) -> tuple[Vector, Vector]:
+    """Return finite bounds around a route, half a turn beyond it and within the limits, shapes (n,)."""
+    lower = np.maximum(world.robot.lower, route.min(axis=0) - np.pi)
+    upper = np.minimum(world.robot.upper, route.max(axis=0) + np.pi)
+    return lower, upper

@@ -1,13 +1,9 @@
-"""Motions that must be proven, in kernels: the same answers as the prover's own, and routes pulled taut among them."""
-
-from itertools import pairwise
+"""Motions that must be proven, in kernels: the same answers as the prover's own."""
 
 import numpy as np
 import pytest
 
 import rrtik_ompl as rrtik
-from rrtik_ompl.kernels.search.taut.tightening import Tightening
-from rrtik_ompl.model.transitions import route_length
 from rrtik_ompl.world.proven_motions import ProvenMotions, proven_motions
 
 KEPT = 0.002
@@ -54,42 +50,3 @@ def test_without_kernels_the_world_proves(problem, route):
     assert proven_motions(blind, KEPT, route).motion_valid_batch(starts, ends).all()
     with pytest.raises(rrtik.InputError, match="no kernels"):
         ProvenMotions(blind, KEPT)
-
-
-def test_a_taut_route_is_proven_and_shorter_with_the_same_ends(problem, route):
-    motions = ProvenMotions(problem.world, KEPT)
-    work, lengths = Tightening(motions.motions, route, seed=4), [route_length(route)]
-    for checks in (10, 40, 160, 640):
-        work.run(checks)
-        lengths.append(route_length(work.waypoints))
-    assert lengths == sorted(lengths, reverse=True)
-    assert lengths[-1] < 0.99 * lengths[0]
-    assert work.intact()
-    assert (work.waypoints[[0, -1]] == route[[0, -1]]).all()
-    assert len(work.waypoints) <= len(route)
-    assert problem.world.prove(work.waypoints, clearance=KEPT).proven
-
-
-def test_a_taut_route_does_not_depend_on_interruptions(problem, route):
-    motions = ProvenMotions(problem.world, KEPT)
-    whole, parts = (Tightening(motions.motions, route, seed=5) for _ in range(2))
-    whole.run(300)
-    for checks in range(7, 301, 7):
-        parts.run(checks)
-    parts.run(300)
-    np.testing.assert_array_equal(whole.waypoints, parts.waypoints)
-    other = Tightening(motions.motions, route, seed=6)
-    other.run(300)
-    assert not np.array_equal(whole.waypoints, other.waypoints)
-
-
-def test_routes_are_pulled_taut_by_checks_in_steps_too(problem, route):
-    work = Tightening(problem.world.motions, route, seed=4)
-    work.run(400)
-    assert route_length(work.waypoints) < route_length(route)
-    assert all(problem.world.motion_valid(a, b) for a, b in pairwise(work.waypoints))
-
-
-def test_a_route_that_is_none_is_refused(problem, route):
-    with pytest.raises(rrtik.InputError, match="a route of two or more"):
-        Tightening(problem.world.motions, route[:1])

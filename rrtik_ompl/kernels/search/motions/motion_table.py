@@ -112,6 +112,11 @@ class FastMotions:
         self.address = self.table.address
 
     @property
+    def proves(self) -> bool:
+        """Whether only proven motions count as free."""
+        return self._proof is not None
+
+    @property
     def joints(self) -> int:
         """How many joint values a configuration has."""
         return len(self._offset)

@@ -8,18 +8,17 @@ from rrtik_ompl.kernels.checks.check_kernels import inner_collision
 from rrtik_ompl.kernels.checks.kinematics import forward_kinematics
 from rrtik_ompl.kernels.layout import COLLIDING, FREE, JointValues, WorldTable
 from rrtik_ompl.kernels.proof.frames import node_frames
-from rrtik_ompl.kernels.proof.layout import NODES, OPEN, ProofTable
-from rrtik_ompl.kernels.proof.proof_kernels import apart, begin_motion, prove_motion, visit
-from rrtik_ompl.kernels.record import Doubles, Ints
+from rrtik_ompl.kernels.proof.layout import NODES, OPEN, PARTS_END, PARTS_FIRST, ProofTable
+from rrtik_ompl.kernels.proof.proof_kernels import apart, begin_motion, beyond, pair_at, prove_motion, visit
+from rrtik_ompl.kernels.record import Ints
 from rrtik_ompl.kernels.search.motions.motion_kernels import (
     check_motion,
-    resolves,
     set_joint_values,
 )
 from rrtik_ompl.kernels.search.motions.motion_layout import MotionTable
 from rrtik_ompl.kernels.search.motions.row_kernels import Configuration, row_at
 from rrtik_ompl.kernels.simd.compiled import WIDTH, entry, inlined, kernel
-from rrtik_ompl.kernels.simd.lanes import bits, lane_numbers, set_wide_lanes
+from rrtik_ompl.kernels.simd.lanes import bits, first_bit, lane_numbers, set_wide_lanes
 from rrtik_ompl.kernels.simd.records import exists
 from rrtik_ompl.kernels.tables.accessors import joint_row
 
@@ -27,8 +26,11 @@ LOOKS = 2  # blocks of configurations, spread over a motion, that are looked at 
 
 
 @kernel
-def seen_colliding(world: WorldTable, start: JointValues, end: JointValues) -> bool:
-    """Whether the inner balls meet something at one of a few configurations of a motion."""
+def seen_at(world: WorldTable, start: JointValues, end: JointValues, one: bool) -> float:
+    """A place of a motion at which the inner balls meet something, -1 if none of a few is.
+
+    It is the first one that is found, or the middle one of all that a look sees.
+    """
     scratch = world.scratch
     joints = world.arm.joint_count
     values = scratch.values
@@ -38,19 +40,52 @@ def seen_colliding(world: WorldTable, start: JointValues, end: JointValues) -> b
         for joint in range(joints):
             set_wide_lanes(values, joint, (1.0 - share) * start[joint] + share * end[joint])
         forward_kinematics(world.arm, scratch)
-        if inner_collision(world, every, block >= 0) != 0:
-            return True
-    return False
+        hit = inner_collision(world, every, one)
+        if hit != 0:
+            return float(middle_bit(hit) * LOOKS + block) / float(LOOKS * WIDTH - 1)
+    return -1.0
+
+
+@inlined
+def middle_bit(hit: int) -> int:
+    """Place of the middle one of the bits that are set."""
+    low = hit
+    high = hit & (hit - 1)  # without the lowest bit
+    while high != 0:
+        low &= low - 1
+        high &= high - 1
+        if high != 0:
+            high &= high - 1
+    bit: int = first_bit(low)
+    return bit
 
 
 @kernel
-def open_at(proof: ProofTable, start: JointValues, end: JointValues, pair: int, place: float) -> bool:
-    """Whether a pair is not proven apart at one place of a motion."""
-    node = int(place * (NODES - 1))
+def open_pair(proof: ProofTable, start: JointValues, end: JointValues, place: float) -> Any:
+    """The first pair that is not proven apart at a place of a motion, -1 if there is none, and the place, rounded."""
+    node = min(int(place * (NODES - 1)), NODES - 2)
     begin_motion(proof, start, end)
     visit(proof, start, end, node)
     frames = node_frames(proof, node)
-    return bool(apart(proof, pair, frames, frames, 0.0) == OPEN)
+    share = node / (NODES - 1)
+
+    count = proof.top_count
+    for k in range(count):
+        proof.lists[k] = proof.top_pairs[k]
+    k = 0
+    while k < count:
+        pair = proof.lists[k]
+        k += 1
+        first = pair_at(proof, pair)[PARTS_FIRST]
+        last = pair_at(proof, pair)[PARTS_END]
+        if first == last:
+            if apart(proof, pair, frames, frames, 0.0) == OPEN:
+                return pair, share
+        elif beyond(proof, pair, frames, frames, 0.0) != 1:
+            for part in range(first, last):
+                proof.lists[count] = part
+                count += 1
+    return -1, share
 
 
 @inlined
@@ -71,34 +106,10 @@ def judge_motion(motions: MotionTable, start: Configuration, end: Configuration,
         checked: int = check_motion(motions, start, end, resolve)
         return checked
     values, others = both_ends(motions, start, end)
-    if seen_colliding(motions.world, values, others):
+    if seen_at(motions.world, values, others, True) >= 0.0:
         return COLLIDING
     pair, _ = prove_motion(proof, values, others)
     return FREE if pair < 0 else COLLIDING
-
-
-@kernel
-def judge_near(motions: MotionTable, start: Configuration, end: Configuration, hint: Doubles) -> int:
-    """As judge_motion; the hint is where a motion near by was not proven, a pair and a place, and is looked at first.
-
-    A new failure is noted there. Its pair is -1 if none is known.
-    """
-    proof = motions.proof
-    if not exists(proof):
-        checked: int = check_motion(motions, start, end, resolves(motions))
-        return checked
-    values, others = both_ends(motions, start, end)
-    pair = int(hint[0])
-    if pair >= 0 and open_at(proof, values, others, pair, hint[1]):
-        return COLLIDING
-    if seen_colliding(motions.world, values, others):
-        return COLLIDING
-    pair, place = prove_motion(proof, values, others)
-    if pair < 0:
-        return FREE
-    hint[0] = float(pair)
-    hint[1] = place
-    return COLLIDING
 
 
 @entry

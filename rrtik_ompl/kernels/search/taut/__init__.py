@@ -1,1 +1,0 @@
-"""Routes pulled taut in a kernel: the table, the kernel, and the object that keeps it between two calls."""
