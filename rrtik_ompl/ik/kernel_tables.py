@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector, frozen
 from rrtik_ompl.ik.tip_columns import TipColumns, tip_columns
 from rrtik_ompl.kernels.ik import ik_layout
-from rrtik_ompl.kernels.ik.ik_layout import CallTable, LimbTable
+from rrtik_ompl.kernels.ik.ik_layout import TWIST_NUMBERS, CallTable, LimbTable
 from rrtik_ompl.kernels.reference.descent import DAMPING, DAMPING_SHARE, LARGEST_STEP, PER_CHORD, SHARE_GROWTH, STALLED
+from rrtik_ompl.kernels.simd.processor import WIDTH
 from rrtik_ompl.kernels.tables.memory import PlannedTable, TablePlan, aligned, packed, sizes_of
 from rrtik_ompl.model.robot import Robot, reach_of
 
@@ -161,9 +162,18 @@ def spare_calls(limb: LimbTable) -> list[KernelCall]:
 
 @lru_cache(maxsize=64)
 def _plan_of(limb: LimbTable, aims: int, rows: int, near: bool, begun: bool, steps: int, patience: int) -> TablePlan:
-    """Return the memory layout of a call for so many goals and rows, with or without ``near`` and ``following``."""
+    """Return the memory layout of a call for so many goals and rows, with or without ``near`` and ``following``.
+
+    Starts go side by side where there are seeds, or many rows to one goal. Arrays that are read in wide lanes come
+    first, since they must begin on a multiple of their alignment.
+    """
+    many = limb.seed_count > 0 or (aims == 1 and rows > 1)
+    places = ik_layout.COLUMNS + (TWIST_NUMBERS + 1) * limb.dof + TWIST_NUMBERS * limb.joints
     return sizes_of(
         CallTable,
+        lanes=WIDTH * places if many else 0,
+        farness=limb.seed_count,
+        starts=WIDTH if many else 0,
         aims=ik_layout.AIM_FLOATS * aims,
         near=limb.dof * rows if near else 0,
         q=limb.dof * rows,
@@ -171,12 +181,11 @@ def _plan_of(limb: LimbTable, aims: int, rows: int, near: bool, begun: bool, ste
         next=rows if begun else 0,
         first=ik_layout.POSE_NUMBERS,
         frames=ik_layout.POSE_NUMBERS * (limb.joints + 1),
-        columns=ik_layout.TWIST_NUMBERS * limb.dof,
-        error=ik_layout.TWIST_NUMBERS,
-        weights=ik_layout.TWIST_NUMBERS,
-        square=ik_layout.TWIST_NUMBERS**2,
+        columns=TWIST_NUMBERS * limb.dof,
+        error=TWIST_NUMBERS,
+        weights=TWIST_NUMBERS,
+        square=TWIST_NUMBERS**2,
         change=limb.dof,
-        farness=limb.seed_count,
         rows=rows,
         steps=steps,
         patience=patience,

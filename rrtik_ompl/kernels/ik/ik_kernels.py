@@ -21,9 +21,10 @@ from rrtik_ompl.kernels.ik.ik_accessors import (
 )
 from rrtik_ompl.kernels.ik.ik_kinematics import differentiate, measure, move_tip, see_from, weigh
 from rrtik_ompl.kernels.ik.ik_layout import TWIST_NUMBERS, Aim, CallTable, LimbTable, Twist
+from rrtik_ompl.kernels.ik.lane_descent import search_lanes, walk_lanes
 from rrtik_ompl.kernels.layout import Configuration
 from rrtik_ompl.kernels.simd.compiled import entry, inlined, kernel
-from rrtik_ompl.kernels.simd.records import row_at
+from rrtik_ompl.kernels.simd.records import exists, row_at
 
 UNBOUNDED_RESIDUAL = 1e300  # without unit
 
@@ -114,6 +115,10 @@ def descend(limb: LimbTable, call: CallTable, aim: Aim, q: Configuration) -> boo
 def walk(limb: LimbTable, call: CallTable) -> int:
     """Walk from every row of Q towards its goal; returns the most steps that one of them took."""
     most = 0
+    if call.aim_numbers == 0 and call.rows > 1 and exists(call.lanes):
+        aim = aim_at(call, 0)
+        see_from(limb, call, aim)
+        return walk_lanes(limb, call, aim)
     for row in range(call.rows):
         aim = aim_at(call, row)
         if row == 0 or call.aim_numbers > 0:
@@ -163,18 +168,36 @@ def take_nearest(limb: LimbTable, call: CallTable) -> int:
 
 @kernel
 def search(limb: LimbTable, call: CallTable, row: int) -> bool:
-    """Walk from the row's next starts until one reaches its goal; whether one does."""
+    """Walk from the row's next starts until one reaches its goal; whether one does.
+
+    The first start goes alone, as it mostly arrives; the seeds go side by side where there is memory for lanes.
+    """
     dof = limb.dof
     aim = aim_at(call, row)
     q = row_at(call.q, dof, row)
     see_from(limb, call, aim)
     begin = call.next[row]
-    source = near_at(call, row)
-    for start in range(limb.seed_count + 1):
-        if start == 1:
-            measure_seeds(limb, call, aim)
+    if begin == 0:
+        source = near_at(call, row)
+        for k in range(dof):
+            q[k] = source[k]
+        call.next[row] = 1
+        if descend(limb, call, aim, q):
+            return True
+        begin = 1
+
+    if begin > limb.seed_count:
+        return False
+    measure_seeds(limb, call, aim)
+    if exists(call.lanes):
+        start = search_lanes(limb, call, aim, begin, q)
+        call.next[row] = (start if start > 0 else limb.seed_count) + 1
         if start > 0:
-            source = row_at(limb.seeds, dof, take_nearest(limb, call))
+            measure(call, aim, move_tip(limb, call, q))
+        return start > 0
+
+    for start in range(1, limb.seed_count + 1):
+        source = row_at(limb.seeds, dof, take_nearest(limb, call))
         if start < begin:
             continue
         for k in range(dof):

@@ -73,7 +73,14 @@ class CallTable(Record):
     change: Configuration
     farness: Doubles  # of the seeds
     done: int  # steps taken
+    lanes: Doubles  # of starts side by side, see below; may be absent
+    starts: Wholes  # number of the start in each lane
 
+
+# Lanes: places of wide lanes. Of each start: share of damping, the squared residual some steps ago and one step ago,
+# steps, whether it moves (1 or 0), residual, lower half of the square, the tip by rows, columns of the Jacobian; behind
+# these coordinates, and axis and origin of each joint.
+SHARE, MARK, BEFORE, AGE, MOVES, ERROR, SQUARE, TIPS, COLUMNS = 0, 1, 2, 3, 4, 5, 11, 32, 44
 
 # Places of a pose's and of a twist's numbers.
 AXES = 3  # rows of a rotation

@@ -11,9 +11,10 @@ from typing import Any
 
 from rrtik_ompl.kernels.ik import ik_layout
 from rrtik_ompl.kernels.ik.branch_layout import BRANCHES, DOF, MATRIX_SIDE, SINGULAR
-from rrtik_ompl.kernels.ik.ik_accessors import next_pose, pose_column, pose_origin, pose_row
+from rrtik_ompl.kernels.ik.ik_accessors import next_pose, pose_origin, pose_row
 from rrtik_ompl.kernels.ik.ik_kernels import search
 from rrtik_ompl.kernels.ik.ik_layout import ANGULAR, LINEAR, Pose
+from rrtik_ompl.kernels.ik.lane_rows import first_row, row_after
 from rrtik_ompl.kernels.ik.parallel_axes import dot, elbow, joints_of, shoulder, vector_of, wrist, wrist_of
 from rrtik_ompl.kernels.ik.pose_layout import ANGLE, AWAY, DISTANCE, SHARES, STEPS_UNIT, UNKNOWN, VALUES, PoseTable
 from rrtik_ompl.kernels.simd.compiled import WIDTH, entry, inlined, kernel
@@ -29,7 +30,6 @@ from rrtik_ompl.kernels.simd.lanes import (
     square_root,
     wide_lanes_at,
 )
-from rrtik_ompl.kernels.simd.vectors import along
 from rrtik_ompl.kernels.simd.wide_angles import TAU, arc_sine, wide_sine_and_cosine, within_half_turn
 
 RIGID = 1e-12  # how far from orthonormal a rotation may be that is taken as it is
@@ -130,28 +130,6 @@ def hold(call: PoseTable) -> int:
     set_wide_lanes(lanes, DISTANCE, away)
     which: int = bits(fits)
     return which
-
-
-@inlined
-def row_after(fixed: Pose, cosine: Any, sine: Any, row: Any) -> Any:
-    """A row of the next frame: of its three axes and its origin, a fixed frame away after a turn about z."""
-    x, y, z, o = row
-    a = cosine * x + sine * y
-    b = cosine * y - sine * x
-    o = o + (a * pose_origin(fixed, 0) + b * pose_origin(fixed, 1) + z * pose_origin(fixed, 2))
-    return (
-        along(pose_column(fixed, 0), a, b, z),
-        along(pose_column(fixed, 1), a, b, z),
-        along(pose_column(fixed, 2), a, b, z),
-        o,
-    )
-
-
-@inlined
-def first_row(fixed: Pose, row: int) -> Any:
-    """A row of the frame before the first joint, in every lane."""
-    x, y, z = spread_vector(pose_row(fixed, row))
-    return x, y, z, spread_wide(pose_origin(fixed, row))
 
 
 @inlined

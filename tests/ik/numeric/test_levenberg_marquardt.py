@@ -10,14 +10,14 @@ import rrtik_ompl as rrtik
 from rrtik_ompl.base.errors import InputError, UnknownNameError
 from rrtik_ompl.description.urdf import robot_from_urdf_text
 from rrtik_ompl.ik.batch import solve_ik_many
-from rrtik_ompl.ik.kernel_tables import SEEDS
+from rrtik_ompl.ik.kernel_tables import SEEDS, seeds_of
 from rrtik_ompl.ik.method_interface import mid_range_configuration
 from rrtik_ompl.ik.numeric import descent
 from rrtik_ompl.ik.numeric.descent import Search, walk
 from rrtik_ompl.ik.numeric.restarts import numeric_ik
 from rrtik_ompl.ik.targets import goal_rows, pose_rows
 from rrtik_ompl.kernels.ik.ik_layout import KERNELS
-from rrtik_ompl.kernels.reference.descent import walk_plainly
+from rrtik_ompl.kernels.reference.descent import farness, walk_plainly
 from rrtik_ompl.kernels.simd.library import library
 from rrtik_ompl.model.goal import GoalSet, PoseGoal, PositionGoal
 from rrtik_ompl.model.shapes import Box
@@ -64,6 +64,36 @@ def test_the_kernel_takes_the_same_steps_as_numpy(name, kind):
     np.testing.assert_allclose(q, plain[0], atol=1e-7)
     assert reached.tolist() == plain[1].tolist()
     assert most == plain[2]
+
+
+@pytest.mark.parametrize("kind", ["pose", "position", "x", "y", "z"])
+@pytest.mark.parametrize("name", ["panda", "mixed", "so100"])
+def test_starts_that_go_side_by_side_go_the_way_that_each_goes_alone(name, kind):
+    """Of more starts than lanes: who ends leaves the lane to the next."""
+    robot = arm(name)
+    aim, starts = goal_rows(goals(robot, kind))[:1], random_rows(robot, 40, seed=3)
+    together, reached, _ = walk(robot, aim, starts, patience=5)
+    alone = [walk(robot, aim, start[None], patience=5) for start in starts]
+    arrived = np.array([each[1][0] for each in alone])
+    assert np.count_nonzero(reached != arrived) <= 1  # rounding may decide about one that hardly goes on
+    both = reached & arrived
+    np.testing.assert_allclose(together[both], np.concatenate([each[0] for each in alone])[both], atol=1e-8)
+
+
+def test_of_seeds_side_by_side_the_nearest_that_arrives_counts():
+    robot = arm("panda")
+    near = mid_range_configuration(robot)
+    for aim in pose_rows(robot.fk_batch(random_rows(robot, 5, seed=4))):
+        seeds = seeds_of(robot)
+        order = np.argsort(farness(robot, aim[None], seeds.tips)[0], kind="stable")
+        ends, reached, _ = walk(robot, np.tile(aim, (SEEDS, 1)), seeds.q[order], patience=5)
+        search = Search(robot, aim[None], near)
+        search.advance(np.arange(1))  # from the hint, or the first seed that arrives
+        numbers = 1 + np.flatnonzero(reached)
+        for number in numbers[numbers >= search._num_starts[0]][:3]:
+            assert search.advance(np.arange(1)).all()
+            np.testing.assert_allclose(search.q[0], ends[number - 1], atol=1e-8)
+            assert search._num_starts[0] == number + 1
 
 
 @pytest.mark.parametrize("name", ARMS)
