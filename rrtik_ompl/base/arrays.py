@@ -145,6 +145,18 @@ def box_of(points: NDArray[np.float64]) -> tuple[Vector, Vector]:
     return np.asarray(columns.min(axis=1)), np.asarray(columns.max(axis=1))
 
 
+def bounds_of(triangles: NDArray[np.float64]) -> tuple[Matrix, Matrix]:
+    """Return the lowest and highest coordinates of triangles, shape (m, 3, 3), quicker than along their axis.
+
+    Example:
+        >>> low, high = bounds_of(np.arange(9.0).reshape(1, 3, 3))
+        >>> low.tolist(), high.tolist()
+        ([[0.0, 1.0, 2.0]], [[6.0, 7.0, 8.0]])
+    """
+    a, b, c = (triangles[:, k] for k in range(3))
+    return np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
+
+
 def welded(points: NDArray[Any]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Find points at the same place, many times faster than ``numpy.unique`` along an axis.
 
@@ -168,10 +180,12 @@ def welded(points: NDArray[Any]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         keys = (keys ^ column) * factor
         keys ^= keys >> np.uint64(29)
 
-    order = np.argsort(keys, kind="stable")
+    if not len(keys):
+        return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
+    order = np.argsort(keys)
     is_new = np.ones(len(order), dtype=bool)
     np.not_equal(keys[order[1:]], keys[order[:-1]], out=is_new[1:])
-    first = order[is_new]
+    first = np.minimum.reduceat(order, np.flatnonzero(is_new))
     place = np.empty(len(order), dtype=np.int64)
     place[order] = np.cumsum(is_new) - 1
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.base.arrays import Matrix, Vector, bounds_of, box_of
 from rrtik_ompl.geometry.collision.solids import mesh_arrays, once_per_geometry
 
 if TYPE_CHECKING:
@@ -33,8 +33,7 @@ class Enclosure:
 
     def __init__(self, vertices: Matrix, triangles: NDArray[np.int64]) -> None:
         corners = vertices[triangles]
-        low = corners.min(axis=(0, 1))
-        high = corners.max(axis=(0, 1))
+        low, high = box_of(corners.reshape(-1, 3))
 
         self.size = float((high - low).max()) / CELLS
         self.origin: Vector = low - 1.5 * self.size
@@ -74,13 +73,16 @@ def _cut_small(triangles: NDArray[np.float64]) -> list[NDArray[np.float64]]:
     """Halve triangles, shape (k, 3, 3), across their longest edges until each fits into a cell along every axis."""
     small_triangles = []
     for _ in range(HALVINGS):
-        is_large = (np.ptp(triangles, axis=1) > 1.0).any(axis=1)
+        low, high = bounds_of(triangles)
+        x, y, z = ((high - low) > 1.0).T
+        is_large = x | y | z
         small_triangles.append(triangles[~is_large])
         triangles = triangles[is_large]
 
-        # Lengths of the edges, from each corner to the next.
-        edges = np.linalg.norm(np.roll(triangles, -1, axis=1) - triangles, axis=2)
-        longest_edge = edges.argmax(axis=1)
+        # Squared lengths of the edges, from each corner to the next.
+        a, b, c = (triangles[:, k] for k in range(3))
+        edges = np.stack([((q - p) ** 2).sum(axis=1) for p, q in ((a, b), (b, c), (c, a))])
+        longest_edge = edges.argmax(axis=0)
         rows = np.arange(len(triangles))
         a, b, c = (triangles[rows, (longest_edge + k) % 3] for k in range(3))
         middle = 0.5 * (a + b)
@@ -90,8 +92,7 @@ def _cut_small(triangles: NDArray[np.float64]) -> list[NDArray[np.float64]]:
 
 def _flag_cells(near_surface: NDArray[np.bool_], triangles: NDArray[np.float64]) -> None:
     """Flag all cells that the bounding boxes of triangles reach into, in place."""
-    low = np.floor(triangles.min(axis=1)).astype(np.int64)
-    high = np.floor(triangles.max(axis=1)).astype(np.int64)
+    low, high = (np.floor(bound).astype(np.int64) for bound in bounds_of(triangles))
     for steps in np.ndindex(*(np.max(high - low, axis=0, initial=0) + 1)):
         cells = low + np.array(steps)
         near_surface[tuple(cells[(cells <= high).all(axis=1)].T)] = True

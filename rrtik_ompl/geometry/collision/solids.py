@@ -31,6 +31,7 @@ BOX_POINTS = 32  # points of a box, in the search for those that are farthest al
 NEAREST_FACES = 8  # faces of the hull, of normals like its own, that a triangle is compared with first
 MOST_COMPARED = 400_000_000  # A mesh with more pairs of a triangle and a face of the hull stays a mesh.
 
+THINNEST_FACE = 1e-6  # least height of a face over its longest side, for its normal to be reliable
 SMALLEST_AREA = 1e-18  # [m^2] twice the area below which a triangle has no usable normal
 
 FLATTEST = 1e-7  # least ratio of a hull's thickness to its extent; flatter hulls are refused
@@ -189,15 +190,17 @@ def _has_dent(vertices: Matrix, triangles: NDArray[np.int64], solid: coal.Convex
 
     No point of a triangle is farther from the plane of a face than the farthest of its corners, whichever face it is.
     So it is enough to find one face that all three corners are near to: among those whose normals are most like the
-    triangle's own, or else the one that is nearest to the triangle's middle.
+    triangle's own, or else the one that is nearest to the triangle's middle. Faces that are too thin to have a reliable
+    normal are left out: others lie in the same plane.
 
     Args:
         vertices: Vertices of the mesh, shape (n, 3).
         triangles: Indices of vertices, shape (m, 3).
         solid: The convex hull.
     """
-    normals, _ = face_normals(*convex_arrays(solid))
-    offsets = farthest_along(vertices, normals)
+    normals, offsets = _reliable_planes(*convex_arrays(solid))
+    if not len(normals):
+        return True
     corners = vertices[triangles]
 
     own = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -208,17 +211,28 @@ def _has_dent(vertices: Matrix, triangles: NDArray[np.int64], solid: coal.Convex
     depth = np.full(len(triangles), np.inf)
     for faces in _similar(normals, own):
         below = offsets[faces, None] - np.einsum("tcj,tj->tc", corners, normals[faces])
-        depth = np.minimum(depth, below.max(axis=1))
+        depth = np.minimum(depth, np.abs(below).max(axis=1))
 
     doubtful = corners[depth > DEEPEST_DENT]
     step = max(COMPARED_AT_ONCE // len(normals), 1)
     for begin in range(0, len(doubtful), step):
         part = doubtful[begin : begin + step]
-        nearest = (offsets - products(part.mean(axis=1), normals)).argmin(axis=1)
-        depth = offsets[nearest, None] - np.einsum("tcj,tj->tc", part, normals[nearest])
-        if (depth > DEEPEST_DENT).any():
+        nearest = np.abs(offsets - products(part.mean(axis=1), normals)).argmin(axis=1)
+        below = offsets[nearest, None] - np.einsum("tcj,tj->tc", part, normals[nearest])
+        if (np.abs(below) > DEEPEST_DENT).any():
             return True
     return False
+
+
+def _reliable_planes(points: Matrix, triangles: NDArray[np.int64]) -> tuple[Matrix, Vector]:
+    """Return unit normals and offsets of the faces of a convex solid that are not too thin, shapes (k, 3) and (k,)."""
+    a, b, c = (points[triangles[:, k]] for k in range(3))
+    areas = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    squares = [((p - q) ** 2).sum(axis=1) for p, q in ((a, b), (b, c), (c, a))]
+    longest = np.maximum(np.maximum(squares[0], squares[1]), squares[2])
+    is_reliable = (areas > THINNEST_FACE * longest) & (areas > SMALLEST_AREA)
+    normals, _ = face_normals(points, triangles[is_reliable])
+    return normals, np.einsum("ij,ij->i", a[is_reliable], normals)
 
 
 def _similar(normals: Matrix, wanted: Matrix) -> Iterator[NDArray[np.int64]]:
@@ -297,8 +311,8 @@ def convex_arrays(solid: coal.Convex) -> tuple[Matrix, NDArray[np.int64]]:
     The triangles are not oriented consistently.
     """
     points = np.array(solid.points(), dtype=np.float64).reshape(-1, 3)
-    corners = (solid.polygons(k) for k in range(solid.num_polygons))
-    return points, np.array([(t[0], t[1], t[2]) for t in corners], dtype=np.int64).reshape(-1, 3)
+    corners = map(_CORNERS, map(solid.polygons, range(solid.num_polygons)))
+    return points, np.array(list(corners), dtype=np.int64).reshape(-1, 3)
 
 
 def face_normals(points: Matrix, triangles: NDArray[np.int64]) -> tuple[Matrix, Vector]:
@@ -359,11 +373,13 @@ def most_different(planes: Matrix, count: int) -> Matrix:
     if len(planes) <= count:
         return planes
 
+    x, y, z = np.ascontiguousarray(planes[:, :3].T)
     taken = [0]
-    largest_cosine = planes[:, :3] @ planes[0, :3]
+    largest_cosine = x * x[0] + y * y[0] + z * z[0]
     while len(taken) < count:
-        taken.append(int(np.argmin(largest_cosine)))
-        largest_cosine = np.maximum(largest_cosine, planes[:, :3] @ planes[taken[-1], :3])
+        last = int(np.argmin(largest_cosine))
+        taken.append(last)
+        np.maximum(largest_cosine, x * x[last] + y * y[last] + z * z[last], out=largest_cosine)
     return planes[taken]
 
 

@@ -17,11 +17,11 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
 
-from rrtik_ompl.base.arrays import Matrix, Vector, box_of, products, welded
+from rrtik_ompl.base.arrays import Matrix, Vector, bounds_of, box_of, products, welded
 from rrtik_ompl.geometry.collision.enclosure import enclosure
 from rrtik_ompl.geometry.collision.solids import inside_mesh, is_closed, mesh_arrays, most_different
 from rrtik_ompl.kernels.covers.cuts import cut_volumes, has_kernels, hull_volume
-from rrtik_ompl.kernels.covers.points import IN_DOUBT, bounds_of, extreme_points, inside_by_rays
+from rrtik_ompl.kernels.covers.points import IN_DOUBT, extreme_points, inside_by_rays
 
 if TYPE_CHECKING:
     import coal

@@ -14,6 +14,7 @@ from rrtik_ompl.kernels.simd.records import row_at
 LOWEST = -1e30  # less than any height
 DOUBT = 2  # what is no number of crossings
 SKEW_Y, SKEW_Z = 0.0137, 0.0391  # how far a ray goes along y and z while it goes 1 along x
+CLOSE = 1e-15  # far below what the rounding of a hull of size 1 leaves beyond its planes
 SMALLEST = 1e-300  # a length or area that is less counts as this
 
 
@@ -43,6 +44,35 @@ def farthest_points(points: Doubles, count: int, origin: Doubles, directions: Fl
             highest = choose(is_higher, height, highest)
             which = choose(is_higher, spread(float32(k)), which)
         set_lanes(tops, block, which)
+    return 0
+
+
+@entry
+def farthest_beyond(
+    points: Doubles, count: int, boxes: Doubles, size: int, planes: Doubles, number: int, farthest: Doubles
+) -> int:
+    """Find the largest distance of a point beyond one of many planes, if it is more than what is given.
+
+    Args:
+        points: Rows of three numbers; ``size`` of them after the other are in one box.
+        count: How many.
+        boxes: Middle and half the sides of each box, rows of six numbers.
+        size: How many points there are in a box; the last box may have fewer.
+        planes: Unit normal and offset, rows of four numbers.
+        number: How many.
+        farthest: The answer.
+    """
+    for k in range(number):
+        plane = row_at(planes, 4, k)
+        x, y, z, offset = plane[0], plane[1], plane[2], plane[3]
+        for b in range((count + size - 1) // size):
+            box = row_at(boxes, 6, b)
+            middle = box[0] * x + box[1] * y + box[2] * z - offset
+            most = middle + box[3] * abs(x) + box[4] * abs(y) + box[5] * abs(z)
+            if most > farthest[0] - CLOSE:  # the bound is rounded too
+                for i in range(b * size, min(b * size + size, count)):
+                    point = row_at(points, 3, i)
+                    farthest[0] = max(farthest[0], point[0] * x + point[1] * y + point[2] * z - offset)
     return 0
 
 

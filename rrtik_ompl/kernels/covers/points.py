@@ -6,9 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Matrix, Vector, box_of, products
+from rrtik_ompl.geometry.collision.solids import farthest_along
 from rrtik_ompl.kernels.covers.memory import called, room
+from rrtik_ompl.kernels.covers.search_layout import BOX_POINTS
 from rrtik_ompl.kernels.simd.library import library
 from rrtik_ompl.kernels.simd.processor import WIDTH
+from rrtik_ompl.model.shapes.point_tree import curve_places
 
 KERNELS = "covers.point_kernels"
 MOST_POINTS = 1 << 24  # whose numbers float32 holds
@@ -29,12 +32,6 @@ def extreme_points(points: Matrix, directions: Matrix) -> Matrix:
     corners = np.ascontiguousarray(points)
     called(kernels.farthest_points, corners, len(points), corners[0].copy(), lanes, len(lanes), tops)
     return corners[np.unique(tops.astype(np.int64))]
-
-
-def bounds_of(triangles: NDArray[np.float64]) -> tuple[Matrix, Matrix]:
-    """Return the lowest and highest coordinates of each triangle, shape (m, 3) both, quicker than along an axis."""
-    a, b, c = (triangles[:, k] for k in range(3))
-    return np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
 
 
 def in_lanes(directions: Matrix) -> NDArray[np.float32]:
@@ -81,6 +78,28 @@ def inside_by_rays(surface: NDArray[np.float64], points: Matrix) -> NDArray[np.i
         close = np.array([RAY_TOLERANCE * np.subtract(*box_of(triangles.reshape(-1, 3))[::-1]).max()])
         called(kernels.inside, np.ascontiguousarray(points), len(points), triangles, len(triangles), close, answers)
     return answers
+
+
+def farthest_beyond(points: Matrix, normals: Matrix, offsets: Vector) -> float:
+    """Return the largest distance of a point, shape (n, 3), beyond one of the planes; 0 if none is beyond any.
+
+    Args:
+        points: The points.
+        normals: Unit normals of the planes, shape (k, 3).
+        offsets: Of the planes, shape (k,).
+    """
+    kernels = library(KERNELS)
+    if kernels is None:
+        return max(float((farthest_along(points, normals) - offsets).max()), 0.0)
+
+    ordered = points[np.argsort(curve_places(points.astype(np.float32)), kind="stable")]
+    starts = np.arange(0, len(points), BOX_POINTS)
+    low, high = np.minimum.reduceat(ordered, starts), np.maximum.reduceat(ordered, starts)
+    boxes = np.column_stack([0.5 * (low + high), 0.5 * (high - low)])
+    planes = np.column_stack([normals, offsets])
+    farthest = np.zeros(1)
+    called(kernels.farthest_beyond, ordered, len(points), boxes, BOX_POINTS, planes, len(planes), farthest)
+    return float(farthest[0])
 
 
 def chosen_balls(gaps: NDArray[np.float32], gap: NDArray[np.float32], count: int) -> NDArray[np.int64]:

@@ -15,9 +15,9 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull
 
-from rrtik_ompl.base.arrays import TAU, Matrix, Vector, box_of, products, welded
-from rrtik_ompl.geometry.collision.solids import farthest_along, inside_mesh, principal_axes
-from rrtik_ompl.kernels.covers.points import bounds_of, distances_to_nearest
+from rrtik_ompl.base.arrays import TAU, Matrix, Vector, bounds_of, box_of, products, welded
+from rrtik_ompl.geometry.collision.solids import inside_mesh, principal_axes
+from rrtik_ompl.kernels.covers.points import distances_to_nearest, farthest_beyond
 
 # Allowance for rounding, relative to the extent of the solid: far above float64's, far below any length that matters.
 ROUNDING = 1e-12
@@ -159,11 +159,12 @@ def convex_solid(points: Matrix) -> tuple[ConvexSolid, Frame]:
     Raises:
         ValueError: If the points lie in a plane.
     """
-    middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    middle = 0.5 * np.add(*box_of(points))
     _, axes = principal_axes(points)
     in_axes = products(points - middle, axes)
-    centre = middle + 0.5 * (in_axes.min(axis=0) + in_axes.max(axis=0)) @ axes
-    extent = np.ptp(in_axes, axis=0)
+    low, high = box_of(in_axes)
+    centre = middle + 0.5 * (low + high) @ axes
+    extent = high - low
     frame = Frame(centre, axes.T, float(np.linalg.norm(extent)))
 
     if not extent.min() > 1e-13 * frame.scale:
@@ -182,11 +183,10 @@ def convex_solid(points: Matrix) -> tuple[ConvexSolid, Frame]:
     outward = np.einsum("ij,ij->i", np.cross(b - a, c - a), normals)
     triangles[outward < 0.0] = triangles[outward < 0.0][:, ::-1]
 
-    points_beyond_planes = float((farthest_along(local, normals) - offsets).max())
-    planes_beyond_triangles = float((offsets[:, None] - np.einsum("ijk,ik->ij", triangles, normals)).max())
-    return ConvexSolid(
-        triangles, normals, offsets, max(points_beyond_planes, 0.0) + max(planes_beyond_triangles, 0.0) + ROUNDING
-    ), frame
+    heights = [np.einsum("ij,ij->i", triangles[:, k], normals) for k in range(3)]
+    planes_beyond_triangles = float((offsets - np.minimum(np.minimum(heights[0], heights[1]), heights[2])).max())
+    slack = farthest_beyond(local, normals, offsets) + max(planes_beyond_triangles, 0.0) + ROUNDING
+    return ConvexSolid(triangles, normals, offsets, slack), frame
 
 
 def cylinder_solid(radius: float, half_length: float) -> tuple[CylinderSolid, Frame]:

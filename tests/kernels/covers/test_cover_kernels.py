@@ -116,11 +116,15 @@ def test_extreme_points_distances_and_chosen_balls(known, monkeypatch):
     gaps = RNG.normal(size=(60, 30)).astype(np.float32)
     gap = np.full(30, 5.0, dtype=np.float32)
 
+    directions = mesh_pieces._unit_directions()
+
     def answers():
         return (
-            points.extreme_points(corners, mesh_pieces._unit_directions()) @ (1.0, 2.0, 3.0),
+            points.extreme_points(corners, directions) @ (1.0, 2.0, 3.0),
             solid.distance(queries),
             points.chosen_balls(gaps, gap, 12),
+            points.farthest_beyond(corners, directions, 0.9 * (corners @ directions.T).max(axis=0)),
+            points.farthest_beyond(corners, directions, 2.0 * (corners @ directions.T).max(axis=0)),
         )
 
     made = answers()
