@@ -199,6 +199,12 @@ def _urdf_of(folder: Path, files: Files) -> Path:
     if package is not None and (package / str(named.get("relative_path"))).is_file():
         return package / str(named.get("relative_path"))
 
+    launch = folder / "launch" / "planning_context.launch"
+    for line in launch.read_text("utf-8").splitlines() if launch.is_file() else ():
+        found = re.search(r"""\$\(find ([\w-]+)\)/([^\s'"]+\.(urdf|xacro))""", line.replace("$(find xacro)/xacro", ""))
+        if found and "semantic" not in line and "srdf" not in line and found[1] in files.packages:
+            return files.packages[found[1]] / found[2]
+
     inside = [*folder.glob("config/*.urdf"), *folder.glob("config/*.urdf.xacro")]
     inside = [file for file in inside if not file.name.startswith("gazebo_")] or inside
     if len(inside) == 1:
@@ -224,6 +230,11 @@ def check_whole(text: str, kind: str, file: Path, files: Files) -> None:
     moving = [joint for joint in root.findall("joint") if joint.get("type") in MOVES]
     if root.tag != "robot" or not moving:
         raise LacksError("joint that moves")
+    links = {link.get("name") for link in root.findall("link")}
+    children = [child.get("link") for child in root.findall("joint/child")]
+    ends = {end.get("link") for tag in ("parent", "child") for end in root.findall(f"joint/{tag}")}
+    if len(set(children)) != len(children) or not ends <= links or len(links) != len(children) + 1:
+        raise LacksError("tree of links and joints")
     for mesh in root.findall("link/collision/geometry/mesh"):
         uri = mesh.get("filename", "")
         name = PACKAGE.sub("", uri).removeprefix("file://").replace(")", "").lstrip("./")

@@ -3,24 +3,31 @@
 from __future__ import annotations
 
 import os
+import re
+import warnings
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.errors import DescriptionWarning, InputError, few
 from rrtik_ompl.description.faults import nearest_name, tell
 from rrtik_ompl.description.joint_limits import parameters
 from rrtik_ompl.description.package_path import ASSISTANT, Packages
 from rrtik_ompl.description.srdf import Srdf, read_srdf
 from rrtik_ompl.description.tree import Tree
 from rrtik_ompl.description.urdf import URDF_OPTIONS, package_roots, robot_from_urdf
-from rrtik_ompl.description.urdf_read import read_urdf
+from rrtik_ompl.description.urdf_read import parse_xml, read_urdf
 from rrtik_ompl.description.xacro_text import is_xacro, robot_text
 from rrtik_ompl.files.strict_yaml import read_yaml
 from rrtik_ompl.files.text import read_text
 from rrtik_ompl.model.robot import Robot
 
-CHOOSING_FILES = (ASSISTANT, "kinematics.yaml", "config/kinematics.yaml", ".", "config")  # which URDF, which group
+LAUNCH = "launch/planning_context.launch"  # file that loads the URDF in MoveIt for ROS 1
+# What the choice of the URDF and of the group depends on.
+CHOOSING_FILES = (ASSISTANT, LAUNCH, "kinematics.yaml", "config/kinematics.yaml", ".", "config")
+_IN_PACKAGE = re.compile(r"\$\(find\s+([\w.-]+)\s*\)/(\S+\.(?:urdf|xacro))")
+_ROBOT = re.compile(r"<robot\b[^>]*?\bname\s*=\s*[\"']([^\"']+)")
 SIMULATED = "gazebo_"  # prefix of the URDF that the assistant writes for Gazebo, which may be out of date
 CONFIG_OPTIONS = tuple(sorted({*URDF_OPTIONS, "urdf"}))
 FilePath = str | os.PathLike[str]
@@ -31,8 +38,9 @@ def robot_from_moveit(folder: FilePath, **options: Any) -> Robot:
 
     The following files are read: the SRDF (groups, postures, allowed collisions, end effectors), ``joint_limits.yaml``,
     ``kinematics.yaml`` (which groups have inverse kinematics; the solver is ours), and the URDF. The URDF is one in the
-    folder; or that of the package which ``.setup_assistant`` names, with the arguments stated there; or a
-    ``.urdf.xacro`` in the folder. A robot of several groups needs ``group``, unless exactly one has a solver.
+    folder; or that of the package which ``.setup_assistant``, or else ``planning_context.launch``, names, with the
+    arguments stated there; or a ``.urdf.xacro`` in the folder; or the only one of the robot's name among the packages
+    beside the folder. A robot of several groups needs ``group``, unless exactly one has a solver.
 
     Args:
         folder: Folder with the files, or with a folder ``config`` that has them.
@@ -62,12 +70,13 @@ def config_files(folder: FilePath, given: Mapping[str, Any]) -> dict[str, Any]:
     packages = package_roots(given.get("packages", ()))
     assistant = _assistant(home, config)
     srdf = given.get("srdf") or _srdf(home, config, assistant)
-    urdf = Path(given.get("urdf") or _urdf(home, config, assistant, packages))
+    named = [_named_by_assistant(home, assistant), _named_by_launch(home)]
+    urdf = Path(given.get("urdf") or _urdf(home, config, Path(srdf), named, packages))
 
     files: dict[str, Any] = {"urdf": urdf, "srdf": Path(srdf)}
     arguments = dict(given.get("xacro_args") or {})
     if not given.get("urdf") and is_xacro(urdf, read_text(urdf)):
-        arguments = _xacro_args(home, assistant) | arguments
+        arguments = dict(next((each.arguments for each in named if each is not None), {})) | arguments
     if arguments:
         files["xacro_args"] = arguments
 
@@ -124,45 +133,105 @@ def _missing(config: Path, kind: str, option: str) -> Path:
     raise InputError(f"{config}: no {kind} in this folder; is it of MoveIt? give {option}=FILE")
 
 
-def _urdf(home: Path, config: Path, assistant: Mapping[str, Any], packages: Iterable[Path]) -> Path:
-    """Return the URDF of a folder.
+@dataclass(frozen=True, slots=True)
+class _Named:
+    """The URDF that a file of a folder names: file, package, path in it, and the arguments of its macros."""
 
-    Candidates are, in this order: a URDF in the folder, the one of the package that the setup assistant names, one
-    with macros in the folder, and one for Gazebo.
-    """
+    where: Path
+    package: str
+    relative: str
+    arguments: Mapping[str, str]
+
+
+def _named_by_assistant(home: Path, assistant: Mapping[str, Any]) -> _Named | None:
+    """Return the URDF that the setup assistant has expanded; None if it names none."""
+    package, relative = (assistant.get("urdf", {}).get(key) for key in ("package", "relative_path"))
+    if not isinstance(package, str) or not isinstance(relative, str):
+        return None
+    written = assistant["urdf"].get("xacro_args") or ""
+    texts = written if isinstance(written, list) else [written]
+    where = home / ASSISTANT
+    return _Named(where, package, relative, _xacro_args(where, [word for text in texts for word in str(text).split()]))
+
+
+def _named_by_launch(home: Path) -> _Named | None:
+    """Return the URDF that ``planning_context.launch`` loads; None if there is no such file, or it loads none."""
+    file = home / LAUNCH
+    if not os.path.isfile(file):
+        return None
+    for parameter in parse_xml(read_text(file), None, str(file)).iter("param"):
+        loaded = (parameter.get("textfile") or parameter.get("command") or "").replace("'", " ")
+        found = _IN_PACKAGE.search(loaded)
+        if found and "semantic" not in parameter.get("name", ""):
+            # Values that depend on arguments of the launch file, $(arg NAME), are left to the macros' own defaults.
+            words = re.sub(r"\S*\$\([^)]*\)\S*", " ", loaded[found.end() :]).split()
+            return _Named(file, found[1], found[2], _xacro_args(file, words))
+    return None
+
+
+def _urdf(home: Path, config: Path, srdf: Path, named: Iterable[_Named | None], packages: Iterable[Path]) -> Path:
+    """Return the URDF of a folder; `robot_from_moveit` has the order in which it is sought."""
     urdf = _only(config, ("*.urdf",), "URDF", "urdf")
     if urdf is not None:
         return urdf
 
-    package, relative = (assistant.get("urdf", {}).get(key) for key in ("package", "relative_path"))
-    package_home = Packages(packages, home.resolve()).find(package) if isinstance(package, str) else None
-    if package_home is not None and isinstance(relative, str) and os.path.isfile(package_home / relative):
-        return package_home / relative
+    known = Packages(packages, home.resolve())
+    sources = [each for each in named if each is not None]
+    for each in sources:
+        package = known.find(each.package)
+        if package is not None and os.path.isfile(package / each.relative):
+            return package / each.relative
 
-    urdf = _only(config, ("*.urdf.xacro",), "URDF", "urdf") or _only(config, (f"{SIMULATED}*.urdf",), "URDF", "urdf")
-    if urdf is None and isinstance(package, str):
+    urdf = (
+        _only(config, ("*.urdf.xacro",), "URDF", "urdf")
+        or _of_same_name(srdf, known)
+        or _only(config, (f"{SIMULATED}*.urdf",), "URDF", "urdf")
+    )
+    if urdf is None and sources:
         raise InputError(
-            f"{home / ASSISTANT}: the URDF {relative} of package '{package}' is not found; "
-            f"give packages=[the folder that holds '{package}'], or urdf=FILE"
+            f"{sources[0].where}: the URDF {sources[0].relative} of package '{sources[0].package}' is not found; "
+            f"give packages=[the folder that holds '{sources[0].package}'], or urdf=FILE"
         )
     return urdf or _missing(config, "URDF", "urdf")
 
 
-def _xacro_args(home: Path, assistant: Mapping[str, Any]) -> dict[str, str]:
-    """Return the arguments with which the setup assistant expanded the URDF, as for the command xacro.
+def _of_same_name(srdf: Path, packages: Packages) -> Path | None:
+    """Return the only URDF of the robot's name in the packages beside a folder, with a warning; None if there is none.
 
-    They are one text or a list of words; words such as ``--inorder`` are switches of the command, and are skipped.
+    Of several, one whose file has the robot's name is preferred.
     """
-    written = assistant.get("urdf", {}).get("xacro_args") or ""
-    texts = written if isinstance(written, list) else [written]
+    stated = _ROBOT.search(read_text(srdf))
+    if stated is None:
+        return None
+
+    described = []
+    for package in packages.neighbours():
+        for file in sorted(file for kind in ("*.urdf", "*.urdf.xacro") for file in package.rglob(kind)):
+            start = _ROBOT.search(file.read_text("utf-8", "replace"))
+            if start is not None and start[1] == stated[1]:
+                described.append(file)
+
+    called = [file for file in described if file.name.removesuffix(".xacro") == f"{stated[1]}.urdf"]
+    chosen = called if len(called) == 1 else described
+    if len(chosen) > 1:
+        raise InputError(
+            f"{srdf}: {len(chosen)} URDFs are of robot '{stated[1]}': {few(map(str, chosen))}; choose one by urdf=FILE"
+        )
+    if chosen:
+        said = f"{srdf}: no file says which URDF it is for: taken is {chosen[0]}, of the same name; else give urdf=FILE"
+        warnings.warn(DescriptionWarning(said), stacklevel=2)
+    return chosen[0] if chosen else None
+
+
+def _xacro_args(where: Path, words: Iterable[str]) -> dict[str, str]:
+    """Return arguments of macros from words as for the command xacro, without its switches such as ``--inorder``."""
     arguments = {}
-    for word in (word for text in texts for word in str(text).split()):
+    for word in words:
         name, assigned, value = word.partition(":=")
         if assigned and name:
             arguments[name] = value
         elif not name.startswith("-"):
-            raise InputError(f"{home / ASSISTANT}: xacro_args: expected words such as name:=value, found '{word}'")
-
+            raise InputError(f"{where}: xacro_args: expected words such as name:=value, found '{word}'")
     return arguments
 
 

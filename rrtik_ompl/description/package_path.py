@@ -53,6 +53,11 @@ class Packages:
             found = found or candidate
         return found
 
+    def neighbours(self) -> list[Path]:
+        """Return the packages beside that of the file, and those in the folders that are given."""
+        found = (self._packages_below(root).values() for root in (*self.given, *self._workspaces))
+        return list(dict.fromkeys(package for packages in found for package in packages))
+
     def files(self, name: str, rest: str) -> Iterator[Path]:
         """Yield where a file of a package may be, the likeliest place first; the file need not exist there.
 

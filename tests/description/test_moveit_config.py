@@ -9,6 +9,7 @@ import pytest
 from rrtik_ompl.base.errors import DescriptionWarning, InputError, RrtikError, UnknownNameError
 from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.description.joint_limits import read_joint_limits
+from rrtik_ompl.description.moveit_config import robot_from_moveit
 from rrtik_ompl.problem_files.problem import load_problem
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
@@ -399,6 +400,52 @@ def test_the_urdf_for_gazebo_is_read_only_if_there_is_no_other(workspace):
     (workspace / "config" / "own.urdf").unlink()
     (workspace.parent / "arm_description" / "urdf" / "arm.urdf.xacro").unlink()
     assert reach(load_robot(workspace)) == pytest.approx(0.1)
+
+
+LAUNCH = """<launch><arg name="load" default="true"/>
+<param if="$(arg load)" name="robot_description" {}/>
+<param name="robot_description_semantic" textfile="$(find arm_moveit_config)/config/arm.srdf"/></launch>"""
+LOADED = {
+    "macros": ("""command="$(find xacro)/xacro --inorder '$(find arm_description)/urdf/arm.urdf.xacro' long:=true"
+        """, 0.9),
+    "macros and an argument of the launch file": (
+        """command="xacro $(find arm_description)/urdf/arm.urdf.xacro name:=$(arg load)" """, 0.3),
+    "text": ('textfile="$(find arm_description)/urdf/plain.urdf"', 0.5),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", LOADED)
+def test_without_the_assistants_file_the_launch_file_names_the_urdf(workspace, case):
+    pytest.importorskip("xacro")
+    (workspace / ".setup_assistant").unlink()
+    (workspace / "package.xml").write_text("<package><name>arm_moveit_config</name></package>")
+    plain = "\n".join(line for line in LENGTH.splitlines() if not line.startswith("<xacro:"))
+    plain = plain.replace("${l}", "0.5").replace("$(arg name)", "far").replace("arm", "other")
+    (workspace.parent / "arm_description" / "urdf" / "plain.urdf").write_text(plain)
+    loaded, length = LOADED[case]
+    (workspace / "launch").mkdir()
+    (workspace / "launch" / "planning_context.launch").write_text(LAUNCH.format(loaded))
+    (workspace / "config" / "arm.srdf").write_text(ARM_GROUP.replace('robot name="arm"', "robot"))
+    assert reach(load_robot(workspace)) == pytest.approx(length)
+
+
+def test_without_any_word_of_it_the_urdf_is_that_of_the_same_name_beside_the_folder(workspace):
+    pytest.importorskip("xacro")
+    (workspace / ".setup_assistant").unlink()
+    (workspace / "package.xml").write_text("<package><name>arm_moveit_config</name></package>")
+    with pytest.raises(InputError, match="no URDF in this folder"):
+        load_robot(workspace)
+    package = workspace.parent / "arm_description"
+    (package / "package.xml").write_text("<package><name>arm_description</name></package>")
+    (package / "urdf" / "other.urdf").write_text(LENGTH.replace('name="arm"', 'name="other"', 1))
+    with pytest.warns(DescriptionWarning, match=r"arm\.srdf: no file says .* taken is .*arm\.urdf\.xacro"):
+        assert reach(load_robot(workspace)) == pytest.approx(0.3)
+    (package / "urdf" / "arm_blue.urdf").write_text(LENGTH)  # the name of the file decides
+    with pytest.warns(DescriptionWarning, match=r"taken is .*arm\.urdf\.xacro"):
+        robot_from_moveit(workspace)
+    (package / "urdf" / "arm.urdf.xacro").rename(package / "urdf" / "arm_red.urdf")
+    with pytest.raises(InputError, match=r"2 URDFs are of robot 'arm': .*arm_blue.* choose one by urdf=FILE"):
+        load_robot(workspace)
 
 
 TWO_GROUPS = """<robot name="arm"><group name="arm"><joint name="j1"/><joint name="j2"/></group>

@@ -25,6 +25,7 @@ from rrtik_ompl.model.shapes.mesh import open_edges_told
 MAX_BYTES = 256 * 1024 * 1024
 LONG_BYTES = 20e6  # size of a file above which the user is told to wait
 COARSEST = 1e-5  # [m] largest distance of neighbouring numbers of single precision with which a shape is read
+FINEST = 1e-6  # the same as a share of the size of the mesh
 AGAIN = "export it again as STL, OBJ or DAE"
 _BINARY_TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("rest", "<u2")])
 _CORNER = re.compile(rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)", re.IGNORECASE)
@@ -83,7 +84,8 @@ def load_surface(path: Path, scale: Vector) -> coal.BVHModelBase:
     surface = _by_assimp(path, scale)
     size = np.abs(bounded_array(surface.vertices(), (None, 3), f"{path}: vertices")).max(axis=0) / np.abs(scale)
     coarse = float((np.spacing(size.astype(np.float32)) * np.abs(scale)).max())
-    if coarse <= COARSEST:
+    extent = float((np.ptp(surface.vertices(), axis=0)).max())
+    if coarse <= max(COARSEST, FINEST * extent):
         return surface
     if kind == ".obj":
         return _from_afar(data, scale)

@@ -241,6 +241,12 @@ def test_a_mesh_far_from_its_origin_keeps_its_shape_or_is_refused(tmp_path, plac
     assert Mesh.load(tmp_path / "far.stl", scale=1e-6).closed is not None  # in micrometres it is near
 
 
+def test_a_large_mesh_is_read_though_its_points_are_coarse(tmp_path):
+    """As a terrain of some hundred metres, or a part in millimetres whose scale was forgotten."""
+    (tmp_path / "large.stl").write_bytes(stl_binary(corners=CORNERS * 100.0))
+    assert volume(Mesh.load(tmp_path / "large.stl")) == pytest.approx(1e6, rel=1e-5)
+
+
 ODD_STL = {
     "bytes after the last triangle": stl_binary() + b"\r\nthe end",
     "a count of 0": stl_binary()[:80] + bytes(4) + stl_binary()[84:],
