@@ -66,6 +66,13 @@ class MissingFileError(InputError):
 class UnknownNameError(InputError):
     """A name does not exist; the error carries the names that do.
 
+    Args:
+        kind: What the name is of, such as "robot".
+        name: The name that was asked for.
+        alternatives: The names that exist.
+        where: File or element in which it stands.
+        similar: Those of them that may have been meant; all if None.
+
     Attributes:
         name: The name that was asked for.
         alternatives: The names that exist, sorted.
@@ -73,19 +80,27 @@ class UnknownNameError(InputError):
     Example:
         >>> rrtik.load_robot("pnada")
         Traceback (most recent call last):
-        rrtik_ompl.base.errors.UnknownNameError: no robot 'pnada'; ... did you mean 'panda'?
+        rrtik_ompl.base.errors.UnknownNameError: no robot 'pnada'; did you mean 'panda'? have ...
     """
 
-    def __init__(self, kind: str, name: object, alternatives: Iterable[str], *, where: str = "") -> None:
+    def __init__(
+        self,
+        kind: str,
+        name: object,
+        alternatives: Iterable[str],
+        *,
+        where: str = "",
+        similar: Iterable[str] | None = None,
+    ) -> None:
         self.name = str(name)
         self.alternatives = tuple(sorted(map(str, listed(alternatives, "alternatives of a name"))))
         require(where, str, "place of a name")
 
-        near = get_close_matches(self.name, self.alternatives, n=1)
-        hint = f"; did you mean '{near[0]}'?" if near else ""
+        near = get_close_matches(self.name, list(self.alternatives if similar is None else similar), n=1)
+        hint = f"; did you mean '{near[0]}'?" if near else ";"
         have = ", ".join(self.alternatives) or "none"
         prefix = f"{where}: " if where else ""
-        super().__init__(f"{prefix}no {kind} '{self.name}'; have {have}{hint}")
+        super().__init__(f"{prefix}no {kind} '{self.name}'{hint} have {have}")
 
 
 class ProblemError(RrtikError):
@@ -219,8 +234,8 @@ class DescriptionWarning(UserWarning):
     """A robot's description contains something wrong or unsupported; the program continues."""
 
 
-class TipWarning(UserWarning):
-    """The tip of an arm is not specified, and more than one link could be it."""
+class ArmWarning(UserWarning):
+    """A description does not say which of its joints and frames are the arm; the line says what was chosen."""
 
 
 class CloudWarning(UserWarning):

@@ -26,6 +26,7 @@ from typing import TYPE_CHECKING, Any
 
 from rrtik_ompl.base.choices import one_of
 from rrtik_ompl.base.errors import InputError, RrtikError, UnknownNameError, listed, name_of, require
+from rrtik_ompl.description.known_arms import fetched, is_description, shipped_name, unknown_robot
 from rrtik_ompl.description.robot_source import BasePose, plain, source_entry
 from rrtik_ompl.description.robot_source import base_pose as checked_base
 from rrtik_ompl.description.urdf import URDF_OPTIONS, robot_from_urdf
@@ -50,6 +51,7 @@ COMMON_OPTIONS: Mapping[str, Callable[..., Robot]] = {
     "joint_ranges": narrowed,
     "joint_weights": weighted,
 }
+VALUES_BY = {"locked": "joint", "gripper": "state, open and closed", "xacro_args": "argument"}
 CACHED_ROBOTS = 64
 MOUNTING = ("base_pose", "tip", *COMMON_OPTIONS)  # keys beside the group of a parametric robot
 
@@ -179,6 +181,7 @@ def load_robot(
     group: str | None = None,
     joints: Iterable[str] | None = None,
     locked: Mapping[str, float] | None = None,
+    gripper: Mapping[str, Mapping[str, float]] | None = None,
     base_pose: BasePose = None,
     padding: float | Mapping[str, float] | None = None,
     scale: Mapping[str, float] | None = None,
@@ -197,15 +200,18 @@ def load_robot(
     """Load a robot by name or from a file; the same call returns the same object, unless one of its files has changed.
 
     A DH table takes ``tip`` and ``base_pose``, and the options of every robot: ``padding``, ``scale``,
-    ``joint_ranges``, ``joint_weights``. An MJCF also takes ``joints``, ``locked``, ``joint_limits`` and ``strict``.
+    ``joint_ranges``, ``joint_weights``. An MJCF also takes ``joints``, ``locked``, ``gripper``,
+    ``joint_limits`` and ``strict``.
 
     Args:
         name: A name from `list_robots`; or the path of a URDF (``.urdf``, ``.xml``; ``.xacro`` needs the package
             xacro), of an MJCF (``.xml``, ``.mjcf``), of a DH table (``.yaml``), or of a MoveIt configuration folder.
-        tip: Link that goals refer to; the last link that every actuated joint moves, or that of the group, if None.
+        tip: Link that goals refer to; that of the group, or of the first arm, if None.
         group: Group of the SRDF whose joints are actuated.
-        joints: Actuated joints, in the order wanted.
+        joints: Actuated joints, in the order wanted; those of the group, or those that move a tip, if None.
         locked: Values of joints that are held fixed [rad or m]; by default 0, moved into the limits.
+        gripper: Joint values at which it is open and closed [rad or m]: ``{"open": {joint: 0.04}, "closed": {..}}``;
+            by default those of the SRDF, or else what follows from the shape of the fingers.
         base_pose: T_world_base: a ``pinocchio.SE3``, or ``{"xyz": [..], "quat_xyzw": [..]}``.
         padding: How much thicker links are than their geometry [m]: one number for all, or by name of link.
         scale: Factors by which the solids of links are larger about their own middles, by name of link.
@@ -241,6 +247,7 @@ def load_robot(
         "group": group,
         "joints": joints,
         "locked": locked,
+        "gripper": gripper,
         "base_pose": base_pose,
         "padding": padding,
         "scale": scale,
@@ -269,8 +276,14 @@ def _loaded(
     xacro_limits: Mapping[str, float] | None = None,
 ) -> Robot:
     """Load a robot as :func:`load_robot` does; options and parameters are in one mapping, as in problem files."""
-    recipe = _recipe(file_name(name) if not isinstance(name, str) else name)
     options = {option: value for option, value in given.items() if value is not None}
+    if isinstance(name, str) and name not in _offers("robots") and not os.path.exists(name):
+        if is_description(name):
+            found = fetched(name)
+            name, options = found.file, found.options | options
+        else:
+            name = shipped_name(name, _offers("robots")) or name
+    recipe = _recipe(file_name(name) if not isinstance(name, str) else name)
     for option in options:
         if option not in (*recipe.options, *COMMON_OPTIONS):
             takes = ", ".join(sorted((*recipe.options, *COMMON_OPTIONS)))
@@ -352,7 +365,7 @@ def _recipe(name: str | os.PathLike[str]) -> _Recipe:
 
     if path.parent != Path() or os.path.exists(path):  # os.path.exists() accepts names of any length.
         raise InputError(f"{text}: not a robot file; expected a URDF (.urdf, .xacro), a DH table (.yaml) or a folder")
-    raise UnknownNameError("robot", text, list_robots())
+    raise unknown_robot(text, list_robots())
 
 
 _Stamp = tuple[str, int, int]  # path, modification time [ns] and size of a file
@@ -414,8 +427,8 @@ def _checked(key: str, value: object, where: str) -> object:
         return [name_of(joint, f"a joint of {what}") for joint in listed(value, what)]
     if key in ("tip", "group"):
         return name_of(value, f"the {key} of {where}")
-    if key in ("locked", "xacro_args"):
-        require(value, Mapping, what, f"give values by name of {'joint' if key == 'locked' else 'argument'}")
+    if key in VALUES_BY:
+        require(value, Mapping, what, f"give values by name of {VALUES_BY[key]}")
     return value
 
 

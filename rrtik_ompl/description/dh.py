@@ -124,6 +124,7 @@ def robot_from_dh(
     return build_robot(
         name,
         Tree(f"robot '{name}'", [*links, Link("tip")], joints),
+        joints=[row.joint for row in table],
         tip=tip,
         base_pose=base_pose,
         limits={row.joint: JointLimits(acceleration=row.acceleration, jerk=row.jerk) for row in table},

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any
@@ -12,8 +12,9 @@ import numpy as np
 import pinocchio as pin
 
 from rrtik_ompl.base.arrays import LARGEST, TAU, Mask, Vector, bounded_array, frozen
-from rrtik_ompl.base.errors import DescriptionWarning, InputError, TipWarning, UnknownNameError, name_of
+from rrtik_ompl.base.errors import ArmWarning, DescriptionWarning, InputError, UnknownNameError, few, name_of, printable
 from rrtik_ompl.description import robot_pickle as robot_pickle  # teaches pickle to take robots
+from rrtik_ompl.description.arm import Limb, arms_of
 from rrtik_ompl.description.robot_source import BasePose
 from rrtik_ompl.description.robot_source import base_pose as checked_base
 from rrtik_ompl.description.tree import Joint, Tree
@@ -21,6 +22,7 @@ from rrtik_ompl.description.tree_model import build_models
 from rrtik_ompl.model.robot import LIMIT_TOLERANCE, Chain, Robot
 
 RATES = ("velocity", "acceleration", "jerk")
+MOST_HELD = 6  # most joints that a warning names
 MOST_TURNS = 100  # most turns of a joint without limits that another joint follows at a fraction
 
 
@@ -71,6 +73,7 @@ def build_robot(
     allowed_collisions: Iterable[Iterable[str]] = (),
     checked_collisions: Iterable[Iterable[str]] = (),
     unchecked_solids: Iterable[Iterable[str]] = (),
+    loops: Mapping[str, float] | None = None,
     self_collision: bool = True,
     closed_form: Callable[..., Any] | None = None,
     planar: bool = False,
@@ -78,13 +81,15 @@ def build_robot(
 ) -> Robot:
     """Build a robot.
 
+    One warning says which tip was chosen, and which joints are held, if that was not to be expected.
+
     Args:
         name: Name used in messages and files.
         tree: Links and joints.
-        joints: Actuated joints, in the order wanted for q; every joint that does not mimic if None.
+        joints: Actuated joints, in the order wanted for q; those that move the tip of an arm if None.
         mimics: Joints that follow others (which follow nothing themselves).
         locked: Values at which joints that are not actuated are held [rad or m]; by default 0, moved into the limits.
-        tip: Frame that goals refer to; the last link that every actuated joint moves if None.
+        tip: Frame that goals refer to; that of the first arm if None: see `rrtik_ompl.description.arm`.
         base_pose: ``pinocchio.SE3`` T_world_base; identity if None.
         limits: Limits by joint name, which replace those of the tree. Limits of a joint that follows another also
             restrict the one that it follows.
@@ -92,6 +97,7 @@ def build_robot(
         allowed_collisions: Pairs of link names that are never checked.
         checked_collisions: Pairs of link names that are checked although a joint joins them.
         unchecked_solids: Pairs of solids that are never checked, by their links' names and numbers: "hand_0".
+        loops: Joints that a loop connects, which the tree leaves open, with the values at which it is closed.
         self_collision: Whether links are checked against each other.
         closed_form: The robot's own inverse kinematics.
         planar: Whether the arm moves in the xy-plane.
@@ -102,8 +108,13 @@ def build_robot(
     """
     mimic_of = {m.joint: m for m in mimics}
     movable = {joint.name: joint for joint in tree.walk() if joint.moves}
-    actuated = tuple(joints) if joints is not None else tuple(n for n in movable if n not in mimic_of)
-    _check_joints(name, tuple(movable), actuated, mimic_of, locked or {})
+    arms = arms_of(
+        tree, {tie.joint: tie.source for tie in mimic_of.values()}, loops or {}, tip if joints is None else None
+    )
+    locked_values = dict(locked or {})
+    actuated = tuple(joints) if joints is not None else tuple(j for j in arms.joints if j not in locked_values)
+    _check_joints(name, tuple(movable), actuated, mimic_of, locked_values)
+    locked_values = {j: v for j, v in (loops or {}).items() if j not in actuated and j not in mimic_of} | locked_values
 
     for tie in mimic_of.values():
         if movable[tie.joint].slides and movable[tie.source].endless:
@@ -113,14 +124,20 @@ def build_robot(
             )
 
     limits_of_joint = _followed(name, movable, actuated, mimic_of, limits or {})
-    held_values = _held_values(name, limits_of_joint, actuated, mimic_of, locked or {})
+    held_values = _held_values(name, limits_of_joint, actuated, mimic_of, locked_values)
     model, collision, visual = build_models(
         tree.hold(held_values), checked_base(base_pose, f"robot '{name}': base_pose")
     )
 
-    tip_name = _last_link(name, tree, actuated) if tip is None else name_of(tip, f"the tip of robot '{name}'")
-    if not model.existFrame(tip_name):
-        raise UnknownNameError(f"frame of robot '{name}' for the tip", tip_name, (f.name for f in model.frames))
+    limbs = sorted(arms.moved_by(actuated), key=lambda limb: -sum(joint in actuated for joint in limb.chain))
+    tips = tuple(limb.tip for limb in limbs) or (_last_link(tree, actuated),)
+    if tip is not None:
+        own = name_of(tip, f"the tip of robot '{name}'")
+        tips = (own, *(limb.tip for limb in limbs if own not in limb.links and own != limb.tip))
+    if not model.existFrame(tips[0]):
+        raise UnknownNameError(f"frame of robot '{name}' for the tip", tips[0], (f.name for f in model.frames))
+    held = arms.held if joints is None else {}
+    _tell_choice(name, tips, tip is None, limbs, held, locked or {})
 
     chain = _chain(model, actuated, mimic_of)
     whole_turns_alike = chain.whole_turns()
@@ -138,7 +155,8 @@ def build_robot(
         name=name,
         joint_names=actuated,
         movable=frozenset(movable),
-        tip=tip_name,
+        tip=tips[0],
+        tips=tips,
         postures=MappingProxyType(named_postures),
         allowed_collisions=_pairs(allowed_collisions),
         checked_collisions=_pairs(checked_collisions),
@@ -272,10 +290,10 @@ def _held_values(
     return {joint: value for joint, value in values.items() if joint not in moving}
 
 
-def _last_link(name: str, tree: Tree, actuated: tuple[str, ...]) -> str:
+def _last_link(tree: Tree, actuated: tuple[str, ...]) -> str:
     """Return the leaf with the most actuated joints above it; among equals the longest branch, then the last described.
 
-    If actuated joints move other leaves too, a warning says which one was chosen.
+    It is the tip where no actuated joint belongs to an arm.
     """
     parents = {joint.parent for joint in tree.joints}
 
@@ -283,15 +301,41 @@ def _last_link(name: str, tree: Tree, actuated: tuple[str, ...]) -> str:
         above = tree.chain(leaf)
         return sum(joint.name in actuated for joint in above), sum(joint.moves for joint in above)
 
-    leaves = [link.name for link in tree.links if link.name not in parents]
-    tip = max(reversed(leaves), key=rank)
-    others = [leaf for leaf in leaves if leaf != tip and rank(leaf)[0]]
+    return max((link.name for link in reversed(tree.links) if link.name not in parents), key=rank)
 
-    if others:
-        examples = ", ".join(others[:4]) + (", ..." if len(others) > 4 else "")
-        message = f"robot '{name}': the tip is taken to be '{tip}'; tip= names another link, such as {examples}"
-        warnings.warn(TipWarning(message), stacklevel=2)
-    return tip
+
+def _tell_choice(
+    name: str,
+    tips: Sequence[str],
+    chosen: bool,
+    limbs: Sequence[Limb],
+    held: Mapping[str, Sequence[str]],
+    locked: Collection[str],
+) -> None:
+    """Warn in one line of what a description left open, if anything.
+
+    Args:
+        name: Name of the robot.
+        tips: Its tips.
+        chosen: Whether the first one was chosen here.
+        limbs: Its arms.
+        held: Joints that are held still though nobody said so, by what they are.
+        locked: Joints of which somebody did.
+    """
+    parts = []
+    if chosen and len(tips) > 1:
+        parts.append(f"{len(tips)} tips: {few(map(repr, tips))}; goals are of the first, a MultiGoal names others")
+    elif chosen and not (limbs and limbs[0].named):
+        parts.append(f"the tip is taken to be '{tips[0]}'")
+
+    unasked = {kind: [repr(joint) for joint in joints if joint not in locked] for kind, joints in held.items()}
+    still = [f"{kind} ({few(joints, MOST_HELD)})" for kind, joints in unasked.items() if joints]
+    if still:
+        parts.append(f"held still: {', '.join(still)}")
+
+    if parts:
+        remedy = "joints=, group= or tip= choose others" if still else "tip= names another link"
+        warnings.warn(ArmWarning(printable(f"robot '{name}': {'; '.join(parts)}; {remedy}")), stacklevel=4)
 
 
 def _chain(model: pin.Model, actuated: tuple[str, ...], mimic_of: Mapping[str, Mimic]) -> Chain:

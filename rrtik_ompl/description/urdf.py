@@ -12,7 +12,7 @@ import numpy as np
 
 from rrtik_ompl.base.errors import InputError, UnknownNameError
 from rrtik_ompl.description.faults import not_read, postures_outside, tell
-from rrtik_ompl.description.gripper import GripperJoints, srdf_gripper
+from rrtik_ompl.description.gripper import GripperJoints, gripper_of
 from rrtik_ompl.description.robot_build import JointLimits, build_robot, merge_limits
 from rrtik_ompl.description.robot_source import source_entry
 from rrtik_ompl.description.srdf import Srdf, read_srdf
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 FilePath = str | os.PathLike[str]
 URDF_OPTIONS = (
     "base_pose",
+    "gripper",
     "group",
     "joint_limits",
     "joints",
@@ -74,6 +75,7 @@ def robot_from_urdf_text(
     joint_limits: FilePath | None = None,
     packages: FilePath | Iterable[FilePath] = (),
     locked: Mapping[str, float] | None = None,
+    gripper: Mapping[str, Mapping[str, float]] | None = None,
     base_pose: BasePose = None,
     limits: Mapping[str, JointLimits] | None = None,
     postures: Mapping[str, Mapping[str, float]] | None = None,
@@ -86,8 +88,8 @@ def robot_from_urdf_text(
     """Load a robot from URDF text.
 
     The actuated joints are, in this order of precedence: ``joints``; those of ``group``; those between the base and
-    ``tip``; all that do not mimic another. Every other joint is held fixed. Soft limits (``safety_controller``) are not
-    used: put the limits you want into ``joint_limits``.
+    ``tip``; those that move the tip of an arm (`rrtik_ompl.description.arm`). Every other joint is held fixed. Soft
+    limits (``safety_controller``) are not used: put the limits you want into ``joint_limits``.
 
     Args:
         text: The XML.
@@ -102,6 +104,8 @@ def robot_from_urdf_text(
         joint_limits: File in the format of MoveIt's ``joint_limits.yaml``.
         packages: Folders in which ``package://`` names are sought first.
         locked: Values of joints that are held fixed [rad or m]; by default 0, moved into the limits.
+        gripper: Joint values at which it is open and closed [rad or m]: ``{"open": {joint: 0.04}, "closed": {..}}``; by
+            default those of the SRDF, or else what follows from the shape of the fingers.
         base_pose: ``pinocchio.SE3`` T_world_base.
         limits: Limits that replace those of the URDF and of ``joint_limits``, by joint name.
         postures: Further named postures.
@@ -127,7 +131,7 @@ def robot_from_urdf_text(
     end = tip
     if tip is None and group is not None and group in semantics.groups:
         end = semantics.group_tip(group, tree)
-    actuated = _actuated(description, semantics, group, joints, tip)
+    actuated = _actuated(description, semantics, group, joints)
     limits_file = None if joint_limits is None else _limits_of_file(joint_limits, tree)
 
     with located(where):
@@ -147,14 +151,14 @@ def robot_from_urdf_text(
             closed_form=closed_form,
             source=source,
         )
-        robot = replace(robot, gripper=srdf_gripper(semantics, tree, description.mimics, actuated))
+        robot = replace(robot, gripper=gripper_of(gripper, semantics, tree, description.mimics, robot))
 
     tell(
         [
             *semantics.of_another(description.name, where),
             *semantics.unknown_names(tree),
-            *semantics.moved_passive(actuated if joints is None else ()),
-            *semantics.short_states(group, actuated),
+            *semantics.moved_passive(robot.joint_names if joints is None else ()),
+            *semantics.short_states(group, robot.joint_names),
             *_outside(robot, postures or {}, semantics, group),
             *_hand_outside(robot.gripper, tree, semantics),
             *description.mended,
@@ -172,15 +176,15 @@ def package_roots(packages: FilePath | Iterable[FilePath]) -> list[Path]:
 
 
 def _actuated(
-    description: UrdfDescription, semantics: Srdf, group: str | None, joints: Iterable[str] | None, tip: str | None
-) -> tuple[str, ...]:
-    """Return the names of the actuated joints; see :func:`robot_from_urdf_text` for the order of precedence."""
+    description: UrdfDescription, semantics: Srdf, group: str | None, joints: Iterable[str] | None
+) -> tuple[str, ...] | None:
+    """Return the names of the actuated joints if they are given, or are those of a group; else None."""
     tree = description.tree
     followers = {tie.joint for tie in description.mimics}
-    movable = tuple(j.name for j in tree.walk() if j.moves and j.name not in followers)
 
     if joints is not None:
         chosen = tuple(joints)
+        movable = tuple(j.name for j in tree.walk() if j.moves and j.name not in followers)
         for joint in chosen:
             if joint not in movable and joint not in followers:
                 raise UnknownNameError("movable joint", joint, movable, where=tree.where)
@@ -189,10 +193,7 @@ def _actuated(
     if group is not None:
         members = semantics.group_joints(group, tree)
         return tuple(joint for joint in members if joint not in followers)
-
-    if tip is not None and tip in {link.name for link in tree.links}:
-        return tuple(joint.name for joint in tree.chain(tip) if joint.name in movable)
-    return movable
+    return None
 
 
 def _limits_of_file(file: FilePath, tree: Tree) -> LimitsFile:

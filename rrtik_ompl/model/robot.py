@@ -86,6 +86,7 @@ class Robot:
         velocity, acceleration, jerk: Limits [rad/s, rad/s^2, rad/s^3 or m], shape (dof,), inf where unknown.
         prismatic, continuous: Which joints are prismatic, and which revolute without limits, shape (dof,).
         tip: Name of the frame that goals refer to.
+        tips: The tips of all arms that move, ``tip`` first; a `MultiGoal` has a goal for each that it names.
         postures: Named configurations, shape (dof,) each.
         allowed_collisions: Pairs of link names that are never checked against each other.
         checked_collisions: Pairs of link names that are checked although a joint connects them.
@@ -125,6 +126,7 @@ class Robot:
     closed_form: Callable[..., Any] | None = None
     gripper: Any = None
     planar: bool = False
+    tips: tuple[str, ...] = ()
     padding: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
     joint_weights: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
     source: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
@@ -142,6 +144,7 @@ class Robot:
         group: str | None = None,
         joints: Iterable[str] | None = None,
         locked: Mapping[str, float] | None = None,
+        gripper: Mapping[str, Mapping[str, float]] | None = None,
         base_pose: PoseLike | Mapping[str, Sequence[float]] | None = None,
         padding: float | Mapping[str, float] | None = None,
         scale: Mapping[str, float] | None = None,
@@ -162,10 +165,12 @@ class Robot:
         Args:
             file: A name from `list_robots`; or the path of a URDF (``.urdf``, ``.xml``; ``.xacro`` needs the package
                 xacro), of an MJCF (``.xml``, ``.mjcf``), of a DH table (``.yaml``), or of a MoveIt folder.
-            tip: Link that goals refer to; the last link that every actuated joint moves, or that of the group, if None.
+            tip: Link that goals refer to; that of the group, or of the first arm, if None.
             group: Group of the SRDF whose joints are actuated.
-            joints: Actuated joints, in the order wanted.
+            joints: Actuated joints, in the order wanted; those of the group, or those that move a tip, if None.
             locked: Values of joints that are held fixed [rad or m]; by default 0, moved into the limits.
+            gripper: Joint values at which it is open and closed [rad or m]: ``{"open": {joint: 1}, "closed": {..}}``;
+                by default those of the SRDF, or else what follows from the shape of the fingers.
             base_pose: T_world_base: a ``pinocchio.SE3``, or ``{"xyz": [..], "quat_xyzw": [..]}``.
             padding: How much thicker links are than their geometry [m]: one number for all, or by name of link.
             scale: Factors by which the solids of links are larger about their own middles, by name of link.
@@ -188,8 +193,8 @@ class Robot:
             InputError: If the robot does not take an option, or a file or value cannot be used.
         """
         return read(
-            Robot, file, tip=tip, group=group, joints=joints, locked=locked, base_pose=base_pose, padding=padding,
-            scale=scale, joint_ranges=joint_ranges, joint_weights=joint_weights, srdf=srdf, urdf=urdf,
+            Robot, file, tip=tip, group=group, joints=joints, locked=locked, gripper=gripper, base_pose=base_pose,
+            padding=padding, scale=scale, joint_ranges=joint_ranges, joint_weights=joint_weights, srdf=srdf, urdf=urdf,
             joint_limits=joint_limits, packages=packages, strict=strict, xacro_args=xacro_args,
             xacro_limits=xacro_limits, trust_xacro=trust_xacro, parameters=parameters,
         )  # fmt: skip

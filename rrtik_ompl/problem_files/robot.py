@@ -25,6 +25,7 @@ from rrtik_ompl.problem_files.shapes import relative_name
 
 PATH_KEYS = ("urdf", "srdf", "joint_limits", "dh", "moveit", "mjcf", "packages")
 
+GRIPPER = "values of its joints where it is open and closed [rad or m]: {open: {joint: ..}, closed: {joint: ..}}"
 
 Padding: TypeAlias = Annotated[
     Annotated[NotNegative, Tag(tag("number"))] | Annotated[dict[Name, NotNegative], Tag(tag("links"))],
@@ -99,6 +100,7 @@ class _Described(_Mounted):
     joint_limits: Name | None = Field(None, description="file in the format of joint_limits.yaml")
     packages: list[Name] | Name | None = Field(None, description="folders in which package:// names are sought")
     locked: dict[Name, Number] | None = Field(None, description="values of joints that are held still [rad or m]")
+    gripper: dict[Name, dict[Name, Number]] | None = Field(None, description=GRIPPER)
     xacro_args: dict[Name, Name | Number] | None = Field(None, description="arguments of the macros of a .xacro file")
     strict: bool | None = Field(None, description="whether what is wrong in the description, or not read, is an error")
 
@@ -123,6 +125,7 @@ class MjcfRobot(_Mounted):
     joints: Annotated[list[Name], Field(min_length=1)] | None = Field(None, description="joints that move, in order")
     joint_limits: Name | None = Field(None, description="file in the format of joint_limits.yaml")
     locked: dict[Name, Number] | None = Field(None, description="values of joints that are held still [rad or m]")
+    gripper: dict[Name, dict[Name, Number]] | None = Field(None, description=GRIPPER)
     strict: bool | None = Field(None, description="whether what is wrong in the description, or not read, is an error")
 
 

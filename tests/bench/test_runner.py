@@ -64,8 +64,8 @@ def test_the_options_of_a_report_are_the_parameters_of_its_function(name):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["trut"], "no report 'trut'; have .*; did you mean 'truth'\\?"),
-        (["behaviour", "stor", "file.json"], "no verb 'stor'; have compare, store; did you mean 'store'\\?"),
+        (["trut"], "no report 'trut'; did you mean 'truth'\\? have .*"),
+        (["behaviour", "stor", "file.json"], "no verb 'stor'; did you mean 'store'\\? have compare, store"),
         (["contract_cases", "--case", "1"], "No such option: --case .*--cases.*"),
         (["contract_cases", "--cases", "many"], "Invalid value for '--cases'.*integer.*"),
         (["contract_cases", "--jobs", "0"], "Invalid value for '--jobs'.*1.*"),
@@ -84,7 +84,7 @@ def test_what_is_wrong_is_said_in_one_line(words, said, tmp_path, capsys):
 
 def test_a_wrong_section_leaves_nothing_behind(tmp_path, capsys):
     assert run(["proofs", "--arms", "pnada", "--out", str(tmp_path / "page.md")]) == 2
-    assert capsys.readouterr().err.endswith("did you mean 'panda'?\n")
+    assert "did you mean 'panda'?" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
 
 

@@ -237,3 +237,107 @@ def test_an_option_without_sense_is_refused_in_one_line(name, urdf):
 def test_limits_and_lengths_of_the_titan_are_checked(option):
     with pytest.raises(InputError, match=f"titan4: {next(iter(option))} must be of type"):
         load_robot("titan4", parameters=option)
+
+
+@pytest.mark.parametrize(
+    ("typed", "shipped"),
+    [("Panda", "panda"), ("franka", "panda"), ("UR-5", "ur5"), ("SO-ARM101", "so101"), ("titan-4", "titan4")],
+)
+def test_the_very_arm_is_found_under_the_names_that_people_type(typed, shipped):
+    assert load_robot(typed) is load_robot(shipped)
+
+
+@pytest.mark.parametrize(
+    ("typed", "remedy"),
+    [
+        ("fr3", 'load_robot("fr3_description")'),
+        ("UR5e", 'load_robot("ur5e_description")'),
+        ("iiwa14", 'load_robot("iiwa14_description")'),
+        ("iiwa", 'load_robot("iiwa14_description")'),
+        ("gen3", 'load_robot("gen3_description")'),
+        ("sawyer", 'load_robot("sawyer_mj_description")'),
+        ("lite6", "xarm_device.urdf.xacro"),
+    ],
+)
+def test_an_arm_that_is_not_shipped_is_said_where_to_get(typed, remedy):
+    with pytest.raises(InputError, match="not shipped") as caught:
+        load_robot(typed)
+    assert remedy in str(caught.value)
+    assert "did you mean" not in str(caught.value)
+
+
+@pytest.mark.parametrize(("typed", "meant"), [("pnada", "panda"), ("ur6", "ur"), ("titn4", "titan4")])
+def test_a_similar_name_is_said_first(typed, meant):
+    with pytest.raises(UnknownNameError, match=rf"^no robot '{typed}'; did you mean '{meant}\w*'\? have "):
+        load_robot(typed)
+
+
+@pytest.mark.parametrize("typed", ["kr3", "m10", "xy7", "cr5", "er5", "rx10", "r5"])
+def test_a_similar_name_is_never_that_of_another_vendors_arm(typed):
+    with pytest.raises(UnknownNameError, match=r"^(?!.*did you mean)"):
+        load_robot(typed)
+
+
+@pytest.fixture
+def descriptions(tmp_path, monkeypatch):
+    """A package like robot_descriptions, whose modules would download, and a cache in which one repository is."""
+    package = tmp_path / "site" / "robot_descriptions"
+    package.mkdir(parents=True)
+    (package / "__init__.py").write_text("raise SystemExit('this package may not run')\n")
+    (package / "_repositories.py").write_text(
+        'REPOSITORIES = {"arms": Repository(url="https://example.org", commit="1234", cache_path="arms_folder")}\n'
+    )
+    module = (
+        "from ._cache import clone_to_cache as _clone_to_cache\n"
+        'REPOSITORY_PATH: str = _clone_to_cache("arms", commit=_getenv("ROBOT_DESCRIPTION_COMMIT", None))\n'
+        'PACKAGE_PATH = _path.join(REPOSITORY_PATH, "robots")\n'
+        "OTHER = [1, 2]\n"
+        '{}_PATH: str = _path.join(PACKAGE_PATH, "arm.{}")\n'
+    )
+    (package / "arm_description.py").write_text(module.format("URDF", "urdf"))
+    (package / "arm_mj_description.py").write_text(module.format("MJCF", "xml"))
+    (package / "absent_description.py").write_text(module.format("URDF", "other"))
+    (package / "odd_description.py").write_text('SOMETHING = "else"\n')
+
+    files = tmp_path / "cache" / "arms_folder" / "robots"
+    files.mkdir(parents=True)
+    (files / "arm.urdf").write_text(ONE_JOINT)
+    (files / "arm.xml").write_text(
+        '<mujoco><worldbody><body><joint name="j" range="-1 1"/></body></worldbody></mujoco>'
+    )
+
+    monkeypatch.setenv("ROBOT_DESCRIPTIONS_CACHE", str(tmp_path / "cache"))
+    monkeypatch.syspath_prepend(tmp_path / "site")
+    return tmp_path
+
+
+ONE_JOINT = (
+    '<robot name="arm"><link name="a"/><link name="b"/><joint name="j" type="continuous"><parent link="a"/>'
+    '<child link="b"/></joint></robot>'
+)
+
+
+@pytest.mark.parametrize("name", ["arm_description", "arm_mj_description"])
+def test_a_description_that_another_package_has_fetched_is_read_from_its_cache(descriptions, name):
+    robot = load_robot(name)
+    assert robot.joint_names == ("j",)
+    assert robot_from_entry(robot.source) is robot
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("absent_description", "arm.other is not there; python -m robot_descriptions pull absent_description"),
+        ("odd_description", "give its file"),
+        ("amr_description", "did you mean 'arm_description'?"),
+    ],
+)
+def test_a_description_that_is_not_there_is_one_line_with_the_remedy(descriptions, name, said):
+    with pytest.raises(InputError) as caught:
+        load_robot(name)
+    assert said in str(caught.value)
+
+
+def test_without_the_package_the_line_says_what_to_install():
+    with pytest.raises(InputError, match="pip install robot_descriptions"):
+        load_robot("fr3_description")

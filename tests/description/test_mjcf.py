@@ -3,12 +3,17 @@
 Pinocchio's parser drops the place of a base that is fixed, and takes the range of a slide for degrees.
 """
 
+import sys
+from xml.etree import ElementTree
+
 import numpy as np
 import pinocchio as pin
 import pytest
 
-from rrtik_ompl.base.errors import RrtikError
+from rrtik_ompl.base.errors import ArmWarning, DescriptionWarning, InputError, RrtikError
 from rrtik_ompl.description.catalog import load_robot
+from rrtik_ompl.description.mjcf.compiled import compiled, ellipsoid
+from rrtik_ompl.description.mjcf.read import read_mjcf
 from rrtik_ompl.problem_files.problem import load_problem
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
@@ -64,6 +69,14 @@ def test_bodies_sites_solids_and_limits_are_those_of_pinocchios_own_parser(tmp_p
                 assert (near < 1e-9) == ("upper" not in each.name), each.name
 
 
+def test_a_ball_joint_is_held_and_named(tmp_path):
+    text = (HEAD + BODIES + TAIL.replace("0.1 -0.2", "1 0 0 0 -0.2")).replace('name="turn"', 'name="turn" type="ball"')
+    with pytest.warns(DescriptionWarning, match="bodies on ball joints, held where they are: 'upper'"):
+        robot = load_robot(written(tmp_path, text))
+    assert robot.joint_names == ("bend", "draw")
+    assert robot.posture("home") == pytest.approx([-0.2, 0.05])
+
+
 # by mj_kinematics of MuJoCo 4.0.0 at 0.1, 0.2, 0.05
 BY_MUJOCO = {
     "degree": {"lower": (0.4421838, 0.23587877, 0.32185261), "tcp": (0.41053176, 0.39929424, 0.04836855)},
@@ -114,10 +127,13 @@ def test_includes_followers_masks_and_references(tmp_path):
     assert {frozenset(("hand", other)) for other in ("base", "upper", "lower")} <= robot.allowed_collisions
 
 
-def test_a_slide_without_limits_may_be_left_out(tmp_path):
+def test_a_slide_without_limits_is_held_unless_it_is_asked_for(tmp_path):
     """Mobile bases have three of them."""
-    text = (HEAD + BODIES + TAIL).replace(' range="-.1 .2"', "")
-    assert load_robot(written(tmp_path, text), joints=["turn", "bend"]).joint_names == ("turn", "bend")
+    file = written(tmp_path, (HEAD + BODIES + TAIL).replace(' range="-.1 .2"', ""))
+    with pytest.warns(ArmWarning, match=r"endless slides of a base \('draw'\)"):
+        assert load_robot(file).joint_names == ("turn", "bend")
+    with pytest.raises(InputError, match=r"needs finite limits.*or leave the joint out of joints="):
+        load_robot(file, joints=["turn", "bend", "draw"])
 
 
 def test_an_arm_of_urdf_may_be_called_xml_too(tmp_path):
@@ -129,13 +145,13 @@ def test_an_arm_of_urdf_may_be_called_xml_too(tmp_path):
 
 
 FAULTS = {
-    "ball": (
-        'name="turn" axis',
-        'name="turn" type="ball" axis',
-        "usable type of joint 'ball'; have free, hinge",
-    ),
+    "joint": ('name="turn" axis', 'name="turn" type="screw" axis', "no type of joint 'screw'; have ball, free"),
     "class": ('childclass="hard"', 'childclass="soft"', "no default class 'soft'"),
-    "ellipsoid": ('type="sphere" size=".05"', 'type="ellipsoid" size=".1 .1 .2"', "usable type of geom 'ellipsoid'"),
+    "ellipsoid": (
+        'type="sphere" size=".05"',
+        'type="ellipsoid" size=".1 .1 .2"',
+        "geom of type 'ellipsoid' .*pip install mujoco",
+    ),
     "size": ('type="sphere" size=".05"', 'type="sphere" size="-1"', "body 'hand'.*greater than 0"),
     "no size": (
         '<geom type="cylinder" size=".08 .1"/>',
@@ -147,10 +163,13 @@ FAULTS = {
     "two orientations": ('quat=".8 0 .6 0"', 'quat=".8 0 .6 0" zaxis="0 0 1"', "has quat and zaxis; leave one"),
     "NaN": ('pos=".4 0 .1"', 'pos="nan 0 .1"', "3 finite numbers"),
     "upside down": ('range="-.1 .2"', 'range=".2 -.1"', "lower must be below upper"),
-    "slide without end": ('range="-.1 .2"', "", "needs finite limits.*or leave the joint out of joints="),
     "named twice": ('name="lower"', 'name="upper"', "'upper': its name stands there twice"),
     "key": ('qpos="0.1 -0.2 0.05"', 'qpos="0.1"', "key 'home': .*must hold 3 finite numbers"),
-    "replicate": ('<site name="tcp" pos="0 0 .1"/>', '<replicate count="3"/>', "<replicate> cannot be read"),
+    "replicate": (
+        '<site name="tcp" pos="0 0 .1"/>',
+        '<replicate count="3"/>',
+        "<replicate> cannot be read.*pip install mujoco",
+    ),
     "missing include": ("<worldbody>", '<include file="no.xml"/><worldbody>', "no such file"),
     "ring": ("<worldbody>", '<include file="arm.xml"/><worldbody>', "is it a ring"),
     "no XML": ("</mujoco>", "", "not valid XML"),
@@ -159,7 +178,8 @@ FAULTS = {
 
 
 @pytest.mark.parametrize("fault", FAULTS)
-def test_what_cannot_be_read_is_one_line_with_the_file(tmp_path, fault):
+def test_what_cannot_be_read_is_one_line_with_the_file(tmp_path, monkeypatch, fault):
+    monkeypatch.setitem(sys.modules, "mujoco", None)  # its compiler reads more
     old, new, said = FAULTS[fault]
     file = written(tmp_path)
     assert old in file.read_text()
@@ -167,3 +187,59 @@ def test_what_cannot_be_read_is_one_line_with_the_file(tmp_path, fault):
     with pytest.raises(RrtikError, match=said) as error:
         load_robot(file)
     assert "\n" not in str(error.value)
+
+
+PLAIN = HEAD + BODIES + TAIL
+MORE = {
+    "frame": ('<site name="tcp" pos="0 0 .1"/>', '<frame pos="0 0 .06"><site name="tcp" pos="0 0 .04"/></frame>'),
+    "replicate": ('<geom type="sphere" size=".05"/>', '<replicate count="3" offset="0 0 .1">'
+                  '<geom name="bead" type="sphere" size=".01"/></replicate>'),
+    "ellipsoid": ('type="sphere" size=".05"', 'type="ellipsoid" size=".05 .1 .2"'),
+    "inline mesh": ('type="sphere" size=".05"', 'type="mesh" mesh="m"'),
+    "fitted": ('type="sphere" size=".05"', 'type="box" mesh="m"'),
+}  # fmt: skip
+ASSET = '<asset><mesh name="m" vertex="0 0 0 .1 0 0 0 .1 0 0 0 .1"/></asset>'
+
+
+@pytest.mark.parametrize("kind", MORE)
+def test_what_only_mujoco_can_read_moves_as_it_does_for_mujoco(tmp_path, kind):
+    mujoco = pytest.importorskip("mujoco")
+    file = written(tmp_path, PLAIN.replace(*MORE[kind]).replace("<worldbody>", ASSET + "<worldbody>"))
+    robot = load_robot(file)
+    assert robot.joint_names == ("turn", "bend", "draw")
+    assert robot.tip == "tcp"
+
+    model = mujoco.MjModel.from_xml_path(str(file))
+    data = mujoco.MjData(model)
+    for q in np.random.default_rng(1).uniform(robot.lower, robot.upper, (5, 3)):
+        data.qpos[:] = q
+        mujoco.mj_kinematics(model, data)
+        np.testing.assert_allclose(robot.fk(q).translation, data.site("tcp").xpos, atol=1e-8)
+    assert len(robot.collision.geometryObjects) == np.count_nonzero(model.geom_contype[1:])
+
+
+@pytest.mark.parametrize("values", [DEGREES, RADIANS])
+def test_a_file_is_the_same_robot_whoever_reads_it(tmp_path, values):
+    pytest.importorskip("mujoco")
+    file = written(tmp_path, values=values)
+    ours = read_mjcf(file)
+    root, _ = compiled(file)
+    theirs_file = tmp_path / "compiled.xml"
+    theirs_file.write_text(ElementTree.tostring(root, encoding="unicode"))
+    theirs = read_mjcf(theirs_file)
+    for name in ("excluded", "apart", "touchable", "loops", "postures", "mimics"):
+        assert getattr(ours, name) == getattr(theirs, name), name
+    for first, second in zip(ours.tree.joints, theirs.tree.joints, strict=True):
+        assert (first.name, first.kind, first.parent) == (second.name, second.kind, second.parent)
+        assert [first.lower, first.upper] == pytest.approx([second.lower, second.upper], abs=1e-12)
+        np.testing.assert_allclose(first.axis, second.axis, atol=1e-12)
+        np.testing.assert_allclose(first.T_parent_joint.homogeneous, second.T_parent_joint.homogeneous, atol=1e-8)
+
+
+def test_the_mesh_of_an_ellipsoid_holds_it_and_is_little_larger():
+    mesh = ellipsoid(np.array([0.1, 0.2, 0.5]))
+    corners = mesh.vertices[mesh.triangles] / [0.1, 0.2, 0.5]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    distances = np.einsum("ij,ij->i", normals, corners[:, 0]) / np.linalg.norm(normals, axis=1)
+    assert distances.min() >= 1.0 - 1e-9  # every face is outside of the sphere, and faces outward
+    assert np.linalg.norm(corners, axis=2).max() < 1.03

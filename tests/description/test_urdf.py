@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from rrtik_ompl.base.errors import DescriptionWarning, InputError, MeshWarning, TipWarning
+from rrtik_ompl.base.errors import ArmWarning, DescriptionWarning, InputError, MeshWarning
 from rrtik_ompl.description.urdf import robot_from_urdf, robot_from_urdf_text
 from rrtik_robots.example_arms import data_folder
 
@@ -51,11 +51,11 @@ def test_link_poses_equal_those_of_pinocchios_own_parser(file):
     values = dict(zip(ours.joint_names, rng.uniform(-1, 1, ours.dof), strict=True))
     followers = ours.chain.gain @ list(values.values()) + ours.chain.offset
     values |= dict(zip(list(ours.model.names)[1:], followers, strict=True))
-    q = pin.neutral(theirs)
+    q = np.clip(pin.neutral(theirs), theirs.lowerPositionLimit, theirs.upperPositionLimit)  # where the others are held
     for number, joint in enumerate(theirs.names):
-        if number > 0 and theirs.nqs[number] == 1:
+        if joint in values and theirs.nqs[number] == 1:
             q[theirs.idx_qs[number]] = values[joint]
-        elif number > 0:
+        elif joint in values:
             q[theirs.idx_qs[number] :][:2] = np.cos(values[joint]), np.sin(values[joint])
     data = theirs.createData()
     pin.framesForwardKinematics(theirs, data, q)
@@ -397,7 +397,7 @@ BAD_OPTIONS = {
     "unknown tip": ({"tip": "foot"}, "no frame.*'foot'"),
     "unknown joint": ({"joints": ["knee"]}, "no movable joint 'knee'"),
     "joint twice": ({"joints": ["elbow", "elbow"]}, "listed twice"),
-    "locked and actuated": ({"locked": {"elbow": 0.0}}, "both actuated and locked"),
+    "locked and actuated": ({"joints": ["elbow"], "locked": {"elbow": 0.0}}, "both actuated and locked"),
     "locked unknown": ({"joints": ["elbow"], "locked": {"knee": 0.0}}, "'knee'"),
     "locked NaN": ({"joints": ["elbow"], "locked": {"shoulder": np.nan}}, "finite"),
     "group without srdf": ({"group": "chain"}, "needs an SRDF"),
@@ -466,18 +466,19 @@ def test_a_missing_file_and_a_folder_are_named(tmp_path):
             robot_from_urdf(path)
 
 
-FORK = (
-    "<joint name='left' type='fixed'><parent link='hand'/><child link='finger_l'/></joint>"
-    "<joint name='right' type='fixed'><parent link='hand'/><child link='finger_r'/></joint>"
+FORK = "".join(
+    f"<joint name='{link}' type='fixed'><parent link='hand'/><child link='{link}'/></joint>"
+    for link in ("left", "right")
 )
-FORKED = "".join(f"<link name='{name}'/>" for name in ("base", "upper", "hand", "finger_l", "finger_r"))
+FORKED = "".join(f"<link name='{name}'/>" for name in ("base", "upper", "hand", "left", "right"))
 
 
 def test_a_tip_that_is_guessed_among_several_is_said_once_with_the_remedy(recwarn):
-    text = arm(FORK, links=FORKED)
-    with pytest.warns(TipWarning, match=r"finger_r.*tip=.*finger_l"):
-        assert robot_from_urdf_text(text).tip == "finger_r"
+    text = arm(FORK, links=FORKED).replace("hand", "plate")  # "hand" would be the tip
+    with pytest.warns(ArmWarning, match=r"taken to be 'right'; tip="):
+        assert robot_from_urdf_text(text).tip == "right"
     recwarn.clear()
-    robot_from_urdf_text(text, tip="finger_l")  # named
+    robot_from_urdf_text(text, tip="left")  # named
+    robot_from_urdf_text(arm(FORK, links=FORKED))  # a usual name
     robot_from_urdf_text(arm())  # no other choice
-    assert not [each for each in recwarn if issubclass(each.category, TipWarning)]
+    assert not [each for each in recwarn if issubclass(each.category, ArmWarning)]

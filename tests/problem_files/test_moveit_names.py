@@ -156,7 +156,7 @@ def test_a_robot_of_the_caller_that_moves_other_joints_than_the_group_is_told(wr
     written({}, {"group_name": "amr"}, srdf=True)
     [line] = said(folder, rrtik.load_robot(file, srdf=srdf, group="arm"))
     assert "group_name: " in line
-    assert "no group 'amr'; have arm, side; did you mean 'arm'?" in line
+    assert "no group 'amr'; did you mean 'arm'? have arm, side" in line
     written({}, {"group_name": "arm"}, srdf=True)
     assert said(folder, rrtik.load_robot(file, srdf=srdf, joints=["x", "y", "z"])) == []
 

@@ -186,7 +186,7 @@ BAD = {
     "no robot": ("version: 1\nstart: {joints: [0]}\ngoal: {joints: [0]}\n", "robot: missing"),
     "no start": (f"version: 1\nrobot: {ARM}\ngoal: {{joints: [0, 0, 0]}}\n", "start: missing"),
     "empty goal": (text(goal=""), ":4: goal: nothing stands after the colon"),
-    "unknown robot": (text("titan5"), ":2: robot: no robot 'titan5'; have .*titan4"),
+    "unknown robot": (text("titan5"), ":2: robot: no robot 'titan5'; .*titan4"),
     "robot is a number": (text("4"), ":2: robot: robot needs one of the keys name, moveit, mjcf, planar"),
     "robot of two kinds": (text("{planar: {lengths: [1]}, urdf: a.urdf}"), "robot.urdf: unknown key 'urdf'"),
     "no such option": (text("{name: titan4, limit: envelope}"), "robot: .*no option 'limit'"),

@@ -58,6 +58,7 @@ def point2d(
     return build_robot(
         "point2d",
         tree,
+        joints=("x", "y"),
         tip=tip,
         base_pose=base_pose,
         postures={"centre": {"x": float(np.mean([left, right])), "y": float(np.mean([bottom, top]))}},

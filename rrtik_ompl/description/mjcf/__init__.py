@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from rrtik_ompl.base.errors import InputError, few
 from rrtik_ompl.description.faults import not_read, postures_outside, tell
+from rrtik_ompl.description.gripper import gripper_of
 from rrtik_ompl.description.joint_limits import LimitsFile, read_joint_limits
 from rrtik_ompl.description.mjcf.read import WORLD, Mjcf, read_mjcf
 from rrtik_ompl.description.robot_build import build_robot
@@ -16,9 +18,7 @@ from rrtik_ompl.description.urdf_read import located
 from rrtik_ompl.files.text import read_text
 from rrtik_ompl.model.robot import Robot
 
-MJCF_OPTIONS = ("base_pose", "joint_limits", "joints", "locked", "strict", "tip")
-# Usual names of the site at the tip.
-TIP_SITES = ("attachment_site", "tip", "tcp", "ee", "ee_site", "end_effector", "eef", "grip_site", "pinch")
+MJCF_OPTIONS = ("base_pose", "gripper", "joint_limits", "joints", "locked", "strict", "tip")
 BEGINNING = 65536  # characters at the beginning of a file among which the top element is sought
 
 
@@ -39,6 +39,7 @@ def robot_from_mjcf(
     tip: str | None = None,
     joint_limits: str | os.PathLike[str] | None = None,
     locked: Mapping[str, float] | None = None,
+    gripper: Mapping[str, Mapping[str, float]] | None = None,
     base_pose: BasePose = None,
     strict: bool = False,
 ) -> Robot:
@@ -53,10 +54,11 @@ def robot_from_mjcf(
 
     Args:
         path: The file; files that it includes are read too.
-        joints: Actuated joints, in order; those up to ``tip``, or all, if None.
-        tip: A body or site; if None, a site with a usual name, such as ``attachment_site`` or ``tcp``.
+        joints: Actuated joints, in order; those that move ``tip``, or the tip of an arm, if None.
+        tip: A body or site; that of the first arm if None.
         joint_limits: File in the format of MoveIt's ``joint_limits.yaml``.
         locked: Values of joints that are held fixed [rad or m].
+        gripper: Joint values [rad or m] at which it is open and closed: ``{"open": {joint: value}, "closed": {..}}``.
         base_pose: ``pinocchio.SE3`` T_world_base.
         strict: Whether it is an error if anything is left out, or a keyframe is outside the limits.
 
@@ -64,46 +66,48 @@ def robot_from_mjcf(
         InputError: If anything in the file cannot be used; one line names file, element and remedy.
     """
     mjcf = read_mjcf(Path(path))
-    options = {"joints": joints, "tip": tip, "joint_limits": joint_limits, "locked": locked, "base_pose": base_pose}
+    options = {
+        "joints": joints,
+        "tip": tip,
+        "joint_limits": joint_limits,
+        "locked": locked,
+        "gripper": gripper,
+        "base_pose": base_pose,
+    }
     joint_names = [joint.name for joint in mjcf.tree.joints]
     limits_file = LimitsFile() if joint_limits is None else read_joint_limits(joint_limits, joint_names)
-    actuated = _actuated(mjcf, joints, tip)
 
     with located(str(path)):
         robot = build_robot(
             mjcf.name or Path(path).stem,
             mjcf.tree,
-            joints=actuated,
+            joints=joints,
             mimics=mjcf.mimics,
             locked=locked,
-            tip=next((site for site in TIP_SITES if site in mjcf.sites), None) if tip is None else tip,
+            tip=tip,
             base_pose=base_pose,
             limits=limits_file.limits,
             postures=mjcf.postures,
             allowed_collisions=mjcf.excluded,
             checked_collisions=mjcf.touchable,
             unchecked_solids=mjcf.apart,
+            loops=mjcf.loops,
             source={"mjcf": str(Path(path).resolve())} | source_entry(options),
         )
+        robot = replace(robot, gripper=gripper_of(gripper, None, mjcf.tree, mjcf.mimics, robot, mjcf.loops))
 
     tell(
         [
             *(f"{path}: key '{name}': {fault}" for name, fault in postures_outside(robot, mjcf.postures)),
-            *not_read(str(path), [*mjcf.unread, *_other_trees(mjcf, actuated, locked or {})]),
+            *not_read(
+                str(path),
+                [*mjcf.unread, *([] if joints is None else _other_trees(mjcf, robot.joint_names, locked or {}))],
+            ),
             *limits_file.faults,
         ],
         strict,
     )
     return robot
-
-
-def _actuated(mjcf: Mjcf, joints: Iterable[str] | None, tip: str | None) -> tuple[str, ...]:
-    if joints is not None:
-        return tuple(joints)
-
-    followers = {tie.joint for tie in mjcf.mimics}
-    over = mjcf.tree.walk() if tip is None else mjcf.tree.chain(tip)
-    return tuple(joint.name for joint in over if joint.moves and joint.name not in followers)
 
 
 def _other_trees(mjcf: Mjcf, actuated: Sequence[str], locked: Mapping[str, float]) -> list[str]:

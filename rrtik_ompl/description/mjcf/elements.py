@@ -20,13 +20,15 @@ from rrtik_ompl.base.poses import pose_from_xyzw, turned_z
 from rrtik_ompl.description.package_path import MESH_SUFFIXES
 from rrtik_ompl.description.tree import MeshFile, Solid
 from rrtik_ompl.description.urdf_read import attribute, numbers
-from rrtik_ompl.model.shapes import Box, Capsule, Cylinder, Shape, Sphere
+from rrtik_ompl.model.shapes import Box, Capsule, Cylinder, Mesh, Shape, Sphere
 
 MAIN = "main"  # the default class from which all others inherit
 OF_THE_SCENE = ("plane", "hfield")
 KINDS = ("box", "capsule", "cylinder", "mesh", "sphere")
 _COUNTS = {"sphere": 1, "capsule": 2, "cylinder": 2, "box": 3}  # how many numbers a size has
 Attributes = Mapping[str, str]
+Meshes = Mapping[str, tuple[MeshFile | Mesh, Any]]  # by name, each with its pose in its geom (pinocchio.SE3)
+COMPILER = "with the package mujoco installed, its compiler reads the file (pip install mujoco)"
 _UNITS = dict(zip("xyz", np.eye(3), strict=True))
 _ORIENTATIONS = ("quat", "axisangle", "euler", "xyaxes", "zaxis")
 
@@ -150,13 +152,13 @@ def masks(geom: Element, where: str) -> tuple[int, int]:
     return kind, affinity
 
 
-def solid_of(geom: Element, settings: Settings, meshes: Mapping[str, tuple[MeshFile, Any]], where: str) -> Solid:
+def solid_of(geom: Element, settings: Settings, meshes: Meshes, where: str) -> Solid:
     """Return the solid of a geom that is neither a plane nor a height field.
 
     Args:
         geom: The element, with defaults filled in.
         settings: Settings of the file.
-        meshes: Mesh files by name, with the pose of each in its geom.
+        meshes: Meshes by name, with the pose of each in its geom.
         where: File and body, put in front of error messages.
 
     Raises:
@@ -166,7 +168,7 @@ def solid_of(geom: Element, settings: Settings, meshes: Mapping[str, tuple[MeshF
     colour = numbers(geom, "rgba", 4, None, where) if geom.get("rgba") is not None else None
     rgba = None if colour is None else (colour[0], colour[1], colour[2], colour[3])
     if kind not in KINDS:
-        raise UnknownNameError("usable type of geom", kind, KINDS, where=where)
+        raise InputError(f"{where}: geom of type '{kind}' cannot be read; {COMPILER}")
     place = settings.placement(geom, where)
 
     if kind == "mesh":
@@ -177,7 +179,7 @@ def solid_of(geom: Element, settings: Settings, meshes: Mapping[str, tuple[MeshF
         return Solid(mesh, place * T_mesh, rgba)
 
     if geom.get("mesh") is not None:
-        raise InputError(f"{where}: a {kind} fitted to a mesh cannot be read; save the compiled model and load that")
+        raise InputError(f"{where}: a {kind} fitted to a mesh cannot be read; {COMPILER}")
 
     length = None
     if geom.get("fromto") is not None and kind in ("capsule", "cylinder", "box"):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import combinations, product
+from itertools import combinations, pairwise, product
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
@@ -12,9 +12,19 @@ import numpy as np
 import pinocchio as pin
 
 from rrtik_ompl.base.errors import InputError, UnknownNameError, few
-from rrtik_ompl.description.mjcf.elements import MAIN, OF_THE_SCENE, Settings, masks, meshes_of, solid_of
+from rrtik_ompl.description.mjcf.compiled import compiled
+from rrtik_ompl.description.mjcf.elements import (
+    COMPILER,
+    MAIN,
+    OF_THE_SCENE,
+    Meshes,
+    Settings,
+    masks,
+    meshes_of,
+    solid_of,
+)
 from rrtik_ompl.description.robot_build import Mimic
-from rrtik_ompl.description.tree import Joint, Link, MeshFile, Solid, Tree
+from rrtik_ompl.description.tree import Joint, Link, Solid, Tree
 from rrtik_ompl.description.urdf_read import attribute, flattened, located, numbers, parse_xml
 from rrtik_ompl.files.text import read_text
 
@@ -22,7 +32,7 @@ MOST_FILES = 100  # most files that are included
 UNREAD = ("composite", "flexcomp", "replicate", "attach", "frame")  # elements that make bodies from other bodies
 SIZES = {"hinge": 1, "slide": 1, "ball": 4, "free": 7}  # how many numbers a joint has in a keyframe
 WORLD = "world"
-HELD = ("free",)  # kinds of joints that are held fixed
+HELD = ("free", "ball")  # kinds of joints that are held fixed
 DEFORMABLE = ("flex", "flexcomp", "skin", "composite")
 OF_JOINTS = ("joint", "jointinparent")  # attributes of an actuator that name a joint
 
@@ -36,22 +46,22 @@ class Mjcf:
     Attributes:
         name: Name of the model.
         tree: The tree in which bodies and sites are links, hinges and slides are joints.
-        sites: Names of the sites.
         mimics: Joints that follow others.
         excluded: Pairs of links that never collide.
         apart: Pairs of solids that never collide, named by link and number, such as "hand_0".
         touchable: Pairs of links that may collide although a joint joins them, as one of them is welded to the world.
+        loops: Joints that a loop connects or an equality holds, with the values [rad or m] at which they are held.
         unread: Things in the file about shapes, joints and limits that are not used.
         postures: The keyframes: joint values [rad or m] by name of the joint, for each name.
     """
 
     name: str
     tree: Tree
-    sites: tuple[str, ...]
     mimics: tuple[Mimic, ...]
     excluded: frozenset[frozenset[str]]
     apart: frozenset[frozenset[str]]
     touchable: frozenset[frozenset[str]]
+    loops: Mapping[str, float]
     unread: tuple[str, ...]
     postures: Mapping[str, Mapping[str, float]]
 
@@ -59,32 +69,48 @@ class Mjcf:
 def read_mjcf(path: Path) -> Mjcf:
     """Read a file and the files that it includes.
 
+    What cannot be read here is read as MuJoCo compiles it, where the package mujoco is installed.
+
     Raises:
         InputError: If anything in it cannot be used.
     """
     where = str(path)
-    root = parse_xml(read_text(path), "mujoco", where)
-    _include(root, path.resolve().parent)
+    try:
+        root = parse_xml(read_text(path), "mujoco", where)
+        _include(root, path.resolve().parent)
+        settings = Settings()
+        settings.read(root, where)
+        return _read(root, settings, meshes_of(root, settings, path.resolve().parent, where), where)
+    except InputError:
+        result = compiled(path)
+        if result is None:
+            raise
+
+    root, meshes = result
     settings = Settings()
     settings.read(root, where)
-    reader = _Reader(where, settings, meshes_of(root, settings, path.resolve().parent, where))
+    return _read(root, settings, {name: (mesh, pin.SE3.Identity()) for name, mesh in meshes.items()}, where)
 
+
+def _read(root: Element, settings: Settings, meshes: Meshes, where: str) -> Mjcf:
+    """Read the elements of a file."""
+    reader = _Reader(where, settings, meshes)
     for world in root.findall("worldbody"):
         reader.read(world)
 
     tree = Tree(where, reader.finished(), reader.joints)
-    sites = tuple(dict.fromkeys(reader.sites))
-    excluded = _excluded(root, reader)
-    unread = unread_of_mjcf(root, reader.bodies, reader.scenery, {name for name, _ in reader.moving})
+    loops = _loops(root, reader, tree)
+    in_loops = {joint: reader.zeros[joint] for joints in loops.values() for joint in joints}
+    unread = unread_of_mjcf(root, reader.bodies, reader.scenery, {name for name, _ in reader.moving}, loops)
 
     return Mjcf(
         name=root.get("model", ""),
         tree=tree,
-        sites=sites,
         mimics=flattened(where, reader.joints, _followers(root, reader)),
-        excluded=excluded,
+        excluded=_excluded(root, reader),
         apart=_never_colliding_solids(reader),
         touchable=touchable(reader.bodies),
+        loops=in_loops | _held_values(root, reader),
         unread=tuple(unread),
         postures=_keys(root, reader),
     )
@@ -125,10 +151,9 @@ class Body:
 class _Reader:
     where: str
     settings: Settings
-    meshes: Mapping[str, tuple[MeshFile, pin.SE3]]
+    meshes: Meshes
     solids: dict[str, tuple[list[Solid], list[Solid]]] = field(default_factory=lambda: {WORLD: ([], [])})
     joints: list[Joint] = field(default_factory=list)
-    sites: list[str] = field(default_factory=list)
     masks: dict[str, list[tuple[int, int]]] = field(default_factory=dict)
     moving: list[tuple[str, str]] = field(default_factory=list)  # names and kinds of joints, in the order of keyframes
     bodies: dict[str, Body] = field(default_factory=lambda: {WORLD: Body("", ())})
@@ -150,7 +175,7 @@ class _Reader:
         place = f"{self.where}: body '{link}'"
         for item in element:
             if item.tag in UNREAD:
-                raise InputError(f"{place}: <{item.tag}> cannot be read; save the compiled model and load that")
+                raise InputError(f"{place}: <{item.tag}> cannot be read; {COMPILER}")
 
         for item in element.findall("geom"):
             geom = self.settings.filled(item, style, place)
@@ -169,7 +194,6 @@ class _Reader:
             name = site.get("name", "")
             if name and name not in self.solids:
                 self.solids[name] = [], []
-                self.sites.append(name)
                 self.fix(link, name, self.settings.placement(site, place))
 
     def mount(self, body: Element, parent: str, name: str, style: str) -> None:
@@ -186,11 +210,11 @@ class _Reader:
             joint = self.settings.filled(item, style, place)
             joint_name = joint.get("name") or f"{name}/joint{number + 1}"
             kind = joint.get("type", "hinge") if joint.tag == "joint" else "free"
-            if kind not in SIZES or kind == "ball":
-                raise UnknownNameError("usable type of joint", kind, ("hinge", "slide", "free"), where=place)
+            if kind not in SIZES:
+                raise UnknownNameError("type of joint", kind, SIZES, where=place)
             self.moving.append((joint_name, kind))
             kinds.append(kind)
-            if kind != "free":
+            if kind not in HELD:
                 link, offset = self.turned(joint, kind, joint_name, link, offset)
 
         self.bodies[name] = Body(parent, tuple(kinds))
@@ -304,7 +328,7 @@ def _keys(root: Element, reader: _Reader) -> dict[str, dict[str, float]]:
             continue
         values = numbers(key, "qpos", sum(sizes), None, f"{reader.where}: key '{key.get('name', number)}'")
         values_by_joint = {
-            name: values[start] for (name, kind), start in zip(reader.moving, starts, strict=False) if kind != "free"
+            name: values[start] for (name, kind), start in zip(reader.moving, starts, strict=False) if kind not in HELD
         }
         postures[key.get("name") or f"key{number}"] = values_by_joint
     return postures
@@ -369,7 +393,7 @@ def touchable(bodies: Mapping[str, Body]) -> frozenset[frozenset[str]]:
 
 
 def _moving_joint_kinds(body: Body) -> tuple[str, ...]:
-    """Return the kinds of joints that move a body relative to its parent; free joints, which are held, do not count."""
+    """Return the kinds of joints that move a body relative to its parent, without those that are held."""
     return tuple(kind for kind in body.joints if kind not in HELD)
 
 
@@ -391,7 +415,11 @@ def _welded(name: str, bodies: Mapping[str, Body]) -> str:
 
 
 def unread_of_mjcf(
-    root: Element, bodies: Mapping[str, Body], scenery: Sequence[str], joints: Collection[str]
+    root: Element,
+    bodies: Mapping[str, Body],
+    scenery: Sequence[str],
+    joints: Collection[str],
+    loops: Mapping[str, Sequence[str]],
 ) -> Iterator[str]:
     """Yield a line for each kind of thing that is left out, with the names of the first few.
 
@@ -400,6 +428,7 @@ def unread_of_mjcf(
         bodies: The bodies by name.
         scenery: Geoms of the scene, which are left out.
         joints: Names of all joints.
+        loops: The loops, each with the joints that it connects.
     """
     free = [name for name, body in bodies.items() if "free" in body.joints]
     acting = [item for item in root.findall("actuator/*") if not any(item.get(key) in joints for key in OF_JOINTS)]
@@ -407,8 +436,11 @@ def unread_of_mjcf(
     kinds = {
         "of the scene (add it as obstacles)": scenery,
         "free bodies, held where they are:": _quoted(free),
+        "bodies on ball joints, held where they are:": _quoted(
+            [n for n, body in bodies.items() if "ball" in body.joints]
+        ),
         "mocap bodies, held where they are:": _names(each for each in root.iter("body") if each.get("mocap") == "true"),
-        "loops, left open:": _loops(root),
+        "loops, left open:": list(loops),
         "joints held by <equality>:": _held(root),
         "actuators of no joint:": _names(acting),
         "limits of tendons:": _names(tendons),
@@ -437,15 +469,57 @@ def _names(elements: Iterable[Element]) -> list[str]:
     return [f"'{item.get('name') or item.tag}'" for item in elements]
 
 
-def _loops(root: Element) -> list[str]:
-    """Return the active equalities that are not between two joints, by kind and by what they connect."""
-    found = []
+def _loops(root: Element, reader: _Reader, tree: Tree) -> dict[str, list[str]]:
+    """Return the active equalities that are not between two joints, each with the movable joints that it connects.
+
+    A free body, or one that a user moves (``mocap``), takes part in no loop: it follows, or leads, whatever is tied.
+    """
+    loose = {name for name, body in reader.bodies.items() if "free" in body.joints}
+    loose |= {body.get("name", "") for body in root.iter("body") if body.get("mocap") == "true"}
+    links = {link.name for link in tree.links}
+    found = {}
+
     for item in root.findall("equality/*"):
         if item.tag == "joint" or item.get("active", "true") != "true":
             continue
         ends = [item.get(f"{kind}{number}") for kind in ("body", "site", "tendon") for number in (1, 2)]
-        found.append(f"{item.tag} of {' and '.join(repr(end) for end in ends if end) or item.get('name', '')}")
+        named = [end for end in ends if end]
+        if item.tag == "tendon":
+            joints = [joint for name in named for joint in _joints_of_tendon(root, name, tree)]
+        else:
+            joints = _between([end if end in links else WORLD for end in (*named, WORLD)[:2]], tree, loose)
+        found[f"{item.tag} of {' and '.join(map(repr, named)) or item.get('name', '')}"] = joints
     return found
+
+
+def _between(ends: Sequence[str], tree: Tree, loose: Collection[str]) -> list[str]:
+    """Return the movable joints on the way between two links, or none if a body on the way is loose."""
+    first, second = (tree.chain(end) for end in ends)
+    way = [*(j for j in first if j not in second), *(j for j in second if j not in first)]
+    return [] if any(joint.child in loose for joint in way) else [joint.name for joint in way if joint.moves]
+
+
+def _joints_of_tendon(root: Element, name: str, tree: Tree) -> list[str]:
+    """Return the joints that a tendon moves: those that it names, or those between the sites along which it runs."""
+    tendon = next((item for item in root.findall("tendon/*") if item.get("name") == name), None)
+    if tendon is None:
+        return []
+    moving = {joint.name for joint in tree.joints if joint.moves}
+    named = [item.get("joint", "") for item in tendon.findall("joint")]
+    sites = [item.get("site", "") for item in tendon.findall("site")]
+    links = {link.name for link in tree.links}
+    pairs = [pair for pair in pairwise(sites) if links.issuperset(pair)]
+    return [joint for joint in (*named, *(j for pair in pairs for j in _between(pair, tree, ()))) if joint in moving]
+
+
+def _held_values(root: Element, reader: _Reader) -> dict[str, float]:
+    """Return the values [rad or m] of the joints that an active equality holds."""
+    return {
+        name: reader.zeros[name] + numbers(item, "polycoef", 5, (0.0, 1.0, 0.0, 0.0, 0.0), reader.where)[0]
+        for item in root.findall("equality/joint")
+        if item.get("joint2") is None and item.get("active", "true") == "true"
+        if (name := item.get("joint1", "")) in reader.zeros
+    }
 
 
 def _held(root: Element) -> list[str]:
