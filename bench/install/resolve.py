@@ -59,13 +59,21 @@ class Answer:
         return f"yes, {len(self.versions)}" if self.versions else f"no: {self.reason}"
 
 
-def resolved(asked: Iterable[str], platform: str, python: str, *options: str) -> Answer:
-    """Versions of all packages that some requirements lead to."""
+def resolved(
+    asked: Iterable[str], platform: str, python: str, *options: str, wheels_alone: bool = True, patience: float = 600.0
+) -> Answer:
+    """Versions of all packages that some requirements lead to; source packages, if allowed, may be built for it."""
     command = [sys.executable, "-m", "uv", "pip", "compile", "--quiet", "--no-header", "--no-annotate"]
-    command += ["--only-binary", ":all:", "--python-platform", platform, "--python-version", python, *options, "-"]
+    command += ["--python-platform", platform, "--python-version", python, *options, "-"]
+    command += ["--only-binary", ":all:"] if wheels_alone else []
     environment = {**os.environ, "MACOSX_DEPLOYMENT_TARGET": "15.0"}
     lines = "\n".join(asked)
-    done = subprocess.run(command, input=lines, env=environment, capture_output=True, text=True, check=False)
+    try:
+        done = subprocess.run(
+            command, input=lines, env=environment, capture_output=True, text=True, check=False, timeout=patience
+        )
+    except subprocess.TimeoutExpired:
+        return Answer({}, f"no answer within {patience:.0f} s")
     if done.returncode:
         hints = [line.strip() for line in done.stderr.replace("\n  ", " ").splitlines() if "hint" in line]
         return Answer({}, " ".join((hints or done.stderr.splitlines() or ["uv failed"])[0].split()))

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import ClassVar
 
 import numpy as np
-from ompl import base as ob
 
 from rrtik_ompl.base.arrays import Matrix, Vector, positive
 from rrtik_ompl.base.budget import iteration_limit
@@ -17,6 +16,7 @@ from rrtik_ompl.kernels.search.constrained.layout import KERNELS
 from rrtik_ompl.kernels.search.constrained.search import ConstrainedSearch
 from rrtik_ompl.kernels.search.motions.motion_table import NO_LIMIT, FastMotions
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SafePlanner, SearchResult, Stop
+from rrtik_ompl.ompl_bridge.bindings import ob
 from rrtik_ompl.world.motion_queries import decider, has_kernels, keeps_constraints
 from rrtik_planners.fast_rrt_connect import python_rules, search_in_python, sound_tree
 

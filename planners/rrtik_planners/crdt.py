@@ -6,13 +6,13 @@ from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from ompl import base as ob
 
 from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.kernels.search.crdt.rules import KERNELS, CrdtRules
 from rrtik_ompl.kernels.search.crdt.search import CrdtSearch
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SearchResult, Stop
+from rrtik_ompl.ompl_bridge.bindings import ob
 from rrtik_ompl.planning.moves.rules import Joints, PerJoint
 from rrtik_ompl.world.motion_queries import has_kernels
 from rrtik_planners.crdt_tree import CrdtStream, CrdtTree, Outcome

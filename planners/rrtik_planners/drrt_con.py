@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import ClassVar
 
 import numpy as np
-from ompl import base as ob
 
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector, positive
 from rrtik_ompl.kernels.search.connect_layout import KERNELS
 from rrtik_ompl.kernels.search.connect_lengths import connect_lengths
 from rrtik_ompl.kernels.search.motions.motion_table import NO_LIMIT
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SafePlanner, SearchResult, Stop
+from rrtik_ompl.ompl_bridge.bindings import ob
 from rrtik_ompl.ompl_bridge.results import PlannerGraph
 from rrtik_ompl.replanning.connecting import KERNELS as LIBRARIES
 from rrtik_ompl.replanning.connecting import KernelConnect, PythonConnect, TreeOptions

@@ -7,7 +7,6 @@ from contextlib import AbstractContextManager
 from typing import ClassVar
 
 import numpy as np
-from ompl import base as ob
 
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector, positive
 from rrtik_ompl.base.budget import iteration_limit
@@ -17,6 +16,7 @@ from rrtik_ompl.kernels.search.connect_lengths import connect_lengths
 from rrtik_ompl.kernels.search.tree_layout import TreeTable
 from rrtik_ompl.kernels.search.tree_memory import certain_tree
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SafePlanner, SearchResult, Stop
+from rrtik_ompl.ompl_bridge.bindings import ob
 from rrtik_ompl.ompl_bridge.results import Tree, without
 from rrtik_ompl.planning.search.rrt_connect import ConnectRules, RrtConnect, straight_path
 from rrtik_ompl.world.motion_queries import KernelWorld, decider, has_kernels

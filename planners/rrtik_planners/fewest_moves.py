@@ -7,14 +7,13 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import Any, ClassVar, NamedTuple
 
-from ompl import base as ob
-
 from rrtik_ompl.base.arrays import Matrix, not_negative, whole_number
 from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.transitions import lower_bound, merge_moves, transitions
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SearchResult, Stop
+from rrtik_ompl.ompl_bridge.bindings import ob
 from rrtik_ompl.ompl_bridge.motion_checker import WorldChecker
 from rrtik_ompl.planning.moves.clearance_levels import Level, clearance_levels
 from rrtik_ompl.planning.moves.fine_grids import FineGrids, rounds_before

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ompl import base as ob
-
 from rrtik_ompl.base.arrays import Matrix, positive, whole_number
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.ik.ikurt.metric import JOINT_RADIUS, ConfigurationMetric, TipMetric
 from rrtik_ompl.ik.ikurt.search import BatchedSearch, IkurtValidity, Options
 from rrtik_ompl.model.goal import Goal
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SearchResult, Stop
+from rrtik_ompl.ompl_bridge.bindings import ob
 from rrtik_ompl.world.world import World
 from rrtik_planners.tip_seeker import TipSeeker, closest
 

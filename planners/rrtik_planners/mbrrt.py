@@ -6,7 +6,6 @@ from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
-from ompl import base as ob
 
 from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.base.errors import InputError
@@ -14,6 +13,7 @@ from rrtik_ompl.ik.mb_rrt.axes import misfit
 from rrtik_ompl.ik.mb_rrt.search import tree_aims
 from rrtik_ompl.model.goal import Goal, TipGoal
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SearchResult, Stop
+from rrtik_ompl.ompl_bridge.bindings import ob
 from rrtik_ompl.world.world import World
 from rrtik_planners.bicrdt import BiCRDT
 

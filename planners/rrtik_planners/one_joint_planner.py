@@ -7,13 +7,13 @@ from dataclasses import replace
 from typing import Any, ClassVar
 
 import numpy as np
-from ompl import base as ob
 
 from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.base.budget import iteration_limit
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.kernels.search.crdt.rules import KERNELS, CrdtRules
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SafePlanner, SearchResult, Stop
+from rrtik_ompl.ompl_bridge.bindings import ob
 from rrtik_ompl.planning.moves.rules import Joints, MoveRules, PerJoint, long_enough
 
 NO_ENDING = "last_joints: they cannot go straight to the goal after all others, or would have to move too little"

@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
-from ompl import base as ob
 
 from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.base.budget import Budget
@@ -16,6 +15,7 @@ from rrtik_ompl.kernels.search.connect_layout import KERNELS
 from rrtik_ompl.kernels.search.shortcut_layout import KERNELS as SHORTCUTS
 from rrtik_ompl.model.transitions import route_length
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SearchResult, Stop
+from rrtik_ompl.ompl_bridge.bindings import ob
 from rrtik_ompl.planning.improving import GAIN, PATIENCE, QUICK_CHECKS, SETTLED, WORTH
 from rrtik_ompl.planning.shortening.best import best_in_time
 from rrtik_ompl.planning.shortening.task import Task, Wishes

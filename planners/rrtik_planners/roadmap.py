@@ -6,7 +6,6 @@ import os
 from typing import ClassVar
 
 import numpy as np
-from ompl import base as ob
 
 from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.base.errors import InputError, PlannerError, require
@@ -15,6 +14,7 @@ from rrtik_ompl.kernels.search import connect_layout
 from rrtik_ompl.kernels.search.roadmap.graph import KernelGraph
 from rrtik_ompl.kernels.search.roadmap.layout import KERNELS
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SafePlanner, SearchResult, Stop
+from rrtik_ompl.ompl_bridge.bindings import ob
 from rrtik_ompl.planning.search.roadmap import NEAR, Graph, Roadmap, checked_near, graph_in
 from rrtik_ompl.world.world import World
 from rrtik_planners.fast_rrt_connect import FastRRTConnect

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import ClassVar
 
 import numpy as np
-from ompl import base as ob
 
 from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.base.errors import InputError
@@ -15,6 +14,7 @@ from rrtik_ompl.ik.ikurt.tree import IkurtTree
 from rrtik_ompl.ik.targets import targets
 from rrtik_ompl.model.goal import Goal, Target, TipGoal
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SafePlanner, SearchResult
+from rrtik_ompl.ompl_bridge.bindings import ob
 from rrtik_ompl.world.world import World
 
 DRAWS = 16  # number of targets drawn from a goal that leaves freedom

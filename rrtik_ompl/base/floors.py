@@ -30,6 +30,7 @@ FLOORS = {
 EVERYWHERE = ("numpy", "pinocchio", "coal")  # in all that this package does
 # Libraries that the wheels of pin 3 were linked with, though they admit newer ones, which then are not found.
 OLD_LIBRARIES = ("liburdfdom", "libtinyxml2")
+NO_OMPL = "OMPL is not installed, and only our own planners are here; pip install ompl (not for Python 3.14)"
 
 
 class DependencyError(RrtikError, ImportError):
@@ -49,7 +50,7 @@ def fitting_packages() -> Iterator[None]:
     try:
         yield
     except Exception as error:
-        if reason := too_old(sys.modules) or _unlinked(error):
+        if reason := too_old(sys.modules) or _missing(error):
             raise DependencyError(reason) from error
         raise
     if reason := too_old(sys.modules, others):
@@ -76,7 +77,9 @@ def _numbers(version: object) -> tuple[int, ...]:
     return tuple(map(int, re.findall(r"\d+", version)[:3])) if isinstance(version, str) else ()
 
 
-def _unlinked(error: Exception) -> str:
-    """Return which packages pin 3 lacks if it could not be loaded for want of them, in a line; else ""."""
+def _missing(error: Exception) -> str:
+    """Return that OMPL is missing, or which packages pin 3 lacks and so could not be loaded, in a line; else ""."""
+    if isinstance(error, ModuleNotFoundError) and error.name == "ompl":
+        return NO_OMPL
     lacks = isinstance(error, ImportError) and any(library in str(error) for library in OLD_LIBRARIES)
     return f"pin 3 {error}; pip install 'cmeel-urdfdom<5' 'cmeel-tinyxml2<11', or 'pin>=4'" if lacks else ""

@@ -18,13 +18,11 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from ompl import base as ob
-from ompl import geometric as og
-from ompl import util as ou
 
 from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.errors import PlannerError, RrtikError
+from rrtik_ompl.ompl_bridge.bindings import ob, og, ou
 from rrtik_ompl.ompl_bridge.ownership import foreign_code
 from rrtik_ompl.ompl_bridge.planner_options import is_safe, other_planner, safe_planner
 from rrtik_ompl.ompl_bridge.planner_traits import OMPL_TRAITS, PlannerFactory, traits_of

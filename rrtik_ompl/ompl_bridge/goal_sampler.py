@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from ompl import base as ob
 
 from rrtik_ompl.base.arrays import Mask, Matrix, frozen, seed_of
 from rrtik_ompl.base.errors import InputError, require
 from rrtik_ompl.ik.goal_configurations import MAX_TOTAL, GoalSearch
+from rrtik_ompl.ompl_bridge.bindings import ob
 from rrtik_ompl.ompl_bridge.setup import ValidityCallback, space_information
 from rrtik_ompl.ompl_bridge.states import StateIO, space_bounds
 from rrtik_ompl.world.problem import Problem

@@ -7,9 +7,9 @@ from itertools import pairwise
 from typing import Protocol
 
 import numpy as np
-from ompl import base as ob
 
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector
+from rrtik_ompl.ompl_bridge.bindings import ob
 from rrtik_ompl.ompl_bridge.states import StateIO
 from rrtik_ompl.ompl_bridge.unrolled import pieces
 from rrtik_ompl.world.motion_queries import MotionQueries

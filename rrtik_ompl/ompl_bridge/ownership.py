@@ -12,8 +12,7 @@ import faulthandler
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from ompl import base as ob
-
+from rrtik_ompl.ompl_bridge.bindings import ob
 from rrtik_ompl.ompl_bridge.safe_planner import SafePlanner
 
 STANDARD_ERROR = 2  # its file descriptor; sys.stderr may have none, as in a notebook

@@ -7,11 +7,11 @@ from collections.abc import Callable
 from numbers import Real
 
 import numpy as np
-from ompl import base as ob
 
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector
 from rrtik_ompl.base.budget import Stop
 from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.ompl_bridge.bindings import ob
 from rrtik_ompl.ompl_bridge.goal_sampler import GoalSampler
 from rrtik_ompl.ompl_bridge.results import IllPosed
 from rrtik_ompl.ompl_bridge.states import StateIO

@@ -15,13 +15,13 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from ompl import base as ob
-
 from rrtik_ompl.base.errors import InputError, UnknownNameError, require
+from rrtik_ompl.base.floors import NO_OMPL
 from rrtik_ompl.description import catalog
 from rrtik_ompl.files.digest import sha256
+from rrtik_ompl.ompl_bridge.bindings import ob
 from rrtik_ompl.ompl_bridge.planner_options import planner_options
-from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory, ompl_planners
+from rrtik_ompl.ompl_bridge.planner_traits import BOUND, PlannerFactory, ompl_planners, unbound_planners
 
 AUTO = "auto"  # a portfolio of planners, which `plan()` runs if none is named
 
@@ -86,6 +86,8 @@ def find_planner(name: str) -> PlannerFactory:
         return _wheel()[bare]
     if bare in catalog.list_planners():
         return catalog.find_planner(bare)
+    if not _wheel() and bare in {*BOUND.lower().split(), *map(str.lower, unbound_planners())}:
+        raise InputError(f"planner '{name}': {NO_OMPL}")
     raise UnknownNameError("planner", name, list_planners())
 
 

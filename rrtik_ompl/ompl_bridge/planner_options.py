@@ -8,11 +8,10 @@ from contextlib import suppress
 from functools import lru_cache
 from typing import Any, TypeGuard
 
-from ompl import base as ob
-
 from rrtik_ompl.base.arrays import finite_array
 from rrtik_ompl.base.errors import InputError, UnknownNameError, require
 from rrtik_ompl.description.joint_weights import weights_as_costs
+from rrtik_ompl.ompl_bridge.bindings import ob
 from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory
 from rrtik_ompl.ompl_bridge.safe_planner import SafePlanner, keyword_parameters
 from rrtik_ompl.world.problem import Problem

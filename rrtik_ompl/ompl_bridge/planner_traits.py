@@ -11,10 +11,8 @@ from dataclasses import dataclass, field, fields
 from functools import cache, lru_cache
 from typing import Any, TypeAlias
 
-from ompl import base as ob
-from ompl import geometric as og
-
 from rrtik_ompl.description import catalog
+from rrtik_ompl.ompl_bridge.bindings import ob, og
 
 # A planner's class, or a function that makes a planner from a SpaceInformation.
 PlannerFactory: TypeAlias = Callable[..., ob.Planner]
@@ -89,6 +87,11 @@ _LISTED = {
     "RRTstar": ANYTIME,
     "SORRTstar": PlannerTraits(anytime=True, straight_first=True, supports_iteration_limit=False),
 }
+
+# Geometric planners of OMPL 2.0.1 that its wheel has.
+BOUND = (
+    "AORRTC BFMT BITstar BKPIECE1 FMT InformedRRTstar KPIECE1 LBKPIECE1 PRM PRMstar RRT RRTConnect RRTstar SORRTstar"
+)
 
 # Geometric planners of OMPL 2.0.1 that its wheel lacks. Those that a later wheel offers are left out.
 _UNBOUND = (

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from ompl import base as ob
 
 from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.base.errors import InputError, require
 from rrtik_ompl.constraints.equations import equation_count, equations
+from rrtik_ompl.ompl_bridge.bindings import ob
 from rrtik_ompl.ompl_bridge.setup import bounded_space
 from rrtik_ompl.ompl_bridge.states import StateIO
 from rrtik_ompl.world.problem import Problem

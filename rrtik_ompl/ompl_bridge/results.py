@@ -11,11 +11,11 @@ from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from ompl import base as ob
 
 from rrtik_ompl.base.arrays import Matrix, Vector, frozen
 from rrtik_ompl.base.errors import InputError, RrtikError
 from rrtik_ompl.files.text import write_text
+from rrtik_ompl.ompl_bridge.bindings import ob
 from rrtik_ompl.ompl_bridge.states import StateIO
 
 Numbers: TypeAlias = NDArray[np.int64]

@@ -17,13 +17,12 @@ from types import MappingProxyType
 from typing import Any, ClassVar
 
 import numpy as np
-from ompl import base as ob
-from ompl import util as ou
 
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector, whole_number
 from rrtik_ompl.base.budget import Stop
 from rrtik_ompl.base.errors import InputError, PlannerError, UnknownNameError
 from rrtik_ompl.model.transitions import route_length
+from rrtik_ompl.ompl_bridge.bindings import ob, ou
 from rrtik_ompl.ompl_bridge.goal_sampler import GoalSampler
 from rrtik_ompl.ompl_bridge.motion_checker import MotionChecker, SpaceChecker, WorldChecker
 from rrtik_ompl.ompl_bridge.planner_inputs import condition_of, starts_and_goals, usable

@@ -10,9 +10,9 @@ from functools import lru_cache
 from itertools import groupby
 
 import numpy as np
-from ompl import base as ob
 
 from rrtik_ompl.base.arrays import TAU, Mask, Matrix, Vector, frozen
+from rrtik_ompl.ompl_bridge.bindings import ob
 from rrtik_ompl.ompl_bridge.states import StateIO
 from rrtik_ompl.ompl_bridge.unrolled import near_image
 from rrtik_ompl.world.motion_queries import MotionFree

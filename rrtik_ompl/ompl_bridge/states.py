@@ -11,11 +11,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from ompl import base as ob
-from ompl import geometric as og
 
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector, frozen
 from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.ompl_bridge.bindings import ob, og
 from rrtik_ompl.ompl_bridge.unrolled import on_circles
 
 WANTED = "needs a RealVectorStateSpace, an SO2StateSpace or a compound of them (one number a coordinate)"

@@ -86,6 +86,25 @@ def test_what_plan_needs_is_imported_without_what_checks_files():
     assert done.stdout.strip() == "[]"
 
 
+@pytest.mark.kernels
+def test_a_plan_loads_none_of_what_only_a_wing_or_a_file_needs():
+    code = """
+import sys
+import rrtik_ompl as rrtik
+
+robot = rrtik.load_robot("panda")
+post = rrtik.Obstacle("post", rrtik.Box(0.1, 0.1, 1.0), [0.45, 0.3, 0.5])
+goal = rrtik.PositionGoal([0.3, 0.5, 0.4], tolerance=0.005)
+plan = rrtik.plan(rrtik.Problem(rrtik.World(robot, rrtik.Scene([post])), robot.posture("default"), goal))
+plan.require(), plan.proven
+print(*{name.partition(".")[0] for name in sys.modules})
+"""
+    wings = "cv2 matplotlib meshcat tornado umsgpack zmq IPython PIL"
+    files = "pydantic yaml typer rich joblib scipy importlib_metadata mcap xacro"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert {*f"{wings} {files}".split()} & {*done.stdout.split()} == set()
+
+
 def test_a_world_is_loaded_without_a_compiler_and_without_what_covers_are_made_with():
     code = "import sys, rrtik_ompl.world.world, rrtik_ompl.kernels.covers.cache, rrtik_ompl.kernels.checks.fast_world"
     code += "; print([m for m in ('numba', 'scipy') if m in sys.modules])"

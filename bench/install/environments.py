@@ -1,0 +1,119 @@
+"""Whether the wheel can be installed beside the toolkits that people have: resolved for each version of Python by uv.
+
+The table goes to docs/install.md. Packages without wheels, such as those that LeRobot needs, are built for their
+metadata, so that a run takes some ten minutes the first time. ``--real FOLDER`` also makes an environment of some GB,
+with LeRobot and ManiSkill, and plans in it.
+"""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+import tempfile
+from datetime import date
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Annotated
+
+from typer import Option
+
+from bench.install.resolve import ROOT, Answer, built_wheel, resolved
+from bench.shared.run import Run
+from rrtik_bench.report.machine import package_version
+from rrtik_bench.report.page import Report
+from rrtik_ompl.base.errors import InputError
+
+PYTHONS = ("3.10", "3.11", "3.12", "3.13", "3.14")
+PLATFORM = "x86_64-manylinux_2_39"
+PATIENCE = 300.0  # [s]
+TOOLKITS = (
+    "lerobot",
+    "lerobot[kinematics]",
+    "mani_skill",
+    "robosuite",
+    "genesis-world",
+    "mujoco",
+    "pin-pink",
+    "roboplan",
+    "drake",
+    "tesseract-robotics-nanobind",
+    "jax",
+)
+PAGE = ROOT / "docs" / "install.md"
+BEGIN, END = "<!-- python -m bench environments -->\n", "<!-- end -->\n"
+
+# OpenCV comes under two names with the same files, of which an environment must hold the same version.
+REAL = ("lerobot", "mani_skill", "opencv-python<4.14", "opencv-python-headless<4.14")
+REAL_PYTHON = "3.12"
+
+
+def beside(toolkit: str, python: str, wheel: Path) -> tuple[str, Answer | None]:
+    """The newest version of a toolkit that there is for a Python, and what uv says of it beside the wheel.
+
+    The version is empty, and the answer None, if the toolkit cannot be had for that Python even alone.
+    """
+    name = re.sub(r"\[.*", "", toolkit).replace("_", "-")
+    version = resolved([toolkit], PLATFORM, python, wheels_alone=False, patience=PATIENCE).versions.get(name, "")
+    if not version:
+        return "", None
+    asked = [f"{toolkit}=={version}", f"rrtik-ompl @ {wheel.as_uri()}"]
+    return version, resolved(asked, PLATFORM, python, wheels_alone=False, patience=PATIENCE)
+
+
+def fill(page: Report, wheel: Path) -> None:
+    """What uv says, here and in docs/install.md."""
+    rows, reasons, asked, good = [], [], 0, 0
+    for toolkit in TOOLKITS:
+        cells = []
+        for python in PYTHONS:
+            version, answer = beside(toolkit, python, wheel)
+            found = answer is not None and bool(answer.versions)
+            asked += answer is not None
+            good += found
+            cells.append(version if found else f"{version}: no" if version else "-")
+            if answer is not None and not found:
+                reasons.append(f"- {toolkit} {version}, Python {python}: {answer.reason}")
+        rows.append([f"`{toolkit}`", *cells])
+
+    page.bar("beside toolkits that can be had", "all resolve", f"{good} of {asked}", good == asked)
+    text = "The newest version of each that resolves alone; -: there is none, or no answer, for that Python."
+    page.table("Python", ("", *PYTHONS), rows, text=text)
+    if reasons:
+        page.note("Why not", "\n".join(reasons))
+
+    lines = [f"Resolved on {date.today()} by {package_version('uv')} for Linux on x86-64; installed: see below.", ""]
+    lines += [f"| {' | '.join(row)} |" for row in (["beside, Python", *PYTHONS], ["---"] * (1 + len(PYTHONS)), *rows)]
+    said = PAGE.read_text()
+    before, _, rest = said.partition(BEGIN)
+    PAGE.write_text(f"{before}{BEGIN}\n" + "\n".join([*lines, *reasons]) + f"\n\n{END}" + rest.partition(END)[2])
+
+
+def plan_beside(wheel: Path, folder: Path) -> str:
+    """Install the wheel with LeRobot and ManiSkill in a folder, import all of them, and plan; what was printed."""
+    uv = [sys.executable, "-m", "uv"]
+    python = str(folder / "bin" / "python")
+    subprocess.run([*uv, "venv", "--quiet", "--allow-existing", "--python", REAL_PYTHON, str(folder)], check=True)
+    subprocess.run([*uv, "pip", "install", "--quiet", "--python", python, *REAL, str(wheel)], check=True)
+    subprocess.run([python, "-c", "import lerobot, mani_skill, rrtik_ompl; rrtik_ompl.sensing.Camera"], check=True)
+    plan = [str(folder / "bin" / "rrtik"), "plan", "panda_shelf", "--seed", "1"]
+    return subprocess.run(plan, cwd=folder, check=True, capture_output=True, text=True).stdout
+
+
+def main(
+    run: Run,
+    *,
+    wheel: Annotated[Path | None, Option(help="One that was built already.")] = None,
+    real: Annotated[Path | None, Option(help="Make an environment here, and plan in it.")] = None,
+) -> Report:
+    """Ask, and with ``--real`` install."""
+    if find_spec("uv") is None:
+        raise InputError("environments: uv is not installed here; pip install uv")
+    report = run.report("The wheel beside other toolkits", "resolved")
+    with tempfile.TemporaryDirectory() as folder:
+        made = (wheel or built_wheel(Path(folder))).resolve()
+        if real is not None:
+            said = plan_beside(made, real.resolve())
+            report.note("LeRobot and ManiSkill installed", f"`rrtik plan panda_shelf --seed 1`:\n\n```\n{said}```")
+        fill(report, made)
+    return report
