@@ -132,6 +132,7 @@ KINDS = MappingProxyType(
             "problem_files.scene:write_scene",
             words=("scene",),
             without="robot",
+            endings=(".scene",),
         ),
         "Robot": Kind(
             "a robot",

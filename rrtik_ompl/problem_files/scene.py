@@ -25,6 +25,7 @@ from rrtik_ompl.files.strict_yaml import Location, YamlDocument, read_yaml, writ
 from rrtik_ompl.files.text import file_name
 from rrtik_ompl.model.scene import AttachedObject, ConstantVelocity, Motion, Obstacle, Scene, TimedPoses, Touching
 from rrtik_ompl.model.world_settings import SETTINGS_IN_FILES
+from rrtik_ompl.problem_files.moveit_scene_text import ENDING, read_scene_text
 from rrtik_ompl.problem_files.shapes import ONE_SHAPE, ShapeEntry, shape_data
 
 
@@ -183,7 +184,7 @@ SceneFile = create_model("SceneFile", __base__=_SceneFile, **_KEYS_OF_WORLDS)
 
 
 def load_scene(file: str | os.PathLike[str]) -> Scene:
-    """Read the scene of a YAML file: ``version: 1`` and ``scene:``, or a whole problem file.
+    """Read the scene of a YAML file: ``version: 1`` and ``scene:``, or a whole problem file; or a ``.scene`` of MoveIt.
 
     Raises:
         InputError: If the file cannot be used; one line with file, line, key, what was found and the remedy.
@@ -193,6 +194,8 @@ def load_scene(file: str | os.PathLike[str]) -> Scene:
         >>> rrtik.load_scene("scene.yaml")
         Scene(post)
     """
+    if file_name(file).suffix.lower() == ENDING:
+        return read_scene_text(file)
     with refusing_others(file, "Scene"):
         document = read_yaml(file)
         return parse(document, SceneFile).scene.build(document)
