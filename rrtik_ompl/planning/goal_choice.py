@@ -56,6 +56,14 @@ class GoalChoice:
         """One line that says why there is no goal configuration; "" if there is one."""
         return self._search.reason
 
+    @property
+    def known(self) -> Matrix:
+        """The goal configurations that are known, those that keep the clearance if any does, shape (k, dof)."""
+        if self.planner_finds_goals or len(self._search.rows) == 0:
+            return self._search.rows[:0]
+        kept = self._find_with_clearance()
+        return self._search.rows[kept]
+
     def of(self, attempt: int) -> Matrix:
         """Return the known goal configurations for an attempt, shape (k, dof); may search for more of them.
 

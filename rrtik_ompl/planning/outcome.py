@@ -37,6 +37,7 @@ class Request:
         parameters: Options of the planner.
         proof: Whether motions have to be proven free.
         clearance: Clearance to keep from obstacles [m], or None.
+        by_length: Whether the goal configuration is chosen by the length of the path.
     """
 
     budget: Budget
@@ -44,6 +45,7 @@ class Request:
     parameters: Mapping[str, Any] = field(default_factory=dict)
     proof: ProofMode = "preferred"
     clearance: float | None = None
+    by_length: bool = False
 
 
 @dataclass(frozen=True, slots=True)

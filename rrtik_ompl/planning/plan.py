@@ -50,7 +50,8 @@ def plan(
 
     A goal of the tip is first turned into collision-free goal configurations by inverse kinematics, unless the planner
     finds such configurations itself. If the planner does not reach them within a bounded effort, more configurations
-    are drawn and the planner is started anew with twice the effort (see :class:`GoalSearch`).
+    are drawn and the planner is started anew with twice the effort (see :class:`GoalSearch`). "auto" chooses among the
+    configurations by the length of the path.
 
     The search runs in three stages, and the path that it finds is shortened within the time left:
 
@@ -204,7 +205,7 @@ def _searched(
         finish_follows: Whether some time has to be left by planners that would use all of it.
     """
     if _is_auto(planner):
-        found = run_portfolio(problem, request)
+        found = run_portfolio(problem, replace(request, by_length=finish_follows))
     else:
         named = named_planner(planner)
         share = ANYTIME_SHARE if finish_follows and traits_of(named.factory).anytime else 1.0
