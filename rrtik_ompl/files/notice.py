@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 COMPILING = "compiling kernels for this processor, once per machine: up to some minutes"
-COVERING = "covering the meshes of a robot that is new to this machine, once: a second or so for each"
+COVERING = "covering the meshes of a robot that is new to this machine, once: about a second"
 
 
 def _silence(message: str) -> None:

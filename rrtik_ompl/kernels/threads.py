@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable
-from concurrent.futures import ThreadPoolExecutor
 from typing import TypeVar
 
 from rrtik_ompl.base.arrays import whole_number
@@ -38,6 +37,8 @@ def in_threads(work: Callable[[Given], Made], given: Iterable[Given], threads: i
     count = cores() if threads is None else min(whole_number(threads, "threads", 1), MOST_THREADS)
     if count == 1:
         return [work(each) for each in given]
+    from concurrent.futures import ThreadPoolExecutor  # it loads more than a first plan needs
+
     with ThreadPoolExecutor(count) as pool:
         asked = [pool.submit(work, each) for each in given]
         try:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import re
-import tempfile
 import warnings
 from io import BytesIO
 from pathlib import Path
@@ -157,6 +156,8 @@ def _from_afar(data: bytes, scale: Vector) -> coal.BVHModelBase:
     def moved(match: re.Match[bytes]) -> bytes:
         values = np.array(match.groups()[1:]).astype(np.float64) - offset
         return match[1] + b" ".join(repr(float(value)).encode() for value in values)
+
+    import tempfile  # few files need it, and it loads random numbers
 
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(folder) / "moved.obj"

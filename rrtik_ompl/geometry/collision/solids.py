@@ -396,8 +396,9 @@ def is_closed(geometry: coal.CollisionGeometry) -> bool:
     start = corners.ravel()
     end = np.roll(corners, -1, axis=1).ravel()
     edge_keys = np.minimum(start, end) * len(vertices) + np.maximum(start, end)
-    _, edge_numbers = np.unique(edge_keys, return_inverse=True)
-    return not np.bincount(np.asarray(edge_numbers).ravel(), weights=np.sign(end - start)).any()
+    order = np.argsort(edge_keys)
+    first = np.flatnonzero(np.diff(edge_keys[order], prepend=-1))
+    return not np.add.reduceat(np.sign(end - start)[order], first).any()
 
 
 @lru_cache(maxsize=16)

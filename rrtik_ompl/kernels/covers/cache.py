@@ -15,7 +15,7 @@ from pathlib import Path
 import coal
 import numpy as np
 
-from rrtik_ompl.base.arrays import Matrix, frozen
+from rrtik_ompl.base.arrays import Matrix, distinct, frozen
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.files.cache import cache_folder, nobody_else_s, write_whole
 from rrtik_ompl.files.digest import sha256
@@ -77,7 +77,7 @@ def cached_convex_pieces(mesh: coal.BVHModelBase) -> tuple[list[Matrix], ...]:
         return np.concatenate(rows)
 
     rows = _cached(mesh, f"convex pieces {PIECES}", make)
-    numbers = np.unique(rows[:, 3])
+    numbers = distinct(rows[:, 3])
     return tuple([rows[rows[:, 3] == k, :3] for k in numbers if k % 3 == kind] for kind in range(3))
 
 
@@ -131,7 +131,7 @@ def _cached(geometry: coal.CollisionGeometry, parameters: str, make: Callable[[]
 
 
 def needs_long(geometry: coal.CollisionGeometry) -> bool:
-    """Check whether a cover takes so long (a second or so) that the user is told: for meshes and convex hulls."""
+    """Check whether a cover takes so long (some tenths of a second) that the user is told: for meshes and hulls."""
     return is_mesh(geometry) or isinstance(geometry, coal.ConvexBase)
 
 

@@ -10,6 +10,7 @@ from rrtik_ompl.geometry.collision.bodies import link_bodies
 from rrtik_ompl.geometry.collision.solids import is_mesh, mesh_arrays
 from rrtik_ompl.kernels.covers import cache
 from rrtik_ompl.kernels.covers.cache import cached_convex_pieces, cached_inner_spheres, cached_outer_cover
+from rrtik_ompl.kernels.covers.mesh_pieces import convex_pieces
 from rrtik_ompl.kernels.covers.spheres import inner_spheres, outer_cover, protrusion_bound
 from rrtik_ompl.world.world import World
 from rrtik_tests.covered_solids import SOLIDS, mesh_solid
@@ -60,6 +61,8 @@ def test_the_store_is_small():
 
 def test_a_new_mesh_is_told_once(tmp_path, monkeypatch):
     told, torus = [], mesh_solid("torus")
+    for made in (outer_cover, inner_spheres, convex_pieces):
+        made(torus)  # the kernels are loaded, or making them would be told too
     monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path))
     monkeypatch.setattr(notice, "listener", told.append)
     monkeypatch.setattr(notice, "_told", set())
