@@ -1,7 +1,9 @@
 """What several tests share: the published lists of moves, small meshes, OMPL without its log."""
 
+import gc
 import os
 import signal
+from collections import Counter
 
 import numpy as np
 import pytest
@@ -27,12 +29,40 @@ os.unsetenv("COLUMNS")
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
+SLOW_AS_MANY = 50  # tests of no size take as long as one that is marked slow
+
 
 def pytest_sessionstart(session):
     """Before a run of all tests every core makes kernels; else each worker waits for a library that another makes."""
     config = session.config
     if config.args_source is config.ArgsSource.TESTPATHS and not hasattr(config, "workerinput"):
         warm_up(lambda _: None)
+
+
+def pytest_configure(config):
+    """Workers take files in the order in which they are collected, not those of most tests first."""
+    if hasattr(config.option, "loadscopereorder"):  # with pytest-xdist
+        config.option.loadscopereorder = False
+
+
+def pytest_collection_modifyitems(config, items):
+    """Among several workers the longest files come first, so that all of them end at about the same time."""
+    if hasattr(config, "workerinput"):
+        work = Counter()
+        for item in items:
+            work[item.path] += SLOW_AS_MANY if item.get_closest_marker("slow") else 1
+        items.sort(key=lambda item: -work[item.path])
+
+
+def pytest_collection_finish():
+    """What the collection has made lives to the end; the garbage collector need not look at it each time."""
+    gc.collect()
+    gc.freeze()
+
+
+def pytest_unconfigure():
+    """What was kept from the collector goes as usual; nanobind tells what is left at the end of the process."""
+    gc.unfreeze()
 
 
 @pytest.hookimpl(wrapper=True)

@@ -62,6 +62,16 @@ def planned(robot, around, stages, start="ready", seconds=10.0):
     return Task(stages).plan(rrtik.World(robot, around), start, seconds=seconds, seed=1)
 
 
+def refused(robot, around, stages, words, start="ready"):
+    """What is said of a task that cannot be done, with more time for a machine that is busy until words are in it."""
+    for seconds in (1.0, 5.0, 25.0):
+        plan = planned(robot, around, stages, start, seconds)
+        assert not plan.found
+        if words in plan.reason:
+            break
+    return plan.reason
+
+
 class Judge:
     """Depths of a held thing in others along motions, by pinocchio and coal from the shapes alone."""
 
@@ -147,12 +157,11 @@ def test_the_look_ahead_lets_go_of_what_it_does_not_know(panda):
 
 def test_a_thing_that_stands_deep_inside_another_needs_a_word_and_may_not_be_let_go_there(panda):
     around = scene(inside=0.01)
-    plan = planned(panda, around, [*taken(), Straight(by=UP)], seconds=1.0)
-    assert not plan.found
-    assert "'table' and 'cup' overlap by 10 mm" in plan.reason
+    words = "'table' and 'cup' overlap by 10 mm"
+    assert words in refused(panda, around, [*taken(), Straight(by=UP)], words)
     assert planned(panda, around, [*taken(allow=["table"]), Straight(by=UP)]).found
-    plan = planned(panda, around, [*taken(allow=["table"]), Detach("cup")], seconds=1.0)
-    assert "'cup' would be left 10 mm inside 'table'" in plan.reason
+    words = "'cup' would be left 10 mm inside 'table'"
+    assert words in refused(panda, around, [*taken(allow=["table"]), Detach("cup")], words)
 
 
 def rod_at(ur5, wall_away):
@@ -169,7 +178,7 @@ def test_what_a_grasp_allowed_ends_with_the_grasp(ur5):
     through = Straight(by=[0.0, 0.1, 0.0])
     first = [Attach("rod", "ee_link", allow=["wall"]), Detach("rod")]
     for grasp in ([], first):
-        plan = Task([*grasp, Attach("rod", "ee_link"), through]).plan(world, STRETCHED, seconds=1.0, seed=1)
+        plan = Task([*grasp, Attach("rod", "ee_link"), through]).plan(world, STRETCHED, seconds=30.0, seed=1)
         assert not plan.found
         assert "'rod'" in plan.reason
         assert "'wall'" in plan.reason
@@ -182,18 +191,17 @@ def test_what_a_grasp_allows_may_be_touched_as_long_as_it_holds_and_no_deeper(ur
     world = rod_at(ur5, 0.02)
     for deep, found in ((0.0205, True), (0.03, False)):
         stages = [Attach("rod", "ee_link", allow=["wall"]), Straight(by=[0.0, deep, 0.0]), Straight(by=UP)]
-        plan = Task(stages).plan(world, STRETCHED, seconds=1.0, seed=1)
+        plan = Task(stages).plan(world, STRETCHED, seconds=20.0, seed=1)
         assert plan.found == found, plan.reason
-    plain = Task([Attach("rod", "ee_link"), Straight(by=[0.0, 0.0205, 0.0])]).plan(world, STRETCHED, seconds=1.0)
+    plain = Task([Attach("rod", "ee_link"), Straight(by=[0.0, 0.0205, 0.0])]).plan(world, STRETCHED, seconds=20.0)
     assert not plain.found
 
 
 def test_what_has_parted_counts_again(panda):
     down_again = [Straight(by=UP), Straight(by=[0.0, 0.0, -0.1205]), Straight(by=UP)]
-    plan = planned(panda, scene(), [*taken(), *down_again], seconds=1.0)
-    assert not plan.found
-    assert "'cup'" in plan.reason
-    assert "'table'" in plan.reason
+    reason = refused(panda, scene(), [*taken(), *down_again], "'cup'")
+    assert "'cup'" in reason
+    assert "'table'" in reason
 
 
 def test_a_contact_lasts_while_a_thing_slides(panda):
@@ -211,9 +219,8 @@ def test_things_on_each_other_and_between_walls_part_one_by_one(panda):
     assert upper.found, upper.reason
     pairs = {frozenset(each.touching.names) for each in upper.contacts[2]}
     assert pairs == {frozenset(("top", "cup")), frozenset(("top", "wall"))}
-    lower = planned(panda, scene(top), [Attach("cup", "panda_hand"), Straight(by=[0.0, 0.0, 0.02])], seconds=1.0)
-    assert not lower.found
-    assert "'top' and 'cup'" in lower.reason
+    words = "'top' and 'cup'"
+    assert words in refused(panda, scene(top), [Attach("cup", "panda_hand"), Straight(by=[0.0, 0.0, 0.02])], words)
 
 
 def test_a_cup_in_the_margin_of_its_table_is_taken_and_set_down(panda):
@@ -267,7 +274,7 @@ def touches(robot, q, cup, tray):
 def test_an_alternative_that_does_not_set_the_thing_down_may_not_touch(panda):
     lower = [MoveTo(above(0.5, -0.25)), Straight(by=[0.0, 0.0, -0.1205])]
     onwards = Alternatives([[Straight(by=UP), Detach("cup")], [Gripper("close", width=0.05)]])
-    plan = planned(panda, scene(), [*taken(), Straight(by=UP), *lower, onwards], seconds=1.0)
+    plan = planned(panda, scene(), [*taken(), Straight(by=UP), *lower, onwards], seconds=2.0)
     assert not plan.found
 
 
@@ -512,20 +519,22 @@ def test_certificates_stand_on_contacts_and_no_deeper(panda):
         assert strict.certificate(lift) is None
 
 
-def plate_beside(robot, away):
+def plate_beside(away):
     plate = rrtik.Obstacle("plate", rrtik.Box([0.05, 0.001, 0.05]), [0.5, 0.25 + away, 0.27])
     stages = [MoveTo(above(0.5, 0.25)), Gripper("close"), Straight(by=DOWN), Gripper("open"), Straight(by=UP)]
-    return planned(robot, rrtik.Scene([TABLE, plate]), stages, seconds=1.0)
+    return rrtik.Scene([TABLE, plate]), stages
 
 
 @pytest.mark.parametrize(("away", "found"), [(0.038, False), (0.07, True)])
 def test_fingers_do_not_pass_through_what_is_between_their_places(panda, away, found):
     """At 38 mm the plate is free of the fingers where they are shut and where they are open."""
-    plan = plate_beside(panda, away)
-    assert plan.found == found, plan.reason
-    if not found:
-        assert "contact of the fingers on their way: 'panda_" in plan.reason
-        assert "attach the object" in plan.reason
+    if found:
+        assert planned(panda, *plate_beside(away)).found
+    else:
+        words = "contact of the fingers on their way: 'panda_"
+        reason = refused(panda, *plate_beside(away), words)
+        assert words in reason
+        assert "attach the object" in reason
 
 
 def test_fingers_may_press_on_what_is_attached_next(panda):
@@ -625,10 +634,9 @@ def test_a_thin_card_does_not_pass_through_a_thin_sheet(panda, inside):
     card = rrtik.Obstacle("card", rrtik.Box([0.06, 0.4, 0.0003]), [0.5, 0.35, 0.30015 - inside])
     reach = [MoveTo(above(0.5, 0.18, height=0.17)), Straight(by=[0.0, 0.0, -0.016]), Attach("card", "panda_hand")]
     around = rrtik.Scene([SHEET, card])
-    through = planned(panda, around, [*reach, Straight(by=[0.0, 0.0, -0.05])], seconds=1.0)
-    assert not through.found
-    assert "'sheet' and 'card' overlap by 0.3" in through.reason
-    lifted = planned(panda, around, [*reach, Straight(by=[0.0, 0.0, 0.05])], seconds=1.0)
+    words = "'sheet' and 'card' overlap by 0.3"
+    assert words in refused(panda, around, [*reach, Straight(by=[0.0, 0.0, -0.05])], words)
+    lifted = planned(panda, around, [*reach, Straight(by=[0.0, 0.0, 0.05])], seconds=20.0 if inside == 0.0 else 1.0)
     assert lifted.found == (inside == 0.0), lifted.reason
     if lifted.found:
         assert lifted.proven
