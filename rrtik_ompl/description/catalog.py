@@ -33,7 +33,7 @@ from rrtik_ompl.description.urdf import URDF_OPTIONS, robot_from_urdf
 from rrtik_ompl.description.variants import narrowed, padded, scaled, weighted
 from rrtik_ompl.description.xacro_text import expanding
 from rrtik_ompl.files.kinds import FilePath, refusing_others
-from rrtik_ompl.files.text import file_name
+from rrtik_ompl.files.text import file_name, is_utf8
 from rrtik_ompl.model.robot import Robot
 
 if TYPE_CHECKING:
@@ -335,6 +335,8 @@ def _recipe(name: str | os.PathLike[str]) -> _Recipe:
     """
     text = os.fspath(name)
     path = Path(text)
+    if not is_utf8(os.path.abspath(text)):  # Pinocchio and coal take no other names.
+        raise InputError(f"{text}: the name of the file, or of a folder above it, is not UTF-8; rename it")
     if isinstance(name, str) and text in _offers("robots"):
         make = _load("robot", "robots", text)
         return _Recipe("name", text, make, tuple(sorted(inspect.signature(make).parameters)))

@@ -211,6 +211,15 @@ def file_name(path: object) -> Path:
     return Path(path)
 
 
+def is_utf8(name: str) -> bool:
+    """Check whether a name can be written as UTF-8; in names of files that are not, Python marks the other bytes."""
+    try:
+        name.encode()
+    except UnicodeEncodeError:
+        return False
+    return True
+
+
 def comma_numbers(text: str, option: str) -> list[float]:
     """Parse the value of a command-line option: one number, or several separated by commas.
 

@@ -1,11 +1,13 @@
 """Packages of ROS are found by the names that their package.xml states, wherever ROS would find them."""
 
+import os
 import time
 
 import pytest
 
 from rrtik_ompl.base.errors import DescriptionWarning, InputError
 from rrtik_ompl.description import package_path
+from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.description.package_path import Packages
 from rrtik_ompl.description.urdf import robot_from_urdf
 
@@ -114,3 +116,12 @@ def test_one_of_five_hundred_packages_is_found_at_once(tmp_path):
     found = Packages((), tmp_path / "src" / "p0").find("robot_499")
     assert found == tmp_path / "src" / "p499"
     assert time.process_time() - begin < 1.0
+
+
+def test_a_folder_whose_name_is_not_utf8_is_refused_in_one_line(tmp_path):
+    home = tmp_path / os.fsdecode(b"arm_\xff")
+    package(home / "one", "arm_description")
+    urdf = described(home / "one" / "arm.urdf")
+    with pytest.raises(InputError, match=r"arm\.urdf: the name .* is not UTF-8; rename it") as error:
+        load_robot(urdf)
+    assert "\n" not in str(error.value)
