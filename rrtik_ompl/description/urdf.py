@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -10,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rrtik_ompl.base.errors import InputError, UnknownNameError
+from rrtik_ompl.base.errors import InputError, MeshWarning, UnknownNameError
 from rrtik_ompl.description.faults import not_read, postures_outside, tell
 from rrtik_ompl.description.gripper import GripperJoints, gripper_of
 from rrtik_ompl.description.robot_build import JointLimits, build_robot, merge_limits
@@ -123,6 +124,8 @@ def robot_from_urdf_text(
     home = None if folder is None else Path(folder)
     description = read_urdf(text, where=where, folder=home, packages=roots)
     tree = description.tree
+    if description.undrawn:
+        warnings.warn(MeshWarning(description.undrawn), stacklevel=2)
 
     semantics = Srdf(where) if srdf is None else read_srdf(robot_text(Path(srdf), roots), str(srdf))
     if group is not None and srdf is None:

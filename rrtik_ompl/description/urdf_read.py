@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -14,8 +13,9 @@ from xml.parsers import expat
 import numpy as np
 import pinocchio as pin
 
-from rrtik_ompl.base.errors import InputError, MeshWarning, RrtikError, UnknownNameError, few
+from rrtik_ompl.base.errors import InputError, RrtikError, UnknownNameError, few
 from rrtik_ompl.base.poses import pose_from_rpy
+from rrtik_ompl.description.faults import nearest_name
 from rrtik_ompl.description.package_path import Packages, resolve_mesh
 from rrtik_ompl.description.robot_build import Mimic
 from rrtik_ompl.description.tree import JOINT_KINDS, Joint, Link, MeshFile, Solid, Tree
@@ -39,6 +39,7 @@ class UrdfDescription:
         mimics: Which joints follow others, with chains of followers resolved.
         unread: Things in it about shapes, joints and limits that are not used.
         mended: What it says that could not be used as it is, and what was done instead, a sentence each.
+        undrawn: A line about visual shapes that are not drawn; "" if all are.
     """
 
     name: str
@@ -46,6 +47,7 @@ class UrdfDescription:
     mimics: tuple[Mimic, ...]
     unread: tuple[str, ...] = ()
     mended: tuple[str, ...] = ()
+    undrawn: str = ""
 
 
 def read_urdf(
@@ -71,15 +73,16 @@ def read_urdf(
         reader.learn_material(material)
     links = [reader.link(element) for element in robot.findall("link")]
 
-    if reader.undrawn:
-        warnings.warn(MeshWarning(f"{where}: not drawn: {few(reader.undrawn, MOST_UNDRAWN)}"), stacklevel=2)
-
     joints = [reader.joint(element) for element in robot.findall("joint")]
     mimics = [tie for element in robot.findall("joint") for tie in reader.mimics(element)]
-    held, following = _held(reader.held, joints, mimics)
+    reader.hold_leaderless(joints, mimics)
+    held, following = _held(reader.still, joints, mimics)
     tree = Tree(where, links, joints).hold(held)
     ties = flattened(where, tree.joints, following)
-    return UrdfDescription(robot.get("name", ""), tree, ties, tuple(unread_of_urdf(robot)), tuple(reader.mended()))
+    undrawn = f"{where}: not drawn: {few(reader.undrawn, MOST_UNDRAWN)}" if reader.undrawn else ""
+    return UrdfDescription(
+        robot.get("name", ""), tree, ties, tuple(unread_of_urdf(robot)), tuple(reader.mended()), undrawn
+    )
 
 
 def parse_xml(text: str, root: str | None, where: str) -> Element:
@@ -178,8 +181,10 @@ class _Reader:
         packages: The packages, and the folder of the file.
         materials: Colours by name of the material.
         undrawn: Why visual shapes are not drawn, each with its link.
-        held: Joints whose two limits are equal, and that value [rad or m].
+        held: Joints whose two limits are equal.
+        still: The values [rad or m] at which those, and the leaderless, are held.
         floating: Joints of a type that is held still.
+        leaderless: Joints that mimic one that does not exist.
         pointlike, thin: Links with collision shapes whose sizes are all 0, or partly.
         odd: Colours and inertias that are not usable, each with where it is.
     """
@@ -188,8 +193,10 @@ class _Reader:
     packages: Packages
     materials: dict[str, Colour]
     undrawn: list[str] = field(default_factory=list)
-    held: dict[str, float] = field(default_factory=dict)
+    held: list[str] = field(default_factory=list)
+    still: dict[str, float] = field(default_factory=dict)
     floating: list[str] = field(default_factory=list)
+    leaderless: list[str] = field(default_factory=list)
     pointlike: list[str] = field(default_factory=list)
     thin: list[str] = field(default_factory=list)
     odd: list[str] = field(default_factory=list)
@@ -198,6 +205,7 @@ class _Reader:
         """Yield a line for each kind of thing that could not be used as it is."""
         for found, words in (
             (self.held, "held still, as its limits are equal: joint {}"),
+            (self.leaderless, "held still, as what it mimics is no joint: {}"),
             (self.floating, "held still, as only joints with one axis are moved: joint {}"),
             (self.pointlike, "ignored, as its size is 0: a collision shape of {}"),
             (self.thin, f"taken {1e3 * THIN:g} mm thick, as one of its sizes is 0: a collision shape of {{}}"),
@@ -334,7 +342,8 @@ class _Reader:
 
         if bounds["lower"] == bounds["upper"]:
             if element.find("mimic") is None:
-                self.held[name] = bounds["lower"]
+                self.held.append(name)
+                self.still[name] = bounds["lower"]
             else:  # Files often state no range for what follows.
                 bounds |= {"lower": -np.inf, "upper": np.inf}
 
@@ -348,6 +357,15 @@ class _Reader:
             source = attribute(tie, "mimic", "joint", where)
             multiplier = numbers(tie, "multiplier", 1, (1.0,), where)[0]
             yield Mimic(element.get("name", ""), source, multiplier, numbers(tie, "offset", 1, (0.0,), where)[0])
+
+    def hold_leaderless(self, joints: Sequence[Joint], mimics: Sequence[Mimic]) -> None:
+        """Hold joints that mimic one that does not exist at 0, or at the limit next to it."""
+        joint_of = {joint.name: joint for joint in joints}
+        for tie in mimics:
+            if tie.source not in joint_of:
+                follower = joint_of[tie.joint]
+                self.still[tie.joint] = min(max(0.0, follower.lower), follower.upper)
+                self.leaderless.append(f"'{tie.joint}' of '{tie.source}'{nearest_name(tie.source, joint_of)}")
 
 
 def _measured(element: Element, measure: Measure, where: str) -> float | list[float]:
@@ -416,7 +434,7 @@ def _held(
 ) -> tuple[dict[str, float], list[Mimic]]:
     """Return the values of joints that are held still, with those that follow them, and the other followers."""
     still = {joint.name: 0.0 for joint in joints if not joint.moves} | dict(held)
-    following = list(mimics)
+    following = [tie for tie in mimics if tie.joint not in still]
     while stopped := [tie for tie in following if tie.source in still]:
         still |= {tie.joint: tie.multiplier * still[tie.source] + tie.offset for tie in stopped}
         following = [tie for tie in following if tie.joint not in still]

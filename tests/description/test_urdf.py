@@ -272,7 +272,6 @@ BAD_TEXTS = {
     "ball": (arm().replace('type="revolute"', 'type="ball"', 1), "no usable joint type 'ball'"),
     "no type": (arm().replace('type="revolute"', "", 1), "<joint type"),
     "no joint moves": ("<robot name='r'><link name='base'/></robot>", "no movable joint"),
-    "unknown mimic": (arm(elbow=BOUNDS + "<mimic joint='sholder'/>"), "did you mean 'shoulder'"),
     "mimic of itself": (arm(elbow=BOUNDS + "<mimic joint='elbow'/>"), "mimics itself"),
     "mimic ring": (
         arm(elbow=BOUNDS + "<mimic joint='shoulder'/>", shoulder=BOUNDS + "<mimic joint='elbow'/>"),
@@ -317,6 +316,10 @@ ODD_TEXTS = {
     "flat box": (solid("<box size='1 0 1'/>"), "0.1 mm thick.*link 'upper'"),
     "colour of words": (arm("<material name='m'><color rgba='red'/></material>"), "colour of material 'm'"),
     "empty colour": (arm("<material name='m'><color rgba=''/></material>"), "colour of material 'm'"),
+    "mimics no joint": (
+        arm(shoulder=BOUNDS + "<mimic joint='elbw'/>"),
+        "held still.*'shoulder' of 'elbw'; did you mean 'elbow'",
+    ),
     "mass of words": (
         arm(links=LINKS.replace("'base'/>", "'base'><inertial><mass value='x'/><inertia/></inertial></link>")),
         "inertia of link 'base'",
