@@ -199,11 +199,16 @@ class _Finder:
                     found.add(joint.name)
 
     def _named_finger(self, joint: Joint, height: int) -> bool:
-        """Check whether a joint has the name of a finger, or moves a link that has."""
-        return height < LONGEST_NAMED and bool(FINGER.search(_words(joint.name)) or FINGER.search(_words(joint.child)))
+        """Check whether a joint has the name of a finger, or moves a link that has; a wrist may turn a fixed jaw."""
+        own, moved = _words(joint.name), _words(joint.child)
+        named = FINGER.search(own) or (FINGER.search(moved) and "fixed" not in moved and not TURNING.search(own))
+        return height < LONGEST_NAMED and bool(named)
 
     def _like_finger(self, joint: Joint, height: int) -> bool:
-        """Check whether a joint closes a gripper, stands beside fingers, or is one of several like it at an arm's end.
+        """Check whether a joint is one of a gripper.
+
+        It closes a gripper by its name; or it is the last one, beside fingers or behind the frame of the tip; or one of
+        several that are alike at the end of an arm.
 
         Args:
             joint: The joint.
@@ -215,7 +220,9 @@ class _Finder:
 
         base = self.body[joint.parent]
         branches = self.below[base]
-        if height == 0 and any(each.name in self.fingers for each in branches):
+        beside_fingers = any(each.name in self.fingers for each in branches)
+        beyond_tip = any(pattern.search(_words(link)) for pattern in TIP_NAMES[:2] for link in self.links[base])
+        if height == 0 and (beside_fingers or (beyond_tip and not TURNING.search(name))):
             return True
 
         heights = [self.heights[each.child] + 1 for each in branches]

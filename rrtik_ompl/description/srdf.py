@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from xml.etree.ElementTree import Element
 
 from rrtik_ompl.base.errors import InputError, UnknownNameError
+from rrtik_ompl.description.arm import FINGER
 from rrtik_ompl.description.faults import nearest_name
 from rrtik_ompl.description.tree import Tree
 from rrtik_ompl.description.urdf_read import attribute, element_lines, numbers, parse_xml
@@ -203,7 +204,10 @@ class Srdf:
         return self.allowed | frozenset(pair for pair in never_checked - self.checked if len(pair) == 2)
 
     def group_tip(self, group: str, tree: Tree) -> str:
-        """Return the link at the end of a group: that of its last chain, its end effector or its last joint."""
+        """Return the link at the end of a group: that of its last chain, its end effector or its last joint.
+
+        Joints with the name of a finger do not count, unless there are no others.
+        """
         chains = self.groups[group].chains
         if chains:
             return chains[-1][1]
@@ -213,8 +217,10 @@ class Srdf:
             if group in (end.parent_group, end.group) and end.parent_link in links:
                 return end.parent_link
 
-        last = self.group_joints(group, tree)[-1]
-        return next(joint.child for joint in tree.joints if joint.name == last)
+        members = self.group_joints(group, tree)
+        moved = [joint for joint in tree.walk() if joint.name in members]
+        arm = [joint for joint in moved if not FINGER.search(f"{joint.name} {joint.child}".lower())]
+        return (arm or moved)[-1].child
 
     def postures(self, group: str | None) -> dict[str, dict[str, float]]:
         """Return the named states merged over all groups; those of ``group`` take precedence."""

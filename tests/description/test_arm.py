@@ -99,6 +99,14 @@ SHAPES = {
     "a frame beyond the hand": (tree(ARM, WIDE, fixed("a5", "my_hand"), fixed("my_hand", "my_tcp")), ["my_tcp"], None),
     "a camera is no tool": (tree(ARM, fixed("a5", "plate", "tool_camera"), JAW), ["a5"], {"fingers": ("jaw",)}),
     "a gripper that closes": (tree(ARM, chain("a5", ["gripper"])), ["a5"], {"fingers": ("gripper",)}),
+    "a jaw behind the tip, without a name": (
+        tree(ARM, fixed("a5", "my_tcp"), chain("a5", ["a6"])), ["my_tcp"], {"fingers": ("a6",)}
+    ),
+    "a wrist that carries a fixed jaw": (
+        tree(ARM, [Joint("wrist_roll", "revolute", "a5", "Fixed_Jaw")], chain("Fixed_Jaw", ["jaw"])),
+        ["Fixed_Jaw"],
+        {"fingers": ("jaw",)},
+    ),
     "a gripper that rolls": (tree(ARM, chain("a5", ["gripper_roll"])), ["gripper_roll"], {}),
     "wheels": (
         tree(ARM, *(chain("base", [f"wheel{k}"], "continuous") for k in range(4))),
