@@ -4,6 +4,7 @@ Pinocchio's parser drops the place of a base that is fixed, and takes the range 
 """
 
 import sys
+import warnings
 from xml.etree import ElementTree
 
 import numpy as np
@@ -243,3 +244,42 @@ def test_the_mesh_of_an_ellipsoid_holds_it_and_is_little_larger():
     distances = np.einsum("ij,ij->i", normals, corners[:, 0]) / np.linalg.norm(normals, axis=1)
     assert distances.min() >= 1.0 - 1e-9  # every face is outside of the sphere, and faces outward
     assert np.linalg.norm(corners, axis=2).max() < 1.03
+
+
+BARS = """<mujoco><compiler angle="radian"/><worldbody>{world}
+<body name="a"><joint name="j1" range="-2 2"/><geom size=".02"/>
+<body name="b" pos=".3 0 0"><joint name="j2" range="-2 2"/><geom size=".02"/>
+<body name="left" pos="0 .1 0"><joint name="crank" range="0.2 1" ref="0.5"/><geom size=".01"/>
+<body name="rod" pos=".1 0 0"><joint name="rod" range="-2 2"/><geom size=".01"/></body></body>
+<body name="right" pos="0 -.1 0"><joint name="rocker" range="-2 2"/><geom size=".01"/></body></body></body>
+</worldbody><tendon><fixed name="cord"><joint joint="crank" coef="1"/></fixed></tendon>
+<equality>{tie}</equality></mujoco>"""
+LOOPS = {
+    "connect": ('<connect body1="rod" body2="right" anchor="0 0 0"/>', ("crank", "rod", "rocker"), 0.5),
+    "weld": ('<weld body1="rod" body2="b"/>', ("crank", "rod"), 0.5),
+    "tendon": ('<tendon tendon1="cord"/>', ("crank",), 0.5),
+    "value": ('<joint joint1="crank" polycoef="0.25 0 0 0 0"/>', ("crank",), 0.75),
+    "weld to what a user moves": ('<weld body1="mouse" body2="rod"/>', (), None),
+    "not active": ('<connect body1="rod" body2="right" anchor="0 0 0" active="false"/>', (), None),
+}
+
+
+@pytest.mark.parametrize("kind", LOOPS)
+def test_joints_in_a_loop_are_held_where_the_file_closes_it(tmp_path, kind):
+    tie, joints, crank = LOOPS[kind]
+    file = tmp_path / "bars.xml"
+    file.write_text(BARS.format(world='<body name="mouse" mocap="true"/>', tie=tie))
+    loops = read_mjcf(file).loops
+    assert tuple(loops) == joints
+    assert loops.get("crank") == crank
+
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        robot = load_robot(file)
+    assert set(joints).isdisjoint(robot.joint_names)
+    assert {"j1", "j2"} <= set(robot.joint_names)
+    told = " ".join(str(each.message) for each in caught)
+    assert not joints or f"joints in loops ('{joints[0]}'" in told
+    if crank is not None:
+        turned = np.arccos(robot.fk(np.zeros(robot.dof), "left").rotation[0, 0])
+        assert turned == pytest.approx(crank - 0.5, abs=1e-9)
