@@ -21,8 +21,12 @@ from rrtik_ompl.ik.methods import METHODS, leaves_a_curve
 from rrtik_ompl.ik.multi_goals import at_all_tips
 from rrtik_ompl.ik.numeric.projection import project, projected
 from rrtik_ompl.ik.numeric.restarts import numeric_ik
-from rrtik_ompl.ik.solve import DRAWS, solve_ik
+from rrtik_ompl.ik.one_pose import solve_one_pose
+from rrtik_ompl.ik.solve import DRAWS, SECONDS, solve_ik, solve_in_any_way
 from rrtik_ompl.ik.targets import leaves_freedom, skip_targets, targets
+from rrtik_ompl.kernels.ik.ik_layout import KERNELS, ChoiceTable
+from rrtik_ompl.kernels.simd.library import library
+from rrtik_ompl.kernels.tables.memory import packed
 from rrtik_ompl.model.goal import GoalPart, GoalSet, Target, TipGoal, has_continuous, joint_difference
 from rrtik_ompl.model.robot import Robot, inside_limits, poses
 from rrtik_ompl.world.problem import Problem
@@ -35,6 +39,7 @@ NO_LIMIT = 1e9  # [s]: MB-RRT then ends by the number of its passes, after some 
 LEAST_SECONDS = 1e-3  # time that MB-RRT gets when the time is up [s]
 MAX_CONFIGURATIONS = 16  # largest number of configurations that one round adds
 MAX_TOTAL = 96  # largest number of configurations altogether
+FARTHEST = 1e300  # [rad] or [m] of a difference, since kernels know no infinity
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -140,18 +145,32 @@ class GoalSearch:
         found = self._search_round()
         self._rounds += 1
 
-        checks = self._problem.world.checks
-        free = found[checks.free(found)]
-        free = free[checks.certified(free)]
-        if self._first_round_is_deterministic and self._rounds == 1:
-            free = _with_full_turns(self._problem, free)
         self._all_at_goal = np.vstack([self._all_at_goal, found])
-        self.rows = frozen(np.vstack([self.rows, _spread_out(self._problem, free, self.rows)])[:MAX_TOTAL])
+        self.rows = frozen(np.vstack([self.rows, self._chosen(found)])[:MAX_TOTAL])
         self.exhausted |= self._rounds >= LAST_ROUND or len(self.rows) >= MAX_TOTAL
 
         if self._first_round_is_deterministic and self._rounds == 1 and not self._problem.constraints:
             _known_first_rounds[self._problem] = self.rows, self._all_at_goal, self.exhausted
         return len(self.rows) > num_known
+
+    def _chosen(self, found: Matrix) -> Matrix:
+        """Return the rows of ``found``, shape (m, dof), that this round adds: free, and spread out; shape (k, dof)."""
+        checks = self._problem.world.checks
+        free = found[checks.free(found)]
+        if len(free) == 0:
+            return free
+        checks.prover.prepare()  # Whoever plans needs the tables soon, and without them coal would check these rows.
+
+        if self._first_round_is_deterministic and self._rounds == 1:
+            turned = _with_full_turns(self._problem, free[checks.certified(free)])
+            return _spread_out(self._problem, turned, self.rows)
+
+        # Of many rows few are chosen, and it is these that are certified.
+        chosen = _spread_out(self._problem, free, self.rows)
+        good = checks.certified(chosen)
+        if good.all():
+            return chosen
+        return _spread_out(self._problem, free[checks.certified(free)], self.rows)
 
     def _recall_first_round(self) -> bool:
         """Take over what another search of this problem has found in its first round.
@@ -202,6 +221,10 @@ class GoalSearch:
         other_branches_may_come = goal_leaves_freedom and round_number % 2 == 0
         closed_form_is_due = round_number == 0 or other_branches_may_come
         if closed_form_is_due and _method_fits("closed-form", robot, drawn_targets):
+            quick = solve_one_pose(robot, goal, problem.start, True, SECONDS, seed, solve_in_any_way)
+            if quick is not None:  # The pose is not singular, so these are all.
+                self._first_round_is_deterministic = self.exhausted = True
+                return quick.solutions
             self._first_round_is_deterministic = not goal_leaves_freedom and len(parts) <= DRAWS
             self.exhausted = self._first_round_is_deterministic and not leaves_a_curve(robot, drawn_targets)
             return solve_ik(robot, goal, method="closed-form", near=problem.start, all=True, seed=seed).solutions
@@ -266,14 +289,10 @@ def _with_full_turns(problem: Problem, rows: Matrix) -> Matrix:
     joints are left out. Where the posture is free, it is free in every turn. Shape (m, dof).
     """
     robot = problem.world.robot
-    spans = robot.upper - robot.lower
-    turned = [rows]
-    for joint in np.flatnonzero(robot.chain.whole_turns() & ~robot.continuous & (spans >= TAU)):
-        for turn in (-TAU, TAU):
-            other = rows.copy()
-            other[:, joint] += turn
-            turned.append(other[inside_limits(robot, other)])
-    return np.vstack(turned)
+    joints = robot.chain.whole_turns() & ~robot.continuous & (robot.upper - robot.lower >= TAU)
+    turn = TAU * np.eye(robot.dof)[joints]
+    turned = (rows[:, None] + np.vstack([turn, -turn])).reshape(-1, robot.dof)
+    return np.vstack([rows, turned[inside_limits(robot, turned)]])
 
 
 def _move_into_regions(problem: Problem, goal: TipGoal, found: Matrix, rng: np.random.Generator) -> Matrix:
@@ -375,14 +394,44 @@ def _spread_out(problem: Problem, rows: Matrix, known: Matrix) -> Matrix:
     for row in known:
         separation = np.minimum(separation, np.abs(joint_difference(robot, turned, row)).max(axis=1))
 
+    chosen = _apart(robot, turned, distance, separation)
+    return turned[sorted(chosen, key=lambda k: (distance[k], k))]
+
+
+def _apart(robot: Robot, rows: Matrix, away: Vector, separation: Vector) -> list[int]:
+    """Return the indices of the rows that `_spread_out` chooses, by a kernel or in numpy.
+
+    Args:
+        robot: The arm.
+        rows: Configurations, shape (m, dof).
+        away: Their distances from the start, shape (m,).
+        separation: The largest joint difference of each from the nearest that is known, shape (m,).
+    """
+    kernels = library(KERNELS)
+    if kernels is not None and len(rows):
+        choice = packed(
+            ChoiceTable,
+            rows=len(rows),
+            dof=robot.dof,
+            most=MAX_CONFIGURATIONS,
+            least=SAME_POSTURE,
+            q=rows,
+            away=away,
+            apart=np.minimum(separation, FARTHEST),
+            endless=robot.continuous.astype(np.int32),
+            chosen=np.zeros(MAX_CONFIGURATIONS, dtype=np.int32),
+        )
+        count = kernels.choose_apart(choice.address)
+        return [int(row) for row in choice.chosen[:count]]
+
     chosen: list[int] = []
     while len(chosen) < MAX_CONFIGURATIONS and (separation > SAME_POSTURE).any():
         is_first_half = len(chosen) < MAX_CONFIGURATIONS // 2
-        score = -distance if is_first_half else separation
+        score = -away if is_first_half else separation
         best = int(np.argmax(np.where(separation > SAME_POSTURE, score, -np.inf)))
         chosen.append(best)
-        separation = np.minimum(separation, np.abs(joint_difference(robot, turned, turned[best])).max(axis=1))
-    return turned[sorted(chosen, key=lambda k: (distance[k], k))]
+        separation = np.minimum(separation, np.abs(joint_difference(robot, rows, rows[best])).max(axis=1))
+    return chosen
 
 
 def _explain_miss(problem: Problem, goal: TipGoal, rounds: str) -> str:

@@ -241,6 +241,11 @@ class Prover:
         """Check whether a proof was made for these bodies, by this prover or its copy for another thread."""
         return isinstance(proof.maker, Prover) and proof.maker.kin is self.kin
 
+    def prepare(self) -> None:
+        """Make the tables, for a caller that has few configurations now and motions to prove later."""
+        if library(PROOF_KERNELS) is not None and not self.always_colliding:
+            self.tables.get(self.bodies, self._new_table)
+
     def still_proven(self, rows: Matrix, *, clearance: float) -> Mask:
         """Return which configurations, shape (m, dof), are proven free with a clearance [m], shape (m,).
 

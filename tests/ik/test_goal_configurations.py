@@ -384,3 +384,39 @@ def test_a_goal_set_says_which_member_is_reached_by_tolerances_of_each():
     exact, far = PositionGoal(tip[:3, 3]), PositionGoal(tip[:3, 3] + 0.1)
     assert GoalSet([far, near]).member_at(robot, q) is None
     assert GoalSet([far, near, exact]).member_at(robot, q) == 2
+
+
+@pytest.mark.kernels
+def test_the_kernel_chooses_the_rows_that_numpy_chooses(monkeypatch):
+    robot = load_robot("kinova")  # some of its joints have no limits
+    rng = np.random.default_rng(0)
+    for count in (1, 5, 60):
+        rows = rng.uniform(-4.0, 4.0, (count, robot.dof))
+        rows[-1] = rows[0] + 1e-5
+        away, apart = rng.uniform(0.0, 1.0, count), np.full(count, np.inf)
+        fast = goal_configurations._apart(robot, rows, away, apart)
+        with monkeypatch.context() as without:
+            without.setattr(goal_configurations, "library", lambda name: None)
+            assert goal_configurations._apart(robot, rows, away, apart) == fast
+        assert len(fast) == min(16, count - (count > 1))
+
+
+def test_a_posture_of_a_ur_is_a_goal_in_the_nearest_turns_and_a_turn_further_on(world):
+    problem = Problem(world, HERE, PoseGoal(world.robot.fk(THERE)))
+    search = GoalSearch(problem, 0)
+    rows = search.first()
+    assert search.exhausted
+    assert np.abs(rows[0] - HERE).max() <= np.pi
+    turned = np.abs(rows - HERE).max(axis=1) > np.pi + 1e-9
+    assert turned.any()
+    assert not turned.all()
+    assert world.valid_batch(rows).all()
+    assert problem.goal.satisfied(world.robot, rows).all()
+
+
+def test_the_tables_of_proofs_are_there_once_goals_are_known():
+    problem = load_problem("ur5_table")
+    again = Problem(World(problem.robot, problem.world.scene), problem.start, problem.goal)
+    assert again.world.prover.tables.packed is None
+    assert len(GoalSearch(again, 0).first())
+    assert again.world.prover.tables.packed is not None

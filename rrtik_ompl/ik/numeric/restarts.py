@@ -195,5 +195,6 @@ def numeric_ik(robot: Robot, goal: TipGoal, starts: Matrix, *, iterations: int =
     aims = goal_rows(goal)
     if len(aims) > 1:
         aims = aims[np.arange(len(starts)) % len(aims)]
-    Q, _, _ = walk(robot, aims, starts, steps=iterations, patience=PATIENCE)
-    return Q[goal.satisfied(robot, Q)]
+    Q, reached, _ = walk(robot, aims, starts, steps=iterations, patience=PATIENCE)
+    # What has not arrived may still be within the tolerances, which are wider than where a walk ends.
+    return Q[reached] if reached.any() else Q[goal.satisfied(robot, Q)]

@@ -6,6 +6,7 @@ go on beyond it are left out of a step. :mod:`rrtik_ompl.kernels.reference.desce
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from rrtik_ompl.kernels.ik import ik_layout
@@ -20,11 +21,12 @@ from rrtik_ompl.kernels.ik.ik_accessors import (
     pose_origin,
 )
 from rrtik_ompl.kernels.ik.ik_kinematics import differentiate, measure, move_tip, see_from, weigh
-from rrtik_ompl.kernels.ik.ik_layout import TWIST_NUMBERS, Aim, CallTable, LimbTable, Twist
+from rrtik_ompl.kernels.ik.ik_layout import TWIST_NUMBERS, Aim, CallTable, ChoiceTable, LimbTable, Twist
 from rrtik_ompl.kernels.ik.lane_descent import search_lanes, walk_lanes
 from rrtik_ompl.kernels.layout import Configuration
 from rrtik_ompl.kernels.simd.compiled import entry, inlined, kernel
 from rrtik_ompl.kernels.simd.records import exists, row_at
+from rrtik_ompl.kernels.simd.wide_angles import TAU
 
 UNBOUNDED_RESIDUAL = 1e300  # without unit
 
@@ -206,6 +208,42 @@ def search(limb: LimbTable, call: CallTable, row: int) -> bool:
         if descend(limb, call, aim, q):
             return True
     return False
+
+
+@entry
+def choose_apart(choice: ChoiceTable) -> int:
+    """Choose rows that differ from each other and from those that are known; how many.
+
+    The first half are those nearest to the start, each of the others the one farthest from all chosen so far.
+    """
+    dof = choice.dof
+    apart = choice.apart
+    for count in range(choice.most):
+        best = -1
+        for k in range(choice.rows):
+            if apart[k] <= choice.least:
+                continue
+            if best < 0:
+                best = k
+            elif 2 * count < choice.most:
+                best = k if choice.away[k] < choice.away[best] else best
+            else:
+                best = k if apart[k] > apart[best] else best
+        if best < 0:
+            return count
+
+        choice.chosen[count] = best
+        own = row_at(choice.q, dof, best)
+        for k in range(choice.rows):
+            other = row_at(choice.q, dof, k)
+            far = 0.0
+            for joint in range(dof):
+                gap = other[joint] - own[joint]
+                if choice.endless[joint] != 0:
+                    gap -= TAU * math.floor(gap / TAU + 0.5)
+                far = max(far, abs(gap))
+            apart[k] = min(apart[k], far)
+    return choice.most
 
 
 @entry

@@ -77,6 +77,20 @@ class CallTable(Record):
     starts: Wholes  # number of the start in each lane
 
 
+class ChoiceTable(Record):
+    """Configurations of which some are chosen."""
+
+    rows: int
+    dof: int
+    most: int  # to choose
+    least: float  # difference of a joint by which two differ
+    q: Configuration
+    away: Doubles  # distance of each from the start
+    apart: Doubles  # largest difference of a joint from the nearest that is known or chosen
+    endless: Ints  # whether a joint has no limits
+    chosen: Ints  # their numbers, in the order of the choice
+
+
 # Lanes: places of wide lanes. Of each start: share of damping, the squared residual some steps ago and one step ago,
 # steps, whether it moves (1 or 0), residual, lower half of the square, the tip by rows, columns of the Jacobian; behind
 # these coordinates, and axis and origin of each joint.

@@ -227,22 +227,23 @@ def write_branches(call: PoseTable, left: int, most: int) -> int:
 
 @inlined
 def closed_form(call: PoseTable, most: int) -> int:
-    """Solve by branches; those that are only nearly at the pose count where no other is, like those that are singular.
+    """Solve by branches; those that are only within the tolerances of the pose count where no other is at it.
 
-    What is singular, or could be within the tolerances where nothing else will do, is left to numpy.
+    What is singular is left to numpy, and so is what is nearly so if nothing else will do or all solutions are wanted.
     """
     if not begin(call):
         return UNKNOWN
     real, away, size = solve_branches(call)
-    if bits((away < SINGULAR) | (size < SINGULAR)) != 0:
+    slack = call.slack
+    nearly = bits((away < slack) | (size < slack)) != 0
+    if (nearly and most > 1) or bits((away < SINGULAR) | (size < SINGULAR)) != 0:
         return UNKNOWN
     good = hold(call)
     good = good & verify(call)
     if good & real != 0:
         good = good & real
     if good == 0:
-        slack = call.slack
-        return UNKNOWN if bits((away < slack) | (size < slack)) != 0 else 0
+        return UNKNOWN if nearly else 0
     return write_branches(call, good, most)
 
 
