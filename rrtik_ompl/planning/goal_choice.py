@@ -7,11 +7,14 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from rrtik_ompl.base.arrays import Mask, Matrix
+from rrtik_ompl.description.joint_weights import weighted_difference
 from rrtik_ompl.ik.goal_configurations import MAX_ROUNDS, GoalSearch
 from rrtik_ompl.model.goal import TipGoal, has_continuous
 from rrtik_ompl.ompl_bridge.planner_traits import PlannerTraits
 from rrtik_ompl.planning.outcome import Request
 from rrtik_ompl.world.problem import Problem
+
+FAR = 2.0  # times the distance of the nearest goal configuration: those farther away are left out of the first attempt
 
 
 class GoalChoice:
@@ -44,6 +47,7 @@ class GoalChoice:
         self._one_goal = traits.one_goal
         self._goal_in_joints = problem.goal.q is not None
         self._has_long_way = self._goal_in_joints and has_continuous(problem.robot) and len(seeds) > 1
+        self._left_out = False
         self._search = GoalSearch(problem, seeds[0], seconds_left=seconds_left)
 
     @property
@@ -81,6 +85,13 @@ class GoalChoice:
             # The first row is the goal as it is given. In the other rows a joint turns the other way round.
             return rows[:1]
 
+        if attempt == 0 and not self._goal_in_joints and len(rows):
+            away = np.linalg.norm(weighted_difference(self._problem.robot, rows, self._problem.start), axis=1)
+            near = away <= FAR * away.min()
+            self._left_out = not near.all()
+            nearest: Matrix = rows[near]
+            return nearest
+
         num_known_kept = int(np.count_nonzero(kept[:num_known]))
         has_new = found_more and num_known_kept < len(rows)
         first = num_known_kept if has_new else attempt
@@ -94,7 +105,11 @@ class GoalChoice:
         """Check whether later attempts would have other goal configurations than this one."""
         if self.planner_finds_goals or attempt == self._max_attempts - 1:
             return False
-        return not self._search.exhausted or (self._one_goal and attempt + 1 < len(self._search.rows))
+        return (
+            not self._search.exhausted
+            or (attempt == 0 and self._left_out)
+            or (self._one_goal and attempt + 1 < len(self._search.rows))
+        )
 
     def _find_with_clearance(self) -> Mask:
         """Return a mask of the known goal configurations to search to, shape (k,).
