@@ -159,7 +159,7 @@ def shorten(
 
     Example:
         >>> problem = rrtik.load_problem("planar3_boxes")
-        >>> found = rrtik.plan(problem, "RRTConnect", seed=1)
+        >>> found = rrtik.plan(problem, "RRTConnect", seed=1, shorten=False)
         >>> rrtik.shorten(found.path, problem).length < found.path.length
         True
     """
