@@ -90,9 +90,10 @@ def test_planners_that_crash_hang_quit_or_eat_the_memory_do_not_end_a_campaign(t
     env = {**os.environ, "PYTHONPATH": path}
     process = command("bench", suite, "--out", tmp_path / "out", "--views", 0, "--jobs", 2, env=env)
     said, errors = process.communicate(timeout=120)
-    assert (process.returncode, errors) == (1, "")  # for one of them never did anything but raise
+    assert (process.returncode, errors) == (1, "")  # for some of them never did anything but raise or crash
     broken = f"planner Raiser broke: ValueError: no idea (bad_planners.py, line {RAISING})"
     assert f"planar3_a, raiser: 1 x error: {broken}" in said.splitlines()
+    assert f"planar3_a, crasher: 1 x crash: {CRASHED}" in said.splitlines()
     outcomes = {
         record["planner"]: (record["status"], record["reason"]) for record in read_records(tmp_path / "out" / NAME)
     }
@@ -103,17 +104,6 @@ def test_planners_that_crash_hang_quit_or_eat_the_memory_do_not_end_a_campaign(t
     assert outcomes["raiser"] == ("error", broken)
     assert outcomes["bicrdt"] == ("solved", "")
     assert f"crash: {CRASHED}" in (tmp_path / "out" / "summary.md").read_text()
-
-
-def test_a_planner_that_crashes_each_time_is_named_and_the_exit_code_is_1(tmp_path, capsys):
-    (tmp_path / "bad_planners.py").write_text(BAD_PLANNERS)
-    suite = tmp_path / "bad.yaml"
-    suite.write_text(
-        'version: 1\nproblems: [planar3_a]\nplanners: ["bad_planners.py:Crasher", bicrdt]\nruns: 2\nseconds: 2\n'
-    )
-    assert run(["bench", str(suite), "--out", str(tmp_path / "out"), "--views", "0"]) == 1
-    said = capsys.readouterr().out
-    assert f"planar3_a, Crasher: 2 x crash: {CRASHED.replace('crasher', 'Crasher')}" in said.splitlines()
 
 
 def test_ctrl_c_ends_a_campaign_with_one_line_and_leaves_nothing_running(suite, tmp_path):

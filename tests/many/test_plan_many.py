@@ -68,7 +68,7 @@ def ends(boxes):
     return starts, [boxes.goal, boxes.goal, boxes.goal, rrtik.JointGoal(boxes.start)]
 
 
-@pytest.mark.parametrize("planner", [None, "fastrrtconnect", "RRTConnect"])
+@pytest.mark.parametrize("planner", [None, "RRTConnect"])  # None: fastrrtconnect first
 def test_problems_and_ends_in_their_world_give_the_same_plans_in_threads_and_processes(boxes, planner):
     starts, goals = ends(boxes)
     world = rrtik.plan_many(boxes.world, starts, goals, planner, seconds=60.0, seed=3)
