@@ -24,7 +24,7 @@ import warnings
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from importlib.resources import files
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -198,12 +198,19 @@ def alike(world: Any, truth: World, case: Case) -> Judged:
     single = bool(world.valid(case.Q[0])) == bool(got[0][0])
     found += Judged(int(single), 0, int(not single), "" if single else "valid: another answer than valid_batch")
     if isinstance(world, World):
+        distances = _distances(world, case)
         for other, allowed in ((World.of(world.settings), NEARLY), (truth, ROUNDED)):
-            apart = [abs(world.clearance(q) - other.clearance(q)) for q in case.Q[:4]]
+            apart = [abs(a - b) for a, b in zip(distances, _distances(other, case), strict=True)]
             far = sum(gap > allowed for gap in apart if not np.isnan(gap))
             found += Judged(len(apart) - far, 0, far, f"clearance: off by {max(apart):.3g} m" if far else "")
         found += _proofs(world.motions_proven(case.A, case.B), truth.unheld, case)
     return found
+
+
+@lru_cache(maxsize=4)  # one world is compared with those of many ways
+def _distances(world: World, case: Case) -> list[float]:
+    """Clearances of a world at some configurations [m]."""
+    return [world.clearance(q) for q in case.Q[:4]]
 
 
 def careful(world: Any, truth: World, case: Case) -> Judged:

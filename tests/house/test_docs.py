@@ -80,6 +80,7 @@ def test_the_python_example_runs_from_top_to_bottom(page, tmp_path, monkeypatch)
 
 
 @pytest.mark.kernels
+@pytest.mark.slow
 def test_the_examples_of_tasks_run(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     names = {}
@@ -96,6 +97,7 @@ def test_the_examples_of_tasks_run(tmp_path, monkeypatch):
 
 @pytest.mark.kernels
 @pytest.mark.parametrize("page", ["constraints", "planners", "replanning", "scenes", "sensing", "trajectories"])
+@pytest.mark.slow
 def test_the_code_of_a_page_runs_from_top_to_bottom(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     names = {}
@@ -105,6 +107,7 @@ def test_the_code_of_a_page_runs_from_top_to_bottom(page, tmp_path, monkeypatch)
 
 
 @pytest.mark.kernels
+@pytest.mark.slow
 def test_the_thirty_wishes_come_true(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     _write_arms()
@@ -140,6 +143,7 @@ def _write_part():
     Path("part.stl").write_text("\n".join([*lines, "endsolid part"]))
 
 
+@pytest.mark.slow
 def test_the_examples_of_own_ompl_code_run_in_their_order(tmp_path, monkeypatch, quiet_ompl):
     monkeypatch.chdir(tmp_path)
     for example in blocks("own_ompl_code", "python"):
