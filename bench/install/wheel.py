@@ -93,7 +93,9 @@ def contents(report: Report, wheel: Path) -> None:
     report.bar("one wheel for all machines", "py3-none-any", wheel.name, universal)
     compiled = sum(counts[kind] for kind in COMPILED)
     report.bar("machine code in it", "none", f"{compiled} files", compiled == 0)
-    text = f"`{wheel.name}`, {wheel.stat().st_size / 1e6:.1f} MB."
+    megabytes = wheel.stat().st_size / 1e6
+    report.bar("size of the wheel", "<= 10 MB", f"{megabytes:.1f} MB", megabytes <= 10.0)
+    text = f"`{wheel.name}`, {megabytes:.1f} MB."
     report.table("Contents", ("ending", "files", "compressed [MB]"), rows, text=text)
     if code:
         report.table("Bitcode", ("folder", "libraries"), [[where, str(count)] for where, count in sorted(code.items())])
