@@ -307,12 +307,12 @@ def _off(robot: Robot, text: str) -> float | None:
             model = pin.buildModelFromXML(ElementTree.tostring(root, "unicode"))
         except (ValueError, RuntimeError):
             return None
-    if not model.existFrame(robot.tip):
+    if not model.existFrame(robot.tip, pin.FrameType.BODY):
         return float("inf")
 
     joints = {joint.get("name", ""): joint for joint in root.findall("joint") if joint.get("type") in MOVES}
     data = model.createData()
-    frame = model.getFrameId(robot.tip)
+    frame = model.getFrameId(robot.tip, pin.FrameType.BODY)
     rng = np.random.default_rng(0)
     worst = 0.0
     for row in rng.uniform(*robot.finite_range(), (POSTURES, robot.dof)):
