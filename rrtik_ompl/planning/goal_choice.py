@@ -85,7 +85,7 @@ class GoalChoice:
             # The first row is the goal as it is given. In the other rows a joint turns the other way round.
             return rows[:1]
 
-        if attempt == 0 and not self._goal_in_joints and len(rows):
+        if attempt == 0 and self._max_attempts > 1 and not self._goal_in_joints and len(rows):
             away = np.linalg.norm(weighted_difference(self._problem.robot, rows, self._problem.start), axis=1)
             near = away <= FAR * away.min()
             self._left_out = not near.all()
