@@ -177,7 +177,7 @@ class ParallelArm:
         q5, real5 = _onto(h2, h5, h6, (g @ h2)[:, None], signs[:, None])
         axis6 = _turned(h5, q5, h6)
         middle, size = _between(axis6, g[:, None], h2)
-        normal = (size < target.least) & real1[:, None] & real5
+        normal = (np.sqrt(size) < target.least) & real1[:, None] & real5
         if last is not None:
             free, _ = _between(_turned(h5, q5, _turned(h6, last, across)), x[:, None], h2)
             middle = np.where(normal, free, middle)

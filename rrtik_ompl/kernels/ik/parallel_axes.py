@@ -147,7 +147,7 @@ def wrist(numbers: Doubles, seen: Any, sign: Any) -> Any:
     fifth, real = onto(h2, h5, h6, dot(h2, axis6), sign)
     middle, size = between(turned(h5, fifth, h6), axis6, h2)
     sixth, _ = between(cross(h5, h6), turned_back(h5, fifth, turned_back(h2, middle, across)), h6)
-    return fifth, middle, sixth, real, size
+    return fifth, middle, sixth, real, square_root(size)  # both parts across are as long as the sine
 
 
 @inlined

@@ -86,6 +86,17 @@ def test_of_a_pose_with_axis_6_along_axis_2_the_members_that_are_wanted_are_give
     assert (form_of(robot).nearness(drawn(robot, 100))["wrist"] > 1e-9).all()
 
 
+@pytest.mark.parametrize("away", [1e-6, 1e-5, 1e-3])
+def test_poses_next_to_singular_ones_are_solved_as_well_as_others(away):
+    robot = load_robot("ur5")
+    Q = drawn(robot, 100, 5)
+    Q[:, 4] = away
+    found = solutions(robot, robot.fk_batch(Q), near=Q)
+    assert found.residuals[found.real].max() < 1e-9
+    assert not found.singular.any()
+    assert solutions(robot, robot.fk_batch(Q), near=Q, slack=2.0 * away).singular.all()
+
+
 def test_where_p_is_on_axis_1_the_members_that_are_wanted_are_given():
     robot = load_robot("titan4")  # whose own form is another
     form = parallel_form(robot)
