@@ -185,6 +185,7 @@ def other_arguments(function: Callable[..., Any]) -> dict[str, Any]:
         "cell": lambda: 0.1,
         "joints": lambda: ["turn"],
         "limit": lambda: 2**20,
+        "scale": lambda: np.ones(3),
     }
     _, *others = signature(function).parameters.values()
     needed = [each for each in others if each.default is Parameter.empty and each.kind is not Parameter.VAR_KEYWORD]

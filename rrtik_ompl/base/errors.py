@@ -96,8 +96,9 @@ class UnknownNameError(InputError):
         self.alternatives = tuple(sorted(map(str, listed(alternatives, "alternatives of a name"))))
         require(where, str, "place of a name")
 
-        near = get_close_matches(self.name, list(self.alternatives if similar is None else similar), n=1)
-        hint = f"; did you mean '{near[0]}'?" if near else ";"
+        meant = {each.lower(): each for each in (self.alternatives if similar is None else similar)}
+        near = get_close_matches(self.name.lower(), meant, n=1)
+        hint = f"; did you mean '{meant[near[0]]}'?" if near else ";"
         have = ", ".join(self.alternatives) or "none"
         prefix = f"{where}: " if where else ""
         super().__init__(f"{prefix}no {kind} '{self.name}'{hint} have {have}")

@@ -93,7 +93,7 @@ def solve_ik(
         >>> robot.fk(q).translation.round(2)
         array([0.4, 0.2, 0.5])
     """
-    if method == "auto" and world is None and (all is False or all is True):
+    if isinstance(method, str) and method == "auto" and world is None and (all is False or all is True):
         quick = solve_one_pose(robot, goal, near, all, seconds, seed, solve_in_any_way)
         if quick is not None:
             return quick

@@ -22,6 +22,7 @@ from rrtik_ompl.model.certificate import Certificate, MotionEntries
 from rrtik_ompl.model.judgement import ClearanceCurve, Contact, Judged, PathContact, Played, Verdict, Violation
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.proof import Gap, Proof
+from rrtik_ompl.model.shapes.mesh_repair import edges_of
 from rrtik_ompl.model.shapes.point_tree import point_tree
 from rrtik_ompl.model.shapes.shape import Measure
 from rrtik_ompl.model.world_settings import WorldSettings
@@ -50,6 +51,7 @@ SAMPLES = {
     "ConstantVelocity": lambda: rrtik.replanning.ConstantVelocity([1.0, 0.0, 0.0]),
     "Contact": lambda: CONTACT,
     "Cylinder": lambda: rrtik.Cylinder(1.0, 2.0),
+    "Edges": lambda: edges_of(np.array([[0, 1, 2], [2, 1, 3]])),
     "Gap": lambda: Gap(1, 0.5, "link1", "ball"),
     "GoalSet": lambda: rrtik.GoalSet([AT, rrtik.PositionGoal([1.0, 0.0, 0.0])], "z"),
     "HalfSpace": lambda: rrtik.HalfSpace([0.0, 0.0, 1.0], 0.0),

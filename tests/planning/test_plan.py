@@ -220,7 +220,7 @@ def test_where_the_short_way_round_is_blocked_the_long_one_does_not_wait_for_hal
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"planner": "rrt_conect"}, "no planner 'rrt_conect'; have"),
+        ({"planner": "rrt_conect"}, "no planner 'rrt_conect'; did you mean 'RRTConnect'"),
         ({"planner": oc.RRT}, "plans with controls"),
         ({"planner": lambda: None}, "cannot be made from"),
         ({"seconds": 0}, "seconds: must be greater than 0"),

@@ -148,7 +148,10 @@ BAD_SCENES = {
     "unknown shape": (("type: sphere", "type: cone"), r"primitives\[0\]\.type: must be 'box', 'cylinder' or 'sphere'"),
     "negative size": (("[0.2]", "[-0.2]"), "must be 1e-06 or more, found -0.2"),
     "poses missing": (("primitive_poses: [{position: [0, 9, 0]}]", "primitive_poses: []"), "'ball' has 1 primitives"),
-    "other frame": (("frame_id: world", "frame_id: camera"), r"collision_objects\[1\]: no frame 'camera'; have"),
+    "other frame": (
+        ("frame_id: world", "frame_id: camera"),
+        r"collision_objects\[1\]: no frame 'camera'; did you mean 'car'",
+    ),
     "mesh": (("header:", "meshes: [{}]\n      header:"), "'ball': meshes and planes are not read"),
     "name twice": (("id: ball", "id: crate"), "'crate' is used 2 times"),
     "ragged table": (("[true, false, false]]", "[true, false]]"), "entry_values must be a table of 3 x 3"),
