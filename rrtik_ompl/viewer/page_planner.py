@@ -68,12 +68,13 @@ LAYOUTS: dict[str, ModuleType] = {
     "crdt": crdt_layout,
     "ik": ik_layout,
 }
-# Tables of the checks, listed separately because the names of their fields repeat.
+# Tables of the checks and of inverse kinematics, listed separately because the names of their fields repeat.
 TABLES: dict[str, type[Record]] = {
     "world": layout.WorldTable,
     "balls": layout.BallTable,
     "primitives": layout.PrimitiveTable,
     "solids": layout.SolidTable,
+    "call": ik_layout.CallTable,
 }
 
 
@@ -266,6 +267,7 @@ def _names(world: World, numbers: Iterable[int]) -> str:
 
 def layout_numbers() -> dict[str, dict[str, int]]:
     """Return the integer constants of the table layouts, and the offsets of fields, by layout or table."""
+    listed = {getmodule(table) for table in TABLES.values()}
 
     def places(table: type[Record]) -> dict[str, int]:
         return {name.upper(): place for name, place in table.places.items()}
@@ -273,7 +275,7 @@ def layout_numbers() -> dict[str, dict[str, int]]:
     def numbers(module: ModuleType) -> dict[str, int]:
         named = {name: value for name, value in vars(module).items() if name.isupper() and type(value) is int}
         for table in vars(module).values():
-            if holds_table(table) and getmodule(table) is module and module is not layout:
+            if holds_table(table) and getmodule(table) is module and module not in listed:
                 named |= places(table)
         return named
 

@@ -15,6 +15,7 @@ import pytest
 import rrtik_ompl as rrtik
 from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.kernels.layout import FREE
+from rrtik_ompl.kernels.record import holds_table
 from rrtik_ompl.kernels.search.connect import ConnectSearch
 from rrtik_ompl.kernels.search.crdt.rules import CrdtRules
 from rrtik_ompl.kernels.search.crdt.search import CrdtSearch
@@ -23,7 +24,7 @@ from rrtik_ompl.model.scene import Scene
 from rrtik_ompl.planning.generated_problems import generated_problem
 from rrtik_ompl.planning.moves.axis_cut import double_axis_cut
 from rrtik_ompl.viewer.page import page
-from rrtik_ompl.viewer.page_planner import SAMPLES, VERTICES, page_planner
+from rrtik_ompl.viewer.page_planner import LAYOUTS, SAMPLES, TABLES, VERTICES, layout_numbers, page_planner
 from rrtik_ompl.world.clearances import Clearances, clearances_between, search_form
 from rrtik_ompl.world.problem import Problem, densely_checked
 from rrtik_tests.browser import Browser, planning_page
@@ -219,6 +220,19 @@ def test_a_pose_is_reached_within_its_tolerances(tmp_path):
     assert np.abs(reached - tips).max() < 2e-5
     assert (np.array(found) >= robot.lower).all()
     assert (np.array(found) <= robot.upper).all()
+
+
+@pytest.mark.parametrize("name", LAYOUTS)
+def test_a_name_means_one_number_of_a_layout(name):
+    numbers = layout_numbers()[name]
+    module = LAYOUTS[name]
+    constants = {key: value for key, value in vars(module).items() if key.isupper() and type(value) is int}
+    assert constants.items() <= numbers.items()
+
+    own = [table for table in vars(module).values() if holds_table(table) and table.__module__ == module.__name__]
+    if not set(own) & set(TABLES.values()):
+        for table in own:
+            assert {field.upper(): place for field, place in table.places.items()}.items() <= numbers.items()
 
 
 def test_what_cannot_plan_is_a_still_page():

@@ -182,7 +182,7 @@ class Kernels {
   reach(pose, from, tip = this.plan.tips[0]) {
     const { names } = this.plan;
     if (tip === undefined) return null;
-    const call = this.table(tip.ik, names.ik);
+    const call = this.table(tip.ik, names.call);
     const aim = call.get("AIMS") / NUMBER_BYTES;
     this.doubles.fill(0, aim, aim + names.ik.AIM_FLOATS);
     this.doubles.set(pose, aim);
