@@ -1,8 +1,10 @@
 """The choice among goal configurations by the length of the path: the first one that a search reaches may be far away.
 
 To each configuration, the nearest first, there is one brief search in kernels, whose route is pulled taut for a moment.
-One whose straight line is no shorter than the best route so far is left out. Searches check motions in coarse steps, as
-every motion that is kept is proven anyway. All of it is bounded by counts: the same seed gives the same path.
+One whose straight line is no shorter than the best route so far is left out, and so is one that the first attempt of a
+planner leaves out. A brief pull may err, so the winner and the given path are both shortened in the end. Searches check
+motions in coarse steps, as every motion that is kept is proven anyway. All of it is bounded by counts: the same seed
+gives the same path.
 """
 
 from __future__ import annotations
@@ -19,6 +21,8 @@ from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.transitions import route_length
 from rrtik_ompl.ompl_bridge.setup import planning_bounds
 from rrtik_ompl.ompl_bridge.weighted import has_weights
+from rrtik_ompl.planning.goal_choice import FAR
+from rrtik_ompl.planning.shortening import Wishes, shortened
 from rrtik_ompl.world.clearances import proved
 from rrtik_ompl.world.motion_queries import has_kernels
 from rrtik_ompl.world.problem import Problem
@@ -35,7 +39,7 @@ SPARE = 2.5e-4  # [m] that motions keep beyond the clearance of the path, as tho
 
 
 def shorter_branch(problem: Problem, path: JointPath, goals: Matrix, budget: Budget) -> JointPath:
-    """Return a path that a brief pull shows to be shorter than a given one, perhaps to another goal configuration.
+    """Return a path that becomes shorter than a given one by `shorten()`, perhaps to another goal configuration.
 
     Args:
         problem: The problem.
@@ -62,7 +66,8 @@ def shorter_branch(problem: Problem, path: JointPath, goals: Matrix, budget: Bud
     lower, upper = planning_bounds(problem, goals)
     motions = ProvenMotions(world, proof.clearance + SPARE).motions
     lines = np.linalg.norm(goals - problem.start, axis=1)
-    order = np.argsort(lines, kind="stable")[:MOST]
+    near = np.flatnonzero(lines <= FAR * lines.min())
+    order = near[np.argsort(lines[near], kind="stable")][:MOST]
 
     def pulled(rows: Matrix, seed: int) -> float:
         """Return the length of a route after a brief pull, +inf if it is not proven."""
@@ -88,4 +93,8 @@ def shorter_branch(problem: Problem, path: JointPath, goals: Matrix, budget: Bud
             if found.proven:
                 best = found
                 shortest = length
-    return best
+    if best is path:
+        return path
+
+    wishes = Wishes(Budget(budget.seed, stop=budget.over), clearance=proof.clearance)
+    return min((path, best), key=lambda each: shortened(each, problem, wishes).length)

@@ -165,7 +165,8 @@ def planned_and_finished(
         InputError: If the planner does not take a parameter.
         PlannerError: If the planner broke.
     """
-    found = _searched(problem, planner, request, finish_follows=method is not None)
+    by_length = _is_auto(planner)  # whether a finish follows or not: `unshortened` is what is found without one
+    found = _searched(problem, planner, replace(request, by_length=by_length), finish_follows=method is not None)
     if method is None:
         return found
 
@@ -205,7 +206,7 @@ def _searched(
         finish_follows: Whether some time has to be left by planners that would use all of it.
     """
     if _is_auto(planner):
-        found = run_portfolio(problem, replace(request, by_length=finish_follows))
+        found = run_portfolio(problem, request)
     else:
         named = named_planner(planner)
         share = ANYTIME_SHARE if finish_follows and traits_of(named.factory).anytime else 1.0

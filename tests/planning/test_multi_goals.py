@@ -152,7 +152,8 @@ def test_thousands_of_grasps_that_cannot_be_reached_do_not_cost_minutes(middle):
     found = rrtik.plan(problem, "RRTConnect", seed=1, seconds=0.05)
     assert time.process_time() - begin < 5.0
     assert not found.found
-    assert re.search(r"wall time|out of reach", found.reason)  # which of the two is found first depends on the machine
+    # Which of these is found first depends on the machine.
+    assert re.search(r"wall time|out of reach|all in collision", found.reason)
     rows = rng.uniform(*world.robot.finite_range(), (5, 7))
     each = np.array([part.distance(world.robot, rows) for part in goal.parts])
     assert (goal.distance(world.robot, rows) == each.min(axis=0)).all()
