@@ -71,7 +71,7 @@ class Browser:
         assert "exceptionDetails" not in found, found
         return found["result"].get("value")
 
-    def wait(self, script, seconds=30.0):
+    def wait(self, script, seconds=90.0):
         try:
             return self._until(lambda: self.ask(f"document.readyState === 'complete' && ({script})"), seconds)
         except AssertionError:
