@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector, frozen, seed_of
 from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.choices import IkMethod
-from rrtik_ompl.base.copies import as_value, in_one_line, set_fields
+from rrtik_ompl.base.copies import as_value, in_one_line, restored, set_fields
 from rrtik_ompl.description.joint_weights import weighted_difference
 from rrtik_ompl.model.goal import Target, TipGoal, has_continuous, joint_difference
 from rrtik_ompl.model.result import required
@@ -149,7 +149,7 @@ class IkResult(_Deferred):
 
         It returns this field and any others by their names.
         """
-        result = object.__new__(cls)
+        result = restored(cls, {})
         _set_later(result, (make, *given))
         return result
 
