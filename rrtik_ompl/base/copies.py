@@ -6,6 +6,7 @@ import sys
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import fields, is_dataclass
+from functools import cache
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Protocol, TypeVar, overload
 
@@ -121,9 +122,13 @@ def restored(kind: type[Thing], state: dict[str, Any]) -> Thing:
 
     This is the only function that creates values without their constructors.
     """
+    return _made(kind, {name: unpacked(value) for name, value in state.items()})
+
+
+def _made(kind: type[Thing], values: Mapping[str, object]) -> Thing:
     thing = object.__new__(kind)
-    for name, value in state.items():
-        object.__setattr__(thing, name, unpacked(value))
+    for name, value in values.items():
+        object.__setattr__(thing, name, value)
     return thing
 
 
@@ -144,8 +149,14 @@ def changed(thing: Thing, **values: object) -> Thing:
         >>> changed(Point(np.zeros(2)), name="origin")
         Point(place=array([0., 0.]), name='origin')
     """
-    same = {each.name: getattr(thing, each.name) for each in fields(thing)}  # type: ignore[arg-type]
-    return restored(type(thing), same | values)
+    same = {name: getattr(thing, name) for name in _field_names(type(thing))}  # type: ignore[arg-type]
+    return _made(type(thing), same | values)
+
+
+@cache
+def _field_names(kind: type) -> tuple[str, ...]:
+    """Return the names of the fields of a dataclass, which takes as long as to copy it."""
+    return tuple([each.name for each in fields(kind)])
 
 
 class _ReadOnlyArray(NamedTuple):

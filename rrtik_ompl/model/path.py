@@ -37,6 +37,7 @@ from rrtik_ompl.model.transitions import (
     length_of,
     merge_moves,
     moved,
+    moves_several,
     part_counts,
     single_joint,
     subdivided,
@@ -167,7 +168,7 @@ class JointPath(Rows):
     @property
     def one_joint_at_a_time(self) -> bool:
         """Whether every edge moves exactly one joint, so that :meth:`moves` can list the moves."""
-        return single_joint(merge_moves(self.waypoints), SAME)
+        return not moves_several(self.waypoints) and single_joint(merge_moves(self.waypoints), SAME)
 
     def moves(self) -> tuple[Move, ...]:
         """Return the single-joint moves of the path; consecutive moves of the same joint are merged.

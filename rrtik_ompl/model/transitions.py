@@ -107,6 +107,15 @@ def single_joint(waypoints: ArrayLike, tolerance: float = 0.0) -> bool:
     return bool((moved(rows[:-1], rows[1:], tolerance).sum(axis=1) == 1).all())
 
 
+def moves_several(rows: Matrix, tolerance: float = SAME) -> bool:
+    """Check whether an edge of a path, shape (k, n), certainly moves several joints at once, merged or not.
+
+    This is quick. Null moves shift a waypoint by at most ``tolerance`` each, so an edge may be so much shorter.
+    """
+    least = tolerance * (len(rows) + 2)
+    return bool(((np.abs(rows[1:] - rows[:-1]) > least).sum(axis=1) > 1).any())
+
+
 def route_length(waypoints: ArrayLike) -> float:
     """Return the sum of the Euclidean lengths of the edges of a path, shape (k, n) [rad, or m for prismatic joints]."""
     return length_of(_rows(waypoints))

@@ -57,11 +57,15 @@ def finished(problem: Problem, found: Plan, request: Request, method: Shortening
             stop=budget.over,
         )
 
-    seconds = budget.elapsed
+    return shortened_plan(found, _as_proven_as_asked(shorter, request), budget.elapsed)
+
+
+def shortened_plan(found: Plan, shorter: JointPath, seconds: float) -> Plan:
+    """Return a plan with its path shortened, which took some time [s]."""
     return replace(
         found,
-        path=_as_proven_as_asked(shorter, request),
-        unshortened=path,
+        path=shorter,
+        unshortened=found.path,
         seconds=found.seconds + seconds,
         statistics=MappingProxyType({**found.statistics, "shortening_seconds": seconds}),
     )

@@ -163,12 +163,14 @@ def test_paths_are_finished_as_plan_finishes_them(shorten):
     rows = np.random.default_rng(5).uniform(-2.0, 2.0, (60, 6))
     rows = rows[world.valid_batch(rows)]
     starts, goals = rows[:8], rows[8:16]
-    plans = rrtik.plan_many(world, starts, goals, "fastrrtconnect", seconds=60.0, seed=4, shorten=shorten, threads=2)
+    planner = None if shorten is True else "fastrrtconnect"  # "auto" begins with it
+    plans = rrtik.plan_many(world, starts, goals, planner, seconds=60.0, seed=4, shorten=shorten, threads=2)
     assert sum(each.found for each in plans) > 4
     for start, goal, each in zip(starts, goals, plans, strict=True):
         problem = rrtik.Problem(world, start, goal)
-        alone = rrtik.plan(problem, "fastrrtconnect", seconds=60.0, seed=each.seed, shorten=shorten)
+        alone = rrtik.plan(problem, planner, seconds=60.0, seed=each.seed, shorten=shorten)
         assert same(each, alone)
+        assert each.statistics.keys() == alone.statistics.keys()
         assert (each.proven, each.unshortened is None) == (alone.proven, alone.unshortened is None)
 
 

@@ -10,6 +10,7 @@ from rrtik_ompl.model.transitions import (
     lower_bound,
     merge_moves,
     moved,
+    moves_several,
     route_length,
     single_joint,
     transitions,
@@ -106,3 +107,11 @@ def test_transitions_lie_between_the_lower_bound_and_the_number_of_edges(route: 
 @given(axis_routes())
 def test_transitions_do_not_depend_on_the_direction(route: np.ndarray) -> None:
     assert transitions(route) == transitions(route[::-1])
+
+
+@given(st.lists(st.lists(st.sampled_from([-0.9, 0.0, 0.9, 3.0, 8.0]), min_size=2, max_size=2), max_size=9))
+def test_a_path_that_is_told_at_once_to_move_several_joints_never_merges_into_single_moves(steps) -> None:
+    rows = np.cumsum([[0.0, 0.0], *steps], axis=0)  # in tolerances, so that null moves add up
+    if moves_several(rows, tolerance=1.0):
+        assert not single_joint(merge_moves(rows, 1.0), 1.0)
+    assert moves_several(RRT_CONNECT)
