@@ -3,7 +3,8 @@
 A description says neither. What is decided here is the default of `rrtik_ompl.load_robot`, which ``joints``, ``group``
 and ``tip`` overrule:
 
-1. Fingers are joints with the name of one, and branches of the same depth at the end of an arm.
+1. Fingers are joints that an SRDF calls those of an end effector, joints with the name of one, and branches of the
+   same depth at the end of an arm.
 2. What is left ends in limbs: the longest one, and those with at least two thirds as many joints of their own. Legs and
    heads are none where there is an arm.
 3. The tip of a limb is a frame with a usual name that is fixed to its last body, else the link that carries the
@@ -90,7 +91,13 @@ class Arms:
         return tuple(limb for limb in self.limbs if not limb.own.isdisjoint(joints))
 
 
-def arms_of(tree: Tree, drivers: Mapping[str, str], loops: Collection[str] = (), tip: str | None = None) -> Arms:
+def arms_of(
+    tree: Tree,
+    drivers: Mapping[str, str],
+    loops: Collection[str] = (),
+    tip: str | None = None,
+    fingers: Collection[str] = (),
+) -> Arms:
     """Find the arms of a tree.
 
     Args:
@@ -98,15 +105,18 @@ def arms_of(tree: Tree, drivers: Mapping[str, str], loops: Collection[str] = (),
         drivers: For each joint that follows another one, the joint that it follows.
         loops: Joints that a loop connects, which the tree leaves open.
         tip: The link that is the tip of the only arm; None to find all arms.
+        fingers: Names of joints that are known to be those of fingers.
     """
-    finder = _Finder(tree, drivers, loops)
+    finder = _Finder(tree, drivers, loops, fingers)
     return finder.arms() if tip not in finder.body else finder.arm_to(tip)
 
 
 class _Finder:
     """The tree as bodies (links that are fixed to each other) with movable joints between them."""
 
-    def __init__(self, tree: Tree, drivers: Mapping[str, str], loops: Collection[str]) -> None:
+    def __init__(
+        self, tree: Tree, drivers: Mapping[str, str], loops: Collection[str], fingers: Collection[str]
+    ) -> None:
         self.drivers = drivers
         self.walk = [joint for joint in tree.walk() if joint.moves]
         self.links: dict[str, list[str]] = {}  # of each body, which is called by its first link
@@ -128,7 +138,7 @@ class _Finder:
         self.loops = set(loops)
         self.excluded = self.loops | self._endless_slides(empty)
         self.heights = self._heights(self.walk)
-        self.fingers: set[str] = set()
+        self.fingers = set(fingers)
         self._find_fingers()
         self.is_hand = all(joint.name in self.fingers | self.excluded for joint in self.walk)
         if self.is_hand:  # Its fingers are the limbs.

@@ -92,8 +92,10 @@ def gripper_of(
     ties = tuple(mimics)
     if given is not None:
         return given_gripper(given, tree, ties, robot)
-    described = None if semantics is None else srdf_gripper(semantics, tree, ties, robot)
-    return described or found_gripper(tree, ties, robot, loops)
+    if semantics is None:
+        return found_gripper(tree, ties, robot, loops)
+    described = srdf_gripper(semantics, tree, ties, robot)
+    return described or found_gripper(tree, ties, robot, loops, semantics.fingers(tree))
 
 
 def srdf_gripper(semantics: Srdf, tree: Tree, mimics: Iterable[Mimic], robot: Robot) -> GripperJoints | None:
@@ -128,7 +130,7 @@ def srdf_gripper(semantics: Srdf, tree: Tree, mimics: Iterable[Mimic], robot: Ro
 
 
 def found_gripper(
-    tree: Tree, mimics: Iterable[Mimic], robot: Robot, loops: Collection[str] = ()
+    tree: Tree, mimics: Iterable[Mimic], robot: Robot, loops: Collection[str] = (), fingers: Collection[str] = ()
 ) -> GripperJoints | None:
     """Return the gripper at the end of the only arm that moves, from the shape of its fingers; None if there is none.
 
@@ -141,9 +143,10 @@ def found_gripper(
         mimics: Joints that follow others.
         robot: The robot that was made of them.
         loops: Joints in loops.
+        fingers: Joints that are known to be those of fingers.
     """
     hand = _Hand(tree, tuple(mimics), robot)
-    limbs = arms_of(tree, hand.drivers, loops).moved_by(robot.joint_names)
+    limbs = arms_of(tree, hand.drivers, loops, fingers=fingers).moved_by(robot.joint_names)
     if len(limbs) != 1 or not set(limbs[0].fingers).isdisjoint({*robot.joint_names, *loops}):
         return None
 

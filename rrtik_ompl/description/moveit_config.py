@@ -10,12 +10,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from rrtik_ompl.base.errors import DescriptionWarning, InputError, few
+from rrtik_ompl.base.errors import ArmWarning, DescriptionWarning, InputError, few, printable
+from rrtik_ompl.description.arm import arms_of
 from rrtik_ompl.description.faults import nearest_name, tell
 from rrtik_ompl.description.joint_limits import parameters
 from rrtik_ompl.description.package_path import ASSISTANT, Packages
 from rrtik_ompl.description.srdf import Srdf, read_srdf
-from rrtik_ompl.description.tree import Tree
 from rrtik_ompl.description.urdf import URDF_OPTIONS, package_roots, robot_from_urdf
 from rrtik_ompl.description.urdf_read import parse_xml, read_urdf
 from rrtik_ompl.description.xacro_text import is_xacro, robot_text
@@ -40,7 +40,7 @@ def robot_from_moveit(folder: FilePath, **options: Any) -> Robot:
     ``kinematics.yaml`` (which groups have inverse kinematics; the solver is ours), and the URDF. The URDF is one in the
     folder; or that of the package which ``.setup_assistant``, or else ``planning_context.launch``, names, with the
     arguments stated there; or a ``.urdf.xacro`` in the folder; or the only one of the robot's name among the packages
-    beside the folder. A robot of several groups needs ``group``, unless exactly one has a solver.
+    beside the folder. The arm is the only group with a solver, or what moves the tips of the groups that have one.
 
     Args:
         folder: Folder with the files, or with a folder ``config`` that has them.
@@ -85,7 +85,7 @@ def config_files(folder: FilePath, given: Mapping[str, Any]) -> dict[str, Any]:
         files["joint_limits"] = Path(limits)
 
     if given.get("group") is None and given.get("joints") is None:
-        files["group"] = _group(home, config, files, packages, bool(given.get("strict")))
+        files |= _arm(home, config, files, packages, bool(given.get("strict")))
 
     return files
 
@@ -235,33 +235,50 @@ def _xacro_args(where: Path, words: Iterable[str]) -> dict[str, str]:
     return arguments
 
 
-def _group(home: Path, config: Path, files: Mapping[str, Any], packages: list[Path], strict: bool) -> str:
-    """Return the group that is the arm: the only one with a solver, or the only one that moves, grippers aside."""
+def _arm(
+    home: Path, config: Path, files: Mapping[str, Any], packages: list[Path], strict: bool
+) -> dict[str, str | tuple[str, ...]]:
+    """Return the ``group`` that is the arm, or the ``joints`` of several groups that are arms.
+
+    It is the only group with a solver, or the only one that moves, grippers aside. Of several, those joints move that
+    move the tip of an arm (`rrtik_ompl.description.arm`); a warning says so.
+
+    Raises:
+        InputError: If none of the groups moves the tip of an arm.
+    """
     semantics = read_srdf(robot_text(files["srdf"], packages), str(files["srdf"]))
     urdf = files["urdf"]
     text = robot_text(urdf, packages, files.get("xacro_args"))
-    tree = read_urdf(text, where=str(urdf), folder=urdf.resolve().parent, packages=packages).tree
+    description = read_urdf(text, where=str(urdf), folder=urdf.resolve().parent, packages=packages)
+    tree = description.tree
 
-    sizes = {name: _size(semantics, name, tree) for name in semantics.groups}
-    moving = [name for name, size in sizes.items() if size > 0]
+    # A group that names unknown joints counts as one that moves: it is an error once it is chosen.
+    joints = {name: semantics.known_movable(name, tree) for name in semantics.groups}
+    moving = [name for name, known in joints.items() if known is None or known]
     with_solver = _solved(config, semantics, strict)
-    grippers = _grippers(semantics, sizes, with_solver)
+    grippers = semantics.hands(tree, with_solver)
     arms = [name for name in moving if name not in grippers] or moving
 
-    for names in ([name for name in arms if name in with_solver], arms):
+    solved = [name for name in arms if name in with_solver]
+    for names in (solved, arms):
         if len(names) == 1:
-            return names[0]
+            return {"group": names[0]}
 
-    choice = ", ".join(arms) or "none that moves"
-    raise InputError(f"{home}: which group is the arm? choose one by group=, of {choice}")
+    drivers = {tie.joint: tie.source for tie in description.mimics}
+    found = arms_of(tree, drivers, fingers=semantics.fingers(tree)).joints
+    independent = {name: {each for each in joints[name] or () if each not in drivers} for name in solved or arms}
+    wanted = tuple(joint for joint in found if any(joint in members for members in independent.values()))
+    if not wanted:
+        choice = ", ".join(arms) or "none that moves"
+        raise InputError(f"{home}: which group is the arm? choose one by group=, of {choice}")
 
-
-def _size(semantics: Srdf, group: str, tree: Tree) -> int:
-    """Return the number of movable joints of a group; 1 if it names unknown joints, an error once it is chosen."""
-    try:
-        return len(semantics.movable(group, tree))
-    except InputError:
-        return 1
+    same = next((name for name, members in independent.items() if members == set(wanted)), None)
+    parts = [name for name, members in independent.items() if members and members <= set(wanted)]
+    chosen = f"groups {few(map(repr, parts))} together" if same is None else f"group '{same}'"
+    others = ", ".join(name for name in independent if name != same)
+    said = f"{home}: the arm is taken to be {chosen}; group= chooses another, of {others}"
+    warnings.warn(ArmWarning(printable(said)), stacklevel=2)
+    return {"joints": wanted} if same is None else {"group": same}
 
 
 def _solved(config: Path, semantics: Srdf, strict: bool) -> set[str]:
@@ -278,18 +295,3 @@ def _solved(config: Path, semantics: Srdf, strict: bool) -> set[str]:
     ]
     tell(faults, strict)
     return set(section) & set(semantics.groups)
-
-
-def _grippers(semantics: Srdf, sizes: Mapping[str, int], solved: set[str]) -> set[str]:
-    """Return the groups of end effectors.
-
-    An SRDF may call the arm an end effector by mistake: a group with more joints than any other one is left out, and so
-    is one with as many as another if it has a solver.
-    """
-    grippers = set()
-    for end in semantics.end_effectors:
-        if end.group in sizes and end.group != end.parent_group:
-            most_joints = max((size for name, size in sizes.items() if name != end.group), default=0)
-            if (sizes[end.group], end.group in solved) <= (most_joints, False):
-                grippers.add(end.group)
-    return grippers

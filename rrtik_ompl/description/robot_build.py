@@ -74,6 +74,7 @@ def build_robot(
     checked_collisions: Iterable[Iterable[str]] = (),
     unchecked_solids: Iterable[Iterable[str]] = (),
     loops: Mapping[str, float] | None = None,
+    fingers: Collection[str] = (),
     self_collision: bool = True,
     closed_form: Callable[..., Any] | None = None,
     planar: bool = False,
@@ -98,6 +99,7 @@ def build_robot(
         checked_collisions: Pairs of link names that are checked although a joint joins them.
         unchecked_solids: Pairs of solids that are never checked, by their links' names and numbers: "hand_0".
         loops: Joints that a loop connects, which the tree leaves open, with the values at which it is closed.
+        fingers: Joints that are known to be those of fingers, which are not actuated by default.
         self_collision: Whether links are checked against each other.
         closed_form: The robot's own inverse kinematics.
         planar: Whether the arm moves in the xy-plane.
@@ -108,9 +110,8 @@ def build_robot(
     """
     mimic_of = {m.joint: m for m in mimics}
     movable = {joint.name: joint for joint in tree.walk() if joint.moves}
-    arms = arms_of(
-        tree, {tie.joint: tie.source for tie in mimic_of.values()}, loops or {}, tip if joints is None else None
-    )
+    drivers = {tie.joint: tie.source for tie in mimic_of.values()}
+    arms = arms_of(tree, drivers, loops or {}, tip if joints is None else None, fingers)
     locked_values = dict(locked or {})
     actuated = tuple(joints) if joints is not None else tuple(j for j in arms.joints if j not in locked_values)
     _check_joints(name, tuple(movable), actuated, mimic_of, locked_values)

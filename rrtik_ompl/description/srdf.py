@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import re
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from xml.etree.ElementTree import Element
 
@@ -12,6 +13,9 @@ from rrtik_ompl.description.faults import nearest_name
 from rrtik_ompl.description.tree import Tree
 from rrtik_ompl.description.urdf_read import attribute, element_lines, numbers, parse_xml
 
+# Names of groups: of those that are end effectors, unless they have an arm too.
+HAND = re.compile(r"hand|gripper|finger|jaw|claw")
+ARM = re.compile(r"arm|manip|torso|body|all|with|and_")
 # Where an SRDF refers to something that must exist: path of the elements, attribute, and kind of what it names.
 MENTIONS = (
     ("disable_collisions", "link1", "link"),
@@ -197,6 +201,46 @@ class Srdf:
             members |= self._members(subgroup, tree, (*enclosing, name))
 
         return members
+
+    def hands(self, tree: Tree, solved: Collection[str] = ()) -> set[str]:
+        """Return the groups of end effectors, and those that are called so.
+
+        An SRDF may call the arm an end effector by mistake: a group with more joints than any other one is left out,
+        and so is one with as many as another if it has a solver.
+
+        Args:
+            tree: Links and joints of the robot.
+            solved: The groups that have a solver.
+        """
+        joints = {name: self.known_movable(name, tree) for name in self.groups}
+        sizes = {name: 1 if known is None else len(known) for name, known in joints.items()}
+        moving = sum(joint.moves for joint in tree.joints)
+        said = {end.group for end in self.end_effectors if end.group != end.parent_group}
+        called = {name for name in sizes if HAND.search(name.lower()) and not ARM.search(name.lower())}
+
+        hands = set()
+        for hand in (said | called) & sizes.keys():
+            others = [size for name, size in sizes.items() if name != hand]
+            most_joints = max(others, default=moving - sizes[hand])
+            if (sizes[hand], hand in solved) <= (most_joints, False):
+                hands.add(hand)
+        return hands
+
+    def known_movable(self, group: str, tree: Tree) -> tuple[str, ...] | None:
+        """Return the same as :meth:`movable`; None if the group names joints or links that the robot does not have."""
+        try:
+            return self.movable(group, tree)
+        except InputError:
+            return None
+
+    def fingers(self, tree: Tree) -> frozenset[str]:
+        """Return the movable joints of its end effectors, without those of the groups that carry these."""
+        carriers = {end.parent_group for end in self.end_effectors} & self.groups.keys()
+        fingers, carrying = (
+            {joint for group in groups for joint in self.known_movable(group, tree) or ()}
+            for groups in (self.hands(tree), carriers)
+        )
+        return frozenset(fingers - carrying)
 
     def allowed_pairs(self, tree: Tree) -> frozenset[frozenset[str]]:
         """Return the pairs of links of a robot that are never checked against each other."""

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rrtik_ompl.base.errors import InputError, MeshWarning, UnknownNameError
+from rrtik_ompl.description.arm import arms_of
 from rrtik_ompl.description.faults import not_read, postures_outside, tell
 from rrtik_ompl.description.gripper import GripperJoints, gripper_of
 from rrtik_ompl.description.robot_build import JointLimits, build_robot, merge_limits
@@ -131,10 +132,11 @@ def robot_from_urdf_text(
     if group is not None and srdf is None:
         raise InputError(f"{where}: group '{group}' needs an SRDF file; give srdf=FILE, or joints=[...] in its place")
 
-    end = tip
-    if tip is None and group is not None and group in semantics.groups:
-        end = semantics.group_tip(group, tree)
     actuated = _actuated(description, semantics, group, joints)
+    fingers = semantics.fingers(tree)
+    end = tip
+    if tip is None and group is not None and not _several_arms(description, actuated or (), fingers):
+        end = semantics.group_tip(group, tree)
     limits_file = None if joint_limits is None else _limits_of_file(joint_limits, tree)
 
     with located(where):
@@ -150,6 +152,7 @@ def robot_from_urdf_text(
             postures=semantics.postures(group) | {key: dict(value) for key, value in (postures or {}).items()},
             allowed_collisions=[*semantics.allowed_pairs(tree), *allowed_collisions],
             checked_collisions=semantics.checked,
+            fingers=fingers,
             self_collision=self_collision,
             closed_form=closed_form,
             source=source,
@@ -197,6 +200,12 @@ def _actuated(
         members = semantics.group_joints(group, tree)
         return tuple(joint for joint in members if joint not in followers)
     return None
+
+
+def _several_arms(description: UrdfDescription, joints: Iterable[str], fingers: Collection[str]) -> bool:
+    """Check whether joints move more than one arm, so that their group has no single tip."""
+    drivers = {tie.joint: tie.source for tie in description.mimics}
+    return len(arms_of(description.tree, drivers, fingers=fingers).moved_by(set(joints))) > 1
 
 
 def _limits_of_file(file: FilePath, tree: Tree) -> LimitsFile:

@@ -3,11 +3,12 @@
 import re
 import shutil
 import sys
+import warnings
 
 import numpy as np
 import pytest
 
-from rrtik_ompl.base.errors import DescriptionWarning, InputError, RrtikError, UnknownNameError
+from rrtik_ompl.base.errors import ArmWarning, DescriptionWarning, InputError, RrtikError, UnknownNameError
 from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.description.joint_limits import read_joint_limits
 from rrtik_ompl.description.moveit_config import robot_from_moveit
@@ -199,12 +200,13 @@ FAULTS = {
         ),
         r"\.setup_assistant: xacro_args: expected words such as name:=value, found 'hand=false'",
     ),
-    "two arms": (
+    "no group that moves": (
         lambda f: (
-            broken(f, "panda.srdf", "</robot>", '<group name="b"><joint name="panda_joint1"/></group></robot>'),
+            broken(f, "panda.srdf", '<chain base_link="panda_link0" tip_link="panda_link8"/>', ""),
+            broken(f, "panda.srdf", '<group name="hand"><joint name="panda_finger_joint1"/>', '<group name="hand">'),
             (f / "config/kinematics.yaml").unlink(),
         ),
-        r"which group is the arm\? choose one by group=, of panda_arm, b",
+        r"which group is the arm\? choose one by group=, of none that moves",
     ),
 }
 
@@ -250,6 +252,67 @@ def test_a_solver_tells_the_arm_among_several_groups(folder):
     broken(folder, "panda.srdf", "</robot>", more)
     assert list(load_robot(folder).joint_names) == ARM
     assert load_robot(folder, group="turret").joint_names == ("panda_joint1",)
+
+
+def link_chain(names, base="base", kind="revolute"):
+    """URDF text of links one after another, moved by joints called like them."""
+    return "".join(
+        f'<link name="{name}"/><joint name="j_{name}" type="{kind}"><parent link="{parent}"/><child link="{name}"/>'
+        '<origin xyz="0 0 0.1"/><axis xyz="1 0 0"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint>'
+        for parent, name in zip([base, *names[:-1]], names, strict=True)
+    )
+
+
+LEFT, RIGHT = ([f"{side}{k}" for k in range(1, 5)] for side in "lr")
+TORSO_AND_ARMS = f'<link name="base"/>{link_chain(["t"])}{link_chain(LEFT, "t")}{link_chain(RIGHT, "t")}'
+CLAMP = link_chain(["clamp"], "l4", "prismatic")
+GROUPS = {
+    "t": '<group name="torso"><joint name="j_t"/></group>',
+    "l": '<group name="left"><chain base_link="t" tip_link="l4"/></group>',
+    "r": '<group name="right"><chain base_link="t" tip_link="r4"/></group>',
+    "tl": '<group name="left_torso"><chain base_link="base" tip_link="l4"/></group>',
+    "tlr": '<group name="all"><group name="torso"/><group name="left"/><group name="right"/></group>',
+    "h": '<group name="hand"><joint name="j_clamp"/></group><end_effector name="e" parent_link="l4" group="hand"/>',
+}
+BOTH = tuple(f"j_{name}" for name in LEFT + RIGHT)
+# Links, groups, joints and tips that are right, words of the warnings.
+SEVERAL = {
+    "two arms": (TORSO_AND_ARMS, "lr", BOTH, ("l4", "r4"), "groups 'left', 'right' together.*2 tips"),
+    "a group of both": (TORSO_AND_ARMS, "t l r tlr", ("j_t", *BOTH), ("l4", "r4"), "group 'all'; .*2 tips"),
+    "with and without torso": (
+        f'<link name="base"/>{link_chain(["t"])}{link_chain(LEFT, "t")}{CLAMP}',
+        "l tl h",
+        ("j_t", *BOTH[:4]),
+        ("l4",),
+        "group 'left_torso'; group= chooses another, of left$",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", SEVERAL)
+def test_of_several_groups_those_joints_move_that_move_a_tip(tmp_path, case):
+    links, groups, joints, tips, said = SEVERAL[case]
+    config = tmp_path / "config"
+    config.mkdir()
+    (config / "a.urdf").write_text(f'<robot name="a">{links}</robot>')
+    named = "".join(GROUPS[each] for each in (groups.split() if " " in groups else groups))
+    (config / "a.srdf").write_text(f'<robot name="a">{named}</robot>')
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        robot = load_robot(tmp_path)
+    assert (robot.joint_names, robot.tips) == (joints, tips)
+    told = " ".join(str(each.message) for each in caught if issubclass(each.category, ArmWarning))
+    assert re.search(said, told), told
+
+
+def test_joints_of_an_end_effector_are_fingers_whatever_they_are_called(tmp_path):
+    links = f'<link name="base"/>{link_chain(LEFT)}{CLAMP}'
+    (tmp_path / "a.urdf").write_text(f'<robot name="a">{links}</robot>')
+    (tmp_path / "a.srdf").write_text(f'<robot name="a">{GROUPS["h"]}</robot>')
+    assert load_robot(tmp_path / "a.urdf").dof == 5
+    with pytest.warns(ArmWarning, match=r"held still: fingers \('j_clamp'\)"):
+        robot = load_robot(tmp_path / "a.urdf", srdf=tmp_path / "a.srdf")
+    assert (robot.joint_names, robot.tip, robot.gripper.joints) == (BOTH[:4], "l4", ("j_clamp",))
 
 
 def test_a_limit_that_is_switched_off_may_say_anything(tmp_path):
@@ -459,8 +522,5 @@ def test_the_arm_is_the_group_with_a_solver_and_no_gripper_that_has_fewer_joints
     (workspace / "config" / "arm.srdf").write_text(TWO_GROUPS.format(held))
     solver = "".join(f"{group}: {{kinematics_solver: kdl}}\n" for group in solved)
     (workspace / "config" / "kinematics.yaml").write_text(solver or "{}")
-    if held == "arm" and solved != ("arm",):  # the file says that the arm is a gripper, and does not contradict itself
-        with pytest.raises(InputError, match=r"group.*arm, gripper"):
-            load_robot(workspace)
-    else:
-        assert load_robot(workspace).joint_names == ("j1", "j2")
+    # Where the file calls the arm the gripper's end effector, names and numbers of joints decide.
+    assert load_robot(workspace).joint_names == ("j1", "j2")
