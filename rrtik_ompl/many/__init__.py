@@ -150,7 +150,7 @@ def plan_many(  # type: ignore[misc]  # the second argument is `planner` after p
     if processes is None and scheduler is None:
         load = lru_cache(maxsize=4)(load_problem)  # consecutive queries are often about one problem
         queries = [partial(_loaded, load, each) if isinstance(each, Named) else each for each in asked]
-        request = Request(Budget(seconds=limit), parameters=parameters, proof=proof)
+        request = Request(Budget(seconds=limit), parameters=parameters, proof=proof, among_many=True)
         answers = plans_in_threads(queries, planner, request, method, threads)
     else:
         options = {"seconds": limit, "parameters": parameters, "shorten": shorten, "proof": proof}

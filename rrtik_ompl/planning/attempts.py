@@ -234,7 +234,7 @@ class Turn:
             from rrtik_ompl.planning.branches import shorter_branch  # with kernels that a named planner does without
 
             goals = self._goal_choice.known
-            with suppress(KeyboardInterrupt):
+            with suppress(*self._request.survived):
                 self.path = shorter_branch(self._problem, self.path, goals, self.budget)
         self.seconds = self.budget.elapsed
         if self.error is not None or self.path is not None:

@@ -36,7 +36,7 @@ def finished(problem: Problem, found: Plan, request: Request, method: Shortening
 
     Returns:
         The plan with the shorter path. Its statistics also have ``shortening_seconds``, which ``seconds`` contains.
-        Ctrl-C ends the work and leaves the path that was found.
+        Ctrl-C ends the work and leaves the path that was found, unless there are many requests.
     """
     path = found.path
     if path is None or len(path.waypoints) < 3:
@@ -46,7 +46,7 @@ def finished(problem: Problem, found: Plan, request: Request, method: Shortening
         return found
 
     shorter = path
-    with suppress(KeyboardInterrupt):
+    with suppress(*request.survived):
         shorter = shorten(
             path,
             problem,

@@ -38,6 +38,7 @@ class Request:
         proof: Whether motions have to be proven free.
         clearance: Clearance to keep from obstacles [m], or None.
         by_length: Whether the goal configuration is chosen by the length of the path.
+        among_many: Whether it is one of many, so that Ctrl-C ends all of them and not its shortening alone.
     """
 
     budget: Budget
@@ -46,6 +47,12 @@ class Request:
     proof: ProofMode = "preferred"
     clearance: float | None = None
     by_length: bool = False
+    among_many: bool = False
+
+    @property
+    def survived(self) -> tuple[type[BaseException], ...]:
+        """What may end the work on a path that is found, and leaves the path."""
+        return () if self.among_many else (KeyboardInterrupt,)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,5 +1,7 @@
 """Several threads ask one world: answers as of one thread, and no kernel writes beyond its memory."""
 
+import threading
+import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
@@ -139,6 +141,27 @@ def test_starts_and_goals_that_do_not_fit_are_refused(world):
 def test_what_work_raises_in_a_thread_is_raised():
     with pytest.raises(ZeroDivisionError):
         in_threads(lambda k: 1 // k, [1, 0, 2], threads=2)
+
+
+def test_an_interrupt_ends_the_work_of_all_threads():
+    caller = threading.current_thread()
+    begun = threading.Event()
+    ended = threading.Event()
+
+    def work(number):
+        if threading.current_thread() is caller:
+            assert begun.wait(5.0)
+            raise KeyboardInterrupt
+        begun.set()
+        try:
+            while not time.sleep(1e-3):
+                pass
+        finally:
+            ended.set()
+
+    with pytest.raises(KeyboardInterrupt):
+        in_threads(work, range(4), threads=2)
+    assert ended.wait(5.0)
 
 
 @pytest.mark.parametrize("name", ["panda", "ur5"])
