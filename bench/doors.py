@@ -1,12 +1,19 @@
 """Descriptions of robots that others wrote: which of them load at the first call, and whether as the right robot.
 
 Give it folders: unpacked wheels, copies of repositories. Every URDF, xacro, MJCF and MoveIt folder below them is loaded
-with default options, in a process of its own. Whether a description is whole (its files are there, its XML is valid, a
-joint moves) is judged without rrtik_ompl: by ElementTree, by the package xacro, which can run anything, and by looking
-for the file names anywhere below the folder. The tip of each URDF is compared with Pinocchio's own reading of it.
+with default options. Whether a description is whole (its files are there, its XML is valid, a joint moves) is judged
+without rrtik_ompl: an MJCF by MuJoCo's compiler; others by ElementTree, by the package xacro, which can run anything,
+and by looking for the files (those of packages in a folder of this name, or whose `package.xml` has it, anywhere below
+the folder). The tip is compared with Pinocchio's or MuJoCo's own reading at 50 postures. Whether a tip or a joint is a
+finger is judged by its name, of descriptions that have other joints too.
+
+A sample, those robots whose paths have the least SHA-256, is planned for: the default planner in a scene of four boxes
+around the arm, up to three pairs of random postures, and the page of the path is written.
 
 A description whose path below its folder has a SHA-256 that is divisible by three is held out: it is counted apart, and
 neither its name nor why it was refused is shown, so that nobody mends the library for it.
+
+The version of a folder is read from its `.dist-info`, or from a file beside it: NAME.commit.
 """
 
 from __future__ import annotations
@@ -25,6 +32,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from hashlib import sha256
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Annotated, Any
 
 import numpy as np
@@ -36,15 +44,19 @@ import rrtik_ompl as rrtik
 from bench.shared.parts import Parts
 from bench.shared.run import Run
 from rrtik_bench.report.page import Report
-from rrtik_ompl.base.errors import RrtikError
+from rrtik_ompl.base.errors import NotFoundError, RrtikError
 from rrtik_ompl.model.robot import Robot
 
 KINDS = ("MoveIt", "URDF", "xacro", "MJCF")
+Case = tuple[str, str, str]  # folder, path below it, kind
 MOVES = ("revolute", "continuous", "prismatic")
 POSTURES = 50
 AGREE = 1e-6  # [m], and of the entries of a rotation
 SECONDS = 90.0
-XACRO = "{http://www.ros.org/wiki/xacro}"
+XACRO = ("{http://www.ros.org/wiki/xacro}", "{http://ros.org/wiki/xacro}")
+FINGER = re.compile(r"finger|thumb|knuckle|jaw|claw|phalan")
+PAIRS = 3  # of random postures that are tried
+SAMPLES = 400  # postures from which reach and free postures are taken
 PACKAGE = re.compile(r"^(?:package|model)://|^file://\$\(find ")
 
 
@@ -59,6 +71,8 @@ class Outcome:
         off: Largest difference of the tip from Pinocchio's [m, or of an entry of the rotation]; None if not compared.
         seconds: Processor time.
         robot: Joints and tip.
+        finger: Whether the tip is a finger by its name.
+        fingers: How many actuated joints are those of fingers by their names.
     """
 
     whole: bool = True
@@ -68,6 +82,29 @@ class Outcome:
     off: float | None = None
     seconds: float = 0.0
     robot: str = ""
+    finger: bool = False
+    fingers: int = 0
+
+
+@dataclass
+class Planned:
+    """What became of a plan in a scene of four boxes.
+
+    Attributes:
+        said: Why there is none; "" if there is one.
+        proven: Whether the whole path is proven.
+        world: Processor time of the first world [s].
+        plan: Processor time of the plan [s].
+        page: Processor time of the page [s].
+        size: Bytes of the page.
+    """
+
+    said: str = ""
+    proven: bool = False
+    world: float = 0.0
+    plan: float = 0.0
+    page: float = 0.0
+    size: int = 0
 
 
 class LacksError(Exception):
@@ -113,7 +150,7 @@ def _is_robot(path: Path) -> bool:
         return False
     own = [element.tag for element in robot if element.tag.startswith(XACRO) or element.tag in ("joint", "link")]
     calls = [
-        tag for tag in own if tag.removeprefix(XACRO) not in ("include", "macro", "property", "arg", "insert_block")
+        tag for tag in own if tag.rpartition("}")[2] not in ("include", "macro", "property", "arg", "insert_block")
     ]
     return robot.tag == "robot" and bool(robot.get("name")) and bool(calls)
 
@@ -123,23 +160,23 @@ class Files:
     """The files below a folder: their names, by their last part, and the folders of packages by name."""
 
     by_name: Mapping[str, Sequence[str]]
-    packages: Mapping[str, Path]
+    packages: Mapping[str, Sequence[Path]]
 
 
 @lru_cache(maxsize=1)
 def files_below(folder: Path) -> Files:
     """Look through a folder."""
     by_name: dict[str, list[str]] = {}
-    packages: dict[str, Path] = {}
+    packages: dict[str, list[Path]] = {}
     for path in sorted(folder.rglob("*")):
         if path.is_file():
             by_name.setdefault(path.name, []).append(path.as_posix())
         elif path.is_dir():
-            packages.setdefault(path.name, path)
+            packages.setdefault(path.name, []).append(path)
     for file in by_name.get("package.xml", ()):
         named = re.search(r"<name>\s*(\S+)\s*</name>", Path(file).read_text("utf-8", "replace"))
         if named:
-            packages[named[1]] = Path(file).parent
+            packages.setdefault(named[1], []).insert(0, Path(file).parent)
     return Files(by_name, packages)
 
 
@@ -151,7 +188,7 @@ def expanded(file: Path, files: Files, arguments: Mapping[str, str]) -> str:
     def find(name: str) -> str:
         if name not in files.packages:
             raise LacksError(f"package {name}")
-        return str(files.packages[name])
+        return str(files.packages[name][0])
 
     substitution_args._eval_find = substitution_args._eval_dict["find"] = find
     with redirect_stderr(io.StringIO()), redirect_stdout(io.StringIO()):
@@ -165,7 +202,7 @@ def urdf_text(path: Path, kind: str, files: Files) -> tuple[str, Path]:
     """The URDF of a description, by others' means, and its file."""
     if kind == "URDF":
         text = path.read_text("utf-8", "replace")
-        return (expanded(path, files, {}) if XACRO.strip("{}") in text else text), path
+        return (expanded(path, files, {}) if any(space.strip("{}") in text for space in XACRO) else text), path
     if kind == "xacro":
         return expanded(path, files, {}), path
 
@@ -195,15 +232,15 @@ def _urdf_of(folder: Path, files: Files) -> Path:
         _parsed(srdf.read_text("utf-8", "replace"))
 
     named = _assistant(folder)
-    package = files.packages.get(str(named.get("package", "")))
-    if package is not None and (package / str(named.get("relative_path"))).is_file():
-        return package / str(named.get("relative_path"))
+    for package in files.packages.get(str(named.get("package", "")), ()):
+        if (package / str(named.get("relative_path"))).is_file():
+            return package / str(named.get("relative_path"))
 
     launch = folder / "launch" / "planning_context.launch"
     for line in launch.read_text("utf-8").splitlines() if launch.is_file() else ():
         found = re.search(r"""\$\(find ([\w-]+)\)/([^\s'"]+\.(urdf|xacro))""", line.replace("$(find xacro)/xacro", ""))
         if found and "semantic" not in line and "srdf" not in line and found[1] in files.packages:
-            return files.packages[found[1]] / found[2]
+            return files.packages[found[1]][0] / found[2]
 
     inside = [*folder.glob("config/*.urdf"), *folder.glob("config/*.urdf.xacro")]
     inside = [file for file in inside if not file.name.startswith("gazebo_")] or inside
@@ -219,14 +256,9 @@ def _parsed(text: str) -> ElementTree.Element:
         raise LacksError(f"XML: {error}") from error
 
 
-def check_whole(text: str, kind: str, file: Path, files: Files) -> None:
-    """Raise an error unless a description has all that it needs."""
+def check_whole(text: str, file: Path, files: Files) -> None:
+    """Raise an error unless a URDF has all that it needs."""
     root = _parsed(text)
-    if kind == "MJCF":
-        if root.tag != "mujoco" or root.find(".//joint") is None:
-            raise LacksError("joint that moves")
-        return
-
     moving = [joint for joint in root.findall("joint") if joint.get("type") in MOVES]
     if root.tag != "robot" or not moving:
         raise LacksError("joint that moves")
@@ -237,11 +269,24 @@ def check_whole(text: str, kind: str, file: Path, files: Files) -> None:
         raise LacksError("tree of links and joints")
     for mesh in root.findall("link/collision/geometry/mesh"):
         uri = mesh.get("filename", "")
-        name = PACKAGE.sub("", uri).removeprefix("file://").replace(")", "").lstrip("./")
-        rest = name.partition("/")[2] if PACKAGE.match(uri) else name
-        found = any(path.endswith("/" + rest.lstrip("./")) for path in files.by_name.get(Path(name).name, ()))
-        if not found and not (file.parent / name).is_file():
+        name = PACKAGE.sub("", uri).removeprefix("file://").replace(")", "")
+        package, _, rest = name.partition("/")
+        places = [each / rest for each in files.packages.get(package, ())] if PACKAGE.match(uri) else []
+        if not any(place.is_file() for place in (*places, file.parent / name)):
             raise LacksError(f"mesh {Path(name).name}")
+
+
+def compiled(file: Path) -> Any:
+    """An MJCF by MuJoCo's own compiler."""
+    import mujoco
+
+    try:
+        model = mujoco.MjModel.from_xml_path(str(file))
+    except ValueError as error:
+        raise LacksError(f"MuJoCo: {error}") from error
+    if not np.isin(model.jnt_type, (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)).any():
+        raise LacksError("joint that moves")
+    return model
 
 
 def outcome(folder: str, name: str, kind: str) -> Outcome:
@@ -249,11 +294,14 @@ def outcome(folder: str, name: str, kind: str) -> Outcome:
     home = Path(folder)
     path = home / name
     found = Outcome()
-    text = None
+    text, model = None, None
     try:
-        files = files_below(home)
-        text, file = (path.read_text("utf-8", "replace"), path) if kind == "MJCF" else urdf_text(path, kind, files)
-        check_whole(text, kind, file, files)
+        if kind == "MJCF":
+            model = compiled(path)
+        else:
+            files = files_below(home)
+            text, file = urdf_text(path, kind, files)
+            check_whole(text, file, files)
     except (LacksError, OSError, UnicodeDecodeError, yaml.YAMLError) as lack:
         found.whole = False
         found.lacks = " ".join(str(lack).split())
@@ -273,9 +321,78 @@ def outcome(folder: str, name: str, kind: str) -> Outcome:
     if robot is not None:
         found.loaded = True
         found.robot = f"{len(robot.joint_names)} joints ({', '.join(robot.joint_names)}), tip {robot.tip}"
-        if text is not None and kind != "MJCF":
+        alone = all(FINGER.search(joint.lower()) for joint in robot.movable)
+        found.finger = not alone and bool(FINGER.search(robot.tip.lower()))
+        found.fingers = 0 if alone else sum(bool(FINGER.search(joint.lower())) for joint in robot.joint_names)
+        if model is not None:
+            found.off = _off_mujoco(robot, model)
+        elif text is not None:
             found.off = _off(robot, text)
     return found
+
+
+def planned(folder: str, name: str, kind: str) -> Planned:
+    """Plan in a scene of four boxes, and write the page."""
+    found = Planned()
+    try:
+        with warnings.catch_warnings(), _within(SECONDS), TemporaryDirectory() as scratch:
+            warnings.simplefilter("ignore")
+            robot = rrtik.load_robot(str(Path(folder) / name))
+            begin = time.process_time()
+            world = rrtik.World(robot, four_boxes(robot))
+            found.world = time.process_time() - begin
+
+            begin = time.process_time()
+            problem, path, found.proven = _path(world)
+            found.plan = time.process_time() - begin
+
+            begin = time.process_time()
+            page = Path(scratch) / "page.html"
+            rrtik.view(problem, path, html=page)
+            found.page = time.process_time() - begin
+            found.size = page.stat().st_size
+    except Exception as error:  # which are counted
+        found.said = " ".join(f"{type(error).__name__}: {error}".split())
+    return found
+
+
+def four_boxes(robot: Robot) -> rrtik.Scene:
+    """Posts on the diagonals around the base, at two thirds of where the tip gets."""
+    rng = np.random.default_rng(0)
+    base = np.array(robot.fk(robot.finite_range()[0], robot.model.frames[1].name).translation)
+    tips = np.array([robot.fk(q).translation for q in rng.uniform(*robot.finite_range(), (SAMPLES, robot.dof))])
+    reach = float(np.quantile(np.linalg.norm((tips - base)[:, :2], axis=1), 0.9)) or 1.0
+    height = float(np.median(tips[:, 2]))
+    corners = ((1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0))
+    return rrtik.Scene(
+        [
+            rrtik.Obstacle(
+                f"post {number}",
+                rrtik.Box([0.1 * reach, 0.1 * reach, 0.6 * reach]),
+                [base[0] + 0.5 * reach * x, base[1] + 0.5 * reach * y, height],
+            )
+            for number, (x, y) in enumerate(corners)
+        ]
+    )
+
+
+def _path(world: rrtik.World) -> tuple[rrtik.Problem, rrtik.JointPath, bool]:
+    """A problem between random free postures, its path, and whether that is proven."""
+    robot = world.robot
+    rng = np.random.default_rng(1)
+    rows = rng.uniform(*robot.finite_range(), (SAMPLES, robot.dof))
+    free = rows[world.valid_batch(rows)]
+    if len(free) < 2:
+        raise NotFoundError(f"{len(free)} of {SAMPLES} random postures are free")
+
+    reason = ""
+    for start, goal in list(zip(free[::2], free[1::2], strict=False))[:PAIRS]:
+        problem = rrtik.Problem(world, start, goal)
+        plan = rrtik.plan(problem)
+        if plan.path is not None:
+            return problem, plan.path, bool(plan.proven)
+        reason = plan.reason
+    raise NotFoundError(reason)
 
 
 @contextmanager
@@ -328,6 +445,45 @@ def _off(robot: Robot, text: str) -> float | None:
     return worst
 
 
+def _off_mujoco(robot: Robot, model: Any) -> float | None:
+    """Compare the tip in random postures with MuJoCo's; None if a joint that the robot holds still moves it there."""
+    import mujoco
+
+    kinds = ((mujoco.mjtObj.mjOBJ_SITE, "site"), (mujoco.mjtObj.mjOBJ_BODY, "xbody"))
+    named = [(kind, mujoco.mj_name2id(model, kind, robot.tip), what) for kind, what in kinds]
+    tip = next(((number, what) for _, number, what in named if number >= 0), None)
+    if tip is None:
+        return None
+
+    body = model.site_bodyid[tip[0]] if tip[1] == "site" else tip[0]
+    before: set[str] = set()
+    while body > 0:
+        for joint in range(model.body_jntadr[body], model.body_jntadr[body] + model.body_jntnum[body]):
+            if model.jnt_type[joint] != mujoco.mjtJoint.mjJNT_FREE:
+                before.add(mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_JOINT, joint) or "")
+        body = model.body_parentid[body]
+    if not before <= set(robot.joint_names):
+        return None
+
+    data = mujoco.MjData(model)
+    rng = np.random.default_rng(0)
+    worst = 0.0
+    for row in rng.uniform(*robot.finite_range(), (POSTURES, robot.dof)):
+        for name, value in zip(robot.joint_names, row, strict=True):
+            joint = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name)
+            if joint >= 0:
+                data.qpos[model.jnt_qposadr[joint]] = value
+        mujoco.mj_kinematics(model, data)
+        place = (data.site_xpos, data.site_xmat) if tip[1] == "site" else (data.xpos, data.xmat)
+        pose = robot.fk(row).homogeneous
+        worst = max(
+            worst,
+            float(np.abs(pose[:3, 3] - place[0][tip[0]]).max()),
+            float(np.abs(pose[:3, :3] - place[1][tip[0]].reshape(3, 3)).max()),
+        )
+    return worst
+
+
 def _value(name: str, joints: Mapping[str, ElementTree.Element], values: Mapping[str, float]) -> float:
     """The value of a joint: given, that of the joint it follows, or zero, moved into its limits."""
     if name in values:
@@ -350,6 +506,7 @@ def main(
     *,
     kinds: Annotated[list[str] | None, Option("--kind", help="MoveIt, URDF, xacro, MJCF; may be repeated.")] = None,
     robots: Annotated[bool, Option(help="List joints and tips of all that are not held out.")] = False,
+    plans: Annotated[int, Option(help="Robots that are planned for.")] = 60,
 ) -> Report:
     """Load all descriptions below the folders."""
     cases = [
@@ -359,13 +516,33 @@ def main(
         if kind in (kinds or KINDS)
     ]
     report = run.report("Descriptions of robots by others: what loads at the first call")
-    write(report, cases, parts(outcome, cases), robots=robots)
+    found = parts(outcome, cases)
+    chosen = sample(cases, found, plans)
+    write(report, cases, found, robots=robots)
+    write_plans(report, chosen, parts(planned, chosen))
+    report.table("Versions", ("folder", "version"), [(folder.name, version(folder.resolve())) for folder in folders])
     return report
 
 
-def write(
-    report: Report, cases: Sequence[tuple[str, str, str]], found: Sequence[Outcome], *, robots: bool = False
-) -> None:
+def sample(cases: Sequence[Case], found: Sequence[Outcome], count: int) -> list[Case]:
+    """Descriptions to plan for: one of each robot that was loaded, those with the least digests."""
+    by_digest = sorted(zip(cases, found, strict=True), key=lambda row: sha256(row[0][1].encode()).hexdigest())
+    first: dict[str, Case] = {}
+    for case, each in by_digest:
+        if each.whole and each.loaded:
+            first.setdefault(each.robot, case)
+    return list(first.values())[:count]
+
+
+def version(folder: Path) -> str:
+    """Version of an unpacked wheel, or commit of a copy of a repository."""
+    commit = folder.with_name(f"{folder.name}.commit")
+    if commit.is_file():
+        return commit.read_text("utf-8").strip()[:12]
+    return ", ".join(sorted(each.name.removesuffix(".dist-info") for each in folder.glob("*.dist-info"))) or "unknown"
+
+
+def write(report: Report, cases: Sequence[Case], found: Sequence[Outcome], *, robots: bool = False) -> None:
     """The page of what was found."""
     report.intro = " ".join((__doc__ or "").partition("\n\n")[2].split())
     rows = list(zip(cases, found, strict=True))
@@ -377,7 +554,18 @@ def write(
     report.bar("those held out", "within 2 points", f"{of_apart:.1f} %", of_apart >= of_shown - 2.0)
     wrong = [(case, each) for case, each in rows if each.off is not None and each.off > AGREE]
     compared = sum(each.off is not None for _, each in rows)
-    report.bar(f"tip elsewhere than Pinocchio says, of {compared}", "0", str(len(wrong)), not wrong)
+    report.bar(f"tip elsewhere than Pinocchio or MuJoCo say, of {compared}", "0", str(len(wrong)), not wrong)
+
+    for group, whose in ((shown, ""), (apart, ", held out")):
+        arms = [each for _, each in group if each.whole and each.loaded]
+        tips, joints = sum(each.finger for each in arms), sum(each.fingers > 0 for each in arms)
+        wanted = "0" if group is shown else "only counted"
+        report.bar(
+            f"tip is a finger; a finger's joint is planned, of {len(arms)}{whose}",
+            wanted,
+            f"{tips}; {joints}",
+            not (tips + joints) or group is apart,
+        )
 
     heads = ("kind", "all", "whole", "loaded of these", "held out: whole", "loaded of these", "slowest [s]")
     table = []
@@ -398,12 +586,37 @@ def write(
     said = [(_named(case), _short(each.said, case)) for case, each in shown if each.whole and not each.loaded]
     report.table("Whole, not held out, and refused", ("description", "what was said"), said)
     off = [(_named(case), f"{each.off:.3g}", each.robot) for case, each in wrong if not held_out(case[1])]
-    report.table("Not where Pinocchio says", ("description", "off [m]", "robot"), off)
+    report.table("Not where Pinocchio or MuJoCo say", ("description", "off [m]", "robot"), off)
+    fingered = [(_named(case), each.robot) for case, each in shown if each.whole and (each.finger or each.fingers)]
+    report.table("Fingers as tips or planned", ("description", "robot"), fingered)
     lacking = Counter(each.lacks.partition(" ")[0] for _, each in rows if not each.whole)
     report.table("Not whole, by what is lacking", ("lacks", "count"), [(k, str(n)) for k, n in lacking.most_common()])
     if robots:
         all_robots = [(_named(case), each.robot) for case, each in shown if each.loaded]
         report.table("Robots", ("description", "robot"), all_robots)
+
+
+def write_plans(report: Report, cases: Sequence[Case], found: Sequence[Planned]) -> None:
+    """What became of the plans."""
+    done = [each for each in found if not each.said]
+    proven = sum(each.proven for each in done)
+    report.bar(
+        f"path in a scene of four boxes and its page, of {len(found)}", "", f"{len(done)}; {proven} proven", held=True
+    )
+    columns = (("first world", "world"), ("plan", "plan"), ("page", "page"))
+    rows = [
+        (what, *(f"{np.quantile([getattr(each, key) for each in done], share):.2f}" for share in (0.5, 0.95, 1.0)))
+        for what, key in columns
+        if done
+    ]
+    text = f"Processor time. Largest page: {max((each.size for each in done), default=0) / 1e6:.1f} MB."
+    report.table("Plans", ("seconds", "median", "95 %", "most"), rows, text=text)
+    shown = [
+        (_named(case), _short(each.said, case))
+        for case, each in zip(cases, found, strict=True)
+        if each.said and not held_out(case[1])
+    ]
+    report.table("Not held out, and without a path", ("description", "what was said"), shown)
 
 
 def _named(case: tuple[str, str, str]) -> str:
