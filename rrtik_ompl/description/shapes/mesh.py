@@ -26,6 +26,7 @@ LONG_BYTES = 20e6  # size of a file above which the user is told to wait
 COARSEST = 1e-5  # [m] largest distance of neighbouring numbers of single precision with which a shape is read
 FINEST = 1e-6  # the same as a share of the size of the mesh
 AGAIN = "export it again as STL, OBJ or DAE"
+_WHERE = ("From file:", "in function:", "at line:", "Could not load resource", "Hint:")  # begins lines of coal's errors
 _BINARY_TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("rest", "<u2")])
 _CORNER = re.compile(rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)", re.IGNORECASE)
 _VERTEX = re.compile(rb"^([ \t]*v[ \t]+)(\S+)[ \t]+(\S+)[ \t]+(\S+)", re.MULTILINE)
@@ -98,19 +99,20 @@ def _by_assimp(path: Path, scale: Vector) -> coal.BVHModelBase:
     try:
         return coal.MeshLoader().load(os.fspath(path), scale)
     except (ValueError, RuntimeError) as error:
-        raise InputError(f"{path}: not a usable mesh: {_reason(error)}; {AGAIN}") from error
+        raise InputError(f"{path}: not a usable mesh: {_reason(path, error)}; {AGAIN}") from error
 
 
-def _reason(error: Exception) -> str:
-    """Return assimp's message without paths, hints and places in its source."""
+def _reason(path: Path, error: Exception) -> str:
+    """Return what is wrong with a file that assimp refuses; what it says is of its own words and places."""
     if isinstance(error, UnicodeError):
         return "its name, or that of its folder, is not UTF-8"
-    lines = [line.strip().removeprefix("message: ") for line in str(error).splitlines() if line.strip()]
-    noise = ("From file:", "in function:", "at line:", "Could not load resource", "Hint:")
-    said = [line for line in lines if not line.startswith(noise)]
+    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+    said = [line for line in lines if not line.startswith(_WHERE)]
     if not said or any("No meshes" in line for line in lines):
         return "no triangles in it"
-    return said[-1].rstrip(".")
+    if "index out of range" in said[-1]:
+        return "a triangle names a vertex that is not there"
+    return f"it is damaged, cut off, or no {path.suffix.lower().removeprefix('.').upper()} file"
 
 
 def _length_of_stl(data: bytes) -> int:
@@ -184,10 +186,14 @@ def stated_unit(path: str | os.PathLike[str], data: bytes) -> float:
     try:
         asset = _asset(data)
         unit = None if asset is None else asset.find("{*}unit")
-        metres = 1.0 if unit is None else float(unit.get("meter", "1"))
     except (ElementTree.ParseError, ValueError, LookupError) as error:  # LookupError: an encoding nobody knows
         raise InputError(f"{path}: not a usable mesh: {error}; {AGAIN}") from error
 
+    stated = "1" if unit is None else unit.get("meter", "1")
+    try:
+        metres = float(stated)
+    except ValueError:
+        raise InputError(f"{path}: not a usable mesh: its unit '{stated}' is no number of metres; {AGAIN}") from None
     if not 0.0 < metres < float("inf"):
         raise InputError(f"{path}: its unit must be greater than 0 metres, found {metres:g}; export it again")
     return metres

@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 from rrtik_ompl.base.arrays import LARGEST, Matrix, Vector, box_of, distinct, products, welded
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.shapes.mesh import mended
+from rrtik_ompl.model.shapes.mesh_repair import edges_of
 from rrtik_ompl.model.shapes.point_tree import curve_places
 
 Found = TypeVar("Found")
@@ -404,7 +406,25 @@ def is_closed(geometry: coal.CollisionGeometry) -> bool:
 @lru_cache(maxsize=16)
 def robot_solids(robot: Robot) -> tuple[Any, ...]:
     """Return the coal geometries of a robot's collision objects in the model's order, convex meshes as solids."""
-    return tuple(measured(convexified(body.geometry)) for body in robot.collision.geometryObjects)
+    return tuple(measured(convexified(closed_if_mended(body.geometry))) for body in robot.collision.geometryObjects)
+
+
+def closed_if_mended(geometry: coal.CollisionGeometry) -> coal.CollisionGeometry:
+    """Return an open mesh without the mistakes that keep it from being closed; any other geometry unchanged.
+
+    Links of robots are read by coal, and are mended like a `Mesh` of a scene; what stays open is left as it was.
+    """
+    better = _closed_if_mended(geometry) if is_mesh(geometry) else None
+    return geometry if better is None else better
+
+
+@once_per_geometry
+def _closed_if_mended(geometry: coal.CollisionGeometry) -> coal.BVHModelBase | None:
+    """Return an open mesh as a closed one; None if it is closed, or stays open."""
+    if is_closed(geometry):
+        return None
+    vertices, triangles = mended(*mesh_arrays(geometry))
+    return bvh(vertices, triangles) if len(triangles) and not edges_of(triangles).open.any() else None
 
 
 def measured(geometry: coal.CollisionGeometry) -> coal.CollisionGeometry:

@@ -79,8 +79,7 @@ class Mesh(Shape):
         if faces.min() < 0 or faces.max() >= len(points):
             raise InputError(f"{what}: a triangle names vertex {int(faces.max())}, but there are only {len(points)}")
 
-        points, faces = _welded(points, faces)
-        faces = faces if len(faces) == 0 else repaired(points, faces)
+        points, faces = mended(points, faces)
         if len(faces) == 0:
             raise InputError(f"{what}: every triangle has zero area; check its scale and export it again")
 
@@ -137,6 +136,17 @@ def open_edges_told(mesh: Mesh) -> str:
     """Return what messages say of the open edges of a mesh, and of what follows from them."""
     part = "the part of it that has them" if mesh.in_closed_parts.any() else "it"
     return f"{mesh.open_edges} open edges; {part} is treated as a surface, not as a solid"
+
+
+def mended(points: Matrix, faces: NDArray[np.int64]) -> tuple[Matrix, NDArray[np.int64]]:
+    """Return a surface as `Mesh` has it: equal vertices merged, no triangles of zero area, small mistakes repaired.
+
+    Args:
+        points: Vertices, shape (n, 3) [m].
+        faces: Indices of the vertices of each triangle, shape (m, 3).
+    """
+    points, faces = _welded(points, faces)
+    return points, faces if len(faces) == 0 else repaired(points, faces)
 
 
 def _welded(points: Matrix, faces: NDArray[np.int64]) -> tuple[Matrix, NDArray[np.int64]]:

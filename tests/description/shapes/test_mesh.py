@@ -15,9 +15,9 @@ from rrtik_ompl.description.shapes import mesh as mesh_files
 from rrtik_ompl.description.urdf import robot_from_urdf_text
 from rrtik_ompl.files import notice
 from rrtik_ompl.geometry.collision.shape_table import pieces
-from rrtik_ompl.geometry.collision.solids import is_closed, mesh_arrays
+from rrtik_ompl.geometry.collision.solids import bvh, closed_if_mended, is_closed, mesh_arrays, robot_solids
 from rrtik_ompl.model.scene import Obstacle, Scene
-from rrtik_ompl.model.shapes import Mesh
+from rrtik_ompl.model.shapes import Mesh, Sphere
 from rrtik_ompl.world.world import World
 
 CORNERS = np.array([[0, 0, 0], [1, 0, 0], [0, 2, 0], [0, 0, 3]], dtype=np.float64)
@@ -187,6 +187,34 @@ def test_a_bad_triangle_does_not_make_boxes_hollow(case):
     assert (np.unique(edges, axis=0, return_counts=True)[1] == 2).all()
 
 
+def obj_of(vertices, faces):
+    rows = [f"v {x} {y} {z}" for x, y, z in vertices] + ["f " + " ".join(str(k + 1) for k in face) for face in faces]
+    return "\n".join(rows)
+
+
+@pytest.mark.parametrize("case", REPAIRED)
+def test_a_bad_triangle_does_not_make_a_link_hollow(tmp_path, case):
+    (tmp_path / "link.obj").write_text(obj_of(*boxes(REPAIRED[case])))
+    mesh = '<geometry><mesh filename="link.obj"/></geometry>'
+    robot = robot_from_urdf_text(LINK_WITH_A_MESH.format(mesh=mesh), folder=tmp_path)
+    assert not is_closed(robot.collision.geometryObjects[0].geometry)
+    assert is_closed(robot_solids(robot)[0])
+
+
+def test_a_ball_in_a_link_with_a_bad_triangle_touches_it(tmp_path):
+    (tmp_path / "link.obj").write_text(obj_of(*boxes(REPAIRED["a T"])))
+    mesh = '<geometry><mesh filename="link.obj"/></geometry>'
+    robot = robot_from_urdf_text(LINK_WITH_A_MESH.format(mesh=mesh), folder=tmp_path)
+    worlds = [World(robot, Scene([Obstacle("ball", Sphere(0.02), [x, 0.15, 0.2])])) for x in (0.1, 0.35)]
+    assert [world.valid([0.0]) for world in worlds] == [False, True]
+
+
+def test_a_link_that_stays_open_is_left_as_it_is():
+    for change in (lambda faces: (faces[1:], []), lambda faces: (faces, [])):
+        mesh = bvh(*boxes(change))
+        assert closed_if_mended(mesh) is mesh
+
+
 def test_a_triangle_that_is_missing_opens_its_own_box_alone():
     vertices, faces = boxes(lambda faces: (faces[1:], []))
     mesh = Mesh(vertices, faces)
@@ -213,8 +241,7 @@ def test_boards_that_share_a_face_are_closed_and_not_said_to_be_open(tmp_path):
     """As most shelves: four triangles meet at an edge, which all agree on what is inside."""
     vertices, faces = boxes(lambda faces: (faces, []))
     vertices[8:16, 0] -= 0.3  # the second box touches the first one
-    rows = [f"v {x} {y} {z}" for x, y, z in vertices] + ["f " + " ".join(str(k + 1) for k in face) for face in faces]
-    (tmp_path / "shelf.obj").write_text("\n".join(rows))
+    (tmp_path / "shelf.obj").write_text(obj_of(vertices, faces))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         mesh = Mesh.load(tmp_path / "shelf.obj")
@@ -303,17 +330,17 @@ BROKEN = {
     "flat.stl": (b"x" * 80 + (2).to_bytes(4, "little") + bytes(100), "no triangles"),
     "nan.stl": (NAN, "finite"),
     "picture.stl": (b"\x89PNG\r\n\x1a\n" + bytes(range(256)), "not a usable mesh"),
-    "index.obj": (obj() + b"f 1 2 99\n", "not a usable mesh"),
+    "index.obj": (obj() + b"f 1 2 99\n", "a triangle names a vertex that is not there"),
     "points.obj": (b"v 0 0 0\nv 1 0 0\nv 0 1 0\n", "no triangles"),
     "lines.obj": (b"v 0 0 0\nv 1 0 0\nv 0 1 0\nl 1 2\n", "no triangles"),
     "huge.obj": (obj().replace(b"v 1.0", b"v 1e999"), "finite"),
     "words.obj": (b"this is not a mesh\n" * 10, "not a usable mesh"),
-    "cut.dae": (dae()[:600], "not a usable mesh"),
+    "cut.dae": (dae()[:600], "damaged, cut off, or no DAE file"),
     "unit.dae": (dae("0"), "unit must be greater than 0"),
-    "units.dae": (dae("centimetre"), "not a usable mesh"),
+    "units.dae": (dae("centimetre"), "unit 'centimetre' is no number"),
     "page.dae": (b"<html><body>404</body></html>", "not a usable mesh"),
     "part.ply": (b"ply\n", "a point cloud, not a mesh"),
-    "cut.glb": (b"glTF\2\0\0\0", "not a usable mesh"),
+    "cut.glb": (b"glTF\2\0\0\0", "damaged, cut off, or no GLB file"),
     "cut_off.stl": (stl_text()[:-60], "is it cut off"),
     "words_for_numbers.stl": (stl_text().replace(b"vertex 1.0", b"vertex one", 1), "not of three numbers"),
     "part": (obj(), "unknown kind of mesh"),
