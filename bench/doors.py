@@ -5,7 +5,9 @@ with default options. Whether a description is whole (its files are there, its X
 without rrtik_ompl: an MJCF by MuJoCo's compiler; others by ElementTree, by the package xacro, which can run anything,
 and by looking for the files (those of packages in a folder of this name, or whose `package.xml` has it, anywhere below
 the folder). The tip is compared with Pinocchio's or MuJoCo's own reading at 50 postures. Whether a tip or a joint is a
-finger is judged by its name, of descriptions that have other joints too.
+finger is judged by its name, but for hands alone: all joints are fingers', or the file is called hand, gripper or
+finger and fewer than three are not. A description whose joints are all in loops is rightly refused by default and
+listed apart.
 
 A sample, those robots whose paths have the least SHA-256, is planned for: the default planner in a scene of four boxes
 around the arm, up to three pairs of random postures, and the page of the path is written.
@@ -54,7 +56,9 @@ POSTURES = 50
 AGREE = 1e-6  # [m], and of the entries of a rotation
 SECONDS = 90.0
 XACRO = ("{http://www.ros.org/wiki/xacro}", "{http://ros.org/wiki/xacro}")
-FINGER = re.compile(r"finger|thumb|knuckle|jaw|claw|phalan")
+FINGER = re.compile(r"finger|thumb|(^|_)(index|middle|ring|pinky)(_|$)|knuckle|jaw|claw|phalan")
+HAND = re.compile(r"hand|gripper|finger")  # name of the file of a hand alone
+FEW = 3  # such a file has fewer other joints
 PAIRS = 3  # of random postures that are tried
 SAMPLES = 400  # postures from which reach and free postures are taken
 PACKAGE = re.compile(r"^(?:package|model)://|^file://\$\(find ")
@@ -68,6 +72,7 @@ class Outcome:
         whole: Whether it can be loaded at all, as far as others can tell; else ``lacks`` says why not.
         loaded: Whether it was.
         said: The message of the refusal.
+        armless: Whether that is that there is no arm in it, only joints in loops, as of most grippers of bars.
         off: Largest difference of the tip from Pinocchio's [m, or of an entry of the rotation]; None if not compared.
         seconds: Processor time.
         robot: Joints and tip.
@@ -79,6 +84,7 @@ class Outcome:
     lacks: str = ""
     loaded: bool = False
     said: str = ""
+    armless: bool = False
     off: float | None = None
     seconds: float = 0.0
     robot: str = ""
@@ -314,6 +320,7 @@ def outcome(folder: str, name: str, kind: str) -> Outcome:
             robot = rrtik.load_robot(str(path))
     except RrtikError as error:
         found.said = str(error)
+        found.armless = "no arm in it" in found.said
     except Exception as error:  # which no description may cause
         found.said = f"{type(error).__name__}: {error}"
     found.seconds = time.process_time() - begin
@@ -321,14 +328,20 @@ def outcome(folder: str, name: str, kind: str) -> Outcome:
     if robot is not None:
         found.loaded = True
         found.robot = f"{len(robot.joint_names)} joints ({', '.join(robot.joint_names)}), tip {robot.tip}"
-        alone = all(FINGER.search(joint.lower()) for joint in robot.movable)
-        found.finger = not alone and bool(FINGER.search(robot.tip.lower()))
-        found.fingers = 0 if alone else sum(bool(FINGER.search(joint.lower())) for joint in robot.joint_names)
+        is_finger = [_is_finger(joint) for joint in robot.movable]
+        alone = all(is_finger) or (bool(HAND.search(path.stem.lower())) and len(is_finger) - sum(is_finger) < FEW)
+        found.finger = not alone and _is_finger(robot.tip)
+        found.fingers = 0 if alone else sum(_is_finger(joint) for joint in robot.joint_names)
         if model is not None:
             found.off = _off_mujoco(robot, model)
         elif text is not None:
             found.off = _off(robot, text)
     return found
+
+
+def _is_finger(name: str) -> bool:
+    """Whether a link or joint has the name of a finger; a jaw that is fixed is a part of a palm."""
+    return bool(FINGER.search(name.lower())) and "fixed" not in name.lower()
 
 
 def planned(folder: str, name: str, kind: str) -> Planned:
@@ -397,17 +410,17 @@ def _path(world: rrtik.World) -> tuple[rrtik.Problem, rrtik.JointPath, bool]:
 
 @contextmanager
 def _within(seconds: float) -> Iterator[None]:
-    """Raise an error after some time."""
+    """Raise an error after some processor time."""
 
     def stop(*_: object) -> None:
         raise TimeoutError(f"takes more than {seconds:g} s")
 
-    signal.signal(signal.SIGALRM, stop)
-    signal.setitimer(signal.ITIMER_REAL, seconds)
+    signal.signal(signal.SIGPROF, stop)
+    signal.setitimer(signal.ITIMER_PROF, seconds)
     try:
         yield
     finally:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
 
 
 def _off(robot: Robot, text: str) -> float | None:
@@ -449,7 +462,7 @@ def _off_mujoco(robot: Robot, model: Any) -> float | None:
     """Compare the tip in random postures with MuJoCo's; None if a joint that the robot holds still moves it there."""
     import mujoco
 
-    kinds = ((mujoco.mjtObj.mjOBJ_SITE, "site"), (mujoco.mjtObj.mjOBJ_BODY, "xbody"))
+    kinds = ((mujoco.mjtObj.mjOBJ_BODY, "xbody"), (mujoco.mjtObj.mjOBJ_SITE, "site"))
     named = [(kind, mujoco.mj_name2id(model, kind, robot.tip), what) for kind, what in kinds]
     tip = next(((number, what) for _, number, what in named if number >= 0), None)
     if tip is None:
@@ -549,7 +562,10 @@ def write(report: Report, cases: Sequence[Case], found: Sequence[Outcome], *, ro
     shown = [(case, each) for case, each in rows if not held_out(case[1])]
     apart = [(case, each) for case, each in rows if held_out(case[1])]
 
-    of_shown, of_apart = (_rate([each for _, each in group if each.whole]) for group in (shown, apart))
+    of_shown, of_apart = (
+        _rate([each for _, each in group if each.whole and not each.armless]) for group in (shown, apart)
+    )
+    alone = [(_named(case), _short(each.said, case)) for case, each in shown if each.whole and each.armless]
     report.bar("loaded at the first call, of the whole ones", "98 %", f"{of_shown:.1f} %", of_shown >= 98.0)
     report.bar("those held out", "within 2 points", f"{of_apart:.1f} %", of_apart >= of_shown - 2.0)
     wrong = [(case, each) for case, each in rows if each.off is not None and each.off > AGREE]
@@ -571,20 +587,25 @@ def write(report: Report, cases: Sequence[Case], found: Sequence[Outcome], *, ro
     table = []
     for kind in KINDS:
         ours, theirs = ([each for case, each in group if case[2] == kind] for group in (shown, apart))
-        whole, their_whole = ([each for each in group if each.whole] for group in (ours, theirs))
+        whole, their_whole = ([each for each in group if each.whole and not each.armless] for group in (ours, theirs))
         slowest = max((each.seconds for each in (*ours, *theirs)), default=0.0)
         counts = (len(ours) + len(theirs), len(whole), _share(whole), len(their_whole), _share(their_whole))
         table.append((kind, *map(str, counts), f"{slowest:.1f}"))
     report.table("By kind", heads, table)
 
-    by_folder = Counter(Path(case[0]).name for case, each in rows if each.whole)
+    by_folder = Counter(Path(case[0]).name for case, each in rows if each.whole and not each.armless)
     loaded = Counter(Path(case[0]).name for case, each in rows if each.whole and each.loaded)
     report.table(
         "By folder", ("folder", "whole", "loaded"), [(k, str(n), str(loaded[k])) for k, n in sorted(by_folder.items())]
     )
 
-    said = [(_named(case), _short(each.said, case)) for case, each in shown if each.whole and not each.loaded]
+    said = [
+        (_named(case), _short(each.said, case))
+        for case, each in shown
+        if each.whole and not each.loaded and not each.armless
+    ]
     report.table("Whole, not held out, and refused", ("description", "what was said"), said)
+    report.table("No arm, which is said and not counted above", ("description", "what was said"), alone)
     off = [(_named(case), f"{each.off:.3g}", each.robot) for case, each in wrong if not held_out(case[1])]
     report.table("Not where Pinocchio or MuJoCo say", ("description", "off [m]", "robot"), off)
     fingered = [(_named(case), each.robot) for case, each in shown if each.whole and (each.finger or each.fingers)]

@@ -143,8 +143,8 @@ class _Finder:
         self.is_hand = all(joint.name in self.fingers | self.excluded for joint in self.walk)
         if self.is_hand:  # Its fingers are the limbs.
             self.fingers = set()
-        if all(joint.name in self.excluded for joint in self.walk):
-            self.excluded = set()
+        if all(joint.name in self.excluded for joint in self.walk):  # A gantry may get its limits elsewhere.
+            self.excluded = set(self.loops)
 
     def _place(self, link: str, body: str, depth: int) -> None:
         self.body[link] = body

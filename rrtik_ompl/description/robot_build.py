@@ -113,6 +113,9 @@ def build_robot(
     drivers = {tie.joint: tie.source for tie in mimic_of.values()}
     arms = arms_of(tree, drivers, loops or {}, tip if joints is None else None, fingers)
     locked_values = dict(locked or {})
+    if joints is None and not arms.joints and arms.held:
+        kinds = ", ".join(f"{kind} ({few(map(repr, held), MOST_HELD)})" for kind, held in arms.held.items())
+        raise InputError(f"robot '{name}': no arm in it, only {kinds}; joints=[...] moves them nevertheless")
     actuated = tuple(joints) if joints is not None else tuple(j for j in arms.joints if j not in locked_values)
     _check_joints(name, tuple(movable), actuated, mimic_of, locked_values)
     locked_values = {j: v for j, v in (loops or {}).items() if j not in actuated and j not in mimic_of} | locked_values

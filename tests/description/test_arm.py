@@ -9,6 +9,7 @@ import pytest
 from rrtik_ompl.base.errors import ArmWarning, InputError
 from rrtik_ompl.description.arm import arms_of
 from rrtik_ompl.description.catalog import load_robot
+from rrtik_ompl.description.robot_build import build_robot
 from rrtik_ompl.description.tree import Joint, Link, Tree
 from rrtik_ompl.model.goal import MultiGoal, PoseGoal
 from rrtik_ompl.tasks.setting import with_gripper
@@ -146,6 +147,14 @@ def test_the_joint_that_another_one_follows_moves_though_it_stands_beside_the_ar
     """A rod drives the forearm: the joint of the arm follows that of the rod."""
     arms = arms_of(tree(chain("base", ["a1", "a2", "a3"]), chain("a1", ["rod"])), {"a2": "rod"})
     assert set(arms.joints) == {"a1", "rod", "a3"}
+
+
+def test_joints_that_are_all_in_loops_are_no_arm():
+    bars = tree(chain("base", ["a1", "a2"]))
+    loops = {"a1": 0.0, "a2": 0.0}
+    with pytest.raises(InputError, match=r"no arm in it, only joints in loops \('a1', 'a2'\); joints="):
+        build_robot("bars", bars, loops=loops)
+    assert build_robot("bars", bars, loops=loops, joints=["a1"]).dof == 1
 
 
 def test_joints_that_are_asked_for_come_back_without_a_word():
