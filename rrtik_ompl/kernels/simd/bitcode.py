@@ -110,4 +110,4 @@ def target_generator(target: Target, effort: int = 3) -> Any:
     """
     llvm.initialize_all_targets()
     llvm.initialize_all_asmprinters()
-    return llvm.Target.from_triple(target.triple).create_target_machine(opt=effort, reloc="pic", codemodel="default")
+    return llvm.Target.from_triple(target.code).create_target_machine(opt=effort, reloc="pic", codemodel="default")

@@ -1,7 +1,8 @@
-"""Kernels as libraries of machine code: made once for a processor, kept in the user's cache, loaded by LLVM alone.
+"""Kernels as libraries of machine code: made once for a processor by LLVM, kept in the user's cache.
 
 Each module with functions that Python calls (``@entry``) is a library of its own, so nobody waits for kernels that he
-does not use. Numba takes part only in making one, and not even then if the package brings it as bitcode.
+does not use. Numba takes part only in making one, and not even then if the package brings it as bitcode. Loading one
+that is kept takes LLVM on ARM alone, see :mod:`rrtik_ompl.kernels.simd.linker`.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 from rrtik_ompl.files.cache import cache_folder
 from rrtik_ompl.kernels.simd.bitcode_store import own_bitcode, packaged_bitcode
 from rrtik_ompl.kernels.simd.code_files import PREFIX, Code, file_name, kept_code, machine_key, write_code
+from rrtik_ompl.kernels.simd.linker import linked
 from rrtik_ompl.kernels.simd.processor import target_machine
 from rrtik_ompl.kernels.simd.targets import UnknownMachineError, target_of, this_target
 
@@ -31,9 +33,10 @@ class Library:
     threads run meanwhile. They work as long as the process lives.
     """
 
-    def __init__(self, name: str, code: Code) -> None:
-        for entry, address in _addresses(name, code).items():
-            kind = ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_int64] * code.entries[entry])
+    def __init__(self, counts: dict[str, int], addresses: dict[str, int]) -> None:
+        """Args: numbers of arguments, and where the functions are, both by name."""
+        for entry, address in addresses.items():
+            kind = ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_int64] * counts[entry])
             setattr(self, entry, kind(address))
 
     if TYPE_CHECKING:
@@ -97,7 +100,7 @@ def _kept(name: str) -> Library | None:
     if code is None:
         return None
     try:
-        return Library(name, code)
+        return Library(code.entries, _addresses(name, code))
     except (RuntimeError, KeyError):  # not what LLVM takes for machine code with these functions
         return None
 
@@ -108,7 +111,7 @@ def _made(name: str) -> Library:
     code = (None if packaged is None else machine_code(packaged)) or machine_code(own_bitcode(name))
     if code is None:
         raise RuntimeError("LLVM does not take the code that numba made")
-    made = Library(name, code)
+    made = Library(code.entries, _addresses(name, code))
     file = code_file(name)
     if file is not None:
         write_code(file, machine_key(name), code)
@@ -119,7 +122,7 @@ def machine_code(bitcode: Code) -> Code | None:
     """Bitcode of any kind of machine as code of this processor; None if a newer LLVM or an unknown kind made it."""
     import llvmlite.binding as llvm
 
-    machine = target_machine()
+    machine = target_machine(this_target().code)
     try:
         module = llvm.parse_bitcode(bitcode.code)
     except RuntimeError:
@@ -135,7 +138,7 @@ def machine_code(bitcode: Code) -> Code | None:
 def _linker() -> Any:
     import llvmlite.binding as llvm
 
-    return llvm.create_lljit_compiler(target_machine(), use_jit_link=True, suppress_errors=True)
+    return llvm.create_lljit_compiler(target_machine(this_target().code), use_jit_link=True, suppress_errors=True)
 
 
 _loaded: list[Any] = []  # machine code goes away with LLVM's handle of it
@@ -144,6 +147,13 @@ _numbers = count()
 
 def _addresses(name: str, code: Code) -> dict[str, int]:
     """Load machine code; where its functions are."""
+    found = linked(code.code, [PREFIX + entry for entry in code.entries])
+    if found is None:
+        found = _linked_by_llvm(name, code)
+    return {entry: found[PREFIX + entry] for entry in code.entries}
+
+
+def _linked_by_llvm(name: str, code: Code) -> dict[str, int]:
     import llvmlite.binding as llvm
 
     builder = llvm.JITLibraryBuilder().add_object_img(code.code).add_current_process()
@@ -151,4 +161,4 @@ def _addresses(name: str, code: Code) -> dict[str, int]:
         builder.export_symbol(PREFIX + entry)
     handle = builder.link(_linker(), f"{name}-{next(_numbers)}")
     _loaded.append(handle)
-    return {entry: handle[PREFIX + entry] for entry in code.entries}
+    return {PREFIX + entry: handle[PREFIX + entry] for entry in code.entries}

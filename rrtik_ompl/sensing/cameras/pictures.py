@@ -21,6 +21,7 @@ from rrtik_ompl.files.text import file_name, write_bytes
 IMAGE_ENDINGS = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp")
 VIDEO_ENDINGS = (".mp4", ".avi", ".webm", ".mkv", ".mov", ".m4v")
 MOST_CAMERAS = 1_000_000  # limit of a device number; OpenCV adds hundreds to it
+LOG_ERRORS = 2  # OpenCV's level of errors: its warnings are left out
 MAX_FILE_BYTES = 512 * 1024 * 1024
 
 
@@ -150,12 +151,12 @@ def _device(number: int) -> Iterator[Picture]:
 @contextmanager
 def quiet() -> Iterator[None]:
     """Suppress OpenCV's warnings, because our own error says in one line why something cannot be opened."""
-    log: Any = cv2.utils.logging
-    before = log.setLogLevel(log.LOG_LEVEL_ERROR)
+    levels: Any = getattr(cv2.utils, "logging", cv2)  # some wheels of OpenCV 4.10 have it elsewhere
+    before = levels.setLogLevel(LOG_ERRORS)
     try:
         yield
     finally:
-        log.setLogLevel(before)
+        levels.setLogLevel(before)
 
 
 @contextmanager
