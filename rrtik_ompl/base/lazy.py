@@ -13,6 +13,7 @@ from inspect import Signature, signature
 from types import FunctionType, ModuleType
 from typing import Any
 
+from rrtik_ompl.base.collector import collector_waits
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.base.floors import fitting_packages
 
@@ -39,7 +40,7 @@ def lazy_names(
         if name not in public:
             raise AttributeError(f"module '{package}' has no attribute '{name}'")
         home = home_of.get(name)
-        with fitting_packages():
+        with fitting_packages(), collector_waits():
             module = import_module(f"{package}.{name}" if home is None else f"rrtik_ompl.{home}")
         value = module if home is None else getattr(module, name)
         if isinstance(value, type):

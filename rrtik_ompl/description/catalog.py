@@ -22,11 +22,12 @@ from functools import cache
 from importlib import import_module
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rrtik_ompl.base.choices import one_of
 from rrtik_ompl.base.errors import InputError, RrtikError, UnknownNameError, listed, name_of, require
 from rrtik_ompl.description.known_arms import fetched, is_description, shipped_name, unknown_robot
+from rrtik_ompl.description.offers import offers_of
 from rrtik_ompl.description.robot_source import BasePose, plain, source_entry
 from rrtik_ompl.description.robot_source import base_pose as checked_base
 from rrtik_ompl.description.urdf import URDF_OPTIONS, robot_from_urdf
@@ -35,9 +36,6 @@ from rrtik_ompl.description.xacro_text import expanding
 from rrtik_ompl.files.kinds import FilePath, refusing_others
 from rrtik_ompl.files.text import file_name, is_utf8
 from rrtik_ompl.model.robot import Robot
-
-if TYPE_CHECKING:
-    from importlib.metadata import EntryPoint, EntryPoints
 
 SOLVED_KINDS = ("any goal", "goal of the tip", "path constraints")  # what planners of "auto" say that they solve
 FILE_OPTIONS = ("urdf", "srdf", "joint_limits", "dh", "moveit", "mjcf")
@@ -63,12 +61,12 @@ def list_robots() -> tuple[str, ...]:
         >>> "panda" in rrtik.list_robots()
         True
     """
-    return tuple(sorted(_offers("robots")))
+    return tuple(sorted(offers_of("robots")))
 
 
 def list_planners() -> tuple[str, ...]:
     """Return the names of the planners that packages offer (without OMPL's own)."""
-    return tuple(sorted(_offers("planners")))
+    return tuple(sorted(offers_of("planners")))
 
 
 def find_planner(name: str) -> type[Any]:
@@ -88,7 +86,7 @@ def portfolio() -> Mapping[str, str]:
     A package that offers planners lists them in ``PORTFOLIO`` of its top-level module, by name: "any goal", "goal of
     the tip" (the planner finds the configurations itself) or "path constraints". No planner is imported for this.
     """
-    offered = _offers("planners")
+    offered = offers_of("planners")
     packages = sorted({entry.module.partition(".")[0] for entry in offered.values()})
     found: dict[str, str] = {}
 
@@ -161,7 +159,7 @@ def find_tables() -> tuple[Any, ...]:
     Raises:
         InputError: If one of them cannot be loaded.
     """
-    return tuple(_load("published tables", "tables", name) for name in sorted(_offers("tables")))
+    return tuple(_load("published tables", "tables", name) for name in sorted(offers_of("tables")))
 
 
 def problem_folders() -> tuple[Path, ...]:
@@ -277,12 +275,12 @@ def _loaded(
 ) -> Robot:
     """Load a robot as :func:`load_robot` does; options and parameters are in one mapping, as in problem files."""
     options = {option: value for option, value in given.items() if value is not None}
-    if isinstance(name, str) and name not in _offers("robots") and not os.path.exists(name):
+    if isinstance(name, str) and name not in offers_of("robots") and not os.path.exists(name):
         if is_description(name):
             found = fetched(name)
             name, options = found.file, found.options | options
         else:
-            name = shipped_name(name, _offers("robots")) or name
+            name = shipped_name(name, offers_of("robots")) or name
     recipe = _recipe(file_name(name) if not isinstance(name, str) else name)
     for option in options:
         if option not in (*recipe.options, *COMMON_OPTIONS):
@@ -337,7 +335,7 @@ def _recipe(name: str | os.PathLike[str]) -> _Recipe:
     path = Path(text)
     if not is_utf8(os.path.abspath(text)):  # Pinocchio and coal take no other names.
         raise InputError(f"{text}: the name of the file, or of a folder above it, is not UTF-8; rename it")
-    if isinstance(name, str) and text in _offers("robots"):
+    if isinstance(name, str) and text in offers_of("robots"):
         make = _load("robot", "robots", text)
         return _Recipe("name", text, make, tuple(sorted(inspect.signature(make).parameters)))
 
@@ -517,25 +515,9 @@ def _in_folder(path: str, folder: str | os.PathLike[str]) -> Path:
 
 
 @cache
-def _offers(group: str) -> dict[str, EntryPoint]:
-    """Return the entry points of a group by name."""
-    return {entry.name: entry for entry in _entry_points().select(group=f"rrtik_ompl.{group}")}
-
-
-@cache
-def _entry_points() -> EntryPoints:
-    """Return the entry points of all groups; cached, as searching the installed packages takes time.
-
-    The module importlib.metadata is imported late because it is large.
-    """
-    found: EntryPoints = import_module("importlib.metadata").entry_points()
-    return found
-
-
-@cache
 def _load(what: str, group: str, name: str) -> Any:  # noqa: ANN401 - what another package offers
     """Load what a package offers under a name of a group; ``what`` describes it in error messages."""
-    offers = _offers(group)
+    offers = offers_of(group)
     if name not in offers:
         raise UnknownNameError(what, name, offers)
     try:
@@ -554,4 +536,4 @@ def _shipped(what: str, group: str, below: str = "") -> dict[str, Path]:
 
 
 def _folders(what: str, group: str) -> tuple[Path, ...]:
-    return tuple(Path(_load(f"{what} folder", group, name)) for name in _offers(group))
+    return tuple(Path(_load(f"{what} folder", group, name)) for name in offers_of(group))

@@ -18,9 +18,10 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector
+from rrtik_ompl.base.collector import collector_waits
 from rrtik_ompl.base.copies import Items
 from rrtik_ompl.base.poses import working_memory
-from rrtik_ompl.geometry.collision.bodies import DISTANCE_TOLERANCE, Body, collector_waits, kept_apart, request
+from rrtik_ompl.geometry.collision.bodies import DISTANCE_TOLERANCE, Body, kept_apart, request
 from rrtik_ompl.geometry.collision.distances import is_ours, own_gap
 from rrtik_ompl.geometry.collision.solids import around, is_mesh, solids_of
 from rrtik_ompl.kernels import FREE, UNDECIDED, FastWorld
@@ -54,7 +55,7 @@ class ExactChecker:
     _data: Any = None
 
     @classmethod
-    @collector_waits
+    @collector_waits()
     def of(cls, solids: Arrangement, clearance: float) -> ExactChecker:
         """Create the checker of an arrangement that keeps a clearance [m] from obstacles on top of their margins."""
         bodies = solids.with_clearance(clearance)

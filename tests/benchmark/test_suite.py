@@ -66,8 +66,8 @@ def test_shipped_suites_name_what_there_is(name):
 
 def test_suites_are_found_by_name_and_unknown_ones_listed(monkeypatch, capsys):
     offers = {"suites": {"ours": EntryPoint("ours", "rrtik_planners.suites:FOLDER", "rrtik_ompl.suites")}}
-    usual = catalog._offers
-    monkeypatch.setattr(catalog, "_offers", lambda group: offers.get(group) or usual(group))
+    usual = catalog.offers_of
+    monkeypatch.setattr(catalog, "offers_of", lambda group: offers.get(group) or usual(group))
     assert run(["list", "suites"]) == 0
     assert "scaling\n" in capsys.readouterr().out
     assert load_suite("quick").name == "quick"

@@ -62,7 +62,7 @@ def test_planners_that_seek_the_tip_try_goals_of_the_tip_alone(boxes, pose):
 @pytest.fixture
 def other_package(monkeypatch):
     """A further package that offers the planner "other", and what stands in its top-level module."""
-    usual, loaded = catalog._offers, catalog.import_module
+    usual, loaded = catalog.offers_of, catalog.import_module
     module = SimpleNamespace()
 
     def load(name):
@@ -73,7 +73,7 @@ def other_package(monkeypatch):
         return module
 
     offer = SimpleNamespace(module="other_planners.one")
-    monkeypatch.setattr(catalog, "_offers", lambda group: usual(group) | {"other": offer})
+    monkeypatch.setattr(catalog, "offers_of", lambda group: usual(group) | {"other": offer})
     monkeypatch.setattr(catalog, "import_module", load)
     catalog.portfolio.cache_clear()
     yield module

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import sys
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -29,13 +29,11 @@ def data_folder() -> Path:
     Raises:
         InputError: If the package is not installed.
     """
-    try:
-        folder = Path(str(distribution(PACKAGE).locate_file(INSIDE)))
-    except PackageNotFoundError:
-        folder = Path()
-    if not folder.name or not folder.is_dir():
-        raise InputError(f"the robot files of {PACKAGE} are not installed; pip install {PACKAGE}")
-    return folder
+    for place in sys.path:  # importlib.metadata takes longer to be loaded than an arm
+        folder = Path(place, INSIDE)
+        if folder.is_dir():
+            return folder
+    raise InputError(f"the robot files of {PACKAGE} are not installed; pip install {PACKAGE}")
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-import gc
 import math
 import warnings
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import lru_cache, wraps
+from functools import lru_cache
 from itertools import chain, combinations, compress
 from operator import not_
-from typing import Any, ParamSpec, TypeAlias, TypeVar
+from typing import Any, TypeAlias
 
 import coal
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from rrtik_ompl.base.collector import collector_waits
 from rrtik_ompl.base.errors import DescriptionWarning, InputError, UnknownNameError, few
 from rrtik_ompl.geometry.collision.shape_table import Piece, pieces
 from rrtik_ompl.geometry.collision.solids import robot_solids
@@ -30,8 +30,6 @@ DEPTH_TOLERANCE = 1e-9
 # [m] Rounding error that is allowed for, both in our own arithmetic and in coal's distances and penetration depths.
 DISTANCE_TOLERANCE = 1e-5
 Pairs: TypeAlias = tuple[tuple[int, int], ...]
-Given = ParamSpec("Given")
-Made = TypeVar("Made")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,26 +64,6 @@ class Body:
     contacts: tuple[tuple[str, float], ...] = ()
 
 
-def collector_waits(work: Callable[Given, Made]) -> Callable[Given, Made]:
-    """Return a version of a function that runs with Python's garbage collector switched off.
-
-    Functions that allocate many thousands of objects would otherwise start the collector again and again, and each run
-    looks at every object of the process. If the collector is off already, it stays off.
-    """
-
-    @wraps(work)
-    def undisturbed(*args: Given.args, **kwargs: Given.kwargs) -> Made:
-        if not gc.isenabled():
-            return work(*args, **kwargs)
-        gc.disable()
-        try:
-            return work(*args, **kwargs)
-        finally:
-            gc.enable()
-
-    return undisturbed
-
-
 @lru_cache(maxsize=16)
 def link_bodies(robot: Robot, margin: float = 0.0) -> tuple[Body, ...]:
     """Return the bodies of the robot's links, in the order of its collision model.
@@ -101,7 +79,7 @@ def link_bodies(robot: Robot, margin: float = 0.0) -> tuple[Body, ...]:
     )
 
 
-@collector_waits
+@collector_waits()
 def scene_bodies(robot: Robot, scene: Scene, margin: float = 0.0) -> tuple[Body, ...]:
     """Return the bodies of all obstacles, then those of all attached objects.
 
@@ -225,7 +203,7 @@ def deepest_contact(bodies: Iterable[Body], first: str, second: str) -> float:
     return SHARE * sum(widths.values())
 
 
-@collector_waits
+@collector_waits()
 def colliding_pairs(robot: Robot, scene: Scene, bodies: tuple[Body, ...]) -> tuple[tuple[int, int], ...]:
     """Return the pairs of bodies that must not touch, as pairs of their numbers, sorted.
 

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.base.arrays import Matrix, Vector
-from rrtik_ompl.geometry.collision.bodies import Body, collector_waits
+from rrtik_ompl.base.collector import collector_waits
+from rrtik_ompl.geometry.collision.bodies import Body
 from rrtik_ompl.geometry.collision.body_arrays import body_arrays
 from rrtik_ompl.geometry.collision.cloud_solid import CloudSolid
 from rrtik_ompl.kernels.layout import CLOUD_SOLID, HALF_SPACE_SOLID
@@ -83,7 +84,7 @@ class ProofPairs:
         return self.table.intact() and all(cloud.intact() for cloud in self.clouds)
 
 
-@collector_waits
+@collector_waits()
 def proof_pairs(
     chain: Chain,
     bodies: Sequence[Body],

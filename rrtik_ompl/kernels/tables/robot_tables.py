@@ -227,22 +227,25 @@ def ball_table(
 
     stacked = np.concatenate([np.zeros((0, BALL_FLOATS)), *balls])
     group_of = {frame: k for k, frame in enumerate(frames)}
-    body_balls = [enclosing_ball(s) if len(s) else np.zeros(BALL_FLOATS) for s in shapes]
     present = [(i, j) for i, j in pairs if len(shapes[i]) and len(shapes[j])]
     present.sort(key=lambda p: sorted(group_of[bodies[k].frame] for k in p))
     pair_groups = _pair_groups([(group_of[bodies[i].frame], group_of[bodies[j].frame]) for i, j in present])
     runs = [(clusters[g[GROUP_FIRST]][CLUSTER_FIRST], clusters[g[GROUP_END] - 1][CLUSTER_END]) for g in groups]
+    sets = [*shapes, *(stacked[first:end] for first, end in runs), *balls]
+    body_balls, group_balls, cluster_balls = np.split(
+        enclosing_balls(sets).astype(np.float32), [len(bodies), len(bodies) + len(groups)]
+    )
 
     return packed(
         BallTable,
         group_count=len(groups),
         groups=whole_records(GROUP_INTS, groups),
-        group_balls=np.array([enclosing_ball(stacked[a:b]) for a, b in runs], dtype=np.float32),
+        group_balls=group_balls,
         clusters=whole_records(CLUSTER_INTS, clusters),
-        cluster_balls=np.array([enclosing_ball(b) for b in balls], dtype=np.float32),
+        cluster_balls=cluster_balls,
         balls=stacked.astype(np.float32),
         bodies=whole_records(BODY_INTS, spans),
-        body_balls=np.array(body_balls, dtype=np.float32),
+        body_balls=body_balls,
         pair_group_count=len(pair_groups),
         pair_groups=whole_records(PAIR_GROUP_INTS, pair_groups),
         pairs=whole_records(PAIR_INTS, [{PAIR_ONE: i, PAIR_OTHER: j} for i, j in present]),
@@ -276,31 +279,45 @@ def neighbourhoods(spheres: Spheres) -> list[Spheres]:
     return neighbourhoods(spheres[order[:middle]]) + neighbourhoods(spheres[order[middle:]])
 
 
-def enclosing_ball(spheres: Spheres) -> Vector:
-    """A small ball around balls, shape (4,): steps towards the farthest one [43], best kept."""
-    if len(spheres) == 1:
-        return np.array(spheres[0])
-    return _enclosing_ball(np.ascontiguousarray(spheres).tobytes())
+def enclosing_balls(sets: Sequence[Spheres]) -> Spheres:
+    """A small ball around each of several sets of balls, shape (sets, 4): steps towards the farthest one [43].
+
+    The best ball of forty steps is kept; all sets take them together. No balls have the ball 0 around them.
+    """
+    found = np.zeros((len(sets), BALL_FLOATS))
+    several = np.array([k for k, spheres in enumerate(sets) if len(spheres) > 1], dtype=int)
+    for k, spheres in enumerate(sets):
+        if len(spheres) == 1:
+            found[k] = spheres[0]
+    # Sets of like size share an array, in which the smaller ones are filled up by their first ball.
+    sizes = np.array([len(sets[k]) for k in several], dtype=int)
+    for alike in range(int(sizes.max(initial=0)).bit_length() + 1):
+        some = several[[size.bit_length() == alike for size in sizes.tolist()]]
+        if len(some):
+            found[some] = _balls_around([sets[k] for k in some])
+    return found
 
 
-@lru_cache(maxsize=4096)  # worlds of one arm that holds different things have most of them in common
-def _enclosing_ball(numbers: bytes) -> Vector:
-    spheres = np.frombuffer(numbers).reshape(-1, BALL_FLOATS)
-    centres = spheres[:, :3]
-    radii = spheres[:, 3]
-    centre = 0.5 * ((centres - radii[:, None]).min(axis=0) + (centres + radii[:, None]).max(axis=0))
+def _balls_around(sets: Sequence[Spheres]) -> Spheres:
+    """As :func:`enclosing_balls`, for sets of two balls or more."""
+    most = max(map(len, sets))
+    spheres = np.stack([np.concatenate([each, np.repeat(each[:1], most - len(each), axis=0)]) for each in sets])
+    centres = spheres[:, :, :3]
+    radii = spheres[:, :, 3]
+    every = np.arange(len(sets))
+    centre = 0.5 * ((centres - radii[:, :, None]).min(axis=1) + (centres + radii[:, :, None]).max(axis=1))
     best = centre
-    radius = np.inf
+    radius = np.full(len(sets), np.inf)
 
     for step in range(1, 41):
-        away = centres - centre
-        depths = np.sqrt(np.add.reduce(away * away, axis=1)) + radii
-        farthest = int(np.argmax(depths))
-        if depths[farthest] < radius:
-            best = centre
-            radius = float(depths[farthest])
+        away = centres - centre[:, None]
+        depths = np.sqrt(np.add.reduce(away * away, axis=2)) + radii
+        farthest = np.argmax(depths, axis=1)
+        depth = depths[every, farthest]
+        better = depth < radius
+        best = np.where(better[:, None], centre, best)
+        radius = np.where(better, depth, radius)
+        centre = centre + (centres[every, farthest] - centre) / (step + 3)
 
-        centre = centre + (centres[farthest] - centre) / (step + 3)
-
-    slack = MARGIN_PER_LEVER * (radius + float(np.abs(best).max()))
-    return frozen([*best, radius + slack])
+    slack = MARGIN_PER_LEVER * (radius + np.abs(best).max(axis=1))
+    return np.column_stack([best, radius + slack])

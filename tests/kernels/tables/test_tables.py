@@ -45,9 +45,12 @@ def test_every_number_in_the_tables_points_into_them():
 
 def test_balls_around_balls_contain_them():
     rng = np.random.default_rng(0)
-    for count in (1, 2, 3, 8, 50):
-        spheres = np.column_stack([rng.normal(size=(count, 3)), rng.uniform(0.1, 1.0, count)])
-        ball = tables.enclosing_ball(spheres)
+    sets = [
+        np.column_stack([rng.normal(size=(count, 3)), rng.uniform(0.1, 1.0, count)]) for count in (1, 2, 3, 8, 50, 9)
+    ]
+    assert not tables.enclosing_balls([sets[0][:0]]).any()
+    for spheres, ball in zip(sets, tables.enclosing_balls(sets), strict=True):
+        np.testing.assert_array_equal(ball, tables.enclosing_balls([spheres])[0])
         depth = np.linalg.norm(spheres[:, :3] - ball[:3], axis=1) + spheres[:, 3]
         assert depth.max() <= ball[3]
         assert ball[3] < 1.2 * 0.5 * (np.ptp(spheres[:, :3], axis=0).max() + 2.0 * spheres[:, 3].max()) * np.sqrt(3)
