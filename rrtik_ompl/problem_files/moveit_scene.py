@@ -377,7 +377,7 @@ class Frames:
         self._q = q
         self._known: dict[str, _Carried] = {"": _STANDING, WORLD: _STANDING}
 
-        for each in self._parents_first(fixed):
+        for each in self._parents_first(each for each in fixed if not _names_itself(each)):
             parent = _bare(each.header.frame_id)
             # An unknown parent frame is taken as another name of the world.
             if not self._has(parent):
@@ -462,3 +462,8 @@ class Frames:
 
 def _bare(name: str) -> str:
     return name.removeprefix("/")
+
+
+def _names_itself(frame: FixedFrame) -> bool:
+    """Whether a fixed frame stands in itself, at the identity: MotionBenchMaker writes the base of the Fetch so."""
+    return _bare(frame.child_frame_id) == _bare(frame.header.frame_id) and frame.transform.build().isIdentity(0.0)

@@ -6,19 +6,25 @@ before the motion and back after it.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
 from rrtik_ompl.base.arrays import Matrix
+from rrtik_ompl.kernels.search.motions.motion_table import MotionsFree
 from rrtik_ompl.model.proof import Proof
 from rrtik_ompl.model.transitions import length_of
+from rrtik_ompl.world.motion_queries import has_kernels
+from rrtik_ompl.world.proven_motions import KERNELS, ProvenMotions
 from rrtik_ompl.world.world import World
 
 SIZES = (0.01, 0.03, 0.1, 0.3)  # distances of a detour's point, as shares of the stretch's length
-POINTS = 12  # number of random points for each size
-WIDER = 3  # number of stretches that are tried, each with one motion more at both ends
+POINTS = 24  # number of random points for each size
+# Motions before and after the unproven one that a stretch has too. Where a waypoint is too near to something, it is
+# enough to move that waypoint.
+STRETCHES = ((0, 0), (1, 0), (0, 1), (1, 1), (2, 2))
 SIDESTEPS = tuple(0.005 * 2.0**k for k in range(8))  # [rad] or [m] by which another joint moves out of the way
 MOST_REPAIRS = 24  # largest number of repairs of a path
 
@@ -79,10 +85,11 @@ class Repair(NamedTuple):
 
 def _repaired(world: World, rows: Matrix, motion: int, clearance: float, rng: np.random.Generator) -> Repair | None:
     """Replace a motion, or a longer stretch with it in the middle, by a detour; return None if none is found."""
-    for more in range(WIDER):
-        first = max(motion - more, 0)
-        last = min(motion + 1 + more, len(rows) - 1)
-        waypoints = _waypoints_around(world, rows[first : last + 1], clearance, rng)
+    spans = [(max(motion - before, 0), min(motion + 1 + after, len(rows) - 1)) for before, after in STRETCHES]
+    for (first, last), proven in zip(spans, _judges(world, rows, spans, clearance), strict=True):
+        if proven is None:
+            continue
+        waypoints = _waypoints_around(world, rows[first : last + 1], proven, rng)
         if waypoints is not None:
             return Repair(np.vstack([rows[: first + 1], waypoints, rows[last:]]), last)
     return None
@@ -110,7 +117,9 @@ def _sidestepped(world: World, rows: Matrix, motion: int, clearance: float) -> R
     offsets[:, np.arange(len(others)), others] = sizes[:, None]
     sidesteps: Matrix = offsets.reshape(-1, len(a))
 
-    proven = partial(world.prover.proven, clearance=clearance)
+    (proven,) = _judges(world, rows, [(motion, motion + 1)], clearance)
+    if proven is None:
+        return None
     sidesteps = sidesteps[proven(a + sidesteps, b + sidesteps)]  # the displaced move
     sidesteps = sidesteps[proven(a + 0.0 * sidesteps, a + sidesteps)]  # the way there
     sidesteps = sidesteps[proven(b + sidesteps, b + 0.0 * sidesteps)]  # the way back
@@ -120,7 +129,7 @@ def _sidestepped(world: World, rows: Matrix, motion: int, clearance: float) -> R
     return Repair(np.vstack([rows[: motion + 1], a + sidesteps[0], b + sidesteps[0], rows[motion + 1 :]]), motion + 1)
 
 
-def _waypoints_around(world: World, stretch: Matrix, clearance: float, rng: np.random.Generator) -> Matrix | None:
+def _waypoints_around(world: World, stretch: Matrix, proven: MotionsFree, rng: np.random.Generator) -> Matrix | None:
     """Find what replaces the inner waypoints of a stretch so that its motions are proven; None if nothing is found.
 
     The straight motion between its ends is tried first, then random points from small to large distances. Of the points
@@ -129,7 +138,7 @@ def _waypoints_around(world: World, stretch: Matrix, clearance: float, rng: np.r
     Args:
         world: The world.
         stretch: Waypoints, shape (k, dof).
-        clearance: Distance kept from obstacles on top of their margins [m].
+        proven: Proves motions.
         rng: Source of the random points.
 
     Returns:
@@ -137,7 +146,6 @@ def _waypoints_around(world: World, stretch: Matrix, clearance: float, rng: np.r
     """
     a = stretch[0]
     b = stretch[-1]
-    proven = partial(world.prover.proven, clearance=clearance)
     if len(stretch) > 2 and proven(a[None], b[None])[0]:
         return stretch[:0]
 
@@ -152,6 +160,38 @@ def _waypoints_around(world: World, stretch: Matrix, clearance: float, rng: np.r
             best: Matrix = points[[lengths.argmin()]]
             return best
     return None
+
+
+def _judges(
+    world: World, rows: Matrix, spans: Sequence[tuple[int, int]], clearance: float
+) -> Sequence[MotionsFree | None]:
+    """Return what proves motions beside each stretch of a path; None where that does not even prove its ends.
+
+    Kernels do that in microseconds. What they leave open takes coal milliseconds a motion, and of random motions beside
+    an unproven one they leave most open: coal is only asked where kernels prove the ends of no stretch.
+
+    Args:
+        world: The world.
+        rows: Waypoints of the path, shape (k, dof).
+        spans: First and last waypoint of each stretch.
+        clearance: Distance kept from obstacles on top of their margins [m].
+    """
+
+    def where_ends_are_proven(proven: MotionsFree) -> Sequence[MotionsFree | None]:
+        ends = np.unique(spans)
+        known = dict(zip(ends.tolist(), proven(rows[ends], rows[ends]).tolist(), strict=True))
+        return [proven if known[first] and known[last] else None for first, last in spans]
+
+    part = rows[min(first for first, _ in spans) : max(last for _, last in spans) + 1]
+    room = max(SIZES) * length_of(part)
+    box = np.clip(np.vstack([part - room, part + room]), world.robot.lower, world.robot.upper)
+    known_world: object = world
+    if world.prover.constraints is None and has_kernels(known_world, KERNELS, within=box):
+        by_kernels = ProvenMotions(world, max(clearance, world.settings.clearance)).motion_valid_batch
+        judges = where_ends_are_proven(by_kernels)
+        if any(judges):
+            return judges
+    return where_ends_are_proven(partial(world.prover.proven, clearance=clearance))
 
 
 def _points_near(world: World, stretch: Matrix, size: float, rng: np.random.Generator) -> Matrix:

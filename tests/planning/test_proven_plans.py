@@ -182,6 +182,18 @@ def test_detours_lead_around_what_is_not_proven():
     assert mended >= 5
 
 
+def test_detours_ask_kernels_alone_where_these_prove_a_way_round(monkeypatch):
+    """Two links of meshes are left to coal, milliseconds a motion; kernels find the detour between proven waypoints."""
+    world = disc_world((5.0, 2.0 - 0.3 + 0.0005 - 0.5, 1.0, 1.0))
+    rows = np.array([[2.0, 2.0], [5.0, 2.0], [8.0, 2.0]])  # only the middle one touches the wall
+    proof = world.prove(rows, clearance=0.001)
+    assert [gap.motion for gap in proof.unproven] == [0, 1]
+    monkeypatch.setattr(type(world.prover), "proven", lambda *_, **__: pytest.fail("asked by other means than kernels"))
+    found = with_detours(world, rows, clearance=0.001, rng=np.random.default_rng(0), proof=proof)
+    assert (found[[0, -1]] == rows[[0, -1]]).all()
+    assert world.prove(found, clearance=0.001).proven
+
+
 def test_the_same_seed_gives_the_same_repaired_path():
     problem = rrtik.load_problem("planar3_boxes")
     first, second = (plan(problem, og.RRTConnect, seed=4, clearance=0.02).path.waypoints for _ in range(2))

@@ -131,6 +131,10 @@ SILENT = {
         {},
     ),
     "a joint of something else": ({}, start(x=0, y=0, z=0, wheel=2)),
+    "a frame that stands in itself, as MotionBenchMaker's Fetch": (
+        {"fixed_frame_transforms": [{"header": {"frame_id": "tool"}, "child_frame_id": "/tool"}]},
+        {},
+    ),
 }
 
 
