@@ -6,11 +6,13 @@ import re
 import sys
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
+from functools import cache
+from importlib import metadata
 from typing import Any
 
 from rrtik_ompl.base.errors import RrtikError
 
-# By the name of the module: the name of the package and its lowest version. Others do not tell their version.
+# By the name of the module: the name of the package and its lowest version. Of example-robot-data only files are read.
 FLOORS = {
     "numpy": ("numpy", "2.0.2"),
     "pinocchio": ("pin", "3.4.0"),
@@ -26,6 +28,9 @@ FLOORS = {
     "PIL": ("pillow", "10.4.0"),
     "tornado": ("tornado", "6.5"),
     "umsgpack": ("u-msgpack-python", "2.8.0"),
+    "ompl": ("ompl", "2.0.1"),
+    "meshcat": ("meshcat", "0.3.2"),
+    "rich": ("rich", "13.9.4"),
 }
 EVERYWHERE = ("numpy", "pinocchio", "coal")  # in all that this package does
 # Libraries that the wheels of pin 3 were linked with, though they admit newer ones, which then are not found.
@@ -67,10 +72,20 @@ def too_old(modules: Mapping[str, Any], but: Collection[str] = ()) -> str:
     """
     for module, (package, floor) in FLOORS.items():
         if module in modules and module not in but:
-            found = getattr(modules[module], "__version__", None) or getattr(modules[module], "version", "")
+            found = getattr(modules[module], "__version__", None) or getattr(modules[module], "version", None)
+            found = found or _installed(package)
             if _numbers(found) and _numbers(found) < _numbers(floor):
                 return f"{package} {found} is too old; pip install '{package}>={floor}'"
     return ""
+
+
+@cache
+def _installed(package: str) -> str:
+    """Return the version that a package was installed as; "" if it has come in another way."""
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return ""
 
 
 def _numbers(version: object) -> tuple[int, ...]:

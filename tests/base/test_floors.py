@@ -6,7 +6,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from rrtik_ompl.base.floors import DependencyError, fitting_packages, too_old
+from rrtik_ompl.base import floors
+from rrtik_ompl.base.floors import FLOORS, DependencyError, fitting_packages, too_old
 
 
 def test_the_packages_of_this_environment_fit():
@@ -23,11 +24,22 @@ def test_the_packages_of_this_environment_fit():
         ("numpy", "1.26.4", "numpy 1.26.4 is too old; pip install 'numpy>=2.0.2'"),
         ("numpy", "2.10.0rc1", ""),
         ("pinocchio", "3.10.0", ""),
-        ("coal", None, ""),  # is being loaded
+        ("coal", None, ""),  # does not say: as it was installed
     ],
 )
 def test_an_old_one_is_told_by_its_version(module, version, said):
     assert too_old({module: SimpleNamespace(__version__=version)}) == said
+
+
+@pytest.mark.parametrize("module", FLOORS)
+def test_every_package_below_its_floor_is_named_with_the_version_that_fits(module, monkeypatch):
+    package, floor = FLOORS[module]
+    lower = f"{int(floor[0]) - 1}{floor[1:]}" if floor[0] != "0" else "0.0.1"
+    said = f"{package} {lower} is too old; pip install '{package}>={floor}'"
+    assert too_old({module: SimpleNamespace(__version__=lower)}) == said
+    assert too_old({module: SimpleNamespace(__version__=floor)}) == ""
+    monkeypatch.setattr(floors, "_installed", lambda name: lower if name == package else "")
+    assert too_old({module: SimpleNamespace()}) == said
 
 
 def test_an_old_one_explains_what_goes_wrong_and_what_is_not_used_is_no_reason(monkeypatch):

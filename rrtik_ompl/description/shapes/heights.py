@@ -127,7 +127,7 @@ def _picture(data: bytes, what: str) -> NDArray[Any]:
     try:
         import cv2
     except ImportError:
-        remedy = "pip install 'rrtik-ompl[markers]', or save it as .npy"
+        remedy = "pip install opencv-python-headless, or save it as .npy"
         raise InputError(f"{what}: pictures need OpenCV: {remedy}") from None
 
     try:
