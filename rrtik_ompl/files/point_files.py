@@ -8,13 +8,15 @@ file must have as many points as its header claims.
 from __future__ import annotations
 
 import io
+import warnings
 from collections.abc import Sequence
+from math import prod
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.errors import CloudWarning, InputError
 
 AXES = ("x", "y", "z")
 LONGEST_LINE = 4 * 1024 * 1024  # [bytes] lines up to this length are read; a line takes ten times its size in memory
@@ -51,20 +53,37 @@ def records(data: bytes, offset: int, kind: np.dtype[Any], count: int, what: str
     return np.frombuffer(data, dtype=kind, count=count, offset=offset)
 
 
-def npy_rows(data: bytes, what: str, columns: int | None = None) -> NDArray[Any]:
-    """Read the array of a .npy file of numpy.
-
-    Args:
-        data: The bytes of the file.
-        what: Name of the file, for messages.
-        columns: Required number of columns; None for any.
-
-    Returns:
-        The array, shape (n, columns), without copying.
+def npy_rows(data: bytes, what: str) -> NDArray[Any]:
+    """Read the array of a .npy file of numpy, shape (n, any), without copying.
 
     Raises:
         InputError: If it is not such a file, its shape is another one, or it is shorter than its header claims.
     """
+    rows = _npy_numbers(data, what)
+    if rows.ndim != 2:
+        raise InputError(f"{what}: expected numbers of shape (any, any), got {rows.dtype} of shape {rows.shape}")
+    return rows
+
+
+def npy_points(data: bytes, what: str) -> NDArray[Any]:
+    """Read the points of a .npy file of numpy, shape (n, 3), without copying; organised ones row by row.
+
+    Raises:
+        InputError: As :func:`npy_rows`.
+    """
+    rows = _npy_numbers(data, what)
+    columns = rows.shape[-1]
+    if columns < len(AXES):
+        wanted = "(any, 3) or (rows, columns, 3)"
+        raise InputError(f"{what}: expected numbers of shape {wanted}, got {rows.dtype} of shape {rows.shape}")
+    if columns > len(AXES):
+        told = f"{what}: the first three of its {columns} columns are taken for x, y and z"
+        warnings.warn(told, CloudWarning, stacklevel=4)
+    return rows.reshape(-1, columns)[:, : len(AXES)]
+
+
+def _npy_numbers(data: bytes, what: str) -> NDArray[Any]:
+    """Read the array of a .npy file of numpy, of any shape."""
     stream = io.BytesIO(data)
     try:
         version = np.lib.format.read_magic(stream)
@@ -73,13 +92,12 @@ def npy_rows(data: bytes, what: str, columns: int | None = None) -> NDArray[Any]
     except (ValueError, KeyError) as error:
         raise InputError(f"{what}: not a .npy file of numpy: {str(error).splitlines()[0]}") from None
 
-    if kind.kind not in "fiu" or len(shape) != 2 or columns not in (None, shape[1]):
-        wanted = f"(any, {'any' if columns is None else columns})"
-        raise InputError(f"{what}: expected numbers of shape {wanted}, got {kind} of shape {shape}")
+    if kind.kind not in "fiu" or len(shape) not in (2, 3):
+        raise InputError(f"{what}: expected numbers of shape (any, any), got {kind} of shape {shape}")
 
-    if not columnwise:
-        return records(data, stream.tell(), np.dtype((kind, (shape[1],))), shape[0], what)
-    return records(data, stream.tell(), kind, shape[1] * shape[0], what).reshape(shape[::-1]).T
+    if columnwise:
+        return records(data, stream.tell(), kind, prod(shape), what).reshape(shape[::-1]).T
+    return records(data, stream.tell(), np.dtype((kind, shape[-1:])), prod(shape[:-1]), what).reshape(shape)
 
 
 def text_rows(data: bytes, columns: Sequence[int] | None, what: str, most: int | None = None) -> NDArray[np.float64]:
@@ -138,11 +156,13 @@ def ply_points(data: bytes, what: str) -> NDArray[Any]:
     if order not in PLY_ORDERS:
         raise InputError(f"{what}: format '{order}' of a PLY file is unknown; have {', '.join(PLY_ORDERS)}")
 
-    fields, claim = _vertex(lines, what)
+    fields, claim, before = _vertex(lines, what)
     names = [line[2] for line in fields]
     count = claimed(claim, what)
 
     if order == "ascii":
+        for _ in range(sum(number for number, _ in before)):  # a line for each thing that comes before the points
+            begin = data.find(b"\n", begin) + 1 or len(data)
         rows = text_rows(data[begin:], [names.index(axis) for axis in AXES], what, count)
         if len(rows) < count:
             raise InputError(f"{what}: its header claims {count} points, but the file has {len(rows)}; save it again")
@@ -152,10 +172,14 @@ def ply_points(data: bytes, what: str) -> NDArray[Any]:
         (f"{k} {name}" if name not in AXES else name, PLY_ORDERS[order] + PLY_TYPES[kind])
         for k, (_, kind, name) in enumerate(fields)
     ]
+    for number, properties in before:
+        if any(line[1] not in PLY_TYPES for line in properties):
+            raise InputError(f"{what}: lists stand before its points; export points alone, or as text")
+        begin += number * sum(np.dtype(PLY_TYPES[line[1]]).itemsize for line in properties)
     return coordinates(records(data, begin, np.dtype(kinds), count, what))
 
 
-def _vertex(lines: list[list[str]], what: str) -> tuple[list[list[str]], str]:
+def _vertex(lines: list[list[str]], what: str) -> tuple[list[list[str]], str, list[tuple[int, list[list[str]]]]]:
     """Parse the element ``vertex`` of the header of a PLY file.
 
     Args:
@@ -163,21 +187,28 @@ def _vertex(lines: list[list[str]], what: str) -> tuple[list[list[str]], str]:
         what: Name of the file, for messages.
 
     Returns:
-        The properties, each as the words "property", type and name; the number of points as text.
+        The properties, each as the words "property", type and name; the number of points as text; the elements that
+        stand before them, each as its number and its properties.
     """
     elements = [k for k, line in enumerate(lines) if line[0:1] == ["element"] and len(line) == 3]
-    if not elements or lines[elements[0]][1] != "vertex":
-        raise InputError(f"{what}: the first element of a PLY file must be 'vertex'; export points alone")
+    parts = [
+        (lines[k], [line for line in lines[k + 1 : end] if line[0:1] == ["property"]])
+        for k, end in zip(elements, [*elements[1:], len(lines)], strict=True)
+    ]
+    names = [head[1] for head, _ in parts]
+    if "vertex" not in names:
+        raise InputError(f"{what}: a PLY file of points needs an element 'vertex'; it has {', '.join(names) or 'none'}")
 
-    end = elements[1] if len(elements) > 1 else len(lines)
-    fields = [line for line in lines[elements[0] + 1 : end] if line[0:1] == ["property"]]
+    place = names.index("vertex")
+    head, fields = parts[place]
+    before = [(claimed(other[2], what), own) for other, own in parts[:place]]
     if any(len(line) != 3 or line[1] not in PLY_TYPES for line in fields):
         raise InputError(f"{what}: a property of 'vertex' is a list or of an unknown type; export points alone")
 
     names = [line[2] for line in fields]
     if missing := [axis for axis in AXES if names.count(axis) != 1]:
         raise InputError(f"{what}: 'vertex' needs one property '{missing[0]}'; it has {', '.join(names) or 'none'}")
-    return fields, lines[elements[0]][2]
+    return fields, head[2], before
 
 
 def pcd_points(data: bytes, what: str) -> NDArray[Any]:
@@ -225,7 +256,7 @@ def _record(header: dict[str, list[str]], names: list[str], what: str) -> np.dty
         size in PCD_SIZES and kind in PCD_KINDS and (kind, size) != ("F", "1")
         for size, kind in zip(sizes, kinds, strict=True)
     )
-    if not known or not all(count.isdigit() and 0 < int(count) < 10_000 for count in counts):
+    if not known or not all(count.isdigit() and int(count) < 10_000 for count in counts):
         raise InputError(f"{what}: SIZE, TYPE or COUNT has an entry that is unknown; export it again")
 
     fields = []

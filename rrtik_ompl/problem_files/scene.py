@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any
 
 import pinocchio as pin
 from pydantic import Field, create_model, model_validator
 
-from rrtik_ompl.files.kinds import refusing_others
+from rrtik_ompl.description.shapes.cloud import read_cloud
+from rrtik_ompl.description.shapes.mesh import read_mesh
+from rrtik_ompl.description.shapes.octree import read_octree
+from rrtik_ompl.files.kinds import KINDS, refusing_others
 from rrtik_ompl.files.pose_entry import PoseEntry, pose_data
 from rrtik_ompl.files.sections import (
     Name,
@@ -24,6 +28,7 @@ from rrtik_ompl.files.sections import (
 from rrtik_ompl.files.strict_yaml import Location, YamlDocument, read_yaml, write_yaml
 from rrtik_ompl.files.text import file_name
 from rrtik_ompl.model.scene import AttachedObject, ConstantVelocity, Motion, Obstacle, Scene, TimedPoses, Touching
+from rrtik_ompl.model.shapes import Shape
 from rrtik_ompl.model.world_settings import SETTINGS_IN_FILES
 from rrtik_ompl.problem_files.moveit_scene_text import ENDING, read_scene_text
 from rrtik_ompl.problem_files.shapes import ONE_SHAPE, ShapeEntry, shape_data
@@ -183,8 +188,21 @@ _KEYS_OF_WORLDS: dict[str, Any] = {each.name: (Any, None) for each in SETTINGS_I
 SceneFile = create_model("SceneFile", __base__=_SceneFile, **_KEYS_OF_WORLDS)
 
 
+SOLIDS: dict[str, Callable[[Path], Shape]] = {
+    **dict.fromkeys(KINDS["PointCloud"].endings, read_cloud),
+    **dict.fromkeys(KINDS["Octree"].endings, read_octree),
+    **dict.fromkeys(KINDS["Mesh"].endings, read_mesh),
+    ".npz": read_cloud,
+}
+
+
 def load_scene(file: str | os.PathLike[str]) -> Scene:
-    """Read the scene of a YAML file: ``version: 1`` and ``scene:``, or a whole problem file; or a ``.scene`` of MoveIt.
+    """Read a scene.
+
+    - YAML: ``version: 1`` and ``scene:``, or a whole problem file
+    - MoveIt's ``.scene`` files
+    - one solid in metres, which becomes the only obstacle, named as the file: a cloud of points (PLY, PCD, XYZ, NPY,
+      NPZ), a map of OctoMap (BT, OT) as its octree, or a mesh (STL, OBJ, DAE, GLB)
 
     Raises:
         InputError: If the file cannot be used; one line with file, line, key, what was found and the remedy.
@@ -194,8 +212,11 @@ def load_scene(file: str | os.PathLike[str]) -> Scene:
         >>> rrtik.load_scene("scene.yaml")
         Scene(post)
     """
-    if file_name(file).suffix.lower() == ENDING:
+    path = file_name(file)
+    if path.suffix.lower() == ENDING:
         return read_scene_text(file)
+    if path.suffix.lower() in SOLIDS:
+        return Scene([Obstacle(path.stem, SOLIDS[path.suffix.lower()](path))])
     with refusing_others(file, "Scene"):
         document = read_yaml(file)
         return parse(document, SceneFile).scene.build(document)

@@ -57,12 +57,14 @@ def _required(measure: Measure) -> tuple[TypeForm, Any]:
 class CloudEntry(Section):
     """A cloud of points: each is a ball of one radius."""
 
-    file: Name = Field(description="NPY, PLY, PCD or XYZ file, relative to the folder of this file")
+    file: Name = Field(description="NPY, NPZ, PLY, PCD, XYZ, BT or OT file, relative to the folder of this file")
     radius: Length | None = Field(
-        None, description=f"of each point [m]; {RADIUS:g} if absent, of a BT file half the diagonal of its cells"
+        None, description=f"of each point [m]; {RADIUS:g} if absent, of a BT or OT file half the diagonal of its cells"
     )
     scale: Positive = Field(1.0, description="metres per unit of the file")
-    invalid: Invalid = Field("refuse", description="what is done with points that are not finite")
+    invalid: Invalid | None = Field(
+        None, description="what is done with points that are not finite; dropped with a warning if absent"
+    )
 
 
 class HeightsEntry(Section):

@@ -8,7 +8,7 @@ from hypothesis.extra.numpy import array_shapes, arrays
 
 import rrtik_ompl as rrtik
 from rrtik_ompl.base.errors import InputError
-from rrtik_ompl.model.shapes import Mesh, Octree
+from rrtik_ompl.model.shapes import Mesh, Octree, octree
 from rrtik_ompl.model.shapes.height_field import HeightField
 
 
@@ -74,13 +74,14 @@ def test_heights_that_make_no_ground_are_one_line(heights, cell, options, messag
     assert "\n" not in str(told.value)
 
 
-def test_an_octree_without_cells_or_with_too_many_is_refused():
+def test_an_octree_without_cells_or_with_too_many_is_refused(monkeypatch):
     with pytest.raises(InputError, match="none of its cells is occupied"):
         Octree(np.zeros((0, 3)), [])
     with pytest.raises(InputError, match="sides must be greater than 0"):
         Octree(np.zeros((1, 3)), -1.0)
-    with pytest.raises(InputError, match=r"boxes.*PointCloud.load"):
-        Octree(np.zeros((30_000, 3)), 0.1)
+    monkeypatch.setattr(octree, "MOST_CELLS", 10)
+    with pytest.raises(InputError, match=r"cells.*coarser resolution"):
+        Octree(np.zeros((11, 3)), 0.1)
 
 
 def test_an_arm_keeps_off_the_ground_as_off_a_box_and_that_is_proven():

@@ -67,7 +67,7 @@ def test_cropping_keeps_what_is_inside():
     ("points", "radius", "message"),
     [
         (np.zeros((0, 3)), 0.01, "it has no point"),
-        ([[np.nan, 0.0, 0.0], [1.0, 0.0, 0.0]], 0.01, "1 of 2 points are not finite"),
+        ([[np.nan, 0.0, 0.0], [np.inf, 0.0, 0.0]], 0.01, "it has no finite point"),
         ([[0.0, 0.0]], 0.01, r"expected points of shape \(any, 3\)"),
         (np.zeros((2, 3, 1)), 0.01, r"expected points of shape"),
         ([[0.0, 0.0, "a"]], 0.01, "expected numbers"),

@@ -8,7 +8,7 @@ from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.description.catalog import find_problem, list_problems
 from rrtik_ompl.files.strict_yaml import read_yaml
 from rrtik_ompl.model.scene import AttachedObject, ConstantVelocity, Obstacle, Scene, TimedPoses
-from rrtik_ompl.model.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, Prism, Sphere
+from rrtik_ompl.model.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, PointCloud, Prism, Sphere, same_shape
 from rrtik_ompl.problem_files.problem_values import ProblemFile, load_unchecked
 from rrtik_ompl.problem_files.scene import SceneFile, load_scene
 
@@ -251,3 +251,20 @@ def test_a_scene_is_read_from_a_file_with_every_key_of_a_problem(tmp_path):
     keys = "planner: rrt\npath_constraints: [{}]\nrun: {}\nstart: {}\ngoal: {}\nrobot: 5\n"
     (tmp_path / "whole.yaml").write_text(f"version: 1\nscene: {{obstacles: [{{name: a, sphere: 1}}]}}\n{keys}")
     assert [each.name for each in load_scene(tmp_path / "whole.yaml").obstacles] == ["a"]
+
+
+@pytest.mark.parametrize("name", ["scan.ply", "scan.npz", "part.obj", "map.bt"])
+def test_a_solid_in_a_file_of_its_own_is_a_scene(name, tmp_path):
+    file = tmp_path / name
+    if name == "scan.ply":
+        PointCloud(np.eye(3)).save(file)
+    elif name == "scan.npz":
+        np.savez(file, points=np.eye(3))
+    elif name == "part.obj":
+        file.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n")
+    else:
+        file.write_bytes(b"# Octomap OcTree binary file\nid OcTree\nsize 1\nres 0.1\ndata\n" + bytes([0, 0b10000000]))
+    (obstacle,) = load_scene(file).obstacles
+    assert obstacle.name == file.stem
+    (again,) = Scene.load(file).obstacles
+    assert same_shape(again.shape, obstacle.shape)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import io
 import os
+import zipfile
+import zlib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -12,14 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import positive
-from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.errors import InputError, at_most
 from rrtik_ompl.description.shapes.octree import octree_points, octree_resolution
-from rrtik_ompl.files.point_files import AXES, npy_rows, pcd_points, ply_points, text_rows
+from rrtik_ompl.files.point_files import npy_points, pcd_points, ply_points, text_rows
 from rrtik_ompl.files.text import file_name, read_bytes, write_bytes
 from rrtik_ompl.model.shapes import PointCloud
 from rrtik_ompl.model.shapes.point_cloud import RADIUS, Invalid
 
 MAX_BYTES = 1024 * 1024 * 1024
+POINTS = "points"  # array of an .npz file that is the cloud
 PLY_HEADER = "ply\nformat binary_little_endian 1.0\nelement vertex {}\n" + "".join(
     f"property float {axis}\n" for axis in "xyz"
 )
@@ -30,7 +33,7 @@ def read_cloud(
     radius: float | None = None,
     *,
     scale: float = 1.0,
-    invalid: Invalid = "refuse",
+    invalid: Invalid | None = None,
 ) -> PointCloud:
     """Read a cloud of points; see :meth:`PointCloud.load`.
 
@@ -48,7 +51,7 @@ def read_cloud(
     if factor != 1.0:
         points = points * factor
 
-    if radius is None and suffix == ".bt":
+    if radius is None and _READERS[suffix] is octree_points:
         radius = factor * 0.5 * np.sqrt(3.0) * octree_resolution(data, str(file))
         # Points are stored in float32, so their rounding is added.
         radius += float(np.finfo(np.float32).eps) * float(np.abs(points).max(initial=0.0))
@@ -78,7 +81,22 @@ def write_cloud(cloud: PointCloud, file: str | os.PathLike[str]) -> PointCloud:
 
 
 def _npy_points(data: bytes, what: str) -> NDArray[Any]:
-    return npy_rows(data, what, len(AXES))
+    return npy_points(data, what)
+
+
+def _npz_points(data: bytes, what: str) -> NDArray[Any]:
+    """Read the array "points" of an ``.npz`` file, or its only one."""
+    try:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            sizes = {Path(each.filename).stem: each for each in archive.infolist() if each.filename.endswith(".npy")}
+            name = POINTS if POINTS in sizes else next(iter(sizes), "")
+            if name != POINTS and len(sizes) != 1:
+                names = ", ".join(sizes) or "none"
+                raise InputError(f"{what}: which array has the points? call it '{POINTS}'; it has {names}")
+            at_most(sizes[name].file_size, MAX_BYTES, f"{what}: bytes of '{name}'")
+            return npy_points(archive.read(sizes[name]), f"{what}: array '{name}'")
+    except (zipfile.BadZipFile, NotImplementedError, EOFError, zlib.error):
+        raise InputError(f"{what}: not an .npz file of numpy; save it again") from None
 
 
 def _xyz_points(data: bytes, what: str) -> NDArray[Any]:
@@ -87,8 +105,10 @@ def _xyz_points(data: bytes, what: str) -> NDArray[Any]:
 
 _READERS: dict[str, Callable[[bytes, str], NDArray[Any]]] = {
     ".npy": _npy_points,
+    ".npz": _npz_points,
     ".ply": ply_points,
     ".pcd": pcd_points,
     ".xyz": _xyz_points,
     ".bt": octree_points,
+    ".ot": octree_points,
 }

@@ -1,4 +1,4 @@
-"""Check clouds of points exactly. Coal has no clouds, so it is asked about a ball at each point that is near enough.
+"""Check clouds of points, or of equal cubes, exactly. Coal has no clouds, so it is asked about single balls or boxes.
 
 Only points close to the other geometry's bounding box are asked about; the cloud's tree finds them.
 """
@@ -16,7 +16,7 @@ from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.geometry.collision.enclosure import enclosure
 from rrtik_ompl.geometry.collision.solids import Ends as Ends
 from rrtik_ompl.geometry.collision.solids import inside_mesh, is_closed, is_mesh, mesh_arrays
-from rrtik_ompl.model.shapes import PointCloud
+from rrtik_ompl.model.shapes.point_cloud import Cloud
 
 # [m] Points up to this much farther than required are measured; beyond that, a gap is only known to be at least this.
 LOOK_AHEAD = 0.05
@@ -29,12 +29,12 @@ class CloudSolid(coal.Sphere):  # type: ignore[misc]
         cloud: The cloud.
     """
 
-    def __init__(self, cloud: PointCloud) -> None:
+    def __init__(self, cloud: Cloud) -> None:
         super().__init__(float(np.linalg.norm(np.maximum(*np.abs(cloud.bounds)))))
         self.cloud = cloud
 
     def computeLocalAABB(self) -> None:
-        """Set the bounding box and sphere to those of the balls around the cloud's points."""
+        """Set the bounding box and sphere to those of the balls or cubes around the cloud's points."""
         super().computeLocalAABB()
         low, high = self.cloud.bounds
         self.aabb_local.min_ = low
@@ -43,7 +43,7 @@ class CloudSolid(coal.Sphere):  # type: ignore[misc]
         self.aabb_radius = float(np.linalg.norm(0.5 * (high - low)))
 
 
-def cloud_solid(cloud: PointCloud) -> CloudSolid:
+def cloud_solid(cloud: Cloud) -> CloudSolid:
     """Return the coal geometry of a cloud: the same object at each call, for as long as a world holds it.
 
     The cloud refers to it only weakly: Python's garbage collector cannot see the references of coal's objects, so a
@@ -74,9 +74,9 @@ def cloud_gap(ends: Ends, margin: float) -> float | None:
     cloud, other, to_other, _ = _sides(ends)
     points, _ = _points_near_box(cloud, other, to_other, cloud.radius + margin + LOOK_AHEAD)
 
-    ball = coal.Sphere(cloud.radius)
+    element = _element(cloud)
     identity = coal.Transform3s()
-    point_pose = coal.Transform3s()
+    point_pose = coal.Transform3s(to_other)
     collision_request = coal.CollisionRequest()
     collision_request.security_margin = margin
 
@@ -84,7 +84,7 @@ def cloud_gap(ends: Ends, margin: float) -> float | None:
     for point in points:
         point_pose.setTranslation(point)
         result = coal.CollisionResult()
-        if coal.collide(other, identity, ball, point_pose, collision_request, result):
+        if coal.collide(other, identity, element, point_pose, collision_request, result):
             return None
         gap = min(gap, float(result.distance_lower_bound))
 
@@ -113,15 +113,17 @@ def nearest_of_cloud(ends: Ends) -> Nearest:
         points, box_distances = _points_near_box(cloud, other, to_other, reach)
         reach *= 4.0
 
-    ball = coal.Sphere(cloud.radius)
+    element = _element(cloud)
     identity = coal.Transform3s()
+    point_pose = coal.Transform3s(to_other)
     nearest = None
     for point, box_distance in zip(points, box_distances, strict=True):
         # Points are sorted by their distance from the box, so no later one can be nearer than the best so far.
         if nearest is not None and box_distance - cloud.radius >= nearest.min_distance:
             break
         result = coal.DistanceResult()
-        coal.distance(other, identity, ball, coal.Transform3s(np.eye(3), point), coal.DistanceRequest(), result)
+        point_pose.setTranslation(point)
+        coal.distance(other, identity, element, point_pose, coal.DistanceRequest(), result)
         nearest = result if nearest is None or result.min_distance < nearest.min_distance else nearest
     assert nearest is not None
 
@@ -130,7 +132,12 @@ def nearest_of_cloud(ends: Ends) -> Nearest:
     return Nearest(float(nearest.min_distance), *(witness_points if swapped else witness_points[::-1]))
 
 
-def _sides(ends: Ends) -> tuple[PointCloud, coal.CollisionGeometry, coal.Transform3s, bool]:
+def _element(cloud: Cloud) -> coal.CollisionGeometry:
+    """Return what stands around each point of a cloud, as a coal geometry."""
+    return coal.Box(*[2.0 * cloud.half] * 3) if cloud.half > 0.0 else coal.Sphere(cloud.radius)
+
+
+def _sides(ends: Ends) -> tuple[Cloud, coal.CollisionGeometry, coal.Transform3s, bool]:
     """Return the parts of a pair with a cloud.
 
     Returns:
@@ -144,15 +151,15 @@ def _sides(ends: Ends) -> tuple[PointCloud, coal.CollisionGeometry, coal.Transfo
 
 
 def _points_near_box(
-    cloud: PointCloud, other: coal.CollisionGeometry, to_other: coal.Transform3s, reach: float
+    cloud: Cloud, other: coal.CollisionGeometry, to_other: coal.Transform3s, reach: float
 ) -> tuple[Matrix, Vector]:
-    """Return the points of a cloud within a distance of another geometry's bounding box.
+    """Return the points of a cloud, or centres of its cubes, within a distance of another geometry's bounding box.
 
     Args:
         cloud: The cloud.
         other: The other geometry.
         to_other: Pose of the cloud in the other's frame.
-        reach: Largest distance from the box [m].
+        reach: Largest distance of a point, or of a cube, from the box [m].
 
     Returns:
         The points in the other's frame [m], shape (n, 3), those deepest inside the box first, and their distances from
@@ -169,7 +176,7 @@ def _points_near_box(
         cloud.tree.within(centre - half_extents, centre + half_extents).astype(np.float64) @ rotation.T + translation
     )
 
-    beyond = np.maximum(low - points, points - high)
+    beyond = np.maximum(low - points, points - high) - cloud.half * np.abs(rotation).sum(axis=1)
     box_distances: NDArray[np.float64] = np.linalg.norm(np.maximum(beyond, 0.0), axis=1)
     near_rows = np.flatnonzero(box_distances <= reach)
     near_rows = near_rows[np.argsort(box_distances[near_rows] + np.minimum(beyond[near_rows].max(axis=1), 0.0))]

@@ -62,7 +62,7 @@ def _shape(geometry: coal.CollisionGeometry) -> Iterable[ArrayLike]:
     if numbers is not None:
         return numbers
     if isinstance(geometry, CloudSolid):
-        return (geometry.cloud.points, geometry.cloud.radius)
+        return (geometry.cloud.points, geometry.cloud.radius, geometry.cloud.half)
     if isinstance(geometry, coal.Halfspace):
         return (np.array(geometry.n), geometry.d)
     return (np.array(geometry.aabb_center), geometry.aabb_radius)  # Nothing is ever proven about other kinds.

@@ -44,6 +44,7 @@ from rrtik_ompl.model.shapes import (
     Sphere,
 )
 from rrtik_ompl.model.shapes.box_pile import BoxPile
+from rrtik_ompl.model.shapes.octree import FEW_CELLS
 from rrtik_ompl.model.shapes.polygons import convex_parts
 
 BOX_CORNERS = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
@@ -157,6 +158,17 @@ def _solids_of_pile(pile: BoxPile) -> list[Any]:
     return [box_of_size[tuple(size)] for size in sizes]
 
 
+def _solids_of_octree(octree: Octree) -> list[Any]:
+    """Return a coal box for each of a few cells, or the clouds that many are."""
+    few = len(octree.sides) <= FEW_CELLS
+    return _solids_of_pile(octree) if few else [cloud_solid(cells) for cells in octree.clouds]
+
+
+def _places_of_octree(octree: Octree) -> list[Any]:
+    few = len(octree.sides) <= FEW_CELLS
+    return _places_of_pile(octree) if few else [pin.SE3.Identity()] * len(octree.clouds)
+
+
 def _places_of_pile(pile: BoxPile) -> list[Any]:
     upright = np.eye(3)
     return [pin.SE3(upright, centre) for centre in pile.boxes[0]]
@@ -208,7 +220,7 @@ ROWS = (
     ShapeRow(Mesh, _mesh),
     ShapeRow(PointCloud, lambda cloud: [cloud_solid(cloud)]),
     ShapeRow(HeightField, _solids_of_pile, places=_places_of_pile),
-    ShapeRow(Octree, _solids_of_pile, places=_places_of_pile),
+    ShapeRow(Octree, _solids_of_octree, places=_places_of_octree),
 )
 _BY_SHAPE: dict[type, ShapeRow] = {}
 _BY_GEOMETRY: dict[type, CoalSolid] = {}
@@ -325,7 +337,8 @@ def shape_of(geometry: coal.CollisionGeometry) -> Shape | None:
     if row is not None:
         return row.shape(*row.sizes(geometry).tolist())
     if isinstance(geometry, CloudSolid):
-        return geometry.cloud
+        cloud = geometry.cloud
+        return cloud if isinstance(cloud, Shape) else Octree(cloud.points, 2.0 * cloud.half)
     if is_mesh(geometry):
         return Mesh(*mesh_arrays(geometry))
     if isinstance(geometry, coal.Convex):

@@ -33,14 +33,14 @@ PARALLEL = 1e-12
 def least_width(geometry: coal.CollisionGeometry) -> float:
     """Return a lower bound of a geometry's width in any direction [m]; 0 for a surface without an inside.
 
-    It is exact for boxes, cylinders, capsules and balls, and for the balls of a cloud. For other convex solids it is
-    the diameter of a ball inside. For a hollow mesh it is half the thickness of the wall as measured along rays, so it
-    is an estimate.
+    It is exact for boxes, cylinders, capsules and balls, and for the balls or cubes of a cloud. For other convex solids
+    it is the diameter of a ball inside. For a hollow mesh it is half the thickness of the wall as measured along rays,
+    so it is an estimate.
     """
     if isinstance(geometry, coal.Halfspace):
         return float("inf")
     if isinstance(geometry, CloudSolid):
-        return 2.0 * float(geometry.cloud.radius)
+        return 2.0 * float(geometry.cloud.radius + geometry.cloud.half)
 
     if is_mesh(geometry):
         wall = _thinnest_wall(*mesh_arrays(geometry)) if is_closed(geometry) else 0.0

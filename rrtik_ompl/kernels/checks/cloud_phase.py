@@ -1,7 +1,8 @@
 """The narrow phase of a body and a cloud: its solids against each point that one of its balls has found.
 
-The balls cover the body, so a point that none of them meets is clear of it. The standing solid of a cloud is a ball
-around whatever point is at hand: its corners are written here. A set of lanes is an integer, one bit a lane.
+The balls cover the body, so a point that none of them meets is clear of it. The standing solid of a cloud is the ball
+around whatever point is at hand, or the cube: its corners are written here. A set of lanes is an integer, one bit a
+lane.
 """
 
 from __future__ import annotations
@@ -14,8 +15,8 @@ import numpy as np
 from rrtik_ompl.kernels import layout
 from rrtik_ompl.kernels.checks.gjk import SHORTEST, Frames, compare, dot, farthest, minus, scaled
 from rrtik_ompl.kernels.checks.sphere_kernels import place_cluster
-from rrtik_ompl.kernels.clouds.accessors import point_at
-from rrtik_ompl.kernels.clouds.kernels import next_block, points_below, points_in_reach
+from rrtik_ompl.kernels.clouds.accessors import PARTS, point_at
+from rrtik_ompl.kernels.clouds.kernels import next_block, points_below, points_in_reach, widened
 from rrtik_ompl.kernels.clouds.primitive_kernels import in_cloud, table_of
 from rrtik_ompl.kernels.layout import (
     COLLIDING,
@@ -29,7 +30,7 @@ from rrtik_ompl.kernels.layout import (
     WorldTable,
 )
 from rrtik_ompl.kernels.simd.compiled import WIDTH, inlined, kernel
-from rrtik_ompl.kernels.simd.lanes import first_bit, float_at, int_at, set_double, set_lanes, spread
+from rrtik_ompl.kernels.simd.lanes import first_bit, float_at, int_at, lanes_at, set_double, set_lanes
 from rrtik_ompl.kernels.simd.vectors import squared
 from rrtik_ompl.kernels.tables.accessors import (
     body_at,
@@ -38,7 +39,6 @@ from rrtik_ompl.kernels.tables.accessors import (
     cluster_at,
     end_around_of,
     end_ball_of,
-    end_block_of,
     end_cluster_of_body,
     end_inside_of,
     first_around_of,
@@ -101,18 +101,28 @@ def centre_in_lane(centres: Centre, ball: int, lane: int) -> Any:
 
 
 @kernel
-def put_point(solids: SolidTable, number: int, p: Any) -> None:
-    """Let the standing solid of a cloud be the ball around a point of the world."""
-    solid = solid_at(solids.solids, number)
-    corners = solids.corners
+def put_point(cloud: Cloud, p: Any) -> Any:
+    """Let the standing solid of a cloud be the ball or the cube around one of its points; the point in the world."""
+    table, shape, solids, number = cloud
+    first = first_block_of(solid_at(solids.solids, number))
     sizes = sizes_at(solids.sizes, number)
 
-    for block in range(first_block_of(solid), end_block_of(solid)):
+    for part in range(PARTS):
+        corners = out_of_cloud(
+            shape,
+            (
+                p[0] + lanes_at(table.corners, part),
+                p[1] + lanes_at(table.corners, PARTS + part),
+                p[2] + lanes_at(table.corners, 2 * PARTS + part),
+            ),
+        )
         for axis in range(layout.AXES):
-            set_lanes(corners, layout.AXES * block + axis, spread(p[axis]))
+            set_lanes(solids.corners, layout.AXES * (first + part) + axis, corners[axis])
 
+    middle = out_of_cloud(shape, p)
     for axis in range(layout.AXES):
-        set_double(sizes, layout.BOUND_CENTRE + axis, p[axis])
+        set_double(sizes, layout.BOUND_CENTRE + axis, middle[axis])
+    return middle
 
 
 @kernel
@@ -152,6 +162,12 @@ def compare_point(
     return UNDECIDED, way
 
 
+@inlined
+def outside(coordinate: Any, half: Any) -> Any:
+    """How far a coordinate lies outside a cube around the origin."""
+    return max(abs(coordinate) - half, ZERO)
+
+
 @kernel
 def may_overlap(mine: SolidTable, span: Span) -> bool:
     """Whether a body has a solid inside it, so that an overlap can be proven."""
@@ -167,7 +183,7 @@ def plane_below(cloud: Cloud, mine: SolidTable, span: Span, frames: Frames, lane
 
     ``size``: largest sum of a point's coordinates there [m], for what rounding may do.
     """
-    _, shape, others, number = cloud
+    table, shape, others, number = cloud
     a = first_axis_of(shape)
     b = second_axis_of(shape)
     c = third_axis_of(shape)
@@ -183,8 +199,10 @@ def plane_below(cloud: Cloud, mine: SolidTable, span: Span, frames: Frames, lane
 
     ball = sizes_at(others.sizes, number)
     rounding = ROUNDING * (size + abs(origin[0]) + abs(origin[1]) + abs(origin[2]))
-    height = least - dot(way, origin) - round_of(ball) - slack_of(ball) - rounding
-    return np.float32(dot(a, way)), np.float32(dot(b, way)), np.float32(dot(c, way)), np.float32(height)
+    normal = dot(a, way), dot(b, way), dot(c, way)
+    cube = table.half * (abs(normal[0]) + abs(normal[1]) + abs(normal[2]))
+    height = least - dot(way, origin) - round_of(ball) - slack_of(ball) - cube - rounding
+    return np.float32(normal[0]), np.float32(normal[1]), np.float32(normal[2]), np.float32(height)
 
 
 @kernel
@@ -206,6 +224,8 @@ def compare_ball(cloud: Cloud, mine: SolidTable, span: Span, frames: Frames, lan
     low = own[0] - reach, own[1] - reach, own[2] - reach
     high = own[0] + reach, own[1] + reach, own[2] + reach
     size = abs(own[0]) + abs(own[1]) + abs(own[2]) + 3.0 * reach
+    half = np.float32(table.half)
+    near = widened(low, high, half)
     points = table.blocks
     block = -1
 
@@ -214,15 +234,15 @@ def compare_ball(cloud: Cloud, mine: SolidTable, span: Span, frames: Frames, lan
         if block < 0 or answer >= worst:
             return answer, plane
 
-        left = points_in_reach(points, block, low, high) & ~points_below(points, block, plane, plane[3])
+        left = points_in_reach(points, block, near[0], near[1]) & ~points_below(points, block, plane, plane[3])
         while left != 0:
             p = point_at(points, block, first_bit(left))
             left &= left - 1
-            if squared(p[0] - own[0], p[1] - own[1], p[2] - own[2]) >= reach * reach:
+            away = outside(p[0] - own[0], half), outside(p[1] - own[1], half), outside(p[2] - own[2], half)
+            if squared(away[0], away[1], away[2]) >= reach * reach:
                 continue
 
-            p = out_of_cloud(shape, p)
-            put_point(others, number, p)
+            p = put_point(cloud, p)
             way = minus((float(x), float(y), float(z)), p)
             length = sqrt(dot(way, way))
             way = scaled(way, 1.0 / length) if length > SHORTEST else (1.0, 0.0, 0.0)

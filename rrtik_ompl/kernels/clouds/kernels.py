@@ -1,5 +1,7 @@
 """Kernels that walk the tree of a cloud: which lanes have a point near, how near the nearest is, what comes next.
 
+A point may be the centre of a cube, see :class:`CloudTable`; it is as near as the cube is then.
+
 A walk goes through the children of a node in their order, down where one is in reach and up again behind it, so that
 it needs no memory. First lanes hold the ``LEAF`` children of a node, or points of a block, and compare them with the
 box around what is asked for in all lanes; what passes is then compared with each lane of its own.
@@ -20,7 +22,17 @@ from rrtik_ompl.kernels.clouds.accessors import (
     sides_at,
 )
 from rrtik_ompl.kernels.simd.compiled import WIDTH, inlined, kernel
-from rrtik_ompl.kernels.simd.lanes import bits, first_bit, highest, larger, lowest, smaller, spread, square_root
+from rrtik_ompl.kernels.simd.lanes import (
+    absolute,
+    bits,
+    first_bit,
+    highest,
+    larger,
+    lowest,
+    smaller,
+    spread,
+    square_root,
+)
 from rrtik_ompl.kernels.simd.vectors import along, squared
 from rrtik_ompl.kernels.tables import cloud_layout as layout
 from rrtik_ompl.kernels.tables.cloud_layout import LEAF, BoxGroups, CloudTable, PointBlocks
@@ -91,6 +103,21 @@ def to_box(boxes: BoxGroups, group: int, child: int, x: Any, y: Any, z: Any) -> 
 
 
 @inlined
+def to_cube(x: Any, y: Any, z: Any, half: Any) -> Any:
+    """Squared distance of lanes of points from a cube, or a point, around the origin."""
+    a = larger(absolute(x) - half, ZERO)
+    b = larger(absolute(y) - half, ZERO)
+    c = larger(absolute(z) - half, ZERO)
+    return squared(a, b, c)
+
+
+@inlined
+def widened(low: Any, high: Any, half: Any) -> Any:
+    """A box that contains the centres of all cubes that meet a box."""
+    return (low[0] - half, low[1] - half, low[2] - half), (high[0] + half, high[1] + half, high[2] + half)
+
+
+@inlined
 def above(left: int, child: int) -> int:
     """The bits of a number from one place on."""
     return (left >> child) << child
@@ -104,14 +131,17 @@ def around_lanes(x: Any, y: Any, z: Any, reach: float) -> Any:
 
 
 @kernel
-def block_meets(points: PointBlocks, block: int, low: Any, high: Any, x: Any, y: Any, z: Any, square: float) -> int:
+def block_meets(cloud: CloudTable, block: int, low: Any, high: Any, x: Any, y: Any, z: Any, square: float) -> int:
     """Lanes with a point of a block nearer than the root of ``square``."""
+    points = cloud.blocks
+    half = np.float32(cloud.half)
+    low, high = widened(low, high, half)
     left = points_in_reach(points, block, low, high)
     meeting = 0
     while left != 0:
         a, b, c = point_at(points, block, first_bit(left))
         left &= left - 1
-        meeting |= bits(squared(x - a, y - b, z - c) < square)
+        meeting |= bits(to_cube(x - a, y - b, z - c, half) < square)
 
     return meeting
 
@@ -123,7 +153,6 @@ def meets_points(cloud: CloudTable, x: Any, y: Any, z: Any, reach: float, bound:
     With ``bound`` a block of points in reach will do.
     """
     boxes = cloud.groups
-    points = cloud.blocks
     top = cloud.level_count - 1
     low, high = around_lanes(x, y, z, reach)
     square = reach * reach
@@ -157,7 +186,7 @@ def meets_points(cloud: CloudTable, x: Any, y: Any, z: Any, reach: float, bound:
             continue
 
         if not bound:
-            near &= block_meets(points, LEAF * number + child, low, high, x, y, z, square)
+            near &= block_meets(cloud, LEAF * number + child, low, high, x, y, z, square)
         meeting |= near
         if meeting == wanted:
             break
@@ -189,11 +218,13 @@ def nearest_child(boxes: BoxGroups, group: int, x: float, y: float, z: float) ->
 
 
 @kernel
-def nearer_of_block(points: PointBlocks, block: int, x: Any, y: Any, z: Any, best: Any) -> Any:
+def nearer_of_block(cloud: CloudTable, block: int, x: Any, y: Any, z: Any, best: Any) -> Any:
     """The smaller of lanes of squared distances and those from the points of a block."""
+    points = cloud.blocks
+    half = np.float32(cloud.half)
     for number in range(LEAF):
         a, b, c = point_at(points, block, number)
-        best = smaller(best, squared(x - a, y - b, z - c))
+        best = smaller(best, to_cube(x - a, y - b, z - c, half))
     return best
 
 
@@ -201,7 +232,6 @@ def nearer_of_block(points: PointBlocks, block: int, x: Any, y: Any, z: Any, bes
 def to_points(cloud: CloudTable, x: Any, y: Any, z: Any) -> Any:
     """Distance of lanes of points, in the cloud's frame, from the nearest point of the cloud."""
     boxes = cloud.groups
-    points = cloud.blocks
     top = cloud.level_count - 1
     middle = HALF * (lowest(x) + highest(x)), HALF * (lowest(y) + highest(y)), HALF * (lowest(z) + highest(z))
     number = 0
@@ -210,7 +240,7 @@ def to_points(cloud: CloudTable, x: Any, y: Any, z: Any) -> Any:
         child = nearest_child(boxes, group_at(cloud, top - down, number), middle[0], middle[1], middle[2])
         number = LEAF * number + child
 
-    best = nearer_of_block(points, number, x, y, z, spread(FAR_SQUARE))
+    best = nearer_of_block(cloud, number, x, y, z, spread(FAR_SQUARE))
     level = top
     number = 0
     group = group_at(cloud, top, 0)
@@ -240,7 +270,7 @@ def to_points(cloud: CloudTable, x: Any, y: Any, z: Any) -> Any:
             left = boxes_in_reach(boxes, group, low, high)
             continue
 
-        best = nearer_of_block(points, LEAF * number + child, x, y, z, best)
+        best = nearer_of_block(cloud, LEAF * number + child, x, y, z, best)
 
     return square_root(best)
 

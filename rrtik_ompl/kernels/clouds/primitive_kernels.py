@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from rrtik_ompl.kernels.clouds.accessors import cloud_at
 from rrtik_ompl.kernels.clouds.kernels import meets_points, to_points
 from rrtik_ompl.kernels.layout import PrimitiveHead, PrimitiveShape, PrimitiveTable
@@ -18,6 +20,8 @@ from rrtik_ompl.kernels.tables.accessors import (
     third_axis_of,
 )
 from rrtik_ompl.kernels.tables.cloud_layout import CloudTable
+
+ZERO = np.float32(0.0)
 
 
 @inlined
@@ -53,13 +57,16 @@ def meets_cloud(
     wanted: int,
 ) -> int:
     """Lanes among ``wanted`` in which a ball meets a point; ``bound``: the ball only stands for balls inside it."""
+    reach = radius + cloud_radius_of(shape)
+    if reach <= ZERO:  # cubes that are taken as smaller than they are, and a ball that is smaller still
+        return 0
     a, b, c = in_cloud(shape, x, y, z)
-    met: int = meets_points(table_of(primitives, head), a, b, c, radius + cloud_radius_of(shape), bound, wanted)
+    met: int = meets_points(table_of(primitives, head), a, b, c, reach, bound, wanted)
     return met
 
 
 @kernel
 def cloud_gap(primitives: PrimitiveTable, head: PrimitiveHead, shape: PrimitiveShape, x: Any, y: Any, z: Any) -> Any:
-    """Signed distance of a point from the nearest of the cloud's balls."""
+    """Distance of a point from the nearest of the cloud's points or cubes, less the radius around these."""
     a, b, c = in_cloud(shape, x, y, z)
     return to_points(table_of(primitives, head), a, b, c) - cloud_radius_of(shape)

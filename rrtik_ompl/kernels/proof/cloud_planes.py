@@ -1,7 +1,8 @@
-"""Planes between a body and the points of a cloud, at both ends of an interval.
+"""Planes between a body and the points of a cloud, or its cubes, at both ends of an interval.
 
 What a box around the body at both ends keeps away needs no search: each point has one of the box's faces between itself
-and the body. For the other points of a block one plane is searched, and if there is none, one for each of them.
+and the body. For the other points of a block one plane is searched, and if there is none, one for each of them. The
+first plane of cubes is one to the box around them.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ SINGLE_ROUNDING = 1e-6  # of a point's place in a box, in single precision, rela
 
 @kernel
 def cloud_apart(proof: ProofTable, one: int, other: int, frames: Any, wanted: float) -> bool:
-    """Whether every ball of a cloud is apart from a solid, at both ends of an interval, by more than ``wanted``.
+    """Whether all balls or cubes of a cloud are apart from a solid, at both ends of an interval, by above ``wanted``.
 
     Args:
         proof: The table.
@@ -67,7 +68,14 @@ def cloud_apart(proof: ProofTable, one: int, other: int, frames: Any, wanted: fl
     own_middle, own_half = box_along(sizes, frames, a, b, c, origin)
     axes = single(turned_back(pose, a)), single(turned_back(pose, b)), single(turned_back(pose, c))
     middles = single(own_middle)
-    halves = single(widened(own_half, reach + 8.0 * SINGLE_ROUNDING * (1.0 + size)))
+    own_half = widened(own_half, reach + 8.0 * SINGLE_ROUNDING * (1.0 + size))
+    halves = single(
+        (
+            own_half[0] + cube_along(cloud, axes[0]),
+            own_half[1] + cube_along(cloud, axes[1]),
+            own_half[2] + cube_along(cloud, axes[2]),
+        )
+    )
 
     points = cloud.blocks
     block = -1
@@ -76,7 +84,7 @@ def cloud_apart(proof: ProofTable, one: int, other: int, frames: Any, wanted: fl
         if block < 0:
             return True
         found = points_in_box(points, block, axes, middles, halves)
-        if found != 0 and not points_apart(proof, one, other, frames, wanted, points, block, found):
+        if found != 0 and not points_apart(proof, one, other, frames, wanted, cloud, block, found):
             return False
 
 
@@ -136,6 +144,13 @@ def widened(half: Any, by: float) -> Any:
 
 
 @inlined
+def cube_along(cloud: CloudTable, axis: Any) -> float:
+    """How far a cube of a cloud extends from its centre along a unit vector."""
+    extent: float = cloud.half * (abs(axis[0]) + abs(axis[1]) + abs(axis[2]))
+    return extent
+
+
+@inlined
 def single(p: Any) -> Any:
     """A vector in single precision."""
     return np.float32(p[0]), np.float32(p[1]), np.float32(p[2])
@@ -161,26 +176,22 @@ def points_in_box(points: PointBlocks, block: int, axes: Any, middle: Any, half:
 
 @kernel
 def points_apart(
-    proof: ProofTable, one: int, other: int, frames: Any, wanted: float, points: PointBlocks, block: int, found: int
+    proof: ProofTable, one: int, other: int, frames: Any, wanted: float, cloud: CloudTable, block: int, found: int
 ) -> bool:
     """Whether planes keep points of a block, given as bits, from a solid at both ends by more than ``wanted``."""
-    count = 0
-    rest = found
-    while rest != 0:
-        put_corner(proof, other, count, point_at(points, block, first_bit(rest)))
-        count += 1
-        rest &= rest - 1  # without the lowest bit
-    count_corners(proof, other, count)
+    if cloud.half > 0.0:
+        put_box_around(proof, other, cloud, block, found)
+    else:
+        put_points(proof, other, cloud, block, found)
     gap, _ = best_plane(proof, one, other, frames, wanted, towards(proof, one, other, frames))
     if gap > wanted:
         return True
-    if count == 1:
+    if found & (found - 1) == 0:  # a single one
         return False
 
-    count_corners(proof, other, 1)
     rest = found
     while rest != 0:
-        put_corner(proof, other, 0, point_at(points, block, first_bit(rest)))
+        put_box_around(proof, other, cloud, block, rest & -rest)
         gap, _ = best_plane(proof, one, other, frames, wanted, towards(proof, one, other, frames))
         if gap <= wanted:
             return False
@@ -189,11 +200,64 @@ def points_apart(
 
 
 @inlined
-def put_corner(proof: ProofTable, other: int, number: int, point: Any) -> None:
-    """Let a point of a cloud be a corner of the solid that stands for it, the only one if it is a block's first."""
+def put_points(proof: ProofTable, other: int, cloud: CloudTable, block: int, found: int) -> None:
+    """Let points of a block, given as bits, be the corners of the solid that stands for their cloud."""
+    pose = pose_of(proof, other)
+    count = 0
+    rest = found
+    while rest != 0:
+        put_corner(proof, other, count, carried(pose, wide(point_at(cloud.blocks, block, first_bit(rest)))))
+        count += 1
+        rest &= rest - 1  # without the lowest bit
+    count_corners(proof, other, count)
+
+
+@kernel
+def put_box_around(proof: ProofTable, other: int, cloud: CloudTable, block: int, found: int) -> None:
+    """Let the box around cubes of a block, given as bits, be the solid that stands for their cloud."""
+    low = wide(point_at(cloud.blocks, block, first_bit(found)))
+    high = low
+    rest = found & (found - 1)
+    while rest != 0:
+        p = wide(point_at(cloud.blocks, block, first_bit(rest)))
+        low = min(low[0], p[0]), min(low[1], p[1]), min(low[2], p[2])
+        high = max(high[0], p[0]), max(high[1], p[1]), max(high[2], p[2])
+        rest &= rest - 1
+
+    half = cloud.half
+    sides = widened(minus(high, low), 2.0 * half)
+    put_box(proof, other, carried(pose_of(proof, other), widened(low, -half)), sides)
+
+
+@kernel
+def put_box(proof: ProofTable, other: int, corner: Any, sides: Any) -> None:
+    """Let a box along a cloud's axes, or one point, be the solid that stands for it; ``corner``: its lowest one."""
+    count = 1 if sides[0] <= 0.0 else 8
+    pose = pose_of(proof, other)
+    for number in range(count):
+        along_x = sides[0] * (number & 1)
+        along_y = sides[1] * (number >> 1 & 1)
+        away = turned(pose, (along_x, along_y, sides[2] * (number >> 2)))
+        put_corner(proof, other, number, minus(corner, scaled(away, -1.0)))
+    count_corners(proof, other, count)
+
+
+@inlined
+def pose_of(proof: ProofTable, other: int) -> Frame:
+    """The frame of the cloud that a solid stands for."""
+    return frame_at(proof.cloud_poses, solid_at(proof, other)[layout.SOLID_KIND] - layout.CLOUD)
+
+
+@inlined
+def wide(point: Any) -> Any:
+    """A vector in double precision."""
+    return np.float64(point[0]), np.float64(point[1]), np.float64(point[2])
+
+
+@inlined
+def put_corner(proof: ProofTable, other: int, number: int, p: Any) -> None:
+    """Let a point be a corner of the solid that stands for a cloud, the only one if it is a block's first."""
     solid = solid_at(proof, other)
-    pose = frame_at(proof.cloud_poses, solid[layout.SOLID_KIND] - layout.CLOUD)
-    p = carried(pose, (np.float64(point[0]), np.float64(point[1]), np.float64(point[2])))
     block = solid[layout.FIRST_BLOCK] + number // WIDTH
     lane = number % WIDTH
     for axis in range(3):

@@ -100,9 +100,25 @@ class PrimitiveView:
         return beyond, across - self.number(layout.CYLINDER_RADIUS)
 
     def to_points(self, away: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Distance of points, shape (..., 3) and seen from a cloud's origin, from its nearest point. Shape (...)."""
+        """Distance of points, shape (..., 3) and seen from a cloud's origin, from its nearest point or cube."""
         axes = self._shape[layout.CLOUD_AXES : layout.CLOUD_AXES + 9].reshape(3, 3)
-        return np.asarray(_search_tree(self._clouds[self._cloud]).query(away @ axes.T)[0])
+        cloud = self._clouds[self._cloud]
+        own = away @ axes.T
+        tree = _search_tree(cloud)
+        distances = np.asarray(tree.query(own)[0])
+        if cloud.half == 0.0:
+            return distances
+
+        # The nearest cube's centre is at most a cube's diagonal farther away than the nearest centre.
+        rows = own.reshape(-1, layout.AXES)
+        near = tree.query_ball_point(rows, distances.ravel() + 2.0 * np.sqrt(3.0) * cloud.half)
+        gaps = [_to_cubes(tree.data[them] - row, cloud.half) for row, them in zip(rows, near, strict=True)]
+        return np.array(gaps).reshape(distances.shape)
+
+
+def _to_cubes(centres: Matrix, half: float) -> float:
+    """Distance of the origin from the nearest of some cubes."""
+    return float(np.linalg.norm(np.maximum(np.abs(centres) - half, 0.0), axis=1).min())
 
 
 @lru_cache(maxsize=8)

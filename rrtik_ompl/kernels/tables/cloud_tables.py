@@ -4,19 +4,30 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, cast
 
-from rrtik_ompl.kernels.tables.cloud_layout import CloudTable
+import numpy as np
+
+from rrtik_ompl.kernels.tables.cloud_layout import LEAF, CloudTable
 from rrtik_ompl.kernels.tables.memory import packed
 
 if TYPE_CHECKING:
-    from rrtik_ompl.model.shapes import PointCloud
+    from rrtik_ompl.model.shapes.point_cloud import Cloud
+
+# Corners of a cube of side 2, shape (LEAF, 3): as many as points of a block, so each of them twice
+CORNERS = np.tile(np.where(np.indices((2, 2, 2)).reshape(3, -1).T == 0, -1.0, 1.0), (LEAF // 8, 1))
 
 
-def cloud_table(cloud: PointCloud) -> CloudTable:
-    """The tree of a cloud's points for the kernels; the cloud keeps it."""
+def cloud_table(cloud: Cloud) -> CloudTable:
+    """The tree of a cloud's points or cubes for the kernels; the cloud keeps it."""
     if not hasattr(cloud, "table"):
         tree = cloud.tree
         made = packed(
-            CloudTable, level_count=len(tree.firsts), firsts=tree.firsts, groups=tree.boxes, blocks=tree.blocks
+            CloudTable,
+            half=cloud.half,
+            level_count=len(tree.firsts),
+            firsts=tree.firsts,
+            groups=tree.boxes,
+            blocks=tree.blocks,
+            corners=(cloud.half * CORNERS.T).astype(np.float32),
         )
         object.__setattr__(cloud, "table", made)
 

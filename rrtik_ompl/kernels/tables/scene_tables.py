@@ -295,7 +295,7 @@ def _convex(body: Body, place: int, grow: float, inflation: float) -> Primitives
 
 
 def _cloud(body: Body, place: int, grow: float, inflation: float) -> Primitives:
-    """A cloud of points by the table of its tree; nothing is left of it if nothing is left of a point."""
+    """A cloud of points or cubes by the table of its tree; nothing is left of it if nothing is left of one of them."""
     solid = cast(CloudSolid, body.geometry)
     low, high = solid.cloud.bounds
     rotation = body.placement.rotation
@@ -308,7 +308,7 @@ def _cloud(body: Body, place: int, grow: float, inflation: float) -> Primitives:
     numbers = record(SHAPE_FLOATS, {SHAPE_CENTRE: origin, CLOUD_AXES: rotation.T.ravel(), CLOUD_RADIUS: radius})
     made = _single(CLOUD, place, numbers, centre - reach, centre + reach, cloud_table(solid.cloud))
 
-    return made.only(np.array([radius > 0.0]))
+    return made.only(np.array([radius + solid.cloud.half > 0.0]))
 
 
 _BUILDERS = {HALF_SPACE: _half_space, CONVEX: _convex, CLOUD: _cloud}

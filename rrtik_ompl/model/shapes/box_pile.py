@@ -35,10 +35,14 @@ class BoxPile(Shape):
 
     def surface(self) -> Triangles:
         """Return the sides of all boxes as triangles."""
-        centres, sizes = self.boxes
-        corners = centres[:, None] + ONE.vertices * sizes[:, None]
-        faces = ONE.faces + len(ONE.vertices) * np.arange(len(centres))[:, None, None]
-        return Triangles(corners.reshape(-1, 3), faces.reshape(-1, 3))
+        return surface_of_boxes(*self.boxes)
+
+
+def surface_of_boxes(centres: Matrix, sizes: Matrix) -> Triangles:
+    """Return the sides of boxes as triangles, from their centres and full side lengths, shape (n, 3) each."""
+    corners = centres[:, None] + ONE.vertices * sizes[:, None]
+    faces = ONE.faces + len(ONE.vertices) * np.arange(len(centres))[:, None, None]
+    return Triangles(corners.reshape(-1, 3), faces.reshape(-1, 3))
 
 
 def few_enough(count: int, what: str, remedy: str) -> None:

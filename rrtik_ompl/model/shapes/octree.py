@@ -1,4 +1,8 @@
-"""The occupied cells of an octree, as mapping programs produce it."""
+"""The occupied cells of an octree, as mapping programs produce it.
+
+A few cells are boxes of their own to whoever checks them; many are taken as clouds of equal cubes, one for each size,
+whose tree the kernels search.
+"""
 
 from __future__ import annotations
 
@@ -10,14 +14,47 @@ from numpy.typing import ArrayLike
 
 from rrtik_ompl.base.arrays import Matrix, Vector, bounded_array, frozen, positive
 from rrtik_ompl.base.copies import as_value
-from rrtik_ompl.base.errors import InputError, require
+from rrtik_ompl.base.errors import InputError, at_most, require
 from rrtik_ompl.files.kinds import read
-from rrtik_ompl.model.shapes.box_pile import BoxPile, few_enough
+from rrtik_ompl.model.shapes.box_pile import BoxPile, surface_of_boxes
+from rrtik_ompl.model.shapes.point_cloud import Cloud, Points
+from rrtik_ompl.model.shapes.surfaces import Triangles
+
+MOST_CELLS = 20_000_000
+MOST_DRAWN = 20_000  # cubes of a drawn surface
+LARGEST_FACTOR = 1024.0  # by which drawn cubes may be larger than the largest cell
+FEW_CELLS = 1_000  # up to which each is a box of its own, so that proofs can be written down as certificates
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Octree(BoxPile):
+class Cells(Cloud):
+    """Equal cubes along the axes of their frame.
+
+    Attributes:
+        points: Their centres, shape (n, 3) [m], float32.
+        half: Half their side plus what rounding may have moved a centre by [m].
+    """
+
+    radius = 0.0
+
+    points: Points
+    half: float
+
+
+class _Kept:
+    """What is computed of an octree on first use and kept."""
+
+    __slots__ = ("_clouds",)
+
+    _clouds: tuple[Cells, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Octree(_Kept, BoxPile):
     """A union of cubes along the axes of their frame.
+
+    Up to 1,000 are checked as boxes. More are checked as cubes whose centres are rounded to single precision and that
+    are larger by what that may amount to: at most 6e-8 of their distance from the origin.
 
     Attributes:
         centres: Centres of the cubes, shape (n, 3) [m].
@@ -54,7 +91,7 @@ class Octree(BoxPile):
             raise InputError(f"{what}: none of its cells is occupied; leave the obstacle out")
         if not (widths > 0.0).all():
             raise InputError(f"{what}: sides must be greater than 0, got {widths.min():g}")
-        few_enough(len(rows), what, "use PointCloud.load(file, radius).voxel(size), or a map of a coarser resolution")
+        at_most(len(rows), MOST_CELLS, f"{what}: cells", "take a map of a coarser resolution, or a part of it")
 
         object.__setattr__(self, "centres", frozen(rows))
         object.__setattr__(self, "sides", frozen(widths))
@@ -63,7 +100,7 @@ class Octree(BoxPile):
 
     @staticmethod
     def load(file: str | os.PathLike[str], *, scale: float = 1.0) -> Octree:
-        """Read a map of OctoMap, a ``.bt`` file: its occupied cells as cubes.
+        """Read a map of OctoMap, a ``.bt`` or ``.ot`` file: its occupied cells as cubes.
 
         Args:
             file: The file.
@@ -77,6 +114,20 @@ class Octree(BoxPile):
         """
         return read(Octree, file, scale=scale)
 
+    @property
+    def clouds(self) -> tuple[Cells, ...]:
+        """Its cubes by their size, the smallest first, built on first use."""
+        if not hasattr(self, "_clouds"):
+            sides, number = np.unique(self.sides, return_inverse=True)
+            clouds = tuple(_cells(self.centres[number == k], side) for k, side in enumerate(sides.tolist()))
+            object.__setattr__(self, "_clouds", clouds)
+        return self._clouds
+
+    def surface(self) -> Triangles:
+        """Return the sides of all cubes as triangles; of many, those of larger cubes that contain them."""
+        centres, sides = _fewer(self.centres, self.sides)
+        return surface_of_boxes(centres, np.repeat(sides[:, None], 3, axis=1))
+
     def __repr__(self) -> str:
         return f"Octree({len(self.sides)} cubes of {self.sides.min():g} to {self.sides.max():g} m)"
 
@@ -84,3 +135,25 @@ class Octree(BoxPile):
     def boxes(self) -> tuple[Matrix, Matrix]:
         """Centres and full side lengths of the cubes [m], shape (n, 3) each."""
         return self.centres, np.repeat(self.sides[:, None], 3, axis=1)
+
+
+def _fewer(centres: Matrix, sides: Vector) -> tuple[Matrix, Vector]:
+    """Return cubes that contain the given ones, at most ``MOST_DRAWN`` of them where these are in a grid."""
+    side = float(sides.min())
+    while len(sides) > MOST_DRAWN and side < sides.max() * LARGEST_FACTOR:
+        side *= 2.0
+        small = sides < side
+        places = np.floor(centres[small] / side).astype(np.int64)
+        shifted = places - places.min(axis=0)
+        keys = (shifted[:, 0] << 42) | (shifted[:, 1] << 21) | shifted[:, 2]  # 21 bits for each coordinate
+        first = np.unique(keys, return_index=True)[1]
+        centres = np.concatenate([centres[~small], (places[first] + 0.5) * side])
+        sides = np.concatenate([sides[~small], np.full(len(first), side)])
+    return centres, sides
+
+
+def _cells(centres: Matrix, side: float) -> Cells:
+    """Return cubes of one size that contain those with the given centres."""
+    points = centres.astype(np.float32)
+    rounding = float(np.abs(points - centres).max())
+    return Cells(frozen(points, np.float32), 0.5 * side + rounding)

@@ -39,18 +39,41 @@ Invalid: TypeAlias = Literal["refuse", "drop"]
 Points: TypeAlias = NDArray[np.float32]
 
 
-class _Kept:
-    """Data derived from a cloud, which is computed on first use and kept."""
+class Cloud:
+    """Points with equal balls or cubes around them, and what is derived from them on first use and kept.
+
+    Attributes:
+        points: Shape (n, 3) [m], float32.
+        radius: Of the balls [m].
+        half: Half a side of the cubes, which lie along the axes of the cloud's frame [m].
+    """
 
     __slots__ = ("_tree", "solid", "table")
+
+    points: Points
+    radius: float
+    half: float
 
     _tree: PointTree
     solid: Callable[[], Any]  # a weak reference to its collision geometry
     table: object  # the kernels' table of its tree
 
+    @property
+    def bounds(self) -> tuple[Vector, Vector]:
+        """Lowest and highest coordinates of the balls or cubes [m], shape (3,) each."""
+        low, high = (end.astype(np.float64) for end in self.tree.bounds)
+        return low - self.radius, high + self.radius
+
+    @property
+    def tree(self) -> PointTree:
+        """Its points in a tree, built on first use (10 ms for 100,000 points)."""
+        if not hasattr(self, "_tree"):
+            object.__setattr__(self, "_tree", point_tree(self.points, self.half))
+        return self._tree
+
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PointCloud(_Kept, Shape):
+class PointCloud(Cloud, Shape):
     """A cloud of points, each of which is exactly a ball of the given radius.
 
     Points are stored in single precision, as sensors and files provide them, with a relative error of at most 6e-8.
@@ -64,17 +87,19 @@ class PointCloud(_Kept, Shape):
         dropped: Number of points that were left out because they were not finite.
 
     Args:
-        points: Shape (n, 3) [m].
+        points: Shape (n, 3), or (rows, columns, 3) as depth cameras give them [m].
         radius: See above.
-        invalid: Whether points that are not finite are refused or dropped.
+        invalid: Whether points that are not finite are refused or dropped; if None, they are dropped with a warning
+            that says how many.
         source: See above.
         scale: See above.
 
     Raises:
-        InputError: If there are no points, points are not numbers or not finite, or the radius is not positive.
+        InputError: If there are no points, points are not numbers, none is finite, or the radius is not positive.
 
     Warns:
-        CloudWarning: If the cloud is wider than 200 m, as it is probably in millimetres.
+        CloudWarning: If points were dropped without being asked to, or if the cloud is wider than 200 m, as it is
+            probably in millimetres.
 
     Example:
         >>> import numpy as np
@@ -87,6 +112,7 @@ class PointCloud(_Kept, Shape):
     movable = False
     smooth = True
     sensed = True
+    half = 0.0
 
     points: Points
     radius: float
@@ -101,14 +127,17 @@ class PointCloud(_Kept, Shape):
         points: ArrayLike,
         radius: float = RADIUS,
         *,
-        invalid: Invalid = "refuse",
+        invalid: Invalid | None = None,
         source: str = "",
         scale: float = 1.0,
     ) -> None:
         require(source, str, "source of a cloud")
         what = f"cloud {source}" if source else "cloud"
-        known_choice(invalid, what)
+        known_choice("drop" if invalid is None else invalid, what)
         rows, dropped = _usable(points, invalid, what)
+        if dropped and invalid is None:
+            counted = f"{dropped} of {dropped + len(rows)} points are not finite and left out"
+            warnings.warn(f"{what}: {counted}; invalid='drop' says that this is meant", CloudWarning, 2)
 
         object.__setattr__(self, "points", rows)
         object.__setattr__(self, "radius", length(radius, f"{what}: radius"))
@@ -144,24 +173,26 @@ class PointCloud(_Kept, Shape):
         radius: float | None = None,
         *,
         scale: float = 1.0,
-        invalid: Invalid = "refuse",
+        invalid: Invalid | None = None,
     ) -> PointCloud:
-        """Read a cloud of points: ``.npy`` (an array of shape (n, 3)), ``.ply``, ``.pcd``, ``.bt``, ``.xyz`` (text).
+        """Read a cloud of points: ``.npy``, ``.npz``, ``.ply``, ``.pcd``, ``.bt``, ``.ot``, ``.xyz`` (text).
 
-        From a map of OctoMap (``.bt``) the centre of each occupied cell is taken; unless a radius is given, the points
-        have balls that cover the cells, of half the cells' diagonal.
+        An array of numpy has shape (n, 3) or (rows, columns, 3); in an ``.npz`` it is called "points", or is the only
+        one. From a map of OctoMap (``.bt``, ``.ot``) the centre of each occupied cell is taken; unless a radius is
+        given, the points have balls that cover the cells, of half the cells' diagonal.
 
         Args:
             file: The file.
             radius: Radius of the ball at each point [m]; if None, 0.01, or what covers the cells of a map.
             scale: Metres per unit of the file; 0.001 for millimetres.
-            invalid: Whether points that are not finite are refused or dropped.
+            invalid: Whether points that are not finite are refused or dropped; if None, they are dropped with a
+                warning that says how many.
 
         Raises:
             InputError: If the file cannot be read, is broken, or has no usable point; one line.
 
         Warns:
-            CloudWarning: If the cloud is so large that it is probably in millimetres.
+            CloudWarning: If points were dropped, or the cloud is so large that it is probably in millimetres.
 
         Example:
             >>> cloud = rrtik.PointCloud.load("scan.ply", radius=0.01).voxel(0.01)  # doctest: +SKIP
@@ -176,19 +207,6 @@ class PointCloud(_Kept, Shape):
         """Distance of its farthest point from its origin plus the radius of a point [m]."""
         squares = np.einsum("ni,ni->n", self.points, self.points, dtype=np.float64)
         return float(np.sqrt(squares.max())) + self.radius
-
-    @property
-    def bounds(self) -> tuple[Vector, Vector]:
-        """Lowest and highest coordinates of the balls [m], shape (3,) each."""
-        low, high = (end.astype(np.float64) for end in self.tree.bounds)
-        return low - self.radius, high + self.radius
-
-    @property
-    def tree(self) -> PointTree:
-        """Its points in a tree, built on first use (10 ms for 100,000 points)."""
-        if not hasattr(self, "_tree"):
-            object.__setattr__(self, "_tree", point_tree(self.points))
-        return self._tree
 
     def surface(self) -> Triangles:
         """Return an octahedron around each point, or around every n-th point if there are many."""
@@ -264,18 +282,20 @@ def known_choice(invalid: Invalid, what: str) -> None:
         raise InputError(f"{what}: invalid must be 'refuse' or 'drop', got {invalid!r}")
 
 
-def _usable(points: ArrayLike, invalid: Invalid, what: str) -> tuple[Points, int]:
+def _usable(points: ArrayLike, invalid: Invalid | None, what: str) -> tuple[Points, int]:
     """Validate the points of a cloud.
 
     Args:
-        points: Shape (n, 3) [m].
-        invalid: Whether points that are not finite are refused or dropped.
+        points: Shape (n, 3) or (rows, columns, 3) [m].
+        invalid: Whether points that are not finite are refused; else they are dropped.
         what: Name of the cloud, for messages.
 
     Returns:
         The points as read-only float32, shape (m, 3), and the number of dropped points.
     """
     given = points if isinstance(points, np.ndarray) and points.dtype == np.float32 else number_rows(points, what)
+    if given.ndim == 3 and given.shape[2] == 3:
+        given = given.reshape(-1, 3)
     if given.ndim != 2 or given.shape[1] != 3:
         raise InputError(f"{what}: expected points of shape (any, 3), got shape {given.shape}")
     at_most(len(given), MOST_POINTS, f"{what}: points", "thin it out before, or crop it")

@@ -24,7 +24,8 @@ class PointTree:
 
     Attributes:
         blocks: Points x, y and z, shape (blocks, 3, LEAF), float32; an incomplete block is filled with its last point.
-        boxes: Sides low x, high x, low y, ... of the boxes, shape (groups, 6, LEAF), float32, level after level.
+        boxes: Sides low x, high x, low y, ... of the boxes around points or cubes, shape (groups, 6, LEAF), float32,
+            level after level.
         firsts: Index of the first group of each level, int32; the level of boxes around points is first.
     """
 
@@ -34,7 +35,7 @@ class PointTree:
 
     @property
     def bounds(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Lowest and highest coordinates of the points, shape (3,) each."""
+        """Lowest and highest coordinates of the points or cubes, shape (3,) each."""
         whole = self.boxes[-1]
         return whole[::2].min(axis=1), whole[1::2].max(axis=1)
 
@@ -58,8 +59,8 @@ def extremes(points: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
     return np.array([column.min() for column in columns]), np.array([column.max() for column in columns])
 
 
-def point_tree(points: NDArray[np.float32]) -> PointTree:
-    """Build the tree of one or more points, shape (n, 3)."""
+def point_tree(points: NDArray[np.float32], half: float = 0.0) -> PointTree:
+    """Build the tree of one or more points, shape (n, 3), or of cubes around them with half a side ``half``."""
     # Sort the points along the curve and repeat the last one to fill its block.
     count = -(-len(points) // LEAF)
     order = np.argsort(curve_places(points))
@@ -68,6 +69,9 @@ def point_tree(points: NDArray[np.float32]) -> PointTree:
 
     low = blocks.min(axis=0)
     high = blocks.max(axis=0)
+    if half > 0.0:  # with the cubes, rounded outwards
+        low = np.nextafter(low - np.float32(half), np.float32(-np.inf))
+        high = np.nextafter(high + np.float32(half), np.float32(np.inf))
     levels = []
     firsts = [0]
 

@@ -89,9 +89,15 @@ def test_compressed_bytes_that_repeat_others_are_read():
     assert unpacked(pattern, 9, "f") == b"abababab" + b"c"
 
 
+def npz(**arrays):
+    stream = io.BytesIO()
+    np.savez_compressed(stream, **arrays)
+    return stream.getvalue()
+
+
 BAD = {
     "empty.npy": (b"", "not a .npy file"),
-    "shape.npy": (npy(np.zeros((3, 4))), r"expected numbers of shape \(any, 3\)"),
+    "shape.npy": (npy(np.zeros((3, 2))), r"expected numbers of shape \(any, 3\)"),
     "objects.npy": (npy(np.array([[None] * 3])), "expected numbers"),
     "short.npy": (npy(POINTS)[:-8], "claims 3 points, but the file has room for 2"),
     "huge.npy": (npy(POINTS).replace(b"(3, 3), ", b"(1000000000, 3), ")[:128] + bytes(72), "points|not a .npy file"),
@@ -103,7 +109,10 @@ BAD = {
     "flat.ply": ((PLY.format("ascii", XYZ[:34]) + text()).encode(), "needs one property 'z'"),
     "list.ply": ((PLY.format("ascii", "property list uchar int x\n" + XYZ) + text()).encode(), "a list"),
     "words.ply": ((PLY.format("ascii", XYZ) + "a b c\n").encode(), "not rows of numbers"),
-    "faces.ply": ((PLY.format("ascii", XYZ).replace("vertex", "face") + text()).encode(), "must be 'vertex'"),
+    "faces.ply": (
+        (PLY.format("ascii", XYZ).replace("vertex", "face") + text()).encode(),
+        "needs an element 'vertex'; it has face",
+    ),
     "huge.pcd": (PLAIN_PCD.format("binary").replace("POINTS 3", "POINTS 1000000000").encode() + bytes(36), "claims"),
     "headless.pcd": (b"x y z\n", "no line DATA"),
     "way.pcd": (PLAIN_PCD.format("base64").encode(), "unknown"),
@@ -113,7 +122,9 @@ BAD = {
     "packed.pcd": (PLAIN_PCD.format("binary_compressed").encode() + compressed(b"\x05abc", 36), "damaged"),
     "size.pcd": (PLAIN_PCD.format("binary_compressed").encode() + compressed(b"\x05abc", 40), "compressed"),
     "empty.xyz": (b"", "no point"),
-    "nan.xyz": (b"0 0 0\nnan 0 0\n", "1 of 2 points are not finite"),
+    "nan.xyz": (b"nan 0 0\nnan 0 0\n", "it has no finite point"),
+    "two.npz": (npz(a=POINTS, b=POINTS), "which array has the points"),
+    "broken.npz": (b"PK", "not an .npz file"),
     "short.xyz": (b"0 0\n", "not rows of numbers"),
     "one_line.xyz": (b"0 0 1 " * 2_000_000, "a line is longer than 4 MiB"),
     "cloud.las": (b"LASF", "unknown kind of cloud"),
@@ -171,3 +182,30 @@ def test_what_a_scene_says_of_a_cloud(tmp_path):
     (tmp_path / "scene.yaml").write_text(entry.format("radius: -1"))
     with pytest.raises(InputError, match=r"scene.yaml:5"):
         load_scene(tmp_path / "scene.yaml")
+
+
+def test_points_of_a_camera_that_are_no_numbers_are_left_out_and_counted(tmp_path):
+    rows = np.zeros((4, 5, 3), dtype=np.float32)
+    rows[..., 2] = np.arange(20).reshape(4, 5)
+    rows[1:3, 2] = np.nan
+    (tmp_path / "a.npy").write_bytes(npy(rows))
+    (tmp_path / "a.npz").write_bytes(npz(depth=np.zeros(3), points=rows))
+    (tmp_path / "one.npz").write_bytes(npz(cloud=rows))
+    for name in ("a.npy", "a.npz", "one.npz"):
+        with pytest.warns(CloudWarning, match=rf"{name}.*: 2 of 20 points are not finite and left out"):
+            cloud = PointCloud.load(tmp_path / name)
+        assert len(cloud.points) == 18
+        assert cloud.dropped == 2
+    assert PointCloud.load(tmp_path / "a.npy", invalid="drop").dropped == 2
+    with pytest.raises(InputError, match="2 of 20"):
+        PointCloud.load(tmp_path / "a.npy", invalid="refuse")
+
+
+def test_columns_and_elements_beside_the_points_are_passed_over(tmp_path):
+    (tmp_path / "a.npy").write_bytes(npy(np.column_stack([POINTS, np.ones(3)])))
+    with pytest.warns(CloudWarning, match="first three of its 4 columns"):
+        assert (PointCloud.load(tmp_path / "a.npy").points == POINTS.astype(np.float32)).all()
+    faces = "element face 2\nproperty list uchar int vertex_indices\n"
+    head = PLY.format("ascii", XYZ).replace("element vertex", faces + "element vertex")
+    (tmp_path / "a.ply").write_text(head + "3 0 1 2\n3 0 1 2\n" + text())
+    assert (PointCloud.load(tmp_path / "a.ply").points == POINTS.astype(np.float32)).all()

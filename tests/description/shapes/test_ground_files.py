@@ -54,6 +54,35 @@ def test_a_map_has_its_occupied_cells_where_the_tree_puts_them(tmp_path):
     assert found == {half: pytest.approx([0.5 * half] * 3), 0.5 * half: pytest.approx([-0.25 * half] * 3)}
 
 
+def full_map(cells, *, colours=False):
+    """A full map of OctoMap (.ot) of the given cells: their places among the finest, and their log-odds."""
+
+    def node(members, level):
+        if level == 16:
+            ((_, value),) = members
+            return struct.pack("<f", value) + bytes(3 * colours) + bytes(1)
+        parts = [[], [], [], [], [], [], [], []]
+        for place, value in members:
+            parts[sum((place[axis] >> (15 - level) & 1) << axis for axis in range(3))].append((place, value))
+        mask = sum(1 << k for k, part in enumerate(parts) if part)
+        head = struct.pack("<f", 0.5) + bytes(3 * colours) + bytes([mask])
+        return head + b"".join(node(part, level + 1) for part in parts if part)
+
+    kind = b"ColorOcTree" if colours else b"OcTree"
+    head = b"# Octomap OcTree file\nid %s\nsize 9\nres 0.1\ndata\n" % kind
+    return head + node(cells, 0)
+
+
+@pytest.mark.parametrize("colours", [False, True])
+def test_a_full_map_has_the_cells_that_are_probably_occupied(colours, tmp_path):
+    low = 2**15
+    cells = [((low + x, low + y, low - 3), value) for x, y, value in ((0, 0, 0.8), (1, 0, -0.4), (5, 40, 0.0))]
+    tree = rrtik.Octree.load(saved(tmp_path, "map.ot", full_map(cells, colours=colours)))
+    assert np.sort(tree.centres, axis=0) == pytest.approx(np.array([[0.05, 0.05, -0.25], [0.55, 4.05, -0.25]]))
+    assert tree.sides == pytest.approx([0.1, 0.1])
+    assert len(rrtik.PointCloud.load(tmp_path / "map.ot").points) == 2
+
+
 def test_a_cloud_of_a_map_has_a_point_for_each_finest_cell(tmp_path):
     path = b""  # down the last children to a cell two levels above the finest, then one finest cell
     for _ in range(13):
@@ -86,11 +115,13 @@ def test_a_scene_with_ground_and_a_map_comes_back(tmp_path):
         ("a.png", b"nothing", "not a picture that can be read"),
         ("a.xls", b"", "unknown kind of heights; have .npy"),
         ("a.bt", b"PK", "not a map of OctoMap"),
-        ("a.bt", HEAD + BODY[:3], "the tree ends too early; save it again"),
-        ("a.bt", HEAD + bytes([0, 0b11000000]) * 17, "the tree is too deep"),
+        ("a.bt", HEAD + BODY[:3], "the tree ends too early"),
+        ("a.bt", HEAD + bytes([0, 0b11000000]) * 16 + bytes(2), "the tree is too deep"),
         ("a.bt", HEAD.replace(b"res 0.1", b"res"), "needs a line 'res'"),
         ("a.bt", HEAD.replace(b"res 0.1", b"res -1"), "res: must be greater than 0"),
-        ("a.bt", HEAD.replace(b"OcTree\nsize", b"ColorOcTree\nsize"), "a tree of type 'ColorOcTree' is unknown"),
+        ("a.bt", HEAD.replace(b"OcTree\nsize", b"CountTree\nsize"), "a tree of type 'CountTree' is unknown"),
+        ("a.bt", HEAD + BODY + BODY[:2], "it ends after 2 of 3 nodes"),
+        ("a.bt", HEAD + BODY + b"x", "within a node of 2 bytes"),
         ("a.bt", HEAD, "none of its cells is occupied"),
     ],
 )

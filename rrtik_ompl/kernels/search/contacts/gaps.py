@@ -11,6 +11,7 @@ from typing import Any
 from rrtik_ompl.kernels.checks.gjk import cross, dot, minus, nearest_on_triangle, scaled
 from rrtik_ompl.kernels.layout import JointValues
 from rrtik_ompl.kernels.proof import layout
+from rrtik_ompl.kernels.proof.cloud_planes import cloud_at, put_box
 from rrtik_ompl.kernels.proof.frames import frame_at, node_frames, origin_of, place_frames, turned, vector_at
 from rrtik_ompl.kernels.proof.layout import Frame, PairRows, ProofTable
 from rrtik_ompl.kernels.proof.planes import farthest, sizes_at, solid_at
@@ -18,7 +19,6 @@ from rrtik_ompl.kernels.proof.proof_kernels import kind_of
 from rrtik_ompl.kernels.record import Doubles
 from rrtik_ompl.kernels.search.motions.motion_layout import MotionTable
 from rrtik_ompl.kernels.simd.compiled import inlined, kernel
-from rrtik_ompl.kernels.simd.lanes import set_wide_lanes, spread_wide
 from rrtik_ompl.kernels.simd.records import row_at
 
 MOST_STEPS = 20
@@ -41,14 +41,14 @@ def makes_contact(proof: ProofTable, pair: PairRows) -> bool:
 
 @inlined
 def show_point(proof: ProofTable, solid: int, point: Doubles) -> None:
-    """Let the solid that stands for a cloud be one of its points, if it is such a solid."""
-    if kind_of(proof, solid) < layout.CLOUD:
-        return
-    row = solid_at(proof, solid)
-    block = row[layout.FIRST_BLOCK]
-    for axis in range(3):
-        set_wide_lanes(proof.corners, 3 * block + axis, spread_wide(point[axis]))
-    row[layout.END_BLOCK] = block + 1
+    """Let the solid that stands for a cloud be one of its points, or the cube with that lowest corner.
+
+    It does nothing for other solids.
+    """
+    kind = kind_of(proof, solid)
+    if kind >= layout.CLOUD:
+        side = 2.0 * cloud_at(proof.clouds, kind - layout.CLOUD).half
+        put_box(proof, solid, vector_at(point, 0), (side, side, side))
 
 
 @kernel

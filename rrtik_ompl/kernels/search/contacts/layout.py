@@ -27,7 +27,7 @@ class PullTable(ShortcutTable):
     shares: Doubles  # and its place there, from 0 to 1
     pairs: Wholes  # its solids
     ways: Doubles  # unit normal between them, towards the first one
-    points: Doubles  # of a cloud the point that is touched
+    points: Doubles  # of a cloud the point, or the lowest corner of the cube, that is touched
     gaps: Doubles  # on the route [m]
     gradients: Configuration  # of the gap
     bounds: Doubles  # what a step may add to the gap at least [m]
