@@ -10,7 +10,7 @@ from rrtik_ompl.model.shapes import Box, Capsule, Cylinder
 from rrtik_ompl.model.shapes.shape import Shape
 from rrtik_ompl.problem_files.motion_bench_maker import load_motion_bench_maker
 
-GROUPS = {"panda": "panda_arm", "ur5": "manipulator"}  # of each robot
+GROUPS = {"panda": "panda_arm", "ur5": "manipulator", "fetch": "arm_with_torso"}  # of each robot
 
 
 def scene_files(folder: Path, arm: str, problems: int) -> list[str]:

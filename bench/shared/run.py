@@ -18,7 +18,12 @@ Sets = Annotated[
     Argument(help="Holds mbm_panda and mbm_ur5, unpacked problems of MotionBenchMaker.", exists=True, file_okay=False),
 ]
 SetsOrNone = Annotated[
-    Path | None, Argument(help="Holds mbm_panda and mbm_ur5 of MotionBenchMaker.", exists=True, file_okay=False)
+    Path | None,
+    Argument(
+        help="Holds mbm_panda, mbm_ur5 and, for whole plans, mbm_fetch of MotionBenchMaker.",
+        exists=True,
+        file_okay=False,
+    ),
 ]
 PandaSet = Annotated[
     Path,

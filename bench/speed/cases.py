@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 from ompl import geometric as og
 
-from bench.shared.motion_bench_maker import problem_of
+from bench.shared.motion_bench_maker import problem_of, scene_files
 from rrtik_ompl import Obstacle, Problem, Scene, World, list_problems, load_problem, load_robot
 from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.base.budget import Budget
@@ -32,7 +32,7 @@ class Options:
     """What the person asked for.
 
     Attributes:
-        folder: The unpacked MotionBenchMaker set of the Panda, or None.
+        folder: Holds the unpacked MotionBenchMaker sets, or None.
         problems: At most so many problems of each of its families.
         peer_problems: As many to see what OMPL costs.
         seed: Of everything that is drawn by lot.
@@ -60,11 +60,8 @@ def clutter(count: int, reach: float, rng: np.random.Generator) -> Scene:
 
 
 def panda_files(options: Options, count: int) -> list[Path]:
-    """Scene files of the set, the first ``count`` of each family; none without a folder."""
-    if options.folder is None:
-        return []
-    families = sorted(path for path in (options.folder / "problems").glob("*") if path.is_dir())
-    return [file for family in families for file in sorted(family.glob("scene*.yaml"))[:count]]
+    """Scene files of the Panda's set, the first ``count`` of each family; none without a folder."""
+    return [] if options.folder is None else [Path(file) for file in scene_files(options.folder, "panda", count)]
 
 
 def family(file: Path) -> str:

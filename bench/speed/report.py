@@ -1,7 +1,8 @@
 """The speed page: our figures beside the peers', all measured in one run on this machine.
 
-Rows that need the Panda's problems say so where their folder is not given: ``panda.urdf``, ``panda_spherized.urdf``,
-``panda.srdf``, ``problems/``. Peers that are not installed are left out, and the rows say so
+Rows that need MotionBenchMaker's problems say so where their folder is not given. It holds ``mbm_panda``, ``mbm_ur5``
+and ``mbm_fetch``: the folders ``panda``, ``ur5`` and ``fetch`` of the resources of KavrakiLab/vamp, with their problems
+unpacked. An arm whose set is not there is left out. Peers that are not installed are left out, and the rows say so
 (``pip install rrtik-ompl[peers]``).
 
 Times are CPU time of this process unless a table says otherwise, for machines are shared; the candidates take turns,
@@ -16,15 +17,17 @@ from typing import Annotated
 from ompl import util as ou
 from typer import Option
 
-from bench.shared.run import PandaSetOrNone, Run
+from bench.shared.run import Run, SetsOrNone
 from bench.speed.cases import Options
 from bench.speed.checks import free_motions, near_obstacles
 from bench.speed.machine import machine
 from bench.speed.planning import exact, ompl_layer, spheres
+from bench.speed.whole import whole_plans
 from rrtik_bench.report.page import Report
 from rrtik_ompl.base.choices import one_of
 
 ROWS = {
+    "whole": whole_plans,
     "spheres": spheres,
     "exact": exact,
     "free-motions": free_motions,
@@ -35,11 +38,11 @@ ROWS = {
 
 def main(
     run: Run,
-    folder: PandaSetOrNone = None,
+    folder: SetsOrNone = None,
     *,
     quick: Annotated[bool, Option(help="A fraction of the work.")] = False,
     only: Annotated[list[str] | None, Option(help="This row; may be repeated.")] = None,
-    problems: Annotated[int, Option(help="Problems of each family.")] = 100,
+    problems: Annotated[int, Option(help="Problems of each family.")] = 50,
     peer_problems: Annotated[int, Option(help="Of each family, to see what OMPL costs.")] = 3,
     seed: int = 1,
 ) -> Report:

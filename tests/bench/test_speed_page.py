@@ -1,4 +1,4 @@
-"""The speed page comes out whole where neither the peers nor the Panda set are there."""
+"""The speed page comes out whole where neither the peers nor the problems' sets are there."""
 
 import os
 import subprocess
@@ -24,7 +24,7 @@ def run(folder, *arguments):
 
 @pytest.fixture(scope="module")
 def page(tmp_path_factory):
-    names = ("exact", "spheres", "free-motions", "near-obstacles", "ompl-layer")
+    names = ("whole", "exact", "spheres", "free-motions", "near-obstacles", "ompl-layer")
     return run(tmp_path_factory.mktemp("speed"), *(word for name in names for word in ("--only", name)))
 
 
@@ -34,7 +34,7 @@ def test_the_page_names_the_processor_and_the_versions(page):
 
 
 def test_rows_without_their_data_say_so(page):
-    assert page.count("Not run: give the folder of the MotionBenchMaker set.") == 2
+    assert page.count("Not run: give the folder of the MotionBenchMaker sets.") == 3
 
 
 def test_rows_that_need_no_data_are_measured(page):
