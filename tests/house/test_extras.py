@@ -1,6 +1,5 @@
 """What an extra brings, and is not there, is told with the command that installs it; nothing else is imported."""
 
-import ast
 import re
 import sys
 
@@ -18,7 +17,7 @@ SECTION = PROJECT.split("[project.optional-dependencies]")[1].split("[project.")
 EXTRAS = set(re.findall(r"^([a-z]+) = \[", SECTION, re.M))
 PACKAGES = ("rrtik_ompl", "planners/rrtik_planners", "robots/rrtik_robots", "bench/rrtik_bench")
 SOURCES = [file for package in PACKAGES for file in sorted((ROOT / package).rglob("*.py"))]
-OWN = {"rrtik_ompl", "rrtik_planners", "rrtik_robots"}
+OWN = {"rrtik_ompl", "rrtik_planners", "rrtik_robots", "rrtik_bench"}
 # What comes with a dependency: numba's, matplotlib's, pydantic's two; for checkers alone; for whom a wheel is built.
 BESIDE = {"llvmlite", "mpl_toolkits", "pydantic_core", "typing_extensions", "_typeshed", "hatchling"}
 
@@ -45,13 +44,12 @@ NEEDED_BY = {
 }
 
 
+IMPORT = re.compile(r"^ *(?:from ([a-z_A-Z]\w*)[\w.]* import|import ([a-z_A-Z]\w*))", re.MULTILINE)
+
+
 def imported(file):
     """Names of all packages that a file imports, wherever it does."""
-    for node in ast.walk(ast.parse(file.read_text())):
-        if isinstance(node, ast.Import):
-            yield from (alias.name.split(".")[0] for alias in node.names)
-        elif isinstance(node, ast.ImportFrom) and not node.level:
-            yield node.module.split(".")[0]
+    return {first or second for first, second in IMPORT.findall(file.read_text())}
 
 
 def test_what_is_imported_is_a_dependency_or_stands_here():
