@@ -201,6 +201,7 @@ def load_scene(file: str | os.PathLike[str]) -> Scene:
 
     - YAML: ``version: 1`` and ``scene:``, or a whole problem file
     - MoveIt's ``.scene`` files
+    - MJCF: what stands beside the robot, whose arm `load_robot` reads of the same file
     - one solid in metres, which becomes the only obstacle, named as the file: a cloud of points (PLY, PCD, XYZ, NPY,
       NPZ), a map of OctoMap (BT, OT) as its octree, or a mesh (STL, OBJ, DAE, GLB)
 
@@ -215,6 +216,10 @@ def load_scene(file: str | os.PathLike[str]) -> Scene:
     path = file_name(file)
     if path.suffix.lower() == ENDING:
         return read_scene_text(file)
+    if path.suffix.lower() in (".xml", ".mjcf"):
+        from rrtik_ompl.description.mjcf.scenery import scene_from_mjcf  # loads slowly, and few scenes are in MJCF
+
+        return scene_from_mjcf(file)
     if path.suffix.lower() in SOLIDS:
         return Scene([Obstacle(path.stem, SOLIDS[path.suffix.lower()](path))])
     with refusing_others(file, "Scene"):

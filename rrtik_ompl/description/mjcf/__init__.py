@@ -46,11 +46,11 @@ def robot_from_mjcf(
     """Load a robot from an MJCF file.
 
     Bodies and sites become links. Geoms that may collide (``contype``, ``conaffinity``) are collision geometry; meshes
-    are used themselves, not their hulls; planes and height fields belong to the scene and are left out. ``<exclude>``
-    gives pairs of links that are never checked, the masks give such pairs of solids; what is welded to the world is
-    checked against everything that moves, as in MuJoCo. ``<equality><joint>`` gives joints that follow others,
-    keyframes give postures. Free joints are held where the file puts them. One warning names what is left out. MJCF has
-    no limits of velocity: give ``joint_limits``.
+    are used themselves, not their hulls. Solids of the world, and bodies on it that no hinge or slide moves, belong to
+    the scene, which `load_scene` reads of the same file. ``<exclude>`` gives pairs of links that are never checked, the
+    masks give such pairs of solids; what is welded to the world is checked against everything that moves, as in MuJoCo.
+    ``<equality><joint>`` gives joints that follow others, keyframes give postures. Free joints are held where the file
+    puts them. One warning names what is left out. MJCF has no limits of velocity: give ``joint_limits``.
 
     Args:
         path: The file; files that it includes are read too.

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from scipy.spatial import ConvexHull
 
 from rrtik_ompl.base.arrays import Vector
+from rrtik_ompl.description.mjcf.elements import field_mesh
 from rrtik_ompl.model.shapes import Mesh
 
 JOINTS = ("free", "ball", "slide", "hinge")  # in the order of MuJoCo's numbers
@@ -124,6 +125,8 @@ class _Writer:
 
         if kind == "ellipsoid":
             geom.set("mesh", self.kept(ellipsoid(size)))
+        elif kind == "hfield":
+            geom.set("mesh", self.kept(self.field(model.geom_dataid[number])))
         elif kind in ("mesh", "sdf"):
             geom.set("mesh", self.kept(self.mesh(model.geom_dataid[number])))
         else:
@@ -136,6 +139,14 @@ class _Writer:
         first, count = model.mesh_vertadr[number], model.mesh_vertnum[number]
         face, faces = model.mesh_faceadr[number], model.mesh_facenum[number]
         return Mesh(model.mesh_vert[first : first + count], model.mesh_face[face : face + faces])
+
+    def field(self, number: int) -> Mesh:
+        """Return a height field."""
+        model = self.model
+        rows, columns = model.hfield_nrow[number], model.hfield_ncol[number]
+        first = model.hfield_adr[number]
+        heights = model.hfield_data[first : first + rows * columns].reshape(rows, columns)
+        return field_mesh(heights, model.hfield_size[number])
 
     def kept(self, mesh: Mesh) -> str:
         """Keep a mesh, and return its name."""

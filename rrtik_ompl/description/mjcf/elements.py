@@ -20,7 +20,7 @@ from rrtik_ompl.base.poses import pose_from_xyzw, turned_z
 from rrtik_ompl.description.package_path import MESH_SUFFIXES
 from rrtik_ompl.description.tree import MeshFile, Solid
 from rrtik_ompl.description.urdf_read import attribute, numbers
-from rrtik_ompl.model.shapes import Box, Capsule, Cylinder, Mesh, Shape, Sphere
+from rrtik_ompl.model.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, Shape, Sphere
 
 MAIN = "main"  # the default class from which all others inherit
 OF_THE_SCENE = ("plane", "hfield")
@@ -153,7 +153,7 @@ def masks(geom: Element, where: str) -> tuple[int, int]:
 
 
 def solid_of(geom: Element, settings: Settings, meshes: Meshes, where: str) -> Solid:
-    """Return the solid of a geom that is neither a plane nor a height field.
+    """Return the solid of a geom that is neither a plane nor a height field (see :func:`ground_of`).
 
     Args:
         geom: The element, with defaults filled in.
@@ -190,6 +190,64 @@ def solid_of(geom: Element, settings: Settings, meshes: Meshes, where: str) -> S
             raise InputError(f"{where}: <geom fromto> is from a point to itself; give two points")
         place = pin.SE3(turned_z(direction / length), ends.mean(axis=0))
     return Solid(_shape(kind, geom, length, where), place, rgba)
+
+
+class UnreadableFieldError(InputError):
+    """A height field is stored in a way that only MuJoCo's compiler reads."""
+
+
+def ground_of(geom: Element, settings: Settings, fields: Mapping[str, Element], where: str) -> Solid:
+    """Return the solid of a plane, below which all is filled, or of a height field.
+
+    Args:
+        geom: The element, with defaults filled in.
+        settings: Settings of the file.
+        fields: Elements of height fields by name.
+        where: File and body, put in front of error messages.
+
+    Raises:
+        UnreadableFieldError: If the heights are in a file.
+        InputError: If anything else cannot be used.
+    """
+    place = settings.placement(geom, where)
+    if geom.get("type") == "plane":
+        return Solid(HalfSpace([0.0, 0.0, 1.0]), place)
+
+    name = attribute(geom, "geom", "hfield", where)
+    if name not in fields:
+        raise UnknownNameError("height field", name, fields, where=where)
+    heights = fields[name]
+    rows, columns = (int(numbers(heights, key, 1, (0.0,), where)[0]) for key in ("nrow", "ncol"))
+    if heights.get("elevation") is None or rows < 2 or columns < 2:
+        raise UnreadableFieldError(f"height field '{name}' is in a file")
+    elevation = np.reshape(numbers(heights, "elevation", rows * columns, None, where), (rows, columns))[::-1]
+    low, high = elevation.min(), elevation.max()
+    return Solid(
+        field_mesh((elevation - low) / max(high - low, 1e-12), numbers(heights, "size", 4, None, where)), place
+    )
+
+
+def field_mesh(heights: Matrix, size: ArrayLike) -> Mesh:
+    """Return the solid below a grid of heights, as MuJoCo has it.
+
+    Args:
+        heights: From 0 to 1, rows along y, shape (rows, columns).
+        size: Half extents along x and y, the height that 1 stands for, and how far the solid reaches below 0 [m].
+    """
+    half_x, half_y, top, base = np.asarray(size, dtype=np.float64)
+    rows, columns = heights.shape
+    x, y = np.meshgrid(np.linspace(-half_x, half_x, columns), np.linspace(-half_y, half_y, rows))
+    upper = np.stack([x, y, top * heights], axis=-1).reshape(-1, 3)
+    lower = np.stack([x, y, np.full_like(x, -base)], axis=-1).reshape(-1, 3)
+
+    number = np.arange(rows * columns).reshape(rows, columns)
+    a, b, c, d = number[:-1, :-1].ravel(), number[:-1, 1:].ravel(), number[1:, 1:].ravel(), number[1:, :-1].ravel()
+    faces = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+    rim = np.concatenate([number[0, :-1], number[:-1, -1], number[-1, :0:-1], number[:0:-1, 0]])
+    after = np.roll(rim, -1)
+    below = rows * columns
+    walls = [np.stack([rim, rim + below, after + below], axis=1), np.stack([rim, after + below, after], axis=1)]
+    return Mesh(np.concatenate([upper, lower]), np.concatenate([faces, faces[:, ::-1] + below, *walls]))
 
 
 def _shape(kind: str, geom: Element, length: float | None, where: str) -> Shape:

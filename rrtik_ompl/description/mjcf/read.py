@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
-from itertools import combinations, pairwise, product
+from dataclasses import dataclass, field, replace
+from itertools import chain, combinations, count, pairwise, product
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
@@ -19,6 +19,8 @@ from rrtik_ompl.description.mjcf.elements import (
     OF_THE_SCENE,
     Meshes,
     Settings,
+    UnreadableFieldError,
+    ground_of,
     masks,
     meshes_of,
     solid_of,
@@ -40,6 +42,23 @@ Mask = tuple[int, int]  # contype and conaffinity
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Thing:
+    """A solid of the world, or of a body on it that no hinge or slide moves.
+
+    Attributes:
+        name: Of its geom, or of its body.
+        kind: The type of the geom.
+        solid: With its pose in the world.
+        apart: Links of the robot that it never collides with, because of masks or ``<exclude>``.
+    """
+
+    name: str
+    kind: str
+    solid: Solid
+    apart: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Mjcf:
     """The contents of an MJCF file.
 
@@ -51,6 +70,7 @@ class Mjcf:
         apart: Pairs of solids that never collide, named by link and number, such as "hand_0".
         touchable: Pairs of links that may collide although a joint joins them, as one of them is welded to the world.
         loops: Joints that a loop connects or an equality holds, with the values [rad or m] at which they are held.
+        things: What stands beside the robot, which the scene has.
         unread: Things in the file about shapes, joints and limits that are not used.
         postures: The keyframes: joint values [rad or m] by name of the joint, for each name.
     """
@@ -62,14 +82,19 @@ class Mjcf:
     apart: frozenset[frozenset[str]]
     touchable: frozenset[frozenset[str]]
     loops: Mapping[str, float]
+    things: tuple[Thing, ...]
     unread: tuple[str, ...]
     postures: Mapping[str, Mapping[str, float]]
 
 
-def read_mjcf(path: Path) -> Mjcf:
+def read_mjcf(path: Path, *, scene: bool = False) -> Mjcf:
     """Read a file and the files that it includes.
 
     What cannot be read here is read as MuJoCo compiles it, where the package mujoco is installed.
+
+    Args:
+        path: The file.
+        scene: Whether what stands beside the robot is wanted: else what cannot be read of it is only named.
 
     Raises:
         InputError: If anything in it cannot be used.
@@ -80,7 +105,7 @@ def read_mjcf(path: Path) -> Mjcf:
         _include(root, path.resolve().parent)
         settings = Settings()
         settings.read(root, where)
-        return _read(root, settings, meshes_of(root, settings, path.resolve().parent, where), where)
+        return _read(root, settings, meshes_of(root, settings, path.resolve().parent, where), where, scene=scene)
     except InputError:
         result = compiled(path)
         if result is None:
@@ -89,28 +114,39 @@ def read_mjcf(path: Path) -> Mjcf:
     root, meshes = result
     settings = Settings()
     settings.read(root, where)
-    return _read(root, settings, {name: (mesh, pin.SE3.Identity()) for name, mesh in meshes.items()}, where)
+    made = {name: (mesh, pin.SE3.Identity()) for name, mesh in meshes.items()}
+    return _read(root, settings, made, where, scene=scene)
 
 
-def _read(root: Element, settings: Settings, meshes: Meshes, where: str) -> Mjcf:
+def _read(root: Element, settings: Settings, meshes: Meshes, where: str, *, scene: bool) -> Mjcf:
     """Read the elements of a file."""
-    reader = _Reader(where, settings, meshes)
+    fields = {each.get("name", ""): each for each in root.findall("asset/hfield")}
+    reader = _Reader(where, settings, meshes, fields)
     for world in root.findall("worldbody"):
         reader.read(world)
+    if scene and reader.unreadable:
+        raise InputError(f"{where}: {reader.unreadable[0]}; {COMPILER}")
 
+    loose = {name for name, body in reader.bodies.items() if "free" in body.joints}
+    loose |= {body.get("name", "") for body in root.iter("body") if body.get("mocap") == "true"}
+    things = _taken_out(root, reader, loose)
     tree = Tree(where, reader.finished(), reader.joints)
-    loops = _loops(root, reader, tree)
+    links = {link.name for link in tree.links}
+    loops = _loops(root, tree, loose)
     in_loops = {joint: reader.zeros[joint] for joints in loops.values() for joint in joints}
-    unread = unread_of_mjcf(root, reader.bodies, reader.scenery, {name for name, _ in reader.moving}, loops)
+    scenery = [*reader.unreadable, *(f"{thing.kind} '{thing.name}'" for thing in things)]
+    held = {name: body for name, body in reader.bodies.items() if name in links}
+    unread = unread_of_mjcf(root, held, scenery, {name for name, _ in reader.moving}, loops)
 
     return Mjcf(
         name=root.get("model", ""),
         tree=tree,
         mimics=flattened(where, reader.joints, _followers(root, reader)),
-        excluded=_excluded(root, reader),
+        excluded=frozenset(pair for pair in _excluded(root, reader) if pair <= links),
         apart=_never_colliding_solids(reader),
-        touchable=touchable(reader.bodies),
+        touchable=frozenset(pair for pair in touchable(reader.bodies) if pair <= links),
         loops=in_loops | _held_values(root, reader),
+        things=things,
         unread=tuple(unread),
         postures=_keys(root, reader),
     )
@@ -152,12 +188,15 @@ class _Reader:
     where: str
     settings: Settings
     meshes: Meshes
+    fields: Mapping[str, Element]  # height fields by name
     solids: dict[str, tuple[list[Solid], list[Solid]]] = field(default_factory=lambda: {WORLD: ([], [])})
     joints: list[Joint] = field(default_factory=list)
     masks: dict[str, list[tuple[int, int]]] = field(default_factory=dict)
     moving: list[tuple[str, str]] = field(default_factory=list)  # names and kinds of joints, in the order of keyframes
     bodies: dict[str, Body] = field(default_factory=lambda: {WORLD: Body("", ())})
-    scenery: list[str] = field(default_factory=list)  # geoms of the scene, which are left out
+    names: dict[str, list[tuple[str, str]]] = field(default_factory=dict)  # of hard solids: names and kinds of geoms
+    grounds: dict[str, list[tuple[str, str, Solid, Mask]]] = field(default_factory=dict)  # planes, height fields
+    unreadable: list[str] = field(default_factory=list)  # height fields that cannot be read
     zeros: dict[str, float] = field(default_factory=dict)  # values of the joints in the pose that the file describes
 
     def read(self, world: Element) -> None:
@@ -179,15 +218,18 @@ class _Reader:
 
         for item in element.findall("geom"):
             geom = self.settings.filled(item, style, place)
-            if geom.get("type") in OF_THE_SCENE:
-                self.scenery.append(f"{geom.get('type')} '{geom.get('name', link)}'")
+            with located(place):
+                geom_masks = masks(geom, place)
+            named = geom.get("name", ""), geom.get("type", "sphere")
+            if named[1] in OF_THE_SCENE:
+                self.ground(geom, link, place, named, geom_masks)
                 continue
             with located(place):
                 solid = solid_of(geom, self.settings, self.meshes, place)
-                geom_masks = masks(geom, place)
             self.solids[link][not any(geom_masks)].append(solid)
             if any(geom_masks):
                 self.masks.setdefault(link, []).append(geom_masks)
+                self.names.setdefault(link, []).append(named)
 
         for item in element.findall("site"):
             site = self.settings.filled(item, style, place)
@@ -195,6 +237,18 @@ class _Reader:
             if name and name not in self.solids:
                 self.solids[name] = [], []
                 self.fix(link, name, self.settings.placement(site, place))
+
+    def ground(self, geom: Element, link: str, place: str, named: tuple[str, str], geom_masks: Mask) -> None:
+        """Read a plane or a height field, which belong to the scene."""
+        if not any(geom_masks):
+            return
+        with located(place):
+            try:
+                solid = ground_of(geom, self.settings, self.fields, place)
+            except UnreadableFieldError as fault:
+                self.unreadable.append(str(fault))
+                return
+        self.grounds.setdefault(link, []).append((*named, solid, geom_masks))
 
     def mount(self, body: Element, parent: str, name: str, style: str) -> None:
         """Add the joints between a body and its parent, with a link without solids after each of them."""
@@ -265,6 +319,66 @@ class _Reader:
     def finished(self) -> list[Link]:
         """Return all links; a link without visual solids is drawn by its collision geometry."""
         return [Link(name, tuple(hard), tuple(drawn or hard)) for name, (hard, drawn) in self.solids.items()]
+
+
+def _taken_out(root: Element, reader: _Reader, loose: set[str]) -> tuple[Thing, ...]:
+    """Take what the scene has out of what was read, and return it: the world's own solids, and bodies beside the robot.
+
+    A body on the world belongs to the robot if a hinge or slide moves it or a body that it carries.
+
+    Args:
+        root: Top element of the file.
+        reader: Loses the links of the scene.
+        loose: Free bodies, and those that a user moves; what is fixed to one that is taken out is added.
+    """
+    roots = {name: _root(name, reader.bodies) for name in reader.bodies}
+    moved = {roots[name] for name, body in reader.bodies.items() if _moving_joint_kinds(body)}
+    beside = [name for name in reader.bodies if name == WORLD or roots[name] not in moved]
+
+    poses = {WORLD: pin.SE3.Identity()}
+    kept = []
+    for joint in reader.joints:  # each after those above it
+        if joint.parent in poses and (joint.parent != WORLD or joint.child in beside):
+            poses[joint.child] = poses[joint.parent] * joint.T_parent_joint
+            loose |= {joint.child} if joint.parent in loose else set()
+        else:
+            kept.append(joint)
+    reader.joints[:] = kept
+
+    solids = []
+    for name in beside:
+        hard = zip(reader.names.pop(name, ()), reader.solids[name][0], reader.masks.pop(name, ()), strict=True)
+        solids += [(name, *each) for each in ((*named, solid, mask) for named, solid, mask in hard)]
+        solids += [(name, *each) for each in reader.grounds.pop(name, ())]
+        reader.solids[name] = [], []
+    for name in poses:
+        if name != WORLD:
+            del reader.solids[name]
+
+    excluded = {frozenset((item.get("body1", ""), item.get("body2", ""))) for item in root.findall("contact/exclude")}
+    taken: set[str] = set()
+    things = []
+    for body, geom, kind, solid, mask in solids:
+        name = _unused(geom or (kind if body == WORLD else body), taken)
+        taken.add(name)
+        apart = [
+            link
+            for link, own in reader.masks.items()
+            if frozenset((link, body)) in excluded or not any(meet(mask, each) for each in own)
+        ]
+        things.append(Thing(name, kind, replace(solid, T_link_solid=poses[body] * solid.T_link_solid), tuple(apart)))
+    return tuple(things)
+
+
+def _root(name: str, bodies: Mapping[str, Body]) -> str:
+    """Return the body on the world that carries a body; the world for itself."""
+    way = [*_ancestry(name, bodies)]
+    return way[-2] if len(way) > 1 else WORLD
+
+
+def _unused(name: str, taken: Collection[str]) -> str:
+    """Return a name, with a number behind it if it is taken."""
+    return next(each for each in chain([name], (f"{name}_{k}" for k in count(2))) if each not in taken)
 
 
 def _below(body: Element, name: str, style: str) -> list[tuple[Element, str, str, str]]:
@@ -434,7 +548,7 @@ def unread_of_mjcf(
     acting = [item for item in root.findall("actuator/*") if not any(item.get(key) in joints for key in OF_JOINTS)]
     tendons = [item for item in root.findall("tendon/*") if item.get("range") or item.get("limited") == "true"]
     kinds = {
-        "of the scene (add it as obstacles)": scenery,
+        "of the scene (load_scene(file) has it):": scenery,
         "free bodies, held where they are:": _quoted(free),
         "bodies on ball joints, held where they are:": _quoted(
             [n for n, body in bodies.items() if "ball" in body.joints]
@@ -469,13 +583,12 @@ def _names(elements: Iterable[Element]) -> list[str]:
     return [f"'{item.get('name') or item.tag}'" for item in elements]
 
 
-def _loops(root: Element, reader: _Reader, tree: Tree) -> dict[str, list[str]]:
+def _loops(root: Element, tree: Tree, loose: Collection[str]) -> dict[str, list[str]]:
     """Return the active equalities that are not between two joints, each with the movable joints that it connects.
 
-    A free body, or one that a user moves (``mocap``), takes part in no loop: it follows, or leads, whatever is tied.
+    What is loose, a free body or one that a user moves (``mocap``), takes part in no loop: it follows, or leads,
+    whatever is tied.
     """
-    loose = {name for name, body in reader.bodies.items() if "free" in body.joints}
-    loose |= {body.get("name", "") for body in root.iter("body") if body.get("mocap") == "true"}
     links = {link.name for link in tree.links}
     found = {}
 
@@ -486,6 +599,8 @@ def _loops(root: Element, reader: _Reader, tree: Tree) -> dict[str, list[str]]:
         named = [end for end in ends if end]
         if item.tag == "tendon":
             joints = [joint for name in named for joint in _joints_of_tendon(root, name, tree)]
+        elif any(end in loose for end in named):
+            joints = []
         else:
             joints = _between([end if end in links else WORLD for end in (*named, WORLD)[:2]], tree, loose)
         found[f"{item.tag} of {' and '.join(map(repr, named)) or item.get('name', '')}"] = joints
