@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector
 from rrtik_ompl.geometry.collision.bodies import DISTANCE_TOLERANCE, Body, keeps_clearance, kept_apart
 from rrtik_ompl.geometry.collision.certificate import fixed_contact
-from rrtik_ompl.geometry.collision.containment import Containment
+from rrtik_ompl.geometry.collision.containment import Containment, filled
 from rrtik_ompl.geometry.collision.digests import robot_digest, scene_digest
 from rrtik_ompl.geometry.collision.distances import measured
 from rrtik_ompl.kernels.layout import CONVEX_SOLID, HALF_SPACE_SOLID
@@ -448,7 +448,8 @@ class Motions:
         bodies = tuple(self.bodies[k] for k in self.pairs[entry.pair])
         approach = 0.5 * entry.width * self.approaches[entry.pair, entry.motion]
         required = self.required_gaps[entry.pair] + DISTANCE_TOLERANCE + approach
-        apart = next(measured(bodies, ((0, 1),), frames, near_only=False)).distance > required
+        solid = tuple(filled(body) for body in bodies)
+        apart = next(measured(solid, ((0, 1),), frames, near_only=False)).distance > required
         whole_bodies = entry.solids_of_motion == self._on_all_of(entry.motion, entry.pair).solids_of_motion
         return bool(whole_bodies and apart and not Containment(bodies, ((0, 1),)).holds((0, 1), frames))
 

@@ -12,7 +12,7 @@ apart, coal's distances between the meshes are used instead (:class:`CoalProof`)
 [16]: if the distance of two bodies at one configuration of a motion exceeds a bound on their approach within an
 interval around it, they are apart in the whole interval. Coal measures distances between surfaces, so one body could be
 wholly inside the other. This is checked once per motion, which suffices: a body cannot leave a closed surface without
-touching it.
+touching it. An open mesh of a link is measured with the faces of the boxes that it encloses.
 """
 
 from __future__ import annotations
@@ -33,11 +33,11 @@ from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.constraints.held_regions import HeldRegions
 from rrtik_ompl.geometry.collision.bodies import DISTANCE_TOLERANCE, Body
 from rrtik_ompl.geometry.collision.cloud_solid import CloudSolid
-from rrtik_ompl.geometry.collision.containment import Containment
+from rrtik_ompl.geometry.collision.containment import Containment, filled, has_inside
 from rrtik_ompl.geometry.collision.digests import robot_digest, scene_digest, world_digest
 from rrtik_ompl.geometry.collision.distances import measured
 from rrtik_ompl.geometry.collision.motion_bound import approach_weights
-from rrtik_ompl.geometry.collision.solids import around, is_closed, is_mesh, of_each
+from rrtik_ompl.geometry.collision.solids import around, is_mesh, of_each
 from rrtik_ompl.kernels.proof import layout
 from rrtik_ompl.kernels.proof.layout import ProofTable
 from rrtik_ompl.kernels.proof.log import logged
@@ -291,8 +291,8 @@ class Prover:
     ) -> list[Gap]:
         """Return the motions that are not proven, each with the pair of bodies and the place where its proof failed.
 
-        The kernels try all motions first, in batches. Motions that fail at two links of which one is a closed mesh are
-        then tried again with coal's distances (:class:`CoalProof`).
+        The kernels try all motions first, in batches. Motions that fail at two links of which one is a mesh are then
+        tried again with coal's distances (:class:`CoalProof`).
 
         Args:
             rows: Start and end configurations, shapes (m or more, dof) and (m, dof).
@@ -416,7 +416,7 @@ def _entries(log: MotionEntries, measured_intervals: NDArray[np.int64]) -> Motio
 
 
 class CoalProof:
-    """Proofs by coal's distances, for pairs of links that kernels leave unproven and of which one is a closed mesh.
+    """Proofs by coal's distances, for pairs of links that kernels leave unproven and of which one is a mesh.
 
     Attributes:
         packed: The table that the kernels read.
@@ -432,16 +432,12 @@ class CoalProof:
         self._robot = robot
         self._bodies = bodies
         self.packed = packed
-        # Select the pairs of links with a closed mesh and without an open one, which has no inside.
-        is_of_arm = [body.kind != "obstacle" for body in bodies]
-        is_mesh_of_arm = np.array(
-            [of_arm and is_mesh(body.geometry) for of_arm, body in zip(is_of_arm, bodies, strict=True)], dtype=bool
-        )
-        is_open_mesh = np.array(
-            [mesh and not is_closed(bodies[k].geometry) for k, mesh in enumerate(is_mesh_of_arm)], dtype=bool
-        )
-        has_closed_mesh = is_mesh_of_arm[packed.bodies].any(axis=1) & ~is_open_mesh[packed.bodies].any(axis=1)
-        self.links: Mask = has_closed_mesh & ~packed.beside_obstacle & ~_groups(packed)
+        # Select the pairs with a mesh of the arm that has an inside: an open one has it if it is of a link.
+        is_mesh_of_arm = [body.kind != "obstacle" and is_mesh(body.geometry) for body in bodies]
+        is_solid = np.array([mesh and has_inside(body) for mesh, body in zip(is_mesh_of_arm, bodies, strict=True)])
+        is_hollow = np.array(is_mesh_of_arm) & ~is_solid
+        has_mesh = is_solid[packed.bodies].any(axis=1) & ~is_hollow[packed.bodies].any(axis=1)
+        self.links: Mask = has_mesh & ~packed.beside_obstacle & ~_groups(packed)
 
     def settle(self, motion: Matrix, pair: Numbers, place: Vector, again: Callable[[], object]) -> NDArray[np.int64]:
         """Prove pairs of links apart by coal, until a motion has no unproven pair or one that coal cannot settle.
@@ -507,6 +503,7 @@ class CoalProof:
             bodies are not proven apart on the whole motion.
         """
         pair = [self._bodies[k] for k in self.packed.bodies[row].tolist()]
+        solid = [filled(body) for body in pair]
         required_gap = float(self.packed.table.margins[row]) + DISTANCE_TOLERANCE
         approach = APPROACH_SPARE * float(
             approach_weights(self._robot, pair, [(0, 1)])[0] @ np.abs(motion[1] - motion[0])
@@ -519,7 +516,7 @@ class CoalProof:
 
         def spare_at(share: float) -> float:
             """Return the distance of the bodies at a share of the motion minus the required gap [m]."""
-            return _gap_at(self._robot, pair, motion[0] + share * (motion[1] - motion[0])) - required_gap
+            return _gap_at(self._robot, solid, motion[0] + share * (motion[1] - motion[0])) - required_gap
 
         if spare_at(place) <= 0.0:
             return []

@@ -8,13 +8,24 @@ import pinocchio as pin
 import pytest
 
 import rrtik_ompl as rrtik
-from rrtik_ompl.geometry.collision.solids import is_closed
+from rrtik_ompl.description.urdf import robot_from_urdf_text
+from rrtik_ompl.geometry.collision.bodies import Body
+from rrtik_ompl.geometry.collision.enclosure import CELLS
+from rrtik_ompl.geometry.collision.solids import bvh, is_closed, measured, mesh_arrays
 from rrtik_ompl.kernels.tables.solid_tables import convex_solids
 from rrtik_ompl.world.proof import CoalProof, Prover
 from rrtik_ompl.world.world import World
+from rrtik_tests.bent_meshes import slotted_cube
 from rrtik_tests.by_coal import free_by_coal
 
 pytestmark = pytest.mark.kernels
+
+
+def opened(mesh):
+    """A mesh without the triangle that lies highest."""
+    vertices, triangles = mesh_arrays(mesh)
+    highest = int(vertices[triangles][:, :, 2].sum(axis=1).argmax())
+    return measured(bvh(vertices, np.delete(triangles, highest, axis=0)))
 
 
 @pytest.fixture(scope="module")
@@ -94,6 +105,40 @@ def test_a_body_wholly_inside_a_link_is_not_proven_apart_from_it(world):
     away = replace(inside, placement=pin.SE3(np.eye(3), np.array([0.0, 0.0, 5.0])))
     apart = tuple(away if k == pair[1] else body for k, body in enumerate(world.bodies))
     assert Prover(world.robot, apart, (pair,)).proven(q[None], q[None])[0]
+
+
+def test_links_of_open_meshes_are_proven_apart_too(world, postures, monkeypatch):
+    with pytest.MonkeyPatch.context() as patch:
+        by_kernels_alone(patch)
+        names = {gap.pair for gap in world.prover.still_gaps(postures, clearance=0.0)}
+    pair = next(pair for pair in world.pairs if tuple(world.bodies[k].name for k in pair) in names)
+    torn = list(world.bodies)
+    for k in pair:
+        torn[k] = replace(torn[k], geometry=opened(torn[k].geometry))
+        assert not is_closed(torn[k].geometry)
+
+    prover = Prover(world.robot, tuple(torn), (pair,))
+    assert prover.proven(postures, postures).all()
+    by_kernels_alone(monkeypatch)
+    assert not prover.proven(postures, postures).all()
+
+
+SLIDE = """<robot name="slide"><link name="base"/><link name="grain"/><joint name="z" type="prismatic">
+<parent link="base"/><child link="grain"/><axis xyz="0 0 1"/><limit lower="-2" upper="2" velocity="1" effort="1"/>
+</joint></robot>"""
+
+
+@pytest.mark.parametrize("width", [0.0, 0.5 / CELLS])
+def test_what_moves_through_a_slot_into_a_link_is_not_proven_apart_from_it(width, cube):
+    """The grain passes through the slot, and touches neither side of it."""
+    shell, grain = bvh(*slotted_cube(cube, width)), small_mesh(1e-3)
+    still = pin.SE3.Identity()
+    bodies = Body("base", 0, still, measured(shell), "link"), Body("grain", 1, still, grain, "link")
+    prover = Prover(robot_from_urdf_text(SLIDE), bodies, ((0, 1),))
+    rows = np.array([[1.9], [1.1], [0.0]])
+    assert prover.proven(rows[:1], rows[1:2]).all()
+    assert not prover.proven(rows[:1], rows[2:]).any()
+    assert not prover.proven(rows[2:], rows[2:]).any()
 
 
 def small_mesh(half):

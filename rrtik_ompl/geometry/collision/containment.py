@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
@@ -15,7 +16,7 @@ from rrtik_ompl.base.arrays import Mask, Matrix, distinct, frozen
 from rrtik_ompl.geometry.collision.bodies import Body
 from rrtik_ompl.geometry.collision.body_arrays import body_arrays
 from rrtik_ompl.geometry.collision.cloud_solid import CloudSolid
-from rrtik_ompl.geometry.collision.enclosure import enclosure
+from rrtik_ompl.geometry.collision.enclosure import enclosure, with_enclosed_boxes
 from rrtik_ompl.geometry.collision.shape_table import has_core
 from rrtik_ompl.geometry.collision.solids import (
     inside_mesh,
@@ -61,7 +62,7 @@ class Containment:
         # [m] Radius of the ball around each hollow body that may contain others, -inf for the rest.
         holding_radius = np.full(len(bodies), -np.inf)
         for k in distinct(pair_array).tolist():
-            if _has_inside(bodies[k]):
+            if has_inside(bodies[k]):
                 holding_radius[k] = bodies[k].geometry.aabb_radius
 
         both_ways = np.concatenate([pair_array, pair_array[:, ::-1]])
@@ -173,7 +174,17 @@ class Containment:
         return inside_mesh(*mesh_arrays(mesh), local[0]) if is_closed(mesh) else enclosure(mesh).holds(local)
 
 
-def _has_inside(body: Body) -> bool:
+def filled(body: Body) -> Body:
+    """Return a link of an open mesh with the faces of the boxes that it encloses; any other body unchanged.
+
+    As long as another body touches neither, none of its points enters or leaves the enclosed cells.
+    """
+    if body.kind != "link" or not is_mesh(body.geometry) or is_closed(body.geometry):
+        return body
+    return replace(body, geometry=with_enclosed_boxes(body.geometry))
+
+
+def has_inside(body: Body) -> bool:
     """Check whether a body is a hollow mesh that represents a solid: a link's always does, others only if closed."""
     return is_mesh(body.geometry) and (body.kind == "link" or is_closed(body.geometry))
 

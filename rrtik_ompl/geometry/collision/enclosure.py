@@ -12,13 +12,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Matrix, Vector, bounds_of, box_of
-from rrtik_ompl.geometry.collision.solids import mesh_arrays, once_per_geometry
+from rrtik_ompl.geometry.collision.solids import (
+    around,
+    bvh,
+    is_mesh,
+    measured,
+    mesh_arrays,
+    once_per_geometry,
+    outward_planes,
+)
 
 if TYPE_CHECKING:
     import coal
 
 
 CELLS = 32  # number of cells along the longest side of the mesh
+BOX_CORNERS = np.array(list(np.ndindex(2, 2, 2)), dtype=bool)  # whether x, y, z of each corner are the highest ones
+SIDES = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]  # corners of a box
+BOX_FACES = np.array([[a, *pair] for a, b, c, d in SIDES for pair in ((b, c), (c, d))])
 HALVINGS = 24  # most times that triangles are halved to make them smaller than a cell
 
 
@@ -56,6 +67,18 @@ class Enclosure:
         high = np.column_stack([end[:, :2] + 1, end[:, 2]])
         return self.origin + self.size * begin, self.origin + self.size * high
 
+    def keep_behind(self, planes: Matrix) -> None:
+        """Drop the boxes that are not wholly behind all planes: unit normals and offsets, shape (k, 4)."""
+        low, high = self.boxes()
+        sticks_out = np.zeros(len(low), dtype=bool)
+        for normal, offset in zip(planes[:, :3], planes[:, 3], strict=True):
+            # The farthest corner of a box along a normal.
+            sticks_out |= np.where(normal > 0.0, high, low) @ normal > offset
+        cells = np.rint((low[sticks_out] - self.origin) / self.size).astype(np.int64)
+        lengths = np.rint((high[sticks_out, 2] - low[sticks_out, 2]) / self.size).astype(np.int64)
+        for (x, y, z), length in zip(cells.tolist(), lengths.tolist(), strict=True):
+            self.inside[x, y, z : z + length] = False
+
     def holds(self, points: Matrix) -> bool:
         """Check whether any of the points, shape (k, 3), is in an enclosed cell."""
         cells = np.floor((points - self.origin) / self.size).astype(np.int64)
@@ -65,8 +88,28 @@ class Enclosure:
 
 @once_per_geometry
 def enclosure(geometry: coal.CollisionGeometry) -> Enclosure:
-    """Return the enclosed cells of a coal mesh."""
-    return Enclosure(*mesh_arrays(geometry))
+    """Return the enclosed cells of a coal mesh, without those that stick out of its convex hull.
+
+    So no enclosed point moves farther than the farthest one of the hull.
+    """
+    found = Enclosure(*mesh_arrays(geometry))
+    solid = around(geometry)
+    planes = None if is_mesh(solid) else outward_planes(solid)
+    if planes is None:
+        found.inside[:] = False
+    else:
+        found.keep_behind(planes)
+    return found
+
+
+@once_per_geometry
+def with_enclosed_boxes(geometry: coal.CollisionGeometry) -> coal.BVHModelBase:
+    """Return a coal mesh with the faces of the boxes of the cells that it encloses."""
+    vertices, triangles = mesh_arrays(geometry)
+    low, high = enclosure(geometry).boxes()
+    corners = np.where(BOX_CORNERS, high[:, None], low[:, None]).reshape(-1, 3)
+    faces = BOX_FACES + len(vertices) + 8 * np.arange(len(low))[:, None, None]
+    return measured(bvh(np.vstack([vertices, corners]), np.vstack([triangles, faces.reshape(-1, 3)])))
 
 
 def _cut_small(triangles: NDArray[np.float64]) -> list[NDArray[np.float64]]:

@@ -4,17 +4,7 @@ import numpy as np
 import pytest
 
 from rrtik_ompl.geometry.collision.enclosure import CELLS, Enclosure
-
-
-def slotted_cube(cube, width):
-    """The cube between -1 and 1 whose top has a slot of a width along x."""
-    bottom_and_sides = [t for t in cube.triangles.tolist() if not (cube.vertices[t][:, 2] > 0).all()]
-    y = width / 2
-    top = np.array([[sx, sy, 1.0] for sy in (-1.0, -y, y, 1.0) for sx in (-1.0, 1.0)])
-    first = len(cube.vertices)
-    strips = [(0, 1, 3), (0, 3, 2), (4, 5, 7), (4, 7, 6)]
-    faces = bottom_and_sides + [tuple(first + k for k in strip) for strip in strips]
-    return np.vstack([cube.vertices, top]), np.array(faces)
+from rrtik_tests.bent_meshes import slotted_cube
 
 
 @pytest.mark.parametrize(("width", "holds"), [(0.0, True), (0.5 / CELLS, True), (8.0 / CELLS, False), (1.0, False)])

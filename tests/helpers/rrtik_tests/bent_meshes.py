@@ -32,3 +32,14 @@ def bent_meshes_of(dented_cube):
         "dented": bvh(dented.vertices, dented.triangles),
         "hollow": bvh(np.vstack([corners, hollow.vertices]), np.vstack([faces, turned + len(corners)])),
     }
+
+
+def slotted_cube(cube, width):
+    """The cube between -1 and 1 whose top has a slot of a width along x."""
+    bottom_and_sides = [t for t in cube.triangles.tolist() if not (cube.vertices[t][:, 2] > 0).all()]
+    y = width / 2
+    top = np.array([[sx, sy, 1.0] for sy in (-1.0, -y, y, 1.0) for sx in (-1.0, 1.0)])
+    first = len(cube.vertices)
+    strips = [(0, 1, 3), (0, 3, 2), (4, 5, 7), (4, 7, 6)]
+    faces = bottom_and_sides + [tuple(first + k for k in strip) for strip in strips]
+    return np.vstack([cube.vertices, top]), np.array(faces)
