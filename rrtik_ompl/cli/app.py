@@ -87,21 +87,30 @@ def list_names(kind: Annotated[Kind | None, typer.Argument(help="All kinds if le
 
 
 def convert(
-    source: Annotated[str, typer.Argument(metavar="IN", help="A path file, or a problem (MotionBenchMaker too).")],
+    source: Annotated[str, typer.Argument(metavar="IN", help="A path, a scene, or a problem (MotionBenchMaker too).")],
     target: Annotated[Path, typer.Argument(metavar="OUT", help="The ending says which format.")],
     robot: Annotated[str | None, typer.Option(help="Robot that the file is for, where the file does not say.")] = None,
 ) -> int:
-    """Convert a path or a problem to another format.
+    """Convert a path, a problem or a scene to another format.
 
-    Paths: .json, .csv, .txt (OMPL's matrix). Problems, MotionBenchMaker's too, become problem files (.yaml).
+    Paths: .json, .csv, .txt (OMPL's matrix). Problems, MotionBenchMaker's too, become problem files (.yaml). Scenes,
+    those of problem files too, become MuJoCo's .xml, or .scene for MoveIt; from .xml, .mjcf and .scene also .yaml.
     """
-    from rrtik_ompl import JointPath, load_problem, load_robot
+    from rrtik_ompl import JointPath, load_problem, load_robot, load_scene
+    from rrtik_ompl.problem_files.scene_out import WRITERS
 
     if Path(source).suffix.lower() in PATH_FORMATS:
         check_target(target, PATH_FORMATS)
         JointPath.load(source, None if robot is None else load_robot(robot)).save(target)
+    elif target.suffix.lower() in WRITERS:
+        known = robot is None and Path(source).suffix  # else a problem that ships, or one of MotionBenchMaker
+        scene = load_scene(source) if known else load_problem(source, robot=robot).world.scene
+        WRITERS[target.suffix.lower()](scene, target)
+    elif Path(source).suffix.lower() in WRITERS:
+        check_target(target, (".yaml", ".yml", *WRITERS))
+        load_scene(source).save(target)
     else:
-        check_target(target, (".yaml", ".yml"))
+        check_target(target, (".yaml", ".yml", *WRITERS))
         load_problem(source, robot=robot).save(target)
 
     say(f"wrote {target}")

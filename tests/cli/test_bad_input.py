@@ -245,7 +245,7 @@ COMMAND_LINE = {
     "page of unknown kind": (task(), ("plan", "task.yaml", "--html", "view.png"), ["view.png", ".html"]),
     "unknown list": ({}, ("list", "robot"), ["robot"]),
     "port is text": (task(), ("show", "task.yaml", "--port", "web"), ["--port", "integer"]),
-    "convert to unknown kind": (task(), ("convert", "task.yaml", "out.xml"), ["out.xml", ".yaml"]),
+    "convert to unknown kind": (task(), ("convert", "task.yaml", "out.foo"), ["out.foo", ".yaml"]),
     "convert nothing": ({}, ("convert", "task.yaml", "out.yaml"), ["task.yaml", "no such file"]),
     "convert a path to a problem": ({"a.json": PATH}, ("convert", "a.json", "b.yaml"), ["b.yaml"]),
 }
