@@ -35,7 +35,10 @@ TIP_NAMES = tuple(
     )
 )
 FRAME = re.compile(r"frame|site|point|target")  # of a link without a body
-FINGER = re.compile(r"finger|thumb|knuckle|jaw|claw|phalan|proximal|distal|(^|[^a-z])(index|middle|ring|little|pinky)_")
+FINGER = re.compile(
+    r"finger|thumb|knuckle|jaw|claw|phalan|proximal|distal"
+    r"|(^|[^a-z])(index|middle|ring|little|pinky)_(?!lumbar|thoracic|cervical)"  # a spine has a middle, too
+)
 CLOSING = re.compile(r"grip|grasp|pinch")  # of the last joint: it opens and closes a gripper
 TURNING = re.compile(r"roll|pitch|yaw|wrist|rotat|twist|turn")
 NOT_FINGER = re.compile(r"head|neck|eye|camera|arm|shoulder|elbow|leg|foot|hip|knee|wheel|caster")

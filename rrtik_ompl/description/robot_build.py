@@ -182,7 +182,9 @@ def _check_joints(
 ) -> None:
     """Raise an error unless the actuated, following and locked joints exist and do not contradict each other."""
     if not actuated:
-        raise InputError(f"robot '{name}': no movable joint; its description holds only fixed joints")
+        raise InputError(
+            f"robot '{name}': no movable joint; its description holds only fixed joints, or limits without a range"
+        )
 
     for joint in (*actuated, *ties, *(m.source for m in ties.values()), *locked):
         if joint not in known:

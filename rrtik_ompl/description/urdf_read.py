@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -94,6 +95,10 @@ def parse_xml(text: str, root: str | None, where: str) -> Element:
     try:
         element = ElementTree.fromstring(text.strip())
     except (ElementTree.ParseError, ValueError) as error:
+        mark = re.search(r"^(<{7}|={7}|>{7})( |$)", text, re.MULTILINE)
+        if mark is not None:
+            line = text.count("\n", 0, mark.start()) + 1
+            raise InputError(f"{where}:{line}: git's merge marker '{mark[1]}'; settle the conflict there") from error
         line = getattr(error, "position", (1, 0))[0]
         raise InputError(f"{where}:{line}: not valid XML: {error}; correct it or export it again") from error
     if root is not None and element.tag != root:

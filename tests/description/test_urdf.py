@@ -252,6 +252,7 @@ BOUNDS = '<limit lower="-1" upper="1" velocity="1" effort="1"/>'
 BAD_TEXTS = {
     "not XML": ("<robot><link</robot>", "not valid XML"),
     "empty": ("", "not valid XML"),
+    "merge markers": ("<robot>\n<<<<<<< HEAD\n<link/>\n=======\n</robot>", r":2: git's merge marker '<<<<<<<'; settle"),
     "another root": ("<sdf/>", "<sdf>, expected <robot>"),
     "no links": ("<robot name='r'/>", "no link"),
     "two links of a name": (arm(links=LINKS + "<link name='hand'/>"), "link name 'hand' stands there twice"),

@@ -68,6 +68,12 @@ def load_surface(path: Path, scale: Vector) -> coal.BVHModelBase:
         InputError: If the file cannot be read, is broken, holds no triangle, or lies so far from its origin that single
             precision does not keep its shape.
     """
+    if os.path.isfile(path) and os.path.getsize(path) > MAX_BYTES:
+        size, most = (count // 2**20 for count in (os.path.getsize(path), MAX_BYTES))
+        raise InputError(
+            f"{path}: a mesh of {size} MiB, more than {most} MiB, the most that is read; simplify it (a robot's link "
+            "needs some thousand triangles)"
+        )
     data = read_bytes(path, MAX_BYTES)
     if not data:
         raise InputError(f"{path}: the file is empty; export the mesh again")

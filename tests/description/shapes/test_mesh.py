@@ -366,6 +366,13 @@ def test_a_missing_file_and_a_folder_are_named(tmp_path):
         Mesh.load(tmp_path / "folder.stl")
 
 
+def test_a_mesh_that_is_too_large_is_refused_before_it_is_read(tmp_path, monkeypatch):
+    (tmp_path / "part.obj").write_bytes(obj())
+    monkeypatch.setattr(mesh_files, "MAX_BYTES", 10)
+    with pytest.raises(InputError, match=r"part\.obj: a mesh of 0 MiB, more than .*; simplify it"):
+        Mesh.load(tmp_path / "part.obj")
+
+
 @pytest.mark.parametrize("scale", [0.0, -1.0, float("nan"), float("inf"), "x", [1, 1, 1]])
 def test_a_scale_that_makes_no_sense_is_refused(tmp_path, scale):
     (tmp_path / "part.obj").write_bytes(obj())
