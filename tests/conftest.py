@@ -13,7 +13,10 @@ from ompl import util as ou
 from rrtik_bench.crdt import published as crdt_published
 from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.kernels import warm_up
+from rrtik_ompl.kernels.simd import library
+from rrtik_ompl.model.proof import Gap
 from rrtik_ompl.model.shapes import Mesh
+from rrtik_ompl.world.proof import Prover
 from rrtik_tests.bent_meshes import bent_meshes_of
 from rrtik_tests.programs import NO_CHROMIUM, NO_NODE
 
@@ -82,6 +85,21 @@ BOTTOM_AND_SIDES = [(0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5
 BOTTOM_AND_SIDES += [(0, 2, 6), (0, 6, 4)]
 TOP = [(1, 5, 7), (1, 7, 3)]
 PUSHED_IN_TOP = [(1, 5, 8), (5, 7, 8), (7, 3, 8), (3, 1, 8)]
+
+
+@pytest.fixture
+def nothing_is_proven(monkeypatch):
+    """No motion is proven free, whatever is asked."""
+    monkeypatch.setattr(
+        Prover, "_gaps", lambda self, rows, *more: [Gap(k, np.nan, "", "") for k in range(len(rows[1]))]
+    )
+
+
+@pytest.fixture
+def without_kernels(monkeypatch):
+    """There are no kernels, as without numba."""
+    monkeypatch.setenv(library.SWITCH, "0")
+    monkeypatch.setattr(library, "_libraries", {})
 
 
 @pytest.fixture(scope="session")

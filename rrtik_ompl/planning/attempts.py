@@ -34,6 +34,7 @@ from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.errors import InputError, PlannerError
 from rrtik_ompl.ik.methods import load_kernels
+from rrtik_ompl.kernels.proof.rows import PROOF_KERNELS
 from rrtik_ompl.kernels.warming import load_together
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.ompl_bridge.attempt import MOTIONS_PER_ITERATION, Attempt, attempt, attempt_seeds
@@ -43,7 +44,6 @@ from rrtik_ompl.planning.goal_choice import GoalChoice
 from rrtik_ompl.planning.outcome import NamedPlanner, Plan, Request
 from rrtik_ompl.planning.second_check import SecondCheck
 from rrtik_ompl.world.problem import Problem, densely_checked, problem_in
-from rrtik_ompl.world.proof import PROOF_KERNELS
 from rrtik_ompl.world.world import form_of
 
 SHORTEST = 1e-3  # [s] the least time of an attempt

@@ -11,20 +11,29 @@ verifier searches for nothing: it only checks what the certificate states.
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 from itertools import groupby, product
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.base.arrays import Mask, Matrix, Vector
+from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.geometry.collision.bodies import DISTANCE_TOLERANCE, Body, keeps_clearance, kept_apart
 from rrtik_ompl.geometry.collision.certificate import fixed_contact
 from rrtik_ompl.geometry.collision.containment import Containment, filled
 from rrtik_ompl.geometry.collision.digests import robot_digest, scene_digest
 from rrtik_ompl.geometry.collision.distances import measured
 from rrtik_ompl.kernels.layout import CONVEX_SOLID, HALF_SPACE_SOLID
+from rrtik_ompl.kernels.reference.separation import (
+    Bounds,
+    Ends,
+    Joints,
+    Numbers,
+    ball_gaps,
+    places_of,
+    rotated,
+    seen_from_base,
+)
 from rrtik_ompl.kernels.tables.solid_tables import UNKNOWN, ConvexSolid, convex_solids, placed_solids
 from rrtik_ompl.model.certificate import DEEPEST, VERSION, Certificate, MotionEntries
 from rrtik_ompl.model.robot import Chain
@@ -36,10 +45,6 @@ ROUNDING = 1e-8  # [m] added to every required gap, to cover rounding errors
 LARGEST_VALUE = 1e3  # [rad] or [m], joint values up to which ROUNDING is sufficient
 UNIT = 1e-9  # tolerance of a normal's length, and of its deviation from the normal of a half-space
 AT_ONCE = 20_000  # number of intervals that are computed together, to bound memory
-_rotated = partial(np.einsum, "nij,nj->ni")
-
-Numbers = NDArray[np.int64]
-Poses = tuple[NDArray[np.float64], Matrix]  # rotations, shape (n, 3, 3), and origins, shape (n, 3)
 
 
 class Entry(NamedTuple):
@@ -186,7 +191,9 @@ class Motions:
 
     Attributes:
         values: Values of all joints at the waypoints, shape (k, joints).
+        joints: The joints of the robot.
         solids: The bodies and their convex parts.
+        bounds: Balls and boxes around them.
         solid_numbers: Index of each solid in ``solids``, by body and part; part -1 is the whole body.
         parts: For each body the range of its part numbers.
         joint_of_solid: The joint that carries each solid, 0 for the world.
@@ -200,6 +207,7 @@ class Motions:
 
     def __init__(self, world: World, rows: Matrix, clearance: float) -> None:
         self.chain = world.robot.chain
+        self.joints = Joints(self.chain.parent + 1, self.chain.placement, self.chain.axis, self.chain.prismatic)
         self.bodies = world.bodies
         self.values: Matrix = rows @ self.chain.gain.T + self.chain.offset
 
@@ -209,6 +217,14 @@ class Motions:
 
         joints = [body.joint for body in self.bodies]
         self.joint_of_solid = np.array([joints[k] for k, _ in self.solid_numbers], dtype=np.int64)
+
+        self.bounds = Bounds(
+            np.array([solid.ball_centre for solid in self.solids]).reshape(-1, 3),
+            np.array([solid.ball_radius for solid in self.solids]),
+            np.array([solid.axes for solid in self.solids]).reshape(-1, 3, 3),
+            np.array([solid.box_centre for solid in self.solids]).reshape(-1, 3),
+            np.array([solid.box_half for solid in self.solids]).reshape(-1, 3),
+        )
 
         # Only pairs of which a body moves are checked here; the header covers the others.
         moving = [
@@ -279,7 +295,7 @@ class Motions:
 
         return np.array([velocity, acceleration])
 
-    def _frames(self, motion: Numbers, share: Vector) -> Poses:
+    def _frames(self, motion: Numbers, share: Vector) -> NDArray[np.float64]:
         """Compute the frames of all joints, the world first, at given places of motions.
 
         Args:
@@ -287,82 +303,12 @@ class Motions:
             share: Share of that motion, from 0 to 1, shape (n,).
 
         Returns:
-            Rotations, shape (n, joints + 1, 3, 3), and origins, shape (n, joints + 1, 3).
+            Shape (n, joints + 1, 4, 4).
         """
-        chain = self.chain
         begin = self.values[motion]
-        values = begin + share[:, None] * (self.values[motion + 1] - begin)
-        rotations = np.zeros((len(values), len(chain.parent) + 1, 3, 3))
-        origins = np.zeros((len(values), len(chain.parent) + 1, 3))
-        rotations[:, 0] = np.eye(3)
+        return self.joints.frames(begin + share[:, None] * (self.values[motion + 1] - begin))
 
-        for k, parent in enumerate(chain.parent):
-            x, y, z = chain.axis[k]
-            placement = chain.placement[k]
-            slides = bool(chain.prismatic[k])
-            cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-
-            q = values[:, k, None]
-            shift = placement[:3, 3] + (q * (placement[:3, :3] @ (x, y, z)) if slides else 0.0 * q)
-            angle = 0.0 * q[:, :, None] if slides else q[:, :, None]
-            rotation = np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * (cross @ cross)
-
-            rotations[:, k + 1] = rotations[:, parent + 1] @ placement[:3, :3] @ rotation
-            origins[:, k + 1] = origins[:, parent + 1] + _rotated(rotations[:, parent + 1], shift)
-
-        return rotations, origins
-
-    def _ball_gaps(
-        self, first_numbers: Numbers, second_numbers: Numbers, poses: list[Poses], second_rests: Mask
-    ) -> Vector:
-        """Compute lower bounds of the gaps between solids on intervals by bounding balls and boxes.
-
-        The centre of the first solid's ball moves along a chord. If the second solid rests in the pair's frame, that
-        chord is compared with its ball and its box, and the larger gap counts. Otherwise the second ball moves along a
-        chord as well.
-
-        Args:
-            first_numbers: Indices of the first solids, shape (n,).
-            second_numbers: Indices of the second solids, shape (n,).
-            poses: Poses in the pair's frame: of the first solids at begin and end of the intervals, then of the second.
-            second_rests: Whether each second solid rests in that frame, shape (n,).
-
-        Returns:
-            The gaps [m], shape (n,).
-        """
-        first = [self.solids[k] for k in first_numbers.tolist()]
-        second = [self.solids[k] for k in second_numbers.tolist()]
-        centres = [np.array([s.ball_centre for s in solids]) for solids in (first, first, second, second)]
-        first_begin, first_end, second_begin, second_end = (
-            pose[1] + _rotated(pose[0], c) for pose, c in zip(poses, centres, strict=True)
-        )
-
-        # Second solid at rest: the point of the chord that is nearest to its ball's centre.
-        chord = first_end - first_begin
-        start = first_begin - second_begin
-        length = partial(np.linalg.norm, axis=1)
-        share = np.clip(-(start * chord).sum(axis=1) / np.maximum(1e-30, (chord * chord).sum(axis=1)), 0.0, 1.0)
-
-        # Second solid moving: each point of a chord is within half its length of its middle.
-        half_chords = 0.5 * (length(chord) + length(second_end - second_begin))
-        moving = length(0.5 * (first_begin + first_end - second_begin - second_end)) - half_chords
-        balls = np.where(second_rests, length(start + share[:, None] * chord), moving) - [s.ball_radius for s in second]
-
-        # Second solid at rest: the chord's extent along each axis of its box, as far as it lies beyond the sides.
-        to_box = (poses[2][0] @ np.array([s.axes for s in second])).transpose(0, 2, 1)
-        begin_in_box, end_in_box = (
-            _rotated(to_box, x - poses[2][1]) - [s.box_centre for s in second] for x in (first_begin, first_end)
-        )
-        half = np.array([s.box_half for s in second])
-        above = np.maximum(0.0, np.minimum(begin_in_box, end_in_box) - half)
-        below = np.minimum(0.0, np.maximum(begin_in_box, end_in_box) + half)
-        boxes = np.where(second_rests, length(above + below), -np.inf)
-
-        return np.asarray(np.maximum(balls, boxes) - [s.ball_radius for s in first])
-
-    def _plane_gaps(
-        self, first_numbers: Numbers, second_numbers: Numbers, poses: list[Poses], normals: Matrix
-    ) -> Vector:
+    def _plane_gaps(self, first_numbers: Numbers, second_numbers: Numbers, ends: Ends, normals: Matrix) -> Vector:
         """Compute lower bounds of the gaps between solids on intervals, along given normals.
 
         The gap is the least height of the first solid above the highest point of the second one, each taken at the end
@@ -371,7 +317,7 @@ class Motions:
         Args:
             first_numbers: Indices of the first solids, shape (n,).
             second_numbers: Indices of the second solids, shape (n,).
-            poses: See :meth:`_ball_gaps`.
+            ends: Poses of both in the pair's frame, at begin and end.
             normals: Unit normals in the pair's frame, pointing from the second solid to the first, shape (n, 3).
 
         Returns:
@@ -381,9 +327,9 @@ class Motions:
         lengths = np.linalg.norm(normals, axis=1)
         heights = []
         numbers = (first_numbers, first_numbers, second_numbers, second_numbers)
-        for solids, (rotations, origins), sign in zip(numbers, poses, (-1.0, -1.0, 1.0, 1.0), strict=True):
+        for solids, (rotations, origins), sign in zip(numbers, ends, (-1.0, -1.0, 1.0, 1.0), strict=True):
             directions = sign * normals / np.maximum(lengths, 0.5)[:, None]
-            local_directions = _rotated(rotations.transpose(0, 2, 1), directions)
+            local_directions = rotated(rotations.transpose(0, 2, 1), directions)
             height = (origins * directions).sum(axis=1)
             for number in np.unique(solids).tolist():
                 height[solids == number] += self.solids[number].support(local_directions[solids == number])
@@ -407,25 +353,19 @@ class Motions:
             columns = zip(*entries[first : first + AT_ONCE], strict=True)
             motion, pair, first_numbers, second_numbers, begins, widths = map(np.array, columns)
 
-            # Motion and share are encoded exactly in one number, so that frames are computed once for each place.
             shares = np.concatenate([begins, begins + widths])
-            places = 2.0 * np.concatenate([motion, motion]) + shares
-            nodes, where = np.unique(places, return_inverse=True)
-            rotations, origins = self._frames((nodes // 2.0).astype(np.int64), nodes % 2.0)
+            motions, places, where = places_of(np.concatenate([motion, motion]), shares)
+            begin, end = where.reshape(2, -1)
 
-            # Poses of both solids at both ends, seen from the frame of the pair.
-            poses = list[Poses]()
             base = self.base_of_pair[pair]
-            for solid, node in product((first_numbers, second_numbers), where.reshape(2, -1)):
-                to_base = rotations[node, base].transpose(0, 2, 1)
-                joint = self.joint_of_solid[solid]
-                origin = _rotated(to_base, origins[node, joint] - origins[node, base])
-                poses.append((to_base @ rotations[node, joint], origin))
+            joints = self.joint_of_solid[first_numbers], self.joint_of_solid[second_numbers]
+            ends = seen_from_base(self._frames(motions, places), (begin, end), joints, base)
 
-            gaps = self._ball_gaps(first_numbers, second_numbers, poses, self.joint_of_solid[second_numbers] == base)
+            around = self.bounds.of(first_numbers), self.bounds.of(second_numbers)
+            gaps, _ = ball_gaps(*around, ends, joints[1] == base)
             if normals is not None:
                 plane_normals = normals[first : first + AT_ONCE]
-                plane_gaps = self._plane_gaps(first_numbers, second_numbers, poses, plane_normals)
+                plane_gaps = self._plane_gaps(first_numbers, second_numbers, ends, plane_normals)
                 gaps = np.where(plane_normals.any(axis=1), plane_gaps, gaps)
 
             # Both solids deviate from their chords by at most the sum of their sagittas.
@@ -440,11 +380,7 @@ class Motions:
         The distance has to exceed the required gap by the bodies' approach in half of the interval, and neither body
         may contain the other.
         """
-        rotations, origins = self._frames(np.array([entry.motion]), np.array([entry.begin + 0.5 * entry.width]))
-        frames = np.tile(np.eye(4), (rotations.shape[1], 1, 1))
-        frames[:, :3, :3] = rotations[0]
-        frames[:, :3, 3] = origins[0]
-
+        frames = self._frames(np.array([entry.motion]), np.array([entry.begin + 0.5 * entry.width]))[0]
         bodies = tuple(self.bodies[k] for k in self.pairs[entry.pair])
         approach = 0.5 * entry.width * self.approaches[entry.pair, entry.motion]
         required = self.required_gaps[entry.pair] + DISTANCE_TOLERANCE + approach

@@ -42,8 +42,8 @@ from rrtik_ompl.kernels.proof import layout
 from rrtik_ompl.kernels.proof.layout import ProofTable
 from rrtik_ompl.kernels.proof.log import logged
 from rrtik_ompl.kernels.proof.packing import ProofPairs, proof_pairs
+from rrtik_ompl.kernels.proof.rows import proof_of_rows
 from rrtik_ompl.kernels.proof.taken_proof import TakenProof
-from rrtik_ompl.kernels.simd.library import library
 from rrtik_ompl.kernels.tables.solid_tables import convex_solids
 from rrtik_ompl.model.certificate import Certificate, MotionEntries
 from rrtik_ompl.model.proof import Gap, Proof
@@ -51,7 +51,6 @@ from rrtik_ompl.model.robot import Robot, inside_limits
 from rrtik_ompl.world.arm_cache import MAX_ROBOTS, Pairs, strokes
 
 LARGEST_VALUE = 1e3  # [rad] or [m], joint values up to which the rounding errors are bounded
-PROOF_KERNELS = "proof.proof_kernels"
 # [m] Certificates keep this distance beyond ROOM, because their verifier rounds in other places.
 SPARE = 1e-10
 MOTIONS_AT_ONCE = 64  # motions per kernel call; the clock and Ctrl-C are only looked at between calls
@@ -62,7 +61,6 @@ DEEPEST_LEVEL = 9  # largest level of an interval in a bisection, 2^-9 of a moti
 # Factor on the bound of the approach of two bodies, because a verifier may bound it by other balls.
 APPROACH_SPARE = 1.01
 FAR_APART = 1e6  # [m]; a pair with the margin -FAR_APART is always proven apart
-DOUBLE, INT = 8, 4  # bytes of a number
 Numbers: TypeAlias = NDArray[np.int32]
 Told: TypeAlias = tuple[MotionEntries, NDArray[np.int64]]  # the kernels' log of a motion; see CoalProof.settle
 Ends: TypeAlias = tuple[Matrix, Matrix]  # start and end configurations of motions, or joint values there
@@ -70,7 +68,7 @@ Ends: TypeAlias = tuple[Matrix, Matrix]  # start and end configurations of motio
 
 @dataclass(eq=False)
 class Prover:
-    """Prover of motions of an arm among bodies. It proves nothing without kernels or where two fixed bodies touch.
+    """Prover of motions of an arm among bodies. It proves nothing where two fixed bodies touch.
 
     Attributes:
         robot, bodies, pairs: The geometry that the proofs refer to; ``pairs`` holds indices into ``bodies``.
@@ -187,8 +185,7 @@ class Prover:
             is not proven.
         """
         values = self._joint_values(rows)
-        kernels = library(PROOF_KERNELS)
-        if kernels is None or not self.route(rows, clearance=clearance).proven:
+        if not self.route(rows, clearance=clearance).proven:
             return None
 
         packed = self._packed_for(clearance, SPARE)
@@ -198,8 +195,7 @@ class Prover:
         place = np.zeros(1)
 
         for k in range(len(rows) - 1):
-            arguments = (values[k].ctypes.data, values[k + 1].ctypes.data, 1, pair.ctypes.data, place.ctypes.data)
-            run = partial(kernels.prove, packed.table.address, *arguments)
+            run = partial(proof_of_rows(packed, values[k : k + 1], values[k + 1 : k + 2], pair, place), 0, 1)
             if packed.touching:
                 suggest_planes(self.robot, self.bodies, packed, rows[k : k + 2])
             logs.append(by_coal.logged(rows[k : k + 2], pair, place, run))
@@ -243,7 +239,7 @@ class Prover:
 
     def prepare(self) -> None:
         """Make the tables, for a caller that has few configurations now and motions to prove later."""
-        if library(PROOF_KERNELS) is not None and not self.always_colliding:
+        if not self.always_colliding:
             self.tables.get(self.bodies, self._new_table)
 
     def still_proven(self, rows: Matrix, *, clearance: float) -> Mask:
@@ -302,28 +298,16 @@ class Prover:
             seconds: Time limit [s]; None for none. Motions that were not examined by then count as not proven.
         """
         tails, heads = values
-        count, joints = heads.shape
+        count = len(heads)
         begin = time.monotonic()
-        kernels = library(PROOF_KERNELS)
-        if kernels is None or self.always_colliding:
+        if self.always_colliding:
             return [Gap(k, float("nan"), "", "") for k in range(count)]
 
         packed = self._packed_for(*distances)
         by_coal = self._coal_proof(packed)
-        address = packed.table.address
         pairs = np.full(count, NOT_LOOKED_AT, dtype=np.int32)
         places = np.full(count, np.nan)
-        read = tails.ctypes.data, heads.ctypes.data
-        written = pairs.ctypes.data, places.ctypes.data
-
-        def prove(first: int, number: int) -> int:
-            """Prove ``number`` motions from index ``first`` on by the kernels, and write their pairs and places.
-
-            Returns the number of motions that remain unproven.
-            """
-            skipped = DOUBLE * joints * first
-            sinks = written[0] + INT * first, written[1] + DOUBLE * first
-            return int(kernels.prove(address, read[0] + skipped, read[1] + skipped, number, *sinks))
+        prove = proof_of_rows(packed, tails, heads, pairs, places)
 
         # Let the kernels prove all motions in batches, as long as there is time.
         looked_at = 0

@@ -204,18 +204,40 @@ class RowChecks:
 
         # Both directions of a motion are checked at the same configurations.
         A, B = one_way(starts[mask], ends[mask])
-        counts = step_counts(A, B, self.solids.weights, self.settings.motion_resolution)
+        if self.checker.fast.address == 0:
+            mask[mask] = self._motions_free_in_numpy(A, B)
+            return mask
 
         clearance = self.settings.proving
-        mask[mask] = free = self.checker.motions_free(
-            A, B, counts, exact=self._exact, to_be_proven=clearance is not None
-        )
-
+        mask[mask] = free = self._free_in_steps(A, B)
         if clearance is not None:
             mask[mask] = self.prover.proven(A[free], B[free], clearance=clearance)
         elif self.constraints is not None:  # a prover checks the constraints as well
             mask[mask] = self.constraints.motions_held(starts[mask], ends[mask])
         return mask
+
+    def _free_in_steps(self, A: Matrix, B: Matrix) -> Mask:
+        """Check motions inside the limits, shapes (m, dof), in steps; not whether they keep path constraints."""
+        counts = step_counts(A, B, self.solids.weights, self.settings.motion_resolution)
+        to_be_proven = self.settings.proving is not None
+        return self.checker.motions_free(A, B, counts, exact=self._exact, to_be_proven=to_be_proven)
+
+    def _motions_free_in_numpy(self, A: Matrix, B: Matrix) -> Mask:
+        """Check motions inside the limits, shapes (m, dof), without kernels.
+
+        In numpy a whole motion is proven sooner than its steps are checked. So proofs come first, and decide alone in a
+        conservative world and where motions have to be proven.
+        """
+        settings = self.settings
+        kept = max(settings.clearance + settings.inflation, settings.proving or 0.0)
+        free = self.prover.proven(A, B, clearance=kept)
+
+        if settings.proving is None and self._exact:
+            open_ = ~free
+            free[open_] = self._free_in_steps(A[open_], B[open_])
+            if self.constraints is not None:
+                free[open_] &= self.constraints.motions_held(A[open_], B[open_])
+        return free
 
 
 def checks_of(settings: WorldSettings) -> RowChecks:

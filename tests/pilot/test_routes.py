@@ -18,7 +18,6 @@ from rrtik_ompl.pilot.routes.route import all_at_once, route_to, route_to_grasp
 from rrtik_ompl.pilot.routes.route_search import GraspRoute, NoRoute, RouteSearch, executions, forgiving, free_rows
 from rrtik_ompl.pilot.surroundings import Surroundings
 from rrtik_ompl.sensing.scene_from_view import SeenObject
-from rrtik_ompl.world import proof
 from rrtik_tests.distances import least_distances
 
 PROBLEM = load_problem("titan4_sdu")
@@ -129,8 +128,8 @@ def test_a_route_that_is_proven_is_taken_before_others_and_one_that_is_not_says_
     assert "not proven" not in routes[0].summary()
 
 
+@pytest.mark.usefixtures("nothing_is_proven")
 def test_where_nothing_can_be_proven_no_planner_is_asked_for_a_proven_route(monkeypatch):
-    monkeypatch.setattr(proof, "library", lambda name: None)  # as without kernels
     monkeypatch.setattr(route_search, "planned", lambda *given: pytest.fail("a planner was asked"))
     route = route_to(PROBLEM.world, np.array(PROBLEM.start), np.array(PROBLEM.goal.q), RATES, 1)
     assert not route.path.violations(PROBLEM.world)

@@ -132,8 +132,8 @@ def test_a_planner_that_gives_up_early_is_started_again(closed):
     assert "bicrdt" in found.reason
 
 
+@pytest.mark.usefixtures("nothing_is_proven")  # what is proven needs no more checks
 def test_a_path_that_the_second_check_rejects_is_never_returned(wall, monkeypatch):
-    monkeypatch.setattr("rrtik_ompl.world.proof.library", lambda name: None)  # what is proven needs no more checks
     refused = (Violation(0, wall.start, "no"),)
     monkeypatch.setattr("rrtik_ompl.planning.second_check.violations_of", lambda world, rows: refused)
     found = plan(wall, "bicrdt", seconds=5.0, seed=1, restarts=2)

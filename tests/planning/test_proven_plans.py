@@ -141,8 +141,8 @@ def test_an_unknown_mode_is_refused():
         plan(rrtik.load_problem("planar3_b"), proof="always")
 
 
-def test_without_kernels_paths_are_checked_in_steps_and_none_is_found_where_proofs_are_required(monkeypatch):
-    monkeypatch.setattr("rrtik_ompl.world.proof.library", lambda name: None)
+@pytest.mark.usefixtures("nothing_is_proven")
+def test_paths_are_checked_in_steps_where_nothing_is_proven_and_none_is_found_where_proofs_are_required():
     problem = rrtik.load_problem("planar3_b")
     found = plan(problem, "bicrdt", seed=3)
     assert found.found

@@ -177,9 +177,8 @@ def test_what_a_plan_returns_says_what_is_proven():
     assert plan.path.with_waypoints(plan.path.waypoints).proof is None
 
 
-@pytest.mark.kernels
-def test_without_kernels_nothing_is_proven_and_plans_are_checked_densely(monkeypatch):
-    monkeypatch.setattr("rrtik_ompl.world.proof.library", lambda name: None)
+@pytest.mark.usefixtures("nothing_is_proven")
+def test_where_nothing_is_proven_plans_are_checked_densely():
     problem = rrtik.load_problem("titan4_prisms")
     plan = rrtik.plan(problem, seed=1)
     assert plan.found

@@ -185,7 +185,8 @@ def test_the_verifier_computes_the_frames_that_pinocchio_does_and_bounds_all_acc
     robot, rows = case.world.robot, case.path.waypoints
     motions = Motions(case.world, rows, 0.0)
     shares = np.linspace(0.0, 1.0, 50)
-    turns, origins = motions._frames(np.zeros(50, dtype=np.int64), shares)
+    frames = motions._frames(np.zeros(50, dtype=np.int64), shares)
+    turns, origins = frames[:, :, :3, :3], frames[:, :, :3, 3]
     dense = rows[0] + shares[:, None] * (rows[1] - rows[0])
     for k, full in enumerate(robot.pinocchio_configuration(dense)):
         data = robot.model.createData()

@@ -99,8 +99,8 @@ class MovedObstacles:
         if not numbers:
             return
         table.cloud_poses[:] = cloud_poses(bodies).ravel()
-        self._clouds = [cloud_table(bodies[k].geometry.cloud) for k in numbers]
-        table.clouds[:] = [cloud.address for cloud in self._clouds]
+        self._packed.clouds = [cloud_table(bodies[k].geometry.cloud) for k in numbers]
+        table.clouds[:] = [cloud.address for cloud in self._packed.clouds]
         sizes = table.sizes.reshape(-1, layout.SIZE_COUNT)
         kinds = table.solids.reshape(-1, layout.SOLID_SIZE)[:, layout.SOLID_KIND]
         places = [bodies[k].placement.homogeneous for k in numbers]

@@ -13,6 +13,7 @@ from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.kernels import layout
 from rrtik_ompl.kernels.tables.cloud_layout import LEAF, CloudTable
 
+GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
 CHUNK = 64  # configurations at a time, to bound memory
 
 
@@ -104,7 +105,7 @@ class PrimitiveView:
         axes = self._shape[layout.CLOUD_AXES : layout.CLOUD_AXES + 9].reshape(3, 3)
         cloud = self._clouds[self._cloud]
         own = away @ axes.T
-        tree = _search_tree(cloud)
+        tree = search_tree(cloud)
         distances = np.asarray(tree.query(own)[0])
         if cloud.half == 0.0:
             return distances
@@ -122,7 +123,7 @@ def _to_cubes(centres: Matrix, half: float) -> float:
 
 
 @lru_cache(maxsize=8)
-def _search_tree(cloud: CloudTable) -> Any:
+def search_tree(cloud: CloudTable) -> Any:
     """SciPy's tree of a cloud's points."""
     from scipy.spatial import cKDTree  # loads slower than most plans take, and few scenes have a cloud
 
@@ -240,8 +241,14 @@ class ReferenceChecks:
         """See :meth:`rrtik_ompl.kernels.FastWorld.classify_edges`."""
         answers = np.zeros(len(starts), dtype=np.int8)
         for edge, count in enumerate(steps):
-            share = (np.arange(count + 1) / count)[:, None]
-            answers[edge] = self.classify((1.0 - share) * starts[edge] + share * ends[edge], resolve=resolve).max()
+            order = np.arange(count + 1)
+            order = order[np.argsort(order * GOLDEN % 1.0)]  # spread over the motion, so that contacts are found early
+            for first in range(0, len(order), CHUNK):
+                share = (order[first : first + CHUNK] / count)[:, None]
+                rows = (1.0 - share) * starts[edge] + share * ends[edge]
+                answers[edge] = max(answers[edge], self.classify(rows, resolve=resolve).max())
+                if answers[edge] == layout.COLLIDING:
+                    break
         return answers
 
     def marks(self, values: Matrix) -> Mask:

@@ -8,6 +8,7 @@ that is kept takes LLVM on ARM alone, see :mod:`rrtik_ompl.kernels.simd.linker`.
 from __future__ import annotations
 
 import ctypes
+import os
 import warnings
 from collections.abc import Callable
 from functools import cache
@@ -24,6 +25,7 @@ from rrtik_ompl.kernels.simd.processor import target_machine
 from rrtik_ompl.kernels.simd.targets import UnknownMachineError, target_of, this_target
 
 MAX_REASON = 300  # [letters]
+SWITCH = "RRTIK_KERNELS"  # environment variable; 0 for none
 
 
 class Library:
@@ -68,6 +70,8 @@ _said: set[str] = set()  # reasons
 
 
 def _tried(name: str) -> Library | None:
+    if os.environ.get(SWITCH) == "0":
+        return None  # as wished, so that nothing need be said
     try:
         this_target()  # code is not even tried on a machine that it has never been made for
         return _kept(name) or _made(name)

@@ -13,10 +13,10 @@ import numpy as np
 from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.kernels.search.contacts.layout import KERNELS
 from rrtik_ompl.kernels.search.contacts.pulling import Pulling
-from rrtik_ompl.model.transitions import length_of, route_length
+from rrtik_ompl.model.transitions import length_of
 from rrtik_ompl.planning.moves.axis_cut import axis_cut_rounds
-from rrtik_ompl.planning.shortening.cuts import random_cut, sequential_cut, shortcut
-from rrtik_ompl.planning.shortening.retraction import STEPS, retract
+from rrtik_ompl.planning.shortening.cuts import cut_in_python, sequential_cut, shortcut
+from rrtik_ompl.planning.shortening.retraction import retract
 from rrtik_ompl.planning.shortening.task import Task, box_around
 from rrtik_ompl.world.motion_queries import KernelWorld, has_kernels
 
@@ -29,7 +29,6 @@ ROUND_WORK = 300
 ROUND_GAIN = 3e-3
 LEAST_GAIN = 1e-4  # share of the length that counts as a gain of a round
 IDLE_ROUNDS = 6  # rounds in a row without a gain that end the work
-FINEST = 16  # factor by which the last retraction is finer if there are no kernels
 
 
 def best_in_time(route: Matrix, task: Task) -> Matrix:
@@ -108,8 +107,11 @@ def _pulled(route: Matrix, task: Task, world: KernelWorld, number: int, cuts: in
 
 
 def _without_kernels(route: Matrix, task: Task) -> Matrix:
-    """Shorten without kernels: retract the better one of a retracted sequential cut and a random cut in small steps."""
+    """Shorten without kernels: retract a sequential cut, then the better one of that and a random cut once more.
+
+    The work is bounded, whatever the limits, as numpy takes milliseconds for each motion.
+    """
     cut = sequential_cut(route, task)
     found = task.better(cut, retract(cut, task))
-    found = task.better(found, random_cut(route, task))
-    return task.better(found, retract(found, task, step=route_length(found) / (STEPS * FINEST)))
+    found = task.better(found, cut_in_python(route, task))
+    return task.better(found, retract(found, task))

@@ -67,7 +67,7 @@ def _cut(route: Matrix, task: Task, tries: int, *, share: float, pull: float) ->
     """
     limit = NO_LIMIT if task.bounded else tries
     if task.kernel_world is None or len(route) < 3:
-        return _plain(route, task, limit, share)
+        return cut_in_python(route, task, limit, share)
 
     for asking in (False, True):
         search = kernel_search(route, task, seed=2 * task.seed + asking, share=share, pull=pull, asking=asking)
@@ -117,8 +117,8 @@ def run(search: ShortcutSearch, task: Task, tries: int, patience: int = PATIENCE
     task.asked = before + search.tries
 
 
-def _plain(route: Matrix, task: Task, tries: int, share: float) -> Matrix:
-    """Apply random cuts without kernels."""
+def cut_in_python(route: Matrix, task: Task, tries: int = TRIES, share: float = 0.0) -> Matrix:
+    """Apply random cuts without kernels; arguments as of the cuts above."""
     rng = np.random.default_rng(task.seed)
     failures = 0
     route = without_repeats(route)

@@ -259,7 +259,7 @@ def why_blocked(world: World, a: Vector, b: Vector, pair: tuple[str, str]) -> st
             return f"contact: {world.explain(q)}"
     first, second = pair
     if not first:
-        return "no proof that the motion is free: there are no kernels, or the bodies always touch"
+        return "no proof that the motion is free: two bodies that no joint moves touch"
     return f"'{first}' and '{second}' come too near to be proven apart"
 
 

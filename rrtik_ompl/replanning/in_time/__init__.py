@@ -13,7 +13,6 @@ from rrtik_ompl.base.choices import TickEvent
 from rrtik_ompl.base.copies import in_one_line
 from rrtik_ompl.base.errors import at_most, require
 from rrtik_ompl.base.poses import pose_row
-from rrtik_ompl.kernels.simd.library import library
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.result import required
 from rrtik_ompl.model.scene import Scene
@@ -28,7 +27,6 @@ from rrtik_ompl.replanning.tick import Tick
 from rrtik_ompl.replanning.travels import refuse_endless_turns
 from rrtik_ompl.world.clearances import CLEARANCE
 from rrtik_ompl.world.problem import Problem
-from rrtik_ompl.world.proof import PROOF_KERNELS
 
 NAME = "in-time"  # of the planner, in records
 MOST_SLOTS = 10_000
@@ -221,8 +219,6 @@ def _search(problem: Problem, options: _Options) -> tuple[TimeSearch, str]:
 
 def _why_impossible(search: TimeSearch, options: _Options, reaches_base: str) -> str:
     """Return the reason why there cannot be a plan, so that the search need not begin, or ""."""
-    if library(PROOF_KERNELS) is None:
-        return "motions in time are proven by kernels, and there are none here; install numba"
     if options.slot * search.least_slots > options.horizon + ROUNDING:
         return f"speeds allow no arrival before {options.slot * search.least_slots:g} s; raise horizon, speed or rate"
     if search.least_slots > search.ends.last:
