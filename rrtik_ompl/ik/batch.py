@@ -27,6 +27,7 @@ from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.world.world import World, check_world
 
 LEAST_SHARE = 256  # least number of poses of a thread: fewer take less time than to start the thread
+MOST_SHARE = 8192  # and the most in one piece of work, as kernels take them all at once and Ctrl-C waits for a kernel
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -123,7 +124,7 @@ def solve_ik_many(
     count = cores() if threads is None else whole_number(threads, "threads", 1)
     check_poses(targets, "poses")
 
-    share = max(LEAST_SHARE, -(-len(targets) // count))
+    share = min(max(LEAST_SHARE, -(-len(targets) // count)), MOST_SHARE)
     how = partial(_solved, robot, targets, method, posture, world, limit, first_seed)
     parts = in_threads(how, [slice(k, k + share) for k in range(0, max(len(targets), 1), share)], count)
 
