@@ -50,7 +50,7 @@ COMMON_OPTIONS: Mapping[str, Callable[..., Robot]] = {
     "joint_weights": weighted,
 }
 VALUES_BY = {"locked": "joint", "gripper": "state, open and closed", "xacro_args": "argument"}
-CACHED_ROBOTS = 64
+CACHED_ROBOTS = 16  # with all that was derived from them
 MOUNTING = ("base_pose", "tip", *COMMON_OPTIONS)  # keys beside the group of a parametric robot
 
 

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
 
 from rrtik_ompl.base.arrays import Matrix, Vector, frozen
+from rrtik_ompl.base.kept import kept_with
 from rrtik_ompl.model.goal import joint_difference
 from rrtik_ompl.model.robot import Robot
 
@@ -27,7 +26,7 @@ def weighted_difference(robot: Robot, Q: Matrix, q: Vector) -> Matrix:
     return difference * weights_of(robot) if robot.joint_weights else difference
 
 
-@lru_cache(maxsize=64)
+@kept_with
 def weights_of(robot: Robot) -> Vector:
     """Return the normalised joint weights, shape (dof,): the diagonal of the box of joint limits keeps its length.
 

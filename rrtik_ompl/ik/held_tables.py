@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
 
 from rrtik_ompl.base.arrays import Mask, Matrix
+from rrtik_ompl.base.kept import kept_with
 from rrtik_ompl.constraints.held_region import HeldRegion
 from rrtik_ompl.constraints.held_regions import HeldRegions
 from rrtik_ompl.constraints.residuals import DAMPING, LARGEST_STEP, STEPS, projected_rows
@@ -170,7 +169,7 @@ def held_tables(robot: Robot, constraints: HeldRegions) -> HeldTables | None:
     return HeldTables(robot, constraints, known) if len(known) == len(limbs) else None
 
 
-@lru_cache(maxsize=64)
+@kept_with
 def _limb_of(robot: Robot, joint: int, placement: bytes) -> LimbTable | None:
     """Return the table of the joints that move a frame, see `limb_table`.
 

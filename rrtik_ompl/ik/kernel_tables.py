@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector, frozen
+from rrtik_ompl.base.kept import kept_with
 from rrtik_ompl.ik.tip_columns import TipColumns, tip_columns
 from rrtik_ompl.kernels.ik import ik_layout
 from rrtik_ompl.kernels.ik.ik_layout import TWIST_NUMBERS, CallTable, LimbTable
@@ -28,14 +29,14 @@ class Seeds:
     tips: NDArray[np.float64]
 
 
-@lru_cache(maxsize=64)
+@kept_with
 def seeds_of(robot: Robot) -> Seeds:
     """Return random configurations of a robot, the same at every call."""
     q = np.random.default_rng(0).uniform(*robot.finite_range(), (SEEDS, robot.dof))
     return Seeds(frozen(q), frozen(robot.fk_batch(q)))
 
 
-@lru_cache(maxsize=64)
+@kept_with
 def limb_of(robot: Robot) -> LimbTable | None:
     """Return the table of a robot's limb without seeds; None if a joint depends on several entries of q."""
     return limb_table(robot, tip_columns(robot))
@@ -67,7 +68,7 @@ def limb_table(robot: Robot, tip: TipColumns) -> LimbTable | None:
     )
 
 
-@lru_cache(maxsize=64)
+@kept_with
 def seeded_limb_of(robot: Robot) -> LimbTable | None:
     """Return the table of a robot's limb, as `limb_of`, with the configurations of `seeds_of` to start from."""
     limb = limb_table(robot, tip_columns(robot))

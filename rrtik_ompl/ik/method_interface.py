@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,6 +14,7 @@ from rrtik_ompl.base.arrays import Mask, Matrix, Vector, frozen, seed_of
 from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.choices import IkMethod
 from rrtik_ompl.base.copies import as_value, in_one_line, restored, set_fields
+from rrtik_ompl.base.kept import kept_with
 from rrtik_ompl.description.joint_weights import weighted_difference
 from rrtik_ompl.model.goal import Target, TipGoal, has_continuous, joint_difference
 from rrtik_ompl.model.result import required
@@ -219,7 +220,7 @@ def unwind(robot: Robot, rows: Matrix, start: Vector | None) -> None:
         last = rows[k]
 
 
-@lru_cache(maxsize=64)
+@kept_with
 def mid_range_configuration(robot: Robot) -> Vector:
     """Return the middle of the limits, shape (dof,), where a search begins by default."""
     return frozen(0.5 * np.sum(robot.finite_range(), axis=0))

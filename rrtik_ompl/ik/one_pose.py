@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import lru_cache
 from math import inf
 from time import monotonic
 from typing import Any
@@ -18,6 +17,7 @@ import pinocchio as pin
 
 from rrtik_ompl.base.arrays import Matrix, Vector, frozen
 from rrtik_ompl.base.choices import IkMethod
+from rrtik_ompl.base.kept import kept_with
 from rrtik_ompl.description.joint_weights import weights_of
 from rrtik_ompl.ik.analytic.branches import UNBOUNDED_ANGLE, tip_fault
 from rrtik_ompl.ik.analytic.closed_form import form_of, has_closed_form
@@ -177,7 +177,7 @@ class _Arm:
     spare_near: list[_Call] = field(default_factory=list)
 
 
-@lru_cache(maxsize=64)
+@kept_with
 def _arm_of(robot: Robot) -> _Arm | None:
     """Return what is known of an arm; None if its method is none of the kernels'."""
     limb = seeded_limb_of(robot)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from functools import lru_cache
 from threading import get_ident
 from typing import Any
 
@@ -13,6 +12,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector
+from rrtik_ompl.base.kept import kept_with
 from rrtik_ompl.base.poses import working_memory
 from rrtik_ompl.model.goal import Target
 from rrtik_ompl.model.robot import Robot, pinocchio_rows
@@ -47,7 +47,7 @@ def error_of_one(robot: Robot, goal: Target, q: Vector) -> tuple[float, float]:
     return distance, math.atan2(sine, 0.5 * (a[0] + b[1] + c[2] - 1.0))
 
 
-@lru_cache(maxsize=64)
+@kept_with
 def _tip_of(robot: Robot, thread: int) -> tuple[Any, Any, int, bool]:
     """Return what `error_of_one` needs of Pinocchio; one entry for each thread, which shares no working memory.
 

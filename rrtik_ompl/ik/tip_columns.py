@@ -7,12 +7,12 @@ the joints. Entries of these that are 0, 1 or -1 need no multiplication.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rrtik_ompl.base.kept import kept_with
 from rrtik_ompl.model.robot import Robot
 
 Numbers = NDArray[np.float64]
@@ -69,7 +69,7 @@ class TipColumns:
         return list(np.tensordot(self.gain, q, 1) + self.offset.reshape(-1, *(1,) * (q.ndim - 1)))
 
 
-@lru_cache(maxsize=64)
+@kept_with
 def tip_columns(robot: Robot) -> TipColumns:
     """Return the chain from the base to the robot's tip."""
     target = robot.model.frames[robot.model.getFrameId(robot.tip)]

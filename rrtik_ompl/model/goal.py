@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
 from typing import TypeAlias, get_args
 
 import numpy as np
@@ -15,6 +14,7 @@ from rrtik_ompl.base.arrays import Mask, Vector, finite_array, frozen, positive,
 from rrtik_ompl.base.choices import FrameAxis, one_of
 from rrtik_ompl.base.copies import as_value, set_fields
 from rrtik_ompl.base.errors import InputError, listed, require
+from rrtik_ompl.base.kept import kept_with
 from rrtik_ompl.base.poses import PoseLike, rigid, rotation_angles
 from rrtik_ompl.base.units import wrapped
 from rrtik_ompl.model.goal_kind import Goal as Goal
@@ -40,7 +40,7 @@ def joint_difference(robot: Robot, Q: ArrayLike, q: ArrayLike) -> NDArray[np.flo
     return shortest
 
 
-@lru_cache(maxsize=64)
+@kept_with
 def has_continuous(robot: Robot) -> bool:
     """Check whether a robot has a continuous joint."""
     return bool(robot.continuous.any())
@@ -397,7 +397,7 @@ PARTS = PoseGoal | PositionGoal | TaskRegion  # the kinds that error messages na
 TIP_GOALS = PARTS | GoalSet
 
 
-@lru_cache(maxsize=64)
+@kept_with
 def _with_tip(robot: Robot, frame: str) -> Robot:
     """Return the same robot with another link as its tip, without its closed-form inverse kinematics."""
     return replace(robot, tip=frame, closed_form=None)

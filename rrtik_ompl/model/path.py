@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -24,6 +23,7 @@ from rrtik_ompl.base.arrays import (
 )
 from rrtik_ompl.base.copies import as_value, changed, in_notebook
 from rrtik_ompl.base.errors import InputError, in_file, listed, name_of, require
+from rrtik_ompl.base.kept import kept_with
 from rrtik_ompl.base.units import joint_units
 from rrtik_ompl.files.kinds import read
 from rrtik_ompl.files.tables import FORMATS, dumps, loads
@@ -320,7 +320,7 @@ def path_through(path: JointPath, rows: Matrix) -> JointPath:
     return changed(path, waypoints=frozen(rows), proof=None)
 
 
-@lru_cache(maxsize=64)
+@kept_with
 def _at_zero(robot: Robot) -> JointPath:
     """Return a path of a robot from which its other paths are copied."""
     return JointPath(np.zeros((1, robot.dof)), robot.joint_names, robot.prismatic, robot.name, robot.continuous)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import lru_cache, partial
+from functools import partial
 from threading import get_ident
 from types import MappingProxyType
 from typing import Any
@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector, allocated, finite_array, finite_number, in_blocks, number_rows
 from rrtik_ompl.base.copies import as_value, itself
 from rrtik_ompl.base.errors import InputError, UnknownNameError, require
+from rrtik_ompl.base.kept import Keeper, kept_with
 from rrtik_ompl.base.poses import MOST_MOVING, PoseLike, cross_products, joint_motions
 from rrtik_ompl.base.units import shown_unit
 from rrtik_ompl.files.kinds import FilePath, read
@@ -71,7 +72,7 @@ class Chain:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Robot:
+class Robot(Keeper):
     """An immutable arm. A configuration ``q`` has one number per actuated joint: radians, or metres if prismatic.
 
     Continuous joints have infinite limits and any real number as a value. The values q and q + 2 pi are the same
@@ -489,17 +490,17 @@ def require_joints(robot: Robot, names: Sequence[str], what: str) -> None:
     raise InputError(f"the {what} moves {own}, but robot '{robot.name}' has the joints {wanted}; {remedy}")
 
 
-@lru_cache(maxsize=64)
+@kept_with
 def _widened_limits(robot: Robot, tolerance: float) -> tuple[Vector, Vector]:
     return robot.lower - tolerance, robot.upper + tolerance
 
 
-@lru_cache(maxsize=64)
+@kept_with
 def _link_names(robot: Robot) -> tuple[str, ...]:
     return tuple(f.name for f in robot.model.frames if f.type == pin.FrameType.BODY)
 
 
-@lru_cache(maxsize=256)
+@kept_with
 def _frame_number(robot: Robot, frame: str | None) -> int:
     """Return Pinocchio's index of a frame, of the tip if None.
 
@@ -512,7 +513,7 @@ def _frame_number(robot: Robot, frame: str | None) -> int:
     return int(robot.model.getFrameId(name))
 
 
-@lru_cache(maxsize=64)
+@kept_with
 def _places_of(robot: Robot) -> tuple[NDArray[np.int64], ...]:
     """Return where the joints stand in Pinocchio's vectors, in which continuous joints have two numbers.
 
@@ -527,7 +528,7 @@ def _places_of(robot: Robot) -> tuple[NDArray[np.int64], ...]:
     return single, starts[single], double, starts[double]
 
 
-@lru_cache(maxsize=64)
+@kept_with
 def _data_of(robot: Robot, _thread: int) -> pin.Data:
     """Return Pinocchio's working memory for a robot; each thread has its own."""
     return robot.model.createData()

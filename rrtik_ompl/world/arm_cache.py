@@ -9,11 +9,11 @@ only the arm's part.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import lru_cache
 
 import numpy as np
 
 from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.base.kept import kept_with
 from rrtik_ompl.geometry.collision.bodies import Body, link_bodies
 from rrtik_ompl.geometry.collision.bodies import Pairs as Pairs
 from rrtik_ompl.geometry.collision.solids import of_each
@@ -23,7 +23,6 @@ from rrtik_ompl.kernels.tables.solid_tables import convex_solids
 from rrtik_ompl.model.robot import Robot
 
 SLIDING_MARGIN = 1e-3  # [m] range beyond the limits of prismatic joints that the tables cover
-MAX_ROBOTS = 16  # number of robots whose covers and tables are kept
 NO_SPHERES = np.empty((0, 4))
 
 Spheres = tuple[Matrix, Matrix]  # outer and inner cover of a body: centre and radius, shape (n, 4) [m]
@@ -77,9 +76,9 @@ class ArmCache:
         return tables
 
 
-@lru_cache(maxsize=MAX_ROBOTS)
+@kept_with
 def arm_cache(robot: Robot) -> ArmCache:
-    """Return the cache of a robot, the same object each time; ``arm_cache.cache_clear()`` drops all caches."""
+    """Return the cache of a robot, the same object each time; the robot keeps it."""
     return ArmCache(robot)
 
 

@@ -20,7 +20,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, lru_cache, partial
+from functools import cached_property, partial
 from typing import ClassVar, TypeAlias
 
 import coal
@@ -30,6 +30,7 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector, frozen, in_blocks
 from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.kept import kept_with
 from rrtik_ompl.constraints.held_regions import HeldRegions
 from rrtik_ompl.geometry.collision.bodies import DISTANCE_TOLERANCE, Body
 from rrtik_ompl.geometry.collision.cloud_solid import CloudSolid
@@ -48,7 +49,7 @@ from rrtik_ompl.kernels.tables.solid_tables import convex_solids
 from rrtik_ompl.model.certificate import Certificate, MotionEntries
 from rrtik_ompl.model.proof import Gap, Proof
 from rrtik_ompl.model.robot import Robot, inside_limits
-from rrtik_ompl.world.arm_cache import MAX_ROBOTS, Pairs, strokes
+from rrtik_ompl.world.arm_cache import Pairs, strokes
 
 LARGEST_VALUE = 1e3  # [rad] or [m], joint values up to which the rounding errors are bounded
 # [m] Certificates keep this distance beyond ROOM, because their verifier rounds in other places.
@@ -358,7 +359,7 @@ class Prover:
         return Gap(motion, place, *(self.bodies[k].name for k in packed.bodies[pair].tolist()))
 
 
-@lru_cache(maxsize=MAX_ROBOTS)
+@kept_with
 def _joints(robot: Robot) -> tuple[Matrix, Vector, bool]:
     """Return the affine map from configurations to joint values, and whether the limits bound these.
 

@@ -6,7 +6,6 @@ import math
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
 from itertools import chain, combinations, compress
 from operator import not_
 from typing import Any, TypeAlias
@@ -18,6 +17,7 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.base.collector import collector_waits
 from rrtik_ompl.base.errors import DescriptionWarning, InputError, UnknownNameError, few
+from rrtik_ompl.base.kept import kept_with
 from rrtik_ompl.geometry.collision.shape_table import Piece, pieces
 from rrtik_ompl.geometry.collision.solids import robot_solids
 from rrtik_ompl.geometry.collision.thickness import SHARE, least_width
@@ -64,7 +64,7 @@ class Body:
     contacts: tuple[tuple[str, float], ...] = ()
 
 
-@lru_cache(maxsize=16)
+@kept_with
 def link_bodies(robot: Robot, margin: float = 0.0) -> tuple[Body, ...]:
     """Return the bodies of the robot's links, in the order of its collision model.
 
@@ -261,7 +261,7 @@ def _allowed(robot: Robot, scene: Scene) -> set[frozenset[str]]:
     return allowed
 
 
-@lru_cache(maxsize=16)
+@kept_with
 def _pairs_of_links(robot: Robot) -> frozenset[tuple[int, int]]:
     """Return the pairs of link bodies that must not touch, as pairs of their numbers, the smaller one first.
 

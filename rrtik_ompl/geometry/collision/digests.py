@@ -7,12 +7,12 @@ short reason why a certificate does not belong to a world; a verifier computes e
 from __future__ import annotations
 
 from collections.abc import Iterable
-from functools import lru_cache
 
 import coal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rrtik_ompl.base.kept import kept_with
 from rrtik_ompl.files.digest import sha256
 from rrtik_ompl.geometry.collision.bodies import Body, link_bodies
 from rrtik_ompl.geometry.collision.cloud_solid import CloudSolid
@@ -23,7 +23,7 @@ DIGITS = 16  # hexadecimal digits of a digest
 DECIMALS = 12  # decimals to which lengths [m] and angles [rad] are rounded
 
 
-@lru_cache(maxsize=16)
+@kept_with
 def robot_digest(robot: Robot) -> str:
     """Return a digest of a robot's joint tree and the geometry of its links."""
     chain = robot.chain

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from functools import lru_cache
 
 import numpy as np
 
 from rrtik_ompl.base.arrays import Matrix, Vector, frozen
+from rrtik_ompl.base.kept import kept_with
 from rrtik_ompl.geometry.collision.bodies import Body
 from rrtik_ompl.model.robot import Robot
 
@@ -24,7 +24,7 @@ def displacement_weights(robot: Robot, bodies: Iterable[Body]) -> Vector:
     return _displacement_weights(robot, tuple(bodies))
 
 
-@lru_cache(maxsize=16)
+@kept_with
 def _displacement_weights(robot: Robot, bodies: tuple[Body, ...]) -> Vector:
     """Return the weights of `displacement_weights`; cached, as all worlds of a robot share the bodies of its links."""
     tip = robot.model.frames[robot.model.getFrameId(robot.tip)]
@@ -46,7 +46,7 @@ def approach_weights(robot: Robot, bodies: Sequence[Body], pairs: Sequence[tuple
     return frozen(np.where((first > 0.0) & (second > 0.0), 0.0, first + second) @ np.abs(robot.chain.gain))
 
 
-@lru_cache(maxsize=512)
+@kept_with
 def _body_weights(robot: Robot, body: Body) -> Vector:
     """Return the `joint_weights` of one body; cached, as all worlds of a robot share the bodies of its links."""
     return frozen(joint_weights(robot, _balls([body])))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import weakref
 from collections.abc import Callable, Iterable, Iterator
-from functools import lru_cache, wraps
+from functools import wraps
 from operator import itemgetter
 from typing import Any, TypeAlias, TypeVar, cast
 
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import LARGEST, Matrix, Vector, box_of, distinct, products, welded
 from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.kept import kept_with
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.shapes.mesh import mended
 from rrtik_ompl.model.shapes.mesh_repair import edges_of
@@ -403,7 +404,7 @@ def is_closed(geometry: coal.CollisionGeometry) -> bool:
     return not np.add.reduceat(np.sign(end - start)[order], first).any()
 
 
-@lru_cache(maxsize=16)
+@kept_with
 def robot_solids(robot: Robot) -> tuple[Any, ...]:
     """Return the coal geometries of a robot's collision objects in the model's order, convex meshes as solids."""
     return tuple(measured(convexified(closed_if_mended(body.geometry))) for body in robot.collision.geometryObjects)

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import TAU, Matrix, Vector
+from rrtik_ompl.base.kept import kept_with
 from rrtik_ompl.ik.analytic.analytic_solver import AnalyticSolver, wrapped
 from rrtik_ompl.ik.kernel_tables import limb_of, pose_numbers
 from rrtik_ompl.ik.tip_columns import tip_columns
@@ -59,7 +60,7 @@ def _singular_branches(
     return _remembered(robot, form, poses.tobytes(), None if hints is None else hints.tobytes(), slack, check)
 
 
-@lru_cache(maxsize=256)
+@kept_with
 def _remembered(
     robot: Robot, form: AnalyticSolver, poses: bytes, hints: bytes | None, slack: float, check: bool
 ) -> list[NDArray[Any]]:
@@ -109,7 +110,7 @@ class _Arm:
     spare: list[_Call] = field(default_factory=list)
 
 
-@lru_cache(maxsize=64)
+@kept_with
 def _arm_of(robot: Robot, form: AnalyticSolver) -> _Arm | None:
     """Return the table of an arm, or None if the kernel cannot compute its forward kinematics."""
     limb = limb_of(robot)
@@ -206,7 +207,7 @@ def _blocks(count: int) -> int:
     return -(-count // WIDTH)
 
 
-@lru_cache(maxsize=64)
+@kept_with
 def tip_fault(robot: Robot, form: AnalyticSolver) -> str:
     """Return why the form does not fit the tip, which another joint carries than the form's frame; "" if it fits."""
     tip, solver_frame = (robot.model.frames[robot.model.getFrameId(name)] for name in (robot.tip, form.frame))
@@ -259,7 +260,7 @@ def _placed(robot: Robot, form: AnalyticSolver, poses: NDArray[np.float64]) -> N
     return poses if T_tip_frame is None else poses @ T_tip_frame
 
 
-@lru_cache(maxsize=64)
+@kept_with
 def mountings(robot: Robot, form: AnalyticSolver) -> tuple[Matrix | None, Matrix | None]:
     """Return T_base_world and T_tip_frame, shape (4, 4) each; None in place of an identity."""
     frames = robot.model.frames

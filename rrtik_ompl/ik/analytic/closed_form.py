@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 from itertools import combinations_with_replacement
 
 import numpy as np
@@ -11,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.base.arrays import Matrix, finite_array
 from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.kept import kept_with
 from rrtik_ompl.base.poses import LAST_ROW, LAST_ROW_TOLERANCE, NOT_RIGID, left_handed
 from rrtik_ompl.ik.analytic.analytic_solver import AnalyticSolver
 from rrtik_ompl.ik.analytic.branches import kernel_branches, reference_branches, tip_fault
@@ -65,7 +65,7 @@ def has_closed_form(robot: Robot) -> bool:
     return _form_of(robot) is not None
 
 
-@lru_cache(maxsize=64)
+@kept_with
 def _form_of(robot: Robot) -> AnalyticSolver | None:
     if isinstance(robot.closed_form, AnalyticSolver):
         return robot.closed_form

@@ -15,13 +15,13 @@ rotation that is left gives q2 + q3 + q4 and q6; what is left of p is a triangle
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import TAU, Mask, Matrix, Vector
+from rrtik_ompl.base.kept import kept_with
 from rrtik_ompl.ik.analytic.analytic_solver import AnalyticSolver, Branches, Limits, wrapped
 from rrtik_ompl.ik.tip_columns import frame_columns
 from rrtik_ompl.kernels.ik.branch_layout import DOUBLE_ROOT, REACH_TOLERANCE, SINGULAR
@@ -271,7 +271,7 @@ class ParallelArm:
         return np.asarray((good[:, 0] | ~free[:, None]).all(axis=(0, 1)))
 
 
-@lru_cache(maxsize=64)
+@kept_with
 def parallel_arm(robot: Robot, frame: str) -> ParallelArm | None:
     """Return the numbers of a robot whose joints carry a frame; None if it is no arm of this family."""
     model = robot.model
@@ -312,7 +312,7 @@ def parallel_arm(robot: Robot, frame: str) -> ParallelArm | None:
     )
 
 
-@lru_cache(maxsize=64)
+@kept_with
 def parallel_form(robot: Robot) -> AnalyticSolver | None:
     """Return the closed form of a robot of this family; None for others."""
     arm = parallel_arm(robot, robot.tip)

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.base.kept import kept_with
 from rrtik_ompl.ik.analytic.analytic_solver import AnalyticSolver, Branches, two_links, wrapped
 from rrtik_ompl.model.robot import Robot
 
@@ -62,7 +62,7 @@ class PlanarArm:
         return {"elbow": np.abs(np.sin(Q[:, 1] + angles[1] - angles[0]))}
 
 
-@lru_cache(maxsize=64)
+@kept_with
 def planar_form(robot: Robot) -> AnalyticSolver | None:
     """Return the closed form of a robot that is a chain of two or three joints with parallel axes; else None."""
     chain = robot.chain

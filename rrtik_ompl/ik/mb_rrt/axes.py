@@ -7,12 +7,12 @@ kinematics.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector
+from rrtik_ompl.base.kept import kept_with
 from rrtik_ompl.ik.mb_rrt.links import ROUNDING, smallest_spans
 from rrtik_ompl.ik.tip_columns import tip_columns
 from rrtik_ompl.model.robot import Robot
@@ -92,7 +92,7 @@ def misfit(robot: Robot) -> str:
     return ""
 
 
-@lru_cache(maxsize=64)
+@kept_with
 def axes_of(robot: Robot, oriented: bool) -> Axes:
     """Return the axes of an arm that `misfit` accepts, for positions or, if ``oriented``, for poses."""
     tip = tip_columns(robot)

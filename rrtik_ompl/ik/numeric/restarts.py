@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import lru_cache
 from typing import TypeAlias
 
 import numpy as np
 
 from rrtik_ompl.base.arrays import TAU, Matrix, Vector
+from rrtik_ompl.base.kept import kept_with
 from rrtik_ompl.ik.kernel_tables import seeded_limb_of
 from rrtik_ompl.ik.method_interface import IkRequest, IkResponse, mid_range_configuration
 from rrtik_ompl.ik.numeric.descent import PATIENCE, STEPS, Search, SearchOfOne, walk
@@ -159,7 +159,7 @@ def nearest_posture(request: IkRequest, *, searched: bool = False) -> Vector:
     return nearest
 
 
-@lru_cache(maxsize=64)
+@kept_with
 def _turning_freely(robot: Robot) -> Robot:
     """Return the robot with limits of a full turn to either side for all joints that turn."""
     turning = ~robot.prismatic

@@ -11,6 +11,7 @@ from functools import lru_cache
 import numpy as np
 
 from rrtik_ompl.base.arrays import Matrix, Vector, frozen
+from rrtik_ompl.base.kept import kept_with
 from rrtik_ompl.ik.kernel_tables import KernelCall, limb_of
 from rrtik_ompl.ik.tip_columns import tip_columns
 from rrtik_ompl.kernels.ik import rail_layout
@@ -86,7 +87,7 @@ class Followed:
         return bool(self.shares[-1] >= 1.0 - SMALLEST_STEP)
 
 
-@lru_cache(maxsize=64)
+@kept_with
 def levers_of(robot: Robot) -> Vector:
     """Return the greatest distance of the tip from each joint between it and the base [m], shape (joints,).
 
@@ -99,19 +100,19 @@ def levers_of(robot: Robot) -> Vector:
     return frozen(np.cumsum((lengths + np.where(tip.prismatic, strokes, 0.0))[::-1])[::-1])
 
 
-@lru_cache(maxsize=64)
+@kept_with
 def moving_the_tip(robot: Robot) -> tuple[int, ...]:
     """Return the indices of the joints that move the tip."""
     return tuple(np.flatnonzero((tip_columns(robot).gain != 0.0).any(axis=0)).tolist())
 
 
-@lru_cache(maxsize=64)
+@kept_with
 def redundant(robot: Robot) -> bool:
     """Check whether a pose of the tip leaves the joints some freedom."""
     return len(moving_the_tip(robot)) > POSE_JOINTS
 
 
-@lru_cache(maxsize=64)
+@kept_with
 def centred(robot: Robot) -> Leaning:
     """Return the leaning away from the joint limits, towards the middle of each range [60]."""
     bounded = np.isfinite(robot.lower) & np.isfinite(robot.upper)
