@@ -220,7 +220,9 @@ CASES: dict[str, Case] = {
         {"link_padding": [{"link_name": "tol", "padding": 0.1}]}, refused="link_padding.*'tol'.*did you mean 'tool'"
     ),
     "a map that is none": Case(world(PLATE, octomap=octomap([1, 2, 3])), refused="octomap.*not a tree of OctoMap"),
-    "a map that is not binary": Case(world(PLATE, octomap=octomap([1, 2], False)), refused="octomap.*only binary maps"),
+    "a full map that is none": Case(
+        world(PLATE, octomap=octomap([1, 2], False)), refused="octomap.*not a tree of OctoMap"
+    ),
     "a map of one cell": Case(
         world(octomap=octomap(tree_of_one_cell(7))), obstacles=((coal.Box(0.2, 0.2, 0.2), at(0.5, 0.0, 0.0)),)
     ),

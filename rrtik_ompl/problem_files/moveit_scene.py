@@ -10,7 +10,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from itertools import combinations
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple, cast
 
 import numpy as np
 import pinocchio as pin
@@ -19,6 +19,7 @@ from rrtik_ompl.base.arrays import Vector
 from rrtik_ompl.base.errors import InputError, SceneWarning, UnknownNameError, few
 from rrtik_ompl.description.faults import nearest_name
 from rrtik_ompl.description.shapes.octree import cells_of_tree
+from rrtik_ompl.files.sections import parse
 from rrtik_ompl.files.strict_yaml import Location, YamlDocument
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import AttachedObject, Obstacle, Scene
@@ -232,6 +233,72 @@ class SceneReader:
         self._frames.add(name, frame, taken.parts, link=item.link_name)
 
 
+class _Nobody:
+    """What a scene without its robot knows of it: its name, and the links that its table of contacts names.
+
+    Attributes:
+        name: Of the robot.
+        link_names: See above.
+    """
+
+    padding: ClassVar[dict[str, float]] = {}
+    allowed_collisions = frozenset({frozenset[str]()})  # has a list: pairs of links are the robot's affair
+
+    def __init__(self, message: SceneMessage) -> None:
+        objects = {item.id for item in message.world.collision_objects}
+        matrix = message.allowed_collision_matrix
+        named = dict.fromkeys((*matrix.entry_names, *matrix.default_entry_names))
+        self.name = message.robot_model_name
+        self.link_names = tuple(name for name in named if name not in (*objects, OCTOMAP))
+        self.model = self
+
+    def existFrame(self, name: str) -> bool:
+        """Say that no frame is known."""
+        return False
+
+
+def planning_scene(document: YamlDocument) -> Scene:
+    """Return the objects of the world of a PlanningScene alone, without its robot.
+
+    The frame in which all objects are given is taken for the world, as MoveIt saves them in the root of its robot.
+
+    Raises:
+        InputError: If one of them cannot be read, or is placed in a frame of the robot; with file, line and key.
+
+    Warns:
+        SceneWarning: If a frame is taken for the world, or the scene says something of the robot, which is left out.
+    """
+    message = parse(document, SceneMessage)
+    nobody = cast(Robot, _Nobody(message))
+    with document.at(("fixed_frame_transforms",)):
+        frames = Frames(nobody, np.zeros(0), message.fixed_frame_transforms)
+
+    used = {_bare(item.header.frame_id): k for k, item in enumerate(message.world.collision_objects)}
+    first = next(iter(used), WORLD)
+    if len(used) == 1 and not frames.knows(first):
+        line = f"frame '{first}' is taken for the world, as a scene alone has no robot"
+        tell(document, ("world", "collision_objects", used[first], "header"), line)
+        frames.add(first, pin.SE3.Identity())
+
+    reader = SceneReader(nobody, frames, message)
+    try:
+        reader.read_world(document)
+    except UnknownNameError as error:
+        remedy = "state it in fixed_frame_transforms, or load the scene with its request and robot (load_problem)"
+        raise InputError(f"{error}; a scene alone knows no links: {remedy}") from None
+
+    said = {
+        "attached objects": message.robot_state.attached_collision_objects,
+        "link_padding": [each for each in message.link_padding if each.padding],
+        "link_scale": [each for each in message.link_scale if each.scale != 1.0],
+    }
+    for what, values in said.items():
+        if values:
+            line = f"{what}: left out, as a scene alone has no robot; load_problem takes them"
+            tell(document, ("robot_state",) if what == "attached objects" else (what,), line)
+    return reader.scene(document)
+
+
 def tell(document: YamlDocument, location: Location, line: str) -> None:
     """Warn of something at a location of a message that does not become part of the problem."""
     warnings.warn(SceneWarning(f"{document.place(location)}: {line}"), stacklevel=3)
@@ -273,18 +340,16 @@ def _mapped(placed: PlacedOctomap, frames: Frames) -> Obstacle | None:
     """Return the occupied cells of a map as an obstacle; None if there is no map.
 
     Raises:
-        InputError: If the map is not binary, or its data are malformed.
+        InputError: If its data are malformed.
     """
     if not placed.octomap.data:
         return None
     tree = placed.octomap
-    if not tree.binary:
-        raise InputError("data: only binary maps are read; write it with binary: true, or as a .bt file")
     if not all(-128 <= value <= 255 for value in tree.data):
         raise InputError("data: must be bytes")
 
     body = np.array(tree.data, dtype=np.int64).astype(np.uint8).tobytes()
-    centres, sides = cells_of_tree(body, tree.resolution, tree.id, "data")
+    centres, sides = cells_of_tree(body, tree.resolution, tree.id, "data", binary=tree.binary)
     pose = frames.pose(placed.header.frame_id) * placed.origin.build()
     return Obstacle(OCTOMAP, Octree(centres, sides), pose)
 
@@ -380,12 +445,12 @@ class Frames:
         for each in self._parents_first(each for each in fixed if not _names_itself(each)):
             parent = _bare(each.header.frame_id)
             # An unknown parent frame is taken as another name of the world.
-            if not self._has(parent):
+            if not self.knows(parent):
                 self._known[parent] = _STANDING
             self.add(_bare(each.child_frame_id), self.pose(parent) * each.transform.build(), link=self.link(parent))
 
         # Some files give coordinates in a frame with the name of the robot.
-        if not self._has(robot.name):
+        if not self.knows(robot.name):
             self._known[robot.name] = _STANDING
 
     def moved_to(self, q: Vector) -> Frames:
@@ -440,7 +505,8 @@ class Frames:
         for each in [each for each in self._known if each == name or each.startswith(f"{name}/")]:
             del self._known[each]
 
-    def _has(self, name: str) -> bool:
+    def knows(self, name: str) -> bool:
+        """Check whether there is such a frame."""
         return name in self._known or self._robot.model.existFrame(name)
 
     def _link_pose(self, link: str) -> pin.SE3:

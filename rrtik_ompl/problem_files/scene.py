@@ -30,6 +30,7 @@ from rrtik_ompl.files.text import file_name
 from rrtik_ompl.model.scene import AttachedObject, ConstantVelocity, Motion, Obstacle, Scene, TimedPoses, Touching
 from rrtik_ompl.model.shapes import Shape
 from rrtik_ompl.model.world_settings import SETTINGS_IN_FILES
+from rrtik_ompl.problem_files.moveit_scene import planning_scene
 from rrtik_ompl.problem_files.moveit_scene_text import ENDING, read_scene_text
 from rrtik_ompl.problem_files.shapes import ONE_SHAPE, ShapeEntry, shape_data
 
@@ -200,7 +201,7 @@ def load_scene(file: str | os.PathLike[str]) -> Scene:
     """Read a scene.
 
     - YAML: ``version: 1`` and ``scene:``, or a whole problem file
-    - MoveIt's ``.scene`` files
+    - MoveIt's ``.scene`` files, and its PlanningScene as YAML or JSON, without what that says of the robot
     - MJCF: what stands beside the robot, whose arm `load_robot` reads of the same file
     - one solid in metres, which becomes the only obstacle, named as the file: a cloud of points (PLY, PCD, XYZ, NPY,
       NPZ), a map of OctoMap (BT, OT) as its octree, or a mesh (STL, OBJ, DAE, GLB)
@@ -224,6 +225,8 @@ def load_scene(file: str | os.PathLike[str]) -> Scene:
         return Scene([Obstacle(path.stem, SOLIDS[path.suffix.lower()](path))])
     with refusing_others(file, "Scene"):
         document = read_yaml(file)
+        if "version" not in document.data and "robot_model_name" in document.data:
+            return planning_scene(document)
         return parse(document, SceneFile).scene.build(document)
 
 

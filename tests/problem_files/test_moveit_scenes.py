@@ -1,5 +1,6 @@
 """What MoveIt's scenes and requests say is in the problem that is made of them, or is refused by its key."""
 
+import json
 import warnings
 from contextlib import nullcontext
 from typing import get_args
@@ -7,6 +8,7 @@ from typing import get_args
 import numpy as np
 import pinocchio as pin
 import pytest
+import yaml
 
 import rrtik_ompl as rrtik
 from bench.truth.moveit_pairs import CASES, GANTRY, attached, box, pose
@@ -209,3 +211,50 @@ def test_ranges_that_make_no_sense_are_refused_in_a_line(files, ranges, message)
         rrtik.load_robot(files / "gantry.urdf", joint_ranges=ranges)
     with pytest.raises(InputError, match="scale of robot 'gantry': tool"):
         rrtik.load_robot(files / "gantry.urdf", scale={"tool": 0.0})
+
+
+ALONE = """name: room
+robot_model_name: somebody
+fixed_frame_transforms: [{{header: {{frame_id: {0}}}, child_frame_id: shelf, transform: {{translation: [0, 0, 1]}}}}]
+world:
+  collision_objects:
+  - {{id: plate, header: {{frame_id: {0}}}, pose: {{position: [0.5, 0, 0]}}, primitives: [{{type: box,
+      dimensions: [0.2, 1, 1]}}], primitive_poses: [{{position: [0, 0, 0.1]}}]}}
+  - {{id: cup, header: {{frame_id: shelf}}, primitives: [{{type: cylinder, dimensions: [0.1, 0.03]}}],
+      primitive_poses: [{{position: [0, 0, 0.05]}}]}}
+allowed_collision_matrix: {{entry_names: [hand, cup], entry_values: [[false, true], [true, false]]}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("name", "frame"), [("room.yaml", "world"), ("room.yaml", "base_link"), ("room.json", "world")]
+)
+def test_a_planning_scene_alone_is_a_scene(name, frame, tmp_path):
+    text = ALONE.format(frame)
+    (tmp_path / name).write_text(json.dumps(yaml.safe_load(text)) if name.endswith("json") else text)
+    scene = rrtik.load_scene(tmp_path / name)
+    assert scene.obstacle("plate").pose.translation == pytest.approx([0.5, 0.0, 0.1])
+    assert scene.obstacle("cup").pose.translation == pytest.approx([0.0, 0.0, 1.05])
+    assert [set(pair) for pair in scene.allowed_collisions] == [{"hand", "cup"}]
+
+
+def test_a_planning_scene_alone_refuses_links_and_names_what_it_leaves_out(tmp_path):
+    file = tmp_path / "room.yaml"
+    second = ALONE.format("base_link").replace(
+        "{id: cup, header: {frame_id: shelf}", "{id: cup, header: {frame_id: hand}"
+    )
+    file.write_text(second)
+    with pytest.raises(InputError, match=r"room.yaml:.*no frame 'hand'.*load_problem"):
+        rrtik.load_scene(file)
+    file.write_text(ALONE.format("world") + "link_padding: [{link_name: hand, padding: 0.1}]\n")
+    with pytest.warns(SceneWarning, match="link_padding: left out"):
+        rrtik.load_scene(file)
+
+
+def test_the_one_frame_of_all_objects_is_taken_for_the_world(tmp_path):
+    file = tmp_path / "room.yaml"
+    shape = "primitives: [{type: sphere, dimensions: [0.1]}], primitive_poses: [{position: [1, 0, 0]}]"
+    ball = f"{{id: ball, header: {{frame_id: base_link}}, {shape}}}"
+    file.write_text(f"robot_model_name: somebody\nworld: {{collision_objects: [{ball}]}}\n")
+    with pytest.warns(SceneWarning, match="'base_link' is taken for the world"):
+        assert rrtik.load_scene(file).obstacle("ball").pose.translation == pytest.approx([1.0, 0.0, 0.0])

@@ -159,7 +159,8 @@ def _cells_in(body: bytes, header: dict[str, str], binary: bool, what: str) -> _
     resolution = _resolution(header, what)
     size = 2 if binary else VALUE_BYTES[kind] + 1
     if len(body) % size != 0:
-        raise InputError(f"{what}: the tree ends too early, within a node of {size} bytes; save it again")
+        early = f"the tree ends too early, within a node of {size} bytes"
+        raise InputError(f"{what}: not a tree of OctoMap: {early}; save it again")
 
     nodes = np.frombuffer(body, dtype=np.uint8).reshape(-1, size)
     if binary:
