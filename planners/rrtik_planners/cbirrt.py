@@ -1,4 +1,4 @@
-"""CBiRRT2: two trees that grow along path constraints by projection; the whole search runs in kernels."""
+"""CBiRRT2: two trees that grow along path constraints by projection; in kernels, or in Python without them."""
 
 from __future__ import annotations
 
@@ -8,16 +8,17 @@ import numpy as np
 
 from rrtik_ompl.base.arrays import Matrix, Vector, positive
 from rrtik_ompl.base.budget import iteration_limit
-from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.constraints.held_regions import HeldRegions
 from rrtik_ompl.constraints.walls import separation
-from rrtik_ompl.ik.held_tables import HeldTables, held_tables
+from rrtik_ompl.ik.held_tables import HeldTables, held_tables, projected_onto, shortest_step
+from rrtik_ompl.kernels.search.connect_lengths import connect_lengths
 from rrtik_ompl.kernels.search.constrained.layout import KERNELS
 from rrtik_ompl.kernels.search.constrained.search import ConstrainedSearch
 from rrtik_ompl.kernels.search.motions.motion_table import NO_LIMIT, FastMotions
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SafePlanner, SearchResult, Stop
 from rrtik_ompl.ompl_bridge.bindings import ob
-from rrtik_ompl.world.motion_queries import decider, has_kernels, keeps_constraints
+from rrtik_ompl.planning.search.along_constraints import AlongConstraints, AlongRules
+from rrtik_ompl.world.motion_queries import HoldingQueries, decider, has_kernels, keeps_constraints
 from rrtik_planners.fast_rrt_connect import python_rules, search_in_python, sound_tree
 
 PLAIN_SAMPLES = 200  # number of samples after which it is checked whether the constraints separate start and goal
@@ -67,7 +68,7 @@ class CBiRRT(SafePlanner):
             motions = world.free_motions
             tables = held_tables(world.robot, world.constraints)
             if motions is None or tables is None:
-                raise InputError("path constraints need searches in kernels: install numba")
+                return self._along_constraints(starts, goals, checker, ptc, world)
         elif has_kernels(world, KERNELS):
             motions = world.motions
             tables = held_tables(world.robot, HeldRegions(()))  # Without regions the search is an RRT-Connect.
@@ -76,6 +77,39 @@ class CBiRRT(SafePlanner):
             rules = python_rules(self.bounds(), self.range, None, self.max_iterations, turning=self.turning())
             return search_in_python(self, starts, goals, rules, checker, ptc)
         return self._in_kernels(starts, goals, checker, ptc, motions, tables)
+
+    def _along_constraints(
+        self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Stop, world: HoldingQueries
+    ) -> SearchResult:
+        """Search in Python."""
+        robot = world.robot
+        constraints = world.constraints
+        lower, upper = self.bounds()
+        lower = np.maximum(lower, robot.lower)
+        upper = np.minimum(upper, robot.upper)
+        longest, _ = connect_lengths(lower, upper, self.range, None, turning=np.ones(robot.dof, dtype=bool))
+
+        def projected(row: Vector) -> Vector | None:
+            found = projected_onto(robot, constraints, row[None])
+            return found[0] if len(found) else None
+
+        shortest = min(shortest_step(constraints), longest)
+        rules = AlongRules(lower, upper, longest, shortest, projected, checker.motion_valid)
+        search = AlongConstraints(starts, goals, rules, self.rng)
+        limit = np.inf if self.max_iterations is None else self.max_iterations
+        first = min(limit, PLAIN_SAMPLES)
+        path = search.run(ptc, first)
+        reason = "" if path is not None or first == limit or ptc() else _separation(world, starts, goals)
+        if path is None and not reason and first < limit:
+            path = search.run(ptc, limit)
+
+        vertices = sum(tree.size for tree in search.trees)
+        counts = {"iterations": search.iterations, "vertices": vertices}
+        counts["edges"] = vertices - len(starts) - len(goals)
+        if reason:
+            counts["separated"] = 1
+        graph = self.grown(search.trees[0].grown, search.trees[1].grown)
+        return SearchResult(path, counts, reason=reason, graph=graph)
 
     def _in_kernels(
         self,

@@ -66,7 +66,7 @@ class HeldTables:
         )
 
         self.address = self.held.address
-        self.shortest = min((_shortest_step(region) for region in constraints.regions), default=SHORTEST_STEP)
+        self.shortest = shortest_step(constraints)
 
     def project(self, rows: Matrix, steps: int = STEPS) -> tuple[Matrix, Mask]:
         """Project configurations onto all regions.
@@ -131,6 +131,11 @@ def _record(region: HeldRegion) -> Matrix:
             layout.LEVERS: levers,
         },
     )
+
+
+def shortest_step(constraints: HeldRegions) -> float:
+    """Return the shortest step of searches along regions [unit of the configurations]."""
+    return min((_shortest_step(region) for region in constraints.regions), default=SHORTEST_STEP)
 
 
 def _shortest_step(region: HeldRegion) -> float:

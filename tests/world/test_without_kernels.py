@@ -115,6 +115,16 @@ def test_what_moves_the_tip_needs_no_kernels():
 
 
 @pytest.mark.usefixtures("without_kernels")
+def test_paths_keep_constraints_without_kernels():
+    problem = rrtik.load_problem("ur5_upright")
+    plan = rrtik.plan(problem, seed=1)
+    assert plan.proven
+    A, B = plan.path.waypoints[:-1], plan.path.waypoints[1:]
+    assert problem.world.constraints.motions_held(A, B).all()
+    assert not cut(problem.world, A, B).any()
+
+
+@pytest.mark.usefixtures("without_kernels")
 def test_motions_in_time_need_no_kernels():
     robot = rrtik.load_robot("planar3")
     ball = Obstacle("ball", rrtik.Sphere(0.1), pose([2.9, 0.6, 0.0]), motion=ConstantVelocity([0.0, -0.3, 0.0]))
