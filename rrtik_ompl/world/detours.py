@@ -21,7 +21,7 @@ from rrtik_ompl.world.proven_motions import KERNELS, ProvenMotions
 from rrtik_ompl.world.world import World
 
 SIZES = (0.01, 0.03, 0.1, 0.3)  # distances of a detour's point, as shares of the stretch's length
-POINTS = 24  # number of random points for each size
+POINTS = 12  # number of random points for each size
 # Motions before and after the unproven one that a stretch has too. Where a waypoint is too near to something, it is
 # enough to move that waypoint.
 STRETCHES = ((0, 0), (1, 0), (0, 1), (1, 1), (2, 2))

@@ -419,8 +419,9 @@ class CoalProof:
         self.packed = packed
         # Select the pairs with a mesh of the arm that has an inside: an open one has it if it is of a link.
         is_mesh_of_arm = [body.kind != "obstacle" and is_mesh(body.geometry) for body in bodies]
-        is_solid = np.array([mesh and has_inside(body) for mesh, body in zip(is_mesh_of_arm, bodies, strict=True)])
-        is_hollow = np.array(is_mesh_of_arm) & ~is_solid
+        has_insides = [mesh and has_inside(body) for mesh, body in zip(is_mesh_of_arm, bodies, strict=True)]
+        is_solid = np.array(has_insides, dtype=bool)  # a world may have no bodies
+        is_hollow = np.array(is_mesh_of_arm, dtype=bool) & ~is_solid
         has_mesh = is_solid[packed.bodies].any(axis=1) & ~is_hollow[packed.bodies].any(axis=1)
         self.links: Mask = has_mesh & ~packed.beside_obstacle & ~_groups(packed)
 
