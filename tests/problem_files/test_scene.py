@@ -179,6 +179,7 @@ BAD = {
     "polygon of two": ("{name: a, polygon: [[0, 0], [1, 1]]}", "polygon: needs at least 3 entries"),
     "polygon on a line": ("{name: a, polygon: [[0, 0], [1, 1], [2, 2]]}", "polygon has no area"),
     "polygon crosses itself": ("{name: a, polygon: [[0, 0], [2, 2], [3, 0], [0, 1]]}", "polygon crosses itself"),
+    "bow tie": ("{name: a, polygon: [[0, 0], [1, 1], [1, 0], [0, 1]]}", "polygon crosses itself"),
     "polygon in 3-D": ("{name: a, polygon: [[0, 0, 0], [1, 0, 0], [0, 1, 0]]}", r"polygon\[0\]: takes at most 2"),
     "height of a box": ("{name: a, box: [1, 1, 1], height: 2}", "'height' belongs to a polygon, but 'a' is a box"),
     "scale of a box": ("{name: a, box: [1, 1, 1], scale: 2}", "'scale' belongs to a mesh"),

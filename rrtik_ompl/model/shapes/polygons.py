@@ -24,9 +24,11 @@ def check_simple(polygon: Matrix) -> None:
     """
     a = polygon
     b = np.roll(polygon, -1, axis=0)
-    area = 0.5 * float(np.sum(a[:, 0] * b[:, 1] - b[:, 0] * a[:, 1]))
+    from_first = a - a[0]
+    farthest = from_first[np.linalg.norm(from_first, axis=1).argmax()]
+    width = np.abs(from_first[:, 0] * farthest[1] - from_first[:, 1] * farthest[0]).max()
     extent = float(np.ptp(polygon, axis=0).max())
-    if abs(area) <= 1e-12 * max(extent * extent, 1e-12):
+    if width <= 1e-12 * max(extent * extent, 1e-12):
         raise InputError("polygon has no area: its vertices lie on one line")
 
     for i in range(len(a)):
