@@ -30,7 +30,8 @@ IMPORTS = {
     "`rrtik_ompl`": "import rrtik_ompl",
     "what `plan()` needs": "import rrtik_ompl as r; (r.plan, r.Problem, r.World, r.load_robot)",
     "and problem files": "import rrtik_ompl as r; (r.plan, r.Problem, r.World, r.load_robot, r.load_problem)",
-    "pinocchio, coal, llvmlite and OMPL alone": "import pinocchio, coal, llvmlite.binding, ompl.base",
+    "and a plan, whose kernels are there": "import rrtik_ompl as r; r.plan(r.load_problem('ur5_table'), seed=1)",
+    "pinocchio, coal and OMPL alone": "import pinocchio, coal, ompl.base",
 }
 # the peak of the process alone: ru_maxrss would be that of the process it came from, if that was larger
 MEASURE = (
@@ -143,12 +144,12 @@ def imports(report: Report, python: Path) -> None:
     """Time and memory of imports, in fresh processes."""
     rows = []
     for name, line in {"Python alone": "pass", **IMPORTS}.items():
-        found = [measured(python, line) for _ in range(ROUNDS)]
+        found = [measured(python, line) for _ in range(ROUNDS)]  # the first plan makes its kernels
         rows.append((name, min(time for time, _ in found), min(memory for _, memory in found)))
     bare = rows[0][1]
-    _, spent, memory = rows[2]
+    spent, memory = rows[2][1], rows[4][2]
     report.bar("import of what plan() needs", "<= 0.25 s", f"{spent - bare:.2f} s", spent - bare <= 0.25)
-    report.bar("memory of what plan() needs", "<= 135 MB", f"{memory:.0f} MB", memory <= 135.0)
+    report.bar("memory of a process that plans", "<= 90 MB", f"{memory:.0f} MB", memory <= 90.0)
     cells = [[name, f"{time - bare:.2f}", f"{held:.0f}"] for name, time, held in rows]
     report.table("Imports", ("", "seconds more than Python alone", "memory [MB]"), cells)
 
