@@ -45,6 +45,7 @@ SAMPLES = {
     "AttachedObject": lambda: rrtik.AttachedObject("tool", "tip", rrtik.Sphere(0.1), AT),
     "Box": lambda: rrtik.Box([1.0, 2.0, 3.0]),
     "Capsule": lambda: rrtik.Capsule(1.0, 2.0),
+    "Cells": lambda: rrtik.Octree([[0, 0, 0]], [0.1]).clouds[0],
     "Certificate": lambda: Certificate("arm", "12", "34", 0.001, 0.0, POINTS[:2], (ENTRIES,)),
     "Chain": lambda: arm().chain,
     "ClearanceCurve": lambda: CURVE,

@@ -40,6 +40,8 @@ class Cells(Cloud):
     points: Points
     half: float
 
+    __reduce__ = as_value
+
 
 class _Kept:
     """What is computed of an octree on first use and kept."""
