@@ -112,6 +112,10 @@ def test_what_moves_the_tip_needs_no_kernels():
     assert straight.proven
     rates = rrtik.following.Servo(world).step(start, [0.0, 0.0, 0.02, 0.0, 0.0, 0.0], 0.01)
     assert np.abs(rates).max() > 0.0
+    near = World(robot, Scene([Obstacle("box", rrtik.Box([0.1] * 3), pose(tip + np.array([0.0, 0.0, 0.25])))]))
+    slowed = rrtik.following.Servo(near, near=0.3).step(start, [0.0, 0.0, 0.5, 0.0, 0.0, 0.0], 0.01)
+    freely = rrtik.following.Servo(world).step(start, [0.0, 0.0, 0.5, 0.0, 0.0, 0.0], 0.01)
+    assert 0.0 < np.linalg.norm(slowed) < 0.8 * np.linalg.norm(freely)
 
 
 @pytest.mark.usefixtures("without_kernels")
