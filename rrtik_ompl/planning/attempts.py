@@ -24,7 +24,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import suppress
 from types import MappingProxyType
 from typing import Literal, NamedTuple, TypeAlias, get_args
 
@@ -226,16 +225,7 @@ class Turn:
         self.totals["rejected"] = self._check.num_rejected
 
     def finish(self) -> None:
-        """Set the time taken and, if no path was accepted, set the best path so far or the reason why there is none.
-
-        If the goal configuration is to be chosen by length, change to a shorter branch.
-        """
-        if self.path is not None and self._request.by_length and self._problem.goal.q is None:
-            from rrtik_ompl.planning.branches import shorter_branch  # with kernels that a named planner does without
-
-            goals = self._goal_choice.known
-            with suppress(*self._request.survived):
-                self.path = shorter_branch(self._problem, self.path, goals, self.budget)
+        """Set the time taken and, if no path was accepted, set the best path so far or the reason why there is none."""
         self.seconds = self.budget.elapsed
         if self.error is not None or self.path is not None:
             return

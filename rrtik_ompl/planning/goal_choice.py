@@ -17,6 +17,16 @@ from rrtik_ompl.world.problem import Problem
 FAR = 2.0  # times the distance of the nearest goal configuration: those farther away are left out of the first attempt
 
 
+def nearest_rows(problem: Problem, rows: Matrix) -> Matrix:
+    """Return the goal configurations, shape (k, dof), at most ``FAR`` times as far as the nearest, nearest first."""
+    if len(rows) < 2:
+        return rows
+    away = np.linalg.norm(weighted_difference(problem.robot, rows, problem.start), axis=1)
+    order = np.argsort(away, kind="stable")
+    nearest: Matrix = rows[order[: np.count_nonzero(away <= FAR * away.min())]]
+    return nearest
+
+
 class GoalChoice:
     """The goal configurations of each attempt of a planner; attempts are counted from 0.
 
@@ -60,14 +70,6 @@ class GoalChoice:
         """One line that says why there is no goal configuration; "" if there is one."""
         return self._search.reason
 
-    @property
-    def known(self) -> Matrix:
-        """The goal configurations that are known, those that keep the clearance if any does, shape (k, dof)."""
-        if self.planner_finds_goals or len(self._search.rows) == 0:
-            return self._search.rows[:0]
-        kept = self._find_with_clearance()
-        return self._search.rows[kept]
-
     def of(self, attempt: int) -> Matrix:
         """Return the known goal configurations for an attempt, shape (k, dof); may search for more of them.
 
@@ -86,10 +88,8 @@ class GoalChoice:
             return rows[:1]
 
         if attempt == 0 and self._max_attempts > 1 and not self._goal_in_joints and len(rows):
-            away = np.linalg.norm(weighted_difference(self._problem.robot, rows, self._problem.start), axis=1)
-            near = away <= FAR * away.min()
-            self._left_out = not near.all()
-            nearest: Matrix = rows[near]
+            nearest = nearest_rows(self._problem, rows)
+            self._left_out = len(nearest) < len(rows)
             return nearest
 
         num_known_kept = int(np.count_nonzero(kept[:num_known]))

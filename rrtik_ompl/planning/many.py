@@ -40,7 +40,6 @@ from rrtik_ompl.planning.attempts import EFFORT_ITERATIONS, load_kernels_for
 from rrtik_ompl.planning.finish import finished, shortened_plan
 from rrtik_ompl.planning.outcome import NamedPlanner, Plan, Request
 from rrtik_ompl.planning.plan import named_planner, planned_and_finished
-from rrtik_ompl.planning.portfolio import members_for
 from rrtik_ompl.planning.shortening import Task, Wishes
 from rrtik_ompl.planning.shortening.acceptance import kept_clearance
 from rrtik_ompl.planning.shortening.best import best_in_time
@@ -148,7 +147,7 @@ def _batch(
 
         name = query.planner(planner)
         answers[k] = partial(answer_alone, query, name, request, method)
-        named = _first_planner(query, name, request)
+        named = _named(name)
         if method == "ompl":
             continue
         if named is None:
@@ -166,19 +165,10 @@ def _batch(
     return [each() if k in at_once and callable(each) else each for k, each in sorted(answers.items())]
 
 
-def _first_planner(query: Query, planner: str | PlannerFactory, request: Request) -> NamedPlanner | None:
-    """Return the planner that tries a query first, with its name; None if it has to be planned alone.
-
-    That is so with "auto" and a goal of the tip, whose configuration is chosen by the length of the path; with "auto"
-    and options, which it refuses; and where there is no planner of that name.
-    """
+def _named(planner: str | PlannerFactory) -> NamedPlanner | None:
+    """Return a planner with its name; None for "auto", whose short path is made alone, and where there is none."""
     try:
-        if not isinstance(planner, str) or not is_auto(planner):
-            return named_planner(planner)
-        if request.parameters or query.goal.q is None:
-            return None
-        names = members_for(query.goal, constrained=query.world.constraints is not None)
-        return named_planner(names[0]) if names else None
+        return None if isinstance(planner, str) and is_auto(planner) else named_planner(planner)
     except InputError:
         return None
 

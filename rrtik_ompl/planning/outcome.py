@@ -37,7 +37,6 @@ class Request:
         parameters: Options of the planner.
         proof: Whether motions have to be proven free.
         clearance: Clearance to keep from obstacles [m], or None.
-        by_length: Whether the goal configuration is chosen by the length of the path.
         among_many: Whether it is one of many, so that Ctrl-C ends all of them and not its shortening alone.
     """
 
@@ -46,7 +45,6 @@ class Request:
     parameters: Mapping[str, Any] = field(default_factory=dict)
     proof: ProofMode = "preferred"
     clearance: float | None = None
-    by_length: bool = False
     among_many: bool = False
 
     @property

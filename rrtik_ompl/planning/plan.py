@@ -18,6 +18,7 @@ from rrtik_ompl.planning.outcome import RESTARTS, Improvement, NamedPlanner, Req
 from rrtik_ompl.planning.outcome import Plan as Plan
 from rrtik_ompl.planning.portfolio import run_portfolio
 from rrtik_ompl.planning.second_check import fixed_ends
+from rrtik_ompl.planning.short_path import short_path
 from rrtik_ompl.world.clearances import check_clearance
 from rrtik_ompl.world.problem import Problem
 
@@ -165,8 +166,10 @@ def planned_and_finished(
         InputError: If the planner does not take a parameter.
         PlannerError: If the planner broke.
     """
-    by_length = _is_auto(planner)  # whether a finish follows or not: `unshortened` is what is found without one
-    found = _searched(problem, planner, replace(request, by_length=by_length), finish_follows=method is not None)
+    short = short_path(problem, request, pull=method == "auto") if _is_auto(planner) else None
+    if short is not None and method in ("auto", None):
+        return short
+    found = short or _searched(problem, planner, request, finish_follows=method is not None)
     if method is None:
         return found
 
@@ -185,9 +188,12 @@ def planned(problem: Problem, planner: str | PlannerFactory, request: Request) -
         InputError: If the planner does not take a parameter.
         PlannerError: If the planner broke.
     """
-    found = _searched(problem, planner, request)
     if not _is_auto(planner):
-        return found
+        return _searched(problem, planner, request)
+    short = short_path(problem, request, pull=True)
+    if short is not None:
+        return short
+    found = _searched(problem, planner, request)
 
     from rrtik_ompl.planning.finish import briefly_shortened  # with shortening, which many plans do without
 

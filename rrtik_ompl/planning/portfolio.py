@@ -8,7 +8,7 @@ from types import MappingProxyType
 
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.description.catalog import portfolio
-from rrtik_ompl.model.goal import Goal, TipGoal
+from rrtik_ompl.model.goal import TipGoal
 from rrtik_ompl.ompl_bridge.planner_names import AUTO, find_planner, refuse_options
 from rrtik_ompl.planning.attempts import Turn, no_path_within, walk
 from rrtik_ompl.planning.outcome import NamedPlanner, Plan, Request
@@ -46,23 +46,24 @@ def run_portfolio(problem: Problem, request: Request) -> Plan:
 
 
 def members(problem: Problem) -> tuple[str, ...]:
-    """Return the names of the planners that try a problem, in their order."""
-    return members_for(problem.goal, constrained=bool(problem.constraints))
-
-
-def members_for(goal: Goal, *, constrained: bool) -> tuple[str, ...]:
-    """Return the names of the planners that try to reach a goal, perhaps under path constraints, in their order.
+    """Return the names of the planners that try a problem, in their order.
 
     Planners for a goal of the tip are included only if the goal is one. With path constraints only the planners that
     keep them are included.
     """
-    if constrained:
+    if problem.constraints:
         wanted = {"path constraints"}
-    elif isinstance(goal, TipGoal):
+    elif isinstance(problem.goal, TipGoal):
         wanted = {"any goal", "goal of the tip"}
     else:
         wanted = {"any goal"}
     return tuple(name for name, solves in portfolio().items() if solves in wanted)
+
+
+def first_member(problem: Problem) -> NamedPlanner | None:
+    """Return the planner that tries a problem first; None if no package offers one."""
+    name = next(iter(members(problem)), None)
+    return None if name is None else NamedPlanner(name, find_planner(name))
 
 
 def _turns(problem: Problem, request: Request) -> Iterator[Turn]:

@@ -118,7 +118,7 @@ def test_ctrl_c_leaves_the_path_that_was_found(monkeypatch):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(finish, "shorten", interrupted)
-    plan = rrtik.plan(rrtik.load_problem("planar3_boxes"), seed=1)
+    plan = rrtik.plan(rrtik.load_problem("planar3_boxes"), "RRTConnect", seed=1)
     np.testing.assert_array_equal(plan.require().waypoints, plan.unshortened.waypoints)
     assert plan.proven
 

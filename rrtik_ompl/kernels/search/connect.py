@@ -49,6 +49,8 @@ class ConnectSearch:
         lower, upper: The box, shape (n,), finite.
         range_: See ``range``; what suits the box if None.
         domain: See ``domain``; what suits the box if None.
+        looks: Whether motions are only looked at by the inner balls, and asked for once they are part of a path; for
+            arms where the answer costs less than a check.
         patience: Paths that may be rejected until undecided motions are asked for before they are used.
         vertices: For which each tree has room at first, a multiple of ``WIDTH``.
 
@@ -64,6 +66,7 @@ class ConnectSearch:
         *,
         range_: float | None = None,
         domain: float | None = None,
+        looks: bool = False,
         patience: int = PATIENCE,
         vertices: int = FIRST_CAPACITY,
     ) -> None:
@@ -72,6 +75,7 @@ class ConnectSearch:
             raise InputError("search in kernels: there are none; install numba")
         self._kernels = kernels
         self._motions = motions  # owns the tables
+        self._looks = looks
         self._dof = dof = motions.dof
         box = finite_array(lower, (dof,), "lower bounds"), finite_array(upper, (dof,), "upper bounds")
         if dof == 0 or (box[0] > box[1]).any():
@@ -134,7 +138,7 @@ class ConnectSearch:
         """
         self._set_roots(0, starts)
         self._set_roots(1, goals)
-        self._search.resolve = ask is not None
+        self._search.resolve = connect_layout.LOOK_AND_ASK if self._looks else int(ask is not None)
         self._search.limit = NO_LIMIT if max_iterations is None else max_iterations
         self._search.bound = connect_layout.UNBOUNDED_COST if bound is None else bound
         self._questions = 0
@@ -172,7 +176,7 @@ class ConnectSearch:
         Such a search asks nothing and draws ``max_iterations`` samples at most; :meth:`go_on` continues it.
         """
         self._fit_trees(roots)
-        self._search.put(resolve=0, limit=max_iterations)
+        self._search.put(resolve=connect_layout.BLOCK, limit=max_iterations)
         return self._search.address
 
     def go_on(self, stop: Callable[[], object]) -> bool:
@@ -310,7 +314,7 @@ def solve_each(search: ConnectSearch, ends: Matrix, seeds: list[int], max_iterat
         return [None] * len(ends)
 
     rows = np.ascontiguousarray(ends)
-    search.table.resolve = 1
+    search.table.resolve = connect_layout.ASK
     search.table.bound = connect_layout.UNBOUNDED_COST
     paths = np.empty((FIRST_PATH * len(rows), rows.shape[2]))
     numbers = np.array([seed & (2**63 - 1) for seed in seeds], dtype=np.int64)

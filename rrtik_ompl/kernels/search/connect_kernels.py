@@ -44,8 +44,8 @@ from typing import Any
 
 import numpy as np
 
-from rrtik_ompl.kernels.checks.check_kernels import check_part
-from rrtik_ompl.kernels.layout import FREE, UNDECIDED
+from rrtik_ompl.kernels.checks.check_kernels import check_part, inner_collision, likely_in_collision, place, places_in
+from rrtik_ompl.kernels.layout import COLLIDING, FREE, UNDECIDED, JointValues, WorldTable
 from rrtik_ompl.kernels.record import Wholes
 from rrtik_ompl.kernels.search import connect_layout
 from rrtik_ompl.kernels.search.connect_layout import ConnectTable
@@ -79,7 +79,16 @@ from rrtik_ompl.kernels.search.two_trees_kernels import (
 )
 from rrtik_ompl.kernels.search.two_trees_layout import UNBOUNDED_DOMAIN
 from rrtik_ompl.kernels.simd.compiled import WIDTH, entry, inlined, kernel
-from rrtik_ompl.kernels.simd.lanes import larger, set_lanes, set_wide_lanes, single, smaller, wide_lanes_at
+from rrtik_ompl.kernels.simd.lanes import (
+    bits,
+    lane_numbers,
+    larger,
+    set_lanes,
+    set_wide_lanes,
+    single,
+    smaller,
+    wide_lanes_at,
+)
 from rrtik_ompl.kernels.simd.random_kernels import next_point
 
 MAX_STRAIGHT_MOTIONS = 16  # whole motions to goals that are tried first
@@ -397,7 +406,28 @@ def check_candidate(search: ConnectTable) -> int:
     if descends(motions.dof, start, search.row):  # checked from the other end
         values, others = others, values
         first = last - count
+    if search.resolve == connect_layout.LOOK_AND_ASK:
+        return look_at_part(motions.world, values, others, last, first, count)
     return check_part(motions.world, values, others, last, first, count, search.resolve != 0)
+
+
+@kernel
+def look_at_part(world: WorldTable, start: JointValues, end: JointValues, last: int, first: int, count: int) -> int:
+    """Look at ``count`` configurations of a motion, those of ``check_part``, with the inner balls alone.
+
+    COLLIDING, or UNDECIDED where they meet nothing.
+    """
+    joints = world.arm.joint_count
+    blocks = (count + WIDTH - 1) // WIDTH
+    every = bits(lane_numbers() >= 0.0)
+    for number in range(blocks):
+        places = smaller(places_in(number, blocks, blocks // 2), float(count - 1)) + float(first)
+        place(world, start, end, places / float(last), joints)
+        if likely_in_collision(world, every, last > 0) != 0:
+            return COLLIDING
+        if inner_collision(world, every, last > 0) != 0:
+            return COLLIDING
+    return UNDECIDED
 
 
 # What follows from that.

@@ -54,3 +54,6 @@ SOLVED, EXHAUSTED, RUNNING, ASKING, FULL = range(5)  # status
 OUTSIDE = -1  # status that a root is not in the box; less its number
 MAX_QUESTIONS = 64  # at a time
 RESULT_NUMBERS = 7  # of one of several queries: status, rows, samples, motions, vertices, questions, rejected paths
+# What becomes of undecided motions: they count as colliding, or are asked for. With a look alone, all that inner balls
+# let pass is undecided.
+BLOCK, ASK, LOOK_AND_ASK = range(3)

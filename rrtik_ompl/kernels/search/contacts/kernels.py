@@ -434,14 +434,22 @@ def pull_once(route: PullTable) -> bool:
 
 
 @entry
+def begin(route: PullTable) -> int:
+    """Jump from waypoint to waypoint, if that has not been done. Returns UNPROVEN, or RUNNING if all is proven."""
+    if route.stage == layout.GIVEN:
+        route.stage = layout.JUMPED
+        jump(route)
+    return layout.UNPROVEN if route.unproven > 0 else layout.RUNNING
+
+
+@entry
 def pull(route: PullTable, work: int) -> int:
     """Go on for about so much work. Returns DONE, RUNNING, or UNPROVEN: the route has motions that are not proven."""
     until = route.work + float(work)
-    if route.pulling == 0:
-        route.pulling = 1
-        jump(route)
-        if route.unproven > 0:
-            return layout.UNPROVEN
+    if begin(route) == layout.UNPROVEN:
+        return layout.UNPROVEN
+    if route.stage == layout.JUMPED:
+        route.stage = layout.CUT
         cut(route)
     while route.count > 2 and route.work < route.max_work:
         if route.work >= until:

@@ -87,6 +87,11 @@ class Pulling:
         """Whether every motion of the route could be proven; if not, it has not been pulled."""
         return self.table.unproven == 0
 
+    def jump(self) -> bool:
+        """Only go from waypoint to the last one that is seen, if :meth:`run` has not; whether the route is proven."""
+        self._motions.make_ready()
+        return self._kernels.begin(self.table.address) != layout.UNPROVEN
+
     def run(self, *, stop: Callable[[], bool] | None = None, work: int = WORK_PER_CALL) -> bool:
         """Go on until nothing moves any more, the work is spent, or ``stop`` says so.
 

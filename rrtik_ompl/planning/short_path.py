@@ -1,0 +1,255 @@
+"""The call that people make: a short, proven path by a few calls of kernels, before any planner is asked.
+
+To each goal configuration, the nearest first, there is one search in coarse steps. Its route jumps from waypoint to
+waypoint, and is pulled taut for a moment if there are others to compare with; the shortest one is pulled on. A
+configuration whose straight line is no shorter than the best route so far is left out. Every motion that is kept is
+proven, so neither the search nor the result is checked again. A route that cannot be proven means the next seed.
+
+All of it is bounded by counts: the same seed gives the same path. Where it finds nothing, the planners take their turns
+(:mod:`rrtik_ompl.planning.portfolio`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import NamedTuple
+
+import numpy as np
+
+from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.base.budget import Budget
+from rrtik_ompl.ik.goal_configurations import GoalSearch
+from rrtik_ompl.ik.methods import load_kernels
+from rrtik_ompl.kernels.layout import SOLID_INTS
+from rrtik_ompl.kernels.search.connect import LARGEST_KEPT, ConnectSearch
+from rrtik_ompl.kernels.search.connect_layout import KERNELS as SEARCH_KERNELS
+from rrtik_ompl.kernels.search.contacts.layout import KERNELS as PULL_KERNELS
+from rrtik_ompl.kernels.search.contacts.pulling import Pulling
+from rrtik_ompl.kernels.warming import load_together
+from rrtik_ompl.model.path import JointPath
+from rrtik_ompl.model.proof import Proof
+from rrtik_ompl.model.transitions import route_length
+from rrtik_ompl.ompl_bridge.planner_traits import traits_of
+from rrtik_ompl.ompl_bridge.setup import planning_bounds
+from rrtik_ompl.ompl_bridge.weighted import has_weights
+from rrtik_ompl.planning.goal_choice import nearest_rows
+from rrtik_ompl.planning.outcome import Plan, Request
+from rrtik_ompl.planning.portfolio import first_member
+from rrtik_ompl.world.clearances import CLEARANCE
+from rrtik_ompl.world.problem import Problem
+from rrtik_ompl.world.proven_motions import KERNELS as PROVEN_KERNELS
+from rrtik_ompl.world.proven_motions import ProvenMotions
+from rrtik_ompl.world.world import World, form_of
+
+MOST_GOALS = 8  # goal configurations that are tried
+TRIES = 8  # searches to each, until one of them has led to a proven route
+SEARCHES = 2  # to each goal configuration, where its route is long
+LONG = 2.0  # times the straight line
+SAMPLES = 2000  # of each search
+COARSE = 4.0  # times the usual steps
+BRIEF_WORK = 20  # of the pull of a route that is compared with others, in proofs of free motions
+CUTS = 6  # random cuts of the route
+WORTH = 0.98  # a straight line of more than this share of the best length is left out
+SPARE = 2.5e-4  # [m] that motions keep beyond the clearance of the path, as those of `shorten()` do
+MANY_PIECES = 250  # convex pieces of an arm whose motions take less to prove than to check in steps
+
+
+class Tools(NamedTuple):
+    """What searches and proves in a world.
+
+    Attributes:
+        search: Searches in the box of configurations.
+        motions: Motions that are proven to keep a clearance.
+        lower, upper: The box, shapes (dof,).
+    """
+
+    search: ConnectSearch
+    motions: ProvenMotions
+    lower: Vector
+    upper: Vector
+
+
+@dataclass(slots=True, eq=False)
+class Shortest:
+    """The best route so far.
+
+    Attributes:
+        route: What is pulled taut; None before any route is proven.
+        found: The route as it was before that, shape (k, dof).
+        length: How long it is [unit of the space].
+        counts: Statistics of the plan.
+    """
+
+    route: Pulling | None
+    found: Matrix
+    length: float
+    counts: dict[str, int | float]
+
+
+def short_path(problem: Problem, request: Request, *, pull: bool) -> Plan | None:
+    """Return the plan of a problem, or None where this finds no path or does not apply.
+
+    It applies to straight motions without path constraints and weights, in exact worlds with kernels, where proofs are
+    wanted and the planner that "auto" begins with is the search of these kernels.
+
+    Args:
+        problem: The problem to solve.
+        request: What is asked for.
+        pull: Whether the path is shortened; otherwise it is what the plan of a shortened one has as ``unshortened``.
+    """
+    if not _applies(problem, request):
+        return None
+    planner = first_member(problem)
+    if planner is None or traits_of(planner.factory).kernels != (SEARCH_KERNELS,):
+        return None
+
+    load_together((SEARCH_KERNELS, PULL_KERNELS, PROVEN_KERNELS))
+    if problem.goal.q is None:
+        load_kernels(problem.robot)
+    budget = request.budget.begun_now()
+    goals = _goals(problem, budget)
+    if goals is None:
+        return None
+
+    world = problem.world
+    clearance = max(CLEARANCE if request.clearance is None else request.clearance, world.settings.required_clearance)
+    bounds = planning_bounds(problem, goals)
+    with _kept_tools(world, clearance + min(clearance, SPARE), *bounds) as tools:
+        ends = np.concatenate([problem.start[None], goals])
+        free = tools.motions.motion_valid_batch(ends, ends)
+        if not free[0] or not free[1:].any():
+            return None
+        best = _best_route(problem.start, goals[free[1:]], tools, budget)
+        if best.route is None:
+            return None
+        searched = budget.elapsed
+        if pull:
+            with suppress(*request.survived):
+                best.route.run(stop=budget.over)
+        rows = best.route.waypoints
+
+    def proved(waypoints: Matrix) -> JointPath:
+        """Return a route that kernels have proven as a path."""
+        proof = Proof(len(waypoints) - 1, clearance, (), world.prover.margin, maker=world.prover)
+        return JointPath.of(problem.robot, waypoints).with_proof(proof)
+
+    own = proved(best.found)
+    shortened = pull and len(best.found) > 2
+    if shortened:
+        best.counts["shortening_seconds"] = budget.elapsed - searched
+    return Plan(
+        True,
+        proved(rows) if shortened else own,
+        "",
+        budget.elapsed,
+        planner.name,
+        budget.seed,
+        MappingProxyType(best.counts),
+        member=problem.goal.member_at(problem.robot, own.end),
+        unshortened=own if shortened else None,
+        problem=problem,
+    )
+
+
+def _applies(problem: Problem, request: Request) -> bool:
+    """Check whether a problem is of the kind that :func:`short_path` solves."""
+    world = problem.world
+    if request.proof == "off" or request.parameters or request.budget.iterations is not None:
+        return False
+    if type(world) is not World or world.accuracy != "exact" or world.settings.proving is not None:
+        return False
+    return world.motions is not None and not problem.constraints and not has_weights(problem)
+
+
+def _goals(problem: Problem, budget: Budget) -> Matrix | None:
+    """Return goal configurations, the nearest first, shape (k, dof); None if the start is one or none is known."""
+    q = problem.goal.q
+    at_goal = problem.reached(problem.start) if q is None else bool((problem.start == q).all())
+    if at_goal:
+        return None
+    found = GoalSearch(problem, budget.seed, seconds_left=lambda: budget.left).first()
+    return nearest_rows(problem, found)[:MOST_GOALS] if len(found) else None
+
+
+@contextmanager
+def _kept_tools(world: World, clearance: float, lower: Vector, upper: Vector) -> Iterator[Tools]:
+    """The tools for a clearance and a box: those that were used last in the world if they are for the same.
+
+    Nobody else gets them meanwhile. An exception leaves none.
+    """
+    motions = world.motions
+    assert motions is not None
+    key = clearance, lower.tobytes(), upper.tobytes()
+    known, tools = motions.spare.pop("short path", (None, None))
+    if tools is None or known != key:
+        tools = _tools(world, clearance, lower, upper)
+    yield tools
+    if tools.search.capacity <= LARGEST_KEPT:
+        motions.spare["short path"] = key, tools
+
+
+def _tools(world: World, clearance: float, lower: Vector, upper: Vector) -> Tools:
+    coarse = form_of(world, accuracy="conservative", motion_resolution=COARSE * world.motion_resolution).motions
+    assert coarse is not None
+    lower = np.maximum(lower, world.robot.lower)  # Kernels prove nothing beyond the limits.
+    upper = np.minimum(upper, world.robot.upper)
+    looks = len(coarse.fast.table.moving_solids.solids) > MANY_PIECES * SOLID_INTS
+    return Tools(ConnectSearch(coarse, lower, upper, looks=looks), ProvenMotions(world, clearance), lower, upper)
+
+
+def _best_route(start: Vector, goals: Matrix, tools: Tools, budget: Budget) -> Shortest:
+    """Return the shortest of the routes to some goal configurations, as far as it is pulled taut to compare them.
+
+    Args:
+        start: Shape (dof,).
+        goals: The nearest first, shape (k, dof).
+        tools: What searches and proves.
+        budget: The seed, and when to end.
+    """
+    best = Shortest(None, goals[:0], np.inf, {"attempts": 0, "rejected": 0, "iterations": 0, "checked_motions": 0})
+    lines = np.linalg.norm(goals - start, axis=1).tolist()
+    for turn in range(TRIES):
+        if turn >= SEARCHES and best.route is not None:
+            break
+        for k, line in enumerate(lines):
+            enough = line / WORTH if turn == 0 else LONG * line
+            if best.length <= max(enough, line / WORTH) or budget.over():
+                continue
+            _search(start, goals[k], 1000 * budget.seed + 100 * turn + k, tools, budget, best)
+    return best
+
+
+def _search(start: Vector, goal: Vector, seed: int, tools: Tools, budget: Budget, best: Shortest) -> None:
+    """Search for a route, and keep it if it is proven and the best one."""
+    search = tools.search
+    rows = search.solve(
+        start[None], goal[None], seed, ask=tools.motions.motion_valid_batch, stop=budget.over, max_iterations=SAMPLES
+    )
+    counts = best.counts
+    counts["attempts"] += 1
+    counts["iterations"] += search.table.iterations
+    counts["checked_motions"] += search.table.checked
+    if rows is None:
+        return
+
+    route = Pulling(tools.motions.motions, rows, tools.lower, tools.upper, seed=seed, cuts=CUTS)
+    if not route.jump():
+        counts["rejected"] += 1
+        return
+    found = route.waypoints
+    length = route_length(found)
+    if len(found) > 2:
+        route.run(work=BRIEF_WORK, stop=_at_once)
+        length = route_length(route.waypoints)
+    if length < best.length:
+        best.route = route
+        best.found = found
+        best.length = length
+
+
+def _at_once() -> bool:
+    """Stop after the first call of a kernel."""
+    return True

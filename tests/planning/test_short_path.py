@@ -1,0 +1,123 @@
+"""The default call: short and proven, without a planner; to the goal configuration whose path is the shortest."""
+
+import itertools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import rrtik_ompl as rrtik
+from rrtik_ompl.base.budget import Budget
+from rrtik_ompl.planning import plan as plan_module
+from rrtik_ompl.planning import portfolio
+from rrtik_ompl.planning import short_path as room
+from rrtik_ompl.planning.outcome import Request
+from rrtik_ompl.planning.short_path import short_path
+
+pytestmark = pytest.mark.kernels
+
+SEEDS = range(6)
+REQUEST = Request(Budget(1))
+
+
+@pytest.fixture(scope="module", params=["ur5_table", "so101_bin"])
+def problem(request):
+    return rrtik.load_problem(request.param)
+
+
+def contacts(world, path, per_motion=40):
+    """Configurations on a path at which coal finds a contact."""
+    rows = path.waypoints
+    places = np.linspace(0.0, 1.0, per_motion)[:, None]
+    along = np.concatenate([a + places * (b - a) for a, b in itertools.pairwise(rows)])
+    return [q for q in along if world.checks.contacts(q)]
+
+
+def test_the_default_is_no_longer_than_a_planner_that_takes_the_first_configuration(problem):
+    default = [rrtik.plan(problem, seed=seed) for seed in SEEDS]
+    first = [rrtik.plan(problem, "fastrrtconnect", seed=seed) for seed in SEEDS]
+    assert all(plan.proven and problem.reached(plan.path.end) for plan in default)
+    ratios = np.array([one.path.length / other.path.length for one, other in zip(default, first, strict=True)])
+    assert ratios.mean() < {"ur5_table": 1.02, "so101_bin": 0.95}[problem.name]
+    assert ratios.max() < 1.1
+
+
+def test_coal_finds_no_contact_on_it(problem):
+    for seed in SEEDS:
+        assert contacts(problem.world, rrtik.plan(problem, seed=seed).path) == []
+
+
+def test_a_seed_gives_one_path(problem):
+    one, again = (rrtik.plan(problem, seed=3).path for _ in range(2))
+    np.testing.assert_array_equal(one.waypoints, again.waypoints)
+    np.testing.assert_array_equal(one.waypoints, rrtik.plan(problem.with_accuracy("exact"), seed=3).path.waypoints)
+
+
+def test_it_is_a_proven_path_to_one_of_the_goals(problem):
+    found = short_path(problem, REQUEST, pull=True)
+    own = short_path(problem, REQUEST, pull=False)
+    assert (found.path.start == problem.start).all()
+    assert problem.reached(found.path.end)
+    np.testing.assert_array_equal(own.path.waypoints, found.unshortened.waypoints)
+    assert own.unshortened is None
+    for path in (found.path, found.unshortened):
+        assert path.proven_in(problem.world)
+        assert problem.world.prove(path, clearance=path.proof.clearance).proven  # by another kernel
+        assert problem.world.verify(problem.world.certificate(path), path.waypoints) == ""
+
+
+@pytest.mark.parametrize("clearance", [0.0, 2e-3])
+def test_it_keeps_the_clearance_that_is_wanted(problem, clearance):
+    found = rrtik.plan(problem, clearance=clearance)
+    assert found.path.proof.clearance == clearance
+    assert problem.world.prove(found.path, clearance=clearance).proven
+
+
+def test_where_it_does_not_apply_planners_take_their_turns(problem, monkeypatch):
+    requests = [
+        replace(REQUEST, proof="off"),
+        replace(REQUEST, parameters={"range": 0.1}),
+        Request(Budget(1, iterations=100)),
+        Request(Budget(1, stop=lambda: True)),
+    ]
+    assert [short_path(problem, request, pull=True) for request in requests] == [None] * len(requests)
+    assert short_path(problem.with_accuracy("conservative"), REQUEST, pull=True) is None
+
+    resting = rrtik.Problem(problem.world, problem.start, problem.start)
+    assert short_path(resting, REQUEST, pull=True) is None
+    monkeypatch.setattr(portfolio, "members", lambda _: ("bicrdt",))  # no planner's search in kernels comes first
+    assert short_path(problem, REQUEST, pull=True) is None
+
+
+def test_what_it_does_not_find_planners_do(monkeypatch):
+    problem = rrtik.load_problem("planar3_boxes")
+    monkeypatch.setattr(plan_module, "short_path", lambda *_, **__: None)
+    plan = rrtik.plan(problem)
+    assert plan.proven
+    assert plan.path.length <= plan.unshortened.length
+
+
+def test_ctrl_c_leaves_the_path_that_was_found(monkeypatch):
+    def interrupted(*_, **arguments):
+        if arguments["stop"] is not room._at_once:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(room.Pulling, "run", interrupted)
+    plan = rrtik.plan(rrtik.load_problem("planar3_boxes"), seed=1)
+    np.testing.assert_array_equal(plan.require().waypoints, plan.unshortened.waypoints)
+    assert plan.proven
+
+
+def test_a_straight_line_is_the_end_of_it(problem, monkeypatch):
+    """No search is made to a goal that is farther than the best path is long."""
+    start = problem.start
+    near = rrtik.Problem(problem.world, start, start + 0.01)
+    goals = np.array([start + 0.01, start + 0.015, start + 0.019])
+    monkeypatch.setattr(room, "_goals", lambda *_: goals)
+    searched = []
+    solve = room.ConnectSearch.solve
+    monkeypatch.setattr(room.ConnectSearch, "solve", lambda *a, **k: searched.append(1) or solve(*a, **k))
+    found = short_path(near, REQUEST, pull=True)
+    assert len(searched) == 1
+    assert len(found.path.waypoints) == 2
+    assert found.unshortened is None
