@@ -21,6 +21,7 @@ import numpy as np
 
 from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.base.budget import Budget
+from rrtik_ompl.description.joint_weights import weights_of
 from rrtik_ompl.ik.goal_configurations import GoalSearch
 from rrtik_ompl.ik.methods import load_kernels
 from rrtik_ompl.kernels.layout import SOLID_INTS
@@ -161,7 +162,8 @@ def _applies(problem: Problem, request: Request) -> bool:
         return False
     if type(world) is not World or world.accuracy != "exact" or world.settings.proving is not None:
         return False
-    return world.motions is not None and not problem.constraints and not has_weights(problem)
+    weights_are_even = not has_weights(problem) or len(set(weights_of(problem.robot).tolist())) == 1
+    return world.motions is not None and not problem.constraints and weights_are_even
 
 
 def _goals(problem: Problem, budget: Budget) -> Matrix | None:
