@@ -1,5 +1,7 @@
 """Depth pictures become the points that the camera saw."""
 
+import warnings
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -7,6 +9,7 @@ import pytest
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.depth import cloud_from_depth
+from rrtik_tests.grey_pictures import grey_png
 
 CAMERA = Camera([[80.0, 0.0, 20.0], [0.0, 90.0, 15.0], [0.0, 0.0, 1.0]], 40, 30, (0.05, -0.02, 0.001, 0.002, 0.0))
 
@@ -44,9 +47,57 @@ def test_pixels_without_a_depth_are_left_out():
         (np.ones((30, 40)), {"every": 0}, "every"),
         (np.ones((30, 40)), {"scale": 0.0}, "scale"),
         ([["a"]], {}, "expected numbers"),
+        (np.ones((30, 40)), {"mask": np.ones((40, 30))}, "mask of a depth picture: the camera has 30 rows of 40"),
+        (np.ones((30, 40)), {"mask": np.zeros((30, 40))}, "its mask leaves no pixel"),
     ],
 )
 def test_bad_pictures_are_refused_in_one_line(depth, options, message):
     with pytest.raises(InputError, match=message) as caught:
         cloud_from_depth(depth, CAMERA, **options)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("white", [True, 1, 255])
+def test_a_mask_says_what_is_used(white):
+    depth = np.random.default_rng(2).uniform(0.5, 3.0, (30, 40))
+    used = np.random.default_rng(3).random(depth.shape) < 0.5
+    expected = cloud_from_depth(np.where(used, depth, 0.0), CAMERA, every=2).points
+    mask = np.where(used, white, type(white)(0))
+    assert np.array_equal(cloud_from_depth(depth, CAMERA, every=2, mask=mask).points, expected)
+    hidden = np.ma.masked_array(depth, mask=~used)
+    assert np.array_equal(cloud_from_depth(hidden, CAMERA, every=2).points, expected)
+
+
+@pytest.mark.parametrize("bits", [1, 2, 4])
+def test_depths_and_masks_of_few_bits_are_those_of_a_picture_file(bits, tmp_path):
+    cv2 = pytest.importorskip("cv2")
+    rows = np.random.default_rng(4).integers(0, 2**bits, (30, 40))
+    (tmp_path / "depth.png").write_bytes(grey_png(rows.tolist(), bits))
+    read = cv2.imread(str(tmp_path / "depth.png"), cv2.IMREAD_UNCHANGED)  # readers stretch few bits to 255
+    cloud = cloud_from_depth(read, CAMERA, scale=(2**bits - 1) / 255.0, farthest=20.0)
+    assert np.allclose(cloud.points[:, 2], rows[rows > 0])
+    masked = cloud_from_depth(np.ones((30, 40)), CAMERA, mask=read)
+    assert len(masked.points) == np.count_nonzero(rows)
+
+
+@pytest.mark.parametrize(
+    ("distortion", "fold"),
+    [
+        ((-0.3, 0.0, 0.0, 0.0, 0.0), (1.0 / 0.9) ** 0.5),  # r (1 - 0.3 r^2) turns back where 0.9 r^2 is 1
+        ((-0.3, 0.1, 0.0, 0.0, 0.0), np.inf),
+        ((1.4, 1.2, 0.001, -0.002, 0.0), np.inf),
+        ((-0.28, 0.07, 0.0003, -0.0002, -0.006), np.inf),
+    ],
+)
+def test_only_pixels_that_a_ray_reaches_become_points(distortion, fold):
+    camera = Camera([[30.0, 0.0, 32.0], [0.0, 30.0, 24.0], [0.0, 0.0, 1.0]], 64, 48, distortion)
+    row, column = np.indices((48, 64))
+    bent = np.hypot(column - 32.0, row - 24.0) / 30.0
+    reached = bent < (fold * (1.0 - 0.3 * fold**2) if np.isfinite(fold) else np.inf)
+    missed = np.count_nonzero(~reached)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        points = cloud_from_depth(np.ones((48, 64)), camera).points.astype(np.float64)
+    assert [f"{missed} of {reached.size} pixels" in str(each.message) for each in caught] == [True] * bool(missed)
+    assert np.allclose(camera.project(points), np.column_stack([column[reached], row[reached]]), atol=1e-4)
+    assert (np.hypot(*points[:, :2].T) < fold).all()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
-from typing import Any
 
 import cv2
 import numpy as np
@@ -16,7 +15,10 @@ from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.files.kinds import read, write
 
 ORIGIN = np.zeros(3)
-UNDISTORT: Any = getattr(cv2, "undistortPointsIter", cv2.undistortPoints)  # OpenCV 5 has merged the two functions
+MOST_STEPS = 30  # of Newton's method
+LONGEST_STEP = 0.2  # on the plane z = 1, so that none jumps over the fold of a lens
+CONVERGED = 1e-12  # on the plane z = 1
+MOST_MISSED = 0.01  # pixels by which a ray may miss its pixel
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -106,14 +108,38 @@ class Camera:
         return np.asarray(pixels, dtype=np.float64)[:, 0]
 
     def rays(self, pixels: ArrayLike) -> Matrix:
-        """Return where the rays of pixels, shape (m, 2), meet the plane z = 1 of the camera frame, shape (m, 2)."""
+        """Return where the rays of pixels, shape (m, 2), meet the plane z = 1 of the camera frame, shape (m, 2).
+
+        Rows are NaN for pixels that no ray reaches. A strong lens model folds back at some distance from the axis:
+        beyond its fold there is no picture, though the formula has values.
+        """
         rows = finite_array(pixels, (None, 2), "pixels")
         if not self.distortion.any():
             return (rows - self.matrix[:2, 2]) / np.diag(self.matrix)[:2]
 
-        stop = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 60, 1e-12)
-        found: Any = UNDISTORT(rows[:, None], self.matrix, self.distortion, R=None, P=None, criteria=stop)
-        return np.asarray(found, dtype=np.float64)[:, 0]
+        # Newton's method with bounded steps, from the ray of a lens without distortion.
+        bent = (rows - self.matrix[:2, 2]) / np.diag(self.matrix)[:2]
+        rays = bent.copy()
+        with np.errstate(all="ignore"):  # a pixel that no ray reaches may lead anywhere
+            for _ in range(MOST_STEPS):
+                found, (a, b, d) = _bent(rays, self.distortion)
+                off = bent - found
+                if (np.abs(off) < CONVERGED).all():
+                    break
+                step = np.column_stack([d * off[:, 0] - b * off[:, 1], a * off[:, 1] - b * off[:, 0]])
+                step /= (a * d - b * b)[:, None]
+                rays += step * np.minimum(1.0, LONGEST_STEP / np.linalg.norm(step, axis=1))[:, None]
+            missed = np.abs(bent - _bent(rays, self.distortion)[0]) * np.diag(self.matrix)[:2]
+            reached = (missed < MOST_MISSED).all(axis=1) & (np.einsum("ni,ni->n", rays, rays) < self._fold())
+        rays[~reached] = np.nan
+        return rays
+
+    def _fold(self) -> float:
+        """Return the square of the radius, on the plane z = 1, at which the radial distortion turns back."""
+        k1, k2, _, _, k3 = self.distortion
+        roots = np.roots([7.0 * k3, 5.0 * k2, 3.0 * k1, 1.0])  # derivative of r (1 + k1 r^2 + k2 r^4 + k3 r^6)
+        turns = roots.real[(np.abs(roots.imag) < 1e-9 * np.abs(roots)) & (roots.real > 0.0)]
+        return float(turns.min(initial=np.inf))
 
     def jacobian(self, points: ArrayLike, translation: ArrayLike) -> Matrix:
         """Return the Jacobian of the pixels of an object's points with respect to its pose, shape (2 m, 6).
@@ -147,3 +173,22 @@ class Camera:
         """Return the covariance of the pixels of points that results from `sigmas`, shape (2 m, 2 m) [pixels^2]."""
         each = self.own_slopes(points) * self.sigmas
         return np.asarray(each @ each.T, dtype=np.float64)
+
+
+def _bent(rays: Matrix, distortion: Vector) -> tuple[Matrix, tuple[Vector, Vector, Vector]]:
+    """Return where a lens bends rays to by Brown's formula [59], on the plane z = 1, shape (m, 2), and its slopes.
+
+    The slopes are dx'/dx, dx'/dy = dy'/dx and dy'/dy, shape (m,) each.
+    """
+    k1, k2, p1, p2, k3 = distortion
+    x, y = rays.T
+    square = x * x + y * y
+    factor = 1.0 + square * (k1 + square * (k2 + square * k3))
+    slope = 2.0 * (k1 + square * (2.0 * k2 + square * 3.0 * k3))
+
+    bent_x = x * factor + 2.0 * p1 * x * y + p2 * (square + 2.0 * x * x)
+    bent_y = y * factor + p1 * (square + 2.0 * y * y) + 2.0 * p2 * x * y
+    xx = factor + x * x * slope + 2.0 * p1 * y + 6.0 * p2 * x
+    xy = x * y * slope + 2.0 * (p1 * x + p2 * y)
+    yy = factor + y * y * slope + 6.0 * p1 * y + 2.0 * p2 * x
+    return np.column_stack([bent_x, bent_y]), (xx, xy, yy)

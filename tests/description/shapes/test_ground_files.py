@@ -4,7 +4,6 @@ import contextlib
 import io
 import struct
 import warnings
-import zlib
 
 import numpy as np
 import pytest
@@ -12,6 +11,7 @@ import pytest
 import rrtik_ompl as rrtik
 from rrtik_ompl.base.errors import CloudWarning, InputError
 from rrtik_ompl.model.shapes import same_shape
+from rrtik_tests.grey_pictures import grey_png
 
 HEIGHTS = np.array([[0.0, 0.5, 1.0], [1.5, 2.0, 2.5]])
 HEAD = b"# Octomap OcTree binary file\n# a comment\nid OcTree\nsize 3\nres 0.1\ndata\n"
@@ -172,21 +172,6 @@ def tiff(rows, *tags, bits=32, photometric=1, order="<"):
     head = (b"II*\0" if order == "<" else b"MM\0*") + struct.pack(f"{order}I", start)
     listed = b"".join(entry for _, entry in sorted(table))
     return head + body + struct.pack(f"{order}H", count) + listed + struct.pack(f"{order}I", 0) + rest
-
-
-def grey_png(rows, bits):
-    """A grey PNG of so many bits a height."""
-
-    def chunk(name, data):
-        return struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
-
-    lines = b""
-    for row in rows:
-        digits = "".join(f"{value:0{bits}b}" for value in row)
-        digits = digits.ljust(-(-len(digits) // 8) * 8, "0")
-        lines += b"\0" + int(digits, 2).to_bytes(len(digits) // 8, "big")
-    head = struct.pack(">IIBBBBB", len(rows[0]), len(rows), bits, 0, 0, 0, 0)
-    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", zlib.compress(lines)) + chunk(b"IEND", b"")
 
 
 def assert_comes_back(field, folder):
