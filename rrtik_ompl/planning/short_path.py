@@ -42,7 +42,7 @@ from rrtik_ompl.planning.portfolio import first_member
 from rrtik_ompl.world.clearances import CLEARANCE
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.proven_motions import KERNELS as PROVEN_KERNELS
-from rrtik_ompl.world.proven_motions import ProvenMotions
+from rrtik_ompl.world.proven_motions import ProvenMotions, kept_motions
 from rrtik_ompl.world.world import World, form_of
 
 MOST_GOALS = 8  # goal configurations that are tried
@@ -117,8 +117,12 @@ def short_path(problem: Problem, request: Request, *, pull: bool) -> Plan | None
 
     world = problem.world
     clearance = max(CLEARANCE if request.clearance is None else request.clearance, world.settings.required_clearance)
-    bounds = planning_bounds(problem, goals)
-    with _kept_tools(world, clearance + min(clearance, SPARE), *bounds) as tools:
+    lower, upper = planning_bounds(problem, goals)
+    lower = np.maximum(lower, world.robot.lower)  # Kernels prove nothing beyond the limits.
+    upper = np.minimum(upper, world.robot.upper)
+    motions = kept_motions(world, clearance + min(clearance, SPARE))
+    with _kept_search(world, lower, upper) as search:
+        tools = Tools(search, motions, lower, upper)
         ends = np.concatenate([problem.start[None], goals])
         free = tools.motions.motion_valid_batch(ends, ends)
         if not free[0] or not free[1:].any():
@@ -177,29 +181,27 @@ def _goals(problem: Problem, budget: Budget) -> Matrix | None:
 
 
 @contextmanager
-def _kept_tools(world: World, clearance: float, lower: Vector, upper: Vector) -> Iterator[Tools]:
-    """The tools for a clearance and a box: those that were used last in the world if they are for the same.
+def _kept_search(world: World, lower: Vector, upper: Vector) -> Iterator[ConnectSearch]:
+    """Searches in a box, shapes (dof,): those that were used last in the world if they are in the same one.
 
     Nobody else gets them meanwhile. An exception leaves none.
     """
     motions = world.motions
     assert motions is not None
-    key = clearance, lower.tobytes(), upper.tobytes()
-    known, tools = motions.spare.pop("short path", (None, None))
-    if tools is None or known != key:
-        tools = _tools(world, clearance, lower, upper)
-    yield tools
-    if tools.search.capacity <= LARGEST_KEPT:
-        motions.spare["short path"] = key, tools
+    box = lower.tobytes(), upper.tobytes()
+    known, search = motions.spare.pop("short path", (None, None))
+    if search is None or known != box:
+        search = _search_in(world, lower, upper)
+    yield search
+    if search.capacity <= LARGEST_KEPT:
+        motions.spare["short path"] = box, search
 
 
-def _tools(world: World, clearance: float, lower: Vector, upper: Vector) -> Tools:
+def _search_in(world: World, lower: Vector, upper: Vector) -> ConnectSearch:
     coarse = form_of(world, accuracy="conservative", motion_resolution=COARSE * world.motion_resolution).motions
     assert coarse is not None
-    lower = np.maximum(lower, world.robot.lower)  # Kernels prove nothing beyond the limits.
-    upper = np.minimum(upper, world.robot.upper)
     looks = len(coarse.fast.table.moving_solids.solids) > MANY_PIECES * SOLID_INTS
-    return Tools(ConnectSearch(coarse, lower, upper, looks=looks), ProvenMotions(world, clearance), lower, upper)
+    return ConnectSearch(coarse, lower, upper, looks=looks)
 
 
 def _best_route(start: Vector, goals: Matrix, tools: Tools, budget: Budget) -> Shortest:

@@ -26,6 +26,8 @@ class ProvenMotions(MotionQueries):
     A proof is cheaper than a check in small steps, and leaves nothing undecided.
 
     Attributes:
+        clearance: Distance kept from obstacles on top of their margins [m].
+        prover: What proves.
         robot, weights, motion_resolution: Those of the world.
         accuracy: "conservative", as no motion is left undecided.
         fast: The tables of the world's checks, which find collisions sooner than a proof fails.
@@ -33,7 +35,7 @@ class ProvenMotions(MotionQueries):
 
     Args:
         world: A world with kernels.
-        clearance: Distance kept from obstacles on top of their margins [m].
+        clearance: See above.
 
     Raises:
         InputError: If the world has no kernels.
@@ -47,6 +49,8 @@ class ProvenMotions(MotionQueries):
         if fast is None or kernels is None:
             raise InputError("proven motions: the world has no kernels")
 
+        self.clearance = clearance
+        self.prover = world.prover
         self.robot: Robot = world.robot
         self.weights: Vector = world.weights
         self.motion_resolution = world.motion_resolution
@@ -59,7 +63,7 @@ class ProvenMotions(MotionQueries):
             chain.offset,
             weights=world.weights,
             resolution=world.motion_resolution,
-            proof=partial(world.prover.table, clearance),
+            proof=partial(self.prover.table, clearance),
         )
         self._kernels = kernels
 
@@ -75,6 +79,21 @@ class ProvenMotions(MotionQueries):
         return free
 
 
+def kept_motions(world: World, clearance: float) -> ProvenMotions:
+    """Return :class:`ProvenMotions` of a world with kernels: those that were asked for last, if they are the same.
+
+    The tables of checks, which keep them, pass to the next world when a body is moved. Its proofs are others.
+    """
+    own = world.motions
+    if own is None:
+        raise InputError("proven motions: the world has no kernels")
+    kept = own.spare.get(KERNELS)
+    if kept is None or kept.prover is not world.prover or kept.clearance != clearance:
+        own.spare[KERNELS] = kept = ProvenMotions(world, clearance)
+    known: ProvenMotions = kept
+    return known
+
+
 def proven_motions(world: World, clearance: float, within: Matrix) -> MotionQueries:
     """Return motion checks that require a proof with a clearance, in kernels where possible.
 
@@ -86,5 +105,5 @@ def proven_motions(world: World, clearance: float, within: Matrix) -> MotionQuer
     known: object = world
     required_clearance = max(clearance, world.settings.clearance)
     if has_kernels(known, KERNELS, within=within):
-        return ProvenMotions(world, required_clearance)
+        return kept_motions(world, required_clearance)
     return keeping(world, 0.0, proven=required_clearance)
