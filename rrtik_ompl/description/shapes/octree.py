@@ -18,9 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Matrix, Vector, positive
-from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.errors import InputError, at_most
 from rrtik_ompl.files.text import file_name, read_bytes
-from rrtik_ompl.model.shapes.octree import Octree
+from rrtik_ompl.model.shapes.octree import COARSER, MOST_CELLS, Octree, tell_size
 from rrtik_ompl.model.shapes.point_cloud import MOST_POINTS
 
 BINARY = b"# Octomap OcTree binary file"
@@ -163,19 +163,28 @@ def _cells_in(body: bytes, header: dict[str, str], binary: bool, what: str) -> _
         raise InputError(f"{what}: not a tree of OctoMap: {early}; save it again")
 
     nodes = np.frombuffer(body, dtype=np.uint8).reshape(-1, size)
+    at_most(len(nodes), MOST_CELLS, f"{what}: nodes of its tree", COARSER)
     if binary:
         bits = nodes[:, 0].astype(np.uint16) | nodes[:, 1].astype(np.uint16) << 8
-        kinds = bits[:, None] >> (2 * np.arange(8, dtype=np.uint16)) & 3  # of children, shape (n, 8)
+        kinds = (bits[:, None] >> (2 * np.arange(8, dtype=np.uint16)) & 3).astype(np.uint8)  # of children, shape (n, 8)
+        _bounded(int(np.count_nonzero(kinds == OCCUPIED)), what)
         follows = kinds == INNER
         places, levels = _walked(follows, DEPTH - 1, what)
         node, child = np.nonzero(kinds == OCCUPIED)
         return _Cells(_of_children(places[node], levels[node], child), levels[node] + 1, resolution)
 
     follows = (nodes[:, -1:] >> np.arange(8, dtype=np.uint8) & 1).astype(bool)
-    places, levels = _walked(follows, DEPTH, what)
     values = np.ascontiguousarray(nodes[:, :4]).view("<f4")[:, 0]
     cells = ~follows.any(axis=1) & (values >= 0.0)
+    _bounded(int(np.count_nonzero(cells)), what)
+    places, levels = _walked(follows, DEPTH, what)
     return _Cells(places[cells], levels[cells], resolution)
+
+
+def _bounded(count: int, what: str) -> None:
+    """Refuse too many cells before they are made, and say what many take."""
+    at_most(count, MOST_CELLS, f"{what}: cells", COARSER)
+    tell_size(count)
 
 
 def _walked(follows: NDArray[np.bool_], deepest: int, what: str) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

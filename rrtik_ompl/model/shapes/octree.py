@@ -16,11 +16,15 @@ from rrtik_ompl.base.arrays import Matrix, Vector, bounded_array, frozen, positi
 from rrtik_ompl.base.copies import as_value
 from rrtik_ompl.base.errors import InputError, at_most, require
 from rrtik_ompl.files.kinds import read
+from rrtik_ompl.files.notice import tell_once
 from rrtik_ompl.model.shapes.box_pile import BoxPile, surface_of_boxes
 from rrtik_ompl.model.shapes.point_cloud import Cloud, Points
 from rrtik_ompl.model.shapes.surfaces import Triangles
 
 MOST_CELLS = 20_000_000
+MANY_CELLS = 1_000_000  # from which on its author is told what they take
+SECONDS, GIGABYTES = 0.8, 0.15  # for a million cells, to read them and to build their trees
+COARSER = "take a map of a coarser resolution, or a part of it"
 MOST_DRAWN = 20_000  # cubes of a drawn surface
 LARGEST_FACTOR = 1024.0  # by which drawn cubes may be larger than the largest cell
 FEW_CELLS = 1_000  # up to which each is a box of its own, so that proofs can be written down as certificates
@@ -93,7 +97,8 @@ class Octree(_Kept, BoxPile):
             raise InputError(f"{what}: none of its cells is occupied; leave the obstacle out")
         if not (widths > 0.0).all():
             raise InputError(f"{what}: sides must be greater than 0, got {widths.min():g}")
-        at_most(len(rows), MOST_CELLS, f"{what}: cells", "take a map of a coarser resolution, or a part of it")
+        at_most(len(rows), MOST_CELLS, f"{what}: cells", COARSER)
+        tell_size(len(rows))
 
         object.__setattr__(self, "centres", frozen(rows))
         object.__setattr__(self, "sides", frozen(widths))
@@ -137,6 +142,14 @@ class Octree(_Kept, BoxPile):
     def boxes(self) -> tuple[Matrix, Matrix]:
         """Centres and full side lengths of the cubes [m], shape (n, 3) each."""
         return self.centres, np.repeat(self.sides[:, None], 3, axis=1)
+
+
+def tell_size(count: int) -> None:
+    """Say beforehand what an octree of many cells takes."""
+    if count >= MANY_CELLS:
+        millions = count / 1e6
+        takes = f"about {SECONDS * millions:.0f} s and {GIGABYTES * millions:.1f} GB"
+        tell_once(f"an octree of {millions:.1f} million cells: {takes}; a coarser one takes less")
 
 
 def _fewer(centres: Matrix, sides: Vector) -> tuple[Matrix, Vector]:

@@ -10,7 +10,9 @@ import pytest
 
 import rrtik_ompl as rrtik
 from rrtik_ompl.base.errors import CloudWarning, InputError
-from rrtik_ompl.model.shapes import same_shape
+from rrtik_ompl.description.shapes import octree as octree_files
+from rrtik_ompl.files import notice
+from rrtik_ompl.model.shapes import octree, same_shape
 from rrtik_tests.grey_pictures import grey_png
 
 HEIGHTS = np.array([[0.0, 0.5, 1.0], [1.5, 2.0, 2.5]])
@@ -300,3 +302,22 @@ def test_the_balls_of_a_map_cover_its_cells_unless_a_radius_is_given(tmp_path):
     scene = {"obstacles": [{"name": "map", "cloud": {"file": "map.bt"}}]}
     (tmp_path / "scene.yaml").write_text(str({"version": 1, "scene": scene}).replace("'", ""))
     assert rrtik.load_scene(tmp_path / "scene.yaml").obstacle("map").shape.radius == cloud.radius
+
+
+def test_who_reads_a_large_map_is_told_beforehand_what_it_takes_and_one_too_large_is_refused(tmp_path, monkeypatch):
+    told = []
+    monkeypatch.setattr(notice, "listener", told.append)
+    monkeypatch.setattr(notice, "_told", set())
+    monkeypatch.setattr(octree, "MANY_CELLS", 8)
+    inner = b"\xff\xff" + 8 * b"\xaa\xaa"  # eight nodes, of which all eight children are occupied
+    file = tmp_path / "map.bt"
+    file.write_bytes(HEAD + inner)
+    assert len(rrtik.Octree.load(file).sides) == 64
+    assert told == ["an octree of 0.0 million cells: about 0 s and 0.0 GB; a coarser one takes less"]
+
+    monkeypatch.setattr(octree_files, "MOST_CELLS", 20)
+    with pytest.raises(InputError, match=r"map.bt: cells.*64.*coarser resolution"):
+        rrtik.Octree.load(file)
+    file.write_bytes(HEAD + 3 * inner)
+    with pytest.raises(InputError, match=r"map.bt: nodes.*27.*coarser resolution"):
+        rrtik.Octree.load(file)
