@@ -43,6 +43,7 @@ TOOLKITS = (
     "tesseract-robotics-nanobind",
     "jax",
 )
+# Of these uv names our bound, which is not the one to blame.
 FOREIGN_BOUNDS = {"robosuite": "mink 0.0.5, which it asks for, wants numpy below 2, and no Pinocchio installs there"}
 PAGE = ROOT / "docs" / "install.md"
 BEGIN, END = "<!-- python -m bench environments -->\n", "<!-- end -->\n"
@@ -76,13 +77,13 @@ def fill(page: Report, wheel: Path) -> None:
     for (toolkit, python), (version, answer) in answers.items():
         cells[toolkit, python] = version if answer and answer.versions else f"{version}: no" if version else "-"
         if answer and not answer.versions:
-            reasons.setdefault(f"{toolkit} {version}: {answer.reason}", []).append(python)
+            reason = FOREIGN_BOUNDS.get(toolkit, answer.reason)
+            reasons.setdefault(f"{toolkit} {version}: {reason}", []).append(python)
 
     rows = [[f"`{toolkit}`", *(cells[toolkit, python] for python in PYTHONS)] for toolkit in TOOLKITS]
     ours = [answer for (toolkit, _), (_, answer) in answers.items() if answer and toolkit not in FOREIGN_BOUNDS]
     asked, good = len(ours), sum(bool(answer.versions) for answer in ours)
     why_not = [f"- {reason} (Python {', '.join(pythons)})" for reason, pythons in reasons.items()]
-    why_not += [f"- {toolkit}: {reason}." for toolkit, reason in FOREIGN_BOUNDS.items()]
     page.bar(
         f"beside toolkits that can be had, but {', '.join(FOREIGN_BOUNDS)}",
         "all resolve",
