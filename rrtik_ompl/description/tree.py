@@ -49,10 +49,14 @@ JOINT_KINDS = {
 
 @dataclass(frozen=True, slots=True)
 class MeshFile:
-    """A mesh in a file, with a scale for each axis; a negative scale mirrors."""
+    """A mesh in a file, with a scale for each axis; a negative scale mirrors.
+
+    If ``painted``, its own materials are drawn where it has some, as RViz does; MuJoCo ignores them.
+    """
 
     path: Path
     scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    painted: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -14,6 +14,7 @@ import pinocchio as pin
 
 from rrtik_ompl.base.copies import Once
 from rrtik_ompl.base.errors import InputError, MeshWarning, few
+from rrtik_ompl.description.shapes.materials import Colour, parts_by_colour
 from rrtik_ompl.description.shapes.mesh import load_surface
 from rrtik_ompl.description.tree import Joint, Link, MeshFile, Solid, Tree
 from rrtik_ompl.geometry.collision.shape_table import pieces
@@ -63,7 +64,11 @@ def build_models(tree: Tree, T_world_base: pin.SE3 | None = None) -> tuple[Any, 
         _add_link(model, links[joint.child], places)
 
     meshes: dict[MeshFile, Any] = {}
-    hard = _geometry(tree, places, meshes, {link.name: link.collision for link in tree.links})
+    hard = pin.GeometryModel()
+    for link in tree.links:
+        for number, solid in enumerate(link.collision):
+            geometry = _loaded(solid.shape, meshes, f"{tree.where}: link '{link.name}'")
+            hard.addGeometryObject(_body(link, number, solid, places[link.name], geometry, solid.colour))
     drawn = (solid.shape for link in tree.links for solid in link.visual)
     files = tuple(str(shape.path) for shape in drawn if isinstance(shape, MeshFile))
     return model, hard, Looks(partial(_looks, tree, places, meshes), files)
@@ -140,47 +145,62 @@ def _add_link(model: pin.Model, link: Link, places: dict[str, _Place]) -> None:
 
 
 def _looks(tree: Tree, places: dict[str, _Place], meshes: dict[MeshFile, Any]) -> pin.GeometryModel:
-    """Return the visual geometry of a tree. What cannot be read is not drawn: a link then looks like its collision."""
+    """Return the visual geometry of a tree, with a body for each colour of a mesh.
+
+    What cannot be read is not drawn: a link then looks like its collision.
+    """
+    looks = pin.GeometryModel()
     undrawn = []
-    readable: dict[str, tuple[Solid, ...]] = {}
+    unpainted = []
     for link in tree.links:
-        solids = []
+        bodies: list[tuple[Solid, Any]] = []
         for solid in link.visual:
             try:
-                _loaded(solid.shape, meshes, f"link '{link.name}'")
-                solids.append(solid)
+                bodies.append((solid, _loaded(solid.shape, meshes, f"link '{link.name}'")))
             except InputError as error:
                 undrawn.append(str(error))
-        readable[link.name] = tuple(solids) or link.collision
+        bodies = bodies or [(solid, _loaded(solid.shape, meshes, tree.where)) for solid in link.collision]
 
-    if undrawn:
-        warnings.warn(MeshWarning(f"{tree.where}: not drawn: {few(undrawn, MOST_UNDRAWN)}"), stacklevel=2)
-    return _geometry(tree, places, meshes, readable)
+        number = 0
+        for solid, geometry in bodies:
+            parts: list[tuple[Any, Colour | None]] = [(geometry, None)]
+            try:
+                parts = _painted(solid.shape, geometry)
+            except InputError as error:
+                unpainted.append(str(error))
+            for part, colour in parts:
+                looks.addGeometryObject(_body(link, number, solid, places[link.name], part, colour or solid.colour))
+                number += 1
+
+    for what, reasons in (("not drawn", undrawn), ("drawn in one colour", dict.fromkeys(unpainted))):
+        if reasons:
+            warnings.warn(MeshWarning(f"{tree.where}: {what}: {few(reasons, MOST_UNDRAWN)}"), stacklevel=2)
+    return looks
 
 
-def _geometry(
-    tree: Tree, places: dict[str, _Place], meshes: dict[MeshFile, Any], solids: Mapping[str, Iterable[Solid]]
-) -> pin.GeometryModel:
-    """Return solids of links as the geometry of a tree; meshes that were loaded before are shared."""
-    geometry = pin.GeometryModel()
-    for link in tree.links:
-        place = places[link.name]
-        for number, solid in enumerate(solids[link.name]):
-            shape = solid.shape
-            mesh = shape if isinstance(shape, MeshFile) else None
-            item = pin.GeometryObject(
-                f"{link.name}_{number}",
-                place.joint,
-                place.frame,
-                place.T_joint_link * solid.T_link_solid,
-                _loaded(shape, meshes, f"{tree.where}: link '{link.name}'"),
-                "" if mesh is None else str(mesh.path),
-                np.array((1.0, 1.0, 1.0) if mesh is None else mesh.scale),
-                solid.colour is not None,
-                np.array(solid.colour or GREY),
-            )
-            geometry.addGeometryObject(item)
-    return geometry
+def _painted(shape: Shape | MeshFile, geometry: coal.CollisionGeometry) -> list[tuple[Any, Colour | None]]:
+    """Return the parts of a shape with the colour of each, None where its file states none."""
+    if isinstance(shape, MeshFile) and shape.painted:
+        return parts_by_colour(shape.path, np.array(shape.scale), geometry)
+    return [(geometry, None)]
+
+
+def _body(
+    link: Link, number: int, solid: Solid, place: _Place, geometry: coal.CollisionGeometry, colour: Colour | None
+) -> pin.GeometryObject:
+    """Return a solid of a link, or a part of it, as a body of Pinocchio's geometry."""
+    mesh = solid.shape if isinstance(solid.shape, MeshFile) else None
+    return pin.GeometryObject(
+        f"{link.name}_{number}",
+        place.joint,
+        place.frame,
+        place.T_joint_link * solid.T_link_solid,
+        geometry,
+        "" if mesh is None else str(mesh.path),
+        np.array((1.0, 1.0, 1.0) if mesh is None else mesh.scale),
+        colour is not None,
+        np.array(colour or GREY),
+    )
 
 
 def _loaded(shape: Shape | MeshFile, meshes: dict[MeshFile, Any], where: str) -> coal.CollisionGeometry:

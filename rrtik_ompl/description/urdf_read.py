@@ -305,7 +305,7 @@ class _Reader:
             x, y, z = numbers(element, "scale", 3, (1.0, 1.0, 1.0), where)
             if x * y * z == 0.0:
                 raise InputError(f"{where}: mesh '{uri}' has a scale of 0; every axis needs another number")
-            return MeshFile(resolve_mesh(uri, self.packages, where), (x, y, z))
+            return MeshFile(resolve_mesh(uri, self.packages, where), (x, y, z), painted=True)
 
         in_urdf = (key for key, kind in SHAPES.items() if kind.in_urdf)
         raise UnknownNameError("shape", element.tag, (*in_urdf, "mesh"), where=where)

@@ -1,4 +1,7 @@
-"""Read mesh files: STL, OBJ, DAE, PLY, GLB and glTF, by assimp through coal; STL that it would refuse by ourselves."""
+"""Read mesh files: STL, OBJ, DAE, PLY, GLB and glTF, by assimp through coal.
+
+STL that it would refuse is read by ourselves, files of several parts that it would garble by trimesh.
+"""
 
 from __future__ import annotations
 
@@ -12,9 +15,10 @@ from xml.etree import ElementTree
 import coal
 import numpy as np
 
-from rrtik_ompl.base.arrays import Vector, bounded_array, positive
+from rrtik_ompl.base.arrays import Vector, bounded_array, distinct, positive
 from rrtik_ompl.base.errors import InputError, MeshWarning
 from rrtik_ompl.description.package_path import MESH_SUFFIXES
+from rrtik_ompl.description.shapes.by_trimesh import joined, meshes_in, triangles_of
 from rrtik_ompl.files.notice import tell_once
 from rrtik_ompl.files.text import file_name, read_bytes
 from rrtik_ompl.geometry.collision.solids import bvh, mesh_arrays
@@ -30,6 +34,8 @@ _WHERE = ("From file:", "in function:", "at line:", "Could not load resource", "
 _BINARY_TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("rest", "<u2")])
 _CORNER = re.compile(rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)", re.IGNORECASE)
 _VERTEX = re.compile(rb"^([ \t]*v[ \t]+)(\S+)[ \t]+(\S+)[ \t]+(\S+)", re.MULTILINE)
+_OF_SEVERAL = (".obj", ".dae", ".glb", ".gltf")  # kinds of files that may hold several parts
+_PART = re.compile(rb"^[ \t]*(usemtl|mtllib|g|o)\b.*$", re.MULTILINE)
 # Matches nan, inf, and numbers that overflow float32 (in which assimp reads), in a text file.
 _NOT_FINITE = re.compile(
     rb"[\s>][-+]?(?:(?:nan|inf)(?:inity)?|[0-9.]+e\+?0*(?:[0-9]{3,}|[4-9][0-9]|39)|[0-9]{39,}[0-9.]*)(?=[\s<]|$)",
@@ -88,6 +94,8 @@ def load_surface(path: Path, scale: Vector) -> coal.BVHModelBase:
 
     scale = scale * stated_unit(path, data)
     surface = _by_assimp(path, scale)
+    if kind in _OF_SEVERAL and _unused(surface):
+        surface = _of_one_part(data, scale) if kind == ".obj" else _by_trimesh(path, scale)
     size = np.abs(bounded_array(surface.vertices(), (None, 3), f"{path}: vertices")).max(axis=0) / np.abs(scale)
     coarse = float((np.spacing(size.astype(np.float32)) * np.abs(scale)).max())
     extent = float((np.ptp(surface.vertices(), axis=0)).max())
@@ -106,6 +114,36 @@ def _by_assimp(path: Path, scale: Vector) -> coal.BVHModelBase:
         return coal.MeshLoader().load(os.fspath(path), scale)
     except (ValueError, RuntimeError) as error:
         raise InputError(f"{path}: not a usable mesh: {_reason(path, error)}; {AGAIN}") from error
+
+
+def _unused(surface: coal.BVHModelBase) -> bool:
+    """Check whether vertices of a mesh are in no triangle.
+
+    Coal 3.0 numbers the vertices of each part of a node, and of each child of a node, from the first one of the node:
+    the triangles of a second part are then between vertices of the first, and its own vertices remain.
+    """
+    vertices, triangles = mesh_arrays(surface)
+    return len(distinct(triangles)) < len(vertices)
+
+
+def _of_one_part(data: bytes, scale: Vector) -> coal.BVHModelBase:
+    """Read an OBJ without its division into objects, groups and materials."""
+    return _by_assimp_from(_PART.sub(b"", data), scale)
+
+
+def _by_trimesh(path: Path, scale: Vector) -> coal.BVHModelBase:
+    pieces = [triangles_of(mesh) for mesh in meshes_in(path, f"{path}: its several parts")]
+    return bvh(*joined(pieces, scale))
+
+
+def _by_assimp_from(data: bytes, scale: Vector) -> coal.BVHModelBase:
+    """Read the text of an OBJ."""
+    import tempfile  # few files need it, and it loads random numbers
+
+    with tempfile.TemporaryDirectory() as folder:
+        copy = Path(folder) / "copy.obj"
+        copy.write_bytes(data)
+        return _by_assimp(copy, scale)
 
 
 def _reason(path: Path, error: Exception) -> str:
@@ -165,12 +203,7 @@ def _from_afar(data: bytes, scale: Vector) -> coal.BVHModelBase:
         values = np.array(match.groups()[1:]).astype(np.float64) - offset
         return match[1] + b" ".join(repr(float(value)).encode() for value in values)
 
-    import tempfile  # few files need it, and it loads random numbers
-
-    with tempfile.TemporaryDirectory() as folder:
-        copy = Path(folder) / "moved.obj"
-        copy.write_bytes(_VERTEX.sub(moved, data))
-        vertices, triangles = mesh_arrays(_by_assimp(copy, np.ones(3)))
+    vertices, triangles = mesh_arrays(_by_assimp_from(_PART.sub(b"", _VERTEX.sub(moved, data)), np.ones(3)))
     return bvh((vertices + offset) * scale, triangles)
 
 

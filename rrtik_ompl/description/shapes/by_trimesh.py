@@ -1,0 +1,50 @@
+"""Read mesh files by trimesh (and pycollada for DAE), an extra, for what coal's reader does not tell or misreads."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rrtik_ompl.base.arrays import Vector
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.model.shapes.surfaces import Triangles
+
+if TYPE_CHECKING:
+    from trimesh import Trimesh
+
+REMEDY = "pip install 'rrtik-ompl[looks]'"
+
+
+def meshes_in(path: Path, purpose: str) -> list[Trimesh]:
+    """Return the meshes of a file as trimesh has them, each where its node puts it, in units of the file.
+
+    Args:
+        path: The file.
+        purpose: What they are read for, for messages: "colours of meshes".
+
+    Raises:
+        InputError: If trimesh or pycollada is missing, or cannot read the file.
+    """
+    if find_spec("trimesh") is None or (path.suffix.lower() == ".dae" and find_spec("collada") is None):
+        raise InputError(f"{purpose} need trimesh and pycollada: {REMEDY}")
+    import trimesh
+
+    try:
+        return list(trimesh.load_scene(str(path), process=False).dump())
+    except Exception as error:  # whatever it meets with in a damaged file
+        raise InputError(f"{path}: trimesh cannot read it") from error
+
+
+def triangles_of(mesh: Trimesh) -> Triangles:
+    """Return the triangles of a mesh of trimesh."""
+    return Triangles(np.asarray(mesh.vertices, dtype=np.float64), np.asarray(mesh.faces, dtype=np.int64))
+
+
+def joined(pieces: list[Triangles], scale: Vector) -> Triangles:
+    """Return several sets of triangles as one, with each axis scaled."""
+    first = np.cumsum([0, *(len(piece.vertices) for piece in pieces)])
+    faces = [piece.faces + start for piece, start in zip(pieces, first, strict=False)]
+    return Triangles(np.concatenate([piece.vertices for piece in pieces]) * scale, np.concatenate(faces))
