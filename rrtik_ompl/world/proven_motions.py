@@ -12,6 +12,7 @@ from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.kernels import FREE, FastWorld
 from rrtik_ompl.kernels.search.motions.motion_table import FastMotions
 from rrtik_ompl.kernels.simd.library import library
+from rrtik_ompl.model.proof import Proof
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.world.clearances import keeping
 from rrtik_ompl.world.motion_queries import MotionQueries, has_kernels
@@ -77,6 +78,15 @@ class ProvenMotions(MotionQueries):
         self._kernels.judge(self.motions.address, *addresses, len(starts), answers.ctypes.data)
         free: Mask = answers == FREE
         return free
+
+    def proof(self, rows: Matrix, clearance: float) -> Proof:
+        """Return the proof of motions between rows, shape (k, n), that these checks have found free.
+
+        Args:
+            rows: Within the limits.
+            clearance: At most that of these checks [m].
+        """
+        return Proof(len(rows) - 1, clearance, (), self.prover.margin, maker=self.prover)
 
 
 def kept_motions(world: World, clearance: float) -> ProvenMotions:

@@ -28,6 +28,7 @@ from rrtik_ompl.planning.shortening.retraction import retract
 from rrtik_ompl.planning.shortening.task import Task, Wishes
 from rrtik_ompl.world.clearances import check_route_clearance, proved
 from rrtik_ompl.world.problem import Problem
+from rrtik_ompl.world.proven_motions import ProvenMotions
 
 __all__ = ["METHODS", "Method", "MoveRules", "Task", "Wishes", "shorten", "shortened"]
 
@@ -256,7 +257,7 @@ def _shorten_in_forms(
             continue
 
         # It has to pass the second check.
-        shorter = acceptance.accepted(path_through(path, rows))
+        shorter = acceptance.accepted(path_through(path, rows), _prover_of(found, task, acceptance))
         if shorter is None:
             continue
 
@@ -294,6 +295,15 @@ def _run(chosen: Method, form: Form, route: Matrix, wishes: Wishes, single: bool
     task = Task(weighted.problem.world, wishes)
     rows = chosen.run(weighted.weighted_rows(route), task, weighted.problem)
     return task, weighted.joint_rows(rows, route[[0, -1]])
+
+
+def _prover_of(found: Matrix, task: Task, acceptance: Acceptance) -> ProvenMotions | None:
+    """Return what has proven every motion of a route, shape (k, n), that a task has found; None if nothing has.
+
+    A route is within the limits, as a proof requires, if the given path is.
+    """
+    proven = found is task.proven and acceptance.input.proven
+    return task.motions if proven and isinstance(task.motions, ProvenMotions) else None
 
 
 def _keeps_single_joint_moves(path: JointPath, method: ShorteningMethod, one_joint: bool | None) -> bool:

@@ -13,7 +13,7 @@ from rrtik_ompl.world.clearances import Clearances, clearances_between, keeping,
 from rrtik_ompl.world.detours import with_detours
 from rrtik_ompl.world.motion_queries import MotionQueries
 from rrtik_ompl.world.problem import Problem, densely_checked, problem_in
-from rrtik_ompl.world.proven_motions import proven_motions
+from rrtik_ompl.world.proven_motions import ProvenMotions, proven_motions
 from rrtik_ompl.world.route_check import violations_of
 from rrtik_ompl.world.world import World
 
@@ -81,36 +81,44 @@ class Acceptance:
         extra room, and if that fails with proofs as well. If the input does not keep the clearance, the last form does
         not ask for it.
         """
-        dense = densely_checked(self._problem)
-        if self._leaves_room:
-            return [Form(dense, dense.world, 1.0)]
-
-        forms = [] if self._clearances is None else self._forms_with_clearance(dense, self._clearances)
-        if not self._input_keeps_clearance:
+        forms = []
+        if self._clearances is not None and not self._leaves_room:
+            forms += self._forms_with_clearance(self._clearances)
+        if self._leaves_room or not self._input_keeps_clearance:
+            dense = densely_checked(self._problem)
             forms.append(Form(dense, dense.world, 1.0))
         return forms
 
-    def _forms_with_clearance(self, dense: Problem, clearances: Clearances) -> list[Form]:
+    def _forms_with_clearance(self, clearances: Clearances) -> list[Form]:
         """Return the forms that keep the clearance.
 
         If the input does not keep it, time is left for a further form that need not.
         """
-        searched_clearance = kept_clearance(dense.world, clearances)
+        problem = self._problem
+        searched_clearance = kept_clearance(problem.world, clearances)
         last_share = 1.0 if self._input_keeps_clearance else 0.5
         if not self._checks_in_steps:
-            return [Form(dense, proven_motions(dense.world, searched_clearance, self.input.waypoints), last_share)]
+            return [Form(problem, proven_motions(problem.world, searched_clearance, self.input.waypoints), last_share)]
 
+        dense = densely_checked(problem)
         clear = keeping(dense.world, searched_clearance)
         proving = keeping(dense.world, searched_clearance, proven=clearances.proven_clearance)
         return [Form(problem_in(dense, clear), clear, 0.7), Form(problem_in(dense, proving), proving, last_share)]
 
-    def accepted(self, shorter: JointPath) -> JointPath | None:
+    def accepted(self, shorter: JointPath, prover: ProvenMotions | None = None) -> JointPath | None:
         """Return a shortened path with its proof if it may be returned in place of the input.
+
+        Args:
+            shorter: The path.
+            prover: What has proven its motions with the clearance of its form; None if they are yet to be proven.
 
         Returns:
             The path with its proof, and with detours where it needs them. None if it keeps less of the clearance than
             the input, if less of it is proven, or if it is not valid.
         """
+        if prover is not None and self._clearances is not None:
+            return shorter.with_proof(prover.proof(shorter.waypoints, self._clearances.proven_clearance))
+
         proved = self._proved(shorter)
         if self._keeps_clearance(proved):
             return proved

@@ -93,6 +93,7 @@ def _pulled(route: Matrix, task: Task, world: KernelWorld, number: int, cuts: in
     task.asked = before + math.ceil(pull.work)
     found = pull.waypoints
     if pull.proven:
+        task.proven = found
         return found
 
     is_proven = world.motion_valid_batch(found[:-1], found[1:])

@@ -46,6 +46,7 @@ class Task:
         wishes: The given wishes.
         asked: How many straight motions have been checked, or tried in kernels.
         confirmed_again: How many motions of a result have been checked again, as parts of free ones.
+        proven: The last route of which kernels have proven every motion, shape (k, n); None if there is none.
 
     Args:
         motions: A world, or another object that checks straight motions.
@@ -57,6 +58,7 @@ class Task:
         self.wishes = Wishes() if wishes is None else wishes
         self.asked = 0
         self.confirmed_again = 0
+        self.proven: Matrix | None = None
         self._stopped = False
         self._known: set[tuple[bytes, bytes]] = set()
         self._reported = (np.inf, np.inf)
