@@ -25,6 +25,7 @@ from rrtik_ompl.description.joint_weights import weights_of
 from rrtik_ompl.ik.goal_configurations import GoalSearch
 from rrtik_ompl.ik.methods import load_kernels
 from rrtik_ompl.kernels.layout import SOLID_INTS
+from rrtik_ompl.kernels.proof.rows import PROOF_KERNELS
 from rrtik_ompl.kernels.search.connect import LARGEST_KEPT, ConnectSearch
 from rrtik_ompl.kernels.search.connect_layout import KERNELS as SEARCH_KERNELS
 from rrtik_ompl.kernels.search.contacts.layout import KERNELS as PULL_KERNELS
@@ -107,7 +108,7 @@ def short_path(problem: Problem, request: Request, *, pull: bool) -> Plan | None
     if planner is None or traits_of(planner.factory).kernels != (SEARCH_KERNELS,):
         return None
 
-    load_together((SEARCH_KERNELS, PULL_KERNELS, PROVEN_KERNELS))
+    load_together((SEARCH_KERNELS, PULL_KERNELS, PROVEN_KERNELS, PROOF_KERNELS))
     if problem.goal.q is None:
         load_kernels(problem.robot)
     budget = request.budget.begun_now()

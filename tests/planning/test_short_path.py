@@ -1,6 +1,7 @@
 """The default call: short and proven, without a planner; to the goal configuration whose path is the shortest."""
 
 import itertools
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -8,6 +9,8 @@ import pytest
 
 import rrtik_ompl as rrtik
 from rrtik_ompl.base.budget import Budget
+from rrtik_ompl.kernels.simd import library
+from rrtik_ompl.kernels.simd.library import Library
 from rrtik_ompl.planning import plan as plan_module
 from rrtik_ompl.planning import portfolio
 from rrtik_ompl.planning import short_path as room
@@ -141,3 +144,22 @@ def test_what_a_world_keeps_is_not_used_once_a_body_has_moved():
         assert found.proven
         assert after.world.motions_proven(found[:-1], found[1:]).all()
         assert contacts(after.world, found) == []
+
+
+def test_the_time_that_kernels_take_to_load_changes_no_path(monkeypatch):
+    known = rrtik.plan(rrtik.load_problem("ur5_table"), seed=1).path.waypoints
+    clock = time.monotonic
+    late = [0.0]
+
+    class Slow(Library):
+        def __init__(self, *args):
+            super().__init__(*args)
+            late[0] += 60.0
+
+    monkeypatch.setattr(library, "_libraries", {})  # as in a new process
+    monkeypatch.setattr(library, "Library", Slow)
+    monkeypatch.setattr(time, "monotonic", lambda: clock() + late[0])
+    again = rrtik.plan(rrtik.load_problem("ur5_table"), seed=1)
+    assert late[0] >= 180.0
+    np.testing.assert_array_equal(again.path.waypoints, known)
+    assert again.seconds < 60.0

@@ -228,6 +228,7 @@ class PlannedTable:
         if plan.blank is not None:
             self._words[:] = plan.blank
         else:
+            self._words[:] = 0.0  # what has been there must not matter
             self._words[plan.guards] = GUARD_WORD
             self.header[:] = plan.fields
 
@@ -235,7 +236,7 @@ class PlannedTable:
         self.address = begin + unaligned + WORD * plan.start
 
     def __getitem__(self, place: int) -> NDArray[Any]:
-        """One of the arrays, its words as float64; not set."""
+        """One of the arrays, its words as float64; 0 at first."""
         return self._words[self._plan.spans[place]]
 
     @property

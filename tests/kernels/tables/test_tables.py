@@ -7,6 +7,7 @@ import pytest
 from rrtik_ompl.geometry.collision.bodies import Body
 from rrtik_ompl.kernels import FastWorld
 from rrtik_ompl.kernels.simd.processor import WIDTH
+from rrtik_ompl.kernels.tables import memory
 from rrtik_ompl.kernels.tables import robot_tables as tables
 from rrtik_tests.random_cases import Case, joint_values
 
@@ -54,3 +55,15 @@ def test_balls_around_balls_contain_them():
         depth = np.linalg.norm(spheres[:, :3] - ball[:3], axis=1) + spheres[:, 3]
         assert depth.max() <= ball[3]
         assert ball[3] < 1.2 * 0.5 * (np.ptp(spheres[:, :3], axis=0).max() + 2.0 * spheres[:, 3].max()) * np.sqrt(3)
+
+
+@pytest.mark.parametrize("words", [8, 2 * memory.COPIED_WORDS])
+def test_what_was_in_memory_before_is_not_in_a_planned_table(words, monkeypatch):
+    def used(size):
+        return np.full(size, 7.0)
+
+    monkeypatch.setattr(memory.np, "empty", used)
+    made = memory.PlannedTable(memory.TablePlan({0: words}, {1: 3}))
+    assert not made[0].any()
+    assert made.header[1] == 3
+    assert made.intact()
