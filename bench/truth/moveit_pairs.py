@@ -170,6 +170,11 @@ def matrix(names: list[str], values: list[Any], **more: Any) -> Message:
     return {"allowed_collision_matrix": {"entry_names": names, "entry_values": values} | more}
 
 
+def solids(key: str, poses: str, solid: Message, place: Message, frame: str = "base") -> Message:
+    """An object of one mesh or plane."""
+    return {"id": key, "header": {"frame_id": frame}, key: [solid], poses: [place]}
+
+
 def octomap(data: list[int], binary: bool = True) -> Message:
     """A map of cells of 0.2 m."""
     tree = {"binary": binary, "id": "OcTree", "resolution": 0.2, "data": data}
@@ -193,6 +198,15 @@ def fixed(parent: str, child: str, x: float) -> Message:
     return {"header": {"frame_id": parent}, "child_frame_id": child, "transform": transform}
 
 
+BLOCK = {  # 0.2 x 1 x 1 m, whose lowest corner is its origin
+    "vertices": [{"x": x, "y": y, "z": z} for x, y, z in product((0.0, 0.2), (0.0, 1.0), (0.0, 1.0))],
+    "triangles": [
+        {"vertex_indices": row}
+        for a, b, c, d in ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
+        for row in ([a, b, c], [a, c, d])
+    ],
+}
+GROUND: Solid = (coal.Halfspace(np.array([0.0, 0.0, 1.0]), -0.4), NOWHERE)
 HELD = {"attached_collision_objects": [attached(ROD)]}
 SIDEWAYS = pin.SE3(pin.Quaternion(*[QUARTER[k] for k in (3, 0, 1, 2)]).matrix(), np.array([0.0, 0.0, 0.5]))
 FREE_PAIR: tuple[Solid, ...] = ()
@@ -424,7 +438,20 @@ CASES: dict[str, Case] = {
     ),
     "a scene that is a difference": Case({"is_diff": True}, refused="is_diff: it is not read"),
     "a misspelt key": Case({"link_paddings": [{"link_name": "tool"}]}, refused="did you mean 'link_padding'"),
-    "a mesh": Case(world(moved(PLATE, meshes=[{"triangles": [1]}])), refused="meshes and planes are not read"),
+    "a mesh": Case(world(solids("meshes", "mesh_poses", BLOCK, pose(0.4, -0.5, -0.5)))),
+    "a mesh of which a link holds half": Case(
+        {
+            "robot_state": {
+                "attached_collision_objects": [attached(solids("meshes", "mesh_poses", BLOCK, pose(0, 0, 0), "tool"))]
+            },
+            "link_scale": [{"link_name": "tool", "scale": 0.5}],
+        },
+        parts=((coal.Sphere(0.005), NOWHERE), (coal.Box(0.1, 0.5, 0.5), at(0.1, 0.5, 0.5))),
+    ),
+    "a plane": Case(
+        world(solids("planes", "plane_poses", {"coef": [0, 0, 2, 1]}, pose(0, 0, 0.1))), obstacles=(GROUND,)
+    ),
+    "a mesh of numbers": Case(world(moved(PLATE, meshes=[{"triangles": [1]}])), refused=r"meshes\[0\]\.triangles\[0\]"),
 }
 
 

@@ -90,22 +90,30 @@ def convert(
     source: Annotated[str, typer.Argument(metavar="IN", help="A path, a scene, or a problem (MotionBenchMaker too).")],
     target: Annotated[Path, typer.Argument(metavar="OUT", help="The ending says which format.")],
     robot: Annotated[str | None, typer.Option(help="Robot that the file is for, where the file does not say.")] = None,
+    moveit: Annotated[
+        bool, typer.Option("--moveit", help="Write a .yaml of a scene as MoveIt's PlanningScene.")
+    ] = False,
 ) -> int:
     """Convert a path, a problem or a scene to another format.
 
     Paths: .json, .csv, .txt (OMPL's matrix). Problems, MotionBenchMaker's too, become problem files (.yaml). Scenes,
-    those of problem files too, become MuJoCo's .xml, or .scene for MoveIt; from .xml, .mjcf and .scene also .yaml.
+    those of problem files too, become MuJoCo's .xml, .scene for MoveIt, or with --moveit its PlanningScene (.yaml);
+    from .xml, .mjcf and .scene also .yaml.
     """
     from rrtik_ompl import JointPath, load_problem, load_robot, load_scene
-    from rrtik_ompl.problem_files.scene_out import WRITERS
+    from rrtik_ompl.problem_files.scene_out import WRITERS, write_planning_scene
+
+    if moveit:
+        check_target(target, (".yaml", ".yml"))
+    writer = write_planning_scene if moveit else WRITERS.get(target.suffix.lower())
 
     if Path(source).suffix.lower() in PATH_FORMATS:
         check_target(target, PATH_FORMATS)
         JointPath.load(source, None if robot is None else load_robot(robot)).save(target)
-    elif target.suffix.lower() in WRITERS:
+    elif writer is not None:
         known = robot is None and Path(source).suffix  # else a problem that ships, or one of MotionBenchMaker
         scene = load_scene(source) if known else load_problem(source, robot=robot).world.scene
-        WRITERS[target.suffix.lower()](scene, target)
+        writer(scene, target)
     elif Path(source).suffix.lower() in WRITERS:
         check_target(target, (".yaml", ".yml", *WRITERS))
         load_scene(source).save(target)

@@ -76,7 +76,7 @@ def load_motion_bench_maker(
 
     # Load the robot, and apply what the scene and the path constraints say of it.
     arm = _arm(scene_document, message, request_document, request, robot, states)
-    if robot is not None and message.robot_model_name not in _names_of(arm):
+    if robot is not None and message.robot_model_name and message.robot_model_name not in _names_of(arm):
         line = f"the scene is of robot '{message.robot_model_name}', and is read with robot '{arm.name}'"
         tell(scene_document, ("robot_model_name",), line)
 
@@ -138,6 +138,10 @@ def _arm(
     document, key = (request_document, "start_state") if moved else (scene_document, "robot_state")
     with document.at((key, "multi_dof_joint_state")):
         base = _base_pose(request.start_state if moved else scene.robot_state)
+
+    if robot is None and not scene.robot_model_name:
+        with scene_document.at(("robot_model_name",)):
+            raise InputError("is empty; give the robot")
 
     if not isinstance(robot, Robot):
         with _said_where(scene_document, request_document, scene, request):

@@ -7,9 +7,11 @@ is empty if ROS fills it in by default: nothing, no text, 0, false, and lists an
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from difflib import get_close_matches
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
+import numpy as np
 import pinocchio as pin
 from pydantic import BaseModel, BeforeValidator, Field, model_validator
 from pydantic_core import PydanticCustomError
@@ -18,7 +20,7 @@ from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.base.poses import IDENTITY_QUATERNION, pose_from_xyzw
 from rrtik_ompl.files.sections import Length, Name, NotNegative, Number, Positive, Vector3, Vector4
-from rrtik_ompl.model.shapes import SHAPES, Shape
+from rrtik_ompl.model.shapes import SHAPES, HalfSpace, Mesh, Shape
 
 KNOWN = {key: kind for key, kind in sorted(SHAPES.items()) if kind.moveit}
 SHAPE_NUMBERS = {1: "box", 2: "sphere", 3: "cylinder", 4: "cone", 5: "prism"}  # constants of shape_msgs/SolidPrimitive
@@ -159,8 +161,52 @@ class Primitive(Message):
         return {m.name: 3 if m.kind == "three lengths" else 1 for m in KNOWN[self.type].measures}
 
 
+class MeshTriangle(Message):
+    """The corners of a triangle, as numbers of vertices."""
+
+    vertex_indices: Annotated[list[int], Field(min_length=3, max_length=3)]
+
+
+class MeshMessage(Message):
+    """A mesh by its triangles and vertices [m]."""
+
+    triangles: list[MeshTriangle] = Field(default_factory=list)
+    vertices: list[Vector] = Field(default_factory=list)
+
+    def build(self, factor: float = 1.0) -> Shape:
+        """Return the mesh, scaled by a factor about the mean of its vertices, as MoveIt does.
+
+        Raises:
+            InputError: If it is no mesh.
+        """
+        vertices = np.array(self.vertices, dtype=np.float64).reshape(-1, 3)
+        if factor != 1.0 and len(vertices):
+            centre = vertices.mean(axis=0)
+            vertices = centre + factor * (vertices - centre)
+        return Mesh(vertices, [each.vertex_indices for each in self.triangles])
+
+
+class PlaneMessage(Message):
+    """A plane a x + b y + c z + d = 0; what lies behind it is filled."""
+
+    coef: Vector4
+
+    def build(self, factor: float = 1.0) -> Shape:
+        """Return the half-space; it has no size that a factor could scale.
+
+        Raises:
+            InputError: If its normal is 0.
+        """
+        del factor
+        *normal, d = self.coef
+        return HalfSpace(normal, -d)
+
+
+Solid = Primitive | MeshMessage | PlaneMessage
+
+
 class CollisionObject(Message):
-    """One or several primitives under one name, and the operation on them."""
+    """One or several shapes under one name, and the operation on them."""
 
     says_nothing = ("type",)
 
@@ -169,36 +215,55 @@ class CollisionObject(Message):
     pose: PoseMessage = Field(default_factory=PoseMessage)
     primitives: list[Primitive] = Field(default_factory=list)
     primitive_poses: list[PoseMessage] = Field(default_factory=list)
-    meshes: list[Any] = Field(default_factory=list)
-    mesh_poses: list[Any] = Field(default_factory=list)
-    planes: list[Any] = Field(default_factory=list)
-    plane_poses: list[Any] = Field(default_factory=list)
+    meshes: list[MeshMessage] = Field(default_factory=list)
+    mesh_poses: list[PoseMessage] = Field(default_factory=list)
+    planes: list[PlaneMessage] = Field(default_factory=list)
+    plane_poses: list[PoseMessage] = Field(default_factory=list)
     subframe_names: list[Name] = Field(default_factory=list)
     subframe_poses: list[PoseMessage] = Field(default_factory=list)
     operation: Annotated[Literal["add", "remove", "append", "move"], _by_number(OPERATION_NUMBERS)] = "add"
 
     def check(self) -> None:
-        """Raise an error if geometry is not supported, or lists have different lengths.
+        """Raise an error if lists have different lengths.
 
         Raises:
-            InputError: If there are meshes or planes, if a shape or a subframe has no pose, or if a shape has a wrong
-                number of dimensions.
+            InputError: If a shape or a subframe has no pose, or if a shape has a wrong number of dimensions.
         """
         for solid in self.primitives:
             solid.check()
 
-        if self.meshes or self.planes:
-            raise InputError(f"'{self.id}': meshes and planes are not read; write them as box, cylinder or sphere")
-        if len(self.primitive_poses) != len(self.primitives) and (self.primitive_poses or not self.pose.given):
-            count = f"{len(self.primitives)} primitives, but {len(self.primitive_poses)} primitive_poses"
-            raise InputError(f"'{self.id}' has {count}; give one pose for each")
+        for what, solids, key, poses in self._lists():
+            if len(poses) != len(solids) and (poses or not self.pose.given):
+                raise InputError(
+                    f"'{self.id}' has {len(solids)} {what}, but {len(poses)} {key}; give one pose for each"
+                )
         if len(self.subframe_poses) != len(self.subframe_names):
             count = f"{len(self.subframe_names)} subframe_names, but {len(self.subframe_poses)} subframe_poses"
             raise InputError(f"'{self.id}' has {count}; give one pose for each")
 
+    @property
+    def solids(self) -> list[Solid]:
+        """Its primitives, meshes and planes, in this order."""
+        return [*self.primitives, *self.meshes, *self.planes]
+
+    @property
+    def poses(self) -> list[PoseMessage]:
+        """The poses that are given for these."""
+        return [*self.primitive_poses, *self.mesh_poses, *self.plane_poses]
+
     def places(self) -> list[pin.SE3]:
-        """Return the pose of each primitive in the frame of the object."""
-        return [each.build() for each in self.primitive_poses] or [pin.SE3.Identity()] * len(self.primitives)
+        """Return the pose of each shape in the frame of the object."""
+        return [
+            place
+            for _, solids, _, poses in self._lists()
+            for place in [each.build() for each in poses] or [pin.SE3.Identity()] * len(solids)
+        ]
+
+    def _lists(self) -> Iterator[tuple[str, Sequence[Solid], str, list[PoseMessage]]]:
+        """Yield the shapes of each kind and their poses, with the keys of both."""
+        yield "primitives", self.primitives, "primitive_poses", self.primitive_poses
+        yield "meshes", self.meshes, "mesh_poses", self.mesh_poses
+        yield "planes", self.planes, "plane_poses", self.plane_poses
 
 
 class AllowedMatrix(Message):
@@ -353,7 +418,7 @@ class SceneMessage(Message):
 
     says_nothing = ("name", "object_colors")
 
-    robot_model_name: Name
+    robot_model_name: str  # may be empty, for any robot
     robot_state: RobotState = RobotState()
     fixed_frame_transforms: list[FixedFrame] = Field(default_factory=list)
     allowed_collision_matrix: AllowedMatrix = AllowedMatrix()

@@ -30,9 +30,9 @@ from rrtik_ompl.problem_files.moveit_messages import (
     CollisionObject,
     FixedFrame,
     PlacedOctomap,
-    Primitive,
     RobotState,
     SceneMessage,
+    Solid,
 )
 
 OCTOMAP = "<octomap>"  # MoveIt's name for the map
@@ -45,7 +45,7 @@ class _Object:
     """An object: its pose in the world, its shapes with their poses in it, and the poses of its subframes in it."""
 
     pose: pin.SE3
-    shapes: list[tuple[Primitive, pin.SE3]] = field(default_factory=list)
+    shapes: list[tuple[Solid, pin.SE3]] = field(default_factory=list)
     parts: dict[str, pin.SE3] = field(default_factory=dict)
 
 
@@ -184,18 +184,18 @@ class SceneReader:
         header = self._frames.pose(item.header.frame_id)
         if item.pose.given:
             known.pose = header * item.pose.build()
-        elif len(item.primitive_poses) == len(known.shapes):
+        elif len(item.poses) == len(known.shapes):
             known.pose = header
-            places = [place.build() for place in item.primitive_poses]
+            places = [place.build() for place in item.poses]
             known.shapes = [(solid, place) for (solid, _), place in zip(known.shapes, places, strict=True)]
         else:
-            raise InputError(f"'{item.id}': to move it, give its pose, or a pose for each of its primitives")
+            raise InputError(f"'{item.id}': to move it, give its pose, or a pose for each of its shapes")
 
     def _built(self, item: CollisionObject) -> _Object:
         """Return the object that a message describes."""
         pose = self._frames.pose(item.header.frame_id) * item.pose.build()
         parts = dict(zip(item.subframe_names, [each.build() for each in item.subframe_poses], strict=True))
-        return _Object(pose, list(zip(item.primitives, item.places(), strict=True)), parts)
+        return _Object(pose, list(zip(item.solids, item.places(), strict=True)), parts)
 
     def _attach(self, item: AttachedMessage) -> None:
         """Attach an object to a link: the one in the message, or the one in the world that it names."""
@@ -208,12 +208,12 @@ class SceneReader:
 
         # The shapes come with the message, or from an object of the world with this name.
         name = item.object.id
-        if item.object.primitives:
+        if item.object.solids:
             taken = self._built(item.object)
         elif name in self._objects:
             taken = self._objects[name]
         else:
-            raise InputError(f"'{name}' has no primitives, and the world has no object of that name")
+            raise InputError(f"'{name}' has no shapes, and the world has no object of that name")
 
         # The object leaves the world.
         self._objects.pop(name, None)

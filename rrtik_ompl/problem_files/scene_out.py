@@ -1,6 +1,6 @@
-"""Write scenes for others: MuJoCo's MJCF, and the ``.scene`` text of MoveIt and RViz.
+"""Write scenes for others: MuJoCo's MJCF, the ``.scene`` text of MoveIt and RViz, and MoveIt's PlanningScene.
 
-Both have obstacles alone. What neither can state, attached objects, motions, margins and contacts, is named in one
+All have obstacles alone. What they cannot state, attached objects, motions, margins and contacts, is named in one
 warning.
 """
 
@@ -18,11 +18,13 @@ from numpy.typing import ArrayLike
 
 from rrtik_ompl.base.errors import InputError, SceneWarning, at_most, few
 from rrtik_ompl.base.poses import turned_z
+from rrtik_ompl.files.strict_yaml import write_yaml
 from rrtik_ompl.files.text import file_name, write_text
 from rrtik_ompl.model.scene import Obstacle, Scene
 from rrtik_ompl.model.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, PointCloud, Prism, Shape, Sphere
 from rrtik_ompl.model.shapes.box_pile import BoxPile
 from rrtik_ompl.model.shapes.polygons import convex_parts
+from rrtik_ompl.problem_files.moveit_messages import SHAPE_NUMBERS
 
 MOST_PARTS = 20_000  # of all obstacles together
 FLAT = 1e-6  # of a mesh's extent: a vertex may lie so far before a face of a convex one
@@ -97,6 +99,32 @@ def write_scene_text(scene: Scene, file: str | os.PathLike[str]) -> None:
     write_text(file, "\n".join([*lines, "."]) + "\n")
 
 
+def write_planning_scene(scene: Scene, file: str | os.PathLike[str]) -> None:
+    """Write the obstacles of a scene as MoveIt's PlanningScene, in YAML with ROS's keys, in the frame "world".
+
+    Capsules, which MoveIt does not have, are written as their surface in triangles.
+
+    Raises:
+        InputError: If the scene has too many boxes or balls, or the file cannot be written.
+
+    Warns:
+        SceneWarning: If something cannot be stated; one line.
+    """
+    objects = []
+    for obstacle, parts in _parts(scene, file):
+        message: dict[str, Any] = {"header": {"frame_id": "world"}, "id": obstacle.name}
+        message["pose"] = _pose_message(obstacle.pose)
+        for part in parts:
+            solids, poses, solid = _solid_message(part.shape)
+            message.setdefault(solids, []).append(solid)
+            message.setdefault(poses, []).append(_pose_message(obstacle.pose.actInv(part.pose)))
+        objects.append(message)
+
+    _warn(scene, file, [])
+    name = file_name(file).stem
+    write_yaml(file, {"name": name, "robot_model_name": "", "world": {"collision_objects": objects}})
+
+
 WRITERS: dict[str, Callable[[Scene, str | os.PathLike[str]], None]] = {
     ".xml": write_mjcf_scene,
     ".mjcf": write_mjcf_scene,
@@ -164,9 +192,24 @@ def _shape_lines(shape: Shape) -> list[str]:
             return ["cylinder", _text([shape.radius, shape.length])]
         case HalfSpace():
             return ["plane", _text([*shape.normal, -shape.offset])]
-    vertices, triangles = (shape.vertices, shape.triangles) if isinstance(shape, Mesh) else shape.surface()
+    vertices, triangles = shape.surface()
     faces = [" ".join(map(str, row)) for row in np.asarray(triangles).tolist()]
     return ["mesh", f"{len(vertices)} {len(faces)}", *map(_text, vertices), *faces]
+
+
+def _solid_message(shape: Shape) -> tuple[str, str, dict[str, Any]]:
+    """Return a shape of a CollisionObject, after the keys under which it and its pose stand."""
+    if isinstance(shape, HalfSpace):
+        return "planes", "plane_poses", {"coef": [*shape.normal.tolist(), -shape.offset]}
+    if shape.moveit:
+        number = next(number for number, key in SHAPE_NUMBERS.items() if key == shape.key)
+        sizes = np.hstack([getattr(shape, name) for name in shape.moveit]).tolist()
+        return "primitives", "primitive_poses", {"type": number, "dimensions": sizes}
+
+    vertices, triangles = shape.surface()
+    corners = [{"vertex_indices": row} for row in np.asarray(triangles).tolist()]
+    points = [dict(zip("xyz", row, strict=True)) for row in np.asarray(vertices, dtype=np.float64).tolist()]
+    return "meshes", "mesh_poses", {"triangles": corners, "vertices": points}
 
 
 def _mesh_asset(assets: Element, name: str, mesh: Mesh) -> None:
@@ -195,6 +238,15 @@ def _place(pose: Any) -> dict[str, str]:  # noqa: ANN401 - pinocchio has no type
 def _pose_lines(pose: Any) -> list[str]:  # noqa: ANN401 - pinocchio has no types
     """Return a pose as two lines: a position, a quaternion x y z w."""
     return [_text(pose.translation), _text(pin.Quaternion(pose.rotation).coeffs())]
+
+
+def _pose_message(pose: Any) -> dict[str, dict[str, float]]:  # noqa: ANN401 - pinocchio has no types
+    """Return a pose as geometry_msgs/Pose."""
+    turn = pin.Quaternion(pose.rotation).coeffs().tolist()
+    return {
+        "position": dict(zip("xyz", pose.translation.tolist(), strict=True)),
+        "orientation": dict(zip("xyzw", turn, strict=True)),
+    }
 
 
 def _text(values: ArrayLike) -> str:

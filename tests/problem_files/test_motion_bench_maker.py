@@ -143,6 +143,7 @@ def test_a_pair_can_be_written_as_a_problem_file(pair, tmp_path):
 
 BAD_SCENES = {
     "unknown robot": (("crane\n", "crain\n"), "scene0007.yaml:1: robot_model_name: no robot 'crain'"),
+    "robot of no name": (("robot_model_name: crane", "robot_model_name: ''"), r"scene0007.yaml:1: robot_model_name: "),
     "robot missing": (("robot_model_name: crane\n", ""), "robot_model_name: missing"),
     "too few sizes": (("[1, 2, 3]", "[1, 2]"), r"scene0007\.yaml:7: .*collision_objects\[0\]: a box has 3 dimensions"),
     "unknown shape": (("type: sphere", "type: cone"), r"primitives\[0\]\.type: must be 'box', 'cylinder' or 'sphere'"),
@@ -152,7 +153,8 @@ BAD_SCENES = {
         ("frame_id: world", "frame_id: camera"),
         r"collision_objects\[1\]: no frame 'camera'; did you mean 'car'",
     ),
-    "mesh": (("header:", "meshes: [{}]\n      header:"), "'ball': meshes and planes are not read"),
+    "mesh": (("header:", "meshes: [{}]\n      header:"), "'ball' has 1 meshes, but 0 mesh_poses"),
+    "no plane": (("header:", "planes: [{coef: [1]}]\n      header:"), r"planes\[0\]\.coef"),
     "name twice": (("id: ball", "id: crate"), "'crate' is used 2 times"),
     "ragged table": (("[true, false, false]]", "[true, false]]"), "entry_values must be a table of 3 x 3"),
 }

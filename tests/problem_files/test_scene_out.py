@@ -4,6 +4,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 import pytest
+import yaml
 
 from rrtik_ompl.base.errors import InputError, SceneWarning
 from rrtik_ompl.cli.app import run
@@ -23,7 +24,7 @@ from rrtik_ompl.model.shapes import (
     same_shape,
 )
 from rrtik_ompl.problem_files.scene import load_scene
-from rrtik_ompl.problem_files.scene_out import write_mjcf_scene, write_scene_text
+from rrtik_ompl.problem_files.scene_out import write_mjcf_scene, write_planning_scene, write_scene_text
 
 WEDGE = Mesh(*Prism([[0.0, 0.0], [0.3, 0.0], [0.0, 0.2]], 0.1).surface())
 SHAPES = {
@@ -79,14 +80,17 @@ def test_mujoco_measures_the_distances_of_the_scene(tmp_path):
                 assert theirs < 1e-6, obstacle.name
 
 
-@pytest.mark.parametrize(("write", "name"), [(write_mjcf_scene, "room.xml"), (write_scene_text, "room.scene")])
+@pytest.mark.parametrize(
+    ("write", "name"),
+    [(write_mjcf_scene, "room.xml"), (write_scene_text, "room.scene"), (write_planning_scene, "room.yaml")],
+)
 def test_a_scene_comes_back(write, name, tmp_path):
     if name == "room.xml":
         pytest.importorskip("mujoco")  # reads meshes that stand in the file
     written = scene()
     write(written, tmp_path / name)
     again = load_scene(tmp_path / name)
-    kept = ("box", "ball", "can", "wedge") if name == "room.scene" else ("box", "ball", "can", "hose")
+    kept = ("box", "ball", "can", "hose") if name == "room.xml" else ("box", "ball", "can", "wedge")
     for each in kept:
         one, other = written.obstacle(each), again.obstacle(each)
         assert same_shape(one.shape, other.shape)
@@ -97,6 +101,16 @@ def test_a_scene_comes_back(write, name, tmp_path):
     assert plane.pose.rotation @ plane.shape.normal == pytest.approx(normal)
     assert plane.shape.offset + normal @ plane.pose.translation == pytest.approx(offset)
     assert set(SHAPES) <= set(again.names)
+
+
+def test_a_planning_scene_is_as_ros_writes_messages(tmp_path):
+    write_planning_scene(
+        Scene([Obstacle("can", Cylinder(0.05, 0.3), pin.SE3(np.eye(3), np.ones(3)))]), tmp_path / "a.yaml"
+    )
+    (can,) = yaml.safe_load((tmp_path / "a.yaml").read_text())["world"]["collision_objects"]
+    assert can["primitives"] == [{"type": 3, "dimensions": [0.3, 0.05]}]  # shape_msgs: CYLINDER, height before radius
+    assert can["pose"]["position"] == {"x": 1.0, "y": 1.0, "z": 1.0}
+    assert can["primitive_poses"][0]["orientation"] == {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}
 
 
 def test_what_cannot_be_written_is_named(tmp_path):
@@ -115,12 +129,16 @@ def test_what_cannot_be_written_is_named(tmp_path):
 def test_the_command_converts_scenes(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Scene([Obstacle("box", Box(0.1, 0.2, 0.3))]).save("scene.yaml")
-    for source, target in (
+    for source, target, *options in (
         ("scene.yaml", "a.xml"),
         ("a.xml", "b.scene"),
         ("b.scene", "c.yaml"),
         ("ur5_table", "d.xml"),
+        ("scene.yaml", "e.yaml", "--moveit"),
+        ("e.yaml", "f.scene"),
     ):
-        assert run(["convert", source, target]) == 0
+        assert run(["convert", source, target, *options]) == 0
+    assert run(["convert", "scene.yaml", "g.xml", "--moveit"]) == 2
+    assert load_scene("f.scene").obstacle("box").shape.size == pytest.approx([0.1, 0.2, 0.3])
     assert load_scene("c.yaml").obstacle("box").shape.size == pytest.approx([0.1, 0.2, 0.3])
     assert load_scene("d.xml").obstacles
