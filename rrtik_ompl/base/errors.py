@@ -63,6 +63,10 @@ class MissingFileError(InputError):
     """A file that another file names does not exist."""
 
 
+class EmptyMeshError(InputError):
+    """A mesh file is whole and holds no triangle."""
+
+
 class UnknownNameError(InputError):
     """A name does not exist; the error carries the names that do.
 

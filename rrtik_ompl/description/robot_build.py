@@ -220,8 +220,9 @@ def _followed(
     Returns:
         For each joint its limits by name: lower, upper, velocity, acceleration, jerk; infinite if there is none.
 
-    Raises:
-        InputError: If no value of an actuated joint is within its limits and those of a joint that follows it.
+    Warns:
+        DescriptionWarning: If no value of an actuated joint is within its limits and those of a joint that follows it;
+            the latter are then ignored, as MoveIt and RViz do.
     """
     own_limits = {joint.name: _own_limits(joint, given.get(joint.name)) for joint in movable.values()}
     limits = dict(own_limits)
@@ -233,11 +234,13 @@ def _followed(
         if narrowed["lower"] < narrowed["upper"]:
             limits[tie.source] = narrowed
         elif tie.source in actuated and leader["lower"] < leader["upper"]:
-            raise InputError(
+            message = (
                 f"robot '{name}': no value of joint '{tie.source}' within {leader['lower']:g} .. {leader['upper']:g} "
                 f"keeps joint '{tie.joint}', which follows it as {tie.multiplier:g} x + {tie.offset:g}, within its "
-                f"limits {follower['lower']:g} .. {follower['upper']:g}; correct the limits, or how it follows"
+                f"limits {follower['lower']:g} .. {follower['upper']:g}, which are ignored; correct them, or how it "
+                "follows"
             )
+            warnings.warn(DescriptionWarning(message), stacklevel=4)
     return limits
 
 

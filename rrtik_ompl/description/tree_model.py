@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -13,7 +14,7 @@ import numpy as np
 import pinocchio as pin
 
 from rrtik_ompl.base.copies import Once
-from rrtik_ompl.base.errors import InputError, MeshWarning, few
+from rrtik_ompl.base.errors import EmptyMeshError, InputError, MeshWarning, few
 from rrtik_ompl.description.shapes.materials import Colour, parts_by_colour
 from rrtik_ompl.description.shapes.mesh import load_surface
 from rrtik_ompl.description.tree import Joint, Link, MeshFile, Solid, Tree
@@ -64,11 +65,7 @@ def build_models(tree: Tree, T_world_base: pin.SE3 | None = None) -> tuple[Any, 
         _add_link(model, links[joint.child], places)
 
     meshes: dict[MeshFile, Any] = {}
-    hard = pin.GeometryModel()
-    for link in tree.links:
-        for number, solid in enumerate(link.collision):
-            geometry = _loaded(solid.shape, meshes, f"{tree.where}: link '{link.name}'")
-            hard.addGeometryObject(_body(link, number, solid, places[link.name], geometry, solid.colour))
+    hard = _collision(tree, places, meshes)
     drawn = (solid.shape for link in tree.links for solid in link.visual)
     files = tuple(str(shape.path) for shape in drawn if isinstance(shape, MeshFile))
     return model, hard, Looks(partial(_looks, tree, places, meshes), files)
@@ -144,6 +141,24 @@ def _add_link(model: pin.Model, link: Link, places: dict[str, _Place]) -> None:
         model.appendBodyToJoint(place.joint, link.inertia, place.T_joint_link)
 
 
+def _collision(tree: Tree, places: dict[str, _Place], meshes: dict[MeshFile, Any]) -> pin.GeometryModel:
+    """Return the collision geometry of a tree. A mesh without triangles touches nothing, and is left out."""
+    hard = pin.GeometryModel()
+    empty = []
+    for link in tree.links:
+        for number, solid in enumerate(link.collision):
+            try:
+                geometry = _loaded(solid.shape, meshes, f"{tree.where}: link '{link.name}'")
+            except EmptyMeshError as error:
+                empty.append(str(error).removeprefix(f"{tree.where}: "))
+            else:
+                hard.addGeometryObject(_body(link, number, solid, places[link.name], geometry, solid.colour))
+
+    if empty:
+        warnings.warn(MeshWarning(f"{tree.where}: touches nothing: {few(empty, MOST_UNDRAWN)}"), stacklevel=2)
+    return hard
+
+
 def _looks(tree: Tree, places: dict[str, _Place], meshes: dict[MeshFile, Any]) -> pin.GeometryModel:
     """Return the visual geometry of a tree, with a body for each colour of a mesh.
 
@@ -159,7 +174,9 @@ def _looks(tree: Tree, places: dict[str, _Place], meshes: dict[MeshFile, Any]) -
                 bodies.append((solid, _loaded(solid.shape, meshes, f"link '{link.name}'")))
             except InputError as error:
                 undrawn.append(str(error))
-        bodies = bodies or [(solid, _loaded(solid.shape, meshes, tree.where)) for solid in link.collision]
+        for solid in () if bodies else link.collision:
+            with suppress(EmptyMeshError):
+                bodies.append((solid, _loaded(solid.shape, meshes, tree.where)))
 
         number = 0
         for solid, geometry in bodies:
@@ -214,5 +231,5 @@ def _loaded(shape: Shape | MeshFile, meshes: dict[MeshFile, Any], where: str) ->
     try:
         meshes[mesh] = load_surface(mesh.path, np.array(mesh.scale))
     except InputError as error:
-        raise InputError(f"{where}: {error}") from error
+        raise type(error)(f"{where}: {error}") from error
     return meshes[mesh]

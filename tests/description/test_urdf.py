@@ -375,7 +375,6 @@ BAD_MESHES = {
     "empty.stl": b"",
     "noise.stl": bytes(range(256)) * 2,
     "huge_count.stl": b"\0" * 80 + struct.pack("<I", 2**31) + b"\0" * 50,
-    "no_triangle.stl": b"\0" * 80 + struct.pack("<I", 0),
     "nan.stl": b"\0" * 80 + struct.pack("<I", 1) + struct.pack("<12f", *[np.nan] * 12) + b"\0\0",
     "cut_off.stl": b"solid x\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\n",
     "nan.obj": b"v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n",

@@ -16,7 +16,7 @@ import coal
 import numpy as np
 
 from rrtik_ompl.base.arrays import Vector, bounded_array, distinct, positive
-from rrtik_ompl.base.errors import InputError, MeshWarning
+from rrtik_ompl.base.errors import EmptyMeshError, InputError, MeshWarning
 from rrtik_ompl.description.package_path import MESH_SUFFIXES
 from rrtik_ompl.description.shapes.by_trimesh import joined, meshes_in, triangles_of
 from rrtik_ompl.files.notice import tell_once
@@ -87,6 +87,8 @@ def load_surface(path: Path, scale: Vector) -> coal.BVHModelBase:
         tell_once(f"reading {path}, {len(data) / 1e6:.0f} MB: about ten seconds for a million triangles")
 
     kind = path.suffix.lower()
+    if kind == ".stl" and len(data) in (80, 84) and not any(data[80:]):
+        raise EmptyMeshError(f"{path}: not a usable mesh: no triangles in it; {AGAIN}")
     if kind == ".stl" and len(data) != _length_of_stl(data):
         return _by_ourselves(path, data, scale)
     if not _finite(data, kind):

@@ -444,3 +444,23 @@ def test_who_reads_a_large_mesh_is_told_that_it_takes_long(tmp_path, monkeypatch
     file.write_bytes(stl_binary())
     Mesh.load(file)
     assert told == [f"reading {file}, 0 MB: about ten seconds for a million triangles"]
+
+
+@pytest.mark.parametrize("data", [bytes(80), bytes(84)], ids=["80 bytes", "84 bytes"])
+def test_a_link_whose_mesh_has_no_triangles_touches_nothing_and_is_said_so(data, tmp_path):
+    """Kinova's end effector has such a mesh: the header of an STL alone."""
+    (tmp_path / "empty.stl").write_bytes(data)
+    mesh = '<geometry><mesh filename="empty.stl"/></geometry>'
+    text = f"""<robot name="r"><link name="base"/><link name="a"><collision>{mesh}</collision>
+<collision><geometry><sphere radius="0.1"/></geometry></collision><visual>{mesh}</visual></link>
+<link name="b"><collision>{mesh}</collision></link>
+<joint name="j" type="revolute"><parent link="base"/><child link="a"/>
+<limit lower="-1" upper="1" velocity="1" effort="1"/></joint>
+<joint name="k" type="fixed"><parent link="a"/><child link="b"/></joint></robot>"""
+    with pytest.warns(MeshWarning, match=r"touches nothing: link 'a': .*empty\.stl: .*no triangles.*link 'b'"):
+        robot = robot_from_urdf_text(text, folder=tmp_path)
+    assert [body.name for body in robot.collision.geometryObjects] == ["a_1"]
+    with pytest.warns(MeshWarning, match="not drawn: link 'a'"):
+        assert robot.visual.ngeoms == 1
+    with pytest.raises(InputError, match="no triangles"):
+        Mesh.load(tmp_path / "empty.stl")
