@@ -125,7 +125,7 @@ class JointPath(Rows):
         """
         require(robot, Robot, "robot of a path")
         rows = finite_array(waypoints, (None, robot.dof), f"path waypoints of robot '{robot.name}'")
-        return path_through(_at_zero(robot), usable_waypoints(robot.onto_limits(rows)))
+        return path_of(robot, usable_waypoints(robot.onto_limits(rows)))
 
     def with_waypoints(self, waypoints: ArrayLike) -> JointPath:
         """Return a path of the same joints with other waypoints, shape (k, n), and without a proof.
@@ -318,6 +318,11 @@ class JointPath(Rows):
 def path_through(path: JointPath, rows: Matrix) -> JointPath:
     """Return a path with other waypoints, as :meth:`JointPath.with_waypoints` but without validation."""
     return changed(path, waypoints=frozen(rows), proof=None)
+
+
+def path_of(robot: Robot, rows: Matrix, proof: Proof | None = None) -> JointPath:
+    """Return a path of a robot, as :meth:`JointPath.of` but without validation; rows are within the limits."""
+    return changed(_at_zero(robot), waypoints=frozen(rows), proof=proof)
 
 
 @kept_with

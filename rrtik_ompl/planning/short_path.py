@@ -31,9 +31,9 @@ from rrtik_ompl.kernels.search.connect_layout import KERNELS as SEARCH_KERNELS
 from rrtik_ompl.kernels.search.contacts.layout import KERNELS as PULL_KERNELS
 from rrtik_ompl.kernels.search.contacts.pulling import Pulling
 from rrtik_ompl.kernels.warming import load_together
-from rrtik_ompl.model.path import JointPath
-from rrtik_ompl.model.proof import Proof
-from rrtik_ompl.model.transitions import route_length
+from rrtik_ompl.model.goal import has_continuous
+from rrtik_ompl.model.path import JointPath, path_of
+from rrtik_ompl.model.transitions import length_of
 from rrtik_ompl.ompl_bridge.planner_traits import traits_of
 from rrtik_ompl.ompl_bridge.setup import planning_bounds
 from rrtik_ompl.ompl_bridge.weighted import has_weights
@@ -139,8 +139,7 @@ def short_path(problem: Problem, request: Request, *, pull: bool) -> Plan | None
 
     def proved(waypoints: Matrix) -> JointPath:
         """Return a route that kernels have proven as a path."""
-        proof = Proof(len(waypoints) - 1, clearance, (), world.prover.margin, maker=world.prover)
-        return JointPath.of(problem.robot, waypoints).with_proof(proof)
+        return path_of(problem.robot, waypoints, motions.proof(waypoints, clearance))
 
     own = proved(best.found)
     shortened = pull and len(best.found) > 2
@@ -177,8 +176,12 @@ def _goals(problem: Problem, budget: Budget) -> Matrix | None:
     at_goal = problem.reached(problem.start) if q is None else bool((problem.start == q).all())
     if at_goal:
         return None
+    if q is not None and not has_continuous(problem.robot):
+        return q[None]
     found = GoalSearch(problem, budget.seed, seconds_left=lambda: budget.left).first()
-    return nearest_rows(problem, found)[:MOST_GOALS] if len(found) else None
+    if len(found) == 0:
+        return None
+    return problem.robot.onto_limits(nearest_rows(problem, found)[:MOST_GOALS])
 
 
 @contextmanager
@@ -245,10 +248,10 @@ def _search(start: Vector, goal: Vector, seed: int, tools: Tools, budget: Budget
         counts["rejected"] += 1
         return
     found = route.waypoints
-    length = route_length(found)
+    length = length_of(found)
     if len(found) > 2:
         route.run(work=BRIEF_WORK, stop=_at_once)
-        length = route_length(route.waypoints)
+        length = length_of(route.waypoints)
     if length < best.length:
         best.route = route
         best.found = found
