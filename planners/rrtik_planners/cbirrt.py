@@ -10,14 +10,13 @@ from rrtik_ompl.base.arrays import Matrix, Vector, positive
 from rrtik_ompl.base.budget import iteration_limit
 from rrtik_ompl.constraints.held_regions import HeldRegions
 from rrtik_ompl.constraints.walls import separation
-from rrtik_ompl.ik.held_tables import HeldTables, held_tables, projected_onto, shortest_step
-from rrtik_ompl.kernels.search.connect_lengths import connect_lengths
+from rrtik_ompl.ik.held_tables import HeldTables, held_tables
 from rrtik_ompl.kernels.search.constrained.layout import KERNELS
 from rrtik_ompl.kernels.search.constrained.search import ConstrainedSearch
 from rrtik_ompl.kernels.search.motions.motion_table import NO_LIMIT, FastMotions
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SafePlanner, SearchResult, Stop
 from rrtik_ompl.ompl_bridge.bindings import ob
-from rrtik_ompl.planning.search.along_constraints import AlongConstraints, AlongRules
+from rrtik_ompl.planning.search.along_constraints import AlongConstraints, rules_along
 from rrtik_ompl.world.motion_queries import HoldingQueries, decider, has_kernels, keeps_constraints
 from rrtik_planners.fast_rrt_connect import python_rules, search_in_python, sound_tree
 
@@ -83,18 +82,9 @@ class CBiRRT(SafePlanner):
     ) -> SearchResult:
         """Search in Python."""
         robot = world.robot
-        constraints = world.constraints
         lower, upper = self.bounds()
-        lower = np.maximum(lower, robot.lower)
-        upper = np.minimum(upper, robot.upper)
-        longest, _ = connect_lengths(lower, upper, self.range, None, turning=np.ones(robot.dof, dtype=bool))
-
-        def projected(row: Vector) -> Vector | None:
-            found = projected_onto(robot, constraints, row[None])
-            return found[0] if len(found) else None
-
-        shortest = min(shortest_step(constraints), longest)
-        rules = AlongRules(lower, upper, longest, shortest, projected, checker.motion_valid)
+        box = np.maximum(lower, robot.lower), np.minimum(upper, robot.upper)
+        rules = rules_along(robot, world.constraints, box, self.range, checker.motion_valid)
         search = AlongConstraints(starts, goals, rules, self.rng)
         limit = np.inf if self.max_iterations is None else self.max_iterations
         first = min(limit, PLAIN_SAMPLES)

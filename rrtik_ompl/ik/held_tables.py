@@ -42,14 +42,11 @@ class HeldTables:
         self.regions = constraints.regions
         self._limbs = limbs
         dof = robot.dof
-        tables = [_region_tables(*pair) for pair in zip(constraints.regions, limbs, strict=True)]
-        addresses = [region.address for region, _ in tables]
-        self._parts = [part for parts in tables for part in parts]
-
+        tables = [_region_table(*pair) for pair in zip(constraints.regions, limbs, strict=True)]
         self.held = packed(
             HeldTable,
-            count=len(addresses),
-            regions=np.array(addresses, dtype=np.int64),
+            count=len(tables),
+            regions=tables,
             dof=dof,
             lower=np.asarray(robot.lower),
             upper=np.asarray(robot.upper),
@@ -87,11 +84,13 @@ class HeldTables:
 
     def intact(self) -> bool:
         """Check that no kernel has written beyond an array."""
-        return all(part.intact() for part in (self.held, *self._parts, *self._limbs))
+        regions = self.held.regions
+        parts = self.held, *regions, *(region.call for region in regions), *self._limbs
+        return all(part.intact() for part in parts)
 
 
-def _region_tables(region: HeldRegion, limb: LimbTable) -> tuple[RegionTable, CallTable]:
-    """Return the table of a region, and that of the memory for its frames, which must live as long.
+def _region_table(region: HeldRegion, limb: LimbTable) -> RegionTable:
+    """Return the table of a region, which keeps the memory for its frames.
 
     Args:
         region: The region.
@@ -108,8 +107,7 @@ def _region_tables(region: HeldRegion, limb: LimbTable) -> tuple[RegionTable, Ca
         frames=np.zeros(ik_layout.POSE_NUMBERS * (limb.joints + 1)),
     )
 
-    made = packed(RegionTable, limb=limb, call=call, turning=int(region.turning), record=_record(region))
-    return made, call
+    return packed(RegionTable, limb=limb, call=call, turning=int(region.turning), record=_record(region))
 
 
 def _record(region: HeldRegion) -> Matrix:

@@ -182,6 +182,7 @@ def test_detours_lead_around_what_is_not_proven():
     assert mended >= 5
 
 
+@pytest.mark.kernels
 def test_detours_ask_kernels_alone_where_these_prove_a_way_round(monkeypatch):
     """Two links of meshes are left to coal, milliseconds a motion; kernels find the detour between proven waypoints."""
     world = disc_world((5.0, 2.0 - 0.3 + 0.0005 - 0.5, 1.0, 1.0))
@@ -196,7 +197,9 @@ def test_detours_ask_kernels_alone_where_these_prove_a_way_round(monkeypatch):
 
 def test_the_same_seed_gives_the_same_repaired_path():
     problem = rrtik.load_problem("planar3_boxes")
-    first, second = (plan(problem, og.RRTConnect, seed=4, clearance=0.02).path.waypoints for _ in range(2))
+    first, second = (
+        plan(problem, og.RRTConnect, seed=4, seconds=60.0, clearance=0.02).path.waypoints for _ in range(2)
+    )
     assert (first == second).all()
 
 

@@ -30,6 +30,7 @@ def arm_scenes():
     return robot, scenes
 
 
+@pytest.mark.kernels
 def test_a_moved_world_answers_as_a_new_one():
     robot, scenes = arm_scenes()
     moving = MovingWorld(World(robot, scenes[0]))

@@ -119,11 +119,14 @@ def test_what_moves_the_tip_needs_no_kernels():
 
 
 @pytest.mark.usefixtures("without_kernels")
-def test_paths_keep_constraints_without_kernels():
+def test_paths_keep_constraints_and_are_shortened_along_them_without_kernels():
     problem = rrtik.load_problem("ur5_upright")
-    plan = rrtik.plan(problem, seed=1)
+    plan = rrtik.plan(problem, seed=1, seconds=60.0, shorten=False)
     assert plan.proven
-    A, B = plan.path.waypoints[:-1], plan.path.waypoints[1:]
+    path = rrtik.shorten(plan.path, problem)
+    assert path.proof.proven
+    assert path.length < 0.5 * plan.path.length
+    A, B = path.waypoints[:-1], path.waypoints[1:]
     assert problem.world.constraints.motions_held(A, B).all()
     assert not cut(problem.world, A, B).any()
 

@@ -7,6 +7,7 @@ interval ends the proof of its motion there, because no shorter interval could c
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -284,36 +285,39 @@ class _Proof:
         apart = np.zeros(len(one), dtype=bool)
         normals = np.zeros((len(one), 3))
 
-        # Beyond a half-space: its own plane.
-        axes = self._sizes[other, layout.DISC_AXIS : layout.DISC_AXIS + 3]
         of_half_space = self._solids[other, layout.SOLID_KIND] == HALF_SPACE
-        beside = np.flatnonzero(of_half_space)
-        if len(beside):
-            core = self._core(one[beside], ends.first_begin, ends.first_end, beside)
-            low = (core.farthest(-axes[beside]) * axes[beside]).sum(axis=1)
-            height = low - self._sizes[other[beside], layout.DISC] - self._sizes[one[beside], layout.ROUND]
-            apart[beside] = height > wanted[beside]
-            normals[beside] = axes[beside]
+        for some in self._batches(one, other, of_half_space):
+            first = self._core(one[some], ends.first_begin, ends.first_end, some)
+            around = self._sizes[one[some], layout.ROUND]
+            if of_half_space[some[0]]:
+                axes = self._sizes[other[some], layout.DISC_AXIS : layout.DISC_AXIS + 3]
+                low = (first.farthest(-axes) * axes).sum(axis=1)
+                gaps = low - self._sizes[other[some], layout.DISC] - around
+                normals[some] = axes
+            else:
+                second = self._core(other[some], ends.second_begin, ends.second_end, some)
+                around = around + self._sizes[other[some], layout.ROUND]
+                gaps, normals[some] = best_planes(first, second, around, wanted[some], ways[some])
+            apart[some] = gaps > wanted[some]
+        return apart, normals
 
-        # Solids of few corners are not compared in arrays that are as wide as those of many.
+    def _batches(self, one: Numbers, other: Numbers, of_half_space: Mask) -> Iterator[Numbers]:
+        """Divide pairs of solids into those beside half-spaces and others, and these further, to bound memory.
+
+        Solids of few corners are not compared in arrays that are as wide as those of many.
+        """
         spans = self._solids[:, layout.END_BLOCK] - self._solids[:, layout.FIRST_BLOCK]
         widest = np.maximum(spans[one], spans[other])
         classes = np.ceil(np.log2(np.maximum(widest, 1))).astype(np.int64)
         if len(one) * int(widest.max()) * WIDTH <= MOST_CORNERS:
             classes[:] = 0
-        for number in np.unique(classes[~of_half_space]).tolist():
-            rows = np.flatnonzero((classes == number) & ~of_half_space)
+
+        groups = 2 * classes + of_half_space
+        for group in np.unique(groups).tolist():
+            rows = np.flatnonzero(groups == group)
             at_once = max(1, MOST_CORNERS // (WIDTH * int(widest[rows].max())))
             for begin in range(0, len(rows), at_once):
-                some = rows[begin : begin + at_once]
-                cores = (
-                    self._core(one[some], ends.first_begin, ends.first_end, some),
-                    self._core(other[some], ends.second_begin, ends.second_end, some),
-                )
-                around = self._sizes[one[some], layout.ROUND] + self._sizes[other[some], layout.ROUND]
-                gaps, normals[some] = best_planes(*cores, around, wanted[some], ways[some])
-                apart[some] = gaps > wanted[some]
-        return apart, normals
+                yield rows[begin : begin + at_once]
 
     def _core(self, solids: Numbers, begin: Poses, end: Poses, rows: Numbers) -> Core:
         """Return the cores of solids at both ends of intervals, of which ``rows`` are the numbers."""

@@ -12,6 +12,10 @@ import numpy as np
 
 from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.base.budget import Stop
+from rrtik_ompl.constraints.held_regions import HeldRegions
+from rrtik_ompl.ik.held_tables import projected_onto, shortest_step
+from rrtik_ompl.kernels.search.connect_lengths import connect_lengths
+from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.planning.search.rrt_connect import ConfigurationTree, path_between
 from rrtik_ompl.world.motion_queries import MotionFree
 
@@ -37,6 +41,31 @@ class AlongRules:
     shortest: float
     projected: Callable[[Vector], Vector | None]
     motion_free: MotionFree
+
+
+def rules_along(
+    robot: Robot,
+    constraints: HeldRegions,
+    box: tuple[Vector, Vector],
+    range_: float | None,
+    motion_free: MotionFree,
+) -> AlongRules:
+    """Return the rules of a search along an arm's path constraints.
+
+    Args:
+        robot: The arm.
+        constraints: What its configurations keep.
+        box: Bounds of the configurations, shape (n,) each.
+        range_: Longest step [unit of the configurations]; what suits the box if None.
+        motion_free: Checks whether a straight motion is free and keeps the constraints.
+    """
+    longest, _ = connect_lengths(*box, range_, None, turning=np.ones(robot.dof, dtype=bool))
+
+    def projected(row: Vector) -> Vector | None:
+        found = projected_onto(robot, constraints, row[None])
+        return found[0] if len(found) else None
+
+    return AlongRules(*box, longest, min(shortest_step(constraints), longest), projected, motion_free)
 
 
 class AlongConstraints:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from rrtik_ompl.kernels.ik.ik_layout import CallTable, LimbTable, StepRules, Twist
 from rrtik_ompl.kernels.layout import Configuration
-from rrtik_ompl.kernels.record import Doubles, Record, Wholes
+from rrtik_ompl.kernels.record import Doubles, Record, Tables
 from rrtik_ompl.kernels.search.two_trees_layout import TwoTreesTable
 
 KERNELS = "search.constrained.kernels"  # the library of these searches
@@ -17,7 +17,7 @@ class HeldTable(StepRules):
     """Path constraints."""
 
     count: int  # regions
-    regions: Wholes  # addresses of their tables
+    regions: Tables
     per_radian: float
     columns: Twist  # scratch memory: 6 numbers for each coordinate
     square: Doubles  # matrix

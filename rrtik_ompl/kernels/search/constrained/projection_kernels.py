@@ -15,7 +15,7 @@ from rrtik_ompl.kernels.ik.damped_steps import move_by, solve_in_place
 from rrtik_ompl.kernels.ik.ik_accessors import column_at, pose_column, pose_entry, pose_origin
 from rrtik_ompl.kernels.ik.ik_kinematics import move_tip, set_columns
 from rrtik_ompl.kernels.ik.ik_layout import ANGULAR, AS_ANGLES, LINEAR, NO_TURN, TWIST_NUMBERS, Pose
-from rrtik_ompl.kernels.record import Wholes
+from rrtik_ompl.kernels.record import Tables
 from rrtik_ompl.kernels.search.constrained import layout
 from rrtik_ompl.kernels.search.constrained.layout import HeldTable, RegionRecord, RegionTable
 from rrtik_ompl.kernels.search.motions.row_kernels import Configuration
@@ -28,7 +28,7 @@ SHARE = 0.5  # of the squared residual, that is added to the damping
 TURN = 2.0 * math.pi
 BEHIND = 2.0  # measure of an axis that points more than a quarter turn away
 SMALL = 1e-12  # sine of an angle below which its axis is not known
-_region_at: Callable[[Wholes, int], RegionTable] = table_reader(RegionTable)
+_region_at: Callable[[Tables, int], RegionTable] = table_reader(RegionTable)
 
 
 # Projection.
