@@ -36,6 +36,8 @@ _CORNER = re.compile(rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)", re.IGNORECASE)
 _VERTEX = re.compile(rb"^([ \t]*v[ \t]+)(\S+)[ \t]+(\S+)[ \t]+(\S+)", re.MULTILINE)
 _OF_SEVERAL = (".obj", ".dae", ".glb", ".gltf")  # kinds of files that may hold several parts
 _PART = re.compile(rb"^[ \t]*(usemtl|mtllib|g|o)\b.*$", re.MULTILINE)
+# Begins a PLY that assimp does not read.
+_FACES_FIRST = re.compile(rb"ply\b(?:(?!\nelement vertex\b|\nend_header\b)[\s\S])*?\nelement face\b")
 # Matches nan, inf, and numbers that overflow float32 (in which assimp reads), in a text file.
 _NOT_FINITE = re.compile(
     rb"[\s>][-+]?(?:(?:nan|inf)(?:inity)?|[0-9.]+e\+?0*(?:[0-9]{3,}|[4-9][0-9]|39)|[0-9]{39,}[0-9.]*)(?=[\s<]|$)",
@@ -95,7 +97,7 @@ def load_surface(path: Path, scale: Vector) -> coal.BVHModelBase:
         raise InputError(f"{path}: not a usable mesh: it holds numbers that are not finite; export it again")
 
     scale = scale * stated_unit(path, data)
-    surface = _by_assimp(path, scale)
+    surface = _by_trimesh(path, scale) if kind == ".ply" and _FACES_FIRST.match(data) else _by_assimp(path, scale)
     if kind in _OF_SEVERAL and _unused(surface):
         surface = _of_one_part(data, scale) if kind == ".obj" else _by_trimesh(path, scale)
     size = np.abs(bounded_array(surface.vertices(), (None, 3), f"{path}: vertices")).max(axis=0) / np.abs(scale)
@@ -134,7 +136,8 @@ def _of_one_part(data: bytes, scale: Vector) -> coal.BVHModelBase:
 
 
 def _by_trimesh(path: Path, scale: Vector) -> coal.BVHModelBase:
-    pieces = [triangles_of(mesh) for mesh in meshes_in(path, f"{path}: its several parts")]
+    what = "its faces, which stand before its vertices," if path.suffix.lower() == ".ply" else "its several parts"
+    pieces = [triangles_of(mesh) for mesh in meshes_in(path, f"{path}: {what}")]
     return bvh(*joined(pieces, scale))
 
 

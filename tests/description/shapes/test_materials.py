@@ -13,6 +13,7 @@ from rrtik_ompl.description.shapes import by_trimesh
 from rrtik_ompl.description.shapes.mesh import load_surface
 from rrtik_ompl.description.urdf import robot_from_urdf_text
 from rrtik_ompl.geometry.collision.solids import mesh_arrays
+from rrtik_ompl.model.shapes import Mesh
 
 pytest.importorskip("trimesh")
 pytest.importorskip("collada")
@@ -188,3 +189,20 @@ def test_parts_that_cannot_be_read_are_refused(tmp_path, monkeypatch):
     monkeypatch.setattr(by_trimesh, "find_spec", lambda name: None)
     with pytest.raises(InputError, match=r"its several parts need trimesh and pycollada: pip install"):
         load_surface(file, np.ones(3))
+
+
+@pytest.mark.parametrize("order", ["ascii", "binary_little_endian"])
+def test_a_ply_may_have_its_faces_before_its_vertices(order, tmp_path):
+    head = f"ply\nformat {order} 1.0\nelement face 4\nproperty list uchar int vertex_indices\nelement vertex 4\n"
+    head += "property float x\nproperty float y\nproperty float z\nend_header\n"
+    if order == "ascii":
+        body = (
+            "\n".join(" ".join(map(str, row)) for row in [*([3, *face] for face in FACES), *CORNERS]).encode() + b"\n"
+        )
+    else:
+        body = b"".join(b"\3" + face.astype("<i4").tobytes() for face in FACES) + CORNERS.astype("<f4").tobytes()
+    (tmp_path / "part.ply").write_bytes(head.encode() + body)
+
+    solid = Mesh.load(tmp_path / "part.ply")
+    assert solid.closed
+    assert solid.vertices.tolist() == sorted(CORNERS.tolist())
