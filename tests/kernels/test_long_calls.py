@@ -42,6 +42,7 @@ ONE_THING = {  # one pose, one query, one path, or one solid whose cover is made
     "ik.pose_kernels": ("nearest_branch", "all_branches", "walk_to_pose"),
     "search.connect_kernels": ("keep_path", "rows_free"),
     "search.constrained.kernels": ("reject", "connect"),
+    "search.contacts.kernels": ("begin",),
     "search.repair_kernels": ("finish",),
     "search.roadmap.kernels": ("insert", "doubt", "pose", "forget_query", "begin", "answer"),
     "timing.kernels": ("sample_curve", "find_squares"),

@@ -74,7 +74,7 @@ def test_every_robot_has_a_readme_with_sources_and_licence():
 
 
 def test_the_package_that_is_absent_is_named(monkeypatch):
-    monkeypatch.setattr(example_arms, "PACKAGE", "no-such-package")
+    monkeypatch.setattr(example_arms, "INSIDE", "no-such-folder")
     with pytest.raises(example_arms.InputError, match="pip install"):
         example_arms.panda()
 

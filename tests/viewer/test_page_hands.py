@@ -70,7 +70,7 @@ def test_a_finger_drags_the_goal(text: str, tmp_path: Path) -> None:
         x, y = browser.ask(GOAL_ON_SCREEN)
         for kind, points in (
             ("touchStart", [{"x": x, "y": y}]),
-            *(("touchMove", [{"x": x + 2 * k, "y": y + 2 * k}]) for k in range(1, 8)),
+            *(("touchMove", [{"x": x - 2 * k, "y": y - 2 * k}]) for k in range(1, 8)),
             ("touchEnd", []),
         ):
             browser.call("Input.dispatchTouchEvent", type=kind, touchPoints=points)
