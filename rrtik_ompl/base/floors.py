@@ -31,6 +31,8 @@ FLOORS = {
     "ompl": ("ompl", "2.0.1"),
     "meshcat": ("meshcat", "0.3.2"),
     "rich": ("rich", "13.9.4"),
+    "trimesh": ("trimesh", "4.6.0"),
+    "collada": ("pycollada", "0.8"),
 }
 EVERYWHERE = ("numpy", "pinocchio", "coal")  # in all that this package does
 # Libraries that the wheels of pin 3 were linked with, though they admit newer ones, which then are not found.

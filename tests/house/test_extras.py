@@ -8,7 +8,6 @@ import pytest
 from rrtik_ompl import load_robot
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.base.floors import FLOORS
-from rrtik_ompl.description.shapes.by_trimesh import meshes_in
 from rrtik_ompl.many.spread import cluster
 from rrtik_ompl.motion.trajectory.text import write_mcap
 from rrtik_tests.places import ROOT
@@ -41,7 +40,6 @@ NEEDED_BY = {
     "mcap": lambda folder: write_mcap(folder / "a.mcap", "robot", ["a"], []),
     "distributed": lambda folder: next(cluster([], "tcp://nowhere:1")),
     "mujoco": mjcf,
-    "trimesh": lambda folder: meshes_in(folder / "a.obj", "colours of meshes"),
     "xacro": xacro,
 }
 
@@ -65,7 +63,7 @@ def test_an_extra_that_is_missing_is_named_with_its_command(package, tmp_path, m
     with pytest.raises(InputError, match=r"^[^\n]*pip install [^\n]*$") as caught:
         NEEDED_BY[package](tmp_path)
     named = re.findall(r"pip install '?([\w\[\]-]+)", str(caught.value))
-    assert named in ([package], [f"rrtik-ompl[{package}]"], ["rrtik-ompl[cluster]"], ["rrtik-ompl[looks]"])
+    assert named in ([package], [f"rrtik-ompl[{package}]"], ["rrtik-ompl[cluster]"])
 
 
 @pytest.mark.parametrize("folder", ["rrtik_ompl", "planners", "robots", "bench", "docs", "examples"])

@@ -1,8 +1,7 @@
-"""Read mesh files by trimesh (and pycollada for DAE), an extra, for what coal's reader does not tell or misreads."""
+"""Read mesh files by trimesh (and pycollada for DAE) for what coal's reader does not tell or misreads."""
 
 from __future__ import annotations
 
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,21 +14,16 @@ from rrtik_ompl.model.shapes.surfaces import Triangles
 if TYPE_CHECKING:
     from trimesh import Trimesh
 
-REMEDY = "pip install 'rrtik-ompl[looks]'"
 
-
-def meshes_in(path: Path, purpose: str) -> list[Trimesh]:
+def meshes_in(path: Path) -> list[Trimesh]:
     """Return the meshes of a file as trimesh has them, each where its node puts it, in units of the file.
 
     Args:
         path: The file.
-        purpose: What they are read for, for messages: "colours of meshes".
 
     Raises:
-        InputError: If trimesh or pycollada is missing, or cannot read the file.
+        InputError: If trimesh cannot read the file.
     """
-    if find_spec("trimesh") is None or (path.suffix.lower() == ".dae" and find_spec("collada") is None):
-        raise InputError(f"{purpose} need trimesh and pycollada: {REMEDY}")
     import trimesh
 
     try:

@@ -52,7 +52,7 @@ def parts_by_colour(
         surface: The whole mesh, as :func:`load_surface` returns it.
 
     Raises:
-        InputError: If trimesh is missing, cannot read the file, or reads another shape.
+        InputError: If trimesh cannot read the file, or reads another shape.
     """
     kind = path.suffix.lower()
     data = read_bytes(path, MAX_BYTES)
@@ -80,9 +80,9 @@ def _painted(path: Path) -> Iterator[tuple[Triangles, Colour | None]]:
     """Yield the triangles of a file by their colours, in units of the file.
 
     Raises:
-        InputError: If trimesh is missing, or cannot read the file.
+        InputError: If trimesh cannot read the file.
     """
-    for mesh in meshes_in(path, "colours of meshes"):
+    for mesh in meshes_in(path):
         yield from _faces_by_colour(mesh, linear=path.suffix.lower() in (".glb", ".gltf"))
 
 

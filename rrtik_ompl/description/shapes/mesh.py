@@ -136,9 +136,8 @@ def _of_one_part(data: bytes, scale: Vector) -> coal.BVHModelBase:
 
 
 def _by_trimesh(path: Path, scale: Vector) -> coal.BVHModelBase:
-    what = "its faces, which stand before its vertices," if path.suffix.lower() == ".ply" else "its several parts"
-    pieces = [triangles_of(mesh) for mesh in meshes_in(path, f"{path}: {what}")]
-    return bvh(*joined(pieces, scale))
+    """Read a PLY whose faces stand before its vertices, or a file of several parts."""
+    return bvh(*joined([triangles_of(mesh) for mesh in meshes_in(path)], scale))
 
 
 def _by_assimp_from(data: bytes, scale: Vector) -> coal.BVHModelBase:
