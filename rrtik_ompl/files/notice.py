@@ -1,10 +1,11 @@
-"""Reports of slow work that happens once per machine, such as compiling kernels and covering meshes."""
+"""Reports of slow work: what happens once per machine, as compiling kernels, and what lacks them."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
 COMPILING = "compiling kernels for this processor, once per machine: up to some minutes"
+IN_NUMPY = "there are no kernels: proofs for an arm of so many pieces take minutes in numpy; Ctrl-C or stop= ends them"
 COVERING = "covering the meshes of a robot that is new to this machine, once: about a second"
 
 

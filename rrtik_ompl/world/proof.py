@@ -32,6 +32,7 @@ from rrtik_ompl.base.arrays import Mask, Matrix, Vector, frozen, in_blocks
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.base.kept import kept_with
 from rrtik_ompl.constraints.held_regions import HeldRegions
+from rrtik_ompl.files import notice
 from rrtik_ompl.geometry.collision.bodies import DISTANCE_TOLERANCE, Body
 from rrtik_ompl.geometry.collision.cloud_solid import CloudSolid
 from rrtik_ompl.geometry.collision.containment import Containment, filled, has_inside
@@ -43,8 +44,9 @@ from rrtik_ompl.kernels.proof import layout
 from rrtik_ompl.kernels.proof.layout import ProofTable
 from rrtik_ompl.kernels.proof.log import logged
 from rrtik_ompl.kernels.proof.packing import ProofPairs, proof_pairs
-from rrtik_ompl.kernels.proof.rows import proof_of_rows
+from rrtik_ompl.kernels.proof.rows import PROOF_KERNELS, proof_of_rows
 from rrtik_ompl.kernels.proof.taken_proof import TakenProof
+from rrtik_ompl.kernels.simd.library import library
 from rrtik_ompl.kernels.tables.solid_tables import convex_solids
 from rrtik_ompl.model.certificate import Certificate, MotionEntries
 from rrtik_ompl.model.proof import Gap, Proof
@@ -55,6 +57,7 @@ LARGEST_VALUE = 1e3  # [rad] or [m], joint values up to which the rounding error
 # [m] Certificates keep this distance beyond ROOM, because their verifier rounds in other places.
 SPARE = 1e-10
 MOTIONS_AT_ONCE = 64  # motions per kernel call; the clock and Ctrl-C are only looked at between calls
+MANY_PAIRS = 1000  # of convex pieces, whose motions take some hundredths of a second each to prove in numpy
 FEW = 200  # number of configurations for which no proof table is made
 PROVEN, NOT_LOOKED_AT = -1, -2  # written in place of the index of an unproven pair
 MOST_DISTANCES = 400  # largest number of coal distances for a pair in one motion, which take some tenths of a second
@@ -351,7 +354,10 @@ class Prover:
     def _new_table(self) -> ProofPairs:
         bodies = tuple(self.bodies)
         solids = of_each((body.geometry for body in bodies), convex_solids)
-        return proof_pairs(self.robot.chain, bodies, self.pairs, solids, strokes(self.robot), fixed=self._fixed)
+        table = proof_pairs(self.robot.chain, bodies, self.pairs, solids, strokes(self.robot), fixed=self._fixed)
+        if len(table.bodies) > MANY_PAIRS and library(PROOF_KERNELS) is None:
+            notice.tell_once(notice.IN_NUMPY)
+        return table
 
     def _gap(self, packed: ProofPairs, motion: int, pair: int, place: float) -> Gap:
         if pair < 0:

@@ -5,6 +5,7 @@ import pytest
 
 import rrtik_ompl as rrtik
 from rrtik_ompl import Obstacle, Scene, World, pose
+from rrtik_ompl.files import notice
 from rrtik_ompl.geometry.collision.certificate import Certificate
 from rrtik_ompl.kernels.proof import rows as proofs
 from rrtik_ompl.kernels.proof.in_numpy import nearest_on_triangles
@@ -129,6 +130,16 @@ def test_paths_keep_constraints_and_are_shortened_along_them_without_kernels():
     A, B = path.waypoints[:-1], path.waypoints[1:]
     assert problem.world.constraints.motions_held(A, B).all()
     assert not cut(problem.world, A, B).any()
+
+
+@pytest.mark.usefixtures("without_kernels")
+@pytest.mark.parametrize(("name", "is_slow"), [("so101_bin", True), ("titan4_prisms", False)])
+def test_proofs_that_take_minutes_say_so_before(name, is_slow, monkeypatch):
+    said = []
+    monkeypatch.setattr(notice, "listener", said.append)
+    monkeypatch.setattr(notice, "_told", {notice.COVERING})
+    rrtik.load_problem(name).world.prover.prepare()
+    assert said == [notice.IN_NUMPY] * is_slow
 
 
 @pytest.mark.usefixtures("without_kernels")
