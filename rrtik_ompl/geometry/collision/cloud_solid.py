@@ -102,16 +102,31 @@ class Nearest(NamedTuple):
 def nearest_of_cloud(ends: Ends) -> Nearest:
     """Return the signed distance and the nearest points of two geometries, one of which is a cloud.
 
-    The search starts near the other's bounding box and widens until it finds points of the cloud.
+    The search starts near the other's bounding box, and widens to the distance that it has found.
     """
     cloud, other, to_other, swapped = _sides(ends)
 
     reach = cloud.radius + LOOK_AHEAD
-    points = np.zeros((0, 3))
-    box_distances = np.zeros(0)
-    while not len(points):
-        points, box_distances = _points_near_box(cloud, other, to_other, reach)
+    nearest = _nearest_within(cloud, other, to_other, reach)
+    while nearest is None:
         reach *= 4.0
+        nearest = _nearest_within(cloud, other, to_other, reach)
+    if nearest.min_distance > reach - cloud.radius:  # one that is farther from the box may be nearer to the solid
+        nearest = _nearest_within(cloud, other, to_other, nearest.min_distance + cloud.radius) or nearest
+
+    pose = ends[1] if swapped else ends[3]
+    witness_points = [pose.transform(np.array(p)) for p in (nearest.getNearestPoint1(), nearest.getNearestPoint2())]
+    return Nearest(float(nearest.min_distance), *(witness_points if swapped else witness_points[::-1]))
+
+
+def _nearest_within(
+    cloud: Cloud, other: coal.CollisionGeometry, to_other: coal.Transform3s, reach: float
+) -> coal.DistanceResult | None:
+    """Return coal's answer for the nearest of the points within a distance of the other's bounding box.
+
+    The answer, None if there are none, is that of the whole cloud if it is at most ``reach - cloud.radius``.
+    """
+    points, box_distances = _points_near_box(cloud, other, to_other, reach)
 
     element = _element(cloud)
     identity = coal.Transform3s()
@@ -125,11 +140,8 @@ def nearest_of_cloud(ends: Ends) -> Nearest:
         point_pose.setTranslation(point)
         coal.distance(other, identity, element, point_pose, coal.DistanceRequest(), result)
         nearest = result if nearest is None or result.min_distance < nearest.min_distance else nearest
-    assert nearest is not None
 
-    pose = ends[1] if swapped else ends[3]
-    witness_points = [pose.transform(np.array(p)) for p in (nearest.getNearestPoint1(), nearest.getNearestPoint2())]
-    return Nearest(float(nearest.min_distance), *(witness_points if swapped else witness_points[::-1]))
+    return nearest
 
 
 def _element(cloud: Cloud) -> coal.CollisionGeometry:

@@ -64,21 +64,26 @@ def test_cells_and_boxes_collide_alike(worlds):
     assert 0.1 < free.mean() < 0.9
 
 
+@pytest.mark.parametrize("kind", ["cubes", "balls"])
 @pytest.mark.parametrize("other", [coal.Capsule(0.05, 0.3), coal.Box(0.3, 0.1, 0.2)])
-def test_a_solid_is_as_far_from_cells_as_from_boxes(other):
-    rng = np.random.default_rng(2)
+def test_a_solid_is_as_far_from_a_cloud_as_from_the_nearest_of_its_parts(other, kind):
+    """Also where the part that is nearest to the solid's bounding box is not the nearest to the solid."""
+    rng = np.random.default_rng(5)
     other.computeLocalAABB()
     centres = 0.1 * rng.integers(-8, 8, (300, 3))
-    (cells,) = rrtik.Octree(centres, 0.06).clouds
-    solid, box = cloud_solid(cells), coal.Box(0.06, 0.06, 0.06)
+    (cubes,) = rrtik.Octree(centres, 0.06).clouds
+    solid, part = {
+        "cubes": (cloud_solid(cubes), coal.Box(0.06, 0.06, 0.06)),
+        "balls": (cloud_solid(rrtik.PointCloud(centres, radius=0.03)), coal.Sphere(0.03)),
+    }[kind]
     pose = coal.Transform3s(POSE.rotation, POSE.translation)
-    for _ in range(12):
-        turn = pin.SE3.Random().rotation
-        place = coal.Transform3s(turn, rng.uniform(-1.0, 1.0, 3))
+    for _ in range(60):
+        turn = pin.Quaternion(rng.normal(size=4)).normalized().toRotationMatrix()
+        place = coal.Transform3s(turn, rng.uniform(-0.9, 0.9, 3))
         gaps = []
         for centre in centres:
             own = coal.Transform3s(POSE.rotation, POSE.act(centre))
-            gaps.append(coal.distance(other, place, box, own, coal.DistanceRequest(), coal.DistanceResult()))
+            gaps.append(coal.distance(other, place, part, own, coal.DistanceRequest(), coal.DistanceResult()))
         ends = (other, place, solid, pose)
         if min(gaps) > 0.0:
             assert nearest_of_cloud(ends).distance == pytest.approx(min(gaps), abs=1e-6)
