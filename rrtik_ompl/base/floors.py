@@ -6,11 +6,10 @@ import re
 import sys
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
-from functools import cache
-from importlib import metadata
 from typing import Any
 
 from rrtik_ompl.base.errors import RrtikError
+from rrtik_ompl.base.installed import version_of
 
 # By the name of the module: the name of the package and its lowest version. Of example-robot-data only files are read.
 FLOORS = {
@@ -75,19 +74,10 @@ def too_old(modules: Mapping[str, Any], but: Collection[str] = ()) -> str:
     for module, (package, floor) in FLOORS.items():
         if module in modules and module not in but:
             found = getattr(modules[module], "__version__", None) or getattr(modules[module], "version", None)
-            found = found or _installed(package)
+            found = found or version_of(package)
             if _numbers(found) and _numbers(found) < _numbers(floor):
                 return f"{package} {found} is too old; pip install '{package}>={floor}'"
     return ""
-
-
-@cache
-def _installed(package: str) -> str:
-    """Return the version that a package was installed as; "" if it has come in another way."""
-    try:
-        return metadata.version(package)
-    except metadata.PackageNotFoundError:
-        return ""
 
 
 def _numbers(version: object) -> tuple[int, ...]:

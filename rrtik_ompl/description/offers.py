@@ -1,23 +1,20 @@
 """What installed packages offer by entry points.
 
-importlib.metadata takes 30 ms to be loaded and to read what all packages offer; here the files that packages leave
-beside their code are read alone, as far as they name a group of this library. Where packages lie in archives, or are
-found in another way than on ``sys.path``, importlib.metadata is asked.
+The files that packages leave beside their code are read alone, as far as they name a group of this library.
+importlib.metadata is asked where :mod:`rrtik_ompl.base.installed` does not know the packages.
 """
 
 from __future__ import annotations
 
 import os
-import re
-import sys
 from dataclasses import dataclass
 from functools import cache, reduce
 from importlib import import_module
 from typing import Any
 
+from rrtik_ompl.base.installed import installed_packages, on_path_alone
+
 PREFIX = "rrtik_ompl."  # of all groups
-METADATA = (".dist-info", ".egg-info")  # endings of folders beside packages
-FINDERS = ("_frozen_importlib_external", "importlib")  # modules of the finder that looks on sys.path
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,19 +54,9 @@ def offers_of(group: str) -> dict[str, Offer]:
 def _offers() -> dict[str, dict[str, Offer]]:
     """Return all offers by group and name; cached, as installed packages have to be looked through."""
     found: dict[str, dict[str, Offer]] = {}
-    for group, offer in _in_folders() if _on_path_alone() else _by_importlib():
+    for group, offer in _in_folders() if on_path_alone() else _by_importlib():
         found.setdefault(group, {})[offer.name] = offer
     return found
-
-
-def _on_path_alone() -> bool:
-    """Check whether all packages are found in folders on ``sys.path``."""
-    others = [
-        finder
-        for finder in sys.meta_path
-        if hasattr(finder, "find_distributions") and getattr(finder, "__module__", "").split(".")[0] not in FINDERS
-    ]
-    return not others and not any(path.endswith(".egg") or os.path.isfile(path) for path in sys.path)
 
 
 def _by_importlib() -> list[tuple[str, Offer]]:
@@ -79,22 +66,9 @@ def _by_importlib() -> list[tuple[str, Offer]]:
 
 
 def _in_folders() -> list[tuple[str, Offer]]:
-    """Read the offers of packages; of several versions of a package on the path the first one counts."""
-    found: list[tuple[str, Offer]] = []
-    seen: set[str] = set()
-    for folder in dict.fromkeys(path or os.curdir for path in sys.path):
-        try:
-            names = os.listdir(folder)
-        except OSError:
-            continue
-        for name in names:
-            stem, ending = os.path.splitext(name)
-            project = re.sub(r"[-_.]+", "_", stem.partition("-")[0]).lower()
-            if ending not in METADATA or project in seen:
-                continue
-            seen.add(project)
-            found += _read(os.path.join(folder, name, "entry_points.txt"))
-    return found
+    """Read the offers of the packages on ``sys.path``."""
+    files = [os.path.join(package.folder, "entry_points.txt") for package in installed_packages().values()]
+    return [offer for file in files for offer in _read(file)]
 
 
 def _read(file: str) -> list[tuple[str, Offer]]:

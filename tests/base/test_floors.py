@@ -38,7 +38,7 @@ def test_every_package_below_its_floor_is_named_with_the_version_that_fits(modul
     said = f"{package} {lower} is too old; pip install '{package}>={floor}'"
     assert too_old({module: SimpleNamespace(__version__=lower)}) == said
     assert too_old({module: SimpleNamespace(__version__=floor)}) == ""
-    monkeypatch.setattr(floors, "_installed", lambda name: lower if name == package else "")
+    monkeypatch.setattr(floors, "version_of", lambda name: lower if name == package else "")
     assert too_old({module: SimpleNamespace()}) == said
 
 

@@ -6,6 +6,7 @@ import sys
 import pytest
 
 from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.installed import installed_packages, version_of
 from rrtik_ompl.description import catalog, offers
 from rrtik_ompl.description.offers import Offer, offers_of
 
@@ -15,14 +16,16 @@ GROUPS = ("planners", "problems", "robots", "suites", "tables", "workspaces")
 @pytest.fixture
 def fresh():
     offers._offers.cache_clear()
+    installed_packages.cache_clear()
     yield
     offers._offers.cache_clear()
+    installed_packages.cache_clear()
 
 
 def package(folder, name, text):
     metadata = folder / f"{name}.dist-info"
     metadata.mkdir(parents=True)
-    (metadata / "METADATA").write_text(f"Name: {name.partition('-')[0]}\nVersion: 1\n")
+    (metadata / "METADATA").write_text(f"Name: {name.partition('-')[0]}\nVersion: {name.partition('-')[2]}\n")
     (metadata / "entry_points.txt").write_text(text)
 
 
@@ -39,6 +42,7 @@ def test_offers_are_those_of_importlib(tmp_path, monkeypatch):
     for group in GROUPS:
         said = {each.name: (each.value, each.module) for each in points.select(group=f"rrtik_ompl.{group}")}
         assert {name: (each.value, each.module) for name, each in offers_of(group).items()} == said
+    assert version_of("our-arms") == importlib.metadata.version("our-arms") == "1.0"
     assert {"ours", "panda"} <= offers_of("robots").keys()
     assert "old" not in offers_of("robots")
 

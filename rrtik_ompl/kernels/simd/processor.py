@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import os
 from functools import cache
-from importlib import metadata
 from pathlib import Path
 from typing import Any
+
+from rrtik_ompl.base.installed import version_of
 
 WIDTH_VARIABLE = "RRTIK_LANES"
 SYSTEM_S_WORD = Path("/proc/cpuinfo")
@@ -78,7 +79,10 @@ def processor_identity() -> str:
     Raises:
         ImportError: Without llvmlite.
     """
-    return f"{_system_s_word() or _llvm_s_word()} llvmlite {metadata.version('llvmlite')}"
+    version = version_of("llvmlite")
+    if not version:
+        raise ImportError("llvmlite is not installed")
+    return f"{_system_s_word() or _llvm_s_word()} llvmlite {version}"
 
 
 def _llvm_s_word() -> str:
