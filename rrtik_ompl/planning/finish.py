@@ -57,15 +57,11 @@ def finished(problem: Problem, found: Plan, request: Request, method: Shortening
             stop=budget.over,
         )
 
-    return shortened_plan(found, _as_proven_as_asked(shorter, request), budget.elapsed)
-
-
-def shortened_plan(found: Plan, shorter: JointPath, seconds: float) -> Plan:
-    """Return a plan with its path shortened, which took some time [s]."""
+    seconds = budget.elapsed
     return replace(
         found,
-        path=shorter,
-        unshortened=found.path,
+        path=_as_proven_as_asked(shorter, request),
+        unshortened=path,
         seconds=found.seconds + seconds,
         statistics=MappingProxyType({**found.statistics, "shortening_seconds": seconds}),
     )

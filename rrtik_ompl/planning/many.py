@@ -19,16 +19,12 @@ from typing import Protocol, TypeAlias, runtime_checkable
 import numpy as np
 
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector
-from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.choices import ShorteningMethod
 from rrtik_ompl.base.errors import InputError, PlannerError, ProblemError
-from rrtik_ompl.kernels.search.contacts.layout import KERNELS as PULL_KERNELS
 from rrtik_ompl.kernels.threads import in_threads
-from rrtik_ompl.kernels.warming import load_together
 from rrtik_ompl.model.goal import Goal, JointGoal
-from rrtik_ompl.model.path import JointPath, path_through
+from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.proof import Proof
-from rrtik_ompl.model.transitions import length_of
 from rrtik_ompl.ompl_bridge.attempt import ITERATION_LIMIT, attempt_seeds
 from rrtik_ompl.ompl_bridge.planner_names import AUTO, is_auto
 from rrtik_ompl.ompl_bridge.planner_options import is_safe, safe_planner
@@ -37,17 +33,11 @@ from rrtik_ompl.ompl_bridge.results import SearchResult
 from rrtik_ompl.ompl_bridge.safe_planner import SafePlanner
 from rrtik_ompl.ompl_bridge.setup import shared_space
 from rrtik_ompl.planning.attempts import EFFORT_ITERATIONS, load_kernels_for
-from rrtik_ompl.planning.finish import finished, shortened_plan
+from rrtik_ompl.planning.finish import finished
 from rrtik_ompl.planning.outcome import NamedPlanner, Plan, Request
 from rrtik_ompl.planning.plan import named_planner, planned_and_finished
-from rrtik_ompl.planning.shortening import Task, Wishes
-from rrtik_ompl.planning.shortening.acceptance import kept_clearance
-from rrtik_ompl.planning.shortening.best import best_in_time
 from rrtik_ompl.world.clearances import Clearances, clearances_of_pairs
-from rrtik_ompl.world.motion_queries import has_kernels
-from rrtik_ompl.world.problem import Problem, densely_checked, known_problem, problem_in
-from rrtik_ompl.world.proven_motions import KERNELS as PROVEN_KERNELS
-from rrtik_ompl.world.proven_motions import ProvenMotions
+from rrtik_ompl.world.problem import Problem, known_problem, problem_in
 from rrtik_ompl.world.world import World, form_of
 
 TOGETHER = 32  # queries at a time, whatever the number of threads
@@ -159,8 +149,9 @@ def _batch(
     for (_, named), group in groups.items():
         with suppress(InputError):  # of an option; each query will get this error
             found = plans_together(named, list(group.values()), request)
-            plans = {k: plan for k, plan in zip(group, found, strict=True) if plan is not None}
-            answers |= plans if method is None else finished_together(plans, request, method)
+            answers |= {
+                k: _finished(plan, request, method) for k, plan in zip(group, found, strict=True) if plan is not None
+            }
 
     return [each() if k in at_once and callable(each) else each for k, each in sorted(answers.items())]
 
@@ -190,70 +181,11 @@ def _with_seed(request: Request, seed: int) -> Request:
     return replace(request, budget=replace(request.budget, seed=seed))
 
 
-def finished_together(plans: Mapping[int, Plan], request: Request, method: ShorteningMethod) -> dict[int, Answer]:
-    """Return plans in one world with their paths shortened, as `plan()` does it one by one.
-
-    Where "auto" pulls in kernels, the shortened paths are proven in a few calls.
-
-    Args:
-        plans: Plans of :func:`plans_together`, with any keys.
-        request: As there.
-        method: The method of shortening.
-    """
-    pulled = _pulled_together(plans, request) if method == "auto" else {}
-    return {
-        k: pulled.get(k) or finished(plan.problem, plan, _with_seed(request, plan.seed), method)
-        for k, plan in plans.items()
-        if plan.problem is not None
-    }
-
-
-def _pulled_together(plans: Mapping[int, Plan], request: Request) -> dict[int, Plan]:
-    """Return plans in one world with their paths shortened by a pull each; those alone where nothing else is needed.
-
-    The motions are proven in a table that is made once for each clearance, and the results in a few calls.
-    """
-    paths = {k: plan.path for k, plan in plans.items() if plan.path is not None and _is_pulled(plan.path)}
-    problem = next((plan.problem for plan in plans.values()), None)
-    if problem is None or not paths:
-        return {}
-    world = densely_checked(problem).world
-    ends = np.array([path.waypoints[[0, -1]] for path in paths.values()])
-    clearances_of = dict(zip(paths, clearances_of_pairs(world, ends, None), strict=True))
-    load_together((PULL_KERNELS, PROVEN_KERNELS))
-
-    # Pull each path.
-    motions_with: dict[float, ProvenMotions] = {}
-    routes: dict[int, tuple[Matrix, Clearances | None]] = {}
-    seconds_of: dict[int, float] = {}
-    for k, path in paths.items():
-        clearances = clearances_of[k]
-        known: object = world
-        left = request.budget.seconds - plans[k].seconds
-        if clearances is None or left <= 0.0 or not has_kernels(known, PROVEN_KERNELS, within=path.waypoints):
-            continue
-        kept = kept_clearance(world, clearances)
-        if kept not in motions_with:
-            motions_with[kept] = ProvenMotions(world, kept)
-
-        budget = replace(request.budget, seed=plans[k].seed, seconds=left).begun_now()
-        task = Task(motions_with[kept], Wishes(Budget(budget.seed, stop=budget.over)))
-        routes[k] = best_in_time(path.waypoints, task), clearances
-        seconds_of[k] = budget.elapsed
-
-    # Only paths that are proven again, and did not become longer, need nothing else.
-    pulled: dict[int, Plan] = {}
-    for k, proof in _proofs(problem.world, routes).items():
-        rows = routes[k][0]
-        if length_of(rows) <= paths[k].length:
-            path = path_through(paths[k], rows).with_proof(proof)
-            pulled[k] = shortened_plan(plans[k], path, seconds_of[k])
-    return pulled
-
-
-def _is_pulled(path: JointPath) -> bool:
-    """Check whether "auto" pulls a path: it has a bend, and is not one of single-joint moves."""
-    return len(path.waypoints) > 2 and not path.one_joint_at_a_time
+def _finished(plan: Plan, request: Request, method: ShorteningMethod | None) -> Plan:
+    """Return a plan with its path shortened, as `plan()` does it."""
+    if method is None or plan.problem is None:
+        return plan
+    return finished(plan.problem, plan, _with_seed(request, plan.seed), method)
 
 
 def no_plan(reason: str, planner: str | PlannerFactory, seed: int, *, seconds: float = 0.0) -> Plan:

@@ -11,8 +11,7 @@ All of it is bounded by counts: the same seed gives the same path. Where it find
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import NamedTuple
@@ -26,7 +25,7 @@ from rrtik_ompl.ik.goal_configurations import GoalSearch
 from rrtik_ompl.ik.methods import load_kernels
 from rrtik_ompl.kernels.layout import SOLID_INTS
 from rrtik_ompl.kernels.proof.rows import PROOF_KERNELS
-from rrtik_ompl.kernels.search.connect import LARGEST_KEPT, ConnectSearch
+from rrtik_ompl.kernels.search.connect import ConnectSearch, kept_search
 from rrtik_ompl.kernels.search.connect_layout import KERNELS as SEARCH_KERNELS
 from rrtik_ompl.kernels.search.contacts.layout import KERNELS as PULL_KERNELS
 from rrtik_ompl.kernels.search.contacts.pulling import Pulling
@@ -122,7 +121,10 @@ def short_path(problem: Problem, request: Request, *, pull: bool) -> Plan | None
     lower = np.maximum(lower, world.robot.lower)  # Kernels prove nothing beyond the limits.
     upper = np.minimum(upper, world.robot.upper)
     motions = kept_motions(world, clearance + min(clearance, SPARE))
-    with _kept_search(world, lower, upper) as search:
+    checks = world.motions
+    assert checks is not None  # as _applies() has found
+    key = ("short path", lower.tobytes(), upper.tobytes())
+    with kept_search(checks, key, lambda: _search_in(world, lower, upper)) as search:
         tools = Tools(search, motions, lower, upper)
         ends = np.concatenate([problem.start[None], goals])
         free = tools.motions.motion_valid_batch(ends, ends)
@@ -182,23 +184,6 @@ def _goals(problem: Problem, budget: Budget) -> Matrix | None:
     if len(found) == 0:
         return None
     return problem.robot.onto_limits(nearest_rows(problem, found)[:MOST_GOALS])
-
-
-@contextmanager
-def _kept_search(world: World, lower: Vector, upper: Vector) -> Iterator[ConnectSearch]:
-    """Searches in a box, shapes (dof,): those that were used last in the world if they are in the same one.
-
-    Nobody else gets them meanwhile. An exception leaves none.
-    """
-    motions = world.motions
-    assert motions is not None
-    box = lower.tobytes(), upper.tobytes()
-    known, search = motions.spare.pop("short path", (None, None))
-    if search is None or known != box:
-        search = _search_in(world, lower, upper)
-    yield search
-    if search.capacity <= LARGEST_KEPT:
-        motions.spare["short path"] = box, search
 
 
 def _search_in(world: World, lower: Vector, upper: Vector) -> ConnectSearch:

@@ -215,14 +215,15 @@ def load_scene(file: str | os.PathLike[str]) -> Scene:
         Scene(post)
     """
     path = file_name(file)
-    if path.suffix.lower() == ENDING:
+    suffix = path.suffix.lower()
+    if suffix == ENDING:
         return read_scene_text(file)
-    if path.suffix.lower() in (".xml", ".mjcf"):
+    if suffix in (".xml", ".mjcf"):
         from rrtik_ompl.description.mjcf.scenery import scene_from_mjcf  # loads slowly, and few scenes are in MJCF
 
         return scene_from_mjcf(file)
-    if path.suffix.lower() in SOLIDS:
-        return Scene([Obstacle(path.stem, SOLIDS[path.suffix.lower()](path))])
+    if suffix in SOLIDS:
+        return Scene([Obstacle(path.stem, SOLIDS[suffix](path))])
     with refusing_others(file, "Scene"):
         document = read_yaml(file)
         if "version" not in document.data and "robot_model_name" in document.data:

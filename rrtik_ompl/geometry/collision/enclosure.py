@@ -21,15 +21,13 @@ from rrtik_ompl.geometry.collision.solids import (
     once_per_geometry,
     outward_planes,
 )
+from rrtik_ompl.model.shapes.box_pile import surface_of_boxes
 
 if TYPE_CHECKING:
     import coal
 
 
 CELLS = 32  # number of cells along the longest side of the mesh
-BOX_CORNERS = np.array(list(np.ndindex(2, 2, 2)), dtype=bool)  # whether x, y, z of each corner are the highest ones
-SIDES = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]  # corners of a box
-BOX_FACES = np.array([[a, *pair] for a, b, c, d in SIDES for pair in ((b, c), (c, d))])
 HALVINGS = 24  # most times that triangles are halved to make them smaller than a cell
 
 
@@ -107,9 +105,8 @@ def with_enclosed_boxes(geometry: coal.CollisionGeometry) -> coal.BVHModelBase:
     """Return a coal mesh with the faces of the boxes of the cells that it encloses."""
     vertices, triangles = mesh_arrays(geometry)
     low, high = enclosure(geometry).boxes()
-    corners = np.where(BOX_CORNERS, high[:, None], low[:, None]).reshape(-1, 3)
-    faces = BOX_FACES + len(vertices) + 8 * np.arange(len(low))[:, None, None]
-    return measured(bvh(np.vstack([vertices, corners]), np.vstack([triangles, faces.reshape(-1, 3)])))
+    corners, faces = surface_of_boxes(0.5 * (low + high), high - low)
+    return measured(bvh(np.vstack([vertices, corners]), np.vstack([triangles, faces + len(vertices)])))
 
 
 def _cut_small(triangles: NDArray[np.float64]) -> list[NDArray[np.float64]]:

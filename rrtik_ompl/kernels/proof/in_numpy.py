@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector
+from rrtik_ompl.geometry.collision.shape_table import BOX_CORNERS
 from rrtik_ompl.kernels.proof import layout
 from rrtik_ompl.kernels.proof.layout import CLOUD, CONVEX_SOLID, DEEPEST, HALF_SPACE, UNKNOWN, WHOLE_BODY
 from rrtik_ompl.kernels.proof.packing import ProofPairs
@@ -44,7 +45,6 @@ PATIENT = 0.1  # width of an interval down to which whole bodies are kept togeth
 EAGER = 0.9  # of a ball's radius: bodies that are nearer than the sagitta less this are split at once, not compared
 SINGLE_ROUNDING = 1e-6  # of a point's place, relative and [m]
 NARROW = 0.01  # width of an interval from which on they are compared nevertheless
-SIGNS = np.where(np.indices((2, 2, 2)).reshape(3, -1).T == 0, -1.0, 1.0)  # of the corners of a cube
 PROVEN, LATER, IN_PARTS, NOT = range(4)  # answers for a pair on an interval
 
 
@@ -358,7 +358,7 @@ class _Proof:
             counts = np.array([len(found) for found in near])
             points = tree.data[np.concatenate(near).astype(np.int64)] @ turn.T + origin
             owners = np.repeat(rows, counts)
-            corners = (SIGNS if cloud_table.half else SIGNS[:1]) @ half.T  # of a point there is one
+            corners = (BOX_CORNERS if cloud_table.half else BOX_CORNERS[:1]) @ half.T  # of a point there is one
 
             close = self._in_box(one[owners], ends, owners, points, reach[owners], half)
             owners = owners[close]

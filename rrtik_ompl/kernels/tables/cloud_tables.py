@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
+from rrtik_ompl.geometry.collision.shape_table import BOX_CORNERS
 from rrtik_ompl.kernels.tables.cloud_layout import LEAF, CloudTable
 from rrtik_ompl.kernels.tables.memory import packed
 
@@ -13,7 +14,7 @@ if TYPE_CHECKING:
     from rrtik_ompl.model.shapes.point_cloud import Cloud
 
 # Corners of a cube of side 2, shape (LEAF, 3): as many as points of a block, so each of them twice
-CORNERS = np.tile(np.where(np.indices((2, 2, 2)).reshape(3, -1).T == 0, -1.0, 1.0), (LEAF // 8, 1))
+CORNERS = np.tile(BOX_CORNERS, (LEAF // len(BOX_CORNERS), 1))
 
 
 def cloud_table(cloud: Cloud) -> CloudTable:

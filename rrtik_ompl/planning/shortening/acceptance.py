@@ -15,7 +15,6 @@ from rrtik_ompl.world.motion_queries import MotionQueries
 from rrtik_ompl.world.problem import Problem, densely_checked, problem_in
 from rrtik_ompl.world.proven_motions import ProvenMotions, proven_motions
 from rrtik_ompl.world.route_check import violations_of
-from rrtik_ompl.world.world import World
 
 # [m] Searches keep this much beyond the clearance if the ends have it: chords of timed motions need 0.1 mm of it.
 SPARE = 2.5e-4
@@ -95,7 +94,7 @@ class Acceptance:
         If the input does not keep it, time is left for a further form that need not.
         """
         problem = self._problem
-        searched_clearance = kept_clearance(problem.world, clearances)
+        searched_clearance = min(clearances.searched_clearance, clearances.proven_clearance + SPARE)
         last_share = 1.0 if self._input_keeps_clearance else 0.5
         if not self._checks_in_steps:
             return [Form(problem, proven_motions(problem.world, searched_clearance, self.input.waypoints), last_share)]
@@ -149,8 +148,3 @@ class Acceptance:
         if self._clearances is None or proof is None:
             return False
         return proof.proven and proof.clearance >= self._clearances.proven_clearance
-
-
-def kept_clearance(world: World, clearances: Clearances) -> float:
-    """Return the clearance [m] that new motions of a path keep, given what its ends allow."""
-    return max(min(clearances.searched_clearance, clearances.proven_clearance + SPARE), world.settings.clearance)
