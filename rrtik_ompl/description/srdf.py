@@ -236,11 +236,11 @@ class Srdf:
     def fingers(self, tree: Tree) -> frozenset[str]:
         """Return the movable joints of its end effectors, without those of the groups that carry these."""
         carriers = {end.parent_group for end in self.end_effectors} & self.groups.keys()
-        fingers, carrying = (
-            {joint for group in groups for joint in self.known_movable(group, tree) or ()}
-            for groups in (self.hands(tree), carriers)
-        )
-        return frozenset(fingers - carrying)
+
+        def joints_of(groups: Iterable[str]) -> frozenset[str]:
+            return frozenset(joint for group in groups for joint in self.known_movable(group, tree) or ())
+
+        return joints_of(self.hands(tree)) - joints_of(carriers)
 
     def allowed_pairs(self, tree: Tree) -> frozenset[frozenset[str]]:
         """Return the pairs of links of a robot that are never checked against each other."""

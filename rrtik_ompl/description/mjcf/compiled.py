@@ -143,7 +143,8 @@ class _Writer:
     def field(self, number: int) -> Mesh:
         """Return a height field."""
         model = self.model
-        rows, columns = model.hfield_nrow[number], model.hfield_ncol[number]
+        rows = model.hfield_nrow[number]
+        columns = model.hfield_ncol[number]
         first = model.hfield_adr[number]
         heights = model.hfield_data[first : first + rows * columns].reshape(rows, columns)
         return field_mesh(heights, model.hfield_size[number])

@@ -241,7 +241,10 @@ def field_mesh(heights: Matrix, size: ArrayLike) -> Mesh:
     lower = np.stack([x, y, np.full_like(x, -base)], axis=-1).reshape(-1, 3)
 
     number = np.arange(rows * columns).reshape(rows, columns)
-    a, b, c, d = number[:-1, :-1].ravel(), number[:-1, 1:].ravel(), number[1:, 1:].ravel(), number[1:, :-1].ravel()
+    a = number[:-1, :-1].ravel()
+    b = number[:-1, 1:].ravel()
+    c = number[1:, 1:].ravel()
+    d = number[1:, :-1].ravel()
     faces = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
     rim = np.concatenate([number[0, :-1], number[:-1, -1], number[-1, :0:-1], number[:0:-1, 0]])
     after = np.roll(rim, -1)

@@ -77,7 +77,8 @@ def load_surface(path: Path, scale: Vector) -> coal.BVHModelBase:
             precision does not keep its shape.
     """
     if os.path.isfile(path) and os.path.getsize(path) > MAX_BYTES:
-        size, most = (count // 2**20 for count in (os.path.getsize(path), MAX_BYTES))
+        size = os.path.getsize(path) // 2**20
+        most = MAX_BYTES // 2**20
         raise InputError(
             f"{path}: a mesh of {size} MiB, more than {most} MiB, the most that is read; simplify it (a robot's link "
             "needs some thousand triangles)"

@@ -219,8 +219,8 @@ class _Proof:
 
             whole = some.of(answers == IN_PARTS)
             if len(whole):
-                firsts, lasts = self._pairs[whole.pair, layout.PARTS_FIRST], self._pairs[whole.pair, layout.PARTS_END]
-                counts = lasts - firsts
+                firsts = self._pairs[whole.pair, layout.PARTS_FIRST]
+                counts = self._pairs[whole.pair, layout.PARTS_END] - firsts
                 parts = whole.of(np.repeat(np.arange(len(whole)), counts))
                 within = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
                 queue += replace(parts, pair=np.repeat(firsts, counts) + within).parts()
@@ -229,8 +229,10 @@ class _Proof:
     def _answers(self, some: Intervals) -> tuple[NDArray[np.int64], Matrix]:
         """Compare pairs on intervals; an answer for each, and the unit normal of the plane that proves it, or zeros."""
         rows = self._pairs[some.pair]
-        one, other = rows[:, layout.PAIR_ONE], rows[:, layout.PAIR_OTHER]
-        kind, other_kind = self._solids[one, layout.SOLID_KIND], self._solids[other, layout.SOLID_KIND]
+        one = rows[:, layout.PAIR_ONE]
+        other = rows[:, layout.PAIR_OTHER]
+        kind = self._solids[one, layout.SOLID_KIND]
+        other_kind = self._solids[other, layout.SOLID_KIND]
         parts = rows[:, layout.PARTS_END] > rows[:, layout.PARTS_FIRST]
         ends = self._ends(some, rows)
 
@@ -323,7 +325,8 @@ class _Proof:
         """Return the cores of solids at both ends of intervals, of which ``rows`` are the numbers."""
         records = self._solids[solids]
         sizes = self._sizes[solids]
-        first, last = records[:, layout.FIRST_BLOCK], records[:, layout.END_BLOCK]
+        first = records[:, layout.FIRST_BLOCK]
+        last = records[:, layout.END_BLOCK]
         blocks = np.minimum(first[:, None] + np.arange((last - first).max()), last[:, None] - 1)
         corners = self._corners[blocks].transpose(0, 1, 3, 2).reshape(len(solids), -1, 3)
         turns = np.stack([begin.rotations[rows], end.rotations[rows]], axis=1)
@@ -348,7 +351,8 @@ class _Proof:
         for number in np.unique(cloud).tolist():
             rows = np.flatnonzero(cloud == number)
             place = self._solids[number, layout.SOLID_KIND] - CLOUD
-            turn, origin = poses[place, : layout.ORIGIN].reshape(3, 3), poses[place, layout.ORIGIN :]
+            turn = poses[place, : layout.ORIGIN].reshape(3, 3)
+            origin = poses[place, layout.ORIGIN :]
             cloud_table = self._packed.clouds[place]
             tree = search_tree(cloud_table)
             half = turn * cloud_table.half  # columns are half the edges of a cube
@@ -479,7 +483,10 @@ def best_planes(first: Core, second: Core, around: Vector, wanted: Vector, ways:
         normals[rows[better]] = way[better]
         going = (best[rows] <= wanted[rows]) & (distance[rows] - along >= CONVERGED)
         if not going.all():
-            rows, corner, first, second = rows[going], corner[going], first.of(going), second.of(going)
+            rows = rows[going]
+            corner = corner[going]
+            first = first.of(going)
+            second = second.of(going)
         if len(rows) == 0:
             break
 
@@ -494,7 +501,9 @@ def best_planes(first: Core, second: Core, around: Vector, wanted: Vector, ways:
         # Points that are so near to each other leave no room for a plane.
         going = (distance[rows] - around[rows] > wanted[rows]) & (distance[rows] >= SHORTEST)
         if not going.all():
-            rows, first, second = rows[going], first.of(going), second.of(going)
+            rows = rows[going]
+            first = first.of(going)
+            second = second.of(going)
         if len(rows) == 0:
             break
     return best, normals

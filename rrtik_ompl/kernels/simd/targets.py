@@ -74,7 +74,8 @@ def this_target() -> Target:
     Raises:
         UnknownMachineError: If kernels have never been made for it.
     """
-    machine, system = platform.machine(), _PYTHON_S_NAMES.get(sys.platform, sys.platform)
+    machine = platform.machine()
+    system = _PYTHON_S_NAMES.get(sys.platform, sys.platform)
     found = target_of(f"{machine}-{system}")
     if found is None or sys.maxsize < 2**32:
         raise UnknownMachineError(f"there are no kernels for {machine} with {system} (there are for {KNOWN})")
