@@ -6,6 +6,7 @@ import signal
 from collections import Counter
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from hypothesis import settings
 from ompl import util as ou
@@ -100,6 +101,12 @@ def without_kernels(monkeypatch):
     """There are no kernels, as without numba."""
     monkeypatch.setenv(library.SWITCH, "0")
     monkeypatch.setattr(library, "_libraries", {})
+
+
+@pytest.fixture(autouse=True)
+def drawn_alike():
+    """Poses of ``pin.SE3.Random()`` are the same whatever tests ran before."""
+    pin.seed(0)
 
 
 @pytest.fixture(scope="session")
