@@ -8,6 +8,7 @@ file must have as many points as its header claims.
 from __future__ import annotations
 
 import io
+import re
 import warnings
 from collections.abc import Sequence
 from math import prod
@@ -138,6 +139,11 @@ def coordinates(rows: NDArray[Any]) -> NDArray[Any]:
     for k, axis in enumerate(AXES):
         points[:, k] = rows[axis]
     return points
+
+
+def is_ply_mesh(data: bytes) -> bool:
+    """Check whether the header of a PLY file announces faces, so that its points are not all there is."""
+    return re.search(rb"\nelement face 0*[1-9]", data.partition(PLY_END)[0]) is not None
 
 
 def ply_points(data: bytes, what: str) -> NDArray[Any]:

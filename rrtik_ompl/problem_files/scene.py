@@ -10,10 +10,11 @@ from typing import Annotated, Any
 import pinocchio as pin
 from pydantic import Field, create_model, model_validator
 
-from rrtik_ompl.description.shapes.cloud import read_cloud
+from rrtik_ompl.description.shapes.cloud import MAX_BYTES, read_cloud
 from rrtik_ompl.description.shapes.mesh import read_mesh
 from rrtik_ompl.description.shapes.octree import read_octree
 from rrtik_ompl.files.kinds import KINDS, refusing_others
+from rrtik_ompl.files.point_files import is_ply_mesh
 from rrtik_ompl.files.pose_entry import PoseEntry, pose_data
 from rrtik_ompl.files.sections import (
     Name,
@@ -26,7 +27,7 @@ from rrtik_ompl.files.sections import (
     parse,
 )
 from rrtik_ompl.files.strict_yaml import Location, YamlDocument, read_yaml, write_yaml
-from rrtik_ompl.files.text import file_name
+from rrtik_ompl.files.text import file_name, read_bytes
 from rrtik_ompl.model.scene import AttachedObject, ConstantVelocity, Motion, Obstacle, Scene, TimedPoses, Touching
 from rrtik_ompl.model.shapes import Shape
 from rrtik_ompl.model.world_settings import SETTINGS_IN_FILES
@@ -189,8 +190,14 @@ _KEYS_OF_WORLDS: dict[str, Any] = {each.name: (Any, None) for each in SETTINGS_I
 SceneFile = create_model("SceneFile", __base__=_SceneFile, **_KEYS_OF_WORLDS)
 
 
+def _read_ply(file: Path) -> Shape:
+    """Read a PLY: a mesh, or points without faces."""
+    return (read_mesh if is_ply_mesh(read_bytes(file, MAX_BYTES)) else read_cloud)(file)
+
+
 SOLIDS: dict[str, Callable[[Path], Shape]] = {
     **dict.fromkeys(KINDS["PointCloud"].endings, read_cloud),
+    ".ply": _read_ply,
     **dict.fromkeys(KINDS["Octree"].endings, read_octree),
     **dict.fromkeys(KINDS["Mesh"].endings, read_mesh),
     ".npz": read_cloud,
@@ -204,7 +211,7 @@ def load_scene(file: str | os.PathLike[str]) -> Scene:
     - MoveIt's ``.scene`` files, and its PlanningScene as YAML or JSON, without what that says of the robot
     - MJCF: what stands beside the robot, whose arm `load_robot` reads of the same file
     - one solid in metres, which becomes the only obstacle, named as the file: a cloud of points (PLY, PCD, XYZ, NPY,
-      NPZ), a map of OctoMap (BT, OT) as its octree, or a mesh (STL, OBJ, DAE, GLB)
+      NPZ), a map of OctoMap (BT, OT) as its octree, or a mesh (STL, OBJ, DAE, GLB, PLY with faces)
 
     Raises:
         InputError: If the file cannot be used; one line with file, line, key, what was found and the remedy.

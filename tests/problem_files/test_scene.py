@@ -254,6 +254,17 @@ def test_a_scene_is_read_from_a_file_with_every_key_of_a_problem(tmp_path):
     assert [each.name for each in load_scene(tmp_path / "whole.yaml").obstacles] == ["a"]
 
 
+@pytest.mark.parametrize(("faces", "kind"), [(4, Mesh), (0, PointCloud)])
+def test_a_ply_with_faces_is_a_mesh_and_not_its_corners(faces, kind, tmp_path):
+    corners = "0 0 0\n0.1 0 0\n0 0.1 0\n0 0 0.1\n"
+    triangles = "3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n" if faces else ""
+    head = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
+    head += f"element face {faces}\nproperty list uchar int vertex_indices\nend_header\n"
+    (tmp_path / "part.ply").write_text(head + corners + triangles)
+    (obstacle,) = load_scene(tmp_path / "part.ply").obstacles
+    assert type(obstacle.shape) is kind
+
+
 @pytest.mark.parametrize("name", ["scan.ply", "scan.npz", "part.obj", "map.bt"])
 def test_a_solid_in_a_file_of_its_own_is_a_scene(name, tmp_path):
     file = tmp_path / name
