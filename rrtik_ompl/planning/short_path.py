@@ -93,7 +93,7 @@ class Shortest:
 def short_path(problem: Problem, request: Request, *, pull: bool) -> Plan | None:
     """Return the plan of a problem, or None where this finds no path or does not apply.
 
-    It applies to straight motions without path constraints and weights, in exact worlds with kernels, where proofs are
+    It applies to straight motions without path constraints and weights, in worlds with kernels, where proofs are
     wanted and the planner that "auto" begins with is the search of these kernels.
 
     Args:
@@ -166,7 +166,7 @@ def _applies(problem: Problem, request: Request) -> bool:
     world = problem.world
     if request.proof == "off" or request.parameters or request.budget.iterations is not None:
         return False
-    if type(world) is not World or world.accuracy != "exact" or world.settings.proving is not None:
+    if type(world) is not World or world.settings.proving is not None:
         return False
     weights_are_even = not has_weights(problem) or len(set(weights_of(problem.robot).tolist())) == 1
     return world.motions is not None and not problem.constraints and weights_are_even

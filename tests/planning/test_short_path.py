@@ -16,6 +16,7 @@ from rrtik_ompl.planning import portfolio
 from rrtik_ompl.planning import short_path as room
 from rrtik_ompl.planning.outcome import Request
 from rrtik_ompl.planning.short_path import short_path
+from rrtik_ompl.world.exact_checks import ExactChecker
 
 pytestmark = pytest.mark.kernels
 
@@ -71,6 +72,19 @@ def test_it_is_a_proven_path_to_one_of_the_goals(problem):
         assert problem.world.verify(problem.world.certificate(path), path.waypoints) == ""
 
 
+def test_a_conservative_world_takes_it_and_asks_coal_nothing(problem, monkeypatch):
+    exact = short_path(problem, REQUEST, pull=True)
+    careful = problem.with_accuracy("conservative")
+
+    def asked(*_):
+        raise AssertionError
+
+    monkeypatch.setattr(ExactChecker, "_gaps", asked)
+    found = short_path(careful, REQUEST, pull=True)
+    np.testing.assert_array_equal(found.path.waypoints, exact.path.waypoints)
+    assert not found.path.violations(careful.world)
+
+
 @pytest.mark.parametrize("clearance", [0.0, 2e-3])
 def test_it_keeps_the_clearance_that_is_wanted(problem, clearance):
     found = rrtik.plan(problem, clearance=clearance)
@@ -86,7 +100,6 @@ def test_where_it_does_not_apply_planners_take_their_turns(problem, monkeypatch)
         Request(Budget(1, stop=lambda: True)),
     ]
     assert [short_path(problem, request, pull=True) for request in requests] == [None] * len(requests)
-    assert short_path(problem.with_accuracy("conservative"), REQUEST, pull=True) is None
 
     resting = rrtik.Problem(problem.world, problem.start, problem.start)
     assert short_path(resting, REQUEST, pull=True) is None
