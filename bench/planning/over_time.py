@@ -53,7 +53,7 @@ def chosen(count: int) -> dict[str, float]:
 
 def ours(problem: rrtik.Problem, seed: int) -> Vector:
     """Length of the best path at each time, +inf before the first."""
-    planned = rrtik.plan(problem, "fastrrtconnect", seed=seed, seconds=5.0, improve=TIMES[-1], shorten=False)
+    planned = rrtik.plan(problem, seed=seed, seconds=5.0, improve=TIMES[-1])
     course = planned.statistics.get("cost_over_time", ())
     return np.array([min((cost for at, cost in course if at <= moment), default=np.inf) for moment in TIMES])
 

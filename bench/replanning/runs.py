@@ -29,7 +29,7 @@ ARMS = {
 }
 RATE, MARGIN, LONGEST = 50.0, 0.02, 20.0
 OURS, SCRATCH = "DRRT-Con", "from scratch, same kernels"
-PLANS = (("fastrrtconnect", "fastrrtconnect"), ("RRTConnect", "OMPL's RRT-Connect"))
+PLANS = (("auto", "the default call"), ("RRTConnect", "OMPL's RRT-Connect"))
 
 
 def arm_problem(name: str, seed: int) -> rrtik.Problem:

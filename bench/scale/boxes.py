@@ -24,8 +24,8 @@ PLANS, FEWEST, ROWS, WORLDS, MOVES = 8, 3, 8000, 2, 200  # FEWEST plans among th
 class Among:
     """Processor times among ``count`` boxes: a world [us a box], a configuration, a move of one box [us], plans [ms].
 
-    ``moved``: a move with the check of a configuration; ``motions``: that each plan checked; ``free``: share of the
-    configurations.
+    ``moved``: a move with the check of a configuration; ``plans``: default calls; ``named``: of the planner, and
+    ``motions`` that each of these checked; ``free``: share of the configurations.
     """
 
     count: int
@@ -34,6 +34,7 @@ class Among:
     move: float
     moved: float
     plans: list[float]
+    named: list[float]
     motions: list[int]
     found: int
     free: float
@@ -90,18 +91,23 @@ def _among(scene: Scene, plans: int, *, corner: bool = False) -> Among:
         blocked = ~world.motion_valid_batch(starts[:FIRST], ends[:FIRST])
         starts, ends = starts[:FIRST][blocked], ends[:FIRST][blocked]
     problems = [Problem(world, a, b) for a, b in zip(starts[:plans], ends[:plans], strict=True)]
-    ask = [partial(plan, problem, PLANNER, seed=1, seconds=BUSY, shorten=False) for problem in problems]
-    ask[0]()
-    runs, moves = [spent(call) for call in ask], _move(world)
+    defaults = [partial(plan, problem, seed=1, seconds=BUSY) for problem in problems]
+    named = [partial(plan, problem, PLANNER, seed=1, seconds=BUSY, shorten=False) for problem in problems]
+    defaults[0]()
+    named[0]()
+    whole = [spent(call) for call in defaults]
+    runs = [spent(call) for call in named]
+    moves = _move(world)
     return Among(
         count=count,
         world=1e6 * min(taken for taken, _ in made) / count,
         check=1e6 * check,
         move=1e6 * moves[0],
         moved=1e6 * moves[1],
-        plans=[1e3 * taken for taken, _ in runs],
+        plans=[1e3 * taken for taken, _ in whole],
+        named=[1e3 * taken for taken, _ in runs],
         motions=[int(found.statistics.get("motions", 0)) for _, found in runs],
-        found=sum(found.found for _, found in runs),
+        found=sum(found.found for _, found in whole),
         free=len(free) / ROWS,
     )
 

@@ -27,8 +27,8 @@ ROWS, MADE = 2000, 3
 class Seen:
     """A problem whose obstacles are points: times [ms, us, ms], and what became of it.
 
-    ``state``: "planned", "swallowed" (the start or the goal is among the points) or "not found"; ``nearest``: how far
-    the arm is from the points' balls, at least [m].
+    ``plan``: the default call; ``named``: the planner; ``state``: "planned", "swallowed" (the start or the goal is
+    among the points) or "not found"; ``nearest``: how far the arm is from the points' balls, at least [m].
     """
 
     state: str
@@ -36,6 +36,7 @@ class Seen:
     world: float = 0.0
     check: float = 0.0
     plan: float = 0.0
+    named: float = 0.0
     proven: bool = False
     nearest: float = float("inf")
 
@@ -83,12 +84,15 @@ def seen_as_points(file: str, folder: str, count: int, judged: bool) -> Seen:
         asked = Problem(world, problem.start, problem.goal)
     except ProblemError:
         return cost("swallowed")
-    plan(asked, PLANNER, seed=2, seconds=BUSY, shorten=False)
-    taken, found = spent(partial(plan, asked, PLANNER, seed=1, seconds=BUSY, shorten=False))
+    calls = (partial(plan, asked, seconds=BUSY), partial(plan, asked, PLANNER, seconds=BUSY, shorten=False))
+    for call in calls:
+        call(seed=2)
+    (taken, found), (named, _) = (spent(partial(call, seed=1)) for call in calls)
+    cost = partial(cost, plan=1e3 * taken, named=1e3 * named)
     if found.path is None:
-        return cost("not found", plan=1e3 * taken)
+        return cost("not found")
     gap = nearest(robot, found.path.waypoints, cloud) if judged else float("nan")
-    return cost("planned", plan=1e3 * taken, proven=bool(found.proven), nearest=gap)
+    return cost("planned", proven=bool(found.proven), nearest=gap)
 
 
 def nearest(robot: Robot, waypoints: Matrix, cloud: PointCloud) -> float:

@@ -52,9 +52,9 @@ def on_workers(workers: int) -> Measured:
         try:
             with Client(address, timeout=120) as client:
                 client.wait_for_workers(workers, timeout=120)
-            plan_many([PROBLEM] * workers, "fastrrtconnect", seed=1, scheduler=address)  # kernels are loaded
+            plan_many([PROBLEM] * workers, seed=1, scheduler=address)  # kernels are loaded
             before, begin = of_process(scheduler.pid), time.perf_counter()
-            plans = plan_many([PROBLEM] * TASKS, "fastrrtconnect", seed=1, scheduler=address)
+            plans = plan_many([PROBLEM] * TASKS, seed=1, scheduler=address)
             wall = time.perf_counter() - begin
             booked = (of_process(scheduler.pid) - before) / TASKS
         finally:

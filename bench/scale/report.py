@@ -10,7 +10,7 @@ from typing import Annotated
 import numpy as np
 from typer import Option
 
-from bench.scale.boxes import Among, among_boxes, among_panels
+from bench.scale.boxes import PLANNER, Among, among_boxes, among_panels
 from bench.scale.clouds import RADIUS, Seen, files_of, memory_of, seen_as_points
 from bench.scale.cluster import TASKS, Measured, on_workers, simulated
 from bench.scale.replans import POINTS, RATE, Walk, walks
@@ -23,7 +23,7 @@ from rrtik_bench.report.page import Report
 AT_ONCE = 10  # runs of replanning in a part
 ROOM_TEXT = (
     "The same room, 1.5 m wide, whatever the number of its panels: what grows is the number of boxes alone. The last "
-    "columns tell a plan's motions and what one costs, proofs and all else included."
+    "columns tell the motions of the named planner and what one costs, proofs and all else included."
 )
 DRAWN_TEXT = (
     "Boxes of 2 cm at most, drawn in a ball of 1.5 m, from 1,000 on as much of it. They leave the arm less and less "
@@ -35,12 +35,13 @@ MANY, MOST = 100_000, 1_000_000  # points
 def boxes(report: Report, title: str, found: list[Among], text: str) -> None:
     """How time grows with the number of boxes."""
     heads = ["boxes", "`World()`, a box [us]", "a configuration [us]", "moving one box [us]", "and a check"]
-    heads += ["free", "`plan()`, median [ms]", "95 % [ms]", "motions, median", "a motion [us]", "found"]
+    heads += ["free", "`plan(problem)`, median [ms]", "95 % [ms]", f"`{PLANNER}`, median [ms]", "its motions, median"]
+    heads += ["one of them [us]", "found"]
     rows = []
     for a in found:
         plans = np.array(a.plans)
-        motion = 1e3 * plans.sum() / sum(a.motions)
-        whole = (np.median(plans), np.quantile(plans, 0.95), np.median(a.motions), motion)
+        motion = 1e3 * sum(a.named) / sum(a.motions)
+        whole = (np.median(plans), np.quantile(plans, 0.95), np.median(a.named), np.median(a.motions), motion)
         times = [f"{number:.3g}" for number in (a.world, a.check, a.move, a.moved)]
         numbers = [f"{number:.4g}" for number in whole]
         rows.append([f"{a.count:,}", *times, f"{100 * a.free:.0f} %", *numbers, f"{a.found} of {len(plans)}"])
@@ -78,11 +79,13 @@ def clouds(report: Report, count: int, found: list[Seen], bars: tuple[float, flo
         "`World()` [ms]",
         "a configuration [us]",
     ]
-    heads += ["`plan()` median [ms]", "95 % [ms]", "nearest point [mm]"]
+    heads += ["`plan(problem)`, median [ms]", "95 % [ms]", f"`{PLANNER}`, median [ms]", "nearest point [mm]"]
     judged = [each.nearest for each in planned if not np.isnan(each.nearest)]
     row = [f"{count:,}", str(len(found)), str(len(found) - len(asked)), str(len(planned))]
     row += [str(sum(each.proven for each in planned)), *(f"{middle[name]:.3g}" for name in ("build", "world", "check"))]
-    row += [f"{np.median(times):.3g}", f"{np.quantile(times, 0.95):.3g}", f"{1e3 * min(judged):.3g}" if judged else "-"]
+    named = [each.named for each in asked]
+    row += [f"{np.median(times):.3g}", f"{np.quantile(times, 0.95):.3g}", f"{np.median(named):.3g}"]
+    row += [f"{1e3 * min(judged):.3g}" if judged else "-"]
     text = (
         f"Obstacles of the Panda's problems as points on their surfaces, {1e3 * RADIUS:g} mm each; a path is compared "
     )

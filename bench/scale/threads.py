@@ -11,7 +11,6 @@ from typing import TypeVar
 
 import numpy as np
 
-from bench.scale.boxes import PLANNER
 from bench.scale.clouds import _panda
 from bench.shared.problems import goal_joints
 from rrtik_ompl import JointPath, plan_many, solve_ik_many
@@ -53,7 +52,7 @@ def plans_in_threads(folder: str, count: int) -> Spread:
     free = rows[problem.world.valid_batch(rows)]
     starts, goals = free[rng.integers(len(free), size=(2, count))]
     starts[::2], goals[1::2] = problem.start, goal_joints(problem)
-    ask = partial(plan_many, problem.world, starts, goals, PLANNER, seed=1)
+    ask = partial(plan_many, problem.world, starts, goals, seed=1)
     ratios, rate, alike, found = [], 0.0, True, 0
     for _ in range(ROUNDS):
         (alone, one), (together, two) = (_wall(partial(ask, threads=n)) for n in (1, 2))

@@ -19,7 +19,8 @@ def machine() -> str:
     about = f"{processor()}, {os.cpu_count()} cores; Python {platform.python_version()}; {packages}."
     load = ", ".join(f"{value:.1f}" for value in os.getloadavg())  # what else ran shows in wall times
     about += f" Load at the start (1, 5, 15 minutes): {load}."
-    return f"{about}\n\nOur planner: `{PLANNER}`. Kernels: {lanes()}. CPU time of the process unless said otherwise."
+    calls = f"`plan(problem)` is the default call; where a planner is named, it is `{PLANNER}`."
+    return f"{about}\n\n{calls} Kernels: {lanes()}. CPU time of the process unless said otherwise."
 
 
 def lanes() -> str:
