@@ -18,6 +18,7 @@ from ompl import util as ou
 from typer import Option
 
 from bench.shared.run import Run, SetsOrNone
+from bench.speed import goals, lengths, trust
 from bench.speed.cases import Options
 from bench.speed.checks import free_motions, near_obstacles
 from bench.speed.machine import machine
@@ -33,6 +34,9 @@ ROWS = {
     "free-motions": free_motions,
     "near-obstacles": near_obstacles,
     "ompl-layer": ompl_layer,
+    **lengths.ROWS,
+    **goals.ROWS,
+    **trust.ROWS,
 }
 
 

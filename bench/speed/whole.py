@@ -115,7 +115,7 @@ def _of_arm(arm: str, options: Options) -> tuple[Runs, int, int, int]:
         path = runs["exact", DEFAULT][-1].path
         if path is not None:
             judge = Contacts(exact.world)
-            rows = _samples(path)
+            rows = samples(path)
             touching += sum(any(True for _ in judge.depths(q)) for q in rows)
             looked += len(rows)
     return runs, touching, looked, refused
@@ -151,7 +151,7 @@ def _run_of_vamp(path: Any) -> Run:
     return Run(0.0, vamp.waypoints(path))
 
 
-def _samples(path: Matrix) -> Matrix:
+def samples(path: Matrix) -> Matrix:
     """Configurations spread evenly over a path, shape (SAMPLES, dof)."""
     ends = np.concatenate([[0.0], np.cumsum([np.linalg.norm(b - a) for a, b in pairwise(path)])])
     places = np.linspace(0.0, ends[-1], SAMPLES)

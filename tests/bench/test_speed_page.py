@@ -24,7 +24,7 @@ def run(folder, *arguments):
 
 @pytest.fixture(scope="module")
 def page(tmp_path_factory):
-    names = ("whole", "exact", "spheres", "free-motions", "near-obstacles", "ompl-layer")
+    names = ("whole", "exact", "spheres", "free-motions", "near-obstacles", "ompl-layer", "shipped-lengths", "solve-ik")
     return run(tmp_path_factory.mktemp("speed"), *(word for name in names for word in ("--only", name)))
 
 
@@ -38,7 +38,7 @@ def test_rows_without_their_data_say_so(page):
 
 
 def test_rows_that_need_no_data_are_measured(page):
-    for title in ("4. Panda along free motions", "5. Exact", "6. SimpleSetup"):
+    for title in ("4. Panda along free motions", "5. Exact", "6. SimpleSetup", "7. Lengths", "10. Inverse"):
         assert f"## {title}" in page
 
 
