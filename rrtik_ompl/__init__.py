@@ -59,9 +59,9 @@ if TYPE_CHECKING:
     from rrtik_ompl.motion.trajectory import RateLimits as RateLimits
     from rrtik_ompl.motion.trajectory import Trajectory as Trajectory
     from rrtik_ompl.motion.trajectory import time_parameterize as time_parameterize
+    from rrtik_ompl.ompl_bridge.planner_names import list_planners as list_planners
     from rrtik_ompl.planning.moves.staircase import one_joint_moves as one_joint_moves
-    from rrtik_ompl.planning.plan import Plan as Plan
-    from rrtik_ompl.planning.plan import list_planners as list_planners
+    from rrtik_ompl.planning.outcome import Plan as Plan
     from rrtik_ompl.planning.plan import plan as plan
     from rrtik_ompl.planning.search.roadmap import Roadmap as Roadmap
     from rrtik_ompl.planning.shortening import MoveRules as MoveRules
@@ -132,11 +132,9 @@ else:
         "world.problem": ("Problem",),
         "problem_files.problem": ("load_problem",),
         "problem_files.scene": ("load_scene",),
-        "planning.plan": (
-            "Plan",
-            "list_planners",
-            "plan",
-        ),
+        "planning.outcome": ("Plan",),
+        "planning.plan": ("plan",),
+        "ompl_bridge.planner_names": ("list_planners",),
         "many": ("plan_many",),
         "planning.shortening": (
             "MoveRules",

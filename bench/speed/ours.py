@@ -20,8 +20,9 @@ from rrtik_ompl.kernels.search.connect import ConnectSearch
 from rrtik_ompl.kernels.search.motions.motion_table import FastMotions
 from rrtik_ompl.ompl_bridge.attempt import attempt
 from rrtik_ompl.ompl_bridge.planner_names import find_planner
-from rrtik_ompl.ompl_bridge.setup import planning_bounds, unchecked_space
+from rrtik_ompl.ompl_bridge.setup import unchecked_space
 from rrtik_ompl.ompl_bridge.states import StateIO
+from rrtik_ompl.world.problem import planning_bounds
 
 Search = Callable[[int], Matrix | None]  # from a seed to a path
 

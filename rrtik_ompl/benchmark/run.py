@@ -15,10 +15,10 @@ from rrtik_ompl.base.choices import ShorteningMethod, SuiteShortening
 from rrtik_ompl.base.errors import RrtikError
 from rrtik_ompl.benchmark.sources import build, from_plain
 from rrtik_ompl.benchmark.suite import BY_KIND, NONE
+from rrtik_ompl.description.catalog import AUTO
 from rrtik_ompl.many.guard import CRASH, HANG, OUT_OF_MEMORY
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.world_settings import FINEST_RESOLUTION
-from rrtik_ompl.ompl_bridge.planner_names import AUTO
 from rrtik_ompl.planning.outcome import Request
 from rrtik_ompl.planning.plan import planned
 from rrtik_ompl.planning.shortening import shorten

@@ -101,7 +101,8 @@ def plan(
 
     from rrtik_ompl import load_problem
     from rrtik_ompl.cli import plan_report as report
-    from rrtik_ompl.ompl_bridge.planner_names import AUTO, options_of
+    from rrtik_ompl.description.catalog import AUTO
+    from rrtik_ompl.ompl_bridge.planner_names import options_of
     from rrtik_ompl.planning.plan import plan as find_path
 
     options_of(AUTO if planner is None else planner)

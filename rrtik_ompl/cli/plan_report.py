@@ -9,11 +9,11 @@ import numpy as np
 
 from rrtik_ompl.base.units import reading, shown_unit
 from rrtik_ompl.cli.table import Table, joint_labels, short_names
+from rrtik_ompl.description.catalog import AUTO, is_auto
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.transitions import lower_bound
-from rrtik_ompl.ompl_bridge.planner_names import AUTO, is_auto
 from rrtik_ompl.planning.moves.text import COLUMNS, moves_document
-from rrtik_ompl.planning.plan import Plan
+from rrtik_ompl.planning.outcome import Plan
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.route_check import how_checked
 

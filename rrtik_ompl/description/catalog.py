@@ -37,6 +37,7 @@ from rrtik_ompl.files.kinds import FilePath, refusing_others
 from rrtik_ompl.files.text import file_name, is_utf8
 from rrtik_ompl.model.robot import Robot
 
+AUTO = "auto"  # a portfolio of planners, which `plan()` runs if none is named
 SOLVED_KINDS = ("any goal", "goal of the tip", "path constraints")  # what planners of "auto" say that they solve
 FILE_OPTIONS = ("urdf", "srdf", "joint_limits", "dh", "moveit", "mjcf")
 FILE_KINDS = (".urdf", ".xml", ".mjcf", ".xacro", ".yaml", ".yml")
@@ -77,6 +78,16 @@ def find_planner(name: str) -> type[Any]:
     """
     found: type[Any] = _load("planner", "planners", name)
     return found
+
+
+def is_auto(name: str) -> bool:
+    """Check whether the name of a planner stands for the portfolio, which has no class.
+
+    Raises:
+        InputError: If it is no name.
+    """
+    require(name, str, "name of a planner", "see list_planners()")
+    return name.lower() == AUTO
 
 
 @cache

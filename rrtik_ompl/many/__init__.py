@@ -15,16 +15,18 @@ from rrtik_ompl.base.arrays import positive, seed_of, whole_number
 from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.choices import ProofMode, ShorteningMethod, one_of
 from rrtik_ompl.base.errors import InputError, ProblemError, require
+from rrtik_ompl.description.catalog import AUTO, is_auto
 from rrtik_ompl.many import spread
 from rrtik_ompl.many.guard import PARCEL
 from rrtik_ompl.many.one_plan import DONE, job_of, parcel_of
 from rrtik_ompl.many.queries import Asked, Ends, Named, Problems, queries_in, queries_of
-from rrtik_ompl.ompl_bridge.planner_names import AUTO, is_auto, is_planner_file, planner_in_folder
+from rrtik_ompl.ompl_bridge.planner_names import is_planner_file, planner_in_folder
 from rrtik_ompl.ompl_bridge.planner_options import check_options
 from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory
 from rrtik_ompl.planning.many import Answer, Query, no_plan, plans_in_threads
 from rrtik_ompl.planning.outcome import Plan, Request
-from rrtik_ompl.planning.plan import PROOF_MODES, named_planner, shortening_method, time_limit
+from rrtik_ompl.planning.plan import PROOF_MODES, shortening_method, time_limit
+from rrtik_ompl.planning.searching import named_planner
 from rrtik_ompl.problem_files.problem import load_problem
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World

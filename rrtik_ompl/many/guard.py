@@ -17,8 +17,9 @@ from pathlib import Path
 from typing import IO, Any
 
 from rrtik_ompl.base.errors import RrtikError
+from rrtik_ompl.description.catalog import is_auto
 from rrtik_ompl.ompl_bridge.ownership import PLAIN_HINT, is_plain
-from rrtik_ompl.ompl_bridge.planner_names import find_planner, is_auto, label_of
+from rrtik_ompl.ompl_bridge.planner_names import find_planner, label_of
 
 COMMAND = (sys.executable, "-m", "rrtik_ompl.many.child")
 OUT_OF_MEMORY, CRASH, HANG = "out of memory", "crash", "hang"  # statuses of lost runs

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.errors import InputError, PlannerError, ProblemError
+from rrtik_ompl.description.catalog import AUTO
 from rrtik_ompl.many.guard import OUT_OF_MEMORY, PARCEL
 from rrtik_ompl.many.queries import Asked, Named
-from rrtik_ompl.ompl_bridge.planner_names import AUTO
 from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory
 from rrtik_ompl.planning.many import Answer, no_plan
 from rrtik_ompl.planning.plan import plan

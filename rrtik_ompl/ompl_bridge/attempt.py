@@ -30,14 +30,13 @@ from rrtik_ompl.ompl_bridge.safe_planner import SafePlanner
 from rrtik_ompl.ompl_bridge.setup import (
     ValidityCallback,
     exact_path,
-    planning_bounds,
     problem_definition,
     shared_space,
     space_information,
 )
 from rrtik_ompl.ompl_bridge.states import StateIO
 from rrtik_ompl.ompl_bridge.weighted import WeightedProblem, has_weights
-from rrtik_ompl.world.problem import Problem
+from rrtik_ompl.world.problem import Problem, planning_bounds
 
 NO_PARAMETERS: Mapping[str, Any] = MappingProxyType({})
 ITERATION_LIMIT = "max_iterations"  # option of array planners

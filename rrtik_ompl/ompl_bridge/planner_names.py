@@ -15,15 +15,14 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from rrtik_ompl.base.errors import InputError, UnknownNameError, require
+from rrtik_ompl.base.errors import InputError, UnknownNameError
 from rrtik_ompl.base.floors import NO_OMPL
 from rrtik_ompl.description import catalog
+from rrtik_ompl.description.catalog import AUTO, is_auto
 from rrtik_ompl.files.digest import sha256
 from rrtik_ompl.ompl_bridge.bindings import ob
 from rrtik_ompl.ompl_bridge.planner_options import planner_options
 from rrtik_ompl.ompl_bridge.planner_traits import BOUND, PlannerFactory, ompl_planners, unbound_planners
-
-AUTO = "auto"  # a portfolio of planners, which `plan()` runs if none is named
 
 MARK = ".py:"  # in the name of a class in a file
 
@@ -38,16 +37,6 @@ def list_planners() -> tuple[str, ...]:
         ('auto', 'bicrdt', 'cbirrt')
     """
     return (AUTO, *catalog.list_planners(), *sorted(ompl_planners()))
-
-
-def is_auto(name: str) -> bool:
-    """Check whether a name stands for the portfolio, which has no class.
-
-    Raises:
-        InputError: If it is no name.
-    """
-    require(name, str, "name of a planner", "see list_planners()")
-    return name.lower() == AUTO
 
 
 def refuse_options(given: Iterable[str]) -> None:

@@ -1,7 +1,8 @@
 """Traits of planner classes, which `plan()` reads, and the table of the traits of OMPL's own planners.
 
 Any class states its traits as attributes of these names (:class:`~rrtik_ompl.ompl_bridge.SafePlanner` lists them with
-their defaults). No other part of the library refers to planners by name.
+their defaults). No other part of the library refers to planners by name, but for
+``SEARCHED_AS`` in `planning/short_path.py`.
 """
 
 from __future__ import annotations

@@ -11,12 +11,12 @@ from itertools import groupby
 
 import numpy as np
 
-from rrtik_ompl.base.arrays import TAU, Mask, Matrix, Vector, frozen
+from rrtik_ompl.base.arrays import Mask, Matrix, Vector
 from rrtik_ompl.ompl_bridge.bindings import ob
 from rrtik_ompl.ompl_bridge.states import StateIO
 from rrtik_ompl.ompl_bridge.unrolled import near_image
 from rrtik_ompl.world.motion_queries import MotionFree
-from rrtik_ompl.world.problem import Problem
+from rrtik_ompl.world.problem import Problem, planning_bounds
 from rrtik_ompl.world.world import World
 
 
@@ -94,25 +94,6 @@ class CheckedMotions(ob.MotionValidator):  # type: ignore[misc]  # OMPL has no t
         a = self._states.read(first)
         b = self._states.read(second)
         return self._motion_valid(a, near_image(b, a, self._states.turning) if self._states.turns else b)
-
-
-def planning_bounds(problem: Problem, goals: Matrix) -> tuple[Vector, Vector]:
-    """Return finite lower and upper bounds to sample in, shapes (n,).
-
-    They are the joint limits; a joint without limits is bounded to one turn beyond start and goals.
-
-    Args:
-        problem: The problem.
-        goals: Goal configurations, shape (k, n).
-    """
-    robot = problem.world.robot
-    if np.isfinite(robot.lower).all() and np.isfinite(robot.upper).all():
-        return robot.lower, robot.upper
-
-    ends = np.vstack([problem.start, goals])
-    lower = np.where(np.isfinite(robot.lower), robot.lower, ends.min(axis=0) - TAU)
-    upper = np.where(np.isfinite(robot.upper), robot.upper, ends.max(axis=0) + TAU)
-    return frozen(lower), frozen(upper)
 
 
 def space_information(problem: Problem, goals: Matrix, validity: ValidityCallback) -> ob.SpaceInformation:

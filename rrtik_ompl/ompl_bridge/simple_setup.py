@@ -18,9 +18,9 @@ from rrtik_ompl.ompl_bridge.goal_sampler import GoalSampler
 from rrtik_ompl.ompl_bridge.ownership import foreign_code
 from rrtik_ompl.ompl_bridge.planner_traits import OMPL_TRAITS, PlannerTraits
 from rrtik_ompl.ompl_bridge.region_constraint import projected_space
-from rrtik_ompl.ompl_bridge.setup import CheckedMotions, bounded_space, circular_space, planning_bounds
+from rrtik_ompl.ompl_bridge.setup import CheckedMotions, bounded_space, circular_space
 from rrtik_ompl.ompl_bridge.states import Coordinates, StateIO, coordinates_of
-from rrtik_ompl.world.problem import Problem
+from rrtik_ompl.world.problem import Problem, planning_bounds
 from rrtik_ompl.world.route_check import motion_taken
 from rrtik_ompl.world.world import World
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,9 +11,11 @@ from rrtik_ompl.base.arrays import Mask, Matrix
 from rrtik_ompl.description.joint_weights import weighted_difference
 from rrtik_ompl.ik.goal_configurations import MAX_ROUNDS, GoalSearch
 from rrtik_ompl.model.goal import TipGoal, has_continuous
-from rrtik_ompl.ompl_bridge.planner_traits import PlannerTraits
 from rrtik_ompl.planning.outcome import Request
 from rrtik_ompl.world.problem import Problem
+
+if TYPE_CHECKING:
+    from rrtik_ompl.ompl_bridge.planner_traits import PlannerTraits
 
 FAR = 2.0  # times the distance of the nearest goal configuration: those farther away are left out of the first attempt
 

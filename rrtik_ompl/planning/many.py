@@ -21,12 +21,12 @@ import numpy as np
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector
 from rrtik_ompl.base.choices import ShorteningMethod
 from rrtik_ompl.base.errors import InputError, PlannerError, ProblemError
+from rrtik_ompl.description.catalog import AUTO, is_auto
 from rrtik_ompl.kernels.threads import in_threads
 from rrtik_ompl.model.goal import Goal, JointGoal
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.proof import Proof
 from rrtik_ompl.ompl_bridge.attempt import ITERATION_LIMIT, attempt_seeds
-from rrtik_ompl.ompl_bridge.planner_names import AUTO, is_auto
 from rrtik_ompl.ompl_bridge.planner_options import is_safe, safe_planner
 from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory, traits_of
 from rrtik_ompl.ompl_bridge.results import SearchResult
@@ -35,7 +35,8 @@ from rrtik_ompl.ompl_bridge.setup import shared_space
 from rrtik_ompl.planning.attempts import EFFORT_ITERATIONS, load_kernels_for
 from rrtik_ompl.planning.finish import finished
 from rrtik_ompl.planning.outcome import NamedPlanner, Plan, Request
-from rrtik_ompl.planning.plan import named_planner, planned_and_finished
+from rrtik_ompl.planning.plan import planned_and_finished
+from rrtik_ompl.planning.searching import named_planner
 from rrtik_ompl.world.clearances import Clearances, clearances_of_pairs
 from rrtik_ompl.world.problem import Problem, known_problem, problem_in
 from rrtik_ompl.world.world import World, form_of

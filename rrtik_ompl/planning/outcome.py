@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.choices import ImproveStrategy, PathObjective, ProofMode
@@ -12,9 +12,11 @@ from rrtik_ompl.base.copies import as_value, in_notebook, in_one_line
 from rrtik_ompl.base.errors import require
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.result import required
-from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.route_check import as_it_stands
+
+if TYPE_CHECKING:
+    from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory
 
 RESTARTS = 20
 

@@ -3,31 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
-from typing import Any, get_args
+from typing import TYPE_CHECKING, Any, get_args
 
 from rrtik_ompl.base.arrays import not_negative, positive, seed_of
 from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.choices import Accuracy, ImproveStrategy, PathObjective, ProofMode, ShorteningMethod, one_of
 from rrtik_ompl.base.errors import InputError, require
-from rrtik_ompl.ompl_bridge.planner_names import AUTO, find_planner, is_auto
-from rrtik_ompl.ompl_bridge.planner_names import list_planners as list_planners
-from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory, traits_of
-from rrtik_ompl.planning.attempts import run_planner
-from rrtik_ompl.planning.outcome import RESTARTS, Improvement, NamedPlanner, Request
-from rrtik_ompl.planning.outcome import Plan as Plan
-from rrtik_ompl.planning.portfolio import run_portfolio
-from rrtik_ompl.planning.second_check import fixed_ends
+from rrtik_ompl.description.catalog import AUTO, is_auto
+from rrtik_ompl.planning.outcome import RESTARTS, Improvement, Plan, Request
 from rrtik_ompl.planning.short_path import short_path
 from rrtik_ompl.world.clearances import check_clearance
-from rrtik_ompl.world.problem import Problem
+from rrtik_ompl.world.problem import Problem, fixed_ends
+
+if TYPE_CHECKING:
+    from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory
 
 MAX_RESTARTS = 1_000_000
 MAX_SECONDS = 1e9  # [s] thirty years; OMPL's clock overflows at about nine times as much
 PROOF_MODES: tuple[ProofMode, ...] = get_args(ProofMode)
 OBJECTIVES: tuple[PathObjective, ...] = get_args(PathObjective)
 STRATEGIES: tuple[ImproveStrategy, ...] = get_args(ImproveStrategy)
-ANYTIME_SHARE = 0.8  # share of the time for a planner that would use all of it, where its path is shortened
 SHORTENING_METHODS: tuple[ShorteningMethod, ...] = get_args(ShorteningMethod)
 
 
@@ -131,6 +126,7 @@ def plan(
     found = planned_and_finished(problem, planner, request, method)
     if found.found and how.seconds > 0.0:
         from rrtik_ompl.planning.improving import improved
+        from rrtik_ompl.planning.searching import named_planner
 
         finder = named_planner(found.planner if isinstance(planner, str) else planner)
         found = improved(problem, found, finder, request, how)
@@ -169,7 +165,11 @@ def planned_and_finished(
     short = short_path(problem, request, pull=method == "auto") if _is_auto(planner) else None
     if short is not None and method in ("auto", None):
         return short
-    found = short or _searched(problem, planner, request, finish_follows=method is not None)
+    found = short
+    if found is None:
+        from rrtik_ompl.planning.searching import searched  # with OMPL, which the short path does without
+
+        found = searched(problem, planner, request, finish_follows=method is not None)
     if method is None:
         return found
 
@@ -188,51 +188,20 @@ def planned(problem: Problem, planner: str | PlannerFactory, request: Request) -
         InputError: If the planner does not take a parameter.
         PlannerError: If the planner broke.
     """
-    if not _is_auto(planner):
-        return _searched(problem, planner, request)
-    short = short_path(problem, request, pull=True)
+    short = short_path(problem, request, pull=True) if _is_auto(planner) else None
     if short is not None:
         return short
-    found = _searched(problem, planner, request)
+
+    from rrtik_ompl.planning.searching import searched  # with OMPL, which the short path does without
+
+    found = searched(problem, planner, request)
+    if not _is_auto(planner):
+        return found
 
     from rrtik_ompl.planning.finish import briefly_shortened  # with shortening, which many plans do without
 
     return briefly_shortened(problem, found, request)
 
 
-def _searched(
-    problem: Problem, planner: str | PlannerFactory, request: Request, *, finish_follows: bool = False
-) -> Plan:
-    """Return a plan with the planner's own path, and the member of a goal set that it reaches.
-
-    Args:
-        problem: The problem to solve.
-        planner: The planner.
-        request: What is asked for.
-        finish_follows: Whether some time has to be left by planners that would use all of it.
-    """
-    if _is_auto(planner):
-        found = run_portfolio(problem, request)
-    else:
-        named = named_planner(planner)
-        share = ANYTIME_SHARE if finish_follows and traits_of(named.factory).anytime else 1.0
-        budget = replace(request.budget, seconds=share * request.budget.seconds)
-        found = run_planner(problem, named, request, budget)
-    if found.path is None:
-        return found
-    return replace(found, member=problem.goal.member_at(problem.robot, found.path.end))
-
-
 def _is_auto(planner: str | PlannerFactory) -> bool:
     return isinstance(planner, str) and is_auto(planner)
-
-
-def named_planner(planner: str | PlannerFactory) -> NamedPlanner:
-    """Return a planner with its name; a name is looked up, a class goes by its own name.
-
-    Raises:
-        UnknownNameError: If there is no planner class of that name; "auto" has none.
-    """
-    if isinstance(planner, str):
-        return NamedPlanner(planner, find_planner(planner))
-    return NamedPlanner(planner.__name__, planner)

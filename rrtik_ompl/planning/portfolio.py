@@ -7,10 +7,10 @@ from dataclasses import replace
 from types import MappingProxyType
 
 from rrtik_ompl.base.errors import InputError
-from rrtik_ompl.description.catalog import portfolio
-from rrtik_ompl.model.goal import TipGoal
-from rrtik_ompl.ompl_bridge.planner_names import AUTO, find_planner, refuse_options
+from rrtik_ompl.description.catalog import AUTO
+from rrtik_ompl.ompl_bridge.planner_names import find_planner, refuse_options
 from rrtik_ompl.planning.attempts import Turn, no_path_within, walk
+from rrtik_ompl.planning.members import members
 from rrtik_ompl.planning.outcome import NamedPlanner, Plan, Request
 from rrtik_ompl.world.problem import Problem
 
@@ -43,27 +43,6 @@ def run_portfolio(problem: Problem, request: Request) -> Plan:
     reason = "" if best.found else _most_telling(turns, request.budget.seconds, totals["attempts"])
     seconds = sum(turn.seconds for turn in turns)
     return replace(best, reason=reason, seconds=seconds, statistics=MappingProxyType(totals))
-
-
-def members(problem: Problem) -> tuple[str, ...]:
-    """Return the names of the planners that try a problem, in their order.
-
-    Planners for a goal of the tip are included only if the goal is one. With path constraints only the planners that
-    keep them are included.
-    """
-    if problem.constraints:
-        wanted = {"path constraints"}
-    elif isinstance(problem.goal, TipGoal):
-        wanted = {"any goal", "goal of the tip"}
-    else:
-        wanted = {"any goal"}
-    return tuple(name for name, solves in portfolio().items() if solves in wanted)
-
-
-def first_member(problem: Problem) -> NamedPlanner | None:
-    """Return the planner that tries a problem first; None if no package offers one."""
-    name = next(iter(members(problem)), None)
-    return None if name is None else NamedPlanner(name, find_planner(name))
 
 
 def _turns(problem: Problem, request: Request) -> Iterator[Turn]:

@@ -19,7 +19,7 @@ from rrtik_ompl.world.clearances import (
     search_form,
 )
 from rrtik_ompl.world.detours import with_detours
-from rrtik_ompl.world.problem import Problem, densely_checked, problem_in
+from rrtik_ompl.world.problem import Problem, densely_checked, fixed_ends, problem_in
 from rrtik_ompl.world.route_check import violations_of
 
 # Options of planners that restrict the moves, see MoveRules.
@@ -223,12 +223,6 @@ class SecondCheck:
         world = self._problem.world
         proof = world.prover.route(rows, clearance=world.settings.required_clearance)
         return str(next(iter(proof.unproven), ""))
-
-
-def fixed_ends(problem: Problem) -> dict[str, Vector]:
-    """Return the configurations that every path of a problem passes, keyed by "start" and "goal"."""
-    q = problem.goal.q
-    return {"start": problem.start} | ({} if q is None else {"goal": q})
 
 
 def _at_goal(problem: Problem, q: Vector) -> bool:

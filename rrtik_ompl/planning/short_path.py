@@ -21,8 +21,6 @@ import numpy as np
 from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.description.joint_weights import weights_of
-from rrtik_ompl.ik.goal_configurations import GoalSearch
-from rrtik_ompl.ik.methods import load_kernels
 from rrtik_ompl.kernels.layout import SOLID_INTS
 from rrtik_ompl.kernels.proof.rows import PROOF_KERNELS
 from rrtik_ompl.kernels.search.connect import ConnectSearch, kept_search
@@ -33,18 +31,15 @@ from rrtik_ompl.kernels.warming import load_together
 from rrtik_ompl.model.goal import has_continuous
 from rrtik_ompl.model.path import JointPath, path_of
 from rrtik_ompl.model.transitions import length_of
-from rrtik_ompl.ompl_bridge.planner_traits import traits_of
-from rrtik_ompl.ompl_bridge.setup import planning_bounds
-from rrtik_ompl.ompl_bridge.weighted import has_weights
-from rrtik_ompl.planning.goal_choice import nearest_rows
+from rrtik_ompl.planning.members import members
 from rrtik_ompl.planning.outcome import Plan, Request
-from rrtik_ompl.planning.portfolio import first_member
 from rrtik_ompl.world.clearances import CLEARANCE
-from rrtik_ompl.world.problem import Problem
+from rrtik_ompl.world.problem import Problem, planning_bounds
 from rrtik_ompl.world.proven_motions import KERNELS as PROVEN_KERNELS
 from rrtik_ompl.world.proven_motions import ProvenMotions, kept_motions
 from rrtik_ompl.world.world import World, form_of
 
+SEARCHED_AS = "fastrrtconnect"  # the planner whose search this is; no planner is imported to know that
 MOST_GOALS = 8  # goal configurations that are tried
 TRIES = 8  # searches to each, until one of them has led to a proven route
 SEARCHES = 2  # to each goal configuration, where its route is long
@@ -101,14 +96,13 @@ def short_path(problem: Problem, request: Request, *, pull: bool) -> Plan | None
         request: What is asked for.
         pull: Whether the path is shortened; otherwise it is what the plan of a shortened one has as ``unshortened``.
     """
-    if not _applies(problem, request):
-        return None
-    planner = first_member(problem)
-    if planner is None or traits_of(planner.factory).kernels != (SEARCH_KERNELS,):
+    if not _applies(problem, request) or members(problem)[:1] != (SEARCHED_AS,):
         return None
 
     load_together((SEARCH_KERNELS, PULL_KERNELS, PROVEN_KERNELS, PROOF_KERNELS))
     if problem.goal.q is None:
+        from rrtik_ompl.ik.methods import load_kernels  # with inverse kinematics, which other goals do without
+
         load_kernels(problem.robot)
     budget = request.budget.begun_now()
     goals = _goals(problem, budget)
@@ -152,7 +146,7 @@ def short_path(problem: Problem, request: Request, *, pull: bool) -> Plan | None
         proved(rows) if shortened else own,
         "",
         budget.elapsed,
-        planner.name,
+        SEARCHED_AS,
         budget.seed,
         MappingProxyType(best.counts),
         member=problem.goal.member_at(problem.robot, own.end),
@@ -168,7 +162,7 @@ def _applies(problem: Problem, request: Request) -> bool:
         return False
     if type(world) is not World or world.settings.proving is not None:
         return False
-    weights_are_even = not has_weights(problem) or len(set(weights_of(problem.robot).tolist())) == 1
+    weights_are_even = not problem.robot.joint_weights or len(set(weights_of(problem.robot).tolist())) == 1
     return world.motions is not None and not problem.constraints and weights_are_even
 
 
@@ -180,6 +174,10 @@ def _goals(problem: Problem, budget: Budget) -> Matrix | None:
         return None
     if q is not None and not has_continuous(problem.robot):
         return q[None]
+
+    from rrtik_ompl.ik.goal_configurations import GoalSearch
+    from rrtik_ompl.planning.goal_choice import nearest_rows
+
     found = GoalSearch(problem, budget.seed, seconds_left=lambda: budget.left).first()
     if len(found) == 0:
         return None

@@ -16,8 +16,8 @@ import numpy as np
 from rrtik_ompl.base.arrays import TAU, Vector
 from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.errors import ProblemError
+from rrtik_ompl.description.catalog import AUTO
 from rrtik_ompl.model.path import JointPath, path_through
-from rrtik_ompl.ompl_bridge.planner_names import AUTO
 from rrtik_ompl.planning.outcome import Request
 from rrtik_ompl.planning.plan import planned
 from rrtik_ompl.tasks.branches import Branch, Expander

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from rrtik_ompl.description.catalog import robot_called
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.motion.trajectory import Trajectory
-from rrtik_ompl.planning.plan import Plan
+from rrtik_ompl.planning.outcome import Plan
 from rrtik_ompl.viewer.page import page
 from rrtik_ompl.viewer.subject import Showable
 from rrtik_ompl.world.problem import Problem

@@ -12,7 +12,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.base.arrays import TAU, Vector, dimensions, frozen
+from rrtik_ompl.base.arrays import TAU, Matrix, Vector, dimensions, frozen
 from rrtik_ompl.base.choices import Accuracy
 from rrtik_ompl.base.copies import as_value, changed, in_notebook, restored
 from rrtik_ompl.base.errors import InputError, ProblemError, listed, require
@@ -361,3 +361,28 @@ def _nearest_turn(world: World, start: Vector, q: Vector) -> Vector:
     turns = np.where(world.robot.continuous, np.round((start - q) / TAU), 0.0)
     nearest: Vector = q + turns * TAU
     return nearest
+
+
+def fixed_ends(problem: Problem) -> dict[str, Vector]:
+    """Return the configurations that every path of a problem passes, keyed by "start" and "goal"."""
+    q = problem.goal.q
+    return {"start": problem.start} | ({} if q is None else {"goal": q})
+
+
+def planning_bounds(problem: Problem, goals: Matrix) -> tuple[Vector, Vector]:
+    """Return finite lower and upper bounds to sample in, shapes (n,).
+
+    They are the joint limits; a joint without limits is bounded to one turn beyond start and goals.
+
+    Args:
+        problem: The problem.
+        goals: Goal configurations, shape (k, n).
+    """
+    robot = problem.world.robot
+    if np.isfinite(robot.lower).all() and np.isfinite(robot.upper).all():
+        return robot.lower, robot.upper
+
+    ends = np.vstack([problem.start, goals])
+    lower = np.where(np.isfinite(robot.lower), robot.lower, ends.min(axis=0) - TAU)
+    upper = np.where(np.isfinite(robot.upper), robot.upper, ends.max(axis=0) + TAU)
+    return frozen(lower), frozen(upper)

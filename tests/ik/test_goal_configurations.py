@@ -22,8 +22,9 @@ from rrtik_ompl.model.goal_kind import TaskRegion
 from rrtik_ompl.model.scene import Obstacle, Scene
 from rrtik_ompl.model.shapes import Box
 from rrtik_ompl.ompl_bridge import GoalSampler, StateIO
+from rrtik_ompl.ompl_bridge.planner_names import list_planners
 from rrtik_ompl.ompl_bridge.planner_traits import ompl_planners, traits_of
-from rrtik_ompl.planning.plan import list_planners, plan
+from rrtik_ompl.planning.plan import plan
 from rrtik_ompl.problem_files.problem import load_problem
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World

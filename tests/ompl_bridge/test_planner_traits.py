@@ -45,6 +45,7 @@ BY_NAME: tuple[str, ...] = (
     "planning/plan.py",
     "planning/improving.py",
     "planning/outcome.py",
+    "planning/short_path.py",
     "kernels/wasm/page_kernels.py",
     "viewer/page_planner.py",
 )

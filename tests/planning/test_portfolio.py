@@ -12,11 +12,15 @@ import rrtik_planners
 from rrtik_ompl import Box, Obstacle, PositionGoal, Problem, Scene, World, load_problem, load_robot, plan, plan_many
 from rrtik_ompl.base.errors import InputError, PlannerError, UnknownNameError
 from rrtik_ompl.description import catalog
+from rrtik_ompl.description.catalog import AUTO
+from rrtik_ompl.kernels.search.connect_layout import KERNELS
 from rrtik_ompl.ompl_bridge import SafePlanner, SearchResult
-from rrtik_ompl.ompl_bridge.planner_names import AUTO, find_planner
+from rrtik_ompl.ompl_bridge.planner_names import find_planner
 from rrtik_ompl.ompl_bridge.planner_traits import traits_of
+from rrtik_ompl.planning import plan as plan_module
 from rrtik_ompl.planning import portfolio
-from rrtik_ompl.planning.portfolio import members
+from rrtik_ompl.planning.members import members
+from rrtik_ompl.planning.short_path import SEARCHED_AS
 
 
 @pytest.fixture(scope="module")
@@ -49,8 +53,9 @@ class Broken(Idle):
 
 
 def replaced(monkeypatch, **classes):
-    """Other classes under the names of some planners of the portfolio."""
+    """Other classes under the names of some planners of the portfolio, which have to search then."""
     monkeypatch.setattr(portfolio, "find_planner", lambda name: classes.get(name) or find_planner(name))
+    monkeypatch.setattr(plan_module, "short_path", lambda *_, **__: None)
 
 
 def test_planners_that_seek_the_tip_try_goals_of_the_tip_alone(boxes, pose):
@@ -104,6 +109,7 @@ def test_planners_of_the_portfolio_solve_what_is_said_of_them():
     for name, solves in catalog.portfolio().items():
         assert offered[name].finds_goals == (solves == "goal of the tip")
         assert offered[name].keeps_constraints == (solves == "path constraints")
+    assert offered[SEARCHED_AS].kernels == (KERNELS,)
     keeping = {name for name, traits in offered.items() if traits.keeps_constraints}
     assert keeping == {name for name, solves in catalog.portfolio().items() if solves == "path constraints"}
 
@@ -158,10 +164,7 @@ def test_what_a_planner_took_until_it_broke_counts(boxes, monkeypatch):
                 time.sleep(0.01)
             raise RuntimeError("no luck")
 
-    def member(name):
-        return BrokenLate if name == members(boxes)[0] else Idle
-
-    monkeypatch.setattr(portfolio, "find_planner", member)
+    replaced(monkeypatch, **dict.fromkeys(members(boxes), Idle) | {members(boxes)[0]: BrokenLate})
     nothing = plan(boxes, seed=1, seconds=2.0)
     assert not nothing.found
     assert nothing.seconds > 0.9

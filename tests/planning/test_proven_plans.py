@@ -14,10 +14,11 @@ from rrtik_ompl.description.urdf import robot_from_urdf_text
 from rrtik_ompl.model.scene import Obstacle, Scene
 from rrtik_ompl.model.shapes import Box, Sphere
 from rrtik_ompl.ompl_bridge.motion_checker import WorldChecker
-from rrtik_ompl.ompl_bridge.setup import planning_bounds, unchecked_space
+from rrtik_ompl.ompl_bridge.setup import unchecked_space
 from rrtik_ompl.planning.plan import plan
 from rrtik_ompl.world.clearances import CLEARANCE, clearances_between
 from rrtik_ompl.world.detours import with_detours
+from rrtik_ompl.world.problem import planning_bounds
 from rrtik_planners import FewestMoves
 
 PLANNERS = ("bicrdt", "fastrrtconnect", "fewest-moves", "RRTConnect", "KPIECE1")

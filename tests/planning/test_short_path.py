@@ -12,7 +12,7 @@ from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.kernels.simd import library
 from rrtik_ompl.kernels.simd.library import Library
 from rrtik_ompl.planning import plan as plan_module
-from rrtik_ompl.planning import portfolio
+from rrtik_ompl.planning import short_path as module
 from rrtik_ompl.planning import short_path as room
 from rrtik_ompl.planning.outcome import Request
 from rrtik_ompl.planning.short_path import short_path
@@ -103,7 +103,7 @@ def test_where_it_does_not_apply_planners_take_their_turns(problem, monkeypatch)
 
     resting = rrtik.Problem(problem.world, problem.start, problem.start)
     assert short_path(resting, REQUEST, pull=True) is None
-    monkeypatch.setattr(portfolio, "members", lambda _: ("bicrdt",))  # no planner's search in kernels comes first
+    monkeypatch.setattr(module, "members", lambda _: ("bicrdt",))  # no planner's search in kernels comes first
     assert short_path(problem, REQUEST, pull=True) is None
 
 
