@@ -255,5 +255,9 @@ class SceneWarning(UserWarning):
     """Something in a scene file is represented differently in the world that is made of it."""
 
 
+class DependencyWarning(UserWarning):
+    """A package is installed in a version below the lowest one that is admitted; what needs it may fail."""
+
+
 class PathWarning(UserWarning):
     """A request does not apply to a path, which stays unchanged."""

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import re
 import sys
+import warnings
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
+from functools import cache
 from typing import Any
 
-from rrtik_ompl.base.errors import RrtikError
-from rrtik_ompl.base.installed import version_of
+from rrtik_ompl.base.errors import DependencyWarning, RrtikError
+from rrtik_ompl.base.installed import version_of, version_on_path
 
-# By the name of the module: the name of the package and its lowest version. Of example-robot-data only files are read.
+# By the name of the module: the name of the package and its lowest version.
 FLOORS = {
     "numpy": ("numpy", "2.0.2"),
     "pinocchio": ("pin", "3.4.0"),
     "coal": ("coal", "3.0.1"),
+    "example_robot_data": ("example-robot-data", "5.0.0"),  # only files of it are read
     "numba": ("numba", "0.62.1"),
     "scipy": ("scipy", "1.13.1"),
     "cv2": ("opencv-python-headless", "4.10.0"),
@@ -34,6 +37,7 @@ FLOORS = {
     "collada": ("pycollada", "0.8"),
 }
 EVERYWHERE = ("numpy", "pinocchio", "coal")  # in all that this package does
+OPENCV = ("opencv-python", "opencv-contrib-python", "opencv-contrib-python-headless")  # the same files by other names
 # Libraries that the wheels of pin 3 were linked with, though they admit newer ones, which then are not found.
 OLD_LIBRARIES = ("liburdfdom", "libtinyxml2")
 NO_OMPL = "OMPL is not installed, and only our own planners are here; pip install ompl (not for Python 3.14)"
@@ -74,10 +78,33 @@ def too_old(modules: Mapping[str, Any], but: Collection[str] = ()) -> str:
     for module, (package, floor) in FLOORS.items():
         if module in modules and module not in but:
             found = getattr(modules[module], "__version__", None) or getattr(modules[module], "version", None)
-            found = found or version_of(package)
-            if _numbers(found) and _numbers(found) < _numbers(floor):
-                return f"{package} {found} is too old; pip install '{package}>={floor}'"
+            if reason := _older(package, found or version_of(package), floor):
+                return reason
     return ""
+
+
+@cache
+def name_old_packages() -> None:
+    """Warn, once, of all packages that are installed in a version below their floor, whether they are used or not.
+
+    Most are loaded where they are first needed, long after this package.
+    """
+    for reason in _installed_too_old():
+        warnings.warn(reason, DependencyWarning, stacklevel=3)
+
+
+def _installed_too_old() -> list[str]:
+    """Return what is wrong with installed packages that are older than their floor, a line each."""
+    floors = [*FLOORS.values(), *((other, FLOORS["cv2"][1]) for other in OPENCV)]
+    reasons = [_older(package, version_on_path(package), floor) for package, floor in floors]
+    return [reason for reason in reasons if reason]
+
+
+def _older(package: str, found: object, floor: str) -> str:
+    """Return that a version is older than the floor, in a line; "" if it is not, or is no version."""
+    if not _numbers(found) or _numbers(found) >= _numbers(floor):
+        return ""
+    return f"{package} {found} is too old; pip install '{package}>={floor}'"
 
 
 def _numbers(version: object) -> tuple[int, ...]:
@@ -85,8 +112,11 @@ def _numbers(version: object) -> tuple[int, ...]:
 
 
 def _missing(error: Exception) -> str:
-    """Return that OMPL is missing, or which packages pin 3 lacks and so could not be loaded, in a line; else ""."""
+    """Return which package is missing, or could not be loaded as it or what it needs is too old, in a line; else ""."""
+    if not isinstance(error, ImportError):
+        return ""
     if isinstance(error, ModuleNotFoundError) and error.name == "ompl":
         return NO_OMPL
-    lacks = isinstance(error, ImportError) and any(library in str(error) for library in OLD_LIBRARIES)
-    return f"pin 3 {error}; pip install 'cmeel-urdfdom<5' 'cmeel-tinyxml2<11', or 'pin>=4'" if lacks else ""
+    if any(library in str(error) for library in OLD_LIBRARIES):
+        return f"pin 3 {error}; pip install 'cmeel-urdfdom<5' 'cmeel-tinyxml2<11', or 'pin>=4'"
+    return next(iter(_installed_too_old()), "")  # which leaves no module behind that says its version

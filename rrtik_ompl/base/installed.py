@@ -31,8 +31,18 @@ def version_of(package: str) -> str:
         >>> version_of("no-such-package")
         ''
     """
+    return version_on_path(package) or _by_importlib(package)
+
+
+def version_on_path(package: str) -> str:
+    """Return the version of a package that lies in a folder on ``sys.path``; "" if it lies elsewhere or nowhere.
+
+    Example:
+        >>> version_on_path("no-such-package")
+        ''
+    """
     found = installed_packages().get(_key(package)) if on_path_alone() else None
-    return found.version if found and found.version else _by_importlib(package)
+    return found.version if found else ""
 
 
 @cache

@@ -15,7 +15,7 @@ from typing import Any
 
 from rrtik_ompl.base.collector import collector_waits
 from rrtik_ompl.base.errors import InputError
-from rrtik_ompl.base.floors import fitting_packages
+from rrtik_ompl.base.floors import fitting_packages, name_old_packages
 
 
 def lazy_names(
@@ -42,6 +42,7 @@ def lazy_names(
         home = home_of.get(name)
         with fitting_packages(), collector_waits():
             module = import_module(f"{package}.{name}" if home is None else f"rrtik_ompl.{home}")
+        name_old_packages()
         value = module if home is None else getattr(module, name)
         if isinstance(value, type):
             guided(value)

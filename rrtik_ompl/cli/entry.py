@@ -9,7 +9,8 @@ import sys
 import threading
 from contextlib import suppress
 
-from rrtik_ompl.cli import INTERRUPTED
+from rrtik_ompl.base.floors import DependencyError, fitting_packages
+from rrtik_ompl.cli import BAD_INPUT, INTERRUPTED
 
 
 def main() -> None:
@@ -20,7 +21,12 @@ def main() -> None:
     if usual is signal.default_int_handler:  # in a shell's background Ctrl-C is ignored, and stays so
         signal.signal(signal.SIGINT, _leave)
 
-    from rrtik_ompl.cli.app import run
+    try:
+        with fitting_packages():  # typer, too
+            from rrtik_ompl.cli.app import run
+    except DependencyError as error:
+        print(f"rrtik: {error}", file=sys.stderr)
+        sys.exit(BAD_INPUT)
 
     signal.signal(signal.SIGINT, usual)
     code = run()

@@ -1,13 +1,16 @@
 """Packages older than their floor are named in a line, when they are loaded or when something of them is missing."""
 
+import os
 import subprocess
 import sys
+import warnings
 from types import SimpleNamespace
 
 import pytest
 
 from rrtik_ompl.base import floors
-from rrtik_ompl.base.floors import FLOORS, DependencyError, fitting_packages, too_old
+from rrtik_ompl.base.errors import DependencyWarning
+from rrtik_ompl.base.floors import FLOORS, OPENCV, DependencyError, fitting_packages, name_old_packages, too_old
 
 
 def test_the_packages_of_this_environment_fit():
@@ -51,6 +54,43 @@ def test_an_old_one_explains_what_goes_wrong_and_what_is_not_used_is_no_reason(m
     monkeypatch.undo()
     with pytest.raises(DependencyError, match=r"pin 3 .*liburdfdom.*cmeel-urdfdom<5"), fitting_packages():
         raise ImportError("liburdfdom_sensor.so.4.0: cannot open shared object file")
+
+
+@pytest.mark.parametrize("package", [*(package for package, _ in FLOORS.values()), *OPENCV])
+def test_an_old_one_that_is_installed_is_named_once_though_it_is_not_used_yet(package, monkeypatch):
+    monkeypatch.setattr(floors, "version_on_path", lambda name: "0.0.1" if name == package else "")
+    name_old_packages.cache_clear()
+    with pytest.warns(DependencyWarning, match=rf"^{package} 0\.0\.1 is too old; pip install '{package}>="):
+        name_old_packages()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        name_old_packages()
+
+
+def test_of_the_packages_of_this_environment_none_is_named():
+    name_old_packages.cache_clear()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        name_old_packages()
+
+
+@pytest.mark.parametrize("package", ["opencv-python-headless", "opencv-python"])
+def test_an_old_one_that_cannot_be_loaded_is_told_by_what_is_installed(package, monkeypatch):
+    monkeypatch.setattr(floors, "version_on_path", lambda name: "4.9.0.80" if name == package else "")
+    with pytest.raises(DependencyError, match=rf"^{package} 4\.9\.0\.80 is too old"), fitting_packages():
+        raise ImportError("numpy.core.multiarray failed to import")  # what OpenCV 4.9 says beside numpy 2
+    with pytest.raises(ValueError, match="something else"), fitting_packages():
+        raise ValueError("something else")
+
+
+def test_a_command_line_whose_typer_is_too_old_says_so_in_a_line(tmp_path):
+    (tmp_path / "typer.py").write_text("__version__ = '0.9.0'")  # and nothing else of it
+    path = os.pathsep.join([str(tmp_path), *filter(None, sys.path)])
+    code = "from rrtik_ompl.cli.entry import main; main()"
+    environment = {**os.environ, "PYTHONPATH": path}
+    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=False)
+    assert done.stderr == "rrtik: typer 0.9.0 is too old; pip install 'typer>=0.15.4'\n"
+    assert done.returncode == 2
 
 
 @pytest.mark.parametrize(
