@@ -107,8 +107,8 @@ def plan_many(  # type: ignore[misc]  # the second argument is `planner` after p
         seed: Seed of all queries; the k-th query has a seed of its own that depends on this and k alone. None draws
             one.
         parameters: Options of the planner.
-        shorten: As for :func:`rrtik_ompl.plan`; False leaves the planners' own paths, and is many times as quick where
-            queries are planned together.
+        shorten: As for :func:`rrtik_ompl.plan`; False leaves the planners' own paths, which by named planners is many
+            times as quick where queries are planned together.
         proof: As for :func:`rrtik_ompl.plan`.
         threads: Number of queries at a time in this process; None for the number of cores.
         processes: Number of processes of this machine that plan instead.

@@ -1,9 +1,10 @@
 """Many queries: those in one world, and with one planner, are planned together where that is possible.
 
-For each query `plan()` makes a brief attempt on what the kernels can prove, and accepts its path if all of it is proven
-with the clearance of its ends. :func:`plans_together` does this for many queries in a few calls: the ends of all
-queries, and then the paths of all queries, go to the kernels together. A query that needs any further step gets no plan
-there; `plan()` then plans it from the beginning.
+Without a planner, :func:`short_plans` makes the short paths of many queries in a few calls. By a named planner,
+`plan()` makes a brief attempt on what the kernels can prove, and accepts its path if all of it is proven with the
+clearance of its ends. :func:`plans_together` does this for many queries in a few calls: the ends of all queries, and
+then the paths of all queries, go to the kernels together. A query that needs any further step gets no plan there;
+`plan()` then plans it from the beginning.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from rrtik_ompl.base.choices import ShorteningMethod
 from rrtik_ompl.base.errors import InputError, PlannerError, ProblemError
 from rrtik_ompl.description.catalog import AUTO, is_auto
 from rrtik_ompl.kernels.threads import in_threads
-from rrtik_ompl.model.goal import Goal, JointGoal
+from rrtik_ompl.model.goal import Goal, JointGoal, has_continuous
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.proof import Proof
 from rrtik_ompl.ompl_bridge.attempt import ITERATION_LIMIT, attempt_seeds
@@ -37,6 +38,7 @@ from rrtik_ompl.planning.finish import finished
 from rrtik_ompl.planning.outcome import NamedPlanner, Plan, Request
 from rrtik_ompl.planning.plan import planned_and_finished
 from rrtik_ompl.planning.searching import named_planner
+from rrtik_ompl.planning.short_path import loaded_for, plan_of, short_routes, tools_for
 from rrtik_ompl.world.clearances import Clearances, clearances_of_pairs
 from rrtik_ompl.world.problem import Problem, known_problem, problem_in
 from rrtik_ompl.world.world import World, form_of
@@ -129,7 +131,7 @@ def _batch(
     """
     answers = dict[int, Answer | Callable[[], Answer]]()
     at_once = dict[int, Query]()
-    groups: dict[tuple[int, NamedPlanner], dict[int, Query]] = {}
+    groups: dict[tuple[int, NamedPlanner | None], dict[int, Query]] = {}
     for k, each in enumerate(asked):
         query = each() if callable(each) else each
         if not isinstance(query, Query):
@@ -141,24 +143,20 @@ def _batch(
         named = _named(name)
         if method == "ompl":
             continue
-        if named is None:
-            at_once[k] = query
-        elif is_safe(named.factory):
+        if named is None or is_safe(named.factory):
             at_once[k] = query
             groups.setdefault((id(query.world), named), {})[k] = query
 
     for (_, named), group in groups.items():
         with suppress(InputError):  # of an option; each query will get this error
-            found = plans_together(named, list(group.values()), request)
-            answers |= {
-                k: _finished(plan, request, method) for k, plan in zip(group, found, strict=True) if plan is not None
-            }
+            found = _finished_together(named, list(group.values()), request, method)
+            answers |= {k: plan for k, plan in zip(group, found, strict=True) if plan is not None}
 
     return [each() if k in at_once and callable(each) else each for k, each in sorted(answers.items())]
 
 
 def _named(planner: str | PlannerFactory) -> NamedPlanner | None:
-    """Return a planner with its name; None for "auto", whose short path is made alone, and where there is none."""
+    """Return a planner with its name; None for "auto", and where there is none of that name."""
     try:
         return None if isinstance(planner, str) and is_auto(planner) else named_planner(planner)
     except InputError:
@@ -178,6 +176,19 @@ def answer_alone(
         return error
 
 
+def _finished_together(
+    named: NamedPlanner | None, queries: Sequence[Query], request: Request, method: ShorteningMethod | None
+) -> list[Plan | None]:
+    """Plan queries in one world together by a planner, or None for "auto", as `plan()` does; None for the others."""
+    if named is None:
+        plans = short_plans(queries, request, pull=method == "auto")
+        if method in ("auto", None):
+            return plans
+    else:
+        plans = plans_together(named, queries, request)
+    return [None if plan is None else _finished(plan, request, method) for plan in plans]
+
+
 def _with_seed(request: Request, seed: int) -> Request:
     return replace(request, budget=replace(request.budget, seed=seed))
 
@@ -193,6 +204,55 @@ def no_plan(reason: str, planner: str | PlannerFactory, seed: int, *, seconds: f
     """Return a plan without a path, for a query that could not be asked, or was lost."""
     name = planner if isinstance(planner, str) else planner.__name__
     return Plan(False, None, reason, seconds, name, seed, MappingProxyType({}))
+
+
+def short_plans(queries: Sequence[Query], request: Request, *, pull: bool) -> list[Plan | None]:
+    """Plan queries in one world as :func:`.short_path.short_path` does, in a few calls; None for those planned alone.
+
+    That a start and a goal are proven with the clearance of the path is all that has to be checked of them. A query
+    that needs more than one search, or none, gets None.
+
+    Args:
+        queries: Their configurations may be outside the limits.
+        request: What is asked for each query, but for the seed.
+        pull: Whether the paths are shortened.
+    """
+    plans: list[Plan | None] = [None] * len(queries)
+    world = queries[0].world
+    robot = world.robot
+    numbers = [k for k, query in enumerate(queries) if isinstance(query.goal, JointGoal)]
+    if not numbers or has_continuous(robot):
+        return plans
+    ends = np.array([(queries[k].start, queries[k].end) for k in numbers])
+    inside = np.logical_and.reduce((ends >= robot.lower) & (ends <= robot.upper), axis=(1, 2))
+    moves = np.logical_or.reduce(ends[:, 0] != ends[:, 1], axis=1)
+    numbers = [numbers[k] for k in np.flatnonzero(inside & moves)]
+    ends = ends[inside & moves]
+    if not numbers:
+        return plans
+
+    any_problem = known_problem(world, *ends[0])
+    if not loaded_for(any_problem, request):
+        return plans
+    began = time.perf_counter()
+    with tools_for(any_problem, request, ends[:, 1]) as tools:
+        rows = ends.reshape(-1, robot.dof)
+        free = tools.motions.motion_valid_batch(rows, rows).reshape(-1, 2).all(axis=1)
+        numbers = [numbers[k] for k in np.flatnonzero(free)]
+        found = short_routes(ends[free], [queries[k].seed for k in numbers], tools, whole=pull)
+    seconds = (time.perf_counter() - began) / max(len(numbers), 1)
+
+    for k, route in zip(numbers, found, strict=True):
+        if route is None:
+            continue
+        query = queries[k]
+        problem = query.problem or known_problem(world, query.start, query.goal)
+        counts = dict(route.counts)
+        if pull and len(route.found) > 2:
+            counts["shortening_seconds"] = seconds
+        pulled = route.pulled if pull else None
+        plans[k] = plan_of(problem, route.found, pulled, tools, seconds, query.seed, counts)
+    return plans
 
 
 @dataclass(frozen=True, slots=True, eq=False)

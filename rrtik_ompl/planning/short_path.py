@@ -11,7 +11,8 @@ All of it is bounded by counts: the same seed gives the same path. Where it find
 
 from __future__ import annotations
 
-from contextlib import suppress
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import NamedTuple
@@ -23,7 +24,7 @@ from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.description.joint_weights import weights_of
 from rrtik_ompl.kernels.layout import SOLID_INTS
 from rrtik_ompl.kernels.proof.rows import PROOF_KERNELS
-from rrtik_ompl.kernels.search.connect import ConnectSearch, kept_search
+from rrtik_ompl.kernels.search.connect import ConnectSearch, kept_search, solve_each
 from rrtik_ompl.kernels.search.connect_layout import KERNELS as SEARCH_KERNELS
 from rrtik_ompl.kernels.search.contacts.layout import KERNELS as PULL_KERNELS
 from rrtik_ompl.kernels.search.contacts.pulling import Pulling
@@ -50,6 +51,7 @@ BRIEF_WORK = 20  # of the pull of a route that is compared with others, in proof
 CUTS = 6  # random cuts of the route
 WORTH = 0.98  # a straight line of more than this share of the best length is left out
 SPARE = 2.5e-4  # [m] that motions keep beyond the clearance of the path, as those of `shorten()` do
+PULLED_AT_ONCE = 8  # routes of many queries in one call of a kernel, so that Ctrl-C is heard
 MANY_PIECES = 250  # convex pieces of an arm whose motions take less to prove than to check in steps
 
 
@@ -60,12 +62,14 @@ class Tools(NamedTuple):
         search: Searches in the box of configurations.
         motions: Motions that are proven to keep a clearance.
         lower, upper: The box, shapes (dof,).
+        clearance: What is said of proven paths, a little less than motions keep [m].
     """
 
     search: ConnectSearch
     motions: ProvenMotions
     lower: Vector
     upper: Vector
+    clearance: float
 
 
 @dataclass(slots=True, eq=False)
@@ -88,18 +92,15 @@ class Shortest:
 def short_path(problem: Problem, request: Request, *, pull: bool) -> Plan | None:
     """Return the plan of a problem, or None where this finds no path or does not apply.
 
-    It applies to straight motions without path constraints and weights, in worlds with kernels, where proofs are
-    wanted and the planner that "auto" begins with is the search of these kernels.
+    Where it applies, :func:`loaded_for` says.
 
     Args:
         problem: The problem to solve.
         request: What is asked for.
         pull: Whether the path is shortened; otherwise it is what the plan of a shortened one has as ``unshortened``.
     """
-    if not _applies(problem, request) or members(problem)[:1] != (SEARCHED_AS,):
+    if not loaded_for(problem, request):
         return None
-
-    load_together((SEARCH_KERNELS, PULL_KERNELS, PROVEN_KERNELS, PROOF_KERNELS))
     if problem.goal.q is None:
         from rrtik_ompl.ik.methods import load_kernels  # with inverse kinematics, which other goals do without
 
@@ -109,17 +110,7 @@ def short_path(problem: Problem, request: Request, *, pull: bool) -> Plan | None
     if goals is None:
         return None
 
-    world = problem.world
-    clearance = max(CLEARANCE if request.clearance is None else request.clearance, world.settings.required_clearance)
-    lower, upper = planning_bounds(problem, goals)
-    lower = np.maximum(lower, world.robot.lower)  # Kernels prove nothing beyond the limits.
-    upper = np.minimum(upper, world.robot.upper)
-    motions = kept_motions(world, clearance + min(clearance, SPARE))
-    checks = world.motions
-    assert checks is not None  # as _applies() has found
-    key = ("short path", lower.tobytes(), upper.tobytes())
-    with kept_search(checks, key, lambda: _search_in(world, lower, upper)) as search:
-        tools = Tools(search, motions, lower, upper)
+    with tools_for(problem, request, goals) as tools:
         ends = np.concatenate([problem.start[None], goals])
         free = tools.motions.motion_valid_batch(ends, ends)
         if not free[0] or not free[1:].any():
@@ -133,26 +124,84 @@ def short_path(problem: Problem, request: Request, *, pull: bool) -> Plan | None
                 best.route.run(stop=budget.over)
         rows = best.route.waypoints
 
-    def proved(waypoints: Matrix) -> JointPath:
-        """Return a route that kernels have proven as a path."""
-        return path_of(problem.robot, waypoints, motions.proof(waypoints, clearance))
-
-    own = proved(best.found)
-    shortened = pull and len(best.found) > 2
-    if shortened:
+    if pull and len(best.found) > 2:
         best.counts["shortening_seconds"] = budget.elapsed - searched
+    pulled = rows if pull else None
+    return plan_of(problem, best.found, pulled, tools, budget.elapsed, budget.seed, best.counts)
+
+
+def plan_of(
+    problem: Problem,
+    found: Matrix,
+    pulled: Matrix | None,
+    tools: Tools,
+    seconds: float,
+    seed: int,
+    counts: Mapping[str, int | float],
+) -> Plan:
+    """Return the plan of a proven route.
+
+    Args:
+        problem: The problem that it solves.
+        found: The route as it was found, shape (k, dof).
+        pulled: The same after a pull, shape (m, dof); None for none.
+        tools: What has proven both.
+        seconds: How long it has taken [s].
+        seed: What its random numbers depend on.
+        counts: Statistics of the plan.
+    """
+
+    def proved(waypoints: Matrix) -> JointPath:
+        return path_of(problem.robot, waypoints, tools.motions.proof(waypoints, tools.clearance))
+
+    own = proved(found)
+    shortened = pulled is not None and len(found) > 2
     return Plan(
         True,
-        proved(rows) if shortened else own,
+        proved(pulled) if pulled is not None and shortened else own,
         "",
-        budget.elapsed,
+        seconds,
         SEARCHED_AS,
-        budget.seed,
-        MappingProxyType(best.counts),
+        seed,
+        MappingProxyType(counts),
         member=problem.goal.member_at(problem.robot, own.end),
         unshortened=own if shortened else None,
         problem=problem,
     )
+
+
+def loaded_for(problem: Problem, request: Request) -> bool:
+    """Check whether a problem may have a short path, and load the kernels for it.
+
+    That is so for straight motions without path constraints and weights, in worlds with kernels, where proofs are
+    wanted and the planner that "auto" begins with is the search of these kernels.
+    """
+    if not _applies(problem, request) or members(problem)[:1] != (SEARCHED_AS,):
+        return False
+    load_together((SEARCH_KERNELS, PULL_KERNELS, PROVEN_KERNELS, PROOF_KERNELS))
+    return True
+
+
+@contextmanager
+def tools_for(problem: Problem, request: Request, goals: Matrix) -> Iterator[Tools]:
+    """Yield what searches and proves in the world of a problem.
+
+    Args:
+        problem: One that :func:`loaded_for` accepts.
+        request: What is asked for.
+        goals: Goal configurations, shape (k, dof).
+    """
+    world = problem.world
+    clearance = max(CLEARANCE if request.clearance is None else request.clearance, world.settings.required_clearance)
+    lower, upper = planning_bounds(problem, goals)
+    lower = np.maximum(lower, world.robot.lower)  # Kernels prove nothing beyond the limits.
+    upper = np.minimum(upper, world.robot.upper)
+    motions = kept_motions(world, clearance + min(clearance, SPARE))
+    checks = world.motions
+    assert checks is not None  # as _applies() has found
+    key = ("short path", lower.tobytes(), upper.tobytes())
+    with kept_search(checks, key, lambda: _search_in(world, lower, upper)) as search:
+        yield Tools(search, motions, lower, upper, clearance)
 
 
 def _applies(problem: Problem, request: Request) -> bool:
@@ -239,6 +288,59 @@ def _search(start: Vector, goal: Vector, seed: int, tools: Tools, budget: Budget
         best.route = route
         best.found = found
         best.length = length
+
+
+class Route(NamedTuple):
+    """A proven route.
+
+    Attributes:
+        found: As it was found, shape (k, dof).
+        pulled: The same after a pull, shape (m, dof).
+        counts: Statistics of its search.
+    """
+
+    found: Matrix
+    pulled: Matrix
+    counts: Mapping[str, int | float]
+
+
+def short_routes(ends: Matrix, seeds: Sequence[int], tools: Tools, *, whole: bool) -> list[Route | None]:
+    """Make many routes in a few calls, each as :func:`short_path` does it; None for those that take more than a search.
+
+    Args:
+        ends: A proven start and a proven goal each, shape (m, 2, dof).
+        seeds: Of each.
+        tools: What searches and proves.
+        whole: Whether routes are pulled to the end; otherwise as far as they are to be compared with others.
+    """
+    search_seeds = [1000 * seed for seed in seeds]
+    searched = solve_each(tools.search, ends, search_seeds, SAMPLES)
+    paths: dict[int, Matrix] = {}
+    counts: dict[int, Mapping[str, int | float]] = {}
+    for k, each in enumerate(searched):
+        # What is asked there is answered by no, so a search that has asked is not the one of `short_path`.
+        if each is not None and each.path is not None and each.questions == 0:
+            paths[k] = each.path
+            counts[k] = {
+                "attempts": 1,
+                "rejected": 0,
+                "iterations": each.iterations,
+                "checked_motions": each.motions,
+            }
+
+    routes: list[Route | None] = [None] * len(ends)
+    longest = LONG * np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    numbers = list(paths)
+    for first in range(0, len(numbers), PULLED_AT_ONCE):
+        some = numbers[first : first + PULLED_AT_ONCE]
+        rows = [paths[k] for k in some]
+        pull = Pulling(tools.motions.motions, max(rows, key=len), tools.lower, tools.upper, cuts=CUTS)
+        own_seeds = [search_seeds[k] for k in some]
+        found = pull.run_each(rows, own_seeds, longest[some], brief=BRIEF_WORK, whole=whole)
+        for k, both in zip(some, found, strict=True):
+            if both is not None:
+                routes[k] = Route(*both, counts[k])
+    return routes
 
 
 def _at_once() -> bool:

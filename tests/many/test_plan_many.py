@@ -154,8 +154,11 @@ def test_a_planner_that_breaks_each_time_is_an_error(boxes, tmp_path):
             rrtik.plan_many([boxes], "RRTConnect", parameters={"range": "long"}, **way)
 
 
-@pytest.mark.parametrize("shorten", ["auto", False, True, "shortcut", "ompl"])
-def test_paths_are_finished_as_plan_finishes_them(shorten):
+@pytest.mark.parametrize(
+    ("planner", "shorten"),
+    [(None, True), (None, False), (None, "shortcut")] + [("fastrrtconnect", how) for how in ("auto", False, "ompl")],
+)
+def test_paths_are_finished_as_plan_finishes_them(planner, shorten):
     robot = rrtik.load_robot("ur5")
     world = rrtik.World(
         robot, rrtik.Scene([rrtik.Obstacle("post", rrtik.Box([0.2, 0.2, 0.9]), rrtik.pose([0.4, 0, 0.3]))])
@@ -163,7 +166,6 @@ def test_paths_are_finished_as_plan_finishes_them(shorten):
     rows = np.random.default_rng(5).uniform(-2.0, 2.0, (60, 6))
     rows = rows[world.valid_batch(rows)]
     starts, goals = rows[:8], rows[8:16]
-    planner = None if shorten is True else "fastrrtconnect"  # "auto" begins with it
     plans = rrtik.plan_many(world, starts, goals, planner, seconds=60.0, seed=4, shorten=shorten, threads=2)
     assert sum(each.found for each in plans) > 4
     for start, goal, each in zip(starts, goals, plans, strict=True):

@@ -15,7 +15,7 @@ from rrtik_ompl.kernels.proof import layout as proof_layout
 from rrtik_ompl.kernels.proof.frames import node_frames, vector_at
 from rrtik_ompl.kernels.proof.planes import corner_at, solid_at
 from rrtik_ompl.kernels.proof.proof_kernels import apart, kind_of, pair_at, prove_motion, visit
-from rrtik_ompl.kernels.record import Doubles
+from rrtik_ompl.kernels.record import Doubles, Wholes
 from rrtik_ompl.kernels.search.contacts import layout
 from rrtik_ompl.kernels.search.contacts.gaps import makes_contact, measure_gap, show_point
 from rrtik_ompl.kernels.search.contacts.layout import PullTable
@@ -457,3 +457,81 @@ def pull(route: PullTable, work: int) -> int:
         if not pull_once(route):
             break
     return layout.DONE
+
+
+@entry
+def pull_each(
+    route: PullTable,
+    rows: Configuration,
+    counts: Wholes,
+    seeds: Wholes,
+    longest: Doubles,
+    number: int,
+    brief: int,
+    work: int,
+    jumped: Configuration,
+    jumped_counts: Wholes,
+) -> int:
+    """Pull one route after the other, each as a new table would, whose memory is used again.
+
+    Args:
+        route: Has room for each of the routes.
+        rows: ``route.capacity`` rows for each route, its waypoints first; gets the pulled routes.
+        counts: Waypoints of each route; gets those of the pulled ones, 0 for one that is not proven or too long.
+        seeds: Of each route.
+        longest: The length that each may have after a brief pull.
+        number: Of routes.
+        brief: Work of a brief pull.
+        work: Work of the pull that follows; 0 for none.
+        jumped: Gets the routes after the jumps, as ``rows``.
+        jumped_counts: Gets their waypoints.
+    """
+    dof = dof_in(route)
+    pulled = 0
+    for k in range(number):
+        sink = row_at(rows, dof * route.capacity, k)
+        give(route, sink, counts[k], seeds[k])
+        counts[k] = 0
+        forget_planes(route)
+        if begin(route) == layout.UNPROVEN:
+            continue
+        copy_row(dof * route.count, route.route, row_at(jumped, dof * route.capacity, k))
+        jumped_counts[k] = route.count
+
+        forget_planes(route)
+        pull(route, brief)
+        if length_of(dof, route.route, route.count) > longest[k]:
+            continue
+        if work > 0:
+            forget_planes(route)
+            pull(route, work)
+        copy_row(dof * route.count, route.route, sink)
+        counts[k] = route.count
+        pulled += 1
+    return pulled
+
+
+@kernel
+def give(route: PullTable, rows: Configuration, count: int, seed: int) -> None:
+    """Begin with another route, as in a new table."""
+    copy_row(dof_in(route) * count, rows, route.route)
+    route.count = count
+    route.random = seed
+    route.tries = 0
+    route.failures = 0
+    route.gains = 0
+    route.contacts = 0
+    route.stage = layout.GIVEN
+    route.unproven = 0
+    route.work = 0.0
+    route.idle = 0
+    route.refused = 0
+    route.found_pair = -1
+
+
+@kernel
+def forget_planes(route: PullTable) -> None:
+    """Forget the planes of earlier proofs, so that nothing depends on what has been proven before."""
+    proof = route.motions.proof
+    for k in range(3 * proof.pair_count):
+        proof.ways[k] = 0.0

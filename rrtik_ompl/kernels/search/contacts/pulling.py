@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
 from functools import lru_cache
+
+import numpy as np
 
 from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.base.errors import InputError
@@ -108,6 +111,49 @@ class Pulling:
                 return True
             if stop is not None and stop():
                 return False
+
+    def run_each(
+        self, routes: Sequence[Matrix], seeds: Sequence[int], longest: Vector, *, brief: int, whole: bool
+    ) -> list[tuple[Matrix, Matrix] | None]:
+        """Pull other routes in one call of the kernel, each as an object of its own does, in the memory of this one.
+
+        Args:
+            routes: Free routes, shapes (k, dof), none with more waypoints than that of this object.
+            seeds: Of the cuts of each route.
+            longest: The length that each may have after a brief pull, shape (m,).
+            brief: The work of that.
+            whole: Whether it is followed by a pull to the end.
+
+        Returns:
+            Each route after the jumps and after the pulls; None for one that is not proven or too long.
+        """
+        dof = self._dof
+        rows = np.zeros((len(routes), self.table.capacity, dof))
+        jumped = np.empty_like(rows)
+        counts = np.array([len(route) for route in routes])
+        jumped_counts = np.zeros_like(counts)
+        numbers = np.array([seed % 2**62 for seed in seeds])
+        for sink, route in zip(rows, routes, strict=True):
+            sink[: len(route)] = route
+
+        self._motions.make_ready()
+        self._kernels.pull_each(
+            self.table.address,
+            rows.ctypes.data,
+            counts.ctypes.data,
+            numbers.ctypes.data,
+            longest.ctypes.data,
+            len(routes),
+            brief,
+            math.ceil(self.table.max_work) if whole else 0,
+            jumped.ctypes.data,
+            jumped_counts.ctypes.data,
+        )
+        ends = zip(jumped_counts.tolist(), counts.tolist(), strict=True)
+        return [
+            (jumped[k, :before].copy(), rows[k, :after].copy()) if after else None
+            for k, (before, after) in enumerate(ends)
+        ]
 
     def intact(self) -> bool:
         """Whether no kernel has written beyond the memory of the route or what it works on."""
