@@ -26,29 +26,22 @@ class WeightedProblem:
     """
 
     def __init__(self, problem: Problem, motions: MotionQueries | None = None) -> None:
-        self._scale = weights_of(problem.robot)
         self._start = problem.start
 
         asked: Any = problem.world if motions is None else motions  # it has the parts of a world that are needed
-        weighted = WeightedMotions(asked, self._scale)
+        self._weighted = weighted = WeightedMotions(asked, weights_of(problem.robot))
 
         settings = changed(problem.settings, robot=weighted.robot)
-        start = frozen(problem.start * self._scale)
+        start = frozen(weighted.weighted_rows(problem.start))
         self.problem = changed(problem, settings=settings, start=start, world=weighted)
 
     def weighted_rows(self, rows: Matrix) -> Matrix:
         """Return configurations in weighted coordinates, shape (m, dof)."""
-        return np.asarray(rows * self._scale)
+        return self._weighted.weighted_rows(rows)
 
     def joint_rows(self, rows: Matrix, known: Matrix) -> Matrix:
-        """Return weighted rows as configurations of the arm, shape (m, dof).
-
-        Values of ``known`` configurations, shape (k, dof), are restored bit for bit.
-        """
-        unweighted = rows / self._scale
-        for row in known:
-            unweighted = np.where(rows == row * self._scale, row, unweighted)
-        return np.asarray(unweighted)
+        """Return weighted rows as configurations of the arm; see :meth:`WeightedMotions.joint_rows`."""
+        return self._weighted.joint_rows(rows, known)
 
     def joint_path(self, rows: Matrix | None, goals: Matrix) -> Matrix | None:
         """Return a weighted path to one of some goals as a path of the arm, shape (k, dof), or None."""

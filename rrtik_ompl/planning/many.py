@@ -239,7 +239,7 @@ def short_plans(queries: Sequence[Query], request: Request, *, pull: bool) -> li
         rows = ends.reshape(-1, robot.dof)
         free = tools.motions.motion_valid_batch(rows, rows).reshape(-1, 2).all(axis=1)
         numbers = [numbers[k] for k in np.flatnonzero(free)]
-        found = short_routes(ends[free], [queries[k].seed for k in numbers], tools, whole=pull)
+        found = short_routes(tools.weighted_rows(ends[free]), [queries[k].seed for k in numbers], tools, whole=pull)
     seconds = (time.perf_counter() - began) / max(len(numbers), 1)
 
     for k, route in zip(numbers, found, strict=True):
@@ -251,7 +251,7 @@ def short_plans(queries: Sequence[Query], request: Request, *, pull: bool) -> li
         if pull and len(route.found) > 2:
             counts["shortening_seconds"] = seconds
         pulled = route.pulled if pull else None
-        plans[k] = plan_of(problem, route.found, pulled, tools, seconds, query.seed, counts)
+        plans[k] = plan_of(problem, query.end[None], route.found, pulled, tools, seconds, query.seed, counts)
     return plans
 
 

@@ -15,7 +15,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -28,6 +28,7 @@ from rrtik_ompl.kernels.search.connect import ConnectSearch, kept_search, solve_
 from rrtik_ompl.kernels.search.connect_layout import KERNELS as SEARCH_KERNELS
 from rrtik_ompl.kernels.search.contacts.layout import KERNELS as PULL_KERNELS
 from rrtik_ompl.kernels.search.contacts.pulling import Pulling
+from rrtik_ompl.kernels.search.motions.motion_table import FastMotions
 from rrtik_ompl.kernels.warming import load_together
 from rrtik_ompl.model.goal import has_continuous
 from rrtik_ompl.model.path import JointPath, path_of
@@ -38,6 +39,7 @@ from rrtik_ompl.world.clearances import CLEARANCE
 from rrtik_ompl.world.problem import Problem, planning_bounds
 from rrtik_ompl.world.proven_motions import KERNELS as PROVEN_KERNELS
 from rrtik_ompl.world.proven_motions import ProvenMotions, kept_motions
+from rrtik_ompl.world.weighted_motions import WeightedMotions
 from rrtik_ompl.world.world import World, form_of
 
 SEARCHED_AS = "fastrrtconnect"  # the planner whose search this is; no planner is imported to know that
@@ -58,18 +60,41 @@ MANY_PIECES = 250  # convex pieces of an arm whose motions take less to prove th
 class Tools(NamedTuple):
     """What searches and proves in a world.
 
+    Searches and pulls work in coordinates in which Euclidean lengths are those that count: joint values, or their
+    products with the joints' weights.
+
     Attributes:
         search: Searches in the box of configurations.
         motions: Motions that are proven to keep a clearance.
-        lower, upper: The box, shapes (dof,).
+        weighted: The same between weighted configurations; ``motions`` itself where weights make no difference.
+        table: What kernels read of these.
+        lower, upper: The box of weighted configurations, shapes (dof,).
         clearance: What is said of proven paths, a little less than motions keep [m].
     """
 
     search: ConnectSearch
     motions: ProvenMotions
+    weighted: ProvenMotions | WeightedMotions
+    table: FastMotions
     lower: Vector
     upper: Vector
     clearance: float
+
+    def weighted_rows(self, rows: Matrix) -> Matrix:
+        """Return configurations, shape (..., dof), as weighted ones."""
+        return rows if isinstance(self.weighted, ProvenMotions) else self.weighted.weighted_rows(rows)
+
+    def proven_rows(self, rows: Matrix, ends: Matrix) -> Matrix | None:
+        """Return a weighted route that is proven, shape (k, dof), in joint values; None if rounding breaks the proof.
+
+        Args:
+            rows: The route.
+            ends: Configurations that are restored bit for bit, shape (m, dof).
+        """
+        if isinstance(self.weighted, ProvenMotions):
+            return rows
+        joint_rows = self.motions.robot.clamp(self.weighted.joint_rows(rows, ends))
+        return joint_rows if self.motions.motion_valid_batch(joint_rows[:-1], joint_rows[1:]).all() else None
 
 
 @dataclass(slots=True, eq=False)
@@ -115,7 +140,7 @@ def short_path(problem: Problem, request: Request, *, pull: bool) -> Plan | None
         free = tools.motions.motion_valid_batch(ends, ends)
         if not free[0] or not free[1:].any():
             return None
-        best = _best_route(problem.start, goals[free[1:]], tools, budget)
+        best = _best_route(tools.weighted_rows(problem.start), tools.weighted_rows(goals[free[1:]]), tools, budget)
         if best.route is None:
             return None
         searched = budget.elapsed
@@ -127,22 +152,24 @@ def short_path(problem: Problem, request: Request, *, pull: bool) -> Plan | None
     if pull and len(best.found) > 2:
         best.counts["shortening_seconds"] = budget.elapsed - searched
     pulled = rows if pull else None
-    return plan_of(problem, best.found, pulled, tools, budget.elapsed, budget.seed, best.counts)
+    return plan_of(problem, goals, best.found, pulled, tools, budget.elapsed, budget.seed, best.counts)
 
 
 def plan_of(
     problem: Problem,
+    goals: Matrix,
     found: Matrix,
     pulled: Matrix | None,
     tools: Tools,
     seconds: float,
     seed: int,
     counts: Mapping[str, int | float],
-) -> Plan:
-    """Return the plan of a proven route.
+) -> Plan | None:
+    """Return the plan of a proven weighted route; None if rounding breaks its proof in joint values.
 
     Args:
         problem: The problem that it solves.
+        goals: Goal configurations, one of which it leads to, shape (m, dof).
         found: The route as it was found, shape (k, dof).
         pulled: The same after a pull, shape (m, dof); None for none.
         tools: What has proven both.
@@ -151,14 +178,18 @@ def plan_of(
         counts: Statistics of the plan.
     """
 
-    def proved(waypoints: Matrix) -> JointPath:
-        return path_of(problem.robot, waypoints, tools.motions.proof(waypoints, tools.clearance))
+    def proved(route: Matrix) -> JointPath | None:
+        rows = tools.proven_rows(route, np.vstack([problem.start, goals]))
+        return None if rows is None else path_of(problem.robot, rows, tools.motions.proof(rows, tools.clearance))
 
     own = proved(found)
     shortened = pulled is not None and len(found) > 2
+    path = proved(pulled) if pulled is not None and shortened else own
+    if own is None or path is None:
+        return None
     return Plan(
         True,
-        proved(pulled) if pulled is not None and shortened else own,
+        path,
         "",
         seconds,
         SEARCHED_AS,
@@ -173,8 +204,8 @@ def plan_of(
 def loaded_for(problem: Problem, request: Request) -> bool:
     """Check whether a problem may have a short path, and load the kernels for it.
 
-    That is so for straight motions without path constraints and weights, in worlds with kernels, where proofs are
-    wanted and the planner that "auto" begins with is the search of these kernels.
+    That is so for straight motions without path constraints, in worlds with kernels, where proofs are wanted and the
+    planner that "auto" begins with is the search of these kernels.
     """
     if not _applies(problem, request) or members(problem)[:1] != (SEARCHED_AS,):
         return False
@@ -199,9 +230,29 @@ def tools_for(problem: Problem, request: Request, goals: Matrix) -> Iterator[Too
     motions = kept_motions(world, clearance + min(clearance, SPARE))
     checks = world.motions
     assert checks is not None  # as _applies() has found
+    weights = weights_of(world.robot)
+    if len(set(weights.tolist())) == 1:
+        weights = np.ones(len(weights))
+        weighted: ProvenMotions | WeightedMotions = motions
+    else:
+        weighted = _weighted(motions, weights)
+    table = weighted.motions
+    assert table is not None  # as there are kernels
+    lower = lower * weights
+    upper = upper * weights
     key = ("short path", lower.tobytes(), upper.tobytes())
-    with kept_search(checks, key, lambda: _search_in(world, lower, upper)) as search:
-        yield Tools(search, motions, lower, upper, clearance)
+    with kept_search(checks, key, lambda: _search_in(world, lower, upper, weights)) as search:
+        yield Tools(search, motions, weighted, table, lower, upper, clearance)
+
+
+def _weighted(motions: ProvenMotions, weights: Vector) -> WeightedMotions:
+    """Return motions between weighted configurations, the same for the same motions; these are of one robot."""
+    kept = motions.motions.spare.get("weighted")
+    if kept is None:
+        asked: Any = motions  # It has the parts of a world that are needed.
+        motions.motions.spare["weighted"] = kept = WeightedMotions(asked, weights)
+    known: WeightedMotions = kept
+    return known
 
 
 def _applies(problem: Problem, request: Request) -> bool:
@@ -211,8 +262,7 @@ def _applies(problem: Problem, request: Request) -> bool:
         return False
     if type(world) is not World or world.settings.proving is not None:
         return False
-    weights_are_even = not problem.robot.joint_weights or len(set(weights_of(problem.robot).tolist())) == 1
-    return world.motions is not None and not problem.constraints and weights_are_even
+    return world.motions is not None and not problem.constraints
 
 
 def _goals(problem: Problem, budget: Budget) -> Matrix | None:
@@ -233,19 +283,19 @@ def _goals(problem: Problem, budget: Budget) -> Matrix | None:
     return problem.robot.onto_limits(nearest_rows(problem, found)[:MOST_GOALS])
 
 
-def _search_in(world: World, lower: Vector, upper: Vector) -> ConnectSearch:
+def _search_in(world: World, lower: Vector, upper: Vector, weights: Vector) -> ConnectSearch:
     coarse = form_of(world, accuracy="conservative", motion_resolution=COARSE * world.motion_resolution).motions
     assert coarse is not None
     looks = len(coarse.fast.table.moving_solids.solids) > MANY_PIECES * SOLID_INTS
-    return ConnectSearch(coarse, lower, upper, looks=looks)
+    return ConnectSearch(coarse if (weights == 1.0).all() else coarse.scaled(weights), lower, upper, looks=looks)
 
 
 def _best_route(start: Vector, goals: Matrix, tools: Tools, budget: Budget) -> Shortest:
     """Return the shortest of the routes to some goal configurations, as far as it is pulled taut to compare them.
 
     Args:
-        start: Shape (dof,).
-        goals: The nearest first, shape (k, dof).
+        start: Weighted, shape (dof,).
+        goals: Weighted, the nearest first, shape (k, dof).
         tools: What searches and proves.
         budget: The seed, and when to end.
     """
@@ -266,7 +316,7 @@ def _search(start: Vector, goal: Vector, seed: int, tools: Tools, budget: Budget
     """Search for a route, and keep it if it is proven and the best one."""
     search = tools.search
     rows = search.solve(
-        start[None], goal[None], seed, ask=tools.motions.motion_valid_batch, stop=budget.over, max_iterations=SAMPLES
+        start[None], goal[None], seed, ask=tools.weighted.motion_valid_batch, stop=budget.over, max_iterations=SAMPLES
     )
     counts = best.counts
     counts["attempts"] += 1
@@ -275,7 +325,7 @@ def _search(start: Vector, goal: Vector, seed: int, tools: Tools, budget: Budget
     if rows is None:
         return
 
-    route = Pulling(tools.motions.motions, rows, tools.lower, tools.upper, seed=seed, cuts=CUTS)
+    route = Pulling(tools.table, rows, tools.lower, tools.upper, seed=seed, cuts=CUTS)
     if not route.jump():
         counts["rejected"] += 1
         return
@@ -291,7 +341,7 @@ def _search(start: Vector, goal: Vector, seed: int, tools: Tools, budget: Budget
 
 
 class Route(NamedTuple):
-    """A proven route.
+    """A proven weighted route.
 
     Attributes:
         found: As it was found, shape (k, dof).
@@ -308,7 +358,7 @@ def short_routes(ends: Matrix, seeds: Sequence[int], tools: Tools, *, whole: boo
     """Make many routes in a few calls, each as :func:`short_path` does it; None for those that take more than a search.
 
     Args:
-        ends: A proven start and a proven goal each, shape (m, 2, dof).
+        ends: A proven start and a proven goal each, weighted, shape (m, 2, dof).
         seeds: Of each.
         tools: What searches and proves.
         whole: Whether routes are pulled to the end; otherwise as far as they are to be compared with others.
@@ -334,7 +384,7 @@ def short_routes(ends: Matrix, seeds: Sequence[int], tools: Tools, *, whole: boo
     for first in range(0, len(numbers), PULLED_AT_ONCE):
         some = numbers[first : first + PULLED_AT_ONCE]
         rows = [paths[k] for k in some]
-        pull = Pulling(tools.motions.motions, max(rows, key=len), tools.lower, tools.upper, cuts=CUTS)
+        pull = Pulling(tools.table, max(rows, key=len), tools.lower, tools.upper, cuts=CUTS)
         own_seeds = [search_seeds[k] for k in some]
         found = pull.run_each(rows, own_seeds, longest[some], brief=BRIEF_WORK, whole=whole)
         for k, both in zip(some, found, strict=True):

@@ -71,6 +71,20 @@ class WeightedMotions(MotionQueries):
         """Return which straight motions A[k] -> B[k], shapes (m, n), are free, shape (m,)."""
         return np.asarray(self._world.motion_valid_batch(self._unweighted(A), self._unweighted(B)))
 
+    def weighted_rows(self, rows: Matrix) -> Matrix:
+        """Return configurations in weighted coordinates, shape (..., n)."""
+        return np.asarray(rows * self._scale)
+
+    def joint_rows(self, rows: Matrix, known: Matrix) -> Matrix:
+        """Return weighted rows as configurations of the arm, shape (m, n).
+
+        Values of ``known`` configurations, shape (k, n), are restored bit for bit.
+        """
+        unweighted = self._unweighted(rows)
+        for row in known:
+            unweighted = np.where(rows == row * self._scale, row, unweighted)
+        return np.asarray(unweighted)
+
     def _unweighted(self, Q: Matrix) -> Matrix:
         """Convert configurations in weighted coordinates to joint values of the world, shape (m, n)."""
         return np.asarray(Q / self._scale)

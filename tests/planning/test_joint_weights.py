@@ -6,12 +6,15 @@ import numpy as np
 import pytest
 
 import rrtik_ompl as rrtik
+from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.errors import InputError, UnknownNameError
 from rrtik_ompl.constraints.held_regions import held_regions
 from rrtik_ompl.constraints.residuals import projected_rows
 from rrtik_ompl.description.variants import weighted
 from rrtik_ompl.planning import improving
 from rrtik_ompl.planning.improving import least_cost, length
+from rrtik_ompl.planning.outcome import Request
+from rrtik_ompl.planning.short_path import short_path
 from rrtik_planners import FastRRTConnect
 
 HEAVY = 6.0
@@ -53,7 +56,7 @@ def problem():
 @pytest.mark.kernels
 def test_paths_are_shorter_in_the_weighted_length_and_free():
     plain, weighted = 0.0, 0.0
-    for seed, (world, heavy, start, goal, weights) in enumerate(cases(32)):
+    for seed, (world, heavy, start, goal, weights) in enumerate(cases(16)):
         one = rrtik.plan(rrtik.Problem(world, start, goal), seed=seed)
         other = rrtik.plan(rrtik.Problem(heavy, start, goal), seed=seed)
         assert other.found, other.reason
@@ -64,6 +67,23 @@ def test_paths_are_shorter_in_the_weighted_length_and_free():
         plain += weighted_length(one.path, weights)
         weighted += weighted_length(other.path, weights)
     assert weighted < 0.99 * plain
+
+
+@pytest.mark.kernels
+def test_the_short_path_is_shortened_in_the_weighted_length_also_among_many(problem):
+    _, heavy, weights = problem
+    found = short_path(heavy, Request(Budget(1)), pull=True)
+    path, own = found.path, found.unshortened
+    assert weighted_length(path, weights) < weighted_length(own, weights)
+    assert (path.waypoints[[0, -1]] == [heavy.start, heavy.goal.q]).all()
+    for each in (path, own):
+        assert heavy.world.prove(each, clearance=each.proof.clearance).proven
+    plans = rrtik.plan_many(
+        heavy.world, [heavy.start, heavy.goal.q], [heavy.goal, rrtik.JointGoal(heavy.start)], seed=4
+    )
+    for plan, (start, goal) in zip(plans, [(heavy.start, heavy.goal), (heavy.goal.q, heavy.start)], strict=True):
+        alone = rrtik.plan(rrtik.Problem(heavy.world, start, goal), seed=plan.seed)
+        np.testing.assert_array_equal(plan.path.waypoints, alone.path.waypoints)
 
 
 @pytest.mark.kernels
