@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -12,6 +11,7 @@ from rrtik_ompl.base.arrays import TAU, Matrix, Vector, frozen
 from rrtik_ompl.base.choices import IkMethod
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.base.units import closest_configuration
+from rrtik_ompl.base.values import dataclass
 from rrtik_ompl.constraints.held_region import held_region
 from rrtik_ompl.constraints.held_regions import HeldRegions
 from rrtik_ompl.description.joint_weights import weighted_difference

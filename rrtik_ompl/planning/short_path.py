@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -21,6 +20,7 @@ import numpy as np
 
 from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.base.budget import Budget
+from rrtik_ompl.base.values import dataclass
 from rrtik_ompl.description.joint_weights import weights_of
 from rrtik_ompl.kernels.layout import SOLID_INTS
 from rrtik_ompl.kernels.proof.rows import PROOF_KERNELS

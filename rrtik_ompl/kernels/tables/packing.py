@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Mask, Vector, distinct
+from rrtik_ompl.base.values import dataclass
 from rrtik_ompl.geometry.collision.bodies import Body, pair_array
 from rrtik_ompl.geometry.collision.body_arrays import body_arrays
 from rrtik_ompl.kernels.layout import (
