@@ -6,7 +6,6 @@ import json
 import os
 import re
 import signal
-import subprocess
 import sys
 import threading
 from collections import OrderedDict
@@ -157,6 +156,8 @@ def _expand_in_child(
 
     environment = os.environ | {"PYTHONHASHSEED": "0"}  # This makes the order of sets the same in each run.
     too_slow = f"{path}: xacro: takes more than {expansion.seconds:g} s; does a macro call itself? else {MORE}"
+
+    import subprocess  # few descriptions are expanded
 
     try:
         process = subprocess.run(

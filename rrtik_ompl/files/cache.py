@@ -9,7 +9,6 @@ import contextlib
 import os
 import stat
 import sys
-import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import IO
@@ -74,6 +73,8 @@ def write_whole(file: Path, write: Callable[[IO[bytes]], object]) -> None:
     """Write a file by calling ``write`` with a stream, so that it appears complete, or not at all if it cannot be."""
     with contextlib.suppress(OSError):
         _make_closed(file.parent)
+        import tempfile  # few calls write, and it loads random numbers
+
         handle, aside = tempfile.mkstemp(dir=file.parent, prefix=".writing-")
         try:
             with os.fdopen(handle, "wb") as stream:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import subprocess
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rrtik_ompl.files.cache import nobody_else_s
 from rrtik_ompl.files.notice import COMPILING, tell_once
@@ -14,6 +14,9 @@ from rrtik_ompl.kernels.simd.bitcode_store import has_bitcode, packaged_bitcode
 from rrtik_ompl.kernels.simd.code_files import kernel_modules, kernels_by_size
 from rrtik_ompl.kernels.simd.library import code_file, is_loaded, library
 from rrtik_ompl.kernels.threads import cores
+
+if TYPE_CHECKING:
+    import subprocess
 
 ROOT = Path(__file__).parents[2]  # where this package stands: another process shall take no other
 MAKE = "import sys; sys.path.insert(0, sys.argv[1]); from rrtik_ompl.kernels.simd.library import library; "
@@ -71,6 +74,8 @@ def _share(names: list[str]) -> None:
 
 def _maker(names: list[str]) -> subprocess.Popen[bytes]:
     """A process that makes libraries and keeps them in the user's cache."""
+    import subprocess  # where all kernels are made nobody needs it
+
     command = [sys.executable, "-W", "ignore", "-c", MAKE, str(ROOT), *names]
     return subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 

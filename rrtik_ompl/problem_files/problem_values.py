@@ -69,7 +69,7 @@ class ProblemFile(WorldKeys):
 
     version: Version
     robot: RobotEntry
-    scene: SceneEntry = Field(default=SceneEntry())
+    scene: SceneEntry = Field(default_factory=SceneEntry)
     start: StartSection
     goal: GoalSection
     planner: str | None = Field(None, description="planner that is used where none is named (rrtik list planners)")

@@ -31,8 +31,6 @@ from rrtik_ompl.files.text import file_name, read_bytes
 from rrtik_ompl.model.scene import AttachedObject, ConstantVelocity, Motion, Obstacle, Scene, TimedPoses, Touching
 from rrtik_ompl.model.shapes import Shape
 from rrtik_ompl.model.world_settings import SETTINGS_IN_FILES
-from rrtik_ompl.problem_files.moveit_scene import planning_scene
-from rrtik_ompl.problem_files.moveit_scene_text import ENDING, read_scene_text
 from rrtik_ompl.problem_files.shapes import ONE_SHAPE, ShapeEntry, shape_data
 
 
@@ -223,7 +221,9 @@ def load_scene(file: str | os.PathLike[str]) -> Scene:
     """
     path = file_name(file)
     suffix = path.suffix.lower()
-    if suffix == ENDING:
+    if suffix == ".scene":
+        from rrtik_ompl.problem_files.moveit_scene_text import read_scene_text  # few scenes are MoveIt's
+
         return read_scene_text(file)
     if suffix in (".xml", ".mjcf"):
         from rrtik_ompl.description.mjcf.scenery import scene_from_mjcf  # loads slowly, and few scenes are in MJCF
@@ -234,6 +234,8 @@ def load_scene(file: str | os.PathLike[str]) -> Scene:
     with refusing_others(file, "Scene"):
         document = read_yaml(file)
         if "version" not in document.data and "robot_model_name" in document.data:
+            from rrtik_ompl.problem_files.moveit_scene import planning_scene
+
             return planning_scene(document)
         return parse(document, SceneFile).scene.build(document)
 

@@ -34,7 +34,7 @@ class WorldEntry(Section):
     """A robot, its fingers as they are held, and what surrounds it."""
 
     robot: RobotEntry
-    scene: SceneEntry = Field(default=SceneEntry())
+    scene: SceneEntry = Field(default_factory=SceneEntry)
 
 
 class StoodOnEntry(ContactEntry):

@@ -165,7 +165,7 @@ class TaskFile(WorldKeys):
 
     version: Version
     robot: RobotEntry
-    scene: SceneEntry = Field(default=SceneEntry())
+    scene: SceneEntry = Field(default_factory=SceneEntry)
     start: StartSection
     task: Annotated[list[StageEntry], Field(min_length=1)] | None = None
     goals: Annotated[list[GoalSection], Field(min_length=1)] | None = Field(

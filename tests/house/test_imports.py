@@ -100,7 +100,7 @@ plan.require(), plan.proven
 print(*{name.partition(".")[0] for name in sys.modules})
 """
     wings = "cv2 matplotlib meshcat tornado umsgpack zmq IPython PIL"
-    files = "ompl pydantic yaml typer rich joblib scipy importlib_metadata mcap xacro"
+    files = "ompl subprocess tempfile pydantic yaml typer rich joblib scipy importlib_metadata mcap xacro"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert {*f"{wings} {files}".split()} & {*done.stdout.split()} == set()
 
