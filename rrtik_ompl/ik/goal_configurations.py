@@ -39,6 +39,7 @@ NO_LIMIT = 1e9  # [s]: MB-RRT then ends by the number of its passes, after some 
 LEAST_SECONDS = 1e-3  # time that MB-RRT gets when the time is up [s]
 MAX_CONFIGURATIONS = 16  # largest number of configurations that one round adds
 MAX_TOTAL = 96  # largest number of configurations altogether
+SLIDES = 2  # halfway to the start and back to the goal
 FARTHEST = 1e300  # [rad] or [m] of a difference, since kernels know no infinity
 
 
@@ -237,7 +238,10 @@ class GoalSearch:
 
         starts = rng.uniform(*robot.finite_range(), (STARTS, robot.dof))
         starts[0] = problem.start
-        return _numeric_solutions(robot, goal, starts, round_number, rng)
+        found = _numeric_solutions(robot, goal, starts, round_number, rng)
+        if round_number == 0 and _leaves_joints_free(robot, goal):
+            return _with_nearer_ones(robot, goal, found, problem.start)
+        return found
 
     @property
     def reason(self) -> str:
@@ -358,6 +362,27 @@ def _numeric_solutions(
         for k, share in zip(chosen_parts, shares, strict=True)
     ]
     return np.vstack(found)
+
+
+def _leaves_joints_free(robot: Robot, goal: TipGoal) -> bool:
+    """Check whether the arm can move while its tip stays at the goal, as it has more joints than the goal needs."""
+    return not goal.has_regions and robot.dof > (6 if goal.oriented else 3)
+
+
+def _with_nearer_ones(robot: Robot, goal: TipGoal, found: Matrix, start: Vector) -> Matrix:
+    """Return configurations at a goal that leaves joints free, shape (m, dof), and others nearer to the start.
+
+    Half of the way towards the start and back to the goal, again and again, slides along the configurations that the
+    tip allows to the one that is nearest.
+    """
+    rows = [found]
+    moved = found
+    for _ in range(SLIDES):
+        away = np.linalg.norm(weighted_difference(robot, moved, start), axis=1)
+        nearest = moved[np.argsort(away, kind="stable")[:MAX_CONFIGURATIONS]]
+        moved = numeric_ik(robot, goal, robot.clamp(nearest - 0.5 * joint_difference(robot, nearest, start)))
+        rows.append(moved)
+    return np.vstack(rows)
 
 
 def _numeric_solutions_of_part(robot: Robot, goal: TipGoal, starts: Matrix, rng: np.random.Generator) -> Matrix:

@@ -43,13 +43,13 @@ from rrtik_ompl.world.weighted_motions import WeightedMotions
 from rrtik_ompl.world.world import World, form_of
 
 SEARCHED_AS = "fastrrtconnect"  # the planner whose search this is; no planner is imported to know that
-MOST_GOALS = 8  # goal configurations that are tried
+MOST_GOALS = 4  # goal configurations that are tried
 TRIES = 8  # searches to each, until one of them has led to a proven route
 SEARCHES = 2  # to each goal configuration, where its route is long
-LONG = 2.0  # times the straight line
+LONG = 1.5  # times the straight line
 SAMPLES = 2000  # of each search
 COARSE = 4.0  # times the usual steps
-BRIEF_WORK = 20  # of the pull of a route that is compared with others, in proofs of free motions
+BRIEF_WORK = 40  # of the pull of a route that is compared with others, in proofs of free motions
 CUTS = 6  # random cuts of the route
 WORTH = 0.98  # a straight line of more than this share of the best length is left out
 SPARE = 2.5e-4  # [m] that motions keep beyond the clearance of the path, as those of `shorten()` do

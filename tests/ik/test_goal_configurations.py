@@ -16,6 +16,7 @@ from rrtik_ompl.base.poses import pose
 from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.ik import goal_configurations
 from rrtik_ompl.ik.goal_configurations import GoalSearch
+from rrtik_ompl.ik.numeric.restarts import numeric_ik
 from rrtik_ompl.ik.targets import skip_targets, targets
 from rrtik_ompl.model.goal import GoalSet, PoseGoal, PositionGoal, joint_difference
 from rrtik_ompl.model.goal_kind import TaskRegion
@@ -421,3 +422,14 @@ def test_the_tables_of_proofs_are_there_once_goals_are_known():
     assert again.world.prover.tables.packed is None
     assert len(GoalSearch(again, 0).first())
     assert again.world.prover.tables.packed is not None
+
+
+def test_an_arm_with_joints_to_spare_gets_configurations_near_the_start():
+    """Nothing that slides on towards the start, the tip at its pose, comes much nearer."""
+    shelf = load_problem("panda_shelf")
+    problem = Problem(World(shelf.robot), shelf.start, shelf.goal)  # nothing is in the way
+    rows = [GoalSearch(problem, seed).first() for seed in range(4)]
+    nearest = [np.linalg.norm(each - problem.start, axis=1).min() for each in rows]
+    starts = problem.start + np.random.default_rng(1).normal(0.0, 0.5, (400, problem.robot.dof))
+    others = numeric_ik(problem.robot, problem.goal, problem.robot.clamp(starts))
+    assert max(nearest) < 1.001 * np.linalg.norm(others - problem.start, axis=1).min()

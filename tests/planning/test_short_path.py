@@ -42,7 +42,7 @@ def test_the_default_is_no_longer_than_a_planner_that_takes_the_first_configurat
     first = [rrtik.plan(problem, "fastrrtconnect", seed=seed) for seed in SEEDS]
     assert all(plan.proven and problem.reached(plan.path.end) for plan in default)
     ratios = np.array([one.path.length / other.path.length for one, other in zip(default, first, strict=True)])
-    assert ratios.mean() < {"ur5_table": 1.02, "so101_bin": 0.95}[problem.name]
+    assert ratios.mean() < {"ur5_table": 1.02, "so101_bin": 0.98}[problem.name]
     assert ratios.max() < 1.1
 
 
