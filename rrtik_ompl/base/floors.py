@@ -34,7 +34,7 @@ FLOORS = {
     "meshcat": ("meshcat", "0.3.2"),
     "rich": ("rich", "13.9.4"),
     "trimesh": ("trimesh", "4.6.0"),
-    "collada": ("pycollada", "0.8"),
+    "collada": ("pycollada", "0.9.1"),
 }
 EVERYWHERE = ("numpy", "pinocchio", "coal")  # in all that this package does
 OPENCV = ("opencv-python", "opencv-contrib-python", "opencv-contrib-python-headless")  # the same files by other names
