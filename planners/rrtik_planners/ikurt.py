@@ -11,6 +11,7 @@ from rrtik_ompl.ik.ikurt.search import BatchedSearch, IkurtValidity, Options
 from rrtik_ompl.model.goal import Goal
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SearchResult, Stop
 from rrtik_ompl.ompl_bridge.bindings import ob
+from rrtik_ompl.world.motion_queries import BatchedMotionQueries
 from rrtik_ompl.world.world import World
 from rrtik_planners.tip_seeker import TipSeeker, closest
 
@@ -73,7 +74,8 @@ class IKURT(TipSeeker):
         stride = self.stride or STRIDE * radian
         options = Options(step, stride, self.jacobian, self.most_vertices)
 
-        validity = IkurtValidity(checker.valid_batch, checker.motion_valid_batch, ptc)
+        motions = BatchedMotionQueries(checker.motion_valid_batch, ptc)
+        validity = IkurtValidity(checker.valid_batch, motions.in_time, ptc)
         search = BatchedSearch(metric, options, *self.bounds(), validity, self.rng, starts)
         path = search.run()
 

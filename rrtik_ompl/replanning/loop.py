@@ -86,6 +86,7 @@ class Loop:
             self._goals = goal_now(robot, goal_feed, 0.0)
 
         self._first_poses = {o.name: o.pose for o in scene.obstacles}  # The record holds only poses that differ.
+        self._cut_short = False  # whether the last search for a path has ended with its time
         self._distance_left_before = np.nan  # distance left at the end of the previous tick [m]
         self._required_distances: dict[str, float] = {}  # distance to keep from each obstacle now [m]
 
@@ -299,6 +300,7 @@ class Loop:
             planner.path = path_before
             planner.check_path(self._world)
 
+        self._cut_short = new_path is None and bool(stop())
         if new_path is None:
             return False
         planner.path = new_path
@@ -414,13 +416,19 @@ class Loop:
         if self._world.valid(self.q):
             path = self._planner.path
             goals = self._goals if path is None else path[-1:]
-            reason = "there is no path" if self._world.valid_batch(goals).any() else "the goal is not free"
-            return "wait", reason, self.q
+            if not self._world.valid_batch(goals).any():
+                return "wait", "the goal is not free", self.q
+            return "wait", self._why_no_path(), self.q
 
         q = self._evasion()
         if q is None:
             return "wait", "an obstacle is too near, and every escape is blocked", self.q
         return "evade", "an obstacle is too near", q
+
+    def _why_no_path(self) -> str:
+        """Return why the last search has found no path."""
+        seconds = self._settings.repair_seconds
+        return f"no path within repair_budget, {seconds:g} s a tick" if self._cut_short else "there is no path"
 
     def _evasion(self) -> Vector | None:
         """Return the configuration after an evasive tick, or None to stand still; the path then starts from there."""

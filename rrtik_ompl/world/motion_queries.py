@@ -10,7 +10,6 @@ from __future__ import annotations
 import time
 from abc import abstractmethod
 from collections.abc import Callable
-from contextlib import suppress
 from typing import Protocol, TypeAlias, TypeGuard
 
 import numpy as np
@@ -28,7 +27,7 @@ from rrtik_ompl.model.robot import Chain, Robot
 MotionFree: TypeAlias = Callable[[Vector, Vector], bool]  # as MotionQueries.motion_valid
 
 LARGEST_BATCH = 1024  # motions
-FIRST_BATCH = 64  # motions
+FIRST_BATCH = 8  # motions, as each may take some hundredths of a second in numpy
 CALL_TARGET_SECONDS = 0.01  # [s] processor time of a batch above which the next one is made smaller
 
 
@@ -192,24 +191,36 @@ class BatchedMotionQueries:
         Raises:
             OutOfTime: If the search has to end.
         """
-        return self._answers(tails, heads, self.stop)
+        if self.stop():
+            raise OutOfTime
+        answers, count = self._answers(tails, heads, self.stop)
+        if count < len(tails):
+            raise OutOfTime
+        return answers
 
     def to_the_end(self, tails: Matrix, heads: Matrix) -> Mask:
         """Return which motions, shapes (m, n), are free, shape (m,), even if the search has to end."""
-        return self._answers(tails, heads, no_stop)
+        return self._answers(tails, heads, no_stop)[0]
 
-    def _answers(self, tails: Matrix, heads: Matrix, stop: Stop) -> Mask:
-        """Check motions batch by batch; raise OutOfTime when ``stop`` says so between two batches."""
-        parts = [np.zeros(0, dtype=bool)]
+    def in_time(self, tails: Matrix, heads: Matrix) -> Mask:
+        """Return which motions, shapes (m, n), are free, shape (m,); none that is left once the search has to end."""
+        if self.stop():
+            return np.zeros(len(tails), dtype=bool)
+        return self._answers(tails, heads, self.stop)[0]
+
+    def _answers(self, tails: Matrix, heads: Matrix, stop: Stop) -> tuple[Mask, int]:
+        """Check motions batch by batch, until ``stop`` says so between two batches.
+
+        Returns:
+            Which motions are free, shape (m,), and how many of them have been checked.
+        """
+        free = np.zeros(len(tails), dtype=bool)
         first = 0
-        while first < len(tails):
-            if stop():
-                raise OutOfTime
-
+        while first < len(tails) and (first == 0 or not stop()):
             begin = time.thread_time()
             last = first + self._batch
-            parts.append(self._motions_free(tails[first:last], heads[first:last]))
-            first = last
+            free[first:last] = self._motions_free(tails[first:last], heads[first:last])
+            first = min(last, len(tails))
 
             # Adapt the size of the next batch to the time that this one took.
             if time.thread_time() - begin > CALL_TARGET_SECONDS:
@@ -217,11 +228,5 @@ class BatchedMotionQueries:
             else:
                 self._batch = min(2 * self._batch, LARGEST_BATCH)
 
-        self.asked += len(tails)
-        return np.concatenate(parts)
-
-    def in_time(self, tails: Matrix, heads: Matrix) -> Mask:
-        """Return which motions, shapes (m, n), are free, shape (m,); all False if the search has to end."""
-        with suppress(OutOfTime):
-            return self(tails, heads)
-        return np.zeros(len(tails), dtype=bool)
+        self.asked += first
+        return free, first

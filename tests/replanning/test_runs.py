@@ -64,6 +64,15 @@ def test_a_covered_goal_is_waited_for():
     assert 4.0 < run.ticks[-1].time < 8.0
 
 
+@pytest.mark.parametrize(
+    ("budget", "reason"), [(30.0, "there is no path"), (1e-9, "no path within repair_budget, 1e-09 s a tick")]
+)
+def test_a_search_that_was_cut_short_does_not_say_that_there_is_no_path(budget, reason):
+    problem = plane(box("wall", 10.0, 10.0, 1.0, 20.0))
+    run = replan(problem, **(OPTIONS | {"repair_budget": budget, "seconds": 0.2}))
+    assert {tick.reason for tick in run.ticks} == {reason}
+
+
 def test_an_obstacle_that_comes_too_near_is_evaded():
     lid = Obstacle(
         "lid", Box([2.0, 2.0, 1.0]), place(19.0, 3.0), TimedPoses([0.0, 0.1], [place(19.0, 3.0), place(19.0, 10.0)])

@@ -15,6 +15,7 @@ from rrtik_ompl.kernels.tables.cloud_layout import LEAF, CloudTable
 
 GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
 CHUNK = 64  # configurations at a time, to bound memory
+FIRST_PART = 4  # configurations of a motion that are checked first; then twice as many each time
 
 
 def frames(arm: layout.ArmTable, values: Matrix) -> NDArray[np.float64]:
@@ -209,6 +210,13 @@ def _outside(beyond: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(np.linalg.norm(np.maximum(beyond, 0.0), axis=-1) + inside)
 
 
+@lru_cache(maxsize=4096)
+def spread(count: int) -> NDArray[np.int64]:
+    """Numbers from 0 to a count, shape (count + 1,), of which any first ones are spread over all."""
+    numbers = np.arange(count + 1)
+    return numbers[np.argsort(numbers * GOLDEN % 1.0)]
+
+
 class ReferenceChecks:
     """The three-valued checks on the tables of a world."""
 
@@ -240,15 +248,21 @@ class ReferenceChecks:
     ) -> NDArray[np.int8]:
         """See :meth:`rrtik_ompl.kernels.FastWorld.classify_edges`."""
         answers = np.zeros(len(starts), dtype=np.int8)
-        for edge, count in enumerate(steps):
-            order = np.arange(count + 1)
-            order = order[np.argsort(order * GOLDEN % 1.0)]  # spread over the motion, so that contacts are found early
-            for first in range(0, len(order), CHUNK):
-                share = (order[first : first + CHUNK] / count)[:, None]
-                rows = (1.0 - share) * starts[edge] + share * ends[edge]
-                answers[edge] = max(answers[edge], self.classify(rows, resolve=resolve).max())
-                if answers[edge] == layout.COLLIDING:
-                    break
+        last = layout.COLLIDING if resolve else layout.UNDECIDED  # an answer that nothing changes any more
+        open_ = np.arange(len(starts))
+        first = 0
+        part = FIRST_PART
+        while len(open_):
+            # A part of each motion, spread over it, so that contacts are found early.
+            orders = [spread(int(count))[first : first + part] for count in steps[open_]]
+            owners = np.repeat(open_, [len(order) for order in orders])
+            shares = (np.concatenate(orders) / steps[owners])[:, None]
+            rows = (1.0 - shares) * starts[owners] + shares * ends[owners]
+            np.maximum.at(answers, owners, self.classify(rows, resolve=resolve))
+
+            first += part
+            part *= 2
+            open_ = open_[(answers[open_] < last) & (first <= steps[open_])]
         return answers
 
     def marks(self, values: Matrix) -> Mask:
@@ -341,7 +355,7 @@ def placed_balls(
         if end > first:
             span = slice(clusters[first, layout.CLUSTER_FIRST], clusters[end - 1, layout.CLUSTER_END])
         pose = poses[:, body[layout.BODY_FRAME]]
-        points.append(np.einsum("mij,nj->mni", pose[:, :, :3], centres[span]) + pose[:, None, :, 3])
+        points.append(centres[span] @ pose[:, :, :3].transpose(0, 2, 1) + pose[:, None, :, 3])
         radii.append(balls[span, layout.RADIUS])
 
     return points, radii

@@ -15,8 +15,8 @@ from rrtik_ompl.kernels.search.contacts.layout import KERNELS
 from rrtik_ompl.kernels.search.contacts.pulling import Pulling
 from rrtik_ompl.model.transitions import length_of
 from rrtik_ompl.planning.moves.axis_cut import axis_cut_rounds
-from rrtik_ompl.planning.shortening.cuts import cut_in_python, sequential_cut, shortcut
-from rrtik_ompl.planning.shortening.retraction import retract
+from rrtik_ompl.planning.shortening.batches import cut_in_batches
+from rrtik_ompl.planning.shortening.cuts import sequential_cut, shortcut
 from rrtik_ompl.planning.shortening.task import Task, box_around
 from rrtik_ompl.world.motion_queries import KernelWorld, has_kernels
 
@@ -37,7 +37,7 @@ def best_in_time(route: Matrix, task: Task) -> Matrix:
         return task.better(route, axis_cut_rounds(route, task.free_batch, budget=task.rest))
     world = task.kernel_world
     if len(route) < 3 or world is None or not has_kernels(world, KERNELS):
-        return _without_kernels(route, task)
+        return task.better(route, cut_in_batches(sequential_cut(route, task), task))
     if not world.motions.proves:
         return task.better(route, shortcut(route, task))
 
@@ -105,14 +105,3 @@ def _pulled(route: Matrix, task: Task, world: KernelWorld, number: int, cuts: in
         for piece in np.split(found, borders)
     ]
     return np.concatenate(pieces)
-
-
-def _without_kernels(route: Matrix, task: Task) -> Matrix:
-    """Shorten without kernels: retract a sequential cut, then the better one of that and a random cut once more.
-
-    The work is bounded, whatever the limits, as numpy takes milliseconds for each motion.
-    """
-    cut = sequential_cut(route, task)
-    found = task.better(cut, retract(cut, task))
-    found = task.better(found, cut_in_python(route, task))
-    return task.better(found, retract(found, task))
