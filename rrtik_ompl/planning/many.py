@@ -1,6 +1,6 @@
 """Many queries: those in one world, and with one planner, are planned together where that is possible.
 
-Without a planner, :func:`short_plans` makes the short paths of many queries in a few calls. By a named planner,
+Without a planner, :func:`short_plans` makes the short paths of many queries with the same tables. By a named planner,
 `plan()` makes a brief attempt on what the kernels can prove, and accepts its path if all of it is proven with the
 clearance of its ends. :func:`plans_together` does this for many queries in a few calls: the ends of all queries, and
 then the paths of all queries, go to the kernels together. A query that needs any further step gets no plan there;
@@ -38,7 +38,7 @@ from rrtik_ompl.planning.finish import finished
 from rrtik_ompl.planning.outcome import NamedPlanner, Plan, Request
 from rrtik_ompl.planning.plan import planned_and_finished
 from rrtik_ompl.planning.searching import named_planner
-from rrtik_ompl.planning.short_path import loaded_for, plan_of, short_routes, tools_for
+from rrtik_ompl.planning.short_path import loaded_for, plan_of, short_route, tools_for
 from rrtik_ompl.world.clearances import Clearances, clearances_of_pairs
 from rrtik_ompl.world.problem import Problem, known_problem, problem_in
 from rrtik_ompl.world.world import World, form_of
@@ -207,10 +207,9 @@ def no_plan(reason: str, planner: str | PlannerFactory, seed: int, *, seconds: f
 
 
 def short_plans(queries: Sequence[Query], request: Request, *, pull: bool) -> list[Plan | None]:
-    """Plan queries in one world as :func:`.short_path.short_path` does, in a few calls; None for those planned alone.
+    """Plan queries in one world as :func:`.short_path.short_path` does; None for those planned alone.
 
-    That a start and a goal are proven with the clearance of the path is all that has to be checked of them. A query
-    that needs more than one search, or none, gets None.
+    That a start and a goal are proven with the clearance of the path is all that has to be checked of them.
 
     Args:
         queries: Their configurations may be outside the limits.
@@ -234,24 +233,15 @@ def short_plans(queries: Sequence[Query], request: Request, *, pull: bool) -> li
     any_problem = known_problem(world, *ends[0])
     if not loaded_for(any_problem, request):
         return plans
-    began = time.perf_counter()
     with tools_for(any_problem, request, ends[:, 1]) as tools:
-        rows = ends.reshape(-1, robot.dof)
-        free = tools.motions.motion_valid_batch(rows, rows).reshape(-1, 2).all(axis=1)
-        numbers = [numbers[k] for k in np.flatnonzero(free)]
-        found = short_routes(tools.weighted_rows(ends[free]), [queries[k].seed for k in numbers], tools, whole=pull)
-    seconds = (time.perf_counter() - began) / max(len(numbers), 1)
-
-    for k, route in zip(numbers, found, strict=True):
-        if route is None:
-            continue
-        query = queries[k]
-        problem = query.problem or known_problem(world, query.start, query.goal)
-        counts = dict(route.counts)
-        if pull and len(route.found) > 2:
-            counts["shortening_seconds"] = seconds
-        pulled = route.pulled if pull else None
-        plans[k] = plan_of(problem, query.end[None], route.found, pulled, tools, seconds, query.seed, counts)
+        for k, (start, goal) in zip(numbers, ends, strict=True):
+            query = queries[k]
+            budget = replace(request.budget, seed=query.seed).begun_now()
+            route = short_route(start, goal[None], tools, budget, pull=pull)
+            if route is None:
+                continue
+            problem = query.problem or known_problem(world, query.start, query.goal)
+            plans[k] = plan_of(problem, goal[None], route, tools, budget.elapsed, query.seed)
     return plans
 
 

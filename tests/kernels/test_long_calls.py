@@ -21,6 +21,7 @@ RESUMED = {  # a budget of work; whoever calls it looks at the clock in between
     "search.crdt.kernels": ("resume_pair", "resume_single"),
     "search.repair_kernels": ("check_path", "repair_path"),
     "search.roadmap.kernels": ("seed_samples", "grow", "connect", "check_edges", "search_on", "learn"),
+    "search.short.kernels": ("find", "finish"),
     "search.shortcut_kernels": ("resume",),
     "ik.rail_kernels": ("follow",),
 }
@@ -42,7 +43,6 @@ ONE_THING = {  # one pose, one query, one path, or one solid whose cover is made
     "ik.pose_kernels": ("nearest_branch", "all_branches", "walk_to_pose"),
     "search.connect_kernels": ("keep_path", "rows_free"),
     "search.constrained.kernels": ("reject", "connect"),
-    "search.contacts.kernels": ("begin",),
     "search.repair_kernels": ("finish",),
     "search.roadmap.kernels": ("insert", "doubt", "pose", "forget_query", "begin", "answer"),
     "timing.kernels": ("sample_curve", "find_squares"),

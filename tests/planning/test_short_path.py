@@ -9,6 +9,8 @@ import pytest
 
 import rrtik_ompl as rrtik
 from rrtik_ompl.base.budget import Budget
+from rrtik_ompl.kernels.search.short import finding
+from rrtik_ompl.kernels.search.short.finding import ShortRoutes
 from rrtik_ompl.kernels.simd import library
 from rrtik_ompl.kernels.simd.library import Library
 from rrtik_ompl.planning import plan as plan_module
@@ -57,6 +59,24 @@ def test_a_seed_gives_one_path(problem):
     one, again = (rrtik.plan(problem, seed=3).path for _ in range(2))
     np.testing.assert_array_equal(one.waypoints, again.waypoints)
     np.testing.assert_array_equal(one.waypoints, rrtik.plan(problem.with_accuracy("exact"), seed=3).path.waypoints)
+
+
+def test_kernels_that_return_often_find_nearly_the_same(problem, monkeypatch):
+    """Each call begins with other planes between solids, so gaps are measured a little differently."""
+    known = rrtik.plan(problem, seed=2)
+    monkeypatch.setattr(finding, "WORK_PER_CALL", 1)
+    again = rrtik.plan(problem, seed=2)
+    assert again.proven
+    assert again.path.length == pytest.approx(known.path.length, rel=0.05)
+
+
+def test_every_motion_is_proven_also_where_the_work_ends_among_the_jumps():
+    """Of this problem the routes have many waypoints, and the work was once spent before all were looked at."""
+    problem = rrtik.load_problem("titan4_sdu")
+    for seed in range(12):
+        found = short_path(problem, replace(REQUEST, budget=Budget(seed)), pull=True)
+        for path in () if found is None else (found.path, found.unshortened):
+            assert problem.world.prove(path, clearance=path.proof.clearance).proven
 
 
 def test_it_is_a_proven_path_to_one_of_the_goals(problem):
@@ -116,14 +136,13 @@ def test_what_it_does_not_find_planners_do(monkeypatch):
 
 
 def test_ctrl_c_leaves_the_path_that_was_found(monkeypatch):
-    def interrupted(*_, **arguments):
-        if arguments["stop"] is not room._at_once:
-            raise KeyboardInterrupt
+    def interrupted(*_):
+        raise KeyboardInterrupt
 
-    monkeypatch.setattr(room.Pulling, "run", interrupted)
+    monkeypatch.setattr(ShortRoutes, "pull", interrupted)
     plan = rrtik.plan(rrtik.load_problem("planar3_boxes"), seed=1)
-    np.testing.assert_array_equal(plan.require().waypoints, plan.unshortened.waypoints)
     assert plan.proven
+    assert plan.path.length <= plan.unshortened.length
 
 
 def test_a_straight_line_is_the_end_of_it(problem, monkeypatch):
@@ -132,11 +151,8 @@ def test_a_straight_line_is_the_end_of_it(problem, monkeypatch):
     near = rrtik.Problem(problem.world, start, start + 0.01)
     goals = np.array([start + 0.01, start + 0.015, start + 0.019])
     monkeypatch.setattr(room, "_goals", lambda *_: goals)
-    searched = []
-    solve = room.ConnectSearch.solve
-    monkeypatch.setattr(room.ConnectSearch, "solve", lambda *a, **k: searched.append(1) or solve(*a, **k))
     found = short_path(near, REQUEST, pull=True)
-    assert len(searched) == 1
+    assert found.statistics["attempts"] == 1
     assert len(found.path.waypoints) == 2
     assert found.unshortened is None
 

@@ -215,7 +215,7 @@ class ConnectSearch:
             if status == connect_layout.ASKING and ask is not None:
                 self._answer(ask)
             elif status == connect_layout.FULL:
-                self._grow()
+                self.grow()
             begin = time.perf_counter()
             status = self._kernels.resume(self._search.address, budget)
             elapsed = time.perf_counter() - begin
@@ -231,7 +231,8 @@ class ConnectSearch:
         self._search.answers[:count] = ask(starts, ends)
         self._questions += count
 
-    def _grow(self) -> None:
+    def grow(self) -> None:
+        """Give both trees twice the room."""
         for tree in self._trees:
             grow(tree)
 
@@ -253,7 +254,7 @@ class ConnectSearch:
 
     def _fit_trees(self, roots: int) -> None:
         while roots >= FIRST_CAPACITY and roots >= self.capacity:
-            self._grow()  # both are as large
+            self.grow()  # both are as large
 
     def _make_room(self, side: int, count: int) -> None:
         self._search.put(**{("start_rows", "goal_rows")[side]: self._zeros(count)})

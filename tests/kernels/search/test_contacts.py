@@ -65,28 +65,6 @@ def test_a_seed_gives_one_route_however_it_is_interrupted(problem, route):
     assert abs(route_length(parts.waypoints) / route_length(whole.waypoints) - 1.0) < 0.05
 
 
-def test_many_routes_in_one_call_are_those_of_many_calls(problem, route):
-    routes = [route, np.repeat(route, 2, axis=0)[1:], route[[0, -1]], route]
-    seeds = [3, 2**70 + 5, 7, 8]
-    shared = pulling(problem.world, max(routes, key=len))
-    length = route_length(route)
-    found = shared.run_each(routes, seeds, np.array([length, length, length, 0.0]), brief=5, whole=True)
-    assert shared.intact()
-    for each, seed, both in zip(routes[:3], seeds, found, strict=False):
-        alone = pulling(problem.world, each, seed=seed)
-        if not alone.jump():
-            assert both is None  # the straight line is blocked
-            continue
-        np.testing.assert_array_equal(both[0], alone.waypoints)
-        alone.run(work=5, stop=lambda: True)
-        alone.run()
-        np.testing.assert_array_equal(both[1], alone.waypoints)
-    assert found[0] is not None
-    assert found[3] is None  # longer than it may be
-    (only_briefly,) = shared.run_each([route], seeds[:1], np.array([length]), brief=5, whole=False)
-    assert route_length(found[0][1]) <= route_length(only_briefly[1]) <= route_length(only_briefly[0])
-
-
 def test_many_waypoints_are_no_obstacle(problem, route):
     fine = np.concatenate([np.linspace(a, b, 60, endpoint=False) for a, b in pairwise(route)])
     fine = np.vstack([fine, route[-1]])

@@ -42,6 +42,7 @@ def test_an_edit_of_a_kernel_or_a_layout_makes_anew_what_depends_on_it_and_nothi
     assert {name for name, key in before.items() if code_files.machine_key(name) != key} == {
         "search.connect_kernels",
         "search.repair_kernels",
+        "search.short.kernels",
     }
 
 

@@ -15,7 +15,7 @@ from rrtik_ompl.kernels.proof import layout as proof_layout
 from rrtik_ompl.kernels.proof.frames import node_frames, vector_at
 from rrtik_ompl.kernels.proof.planes import corner_at, solid_at
 from rrtik_ompl.kernels.proof.proof_kernels import apart, kind_of, pair_at, prove_motion, visit
-from rrtik_ompl.kernels.record import Doubles, Wholes
+from rrtik_ompl.kernels.record import Doubles
 from rrtik_ompl.kernels.search.contacts import layout
 from rrtik_ompl.kernels.search.contacts.gaps import makes_contact, measure_gap, show_point
 from rrtik_ompl.kernels.search.contacts.layout import PullTable
@@ -120,11 +120,31 @@ def bound_by(gap: float) -> float:
 
 
 @kernel
-def jump(route: PullTable) -> None:
-    """Go from each waypoint to the last one that is seen, by bisection; count motions that are not proven."""
+def lay_out(route: PullTable, seed: int) -> None:
+    """Forget what was done with the route that was here before."""
+    route.stage = layout.GIVEN
+    route.random = seed
+    route.tries = 0
+    route.contacts = 0
+    route.jumped = 0
+    route.unproven = 0
+    route.work = 0.0
+    route.idle = 0
+    route.refused = 0
+
+
+@kernel
+def jump(route: PullTable, until: float, thorough: bool) -> bool:
+    """Go from each waypoint to the last one that is seen, by bisection, until so much work is done; whether all is.
+
+    A motion that stays as it was is proven, also once the work for better ones is spent. One that is not proven is
+    counted, and ends it unless it is to be ``thorough``.
+    """
     dof = dof_in(route)
-    here = 0
-    while here < route.count - 1:
+    while route.jumped < route.count - 1 and (thorough or route.unproven == 0):
+        if route.work >= until:
+            return False
+        here = route.jumped
         seen = here + 1
         known = False
         hidden = route.count
@@ -139,10 +159,10 @@ def jump(route: PullTable) -> None:
 
         copy_row(dof * (route.count - seen), waypoint(route, seen), waypoint(route, here + 1))
         route.count -= seen - here - 1
-        unsure = not known and route.work < route.max_work
-        if unsure and not is_proven(route, waypoint(route, here), waypoint(route, here + 1)):
+        if not known and not is_proven(route, waypoint(route, here), waypoint(route, here + 1)):
             route.unproven += 1
-        here += 1
+        route.jumped = here + 1
+    return True
 
 
 @kernel
@@ -433,105 +453,31 @@ def pull_once(route: PullTable) -> bool:
     return bend_at_contacts(route, total) > 0 or (stepped and route.idle < 2)
 
 
-@entry
-def begin(route: PullTable) -> int:
-    """Jump from waypoint to waypoint, if that has not been done. Returns UNPROVEN, or RUNNING if all is proven."""
+@kernel
+def pull_on(route: PullTable, work: float) -> bool:
+    """Go on for about so much work; whether there is nothing left to do."""
+    until = route.work + work
     if route.stage == layout.GIVEN:
+        if not jump(route, until, True):
+            return False
         route.stage = layout.JUMPED
-        jump(route)
-    return layout.UNPROVEN if route.unproven > 0 else layout.RUNNING
+    if route.unproven > 0:
+        return True
+    if route.stage == layout.JUMPED:
+        cut(route)
+        route.stage = layout.CUT
+    while route.stage == layout.CUT and route.count > 2 and route.work < route.max_work:
+        if route.work >= until:
+            return False
+        if not pull_once(route):
+            route.stage = layout.SETTLED
+    return True
 
 
 @entry
 def pull(route: PullTable, work: int) -> int:
     """Go on for about so much work. Returns DONE, RUNNING, or UNPROVEN: the route has motions that are not proven."""
-    until = route.work + float(work)
-    if begin(route) == layout.UNPROVEN:
+    complete = pull_on(route, float(work))
+    if route.unproven > 0 and complete:
         return layout.UNPROVEN
-    if route.stage == layout.JUMPED:
-        route.stage = layout.CUT
-        cut(route)
-    while route.count > 2 and route.work < route.max_work:
-        if route.work >= until:
-            return layout.RUNNING
-        if not pull_once(route):
-            break
-    return layout.DONE
-
-
-@entry
-def pull_each(
-    route: PullTable,
-    rows: Configuration,
-    counts: Wholes,
-    seeds: Wholes,
-    longest: Doubles,
-    number: int,
-    brief: int,
-    work: int,
-    jumped: Configuration,
-    jumped_counts: Wholes,
-) -> int:
-    """Pull one route after the other, each as a new table would, whose memory is used again.
-
-    Args:
-        route: Has room for each of the routes.
-        rows: ``route.capacity`` rows for each route, its waypoints first; gets the pulled routes.
-        counts: Waypoints of each route; gets those of the pulled ones, 0 for one that is not proven or too long.
-        seeds: Of each route.
-        longest: The length that each may have after a brief pull.
-        number: Of routes.
-        brief: Work of a brief pull.
-        work: Work of the pull that follows; 0 for none.
-        jumped: Gets the routes after the jumps, as ``rows``.
-        jumped_counts: Gets their waypoints.
-    """
-    dof = dof_in(route)
-    pulled = 0
-    for k in range(number):
-        sink = row_at(rows, dof * route.capacity, k)
-        give(route, sink, counts[k], seeds[k])
-        counts[k] = 0
-        forget_planes(route)
-        if begin(route) == layout.UNPROVEN:
-            continue
-        copy_row(dof * route.count, route.route, row_at(jumped, dof * route.capacity, k))
-        jumped_counts[k] = route.count
-
-        forget_planes(route)
-        pull(route, brief)
-        if length_of(dof, route.route, route.count) > longest[k]:
-            continue
-        if work > 0:
-            forget_planes(route)
-            pull(route, work)
-        copy_row(dof * route.count, route.route, sink)
-        counts[k] = route.count
-        pulled += 1
-    return pulled
-
-
-@kernel
-def give(route: PullTable, rows: Configuration, count: int, seed: int) -> None:
-    """Begin with another route, as in a new table."""
-    copy_row(dof_in(route) * count, rows, route.route)
-    route.count = count
-    route.random = seed
-    route.tries = 0
-    route.failures = 0
-    route.gains = 0
-    route.contacts = 0
-    route.stage = layout.GIVEN
-    route.unproven = 0
-    route.work = 0.0
-    route.idle = 0
-    route.refused = 0
-    route.found_pair = -1
-
-
-@kernel
-def forget_planes(route: PullTable) -> None:
-    """Forget the planes of earlier proofs, so that nothing depends on what has been proven before."""
-    proof = route.motions.proof
-    for k in range(3 * proof.pair_count):
-        proof.ways[k] = 0.0
+    return layout.DONE if complete else layout.RUNNING

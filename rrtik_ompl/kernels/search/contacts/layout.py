@@ -40,6 +40,7 @@ class PullTable(ShortcutTable):
     next_gradients: Configuration
 
     stage: int  # what has been done
+    jumped: int  # waypoint from which the next jump goes
     unproven: int  # motions of the route that are not proven
     work: float  # so far, in proofs of free motions
     max_work: float
@@ -50,6 +51,6 @@ class PullTable(ShortcutTable):
     found_place: float  # and where on the motion
 
 
-GIVEN, JUMPED, CUT = range(3)  # stages
+GIVEN, JUMPED, CUT, SETTLED = range(4)  # stages
 DONE, RUNNING, UNPROVEN = range(3)  # what pull() returns; unproven: a motion of the given route cannot be proven here
 MAX_BENDS = 8  # of a route that gets new ones

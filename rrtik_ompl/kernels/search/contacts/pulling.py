@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import lru_cache
-
-import numpy as np
 
 from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.base.errors import InputError
@@ -67,12 +64,10 @@ class Pulling:
         self._kernels = kernels
         self._motions = motions
         self._dof = dof
-        self.table = made = PullTable(PlannedTable(_plan(len(waypoints), dof)))
-        made.put(motions=motions.table, count=len(waypoints), random=seed % 2**62, max_tries=cuts)
-        made.put(max_work=work, least_gain=least_gain)
-        made.metric[:] = 1.0
-        made.lower[:] = lower
-        made.upper[:] = upper
+        self.table = made = route_table(
+            motions, len(waypoints), lower, upper, cuts=cuts, work=work, least_gain=least_gain
+        )
+        made.put(count=len(waypoints), random=seed % 2**62)
         made.route[: waypoints.size] = waypoints.ravel()
 
     @property
@@ -89,11 +84,6 @@ class Pulling:
     def proven(self) -> bool:
         """Whether every motion of the route could be proven; if not, it has not been pulled."""
         return self.table.unproven == 0
-
-    def jump(self) -> bool:
-        """Only go from waypoint to the last one that is seen, if :meth:`run` has not; whether the route is proven."""
-        self._motions.make_ready()
-        return self._kernels.begin(self.table.address) != layout.UNPROVEN
 
     def run(self, *, stop: Callable[[], bool] | None = None, work: int = WORK_PER_CALL) -> bool:
         """Go on until nothing moves any more, the work is spent, or ``stop`` says so.
@@ -112,52 +102,28 @@ class Pulling:
             if stop is not None and stop():
                 return False
 
-    def run_each(
-        self, routes: Sequence[Matrix], seeds: Sequence[int], longest: Vector, *, brief: int, whole: bool
-    ) -> list[tuple[Matrix, Matrix] | None]:
-        """Pull other routes in one call of the kernel, each as an object of its own does, in the memory of this one.
-
-        Args:
-            routes: Free routes, shapes (k, dof), none with more waypoints than that of this object.
-            seeds: Of the cuts of each route.
-            longest: The length that each may have after a brief pull, shape (m,).
-            brief: The work of that.
-            whole: Whether it is followed by a pull to the end.
-
-        Returns:
-            Each route after the jumps and after the pulls; None for one that is not proven or too long.
-        """
-        dof = self._dof
-        rows = np.zeros((len(routes), self.table.capacity, dof))
-        jumped = np.empty_like(rows)
-        counts = np.array([len(route) for route in routes])
-        jumped_counts = np.zeros_like(counts)
-        numbers = np.array([seed % 2**62 for seed in seeds])
-        for sink, route in zip(rows, routes, strict=True):
-            sink[: len(route)] = route
-
-        self._motions.make_ready()
-        self._kernels.pull_each(
-            self.table.address,
-            rows.ctypes.data,
-            counts.ctypes.data,
-            numbers.ctypes.data,
-            longest.ctypes.data,
-            len(routes),
-            brief,
-            math.ceil(self.table.max_work) if whole else 0,
-            jumped.ctypes.data,
-            jumped_counts.ctypes.data,
-        )
-        ends = zip(jumped_counts.tolist(), counts.tolist(), strict=True)
-        return [
-            (jumped[k, :before].copy(), rows[k, :after].copy()) if after else None
-            for k, (before, after) in enumerate(ends)
-        ]
-
     def intact(self) -> bool:
         """Whether no kernel has written beyond the memory of the route or what it works on."""
         return self.table.intact() and self._motions.intact()
+
+
+def route_table(
+    motions: FastMotions,
+    count: int,
+    lower: Vector,
+    upper: Vector,
+    *,
+    cuts: int,
+    work: float = WORK,
+    least_gain: float = LEAST_GAIN,
+) -> PullTable:
+    """A table with room for a route of so many waypoints; see :class:`Pulling`."""
+    made = PullTable(PlannedTable(_plan(count, motions.dof)))
+    made.put(motions=motions.table, max_tries=cuts, max_work=work, least_gain=least_gain)
+    made.metric[:] = 1.0
+    made.lower[:] = lower
+    made.upper[:] = upper
+    return made
 
 
 @lru_cache(maxsize=256)

@@ -1,0 +1,135 @@
+"""The search for a short route: the object that keeps the memory of the kernels, from one call to the next."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.kernels.search.connect import LARGEST_KEPT, ConnectSearch
+from rrtik_ompl.kernels.search.connect_layout import ASK, LOOK_AND_ASK, UNBOUNDED_COST
+from rrtik_ompl.kernels.search.contacts.layout import PullTable
+from rrtik_ompl.kernels.search.contacts.pulling import route_table
+from rrtik_ompl.kernels.search.motions.motion_table import FastMotions
+from rrtik_ompl.kernels.search.short import layout
+from rrtik_ompl.kernels.search.short.layout import CAPACITY, ShortTable
+from rrtik_ompl.kernels.simd.library import library
+from rrtik_ompl.kernels.tables.memory import packed
+
+SAMPLES = 2000  # of each search
+CUTS = 6  # random cuts of a route
+MOST_GOALS = 4  # that are tried
+WORK_PER_CALL = 250  # of a kernel, about 5 ms, until the caller may stop it
+SEEDS = 2**61  # how many there are
+
+
+class ShortRoutes:
+    """Searches for the shortest of some routes to one of some goals, and pulls it taut; for any number of queries.
+
+    Every motion of what it finds is proven free. The same seed gives the same route.
+
+    Attributes:
+        table: What the kernels read.
+
+    Args:
+        coarse: How the search checks motions.
+        motions: How motions are proven.
+        lower, upper: The box of configurations, shapes (dof,).
+        looks: See :class:`ConnectSearch`.
+
+    Raises:
+        InputError: If there are no kernels.
+    """
+
+    def __init__(self, coarse: FastMotions, motions: FastMotions, lower: Vector, upper: Vector, *, looks: bool) -> None:
+        kernels = library(layout.KERNELS)
+        if kernels is None or not motions.proves:
+            raise InputError("short routes: there are no kernels that prove motions; install numba")
+        self._kernels = kernels
+        self._motions = motions
+        self._dof = motions.dof
+        self._search = ConnectSearch(coarse, lower, upper)
+        self._search.table.put(resolve=LOOK_AND_ASK if looks else ASK, limit=SAMPLES, bound=UNBOUNDED_COST)
+        self.table = packed(
+            ShortTable,
+            search=self._search.table,
+            first=route_table(motions, CAPACITY, lower, upper, cuts=CUTS),
+            second=route_table(motions, CAPACITY, lower, upper, cuts=CUTS),
+            found=np.zeros(2 * CAPACITY * self._dof),
+            found_rows=np.zeros(2, dtype=np.int64),
+            start=np.zeros(self._dof),
+            goals=np.zeros(MOST_GOALS * self._dof),
+            lines=np.zeros(MOST_GOALS),
+        )
+
+    def find(self, start: Vector, goals: Matrix, seed: int, stop: Callable[[], bool]) -> bool:
+        """Find a route, as far pulled taut as it takes to compare some.
+
+        Args:
+            start: Shape (dof,), in the box.
+            goals: The nearest first, shape (k, dof), k from 1 to ``MOST_GOALS``, in the box.
+            seed: Any whole number.
+            stop: Asked between two calls of the kernel; True ends the search with the best route so far.
+
+        Returns:
+            Whether there is one.
+        """
+        table = self.table
+        table.start[:] = start
+        table.goals[: goals.size] = goals.ravel()
+        table.put(goal_count=len(goals), seed=1000 * seed % SEEDS, best=-1, length=np.inf)
+        table.put(stage=layout.GIVEN, turn=0, goal=0, attempts=0, rejected=0, iterations=0, checked=0)
+        status = layout.RUNNING
+        while status != layout.DONE and not stop():
+            self._motions.make_ready()
+            status = self._kernels.find(table.address, WORK_PER_CALL)
+            if status == layout.FULL:
+                self._search.grow()
+        return table.best >= 0
+
+    def pull(self, stop: Callable[[], bool]) -> None:
+        """Pull the route that was found on, until nothing moves any more, the work is spent, or ``stop`` says so."""
+        status = layout.RUNNING
+        while status != layout.DONE and not stop():
+            self._motions.make_ready()
+            status = self._kernels.finish(self.table.address, WORK_PER_CALL)
+
+    @property
+    def found(self) -> Matrix:
+        """The route before it was pulled, shape (k, dof); a copy."""
+        best = self.table.best
+        rows: Matrix = self.table.found.reshape(2, CAPACITY, self._dof)[best, : self.table.found_rows[best]].copy()
+        return rows
+
+    @property
+    def route(self) -> Matrix:
+        """The route as it is now, shape (k, dof); a copy."""
+        route = self._routes[self.table.best]
+        return route.route[: route.count * self._dof].reshape(-1, self._dof).copy()
+
+    @property
+    def counts(self) -> dict[str, int | float]:
+        """Searches, routes that could not be proven, samples, and motions that were checked."""
+        table = self.table
+        return {
+            "attempts": table.attempts,
+            "rejected": table.rejected,
+            "iterations": table.iterations,
+            "checked_motions": table.checked,
+        }
+
+    @property
+    def worth_keeping(self) -> bool:
+        """Whether its trees have not grown large."""
+        return self._search.capacity <= LARGEST_KEPT
+
+    def intact(self) -> bool:
+        """Whether no kernel has written beyond the memory of the routes, the search or what they work on."""
+        own = (self.table, *self._routes)
+        return self._motions.intact() and self._search.intact() and all(table.intact() for table in own)
+
+    @property
+    def _routes(self) -> tuple[PullTable, PullTable]:
+        return self.table.first, self.table.second

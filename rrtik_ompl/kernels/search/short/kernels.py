@@ -1,0 +1,179 @@
+"""The kernel that makes a short, proven route: searches in coarse steps, jumps, pulls, and the choice of the shortest.
+
+To each goal, the nearest first, there is one search. Its route jumps from waypoint to waypoint, and is pulled taut for
+a moment; the shortest one is pulled on. A goal whose straight line is no shorter than the best route is left out. A
+route that cannot be proven means the next seed. All of it is bounded by counts, so the same seed gives the same route.
+"""
+
+from __future__ import annotations
+
+from rrtik_ompl.kernels.layout import FREE
+from rrtik_ompl.kernels.search import connect_layout
+from rrtik_ompl.kernels.search.connect_kernels import begin_between, search_on, write_path
+from rrtik_ompl.kernels.search.contacts.kernels import jump, lay_out, pull_on
+from rrtik_ompl.kernels.search.contacts.layout import JUMPED, PullTable
+from rrtik_ompl.kernels.search.contacts.steps import length_of
+from rrtik_ompl.kernels.search.motions.motion_layout import Configuration
+from rrtik_ompl.kernels.search.motions.proven_kernels import judge_motion
+from rrtik_ompl.kernels.search.motions.row_kernels import copy_row, distance, row_at
+from rrtik_ompl.kernels.search.short import layout
+from rrtik_ompl.kernels.search.short.layout import ShortTable
+from rrtik_ompl.kernels.simd.compiled import entry, inlined, kernel
+
+TRIES = 8  # searches to each goal, until one of them has led to a proven route
+SEARCHES = 2  # to each, where its route is long
+LONG = 1.5  # times the straight line
+BRIEF_WORK = 40.0  # of the pull of a route that is compared with others, in proofs of free motions
+WORTH = 0.98  # a straight line of more than this share of the best length is left out
+STEP = 0.25  # work of a motion or a sample of a search
+
+
+@inlined
+def route_at(short: ShortTable, number: int) -> PullTable:
+    """One of the two routes."""
+    return short.first if number == 0 else short.second
+
+
+@inlined
+def candidate(short: ShortTable) -> int:
+    """Which of the two routes is not the shortest so far."""
+    return 1 if short.best == 0 else 0
+
+
+@kernel
+def stays_free(short: ShortTable, row: Configuration) -> bool:
+    """Whether a configuration is proven free."""
+    short.left -= 1.0
+    free: bool = judge_motion(short.first.motions, row, row, True) == FREE
+    return free
+
+
+@kernel
+def admit(short: ShortTable) -> bool:
+    """Leave out the goals that are not proven free; whether the start is, and a goal is left."""
+    if not stays_free(short, short.start):
+        return False
+    dof = short.first.motions.dof
+    kept = 0
+    for goal in range(short.goal_count):
+        row = row_at(short.goals, dof, goal)
+        if stays_free(short, row):
+            copy_row(dof, row, row_at(short.goals, dof, kept))
+            short.lines[kept] = distance(dof, short.start, row)
+            kept += 1
+    short.goal_count = kept
+    return kept > 0
+
+
+@kernel
+def begin_search(short: ShortTable) -> bool:
+    """Begin the next search that may lead to a shorter route; False if there is none."""
+    dof = short.first.motions.dof
+    while short.turn < TRIES and (short.best < 0 or short.turn < SEARCHES):
+        while short.goal < short.goal_count:
+            goal = short.goal
+            short.goal += 1
+            line = short.lines[goal]
+            enough = line / WORTH if short.turn == 0 else max(LONG * line, line / WORTH)
+            if short.length <= enough:
+                continue
+            seed = short.seed + 100 * short.turn + goal
+            if begin_between(short.search, short.start, 1, row_at(short.goals, dof, goal), 1, seed) < 0:
+                short.stage = layout.SEARCHING
+                lay_out(route_at(short, candidate(short)), seed)
+                return True
+        short.turn += 1
+        short.goal = 0
+    return False
+
+
+@kernel
+def search_for_a_while(short: ShortTable) -> int:
+    """Search on; the status."""
+    search = short.search
+    before = search.checked + search.iterations
+    status = search_on(search, 1 + int(short.left / STEP))
+    short.left -= STEP * float(search.checked + search.iterations - before)
+    if status == connect_layout.ASKING:
+        answer(short)
+    if status == connect_layout.FULL:
+        return layout.FULL
+    if status == connect_layout.SOLVED or status == connect_layout.EXHAUSTED:
+        short.attempts += 1
+        short.iterations += search.iterations
+        short.checked += search.checked
+        short.stage = layout.NEXT
+    if status == connect_layout.SOLVED:
+        route = route_at(short, candidate(short))
+        route.count = write_path(search, route.route, route.capacity)
+        if route.count <= route.capacity:
+            short.stage = layout.FOUND
+        else:
+            short.rejected += 1
+    return layout.RUNNING
+
+
+@kernel
+def answer(short: ShortTable) -> None:
+    """Prove what the search asks for."""
+    search = short.search
+    motions = short.first.motions
+    dof = motions.dof
+    for k in range(search.questions):
+        start = row_at(search.question_starts, dof, k)
+        end = row_at(search.question_ends, dof, k)
+        search.answers[k] = 1 if judge_motion(motions, start, end, True) == FREE else 0
+        short.left -= 1.0
+
+
+@kernel
+def compare(short: ShortTable) -> None:
+    """Let the route that was found jump; once it has, and is proven, see whether it is the shortest."""
+    number = candidate(short)
+    route = route_at(short, number)
+    dof = route.motions.dof
+    before = route.work
+    complete = jump(route, before + short.left, False)
+    if complete and route.unproven == 0:
+        route.stage = JUMPED
+        copy_row(dof * route.count, route.route, row_at(short.found, dof * layout.CAPACITY, number))
+        short.found_rows[number] = route.count
+        if route.count > 2:
+            pull_on(route, BRIEF_WORK)
+        length = length_of(dof, route.route, route.count)
+        if length < short.length:
+            short.best = number
+            short.length = length
+    if complete:
+        short.rejected += 1 if route.unproven > 0 else 0
+        short.stage = layout.NEXT
+    short.left -= route.work - before
+
+
+@entry
+def find(short: ShortTable, work: int) -> int:
+    """Go on for about so much work, in proofs of free motions; the status."""
+    short.left = float(work)
+    while short.left > 0.0:
+        if short.stage == layout.GIVEN:
+            if not admit(short):
+                return layout.DONE
+            short.stage = layout.NEXT
+        elif short.stage == layout.NEXT:
+            if not begin_search(short):
+                return layout.DONE
+        elif short.stage == layout.SEARCHING:
+            if search_for_a_while(short) == layout.FULL:
+                return layout.FULL
+        else:
+            compare(short)
+    return layout.RUNNING
+
+
+@entry
+def finish(short: ShortTable, work: int) -> int:
+    """Pull the shortest route on, for about so much work; the status."""
+    route = route_at(short, short.best)
+    if route.count < 3:
+        return layout.DONE
+    return layout.DONE if pull_on(route, float(work)) else layout.RUNNING
