@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Hashable
+from threading import RLock
 from typing import Any, Generic, TypeVar
 from weakref import WeakKeyDictionary, WeakValueDictionary
 
@@ -34,6 +35,7 @@ class Shared(Generic[Part]):
     def __init__(self, make: Callable[..., Part]) -> None:
         self._make = make
         self._parts: WeakValueDictionary[Hashable, Any] = WeakValueDictionary()
+        self._pending: dict[Hashable, RLock] = {}  # what is being made
         # Objects are identified by their addresses, so they must live as long as the parts that are made of them.
         self._values: WeakKeyDictionary[Any, tuple[object, ...]] = WeakKeyDictionary()
 
@@ -47,7 +49,13 @@ class Shared(Generic[Part]):
 
         found: Any = self._parts.get(key)
         if found is None:
-            return self.keep(self._make(*values), *values)
+            with self._pending.setdefault(key, RLock()):
+                found = self._parts.get(key)  # another thread may have made it meanwhile
+                if found is None:
+                    try:
+                        return self.keep(self._make(*values), *values)
+                    finally:
+                        self._pending.pop(key, None)
         if not hasattr(found, "for_thread"):
             return found  # type: ignore[no-any-return]
 

@@ -1,7 +1,9 @@
 """Parts are made once of the same values, and live as long as somebody holds them."""
 
 import gc
+import time
 from concurrent.futures import ThreadPoolExecutor
+from threading import Barrier
 
 import numpy as np
 import pytest
@@ -64,6 +66,34 @@ def test_each_thread_has_a_part_of_its_own_where_that_is_needed():
     assert there[1] is there[0]
     assert there[2] is here[1]
     assert own.of("a") is here[0]
+
+
+@pytest.mark.parametrize("kind", [Part, OwnPart])
+def test_threads_that_want_the_same_part_make_it_once(kind):
+    made = []
+
+    def make(value):
+        made.append(value)
+        if len(made) == 1:
+            raise InterruptedError  # what could not be made is made by whoever waits for it
+        time.sleep(0.01)
+        return kind(value)
+
+    parts = Shared(make)
+    together = Barrier(4)
+
+    def ask(_):
+        together.wait()
+        try:
+            return parts.of("a")
+        except InterruptedError:
+            return None
+
+    with ThreadPoolExecutor(4) as pool:
+        found = [part for part in pool.map(ask, range(4)) if part is not None]
+    assert made == ["a", "a"]
+    assert len(found) == 3
+    assert len({id(part) for part in found}) == (1 if kind is Part else 3)
 
 
 def test_what_is_kept_is_found():

@@ -387,6 +387,7 @@ def most_different(planes: Matrix, count: int) -> Matrix:
 
 
 @once_per_geometry
+@once_per_geometry
 def is_closed(geometry: coal.CollisionGeometry) -> bool:
     """Check whether a coal mesh is closed: triangles pass every edge equally often in both directions.
 

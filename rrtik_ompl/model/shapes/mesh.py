@@ -18,6 +18,7 @@ from rrtik_ompl.base.arrays import (
     frozen,
     number_rows,
     positive,
+    welded,
 )
 from rrtik_ompl.base.copies import as_value, in_one_line
 from rrtik_ompl.base.errors import InputError, at_most, require
@@ -171,7 +172,10 @@ def _merged(keys: Matrix, points: Matrix, faces: NDArray[np.int64]) -> tuple[Mat
     """Keep one of the points with equal keys, and renumber the faces accordingly.
 
     Returns:
-        The points, shape (n, 3), and the faces, shape (m, 3).
+        The points in the order of their keys, shape (n, 3), and the faces, shape (m, 3).
     """
-    _, first, index = np.unique(keys, axis=0, return_index=True, return_inverse=True)
-    return points[first], np.asarray(index).reshape(-1)[faces]
+    first, place = welded(keys)
+    order = np.lexsort(keys[first].T[::-1])
+    rank = np.empty(len(order), dtype=np.int64)
+    rank[order] = np.arange(len(order))
+    return points[first[order]], rank[place][faces]

@@ -57,30 +57,34 @@ def repaired(points: Matrix, faces: Faces) -> Faces:
         points: Vertices, no two of them equal, shape (n, 3).
         faces: Indices of the vertices of each triangle, shape (m, 3).
     """
+    edges = edges_of(faces)
     for repair in (_without_doubles, _cut_at_vertices, _turned_alike):
-        if not 0 < np.count_nonzero(edges_of(faces).open) <= MOST_OPEN:
+        if not 0 < np.count_nonzero(edges.open) <= MOST_OPEN:
             break
-        faces = repair(points, faces)
+        faces, edges = repair(points, faces, edges)
     return faces
 
 
-def _without_doubles(_: Matrix, faces: Faces) -> Faces:
+def _without_doubles(_: Matrix, faces: Faces, edges: Edges) -> tuple[Faces, Edges]:
     """Keep one of the triangles with the same corners, whichever way they are turned, where an edge of them is open."""
-    edges = edges_of(faces)
     doubtful = np.flatnonzero(edges.open[edges.number].any(axis=1))
     _, first = np.unique(np.sort(faces[doubtful], axis=1), axis=0, return_index=True)
-    return np.delete(faces, np.delete(doubtful, first), axis=0)
+    surplus = np.delete(doubtful, first)
+    if not len(surplus):
+        return faces, edges
+    kept = np.delete(faces, surplus, axis=0)
+    return kept, edges_of(kept)
 
 
-def _cut_at_vertices(points: Matrix, faces: Faces) -> Faces:
+def _cut_at_vertices(points: Matrix, faces: Faces, edges: Edges) -> tuple[Faces, Edges]:
     """Cut triangles at vertices that lie on their open edges, until there are no such vertices."""
     for _ in range(ROUNDS):
-        edges = edges_of(faces)
         cuts = _vertices_on(points, edges) if edges.open.any() else {}
         if not cuts:
             break
         faces = _cut(faces, edges, cuts)
-    return faces
+        edges = edges_of(faces)
+    return faces, edges
 
 
 def _vertices_on(points: Matrix, edges: Edges) -> dict[int, list[int]]:
@@ -123,19 +127,18 @@ def _cut(faces: Faces, edges: Edges, cuts: dict[int, list[int]]) -> Faces:
     return np.concatenate(pieces)
 
 
-def _turned_alike(_: Matrix, faces: Faces) -> Faces:
+def _turned_alike(_: Matrix, faces: Faces, edges: Edges) -> tuple[Faces, Edges]:
     """Turn triangles so that in each part, whose triangles are joined by edges of two, all face the same side.
 
     The side is that of most triangles of the part. A part without such a side, as a Moebius strip, stays open.
     """
-    edges = edges_of(faces)
     side_edges = edges.number.ravel()
     by_edge = np.argsort(side_edges, kind="stable")
     sides = by_edge[(np.bincount(side_edges) == 2)[side_edges[by_edge]]].reshape(-1, 2)
     # Neighbours that pass their edge in the same direction face different sides.
     differs = edges.surplus[side_edges[sides[:, 0]]] != 0
     if not differs.any():
-        return faces
+        return faces, edges
 
     first, second = (sides // 3).T
     part = _components(len(faces), first, second)
@@ -160,7 +163,8 @@ def _turned_alike(_: Matrix, faces: Faces) -> Faces:
                     turn[other] = turn[face] ^ differ
         if 2 * np.count_nonzero(turn[members]) > len(members):
             turn[members] = ~turn[members]
-    return np.where(turn[:, None], faces[:, ::-1], faces)
+    turned = np.where(turn[:, None], faces[:, ::-1], faces)
+    return turned, edges_of(turned)
 
 
 def in_closed_parts(faces: Faces) -> Mask:
