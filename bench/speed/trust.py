@@ -10,7 +10,7 @@ import numpy as np
 from bench.shared.judge import Contacts
 from bench.shared.motion_bench_maker import problem_of, scene_files
 from bench.speed.cases import Options
-from bench.speed.lengths import STORED
+from bench.speed.lengths import STORED, processor_clocks
 from bench.speed.whole import samples
 from rrtik_bench.report.page import Report
 from rrtik_ompl import Problem, load_problem, plan, plan_many
@@ -29,9 +29,12 @@ def trusted(options: Options, report: Report) -> None:
     verified = touching = looked = unproven = 0
     judges = [Contacts(problem.world) for problem in problems]
     for number, problem in enumerate(islice(cycle(problems), judged)):
-        found = plan(problem, seed=options.seed + number)
-        path = found.require()
+        with processor_clocks():
+            found = plan(problem, seed=options.seed + number)
+        path = found.path
         unproven += found.proven is not True
+        if path is None:
+            continue
         if number < certificates and path.proof is not None:
             certificate = certificate_by(path.proof, path.waypoints)
             fault = certificate_fault(certificate, problem.world, path.waypoints, clearance=path.proof.clearance)
@@ -40,16 +43,17 @@ def trusted(options: Options, report: Report) -> None:
         touching += sum(any(True for _ in judges[number % len(problems)].depths(q)) for q in rows)
         looked += len(rows)
 
-    alone = plan_many(problems, seed=options.seed, threads=1)
-    together = plan_many(problems, seed=options.seed, threads=THREADS)
+    with processor_clocks():
+        alone = plan_many(problems, seed=options.seed, threads=1)
+        together = plan_many(problems, seed=options.seed, threads=THREADS)
     same = sum(
-        np.array_equal(one.require().waypoints, other.require().waypoints)
+        one.path is not None and other.path is not None and np.array_equal(one.path.waypoints, other.path.waypoints)
         for one, other in zip(alone, together, strict=True)
     )
     rows_of_bars = (
         (f"certificates of {certificates} default paths verify", certificates, verified),
         (f"configurations of {judged} default paths that touch, by Pinocchio and coal, of {looked}", 0, touching),
-        (f"default paths that are not proven, of {judged}", 0, unproven),
+        (f"default plans without a proven path, of {judged}", 0, unproven),
         (f"paths that are the same in one thread and in {THREADS}", len(problems), same),
     )
     for what, wanted, measured in rows_of_bars:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import lru_cache
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from rrtik_ompl.base.arrays import TAU, Matrix, Vector, frozen
 from rrtik_ompl.base.choices import IkMethod
 from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.kept import kept_with
 from rrtik_ompl.base.units import closest_configuration
 from rrtik_ompl.base.values import dataclass
 from rrtik_ompl.constraints.held_region import held_region
@@ -26,7 +28,7 @@ from rrtik_ompl.ik.solve import DRAWS, SECONDS, solve_ik, solve_in_any_way
 from rrtik_ompl.ik.targets import leaves_freedom, skip_targets, targets
 from rrtik_ompl.kernels.ik.ik_layout import KERNELS, ChoiceTable
 from rrtik_ompl.kernels.simd.library import library
-from rrtik_ompl.kernels.tables.memory import packed
+from rrtik_ompl.kernels.tables.memory import PlannedTable, TablePlan, sizes_of
 from rrtik_ompl.model.goal import GoalPart, GoalSet, Target, TipGoal, has_continuous, joint_difference
 from rrtik_ompl.model.robot import Robot, inside_limits, poses
 from rrtik_ompl.world.problem import Problem
@@ -293,10 +295,16 @@ def _with_full_turns(problem: Problem, rows: Matrix) -> Matrix:
     joints are left out. Where the posture is free, it is free in every turn. Shape (m, dof).
     """
     robot = problem.world.robot
+    turned = (rows[:, None] + _full_turns(robot)).reshape(-1, robot.dof)
+    return np.vstack([rows, turned[inside_limits(robot, turned)]])
+
+
+@kept_with
+def _full_turns(robot: Robot) -> Matrix:
+    """Return what a full turn of each joint that has room for one adds to a configuration, shape (k, dof)."""
     joints = robot.chain.whole_turns() & ~robot.continuous & (robot.upper - robot.lower >= TAU)
     turn = TAU * np.eye(robot.dof)[joints]
-    turned = (rows[:, None] + np.vstack([turn, -turn])).reshape(-1, robot.dof)
-    return np.vstack([rows, turned[inside_limits(robot, turned)]])
+    return frozen(np.vstack([turn, -turn]))
 
 
 def _move_into_regions(problem: Problem, goal: TipGoal, found: Matrix, rng: np.random.Generator) -> Matrix:
@@ -432,24 +440,18 @@ def _apart(robot: Robot, rows: Matrix, away: Vector, separation: Vector) -> list
         away: Their distances from the start, shape (m,).
         separation: The largest joint difference of each from the nearest that is known, shape (m,).
     """
+    chosen: list[int] = []
     kernels = library(KERNELS)
     if kernels is not None and len(rows):
-        choice = packed(
-            ChoiceTable,
-            rows=len(rows),
-            dof=robot.dof,
-            most=MAX_CONFIGURATIONS,
-            least=SAME_POSTURE,
-            q=rows,
-            away=away,
-            apart=np.minimum(separation, FARTHEST),
-            endless=robot.continuous.astype(np.int32),
-            chosen=np.zeros(MAX_CONFIGURATIONS, dtype=np.int32),
-        )
+        choice = ChoiceTable(PlannedTable(_choice_plan(len(rows), robot.dof)))
+        choice.q[:] = rows.ravel()
+        choice.away[:] = away
+        choice.apart[:] = np.minimum(separation, FARTHEST)
+        choice.endless.view(np.int32)[: robot.dof] = robot.continuous
         count = kernels.choose_apart(choice.address)
-        return [int(row) for row in choice.chosen[:count]]
+        chosen = choice.chosen.view(np.int32)[:count].tolist()
+        return chosen
 
-    chosen: list[int] = []
     while len(chosen) < MAX_CONFIGURATIONS and (separation > SAME_POSTURE).any():
         is_first_half = len(chosen) < MAX_CONFIGURATIONS // 2
         score = -away if is_first_half else separation
@@ -457,6 +459,23 @@ def _apart(robot: Robot, rows: Matrix, away: Vector, separation: Vector) -> list
         chosen.append(best)
         separation = np.minimum(separation, np.abs(joint_difference(robot, rows, rows[best])).max(axis=1))
     return chosen
+
+
+@lru_cache(maxsize=64)
+def _choice_plan(rows: int, dof: int) -> TablePlan:
+    """Return the memory layout of a choice among so many configurations; cached."""
+    return sizes_of(
+        ChoiceTable,
+        q=rows * dof,
+        away=rows,
+        apart=rows,
+        endless=dof,
+        chosen=MAX_CONFIGURATIONS,
+        rows=rows,
+        dof=dof,
+        most=MAX_CONFIGURATIONS,
+        least=SAME_POSTURE,
+    )
 
 
 def _explain_miss(problem: Problem, goal: TipGoal, rounds: str) -> str:

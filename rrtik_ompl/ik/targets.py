@@ -33,6 +33,9 @@ def targets(goal: TipGoal, max_count: int, rng: np.random.Generator) -> list[Tar
             exactly so many.
         rng: Source of random numbers.
     """
+    exact = [part for part in goal.parts if isinstance(part, Target)]
+    if len(exact) == len(goal.parts) <= max_count:
+        return exact  # so nothing is drawn
     parts, coordinates = _drawn(goal, max_count, rng)
     places = iter(displacements(coordinates))
     return [part if isinstance(part, Target) else _target(part.region(), next(places)) for part in parts]
