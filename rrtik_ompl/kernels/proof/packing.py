@@ -107,10 +107,7 @@ def proof_pairs(
     """
     joints = len(chain.parent)
     parts = [own.around or (NOTHING,) for own in placed_bodies(solids, body_arrays(bodies).placements)]
-    reached = [
-        _reaches(chain, body.joint, own, np.broadcast_to(strokes, joints))
-        for body, own in zip(bodies, parts, strict=True)
-    ]
+    reached = _reaches(chain, bodies, parts, np.broadcast_to(strokes, joints))
     firsts = np.cumsum([0, *(len(part) + (len(part) > 1) for part in parts)]).tolist()
     listed = _listed_pairs(chain, bodies, pairs, parts, firsts, fixed=fixed)
     sweeps = listed.sweeps
@@ -132,7 +129,7 @@ def proof_pairs(
         **_solid_arrays(bodies, parts, listed.together),
         sweep_count=len(sweeps),
         sweeps=np.array([(bodies[k].joint, base) for (k, *_), base in sweeps], dtype=np.int32),
-        reaches=np.array([np.max([reached[k] for k in them], axis=0) for them, _ in sweeps]),
+        reaches=np.array([reached[list(them)].max(axis=0) for them, _ in sweeps]),
         body_pair_count=len(listed.whole),
         pair_count=len(rows),
         pairs=rows[:, : layout.PAIR_SIZE].astype(np.int32),
@@ -255,29 +252,47 @@ def _joint_rows(chain: Chain) -> Matrix:
     return np.concatenate([turns, chain.placement[:, :3, 3], chain.axis], axis=1)
 
 
-def _points(solid: ConvexSolid, axis: Vector) -> tuple[float, float]:
-    """Largest distance of a solid's points from the frame's origin, and from an axis through it."""
-    around = solid.disc + solid.radius
-    far = float(np.linalg.norm(solid.corners, axis=1).max()) + around
-    return far, float(np.linalg.norm(np.cross(solid.corners, axis), axis=1).max()) + around
-
-
-def _reaches(chain: Chain, joint: int, parts: Sequence[ConvexSolid], strokes: Vector) -> Vector:
-    """How far a body's points come from the axis of each joint that carries it, in any posture, shape (joints,)."""
-    reaches = np.zeros(len(chain.parent))
-    if joint == 0:
+def _reaches(chain: Chain, bodies: Sequence[Body], parts: Sequence[Sequence[ConvexSolid]], strokes: Vector) -> Matrix:
+    """How far points of bodies come from the axis of each joint that carries them, in any posture, (bodies, joints)."""
+    reaches = np.zeros((len(bodies), len(chain.parent)))
+    convex = np.array([all(solid.kind == IS_CONVEX for solid in own) for own in parts], dtype=bool)
+    carried = np.array([body.joint > 0 for body in bodies], dtype=bool)
+    reaches[carried & ~convex] = np.inf
+    measured = np.flatnonzero(carried & convex).tolist()
+    if not measured:
         return reaches
-    if any(solid.kind != IS_CONVEX for solid in parts):
-        return np.full(len(chain.parent), np.inf)
-    measured = np.array([_points(solid, chain.axis[joint - 1]) for solid in parts]).max(axis=0)
-    far, reaches[joint - 1] = measured
-    while (parent := int(chain.parent[joint - 1])) >= 0:
-        origin = chain.placement[joint - 1][:3, 3]
-        slide = float(strokes[joint - 1]) if chain.prismatic[joint - 1] else 0.0
-        reaches[parent] = float(np.linalg.norm(np.cross(origin, chain.axis[parent]))) + slide + far
-        far += float(np.linalg.norm(origin)) + slide
-        joint = parent + 1
+
+    origins = chain.placement[:, :3, 3]
+    slides = np.where(chain.prismatic, strokes, 0.0)
+    steps = (np.linalg.norm(origins, axis=1) + slides).tolist()
+    lifts = (np.linalg.norm(np.cross(origins, chain.axis[chain.parent]), axis=1) + slides).tolist()
+    last = [bodies[k].joint - 1 for k in measured]
+    far, off_axis = _farthest([parts[k] for k in measured], chain.axis[last])
+    for number, joint, whole, own in zip(measured, last, far.tolist(), off_axis.tolist(), strict=True):
+        reaches[number, joint] = own
+        while (parent := int(chain.parent[joint])) >= 0:
+            reaches[number, parent] = lifts[joint] + whole
+            whole += steps[joint]
+            joint = parent
     return reaches
+
+
+def _farthest(groups: Sequence[Sequence[ConvexSolid]], axes: Matrix) -> tuple[Vector, Vector]:
+    """Largest distances of groups' points from the frame's origin and from an axis each, shapes (n,).
+
+    Args:
+        groups: n groups of one solid or more.
+        axes: Unit vectors through the origin, shape (n, 3).
+    """
+    solids = [solid for group in groups for solid in group]
+    counts = [len(solid.corners) for solid in solids]
+    around = np.repeat([solid.disc + solid.radius for solid in solids], counts)
+    group_of = np.repeat(np.repeat(np.arange(len(groups)), [len(group) for group in groups]), counts)
+    starts = np.searchsorted(group_of, np.arange(len(groups)))
+    corners = np.concatenate([solid.corners for solid in solids])
+    far = np.linalg.norm(corners, axis=1) + around
+    off_axis = np.linalg.norm(np.cross(corners, axes[group_of]), axis=1) + around
+    return np.maximum.reduceat(far, starts), np.maximum.reduceat(off_axis, starts)
 
 
 def size_rows(groups: Sequence[Sequence[ConvexSolid]], turns: NDArray[np.float64]) -> Matrix:
