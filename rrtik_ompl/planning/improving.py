@@ -1,7 +1,9 @@
 """Improvement of paths: plan again, shorten, and keep the best path until the time is up or nothing is gained.
 
 Plans with new seeds pass obstacles on other sides, which shortening alone cannot do. Most of them are worth little
-work: each new path is shortened briefly, and only the best of a few such paths is shortened until it stops improving.
+work. Where short paths can be made (:mod:`rrtik_ompl.planning.short_path`), a plan is one search in kernels and a brief
+pull; only what comes near the best path is pulled to the end. By other planners, each new path is shortened briefly,
+and only the best of a few such paths is shortened until it stops improving.
 
 The quantity that is minimized is a cost of a path (`COSTS`); :func:`least_cost` is a lower bound of it for a problem.
 """
@@ -16,20 +18,21 @@ from typing import TypeAlias
 
 import numpy as np
 
-from rrtik_ompl.base.arrays import Vector
+from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.choices import PathObjective
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.description.joint_weights import weights_of
-from rrtik_ompl.model.path import JointPath
+from rrtik_ompl.model.path import JointPath, path_of
 from rrtik_ompl.model.robot import Robot
-from rrtik_ompl.model.transitions import route_length
+from rrtik_ompl.model.transitions import length_of, route_length
 from rrtik_ompl.ompl_bridge.attempt import ITERATION_LIMIT
 from rrtik_ompl.ompl_bridge.planner_options import planner_options
 from rrtik_ompl.ompl_bridge.weighted import has_weights
 from rrtik_ompl.planning.attempts import Turn, walk
 from rrtik_ompl.planning.finish import rules_among
 from rrtik_ompl.planning.outcome import Improvement, NamedPlanner, Plan, Request
+from rrtik_ompl.planning.short_path import SEARCHED_AS, Tools, goal_rows, loaded_for, tools_for
 from rrtik_ompl.planning.shortening import Wishes, shortened
 from rrtik_ompl.world.clearance_curve import distances_at, places_along
 from rrtik_ompl.world.clearances import possible_clearance
@@ -45,6 +48,7 @@ WORTH = 1.2  # paths of more than this times the best cost are not shortened fur
 SETTLED = 1e-2  # a path is shortened again only if this share of its cost was gained
 BOUND = 1.5  # limit of the length of further plans, in lengths of the best path
 BOUNDED_SAMPLES = 3000  # samples of such a bounded plan
+SHORT_PATHS = 4  # that count as one plan where the search has converged
 
 NEAREST = 1e-3  # [m] clearances below this cost no more
 DOUBLE = 0.05  # [m] the clearance at which a piece of a path counts double
@@ -120,6 +124,8 @@ class _Work:
 
     def run(self) -> None:
         """Plan and shorten until the time is up, nothing is gained any more, or the cost reaches its lower bound."""
+        if self._improves_by_short_paths():
+            return
         seeds = np.random.default_rng([self._request.budget.seed, 1])
         paths = [self._shortened(self.best, self._quick_checks)]
         while self._how.strategy == "restart-shorten" and self._rounds_without_gain < PATIENCE:
@@ -136,6 +142,46 @@ class _Work:
                 self._shorten_further(min(paths, key=self._cost, default=self.best))
                 paths = []
         self._shorten_further(self.best)
+
+    def _improves_by_short_paths(self) -> bool:
+        """Improve by further short paths, see :func:`.short_path.short_path`; False where none can be made."""
+        problem = self._problem
+        is_their_search = self._planner.name == SEARCHED_AS and self._how.strategy == "restart-shorten"
+        if self._one_joint or not is_their_search or not loaded_for(problem, self._request):
+            return False
+        goals = goal_rows(problem, self._budget)
+        if goals is None:
+            return False
+
+        with tools_for(problem, self._request, goals) as tools:
+            start_is_free, *goals_are_free = tools.motions.valid_batch(np.vstack([problem.start, goals]))
+            if not start_is_free or not any(goals_are_free):
+                return False
+            self._make_short_paths(goals, tools)
+        return True
+
+    def _make_short_paths(self, goals: Matrix, tools: Tools) -> None:
+        """Search with further seeds to the goals, shape (k, dof), and pull what is found; now and then the best."""
+        start = tools.weighted_rows(self._problem.start)
+        aims = tools.weighted_rows(goals)
+        seeds = np.random.default_rng([self._request.budget.seed, 1])
+        while self._rounds_without_gain < SHORT_PATHS * PATIENCE and not self._is_done():
+            seed = int(seeds.integers(2**31))
+            best = tools.weighted_rows(self.best.waypoints)
+            if self.rounds % PLANS == 0 and len(best) > 2:
+                self._keep_route(tools.routes.pulled_again(best, seed, self._budget.over), goals, tools)
+
+            self.rounds += 1
+            self._rounds_without_gain += 1  # `_keep_if_best` resets it after a gain
+            if tools.routes.find(start, aims, seed, self._budget.over, below=WORTH * length_of(best)):
+                tools.routes.pull(self._budget.over)
+                self._keep_route(tools.routes.route, goals, tools)
+
+    def _keep_route(self, route: Matrix | None, goals: Matrix, tools: Tools) -> None:
+        """Keep a weighted route to one of the goals, shapes (m, dof) and (k, dof), if it is the best."""
+        rows = None if route is None else tools.proven_rows(route, self._problem.start, goals)
+        if rows is not None:
+            self._keep_if_best(path_of(self._problem.robot, rows, tools.motions.proof(rows, tools.clearance)))
 
     @property
     def _quick_checks(self) -> int | None:

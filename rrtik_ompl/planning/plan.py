@@ -80,7 +80,7 @@ def plan(
             goal configurations that keep the clearance are preferred.
         improve: How long the path may be improved after it was found [s], within ``seconds``: the problem is planned
             again with other seeds, each path is shortened, and the best one is kept. Improvement ends when sixty plans
-            in a row gain nothing, or when the path reaches the lower bound of its cost.
+            in a row (240 brief ones of "auto") gain nothing, or when the path reaches the lower bound of its cost.
             ``statistics["cost_over_time"]`` holds rows of seconds and cost, ``"length_bound"`` a lower bound of the
             length of any path. Ctrl-C ends the improvement, and the best path so far is returned. The clock decides how
             many plans are tried, so paths of the same seed may differ.

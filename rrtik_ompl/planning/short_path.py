@@ -111,7 +111,7 @@ def short_path(problem: Problem, request: Request, *, pull: bool) -> Plan | None
 
         load_kernels(problem.robot)
     budget = request.budget.begun_now()
-    goals = _goals(problem, budget)
+    goals = goal_rows(problem, budget)
     if goals is None:
         return None
 
@@ -280,7 +280,7 @@ def _applies(problem: Problem, request: Request) -> bool:
     return world.motions is not None and not problem.constraints
 
 
-def _goals(problem: Problem, budget: Budget) -> Matrix | None:
+def goal_rows(problem: Problem, budget: Budget) -> Matrix | None:
     """Return goal configurations, the nearest first, shape (k, dof); None if the start is one or none is known."""
     q = problem.goal.q
     at_goal = problem.reached(problem.start) if q is None else bool((problem.start == q).all())

@@ -10,10 +10,12 @@ import pytest
 from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.errors import InputError, UnknownNameError
 from rrtik_ompl.cli.app import run
+from rrtik_ompl.model.transitions import route_length
 from rrtik_ompl.planning import improving
 from rrtik_ompl.planning.improving import COSTS, improved, least_time, weighted_length
 from rrtik_ompl.planning.outcome import Improvement, NamedPlanner, Request
 from rrtik_ompl.planning.plan import plan
+from rrtik_ompl.planning.short_path import tools_for
 from rrtik_ompl.problem_files.problem import load_problem
 from rrtik_ompl.world.problem import Problem
 from rrtik_planners import FastRRTConnect
@@ -178,3 +180,31 @@ def test_the_default_planner_goes_on_with_the_one_that_found_the_path(few_rounds
     found = plan(problem, seed=2, seconds=LONG, improve=LONG)
     assert found.statistics["improving_rounds"] > 0
     assert found.proven
+
+
+@pytest.mark.kernels
+@pytest.mark.parametrize("name", ["panda_shelf", "so101_bin"])  # goals in joints and of the tip
+def test_further_paths_of_the_default_are_short_paths(few_rounds, monkeypatch, name):
+    monkeypatch.setattr(improving, "walk", None)  # no planner takes a turn
+    problem = load_problem(name)
+    first, found = plan(problem, seed=2), plan(problem, seed=2, seconds=LONG, improve=LONG)
+    assert found.statistics["improving_rounds"] >= 12
+    assert found.path.length <= first.path.length
+    assert problem.reached(found.path.end)
+    assert problem.world.prove(found.path, clearance=found.path.proof.clearance).proven
+    assert found.path.violations(problem.world) == ()
+
+
+@pytest.mark.kernels
+def test_a_route_stays_below_the_length_that_is_asked_for():
+    problem = load_problem("panda_shelf")
+    goals = problem.goal.q[None]
+    with tools_for(problem, Request(Budget()), goals) as tools:
+        lengths = []
+        for below in (np.inf, 4.0, 3.5, 1.0):
+            found = tools.routes.find(problem.start, goals, 5, lambda: False, below=below)
+            lengths.append(route_length(tools.routes.route) if found else None)
+            assert not found or lengths[-1] < below
+        assert lengths[0] is not None
+        assert lengths[-1] is None  # less than the straight line
+        assert tools.routes.intact()

@@ -150,7 +150,7 @@ def test_a_straight_line_is_the_end_of_it(problem, monkeypatch):
     start = problem.start
     near = rrtik.Problem(problem.world, start, start + 0.01)
     goals = np.array([start + 0.01, start + 0.015, start + 0.019])
-    monkeypatch.setattr(room, "_goals", lambda *_: goals)
+    monkeypatch.setattr(room, "goal_rows", lambda *_: goals)
     found = short_path(near, REQUEST, pull=True)
     assert found.statistics["attempts"] == 1
     assert len(found.path.waypoints) == 2

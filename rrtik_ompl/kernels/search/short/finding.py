@@ -11,7 +11,7 @@ from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.kernels.search.connect import LARGEST_KEPT, ConnectSearch
 from rrtik_ompl.kernels.search.connect_layout import ASK, LOOK_AND_ASK, UNBOUNDED_COST
 from rrtik_ompl.kernels.search.contacts.layout import PullTable
-from rrtik_ompl.kernels.search.contacts.pulling import route_table
+from rrtik_ompl.kernels.search.contacts.pulling import Pulling, route_table
 from rrtik_ompl.kernels.search.motions.motion_table import FastMotions
 from rrtik_ompl.kernels.search.short import layout
 from rrtik_ompl.kernels.search.short.layout import CAPACITY, ShortTable
@@ -22,6 +22,11 @@ SAMPLES = 2000  # of each search
 CUTS = 6  # random cuts of a route
 MOST_GOALS = 4  # that are tried
 WORK_PER_CALL = 250  # of a kernel, about 5 ms, until the caller may stop it
+STOPPED_AFTER = 100  # work of one call of a pull, about 2 ms
+AGAIN_CUTS = 60  # of the best route, before it is pulled again
+AGAIN_WORK = 300.0
+AGAIN_GAIN = 3e-3
+SLACK = 1.7  # times the length that a route has to stay below
 SEEDS = 2**61  # how many there are
 
 
@@ -64,7 +69,7 @@ class ShortRoutes:
             lines=np.zeros(MOST_GOALS),
         )
 
-    def find(self, start: Vector, goals: Matrix, seed: int, stop: Callable[[], bool]) -> bool:
+    def find(self, start: Vector, goals: Matrix, seed: int, stop: Callable[[], bool], *, below: float = np.inf) -> bool:
         """Find a route, as far pulled taut as it takes to compare some.
 
         Args:
@@ -72,14 +77,16 @@ class ShortRoutes:
             goals: The nearest first, shape (k, dof), k from 1 to ``MOST_GOALS``, in the box.
             seed: Any whole number.
             stop: Asked between two calls of the kernel; True ends the search with the best route so far.
+            below: The length that the route has to stay below. Routes of up to ``SLACK`` times this are pulled.
 
         Returns:
             Whether there is one.
         """
+        self._search.table.bound = SLACK * below if np.isfinite(below) else UNBOUNDED_COST
         table = self.table
         table.start[:] = start
         table.goals[: goals.size] = goals.ravel()
-        table.put(goal_count=len(goals), seed=1000 * seed % SEEDS, best=-1, length=np.inf)
+        table.put(goal_count=len(goals), seed=1000 * seed % SEEDS, best=-1, length=below)
         table.put(stage=layout.GIVEN, turn=0, goal=0, attempts=0, rejected=0, iterations=0, checked=0)
         status = layout.RUNNING
         while status != layout.DONE and not stop():
@@ -95,6 +102,22 @@ class ShortRoutes:
         while status != layout.DONE and not stop():
             self._motions.make_ready()
             status = self._kernels.finish(self.table.address, WORK_PER_CALL)
+
+    def pulled_again(self, rows: Matrix, seed: int, stop: Callable[[], bool]) -> Matrix | None:
+        """Return a route, shape (k, dof), k at least 3, after more cuts and a longer pull; None if it is not proven."""
+        route = self.table.first
+        again = Pulling(
+            self._motions,
+            rows,
+            route.lower,
+            route.upper,
+            seed=seed,
+            cuts=AGAIN_CUTS,
+            work=AGAIN_WORK,
+            least_gain=AGAIN_GAIN,
+        )
+        again.run(stop=stop, work=STOPPED_AFTER)
+        return again.waypoints if again.proven else None
 
     @property
     def found(self) -> Matrix:
