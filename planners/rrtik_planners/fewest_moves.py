@@ -23,6 +23,7 @@ from rrtik_ompl.planning.moves.search import MOST_NODES, MoveSearch, Proof
 from rrtik_ompl.planning.moves.staircase import one_joint_moves
 from rrtik_ompl.planning.shortening import Task, Wishes
 from rrtik_ompl.planning.shortening.cuts import shortcut
+from rrtik_ompl.world.motion_queries import has_kernels
 from rrtik_ompl.world.world import World
 from rrtik_planners.bicrdt import BiCRDT
 from rrtik_planners.fast_rrt_connect import FastRRTConnect
@@ -31,6 +32,7 @@ from rrtik_planners.one_joint_planner import OneJointPlanner
 SEARCHES = 5  # number of runs of BiCRDT, the best of which is improved
 MAX_IMPROVEMENT_ROUNDS = 10
 BRIEF_ITERATIONS = 1000  # iterations of one of these runs
+BRIEF_IN_PYTHON = 100  # the same without kernels on a level whose clearance is a mere preference
 SAMPLED_ITERATIONS = 20_000  # iterations of RRT-Connect
 FEW_NODES = 256  # largest number of nodes of a lattice if there is no world, so that each motion is checked by itself
 
@@ -284,6 +286,12 @@ class FewestMoves(OneJointPlanner):
         world = self._world if level is None else level.searched
         iterations = 0
         seeds = self.rng.integers(2**31, size=self.searches).tolist()
+        if not patient and not has_kernels(world):  # the time is for the last level
+            found = self._bicrdt(world, seeds[0], BRIEF_IN_PYTHON).search(*asked.ends)
+            if found.path is not None:
+                _offer(moves, found.path, level)
+            return int(found.statistics.get("iterations", 0))
+
         for seed in seeds:
             if moves.proven or asked.stop():
                 return iterations

@@ -102,6 +102,7 @@ def test_what_is_kept_is_found():
     assert parts.of("b") is kept
 
 
+@pytest.mark.kernels
 def test_worlds_of_the_same_values_share_what_depends_on_them():
     robot = rrtik.load_robot("planar3")
     scene = rrtik.Scene((rrtik.Obstacle("ball", rrtik.Sphere(0.1), rrtik.pose([0.9, 0.0, 0.0])),))

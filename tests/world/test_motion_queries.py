@@ -109,6 +109,7 @@ def test_a_stand_in_needs_to_check_motions_alone():
     assert not wall.motion_valid(np.array([1.0, 1.0]), np.array([9.0, 1.0]))
 
 
+@pytest.mark.kernels
 def test_a_stand_in_has_no_kernels_and_counts_as_exact():
     world = load_problem("planar3_b").world
     assert not has_kernels(Wall(), KERNELS)

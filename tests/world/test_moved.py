@@ -83,6 +83,7 @@ def test_after_any_moves_a_world_answers_as_one_made_anew(queries, count, margin
     assert world.fast is None or world.fast.intact()
 
 
+@pytest.mark.kernels
 def test_the_rows_of_a_box_are_those_that_packing_makes(queries, monkeypatch):
     world = rrtik.World(queries[0], scene_of(0, margin=0.01))
     poses = [anywhere(np.random.default_rng(seed)) for seed in range(40)]
@@ -99,6 +100,7 @@ def rows_after(world, pose):
     return [array.copy() for each in scene for array in each.memory.arrays.values()]
 
 
+@pytest.mark.kernels
 def test_nothing_is_packed_anew(queries, monkeypatch):
     world = rrtik.World(queries[0], scene_of(20))
     moved = world.moved("3", [0.5, 0.5, 0.5])
@@ -133,6 +135,7 @@ def test_what_other_threads_ask_is_never_changed_beneath_them(queries):
     assert alike(asked(moved, rows, ends), asked(rrtik.World(robot, moved.scene), rows, ends))
 
 
+@pytest.mark.kernels
 def test_a_roadmap_keeps_the_world_that_it_was_made_for(queries):
     world = rrtik.World(queries[0], scene_of(4))
     roadmap = rrtik.Roadmap(world, vertices=50)
