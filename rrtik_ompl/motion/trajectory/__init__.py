@@ -120,6 +120,8 @@ def time_parameterize(
     if world is None:
         raise InputError("a path with rounded corners leaves the checked one: pass world=problem.world, to check it")
     check_route_clearance(world, clearance, path.waypoints)
+    if len(corners) == 2:  # no corner to round
+        return stopping
     faults = fault_finder(path, world, clearance)
     return blended(path, corners, bounds, reach, stopping.duration, faults, more) or stopping
 

@@ -8,12 +8,13 @@ the window's variance times the acceleration across the path.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.motion.trajectory.limits import ROUNDING_MARGIN, RateLimits
 
 WIDTHS = (1.0, 0.75, 0.55, 0.4, 0.25)  # shares of the widest window that are tried
@@ -62,16 +63,6 @@ class Spline:
         """Return the same spline, ``factor`` times as long."""
         return Spline(self.controls, self.step * factor)
 
-    def peaks(self) -> tuple[Vector, Vector, Vector]:
-        """Return bounds of velocity, acceleration and jerk, shape (n,) each; the last two are exact."""
-        # Joints are in rows, as numpy finds the largest number along a row much faster than along a column.
-        bounds = []
-        rows = np.ascontiguousarray(self.controls.T)
-        for power in (1, 2, 3):
-            rows = rows[:, 1:] - rows[:, :-1]
-            bounds.append(np.maximum(rows.max(axis=1), -rows.min(axis=1)) / self.step**power)
-        return bounds[0], bounds[1], bounds[2]
-
 
 def widest_window(limits: RateLimits) -> float:
     """Return the widest window that the jerk limits may need [s].
@@ -107,39 +98,66 @@ def smoothed(rows: Matrix, step: float, max_steps: int, limits: RateLimits) -> S
         max_steps: Number of steps of the widest window, 1 or more.
         limits: Limits of the joints, which are the first columns.
     """
-    n = len(limits.velocity)
-    widths = {int(np.ceil(share * max_steps)) for share in WIDTHS}
-    splines = (Spline(controls, step) for controls in _means(rows, widths))
-    timed = (spline.slowed(slowing(Spline(spline.controls[:, :n], step), limits)) for spline in splines)
-    return min(timed, key=lambda spline: spline.duration)
+    widths = sorted({int(np.ceil(share * max_steps)) for share in WIDTHS})
+    controls = _means(rows, widths)
+    factors = _slowings(controls[:, :, : len(limits.velocity)], step, limits)
+    splines = [
+        Spline(each[: len(rows) + width + 3], step * factor)
+        for each, width, factor in zip(controls, widths, factors, strict=True)
+    ]
+    return min(splines, key=lambda spline: spline.duration)
 
 
-def slowing(spline: Spline, limits: RateLimits) -> float:
-    """Return the factor, 1 or more, by which a spline must be slowed to keep the limits."""
-    bounds = (limits.velocity, limits.acceleration, limits.jerk)
-    shares = [float((peak / bound).max()) for peak, bound in zip(spline.peaks(), bounds, strict=True)]
-    factor: float = max(share ** (1.0 / power) for power, share in enumerate(shares, start=1))
-    return max(1.0, factor * ROUNDING_MARGIN)
+def _slowings(controls: NDArray[np.float64], step: float, limits: RateLimits) -> list[float]:
+    """Return the factors, 1 or more, by which splines must be slowed to keep the limits.
+
+    Args:
+        controls: Control points of k splines, shape (k, m, n); the last one may be repeated.
+        step: Time between two knots of all of them [s].
+        limits: Limits of the n joints.
+    """
+    # Joints are in rows, as numpy finds the largest number along a row much faster than along a column.
+    rows = np.ascontiguousarray(controls.transpose(0, 2, 1))
+    factors = [1.0] * len(rows)
+    for power, bound in enumerate((limits.velocity, limits.acceleration, limits.jerk), start=1):
+        rows = rows[:, :, 1:] - rows[:, :, :-1]
+        peaks = np.maximum(rows.max(axis=2), -rows.min(axis=2)) / step**power  # of the velocity an upper bound
+        shares = (peaks / bound).max(axis=1).tolist()
+        factors = [
+            max(factor, share ** (1.0 / power) * ROUNDING_MARGIN) for factor, share in zip(factors, shares, strict=True)
+        ]
+    return factors
 
 
-def _means(rows: Matrix, widths: set[int]) -> Iterator[Matrix]:
-    """Yield control points for each window width: means of the motion over windows of so many rows.
+def _means(rows: Matrix, widths: Sequence[int]) -> NDArray[np.float64]:
+    """Return control points for each window width: means of the motion over windows of so many rows.
 
-    The first and the last control point are repeated, as the spline needs to be at rest there.
+    The first and the last control point are repeated, as the spline needs to be at rest there. Of a narrower window
+    than the widest one, the last is repeated again to the end of the array.
 
     Args:
         rows: The motion at even steps, shape (m, k).
-        widths: Numbers of rows of the windows.
+        widths: Numbers of rows of the windows, ascending.
+
+    Returns:
+        Control points, shape (widths, m + greatest width + 3, k); those of a width w are the first m + w + 3.
     """
+    count = len(rows)
     first = rows[:1]
     offsets = rows - first
-    total = np.zeros((len(rows) - 1, rows.shape[1]))
+    total = np.zeros((count + widths[-1] - 1, rows.shape[1]))
+    controls = np.empty((len(widths), count + widths[-1] + 3, rows.shape[1]))
+    made = 0
 
     # The sums over windows of one more row are computed from the previous ones.
-    for width in range(1, max(widths) + 1):
-        last_rows = np.broadcast_to((width - 1) * offsets[-1], (1, rows.shape[1]))
-        total = np.vstack([total, last_rows])
-        total[width - 1 :] += offsets
-        if width in widths:
-            mean = first + total / width
-            yield np.vstack([mean[[0, 0]], mean, mean[[-1, -1]]])
+    for width in range(1, widths[-1] + 1):
+        end = count + width - 1
+        total[end - 1] = (width - 1) * offsets[-1]
+        total[width - 1 : end] += offsets
+        if width == widths[made]:
+            mean = first + total[:end] / width
+            controls[made, :2] = mean[0]
+            controls[made, 2 : end + 2] = mean
+            controls[made, end + 2 :] = mean[-1]
+            made += 1
+    return controls
