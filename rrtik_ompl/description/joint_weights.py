@@ -35,3 +35,10 @@ def weights_of(robot: Robot) -> Vector:
     given = np.array(given_weights(robot))
     lower, upper = robot.finite_range()
     return frozen(given * (np.linalg.norm(upper - lower) / np.linalg.norm(given * (upper - lower))))
+
+
+@kept_with
+def has_even_weights(robot: Robot) -> bool:
+    """Check whether all joints weigh the same, so that weights make no difference."""
+    weights = weights_of(robot)
+    return bool((weights == weights[0]).all())

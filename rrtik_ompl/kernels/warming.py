@@ -48,6 +48,8 @@ def load_together(names: Sequence[str]) -> None:
 
     A library takes LLVM half a second, once on a machine, and LLVM makes one at a time in a process.
     """
+    if all(map(is_loaded, names)):
+        return
     missing = [name for name in dict.fromkeys(names) if not is_loaded(name) and _missing(name) and has_bitcode(name)]
     if len(missing) > 1:
         _share(missing)

@@ -19,7 +19,7 @@ import numpy as np
 
 from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.base.budget import Budget
-from rrtik_ompl.description.joint_weights import weights_of
+from rrtik_ompl.description.joint_weights import has_even_weights, weights_of
 from rrtik_ompl.kernels.layout import SOLID_INTS
 from rrtik_ompl.kernels.proof.rows import PROOF_KERNELS
 from rrtik_ompl.kernels.search.connect_layout import KERNELS as SEARCH_KERNELS
@@ -218,10 +218,9 @@ def tools_for(problem: Problem, request: Request, goals: Matrix) -> Iterator[Too
     world = problem.world
     clearance = max(CLEARANCE if request.clearance is None else request.clearance, world.settings.required_clearance)
     motions = kept_motions(world, clearance + min(clearance, SPARE))
-    weights = weights_of(world.robot)
-    even = bool((weights == weights[0]).all())
-    weighted: ProvenMotions | WeightedMotions = motions if even else _weighted(motions, weights)
-    with _kept_routes(world, weighted, planning_bounds(problem, goals), None if even else weights) as routes:
+    weights = None if has_even_weights(world.robot) else weights_of(world.robot)
+    weighted: ProvenMotions | WeightedMotions = motions if weights is None else _weighted(motions, weights)
+    with _kept_routes(world, weighted, planning_bounds(problem, goals), weights) as routes:
         yield Tools(routes, motions, weighted, clearance)
 
 

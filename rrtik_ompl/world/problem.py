@@ -16,6 +16,7 @@ from rrtik_ompl.base.arrays import TAU, Matrix, Vector, dimensions, frozen
 from rrtik_ompl.base.choices import Accuracy
 from rrtik_ompl.base.copies import as_value, changed, in_notebook, restored
 from rrtik_ompl.base.errors import InputError, ProblemError, listed, require
+from rrtik_ompl.base.kept import kept_with
 from rrtik_ompl.base.poses import rigid
 from rrtik_ompl.constraints.held_regions import HeldRegions, goal_regions, held_regions
 from rrtik_ompl.constraints.residuals import contradiction
@@ -379,10 +380,16 @@ def planning_bounds(problem: Problem, goals: Matrix) -> tuple[Vector, Vector]:
         goals: Goal configurations, shape (k, n).
     """
     robot = problem.world.robot
-    if np.isfinite(robot.lower).all() and np.isfinite(robot.upper).all():
+    if _has_limits(robot):
         return robot.lower, robot.upper
 
     ends = np.vstack([problem.start, goals])
     lower = np.where(np.isfinite(robot.lower), robot.lower, ends.min(axis=0) - TAU)
     upper = np.where(np.isfinite(robot.upper), robot.upper, ends.max(axis=0) + TAU)
     return frozen(lower), frozen(upper)
+
+
+@kept_with
+def _has_limits(robot: Robot) -> bool:
+    """Check whether all joints of a robot have limits."""
+    return bool(np.isfinite(robot.lower).all() and np.isfinite(robot.upper).all())

@@ -20,6 +20,7 @@ from rrtik_ompl.kernels.tables.memory import packed
 
 SAMPLES = 2000  # of each search
 CUTS = 6  # random cuts of a route
+LEAST_GAIN = 1.5e-2  # of a step of its pull, as a share of the length; less lets it settle
 MOST_GOALS = 4  # that are tried
 WORK_PER_CALL = 250  # of a kernel, about 5 ms, until the caller may stop it
 STOPPED_AFTER = 100  # work of one call of a pull, about 2 ms
@@ -60,8 +61,8 @@ class ShortRoutes:
         self.table = packed(
             ShortTable,
             search=self._search.table,
-            first=route_table(motions, CAPACITY, lower, upper, cuts=CUTS),
-            second=route_table(motions, CAPACITY, lower, upper, cuts=CUTS),
+            first=route_table(motions, CAPACITY, lower, upper, cuts=CUTS, least_gain=LEAST_GAIN),
+            second=route_table(motions, CAPACITY, lower, upper, cuts=CUTS, least_gain=LEAST_GAIN),
             found=np.zeros(2 * CAPACITY * self._dof),
             found_rows=np.zeros(2, dtype=np.int64),
             start=np.zeros(self._dof),
