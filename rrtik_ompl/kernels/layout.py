@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from typing import cast
 
-from rrtik_ompl.kernels.record import Doubles, Floats, Ints, Record, Tables
+from rrtik_ompl.kernels.record import Doubles, Floats, Ints, Record, Tables, Wholes
 
 ALIGNMENT = 64  # [bytes] of every array that whole vectors are read from
 INT_BYTES, FLOAT_BYTES, DOUBLE_BYTES = 4, 4, 8
@@ -102,11 +102,11 @@ PAIR_GROUP_ONE, PAIR_GROUP_OTHER, PAIR_GROUP_FIRST, PAIR_GROUP_END = range(4)
 
 
 class Pair(Ints):
-    """Numbers of two bodies that must not touch."""
+    """Numbers of two bodies that must not touch, and whether they are neighbours, which balls need not look at."""
 
 
-PAIR_INTS = 2
-PAIR_ONE, PAIR_OTHER = range(2)
+PAIR_INTS = 3
+PAIR_ONE, PAIR_OTHER, PAIR_LOOKED_UP = range(3)
 
 
 class BallTable(Record):
@@ -186,14 +186,15 @@ class PrimitiveTable(Record):
     heads: PrimitiveHead
     planes: Plane
     standing_count: int  # bodies
-    checked: Ints  # for each moving and standing body 0 to ignore that pair
-    excluding: Ints  # for each moving body whether it has a pair to ignore
+    checked: Ints  # for each moving and standing body 0 to ignore that pair, LOOKED_UP for neighbours
+    excluding: Ints  # for each moving body whether it has a pair that balls need not look at
     own: Ints  # for each standing body the primitive that has its formula, or any of its balls, -1 if it has none
     clouds: Tables
     block_count: int  # 0 where primitives are few
     block_boxes: Floats  # as ``boxes``, around each ``BLOCK`` primitives
 
 
+IGNORED, BY_BALLS, LOOKED_UP = range(3)  # how a pair is checked; neighbours of the arm are looked up
 BLOCK = 16  # primitives: boxes are compared this many at a time, or half as many
 LOW_X, HIGH_X, LOW_Y, HIGH_Y, LOW_Z, HIGH_Z = BOX_RUNS = range(6)
 
@@ -238,6 +239,30 @@ class SolidTable(Record):
     solids: Solid
     sizes: SolidSizes
     corners: Corners
+
+
+# Neighbours of the arm, whose distance depends on one or two joints alone.
+
+
+class Neighbours(Ints):
+    """Of a pair of bodies: its place among the marks, the joints of the rows and of the columns of its cells."""
+
+
+NEIGHBOUR_INTS = 3
+NEIGHBOUR_MARK, NEIGHBOUR_ROW, NEIGHBOUR_COLUMN = range(3)
+CELLS = 64  # of a whole turn; as many as a whole number has bits
+CELLS_APART = 0.0005  # [m] that bodies keep in cells in which they are apart
+
+
+class NeighbourTable(Record):
+    """Where neighbours are apart: cells of the values of the joints between them."""
+
+    count: int
+    pairs: Neighbours
+    # Of each pair ``CELLS`` rows of cells, a bit each: whether the bodies are apart in it; then as many rows that say
+    # whether they are in all cells around it, too.
+    cells: Wholes
+    joint_count: int  # the first joints, among which are those of all rows and columns
 
 
 # What a check computes in.
@@ -318,3 +343,4 @@ class WorldTable(Record):
     standing_solids: SolidTable
     wider_solids: SolidTable  # the moving ones, each with the margin around it that the arm keeps from itself
     motion_bounds: BoundTable
+    neighbours: NeighbourTable

@@ -9,20 +9,32 @@ only the arm's part.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from random import Random
 
 import numpy as np
 
 from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.base.kept import kept_with
-from rrtik_ompl.geometry.collision.bodies import Body, link_bodies
+from rrtik_ompl.geometry.collision.bodies import Body, link_bodies, pair_array
 from rrtik_ompl.geometry.collision.bodies import Pairs as Pairs
 from rrtik_ompl.geometry.collision.solids import of_each
 from rrtik_ompl.kernels import FastWorld, needs_covers
 from rrtik_ompl.kernels.covers.cache import cached_inner_spheres, cached_outer_cover
+from rrtik_ompl.kernels.proof.neighbours import cells_of, joints_between
+from rrtik_ompl.kernels.proof.rows import PROOF_KERNELS
+from rrtik_ompl.kernels.simd.library import library
+from rrtik_ompl.kernels.tables.neighbour_tables import Cells
+from rrtik_ompl.kernels.tables.packing import alike, partners
+from rrtik_ompl.kernels.tables.robot_tables import usable_cover
 from rrtik_ompl.kernels.tables.solid_tables import convex_solids
 from rrtik_ompl.model.robot import Robot
 
 SLIDING_MARGIN = 1e-3  # [m] range beyond the limits of prismatic joints that the tables cover
+LOOKS = 64  # configurations by which it is told how often covers meet
+OFTEN = 0.1  # share of these, from which on balls tell too little of two links
+MOST_PIECES = (
+    32  # pairs of convex pieces of two links, up to which their cells are found in a few hundredths of a second
+)
 NO_SPHERES = np.empty((0, 4))
 
 Spheres = tuple[Matrix, Matrix]  # outer and inner cover of a body: centre and radius, shape (n, 4) [m]
@@ -40,6 +52,7 @@ class ArmCache:
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
         self.covers: tuple[Spheres, ...] = tuple(_spheres(body) for body in link_bodies(robot))
+        self._cells: dict[Pairs, dict[tuple[int, int], Cells]] = {}  # of the pairs of links that a world has
         self._latest: FastWorld | None = None
 
     def covers_of(self, bodies: Sequence[Body]) -> tuple[Spheres, ...]:
@@ -51,6 +64,56 @@ class ArmCache:
             if key not in spheres_of_key:
                 spheres_of_key[key] = _spheres(body)
         return (*self.covers, *(spheres_of_key[key] for key in keys))
+
+    def cells(self, bodies: Sequence[Body], pairs: Pairs) -> dict[tuple[int, int], Cells]:
+        """Return where neighbours among the links are apart, by their numbers, if their covers meet often.
+
+        Links that kernels compare together with others of the same joint are left out.
+
+        Args:
+            bodies: The bodies of a world; those of the robot's links first.
+            pairs: Pairs of indices into ``bodies`` that must not touch.
+        """
+        if library(PROOF_KERNELS) is None:
+            return {}
+        listed = pair_array(pairs)
+        links = np.sort(listed[(listed < len(self.covers)).all(axis=1)], axis=1).tolist()
+        own = tuple((first, second) for first, second in links)
+        if own not in self._cells:
+            sets = alike(bodies, partners(bodies, own))
+            together = {k for members in sets if len(members) > 1 for k in members}
+            known = {pair: self._cells_of(*pair) for pair in own if together.isdisjoint(pair)}
+            self._cells[own] = {pair: cells for pair, cells in known.items() if cells is not None}
+        return self._cells[own]
+
+    def _cells_of(self, first: int, second: int) -> Cells | None:
+        """Return where two links are apart; None if no table is worthwhile or possible."""
+        robot = self._robot
+        bodies = [link_bodies(robot)[k] for k in (first, second)]
+        if joints_between(robot.chain, *bodies) is None:
+            return None
+        solids = [convex_solids(body.geometry) for body in bodies]
+        if len(solids[0].around) * len(solids[1].around) > MOST_PIECES or not self._often_near(first, second):
+            return None
+        return cells_of(robot.chain, bodies, solids, strokes(robot))
+
+    def _often_near(self, first: int, second: int) -> bool:
+        """Check whether the outer covers of two links meet in many of some random configurations."""
+        robot = self._robot
+        lower, upper = robot.finite_range()
+        rng = Random(0)  # of Python, as numpy's takes 20 ms to load
+        shares = np.array([[rng.random() for _ in range(robot.dof)] for _ in range(LOOKS)])
+        frames = robot.chain.joint_frames(lower + shares * (upper - lower))
+        placed = []
+        for k in (first, second):
+            body = link_bodies(robot)[k]
+            cover = usable_cover(body.geometry, self.covers[k][0])
+            poses = frames[:, body.joint] @ body.placement.homogeneous
+            centres = np.einsum("mij,nj->mni", poses[:, :3, :3], cover[:, :3]) + poses[:, None, :3, 3]
+            placed.append((centres, cover[:, 3]))
+        (one, radii), (other, other_radii) = placed
+        gaps = np.linalg.norm(one[:, :, None] - other[:, None], axis=3) - radii[:, None] - other_radii
+        return bool((gaps.min(axis=(1, 2)) < 0.0).mean() > OFTEN)
 
     def pack(self, bodies: Sequence[Body], pairs: Pairs, covers: Sequence[Spheres], *, share: bool = True) -> FastWorld:
         """Pack the kernels' tables of a world.
@@ -69,6 +132,7 @@ class ArmCache:
             inner=[inside for _, inside in covers],
             solids=of_each((body.geometry for body in bodies), convex_solids),
             strokes=strokes(self._robot),
+            cells=self.cells(bodies, pairs),
             like=self._latest if share else None,
         )
         if share:

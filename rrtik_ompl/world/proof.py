@@ -52,7 +52,7 @@ from rrtik_ompl.kernels.tables.solid_tables import convex_solids
 from rrtik_ompl.model.certificate import Certificate, MotionEntries
 from rrtik_ompl.model.proof import Gap, Proof
 from rrtik_ompl.model.robot import Robot, inside_limits
-from rrtik_ompl.world.arm_cache import Pairs, strokes
+from rrtik_ompl.world.arm_cache import Pairs, arm_cache, strokes
 
 LARGEST_VALUE = 1e3  # [rad] or [m], joint values up to which the rounding errors are bounded
 # [m] Certificates keep this distance beyond ROOM, because their verifier rounds in other places.
@@ -355,7 +355,9 @@ class Prover:
     def _new_table(self) -> ProofPairs:
         bodies = tuple(self.bodies)
         solids = of_each((body.geometry for body in bodies), convex_solids)
-        table = proof_pairs(self.robot.chain, bodies, self.pairs, solids, strokes(self.robot), fixed=self._fixed)
+        cells = arm_cache(self.robot).cells(bodies, self.pairs)
+        joints = self.robot.chain
+        table = proof_pairs(joints, bodies, self.pairs, solids, strokes(self.robot), fixed=self._fixed, cells=cells)
         if len(table.bodies) > MANY_PAIRS and library(PROOF_KERNELS) is None:
             notice.tell_once(notice.IN_NUMPY)
         return table

@@ -12,7 +12,8 @@ from typing import Any
 
 from rrtik_ompl.kernels.checks.kinematics import first_frames, forward_kinematics
 from rrtik_ompl.kernels.checks.likely_kernels import likely_collision
-from rrtik_ompl.kernels.checks.narrow_phase import narrow_phase
+from rrtik_ompl.kernels.checks.narrow_phase import compared_neighbours, narrow_phase
+from rrtik_ompl.kernels.checks.neighbour_kernels import near_on_way, neighbours_near
 from rrtik_ompl.kernels.checks.obstacle_kernels import ALL_LANES, kinds_known
 from rrtik_ompl.kernels.checks.self_kernels import self_collision
 from rrtik_ompl.kernels.checks.sphere_kernels import prepare, scene_collision
@@ -78,7 +79,7 @@ def in_collision(
 
 @inlined
 def outer_collision(world: WorldTable, wanted: int, one: bool, watch: Watch, joints: int) -> Any:
-    """Lanes that the outer balls cannot prove free, for the frames in the scratch memory."""
+    """Lanes that the outer balls cannot prove free, neighbours that are looked up aside."""
     likely = world.scratch.outer_likely
     return in_collision(world, world.outer_balls, world.outer_primitives, wanted, likely, one, watch, joints)
 
@@ -153,6 +154,7 @@ def classify(world: WorldTable, rows: JointValues, count: int, answers: Ints, re
     queue = world.scratch.waiting
     waiting = 0
     joints = world.arm.joint_count
+    near = (1 << world.neighbours.count) - 1
 
     for start in range(0, count, WIDTH):
         filled = min(WIDTH, count - start)
@@ -160,6 +162,7 @@ def classify(world: WorldTable, rows: JointValues, count: int, answers: Ints, re
             load_row(world, rows, start + min(lane, filled - 1), lane)
         forward_kinematics(world.arm, world.scratch)
         doubtful = outer_collision(world, ALL_LANES >> (WIDTH - filled), filled < 0, NO_WATCH, joints)
+        doubtful |= neighbours_near(world.neighbours, near, world.scratch.values, ALL_LANES & ~doubtful)
         for lane in range(filled):
             open_ = (doubtful >> lane) & 1
             set_int(answers, start + lane, open_)
@@ -220,7 +223,8 @@ def check_part(
     """Check ``count`` configurations of a motion between two rows of joint values: those at k / last, k = first, ...
 
     The lanes of the first block are spread over the whole part, so that a collision anywhere shows early; what keeps
-    its distance there from all that lies between is watched no more. Without ``resolve`` the outer balls alone decide.
+    its distance there from all that lies between is watched no more. Without ``resolve`` outer balls and the cells of
+    neighbours alone decide.
     """
     scratch = world.scratch
     joints = world.arm.joint_count
@@ -230,6 +234,7 @@ def check_part(
     middle = blocks // 2
     watch = NO_WATCH
     left = joints
+    near = 0
 
     for number in range(blocks):
         places = smaller(places_in(number, blocks, middle), float(count - 1)) + float(first)
@@ -241,6 +246,7 @@ def check_part(
                 answer = COLLIDING if resolve else UNDECIDED
                 break
 
+            near = near_on_way(world.neighbours, start, end)
             if blocks > 1:
                 watch = scratch.watch
                 watch_motion(world, start, end, float(middle) / float(last))
@@ -250,19 +256,16 @@ def check_part(
             place(world, start, end, share, joints)
         if number == 0 and blocks > 1:
             left = joints_left(world)
-        if doubtful == 0:
-            if left == 0:
-                break
-            continue
+            if near != 0:
+                left = max(left, world.neighbours.joint_count)
 
-        if not resolve:
-            answer = UNDECIDED
-            break
-
-        resolved = resolved_block(world, doubtful, resolve)
-        if resolved != FREE:
-            answer = resolved
-        if resolved == COLLIDING:
+        found = FREE
+        if doubtful != 0:
+            found = resolved_block(world, doubtful, resolve) if resolve else UNDECIDED
+        if near != 0 and (found == FREE or (resolve and found != COLLIDING)):
+            found = max(found, compared_neighbours(world, near, every & ~doubtful, resolve))
+        answer = max(answer, found)
+        if left == 0 or found == COLLIDING or (found == UNDECIDED and not resolve):
             break
 
     return answer

@@ -8,7 +8,8 @@ covered by a margin, so the first two answers are certain.
 from __future__ import annotations
 
 import copy
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,11 +19,12 @@ from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.geometry.collision.bodies import Body, by_motion, pair_array
 from rrtik_ompl.kernels.checks import inputs
 from rrtik_ompl.kernels.checks.clearance import Clearance, rounded
-from rrtik_ompl.kernels.layout import UNDECIDED, ProbeTable, WorldTable
+from rrtik_ompl.kernels.layout import IGNORED, UNDECIDED, ProbeTable, WorldTable
 from rrtik_ompl.kernels.record import Record
 from rrtik_ompl.kernels.reference.checks import ReferenceChecks, measure
 from rrtik_ompl.kernels.simd.library import library
 from rrtik_ompl.kernels.tables.memory import packed, with_own_arrays
+from rrtik_ompl.kernels.tables.neighbour_tables import Cells, neighbour_table
 from rrtik_ompl.kernels.tables.packing import (
     ArmTables,
     Flags,
@@ -30,6 +32,7 @@ from rrtik_ompl.kernels.tables.packing import (
     alike,
     arm_tables,
     checked_table,
+    looked_up,
     partners,
     standing_solids,
     standing_tables,
@@ -67,6 +70,7 @@ class FastWorld:
         inner: For each body spheres inside it, shape (n, 4), possibly none.
         solids: For each body convex solids around and inside it; None leaves undecided what spheres do not decide.
         strokes: Largest value of sliding joints [m], a number or shape (joints,).
+        cells: Of neighbours, by their numbers, the smaller one first, where they are apart; not used without kernels.
         like: A world of the same arm in another scene: what has not changed is not packed again.
         compiled: Whether to use the kernels; False for plain numpy.
 
@@ -84,6 +88,7 @@ class FastWorld:
         inner: Sequence[Spheres],
         solids: Sequence[Solids] | None = None,
         strokes: ArrayLike = inputs.STROKE,
+        cells: Mapping[tuple[int, int], Cells] = MappingProxyType({}),
         like: FastWorld | None = None,
         compiled: bool = True,
     ) -> None:
@@ -97,8 +102,12 @@ class FastWorld:
         self._pairs = kept
         solids = [NO_SOLIDS] * len(bodies) if solids is None else solids
         same = like._arm if like is not None and like._joints == self._joints else None
-        self._arm: ArmTables = arm_tables(chain, bodies, moving, kept, outer, inner, solids, self._limits, like=same)
-        self._checked = checked_table(moving, standing, clear)
+        self._kernels = library("checks.check_kernels") if compiled else None
+        near = {} if self._kernels is None else looked_up(bodies, moving, kept, cells)
+        self._arm: ArmTables = arm_tables(
+            chain, bodies, moving, kept, outer, inner, solids, self._limits, looked_up=near, like=same
+        )
+        self._checked = checked_table(moving, standing, clear, near)
         self._primitives = standing_tables(bodies, standing, self._checked, outer, inner)
         self.moving = moving
         self.standing = standing
@@ -106,13 +115,13 @@ class FastWorld:
         self._placed = PlacedPrimitives()
         self._flagged = Flags(clear, self._arm, moving, standing)
         self._reference = ReferenceChecks(self._arm.arm, self._arm.balls, self._primitives)
-        self._kernels = library("checks.check_kernels") if compiled else None
         self._probe: ProbeTable | None = None
         self._moved = False
         self.pinned = False
         self.address = 0
         if self._kernels is not None:
             self._solids = standing_solids(bodies, standing, solids)
+            self._neighbours = neighbour_table([(own, self._flagged.number(pair)) for pair, own in near.items()])
             self._take_memory()
 
     def _take_memory(self) -> None:
@@ -133,6 +142,7 @@ class FastWorld:
             standing_solids=self._solids,
             wider_solids=arm.wider_solids,
             motion_bounds=arm.bounds,
+            neighbours=self._neighbours,
         )
         self.address = self.table.address
         self._marks = self._scratch.marks
@@ -163,7 +173,7 @@ class FastWorld:
         around = self._placed.primitives(bodies, self.standing, self._outer, inflation)
         first = not self._moved
         self._moved = True
-        inside = primitive_table(joined([]), self._checked) if first else self._primitives[1]
+        inside = primitive_table(joined([]), self._checked != IGNORED) if first else self._primitives[1]
         self._primitives = primitive_table(around, self._checked), inside
         self._reference = ReferenceChecks(self._arm.arm, self._arm.balls, self._primitives)
         self._probe = None
@@ -182,7 +192,7 @@ class FastWorld:
         tables: list[Record] = [arm.arm, *arm.balls, outer, inner, *outer.clouds, *inner.clouds]
         tables += [arm.solids, arm.wider_solids, arm.bounds]
         if self._kernels is not None:
-            tables += [self._scratch, self._solids, self.table]
+            tables += [self._scratch, self._solids, self._neighbours, self.table]
         return all(each.intact() for each in tables) and (self._probe is None or self._probe.intact())
 
     @property

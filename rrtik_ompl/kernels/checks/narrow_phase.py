@@ -22,6 +22,7 @@ from rrtik_ompl.kernels.checks.gjk import (
     scaled,
     slack_between,
 )
+from rrtik_ompl.kernels.checks.neighbour_kernels import mark_neighbours, near_in_lanes
 from rrtik_ompl.kernels.checks.obstacle_kernels import ZERO, primitive_gap
 from rrtik_ompl.kernels.checks.self_kernels import self_collision
 from rrtik_ompl.kernels.checks.sphere_kernels import prepare, scene_collision
@@ -55,7 +56,9 @@ from rrtik_ompl.kernels.tables.accessors import (
     frame_of_span,
     is_inside,
     kind_of_solid,
+    mark_of_neighbours,
     marks_row,
+    neighbours_at,
     one_body_of,
     other_body_of,
     pair_at,
@@ -214,7 +217,9 @@ def corners_inside(world: WorldTable, body: int, standing: int, wanted: int) -> 
 
 @kernel
 def mark(world: WorldTable, wanted: int) -> int:
-    """Collect for each pair of bodies the lanes in which the outer balls cannot prove it free; returns their number.
+    """Collect for each pair of bodies the lanes in which it is not proven free; returns the number of pairs.
+
+    Outer balls prove that, or the cells of neighbours.
 
     The numbers of moving and standing bodies come first, then those of the pairs of moving bodies.
     """
@@ -230,6 +235,7 @@ def mark(world: WorldTable, wanted: int) -> int:
         set_lanes(marks, block, spread(ZERO))
     scene_collision(balls, primitives, scratch, wanted, marks, wanted < 0, scratch.outer_likely, NO_WATCH)
     self_collision(balls, scratch, wanted, marks_row(marks, crossing, 1), wanted < 0, NO_WATCH)
+    mark_neighbours(world.neighbours, scratch.values, wanted, marks)
     return total
 
 
@@ -255,6 +261,25 @@ def compare_pair(world: WorldTable, number: int, wanted: int) -> Any:
     if left != hit:
         hit |= corners_inside(world, first, second, left & ~hit)
     return left, hit
+
+
+@kernel
+def compared_neighbours(world: WorldTable, pairs: int, wanted: int, resolve: bool) -> int:
+    """What cells, and with ``resolve`` solids, say of some neighbours (as bits) in the lanes: the worst answer."""
+    neighbours = world.neighbours
+    worst = FREE
+    while pairs != 0 and worst != COLLIDING:
+        number = first_bit(pairs)
+        pairs &= pairs - 1
+        near = near_in_lanes(neighbours, number, world.scratch.values, wanted)
+        if near == 0:
+            continue
+        if not resolve:
+            return UNDECIDED
+        left, hit = compare_pair(world, mark_of_neighbours(neighbours_at(neighbours.pairs, number)), near)
+        if left != 0:
+            worst = COLLIDING if hit != 0 else UNDECIDED
+    return worst
 
 
 @kernel

@@ -26,6 +26,7 @@ from rrtik_ompl.kernels.tables.accessors import (
     frame_at,
     frame_of_body,
     frame_of_cluster,
+    looked_up_of,
     one_body_of,
     one_group_of,
     other_body_of,
@@ -127,6 +128,7 @@ def bodies_meet(balls: BallTable, scratch: ScratchTable, first: int, second: int
 def self_collision(balls: BallTable, scratch: ScratchTable, wanted: int, marks: Marks, one: bool, watch: Watch) -> int:
     """Lanes among ``wanted`` in which two bodies of the arm meet; if ``one`` is enough, not all of them.
 
+    Neighbours that are looked up are left out.
     Unless ``NO_MARKS``, ``marks`` are one number for each pair, which collects the lanes. ``watch``: see
     :mod:`rrtik_ompl.kernels.checks.watch_kernels`.
     """
@@ -157,6 +159,8 @@ def self_collision(balls: BallTable, scratch: ScratchTable, wanted: int, marks: 
 
         for k in range(first_pair_of(group), end_pair_of(group)):
             pair = pair_at(pairs, k)
+            if looked_up_of(pair) != 0:
+                continue
             found, near = bodies_meet(balls, scratch, one_body_of(pair), other_body_of(pair), close, slack)
             meeting |= found
             if near and slack > ZERO:

@@ -13,6 +13,7 @@ from rrtik_ompl.kernels.checks.broad_phase import primitives_in_reach
 from rrtik_ompl.kernels.checks.obstacle_kernels import meets_primitives
 from rrtik_ompl.kernels.checks.watch_kernels import ZERO, set_clear, slack_at
 from rrtik_ompl.kernels.layout import (
+    BY_BALLS,
     LIKELY_COUNT,
     NO_MARKS,
     Ball,
@@ -78,7 +79,7 @@ def placed_centre(frame: Frame, balls: Ball, number: int) -> Any:
 def checked_primitives(
     primitives: PrimitiveTable, body: int, source: PrimitiveList, count: int, sink: PrimitiveList
 ) -> int:
-    """Copy a list of primitives without those that a body need not keep clear of; returns how many are left."""
+    """Copy a list of primitives without those that balls of a body need not look at; returns how many are left."""
     everything = int_at(primitives.excluding, body) == 0
     checked = checked_row(primitives.checked, primitives.standing_count, body)
     heads = primitives.heads
@@ -86,7 +87,7 @@ def checked_primitives(
 
     for k in range(count):
         number = int_at(source, k)
-        if everything or int_at(checked, standing_body_at(heads, number)) != 0:
+        if everything or int_at(checked, standing_body_at(heads, number)) == BY_BALLS:
             set_int(sink, kept, number)
             kept += 1
 

@@ -8,14 +8,15 @@ cache cannot be used, the cover is computed again.
 from __future__ import annotations
 
 import zlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 
 import coal
 import numpy as np
+from numpy.typing import ArrayLike
 
-from rrtik_ompl.base.arrays import Matrix, distinct, frozen
+from rrtik_ompl.base.arrays import Mask, Matrix, distinct, frozen
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.files.cache import cache_folder, nobody_else_s, write_whole
 from rrtik_ompl.files.digest import sha256
@@ -27,6 +28,7 @@ from rrtik_ompl.geometry.collision.solids import around, fills_its_hull, is_mesh
 LAYOUT = 1
 ALGORITHM = 3  # counts up when rrtik_ompl.kernels.covers.spheres makes other spheres of the same geometry
 PIECES = 2  # counts up when rrtik_ompl.kernels.covers.mesh_pieces makes other pieces of the same mesh
+CELLS = 1  # counts up when rrtik_ompl.kernels.proof.neighbours finds other cells for the same bodies
 STORE = Path(__file__).with_name("shipped.npz")
 COLUMNS = 4  # numbers in a row of a cover
 
@@ -79,6 +81,33 @@ def cached_convex_pieces(mesh: coal.BVHModelBase) -> tuple[list[Matrix], ...]:
     rows = _cached(mesh, f"convex pieces {PIECES}", make)
     numbers = distinct(rows[:, 3])
     return tuple([rows[rows[:, 3] == k, :3] for k in numbers if k % 3 == kind] for kind in range(3))
+
+
+def cached_cells(
+    geometries: Sequence[coal.CollisionGeometry], place: ArrayLike, size: int, make: Callable[[], Mask | None]
+) -> Mask | None:
+    """Return cells that depend on two geometries and on some numbers, from the cache if they are there.
+
+    Args:
+        geometries: The two geometries.
+        place: The numbers.
+        size: How many rows and columns of cells there are.
+        make: Function that makes them, shape (size, size), or None if there are none; that is not kept.
+    """
+    keys = [cover_key(geometry, f"cells {CELLS} {size}") for geometry in geometries]
+    numbers = np.ascontiguousarray(place, dtype=np.float64).tobytes()
+    folder = cache_folder("covers")
+    if folder is None or None in keys:
+        return make()
+    key = sha256(b"\0".join([*map(str.encode, map(str, keys)), numbers])).hexdigest()
+    file = folder / f"{key}.npz"
+    rows = _read(file, key) if nobody_else_s(file) else None
+    if rows is not None and rows.size == size * size:
+        return np.asarray(rows.reshape(size, size) != 0.0)
+    cells = make()
+    if cells is not None:
+        _write(file, key, cells.astype(np.float64).reshape(-1, COLUMNS))
+    return cells
 
 
 def geometry_bytes(geometry: coal.CollisionGeometry) -> bytes | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from rrtik_ompl.kernels.layout import NeighbourTable
 from rrtik_ompl.kernels.record import Doubles, Ints, Record, Wholes
 
 
@@ -61,6 +62,8 @@ class ProofTable(Record):
     margins: Doubles  # what each pair keeps [m], rounding included
     top_count: int
     top_pairs: Ints  # the pairs to begin with, groups of bodies before their bodies
+    looked_up: Ints  # of each of them its number among the neighbours, -1 for others
+    neighbours: NeighbourTable
 
     # What a proof computes in.
     frames: Frame  # at each node that of the world, then those of all joints

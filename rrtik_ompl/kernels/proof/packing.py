@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cache, partial
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -25,6 +26,7 @@ from rrtik_ompl.kernels.simd.processor import WIDTH
 from rrtik_ompl.kernels.tables.cloud_layout import CloudTable
 from rrtik_ompl.kernels.tables.cloud_tables import cloud_table
 from rrtik_ompl.kernels.tables.memory import packed, with_own
+from rrtik_ompl.kernels.tables.neighbour_tables import Cells, neighbour_table
 from rrtik_ompl.kernels.tables.solid_tables import ConvexSolid, Solids, placed_bodies
 from rrtik_ompl.model.robot import Chain
 
@@ -94,6 +96,7 @@ def proof_pairs(
     strokes: ArrayLike,
     *,
     fixed: bool = True,
+    cells: Mapping[tuple[int, int], Cells] = MappingProxyType({}),
 ) -> ProofPairs:
     """Pack a proof.
 
@@ -104,6 +107,7 @@ def proof_pairs(
         solids: For each body convex solids around it, in its own frame.
         strokes: Largest value of sliding joints [m], a number or shape (joints,).
         fixed: Whether obstacles stay where they are; neighbours among many are compared as one then.
+        cells: Of neighbours of the arm, by their numbers, the smaller one first, where they are apart.
     """
     joints = len(chain.parent)
     parts = [own.around or (NOTHING,) for own in placed_bodies(solids, body_arrays(bodies).placements)]
@@ -118,6 +122,12 @@ def proof_pairs(
     rows[: len(listed.whole), layout.PARTS_FIRST : layout.PARTS_END + 1] += len(listed.whole)
     sides = rows[:, layout.PAIR_SIZE :]
     named = np.sort(sides[:, ::2], axis=1)
+
+    numbers = {pair: number for number, pair in enumerate(cells)}
+
+    def looked_up(row: int) -> int:
+        """The number among the neighbours; rows beyond those of two bodies stand for more."""
+        return numbers.get((int(named[row, 0]), int(named[row, 1])), -1) if row < len(listed.whole) else -1
 
     clouds = [cloud_table(bodies[k].geometry.cloud) for k in cloud_bodies(bodies)]
     made = packed(
@@ -136,6 +146,8 @@ def proof_pairs(
         margins=np.zeros(len(rows)),
         top_count=len(listed.top),
         top_pairs=np.array(listed.top, dtype=np.int32),
+        looked_up=np.array([looked_up(k) for k in listed.top], dtype=np.int32),
+        neighbours=neighbour_table([(own, 0) for own in cells.values()]),
         frames=np.zeros(NODES * (joints + 1) * layout.FRAME_SIZE),
         stamps=np.zeros(NODES, dtype=np.int32),
         bends=np.zeros(len(sweeps)),
@@ -198,7 +210,7 @@ def _listed_pairs(
 ) -> _ListedPairs:
     """The pairs of bodies, of their parts, and of groups of bodies; arguments as of :func:`proof_pairs`."""
     joints = [body.joint for body in bodies]
-    common = cache(partial(_common, chain))
+    common = cache(partial(common_frame, chain))
     moving = [(i, j) for i, j in pairs if joints[i] or joints[j]]
 
     # those that groups are made of come first
@@ -239,7 +251,7 @@ def solid_kind(body: Body, solid: ConvexSolid) -> int:
     return UNKNOWN if kind == HALF_SPACE and body.joint > 0 else kind
 
 
-def _common(chain: Chain, first: int, second: int) -> int:
+def common_frame(chain: Chain, first: int, second: int) -> int:
     """The last frame that carries both of two frames."""
     while first != second:  # parents have smaller numbers
         first, second = min(first, second), int(chain.parent[max(first, second) - 1]) + 1

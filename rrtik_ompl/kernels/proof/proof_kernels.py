@@ -12,7 +12,8 @@ from __future__ import annotations
 from typing import Any
 
 from rrtik_ompl.kernels.checks.gjk import dot
-from rrtik_ompl.kernels.layout import JointValues
+from rrtik_ompl.kernels.checks.neighbour_kernels import apart_on_way
+from rrtik_ompl.kernels.layout import CELLS_APART, JointValues
 from rrtik_ompl.kernels.proof import layout
 from rrtik_ompl.kernels.proof.cloud_planes import cloud_apart
 from rrtik_ompl.kernels.proof.frames import bound_bends, frame_at, node_frames, place_frames, seen_from, vector_at
@@ -60,7 +61,7 @@ def prove_motion(proof: ProofTable, start: JointValues, end: JointValues) -> Any
     Intervals are halved until no pair is left open on them, depth first, the first half first.
     """
     begin_motion(proof, start, end)
-    open_first_pairs(proof)
+    open_first_pairs(proof, start, end)
     moves = False
     for k in range(proof.joint_count):
         moves |= start[k] != end[k]
@@ -106,13 +107,26 @@ def visit(proof: ProofTable, start: JointValues, end: JointValues, node: int) ->
         place_frames(proof, start, end, node / (layout.NODES - 1), node)
 
 
-@inlined
-def open_first_pairs(proof: ProofTable) -> None:
-    """List the pairs that the whole motion begins with. The log is told of each body: its reader knows no groups."""
-    telling = proof.log_room > 0
-    count = proof.body_pair_count if telling else proof.top_count
-    for k in range(count):
-        proof.lists[k] = k if telling else proof.top_pairs[k]
+@kernel
+def open_first_pairs(proof: ProofTable, start: JointValues, end: JointValues) -> None:
+    """List the pairs that the whole motion begins with, but neighbours that are known to be apart on it.
+
+    The log is told of each body by planes: its reader knows neither groups nor neighbours.
+    """
+    if proof.log_room > 0:
+        for k in range(proof.body_pair_count):
+            proof.lists[k] = k
+        proof.counts[0] = proof.body_pair_count
+        return
+
+    count = 0
+    for k in range(proof.top_count):
+        pair = proof.top_pairs[k]
+        number = proof.looked_up[k]
+        if number >= 0 and proof.margins[pair] <= CELLS_APART and apart_on_way(proof.neighbours, number, start, end):
+            continue
+        proof.lists[count] = pair
+        count += 1
     proof.counts[0] = count
 
 

@@ -65,6 +65,13 @@ end_pair_of: Callable[[layout.PairGroup], int] = int_reader(layout.PAIR_GROUP_EN
 pair_at: Callable[[layout.Pair, int], layout.Pair] = record_reader(INT_BYTES * layout.PAIR_INTS)
 one_body_of: Callable[[layout.Pair], int] = int_reader(layout.PAIR_ONE)
 other_body_of: Callable[[layout.Pair], int] = int_reader(layout.PAIR_OTHER)
+looked_up_of: Callable[[layout.Pair], int] = int_reader(layout.PAIR_LOOKED_UP)
+
+# Neighbours
+neighbours_at: Callable[[layout.Neighbours, int], layout.Neighbours] = record_reader(INT_BYTES * layout.NEIGHBOUR_INTS)
+mark_of_neighbours: Callable[[layout.Neighbours], int] = int_reader(layout.NEIGHBOUR_MARK)
+row_joint_of: Callable[[layout.Neighbours], int] = int_reader(layout.NEIGHBOUR_ROW)
+column_joint_of: Callable[[layout.Neighbours], int] = int_reader(layout.NEIGHBOUR_COLUMN)
 
 # Primitives: what stands still
 standing_body_at: Callable[[layout.PrimitiveHead, int], int] = int_column(layout.HEAD_INTS, layout.STANDING_BODY)

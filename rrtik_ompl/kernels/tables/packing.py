@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,9 +10,13 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Mask, Vector, distinct
 from rrtik_ompl.base.values import dataclass
-from rrtik_ompl.geometry.collision.bodies import Body, pair_array
+from rrtik_ompl.geometry.collision.bodies import Body, kept_apart, pair_array
 from rrtik_ompl.geometry.collision.body_arrays import body_arrays
 from rrtik_ompl.kernels.layout import (
+    BY_BALLS,
+    CELLS_APART,
+    IGNORED,
+    LOOKED_UP,
     PAIR_INTS,
     PAIR_ONE,
     PAIR_OTHER,
@@ -23,6 +27,7 @@ from rrtik_ompl.kernels.layout import (
     SolidTable,
 )
 from rrtik_ompl.kernels.tables.motion_bounds import bounds_table
+from rrtik_ompl.kernels.tables.neighbour_tables import Cells
 from rrtik_ompl.kernels.tables.primitive_tables import Primitives, joined, primitive_table
 from rrtik_ompl.kernels.tables.robot_tables import (
     MovingBody,
@@ -48,6 +53,7 @@ class ArmTables:
     covers: tuple[Spheres, ...]
     solids_of: tuple[Solids, ...]
     pairs: tuple[tuple[int, int], ...]
+    looked_up: tuple[tuple[int, int], ...]
     strokes: Vector
     margin: float
     arm: ArmTable
@@ -63,6 +69,7 @@ class ArmTables:
         covers: Sequence[Spheres],
         solids_of: Sequence[Solids],
         pairs: Sequence[tuple[int, int]],
+        looked_up: Sequence[tuple[int, int]],
         strokes: Vector,
     ) -> bool:
         """Whether the tables of these bodies would be the same."""
@@ -71,6 +78,7 @@ class ArmTables:
             and tuple(sizes) == self.sizes
             and tuple(solids_of) == self.solids_of
             and tuple(pairs) == self.pairs
+            and tuple(looked_up) == self.looked_up
             and np.array_equal(strokes, self.strokes)
             and all(np.array_equal(a, b) for a, b in zip(covers, self.covers, strict=True))
             and all(_same(a, b) for a, b in zip(bodies, self.bodies, strict=True))
@@ -113,18 +121,23 @@ def arm_tables(
     solids: Sequence[Solids],
     limits: Vector,
     *,
+    looked_up: Collection[tuple[int, int]] = (),
     like: ArmTables | None,
 ) -> ArmTables:
-    """Tables of the moving bodies (see :func:`alike`); those of ``like`` if they are the same."""
+    """Tables of the moving bodies (see :func:`alike`); those of ``like`` if they are the same.
+
+    Balls do not look at the pairs ``looked_up``, of bodies that are alone in their sets.
+    """
     place = {body: k for k, members in enumerate(moving) for body in members}
     listed = pair_array(pairs)
     both = np.sort(listed[np.isin(listed, list(place)).all(axis=1)], axis=1).tolist()
     own = tuple(dict.fromkeys((place[i], place[j]) for i, j in both))
+    by_cells = tuple(pair for pair in own if tuple(sorted(moving[k][0] for k in pair)) in looked_up)
     carried = tuple(bodies[k] for members in moving for k in members)
     sizes = tuple(map(len, moving))
     covers = tuple(np.asarray(s[k], dtype=np.float64) for members in moving for k in members for s in (outer, inner))
     solids_of = tuple(solids[k] for members in moving for k in members)
-    if like is not None and like.serves(carried, sizes, covers, solids_of, own, limits):
+    if like is not None and like.serves(carried, sizes, covers, solids_of, own, by_cells, limits):
         return like
 
     reaches = [(bodies[k].joint, _reach(bodies[k], outer[k])) for members in moving for k in members]
@@ -133,7 +146,10 @@ def arm_tables(
         as_one([moving_body(chain, bodies[k], outer[k], inner[k], margin) for k in members]) for members in moving
     ]
     kept = max((body.margin for body in carried), default=0.0)  # one for all of them
-    balls = (ball_table(packed, own, inner=False, kept=kept), ball_table(packed, own, inner=True, kept=kept))
+    balls = (
+        ball_table(packed, own, inner=False, kept=kept, looked_up=by_cells),
+        ball_table(packed, own, inner=True, kept=kept),
+    )
     bounds = bounds_table(chain, balls[0], limits, margin)
     turns = axis_turns(chain)
     poses = np.zeros((len(carried), 4, 4))
@@ -148,7 +164,8 @@ def arm_tables(
     wider = single if kept == 0.0 else _solids(solids_of, poses, frames, sizes, kept=thick + kept, slack=margin)
     joints = arm_table(chain)
 
-    return ArmTables(carried, sizes, covers, solids_of, own, limits, margin, joints, balls, bounds, single, wider)
+    kinds = carried, sizes, covers, solids_of, own, by_cells, limits, margin
+    return ArmTables(*kinds, joints, balls, bounds, single, wider)
 
 
 def _solids(
@@ -173,17 +190,25 @@ def as_one(parts: Sequence[MovingBody]) -> MovingBody:
 
 
 def checked_table(
-    moving: Sequence[tuple[int, ...]], standing: Sequence[int], keeps_clear: Mapping[int, Mask]
-) -> NDArray[np.bool_]:
-    """Which moving bodies must not touch which standing ones, shape (moving, standing)."""
+    moving: Sequence[tuple[int, ...]],
+    standing: Sequence[int],
+    keeps_clear: Mapping[int, Mask],
+    looked_up: Collection[tuple[int, int]],
+) -> NDArray[np.int32]:
+    """How pairs of moving and standing bodies are checked, IGNORED where they may touch, shape (moving, standing)."""
     rows = [keeps_clear[members[0]][standing] for members in moving]
-    return np.array(rows, dtype=bool).reshape(len(moving), len(standing))
+    table = np.where(np.array(rows, dtype=bool).reshape(len(moving), len(standing)), BY_BALLS, IGNORED)
+    for pair in looked_up:
+        places = [standing.index(k) for k in pair if k in standing]
+        for place in places:
+            table[[members[0] in pair for members in moving], place] = LOOKED_UP
+    return table.astype(np.int32)
 
 
 def standing_tables(
     bodies: Sequence[Body],
     standing: Sequence[int],
-    checked: NDArray[np.bool_],
+    checked: NDArray[np.int32],
     outer: Sequence[Spheres],
     inner: Sequence[Spheres],
 ) -> tuple[PrimitiveTable, PrimitiveTable]:
@@ -191,7 +216,7 @@ def standing_tables(
     still = [bodies[k] for k in standing]
     around, inside = ([each[k] for k in standing] for each in (outer, inner))
     made = outer_primitives(still, around), inner_primitives(still, inside)
-    return primitive_table(made[0], checked), primitive_table(made[1], checked)
+    return primitive_table(made[0], checked), primitive_table(made[1], checked != IGNORED)
 
 
 class PlacedPrimitives:
@@ -227,6 +252,24 @@ def standing_solids(bodies: Sequence[Body], standing: Sequence[int], solids: Seq
     return solid_table([(0, [each]) for each in placed])
 
 
+def looked_up(
+    bodies: Sequence[Body],
+    moving: Sequence[tuple[int, ...]],
+    pairs: Sequence[tuple[int, int]],
+    cells: Mapping[tuple[int, int], Cells],
+) -> dict[tuple[int, int], Cells]:
+    """The pairs whose cells tell enough: each body alone in its set, with no more to keep than ``CELLS_APART``."""
+    if not cells:
+        return {}
+    checked = {(min(pair), max(pair)) for pair in pairs}
+    together = {k for members in moving if len(members) > 1 for k in members}
+    return {
+        (i, j): own
+        for (i, j), own in cells.items()
+        if (i, j) in checked and together.isdisjoint((i, j)) and kept_apart(bodies[i], bodies[j]) <= CELLS_APART
+    }
+
+
 class Flags:
     """For each flag that the kernels can set the pairs that it stands for.
 
@@ -247,6 +290,16 @@ class Flags:
         self._moving = moving
         self._standing = standing
         self._own = arm.balls[0].pairs.reshape(-1, PAIR_INTS)
+
+    def number(self, pair: tuple[int, int]) -> int:
+        """The flag of two bodies, each alone in its set or standing still."""
+        place = {members[0]: k for k, members in enumerate(self._moving)}
+        rows = [place[k] for k in pair if k in place]
+        if len(rows) == 1:
+            return rows[0] * len(self._standing) + next(self._standing.index(k) for k in pair if k not in place)
+        listed = np.sort(self._own[:, [PAIR_ONE, PAIR_OTHER]], axis=1).tolist()
+        among: int = listed.index(sorted(rows))
+        return len(self._moving) * len(self._standing) + among
 
     def __getitem__(self, flag: int) -> list[tuple[int, int]]:
         """Pairs of bodies by number, the smaller one first; those of the arm come after the others."""

@@ -18,6 +18,7 @@ from rrtik_ompl.base.values import dataclass
 from rrtik_ompl.kernels.layout import (
     BLOCK,
     BOX_RUNS,
+    BY_BALLS,
     CLOUD,
     END_PLANE,
     FIRST_PLANE,
@@ -92,8 +93,8 @@ def joined(parts: Sequence[Primitives]) -> Primitives:
     )
 
 
-def primitive_table(primitives: Primitives, checked: NDArray[np.bool_]) -> PrimitiveTable:
-    """Table of primitives; ``checked`` has shape (moving bodies, standing bodies).
+def primitive_table(primitives: Primitives, checked: NDArray[np.int32] | Mask) -> PrimitiveTable:
+    """Table of primitives; ``checked``: how each pair is, shape (moving bodies, standing bodies).
 
     The kind of balls comes first, so that the last primitive of a body is the one with its formula, if it has one.
 
@@ -132,7 +133,7 @@ def primitive_table(primitives: Primitives, checked: NDArray[np.bool_]) -> Primi
         planes=np.concatenate([np.zeros((0, PLANE_FLOATS)), *planes]).astype(np.float32),
         standing_count=checked.shape[1],
         checked=checked.astype(np.int32),
-        excluding=np.asarray((~checked).any(axis=1), dtype=np.int32),
+        excluding=np.asarray((checked != BY_BALLS).any(axis=1), dtype=np.int32),
         own=own,
         clouds=clouds,
         block_count=blocks.shape[1],

@@ -6,7 +6,7 @@ holds. Every joint frame is turned so that its axis is z; the balls and the fram
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from functools import lru_cache
 from typing import Any, TypeAlias
 
@@ -40,6 +40,7 @@ from rrtik_ompl.kernels.layout import (
     PAIR_GROUP_ONE,
     PAIR_GROUP_OTHER,
     PAIR_INTS,
+    PAIR_LOOKED_UP,
     PAIR_ONE,
     PAIR_OTHER,
     POSE_NUMBERS,
@@ -193,7 +194,12 @@ def rounding_margin(chain: Chain, reaches: Sequence[tuple[int, float]], strokes:
 
 
 def ball_table(
-    bodies: Sequence[MovingBody], pairs: Sequence[tuple[int, int]], *, inner: bool, kept: float
+    bodies: Sequence[MovingBody],
+    pairs: Sequence[tuple[int, int]],
+    *,
+    inner: bool,
+    kept: float,
+    looked_up: Collection[tuple[int, int]] = (),
 ) -> BallTable:
     """Balls of the moving bodies in three levels, and the pairs of bodies (numbers in ``bodies``) to test.
 
@@ -202,6 +208,7 @@ def ball_table(
         pairs: Pairs of them that must not touch.
         inner: Whether to take the inner balls; bodies without balls take no part.
         kept: How far the bodies of a pair must stay apart [m].
+        looked_up: Those of the pairs whose balls need not be looked at.
     """
     shapes = [body.inner if inner else body.outer for body in bodies]
     frames = sorted({b.frame for b, balls in zip(bodies, shapes, strict=True) if len(balls)}, reverse=True)
@@ -248,7 +255,9 @@ def ball_table(
         body_balls=body_balls,
         pair_group_count=len(pair_groups),
         pair_groups=whole_records(PAIR_GROUP_INTS, pair_groups),
-        pairs=whole_records(PAIR_INTS, [{PAIR_ONE: i, PAIR_OTHER: j} for i, j in present]),
+        pairs=whole_records(
+            PAIR_INTS, [{PAIR_ONE: i, PAIR_OTHER: j, PAIR_LOOKED_UP: int((i, j) in looked_up)} for i, j in present]
+        ),
         cluster_count=len(clusters),
         body_count=len(bodies),
         pair_count=len(present),
