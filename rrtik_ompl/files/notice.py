@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 
 COMPILING = "compiling kernels for this processor, once per machine: up to some minutes"
-IN_NUMPY = "there are no kernels: proofs for an arm of so many pieces take minutes in numpy; Ctrl-C or stop= ends them"
 COVERING = "covering the meshes of a robot that is new to this machine, once: about a second"
 
 
@@ -22,3 +22,8 @@ def tell_once(message: str) -> None:
     if message not in _told:
         _told.add(message)
         listener(message)
+
+
+def warn_of_minutes(what: str) -> None:
+    """Warn before something takes minutes because there are no kernels."""
+    warnings.warn(f"there are no kernels: {what} take minutes in numpy; Ctrl-C ends them", RuntimeWarning, stacklevel=3)

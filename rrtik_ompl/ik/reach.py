@@ -18,6 +18,7 @@ from rrtik_ompl.base.arrays import TAU, Matrix, Vector, finite_array, frozen, po
 from rrtik_ompl.base.choices import one_of
 from rrtik_ompl.base.copies import as_value, in_one_line
 from rrtik_ompl.base.errors import InputError, at_most
+from rrtik_ompl.files import notice
 from rrtik_ompl.files.kinds import read
 from rrtik_ompl.files.named_arrays import NamedArrays
 from rrtik_ompl.files.text import known_ending, write_bytes, write_text
@@ -36,6 +37,7 @@ PROBE_MARGIN = 1.1  # ratio of the reach of the grid to the reach of the probe
 FORMATS = (".npz", ".csv")
 DIRECTIONS = 64  # number of directions; each has one bit of a 64-bit number
 FINE = 16  # The nearest direction is looked up in a cube with 2 * FINE + 1 = 33 cells a side.
+MANY_IN_NUMPY = 50_000  # samples that take up to a millisecond each to check in numpy
 GOLDEN = np.pi * (3.0 - np.sqrt(5.0))  # [rad], the golden angle
 
 Grid = NDArray[np.float64]
@@ -77,6 +79,8 @@ def reach_map(
         ('orientations', 3)
     """
     check_world(world, robot)
+    if world is not None and world.fast is None and samples > MANY_IN_NUMPY:
+        notice.warn_of_minutes(f"{samples} samples of a reachability map")
     measure = one_of(MEASURES, measure, "measure of reach")
     axis = ("x" if robot.planar else "z") if axis is None else axis
     if not isinstance(axis, str) or axis not in ("x", "y", "z"):

@@ -58,6 +58,7 @@ LARGEST_VALUE = 1e3  # [rad] or [m], joint values up to which the rounding error
 # [m] Certificates keep this distance beyond ROOM, because their verifier rounds in other places.
 SPARE = 1e-10
 MOTIONS_AT_ONCE = 64  # motions per kernel call; the clock and Ctrl-C are only looked at between calls
+FEW_AT_ONCE = 4  # the same in numpy where the time is limited
 MANY_PAIRS = 1000  # of convex pieces, whose motions take some hundredths of a second each to prove in numpy
 FEW = 200  # number of configurations for which no proof table is made
 PROVEN, NOT_LOOKED_AT = -1, -2  # written in place of the index of an unproven pair
@@ -317,7 +318,8 @@ class Prover:
         # Let the kernels prove all motions in batches, as long as there is time.
         looked_at = 0
         open_count = 0
-        batch = 1 if packed.touching else MOTIONS_AT_ONCE  # the planes of contacts differ from motion to motion
+        at_once = MOTIONS_AT_ONCE if seconds is None or library(PROOF_KERNELS) is not None else FEW_AT_ONCE
+        batch = 1 if packed.touching else at_once  # the planes of contacts differ from motion to motion
         for first in range(0, count, batch):
             if first > 0 and seconds is not None and time.monotonic() - begin > seconds:
                 break
@@ -359,7 +361,7 @@ class Prover:
         joints = self.robot.chain
         table = proof_pairs(joints, bodies, self.pairs, solids, strokes(self.robot), fixed=self._fixed, cells=cells)
         if len(table.bodies) > MANY_PAIRS and library(PROOF_KERNELS) is None:
-            notice.tell_once(notice.IN_NUMPY)
+            notice.warn_of_minutes("proofs for an arm of so many pieces")
         return table
 
     def _gap(self, packed: ProofPairs, motion: int, pair: int, place: float) -> Gap:

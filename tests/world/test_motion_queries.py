@@ -132,6 +132,13 @@ def test_batches_give_the_answers_of_one_call_and_end_when_it_is_time():
         queries(A, B)
 
 
+def test_what_is_left_when_it_is_time_is_not_free():
+    looks = iter([False, True])
+    queries = BatchedMotionQueries(lambda tails, _: np.ones(len(tails), dtype=bool), lambda: next(looks))
+    rows = np.zeros((20, 2))
+    assert queries.in_time(rows, rows).tolist() == [True] * FIRST_BATCH + [False] * (20 - FIRST_BATCH)
+
+
 def test_batches_grow_while_the_machine_is_busy_with_something_else():
     sizes = []
 

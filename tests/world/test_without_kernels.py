@@ -1,11 +1,12 @@
 """Without kernels numpy gives the same answers: what is proven, certified and planned, judged by coal."""
 
+import warnings
+
 import numpy as np
 import pytest
 
 import rrtik_ompl as rrtik
 from rrtik_ompl import Obstacle, Scene, World, pose
-from rrtik_ompl.files import notice
 from rrtik_ompl.geometry.collision.certificate import Certificate
 from rrtik_ompl.kernels.proof import rows as proofs
 from rrtik_ompl.kernels.proof.in_numpy import nearest_on_triangles
@@ -13,6 +14,7 @@ from rrtik_ompl.kernels.simd.library import library
 from rrtik_ompl.model.scene import ConstantVelocity
 from rrtik_ompl.replanning.in_time import plan_in_time
 from rrtik_ompl.world.certificate_check import certificate_fault
+from rrtik_ompl.world.proof import FEW_AT_ONCE
 
 SHARES = (1.0, 0.2, 0.0)  # of random motions
 EDGE_SOLIDS = {
@@ -134,12 +136,38 @@ def test_paths_keep_constraints_and_are_shortened_along_them_without_kernels():
 
 @pytest.mark.usefixtures("without_kernels")
 @pytest.mark.parametrize(("name", "is_slow"), [("so101_bin", True), ("titan4_prisms", False)])
-def test_proofs_that_take_minutes_say_so_before(name, is_slow, monkeypatch):
-    said = []
-    monkeypatch.setattr(notice, "listener", said.append)
-    monkeypatch.setattr(notice, "_told", {notice.COVERING})
-    rrtik.load_problem(name).world.prover.prepare()
-    assert said == [notice.IN_NUMPY] * is_slow
+def test_proofs_that_take_minutes_say_so_before(name, is_slow):
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        rrtik.load_problem(name).world.prover.prepare()
+    minutes = [str(each.message) for each in said if issubclass(each.category, RuntimeWarning)]
+    assert ["proofs for an arm" in line for line in minutes] == [True] * is_slow
+
+
+@pytest.mark.usefixtures("without_kernels")
+def test_roadmaps_and_reachability_maps_say_before_that_they_take_minutes():
+    world = World(rrtik.load_robot("planar3"))
+    with pytest.warns(RuntimeWarning, match="300 vertices of a roadmap take minutes in numpy; Ctrl-C ends them"):
+        rrtik.Roadmap(world, vertices=0).grow(300, seconds=0.01)
+    with pytest.warns(RuntimeWarning, match="60000 samples of a reachability map take minutes"):
+        rrtik.ik.reach_map(world.robot, world=world, samples=60_000, cell=1.0)
+
+
+@pytest.mark.usefixtures("without_kernels")
+def test_proofs_in_numpy_look_at_the_clock_after_a_few_motions(monkeypatch):
+    asked = []
+    prove = proofs.in_numpy.prove
+
+    def counted(packed, starts, *more):
+        asked.append(len(starts))
+        return prove(packed, starts, *more)
+
+    monkeypatch.setattr(proofs.in_numpy, "prove", counted)
+    world = World(rrtik.load_robot("planar3"), Scene([Obstacle("ball", rrtik.Sphere(0.1), pose([9.0, 0.0, 0.0]))]))
+    rows = np.random.default_rng(0).uniform(-0.1, 0.1, (200, 3))
+    proof = world.prove(rows, seconds=1e-6)
+    assert asked == [FEW_AT_ONCE]
+    assert len(proof.unproven) == 199 - FEW_AT_ONCE
 
 
 @pytest.mark.usefixtures("without_kernels")

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from rrtik_ompl.base.arrays import TAU, Matrix, Vector, filled_rows, finite_array, positive, seed_of, whole_number
 from rrtik_ompl.base.budget import Stop
 from rrtik_ompl.base.errors import InputError, called, in_file, require
+from rrtik_ompl.files import notice
 from rrtik_ompl.files.kinds import read
 from rrtik_ompl.files.named_arrays import NamedArrays
 from rrtik_ompl.files.text import known_ending, write_bytes
@@ -30,6 +31,7 @@ from rrtik_ompl.world.world import World
 
 VERTICES = 2000  # vertices of a new roadmap
 NEAR = 10  # near vertices with which a new one is joined
+MANY_IN_NUMPY = 200  # vertices that take some tenths of a second each in numpy
 SECONDS = 60.0  # [s] limit for making a roadmap in a world where next to nothing is free
 MOST_VERTICES = 1_000_000
 FORMAT = 1
@@ -173,8 +175,11 @@ class Roadmap:
 
     def grow(self, vertices: int, *, seconds: float = SECONDS) -> int:
         """Add vertices and check their edges, for at most ``seconds``; return how many vertices were added."""
+        vertices = whole_number(vertices, "vertices")
+        if vertices > MANY_IN_NUMPY and not has_kernels(self.world, KERNELS):
+            notice.warn_of_minutes(f"{vertices} vertices of a roadmap")
         deadline = time.perf_counter() + positive(seconds, "seconds")
-        added = self.graph.grow(whole_number(vertices, "vertices"), lambda: time.perf_counter() > deadline)
+        added = self.graph.grow(vertices, lambda: time.perf_counter() > deadline)
         self.graph.check(lambda: time.perf_counter() > deadline)
         return added
 
