@@ -23,7 +23,7 @@ from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.choices import PathObjective
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.description.joint_weights import weights_of
-from rrtik_ompl.model.path import JointPath, path_of
+from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.transitions import length_of, route_length
 from rrtik_ompl.ompl_bridge.attempt import ITERATION_LIMIT
@@ -32,7 +32,15 @@ from rrtik_ompl.ompl_bridge.weighted import has_weights
 from rrtik_ompl.planning.attempts import Turn, walk
 from rrtik_ompl.planning.finish import rules_among
 from rrtik_ompl.planning.outcome import Improvement, NamedPlanner, Plan, Request
-from rrtik_ompl.planning.short_path import SEARCHED_AS, Tools, goal_rows, loaded_for, tools_for
+from rrtik_ompl.planning.short_path import (
+    SEARCHED_AS,
+    Tools,
+    goal_rows,
+    loaded_for,
+    proven_path,
+    tools_for,
+    without_constraints,
+)
 from rrtik_ompl.planning.shortening import Wishes, shortened
 from rrtik_ompl.world.clearance_curve import distances_at, places_along
 from rrtik_ompl.world.clearances import possible_clearance
@@ -147,13 +155,14 @@ class _Work:
         """Improve by further short paths, see :func:`.short_path.short_path`; False where none can be made."""
         problem = self._problem
         is_their_search = self._planner.name == SEARCHED_AS and self._how.strategy == "restart-shorten"
-        if self._one_joint or not is_their_search or not loaded_for(problem, self._request):
+        unheld = without_constraints(problem)
+        if self._one_joint or not is_their_search or not loaded_for(unheld, self._request):
             return False
         goals = goal_rows(problem, self._budget)
         if goals is None:
             return False
 
-        with tools_for(problem, self._request, goals) as tools:
+        with tools_for(unheld, self._request, goals) as tools:
             start_is_free, *goals_are_free = tools.motions.valid_batch(np.vstack([problem.start, goals]))
             if not start_is_free or not any(goals_are_free):
                 return False
@@ -179,9 +188,9 @@ class _Work:
 
     def _keep_route(self, route: Matrix | None, goals: Matrix, tools: Tools) -> None:
         """Keep a weighted route to one of the goals, shapes (m, dof) and (k, dof), if it is the best."""
-        rows = None if route is None else tools.proven_rows(route, self._problem.start, goals)
-        if rows is not None:
-            self._keep_if_best(path_of(self._problem.robot, rows, tools.motions.proof(rows, tools.clearance)))
+        path = None if route is None else proven_path(self._problem, goals, route, tools)
+        if path is not None:
+            self._keep_if_best(path)
 
     @property
     def _quick_checks(self) -> int | None:

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -32,7 +33,7 @@ from rrtik_ompl.model.path import JointPath, path_of
 from rrtik_ompl.planning.members import members
 from rrtik_ompl.planning.outcome import Plan, Request
 from rrtik_ompl.world.clearances import CLEARANCE
-from rrtik_ompl.world.problem import Problem, planning_bounds
+from rrtik_ompl.world.problem import Problem, planning_bounds, problem_in
 from rrtik_ompl.world.proven_motions import KERNELS as PROVEN_KERNELS
 from rrtik_ompl.world.proven_motions import ProvenMotions, kept_motions
 from rrtik_ompl.world.weighted_motions import WeightedMotions
@@ -97,14 +98,16 @@ class Route(NamedTuple):
 def short_path(problem: Problem, request: Request, *, pull: bool) -> Plan | None:
     """Return the plan of a problem, or None where this finds no path or does not apply.
 
-    Where it applies, :func:`loaded_for` says.
+    Where it applies, :func:`loaded_for` says. Under path constraints it is the path without them, if that keeps them:
+    regions are often wide, and a path along them is several times as long.
 
     Args:
         problem: The problem to solve.
         request: What is asked for.
         pull: Whether the path is shortened; otherwise it is what the plan of a shortened one has as ``unshortened``.
     """
-    if not loaded_for(problem, request):
+    unheld = without_constraints(problem)
+    if not loaded_for(unheld, request):
         return None
     if problem.goal.q is None:
         from rrtik_ompl.ik.methods import load_kernels  # with inverse kinematics, which other goals do without
@@ -115,7 +118,7 @@ def short_path(problem: Problem, request: Request, *, pull: bool) -> Plan | None
     if goals is None:
         return None
 
-    with tools_for(problem, request, goals) as tools:
+    with tools_for(unheld, request, goals) as tools:
         route = short_route(problem.start, goals, tools, budget, survived=request.survived, pull=pull)
     return None if route is None else plan_of(problem, goals, route, tools, budget.elapsed, budget.seed)
 
@@ -161,7 +164,7 @@ def plan_of(
     seconds: float,
     seed: int,
 ) -> Plan | None:
-    """Return the plan of a proven weighted route; None if rounding breaks its proof in joint values.
+    """Return the plan of a proven weighted route; None if it does not make a :func:`proven_path`.
 
     Args:
         problem: The problem that it solves.
@@ -171,14 +174,9 @@ def plan_of(
         seconds: How long it has taken [s].
         seed: What its random numbers depend on.
     """
-
-    def proved(weighted: Matrix) -> JointPath | None:
-        rows = tools.proven_rows(weighted, problem.start, goals)
-        return None if rows is None else path_of(problem.robot, rows, tools.motions.proof(rows, tools.clearance))
-
-    own = proved(route.found)
-    path = own if route.pulled is None else proved(route.pulled)
-    if own is None or path is None:
+    own = proven_path(problem, goals, route.found, tools)
+    path = own if route.pulled is None else proven_path(problem, goals, route.pulled, tools)
+    if path is None:
         return None
     return Plan(
         True,
@@ -188,10 +186,36 @@ def plan_of(
         SEARCHED_AS,
         seed,
         MappingProxyType(route.counts),
-        member=problem.goal.member_at(problem.robot, own.end),
+        member=problem.goal.member_at(problem.robot, path.end),
         unshortened=None if path is own else own,
         problem=problem,
     )
+
+
+def proven_path(problem: Problem, goals: Matrix, route: Matrix, tools: Tools) -> JointPath | None:
+    """Return a proven weighted route as a path; None if rounding breaks its proof, or it leaves path constraints.
+
+    Args:
+        problem: The problem that it solves.
+        goals: Goal configurations, one of which it leads to, shape (m, dof).
+        route: Shape (k, dof).
+        tools: What has proven it, without path constraints.
+    """
+    rows = tools.proven_rows(route, problem.start, goals)
+    if rows is None:
+        return None
+    proof = tools.motions.proof(rows, tools.clearance)
+    held = problem.world.constraints
+    if held is not None:
+        if not held.route_held(rows).all():
+            return None
+        proof = replace(proof, maker=problem.world.prover)
+    return path_of(problem.robot, rows, proof)
+
+
+def without_constraints(problem: Problem) -> Problem:
+    """Return the same problem without path constraints."""
+    return problem_in(problem, problem.world.unheld) if problem.constraints else problem
 
 
 def loaded_for(problem: Problem, request: Request) -> bool:

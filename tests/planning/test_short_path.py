@@ -193,3 +193,25 @@ def test_the_time_that_kernels_take_to_load_changes_no_path(monkeypatch):
     assert late[0] >= 180.0
     np.testing.assert_array_equal(again.path.waypoints, known)
     assert again.seconds < 60.0
+
+
+def test_under_path_constraints_it_is_the_free_path_if_that_keeps_them():
+    problem = rrtik.load_problem("ur5_upright")
+    unheld = problem.with_world(problem.world.unheld)
+    plan = rrtik.plan(problem, seed=2)
+    free = rrtik.plan(unheld, seed=2)
+    np.testing.assert_array_equal(plan.path.waypoints, free.path.waypoints)
+    assert plan.path.proven_in(problem.world)
+    assert problem.world.prove(plan.path, clearance=plan.path.proof.clearance).proven
+    assert plan.path.violations(problem.world) == ()
+    better = rrtik.plan(problem, seed=2, improve=0.05)
+    assert better.path.length <= plan.path.length
+    assert problem.world.prove(better.path, clearance=better.path.proof.clearance).proven
+
+
+def test_a_free_path_that_leaves_the_constraints_is_none():
+    problem = rrtik.load_problem("panda_upright")
+    assert short_path(problem, REQUEST, pull=True) is None
+    plan = rrtik.plan(problem, seed=1)
+    assert plan.planner != room.SEARCHED_AS
+    assert problem.world.prove(plan.path, clearance=plan.path.proof.clearance).proven
