@@ -96,6 +96,7 @@ class GoalSearch:
         rng: np.random.Generator | int,
         *,
         all_turns: bool = True,
+        most: int = MAX_CONFIGURATIONS,
         seconds_left: Callable[[], float] = lambda: NO_LIMIT,
     ) -> None:
         """Prepare the search.
@@ -104,10 +105,13 @@ class GoalSearch:
             problem: The problem.
             rng: Source of random numbers, or a seed.
             all_turns: See :func:`goal_configurations`.
+            most: Largest number of configurations that a round adds, even: half are the nearest to the start. Fewer are
+                found sooner, as each is proven; all branches of a closed form are looked at in any case.
             seconds_left: Returns how much time is left [s]. :meth:`first` begins no later round when time is up, and
                 MB-RRT ends with it.
         """
         self._problem = problem
+        self._most = most
         self._seconds_left = seconds_left
         none_yet: Matrix = frozen(np.zeros((0, problem.world.robot.dof)))
 
@@ -169,11 +173,11 @@ class GoalSearch:
             return _spread_out(self._problem, turned, self.rows)
 
         # Of many rows few are chosen, and it is these that are certified.
-        chosen = _spread_out(self._problem, free, self.rows)
+        chosen = _spread_out(self._problem, free, self.rows, self._most)
         good = checks.certified(chosen)
         if good.all():
             return chosen
-        return _spread_out(self._problem, free[checks.certified(free)], self.rows)
+        return _spread_out(self._problem, free[checks.certified(free)], self.rows, self._most)
 
     def _recall_first_round(self) -> bool:
         """Take over what another search of this problem has found in its first round.
@@ -405,8 +409,8 @@ def _numeric_solutions_of_part(robot: Robot, goal: TipGoal, starts: Matrix, rng:
     return rows[part.satisfied(robot, rows)]
 
 
-def _spread_out(problem: Problem, rows: Matrix, known: Matrix) -> Matrix:
-    """Choose at most `MAX_CONFIGURATIONS` rows that differ from each other and from the known ones.
+def _spread_out(problem: Problem, rows: Matrix, known: Matrix, most: int = MAX_CONFIGURATIONS) -> Matrix:
+    """Choose at most `most` rows that differ from each other and from the known ones.
 
     The first half are those nearest to the start. Each of the others is the one farthest from all chosen so far, since
     configurations near to each other may all be blocked by the same obstacle.
@@ -415,6 +419,7 @@ def _spread_out(problem: Problem, rows: Matrix, known: Matrix) -> Matrix:
         problem: The problem, which gives the start.
         rows: Configurations to choose from, shape (m, dof).
         known: Configurations that are known already, shape (k, dof).
+        most: Largest number of rows.
 
     Returns:
         The chosen rows with continuous joints turned near to the start, nearest to the start first.
@@ -427,11 +432,11 @@ def _spread_out(problem: Problem, rows: Matrix, known: Matrix) -> Matrix:
     for row in known:
         separation = np.minimum(separation, np.abs(joint_difference(robot, turned, row)).max(axis=1))
 
-    chosen = _apart(robot, turned, distance, separation)
+    chosen = _apart(robot, turned, distance, separation, most)
     return turned[sorted(chosen, key=lambda k: (distance[k], k))]
 
 
-def _apart(robot: Robot, rows: Matrix, away: Vector, separation: Vector) -> list[int]:
+def _apart(robot: Robot, rows: Matrix, away: Vector, separation: Vector, most: int) -> list[int]:
     """Return the indices of the rows that `_spread_out` chooses, by a kernel or in numpy.
 
     Args:
@@ -439,11 +444,12 @@ def _apart(robot: Robot, rows: Matrix, away: Vector, separation: Vector) -> list
         rows: Configurations, shape (m, dof).
         away: Their distances from the start, shape (m,).
         separation: The largest joint difference of each from the nearest that is known, shape (m,).
+        most: Largest number of them.
     """
     chosen: list[int] = []
     kernels = library(KERNELS)
     if kernels is not None and len(rows):
-        choice = ChoiceTable(PlannedTable(_choice_plan(len(rows), robot.dof)))
+        choice = ChoiceTable(PlannedTable(_choice_plan(len(rows), robot.dof, most)))
         choice.q[:] = rows.ravel()
         choice.away[:] = away
         choice.apart[:] = np.minimum(separation, FARTHEST)
@@ -452,8 +458,8 @@ def _apart(robot: Robot, rows: Matrix, away: Vector, separation: Vector) -> list
         chosen = choice.chosen.view(np.int32)[:count].tolist()
         return chosen
 
-    while len(chosen) < MAX_CONFIGURATIONS and (separation > SAME_POSTURE).any():
-        is_first_half = len(chosen) < MAX_CONFIGURATIONS // 2
+    while len(chosen) < most and (separation > SAME_POSTURE).any():
+        is_first_half = len(chosen) < most // 2
         score = -away if is_first_half else separation
         best = int(np.argmax(np.where(separation > SAME_POSTURE, score, -np.inf)))
         chosen.append(best)
@@ -462,18 +468,18 @@ def _apart(robot: Robot, rows: Matrix, away: Vector, separation: Vector) -> list
 
 
 @lru_cache(maxsize=64)
-def _choice_plan(rows: int, dof: int) -> TablePlan:
-    """Return the memory layout of a choice among so many configurations; cached."""
+def _choice_plan(rows: int, dof: int, most: int) -> TablePlan:
+    """Return the memory layout of a choice of at most so many among configurations; cached."""
     return sizes_of(
         ChoiceTable,
         q=rows * dof,
         away=rows,
         apart=rows,
         endless=dof,
-        chosen=MAX_CONFIGURATIONS,
+        chosen=most,
         rows=rows,
         dof=dof,
-        most=MAX_CONFIGURATIONS,
+        most=most,
         least=SAME_POSTURE,
     )
 

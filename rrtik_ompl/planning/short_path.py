@@ -315,7 +315,7 @@ def goal_rows(problem: Problem, budget: Budget) -> Matrix | None:
     from rrtik_ompl.ik.goal_configurations import GoalSearch
     from rrtik_ompl.planning.goal_choice import nearest_rows
 
-    found = GoalSearch(problem, budget.seed, seconds_left=lambda: budget.left).first()
+    found = GoalSearch(problem, budget.seed, most=2 * MOST_GOALS, seconds_left=lambda: budget.left).first()
     if len(found) == 0:
         return None
     return problem.robot.onto_limits(nearest_rows(problem, found)[:MOST_GOALS])
