@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from math import ceil
 from typing import TypeAlias
 
 import numpy as np
 
 from rrtik_ompl.base.errors import InputError
-from rrtik_ompl.base.values import dataclass
 
 Stop: TypeAlias = Callable[[], object]  # returns a true value when the computation has to end
 

@@ -9,6 +9,7 @@ those of its axes and of its quaternion by angles alone.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any
 
@@ -19,7 +20,6 @@ from numpy.typing import NDArray
 from rrtik_ompl.base.arrays import TAU, Matrix, Vector
 from rrtik_ompl.base.errors import InputError, UnknownNameError
 from rrtik_ompl.base.poses import rpy_matrices, turned_z
-from rrtik_ompl.base.values import dataclass
 from rrtik_ompl.geometry.collision.motion_bound import joint_weights
 from rrtik_ompl.model.goal_kind import TaskRegion, into_range, roll_pitch_yaw
 from rrtik_ompl.model.robot import Robot

@@ -17,10 +17,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from rrtik_ompl.base.values import dataclass
 from rrtik_ompl.description.tree import Joint, Tree
 
 # Usual names of the frame at the tip, the most telling first.

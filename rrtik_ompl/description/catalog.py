@@ -17,7 +17,7 @@ import threading
 import warnings
 from collections import OrderedDict
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib import import_module
 from pathlib import Path
@@ -26,7 +26,6 @@ from typing import Any
 
 from rrtik_ompl.base.choices import one_of
 from rrtik_ompl.base.errors import InputError, RrtikError, UnknownNameError, listed, name_of, require
-from rrtik_ompl.base.values import dataclass
 from rrtik_ompl.description.known_arms import fetched, is_description, shipped_name, unknown_robot
 from rrtik_ompl.description.offers import offers_of
 from rrtik_ompl.description.robot_source import BasePose, plain, source_entry

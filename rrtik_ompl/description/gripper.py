@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import combinations
 from typing import Any
 
@@ -12,7 +13,6 @@ import pinocchio as pin
 
 from rrtik_ompl.base.arrays import finite_number
 from rrtik_ompl.base.errors import InputError, UnknownNameError
-from rrtik_ompl.base.values import dataclass
 from rrtik_ompl.description.arm import arms_of
 from rrtik_ompl.description.robot_build import Mimic
 from rrtik_ompl.description.srdf import Srdf

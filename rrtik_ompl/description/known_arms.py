@@ -11,14 +11,13 @@ import ast
 import os
 import re
 from collections.abc import Iterable
-from dataclasses import field
+from dataclasses import dataclass, field
 from difflib import SequenceMatcher
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from rrtik_ompl.base.errors import InputError, UnknownNameError
-from rrtik_ompl.base.values import dataclass
 
 PACKAGE = "robot_descriptions"
 CACHE = "ROBOT_DESCRIPTIONS_CACHE"  # variable that names its folder

@@ -7,12 +7,12 @@ importlib.metadata is asked where :mod:`rrtik_ompl.base.installed` does not know
 from __future__ import annotations
 
 import os
+from dataclasses import dataclass
 from functools import cache, reduce
 from importlib import import_module
 from typing import Any
 
 from rrtik_ompl.base.installed import installed_packages, on_path_alone
-from rrtik_ompl.base.values import dataclass
 
 PREFIX = "rrtik_ompl."  # of all groups
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any
 
@@ -13,7 +13,6 @@ import pinocchio as pin
 
 from rrtik_ompl.base.arrays import LARGEST, TAU, Mask, Vector, bounded_array, frozen
 from rrtik_ompl.base.errors import ArmWarning, DescriptionWarning, InputError, UnknownNameError, few, name_of, printable
-from rrtik_ompl.base.values import dataclass
 from rrtik_ompl.description import robot_pickle as robot_pickle  # teaches pickle to take robots
 from rrtik_ompl.description.arm import Limb, arms_of
 from rrtik_ompl.description.robot_source import BasePose

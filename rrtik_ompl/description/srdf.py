@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Iterable, Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 from xml.etree.ElementTree import Element
 
 from rrtik_ompl.base.errors import InputError, UnknownNameError
-from rrtik_ompl.base.values import dataclass
 from rrtik_ompl.description.arm import FINGER
 from rrtik_ompl.description.faults import nearest_name
 from rrtik_ompl.description.tree import Tree

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +19,6 @@ from numpy.typing import ArrayLike
 from rrtik_ompl.base.arrays import Vector, bounded_array, frozen
 from rrtik_ompl.base.errors import InputError, UnknownNameError, at_most, name_of
 from rrtik_ompl.base.poses import rigid
-from rrtik_ompl.base.values import dataclass
 from rrtik_ompl.model.shapes import Shape
 
 MOST_JOINTS = 1001  # most joints of a tree: a thousand of an arm, and one that fixes its tip

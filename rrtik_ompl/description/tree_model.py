@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -14,7 +15,6 @@ import pinocchio as pin
 
 from rrtik_ompl.base.copies import Once
 from rrtik_ompl.base.errors import EmptyMeshError, InputError, MeshWarning, few
-from rrtik_ompl.base.values import dataclass
 from rrtik_ompl.description.shapes.materials import Colour, parts_by_colour
 from rrtik_ompl.description.shapes.mesh import load_surface
 from rrtik_ompl.description.tree import Joint, Link, MeshFile, Solid, Tree

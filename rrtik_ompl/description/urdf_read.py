@@ -6,7 +6,7 @@ import re
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import field
+from dataclasses import dataclass, field
 from pathlib import Path
 from xml.etree.ElementTree import Element
 from xml.parsers import expat
@@ -16,7 +16,6 @@ import pinocchio as pin
 
 from rrtik_ompl.base.errors import InputError, RrtikError, UnknownNameError, few
 from rrtik_ompl.base.poses import pose_from_rpy
-from rrtik_ompl.base.values import dataclass
 from rrtik_ompl.description.faults import nearest_name
 from rrtik_ompl.description.package_path import Packages, resolve_mesh
 from rrtik_ompl.description.robot_build import Mimic

@@ -12,13 +12,13 @@ from collections import OrderedDict
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
+from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from rrtik_ompl.base.arrays import positive
 from rrtik_ompl.base.errors import InputError, UnknownNameError
-from rrtik_ompl.base.values import dataclass
 from rrtik_ompl.files.text import MAX_BYTES, read_text
 
 CHILD = Path(__file__).with_name("xacro_child.py")

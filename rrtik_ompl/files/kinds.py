@@ -9,13 +9,13 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, TypeAlias, TypeVar
 
 from rrtik_ompl.base.errors import InputError, in_file
-from rrtik_ompl.base.values import dataclass
 from rrtik_ompl.files.named_arrays import NamedArrays
 from rrtik_ompl.files.tables import json_value
 from rrtik_ompl.files.text import file_name, read_text

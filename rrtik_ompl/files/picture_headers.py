@@ -5,12 +5,12 @@ from __future__ import annotations
 import re
 import struct
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
 from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.base.errors import InputError
-from rrtik_ompl.base.values import dataclass
 
 PNG = b"\x89PNG\r\n\x1a\n"  # signature
 PNG_BITS = 24  # offset of the number of bits of a sample

@@ -15,14 +15,13 @@ import re
 import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeAlias
 
 import yaml
 
 from rrtik_ompl.base.errors import DescriptionWarning, InputError, RrtikError, few
-from rrtik_ompl.base.values import dataclass
 from rrtik_ompl.files.text import file_name, read_text, write_text
 
 Location: TypeAlias = tuple[str | int, ...]  # keys and list indices from the top: ("start", "joints", 2)

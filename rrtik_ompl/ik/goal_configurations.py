@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import lru_cache
 from weakref import WeakKeyDictionary
 
@@ -13,7 +14,6 @@ from rrtik_ompl.base.choices import IkMethod
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.base.kept import kept_with
 from rrtik_ompl.base.units import closest_configuration
-from rrtik_ompl.base.values import dataclass
 from rrtik_ompl.constraints.held_region import held_region
 from rrtik_ompl.constraints.held_regions import HeldRegions
 from rrtik_ompl.description.joint_weights import weighted_difference

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -9,7 +10,6 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector, frozen
 from rrtik_ompl.base.kept import kept_with
-from rrtik_ompl.base.values import dataclass
 from rrtik_ompl.ik.tip_columns import TipColumns, tip_columns
 from rrtik_ompl.kernels.ik import ik_layout
 from rrtik_ompl.kernels.ik.ik_layout import TWIST_NUMBERS, CallTable, LimbTable

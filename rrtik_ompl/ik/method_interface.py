@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +15,6 @@ from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.choices import IkMethod
 from rrtik_ompl.base.copies import as_value, in_one_line, restored, set_fields
 from rrtik_ompl.base.kept import kept_with
-from rrtik_ompl.base.values import dataclass
 from rrtik_ompl.description.joint_weights import weighted_difference
 from rrtik_ompl.model.goal import Target, TipGoal, has_continuous, joint_difference
 from rrtik_ompl.model.result import required

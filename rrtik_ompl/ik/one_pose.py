@@ -7,7 +7,7 @@ does not know: poses that are no rigid motions, and singular ones.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import field
+from dataclasses import dataclass, field
 from math import inf
 from time import monotonic
 from typing import Any
@@ -18,7 +18,6 @@ import pinocchio as pin
 from rrtik_ompl.base.arrays import Matrix, Vector, frozen
 from rrtik_ompl.base.choices import IkMethod
 from rrtik_ompl.base.kept import kept_with
-from rrtik_ompl.base.values import dataclass
 from rrtik_ompl.description.joint_weights import weights_of
 from rrtik_ompl.ik.analytic.branches import UNBOUNDED_ANGLE, tip_fault
 from rrtik_ompl.ik.analytic.closed_form import form_of, has_closed_form

@@ -6,13 +6,13 @@ the joints. Entries of these that are 0, 1 or -1 need no multiplication.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.kept import kept_with
-from rrtik_ompl.base.values import dataclass
 from rrtik_ompl.model.robot import Robot
 
 Numbers = NDArray[np.float64]

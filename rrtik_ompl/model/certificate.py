@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,6 @@ from numpy.typing import NDArray
 from rrtik_ompl.base.arrays import Matrix, finite_array, finite_number, frozen, not_negative
 from rrtik_ompl.base.copies import as_value, in_one_line
 from rrtik_ompl.base.errors import InputError, in_file
-from rrtik_ompl.base.values import dataclass
 from rrtik_ompl.files.kinds import read
 from rrtik_ompl.files.tables import checked_object, json_object
 from rrtik_ompl.files.text import known_ending, read_text, write_text

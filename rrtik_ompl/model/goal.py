@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from typing import TypeAlias, get_args
 
 import numpy as np
@@ -17,7 +17,6 @@ from rrtik_ompl.base.errors import InputError, listed, require
 from rrtik_ompl.base.kept import kept_with
 from rrtik_ompl.base.poses import PoseLike, rigid, rotation_angles
 from rrtik_ompl.base.units import wrapped
-from rrtik_ompl.base.values import dataclass
 from rrtik_ompl.model.goal_kind import Goal as Goal
 from rrtik_ompl.model.goal_kind import GoalPart as GoalPart
 from rrtik_ompl.model.goal_kind import Target as Target

@@ -12,7 +12,7 @@ for an example. The names of the kinds in files are defined in ``rrtik_ompl.prob
 from __future__ import annotations
 
 from abc import abstractmethod
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -35,7 +35,6 @@ from rrtik_ompl.base.choices import FrameAxis
 from rrtik_ompl.base.copies import as_value, set_fields
 from rrtik_ompl.base.errors import InputError, name_of, require
 from rrtik_ompl.base.poses import PoseLike, rigid, rotation_angles, rpy_matrices, turned_z, unit_vector
-from rrtik_ompl.base.values import dataclass
 from rrtik_ompl.model.robot import Robot, metres_per_radian
 
 COORDINATES = ("x", "y", "z", "roll", "pitch", "yaw")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -10,7 +11,6 @@ from numpy.typing import ArrayLike, NDArray
 from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.base.copies import as_value, in_one_line
 from rrtik_ompl.base.errors import InputError
-from rrtik_ompl.base.values import dataclass
 from rrtik_ompl.model.proof import Proof
 from rrtik_ompl.model.robot import Robot
 

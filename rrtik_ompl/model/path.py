@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -24,7 +25,6 @@ from rrtik_ompl.base.copies import as_value, changed, in_notebook
 from rrtik_ompl.base.errors import InputError, in_file, listed, name_of, require
 from rrtik_ompl.base.kept import kept_with
 from rrtik_ompl.base.units import joint_units
-from rrtik_ompl.base.values import dataclass
 from rrtik_ompl.files.kinds import read
 from rrtik_ompl.files.tables import FORMATS, dumps, loads
 from rrtik_ompl.files.text import known_ending, read_text, write_text

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import field
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Any, Protocol
 
 from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.base.errors import InputError
-from rrtik_ompl.base.values import dataclass
 from rrtik_ompl.model.certificate import Certificate
 
 NOWHERE = partial(float, "nan")

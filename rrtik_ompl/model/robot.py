@@ -7,7 +7,7 @@ methods of :class:`Chain`, which expect valid rows: float64, shape (m, dof).
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from functools import partial
 from threading import get_ident
 from types import MappingProxyType
@@ -23,7 +23,6 @@ from rrtik_ompl.base.errors import InputError, UnknownNameError, require
 from rrtik_ompl.base.kept import Keeper, kept_with
 from rrtik_ompl.base.poses import MOST_MOVING, PoseLike, cross_products, joint_motions
 from rrtik_ompl.base.units import shown_unit
-from rrtik_ompl.base.values import dataclass
 from rrtik_ompl.files.kinds import FilePath, read
 
 FEW = 16  # number of configurations up to which Pinocchio is faster than numpy

@@ -6,7 +6,7 @@ import os
 import re
 from collections import Counter
 from collections.abc import Iterable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 import numpy as np
@@ -17,7 +17,6 @@ from rrtik_ompl.base.arrays import LARGEST, Vector, bounded_array, finite_array,
 from rrtik_ompl.base.copies import as_value, changed, set_fields
 from rrtik_ompl.base.errors import InputError, UnknownNameError, at_most, listed, name_of, require
 from rrtik_ompl.base.poses import PoseLike, rigid
-from rrtik_ompl.base.values import dataclass
 from rrtik_ompl.files.kinds import read, write
 from rrtik_ompl.model.shapes import SHAPES, Shape
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import KW_ONLY, MISSING, field, fields
+from dataclasses import KW_ONLY, MISSING, dataclass, field, fields
 from functools import partial
 from typing import Any, get_args
 
@@ -12,7 +12,6 @@ from rrtik_ompl.base.choices import Accuracy, one_of
 from rrtik_ompl.base.copies import as_value
 from rrtik_ompl.base.errors import InputError, UnknownNameError, listed, require
 from rrtik_ompl.base.poses import few_joints
-from rrtik_ompl.base.values import dataclass
 from rrtik_ompl.model.goal_kind import TaskRegion
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import Scene

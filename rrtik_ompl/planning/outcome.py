@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.choices import ImproveStrategy, PathObjective, ProofMode
 from rrtik_ompl.base.copies import as_value, in_notebook, in_one_line
 from rrtik_ompl.base.errors import require
-from rrtik_ompl.base.values import dataclass
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.result import required
 from rrtik_ompl.world.problem import Problem

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from difflib import get_close_matches
 from itertools import combinations
 from typing import ClassVar, NamedTuple, cast
@@ -17,7 +17,6 @@ import pinocchio as pin
 
 from rrtik_ompl.base.arrays import Vector
 from rrtik_ompl.base.errors import InputError, SceneWarning, UnknownNameError, few
-from rrtik_ompl.base.values import dataclass
 from rrtik_ompl.description.faults import nearest_name
 from rrtik_ompl.description.shapes.octree import cells_of_tree
 from rrtik_ompl.files.sections import parse

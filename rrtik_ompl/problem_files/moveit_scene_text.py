@@ -5,13 +5,13 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
 
 from rrtik_ompl.base.errors import InputError, in_file
 from rrtik_ompl.base.poses import pose_from_xyzw
-from rrtik_ompl.base.values import dataclass
 from rrtik_ompl.files.text import read_text
 from rrtik_ompl.model.scene import Obstacle, Scene
 from rrtik_ompl.model.shapes import Box, Cylinder, HalfSpace, Mesh, Shape, Sphere

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
@@ -12,7 +13,6 @@ from pydantic import Field, create_model, model_validator
 from pydantic_core import PydanticCustomError
 
 from rrtik_ompl.base.errors import InputError
-from rrtik_ompl.base.values import dataclass
 from rrtik_ompl.description.shapes.cloud import read_cloud
 from rrtik_ompl.description.shapes.heights import read_heights
 from rrtik_ompl.description.shapes.mesh import read_mesh

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import pinocchio as pin
@@ -13,7 +13,6 @@ from rrtik_ompl.base.arrays import Vector
 from rrtik_ompl.base.copies import Items, Once, changed
 from rrtik_ompl.base.errors import UnknownNameError
 from rrtik_ompl.base.poses import rigid
-from rrtik_ompl.base.values import dataclass
 from rrtik_ompl.geometry.collision.bodies import (
     DISTANCE_TOLERANCE,
     Body,

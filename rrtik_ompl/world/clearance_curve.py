@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Matrix, Vector, frozen
-from rrtik_ompl.base.values import dataclass
 from rrtik_ompl.model.judgement import FARTHEST, ClearanceCurve
 from rrtik_ompl.model.proof import Gap, Proof
 from rrtik_ompl.world.row_checks import RowChecks

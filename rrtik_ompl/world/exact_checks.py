@@ -8,7 +8,7 @@ points and have been seen to miss overlaps.
 
 from __future__ import annotations
 
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -21,7 +21,6 @@ from rrtik_ompl.base.arrays import Mask, Matrix, Vector
 from rrtik_ompl.base.collector import collector_waits
 from rrtik_ompl.base.copies import Items
 from rrtik_ompl.base.poses import working_memory
-from rrtik_ompl.base.values import dataclass
 from rrtik_ompl.geometry.collision.bodies import DISTANCE_TOLERANCE, Body, kept_apart, request
 from rrtik_ompl.geometry.collision.distances import is_ours, own_gap
 from rrtik_ompl.geometry.collision.solids import around, is_mesh, solids_of

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import ClassVar, TypeAlias
 
@@ -31,7 +31,6 @@ from numpy.typing import NDArray
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector, frozen, in_blocks
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.base.kept import kept_with
-from rrtik_ompl.base.values import dataclass
 from rrtik_ompl.constraints.held_regions import HeldRegions
 from rrtik_ompl.files import notice
 from rrtik_ompl.geometry.collision.bodies import DISTANCE_TOLERANCE, Body

@@ -7,7 +7,7 @@ calls them directly with rows that are float64, finite and of shape (m, dof) alr
 from __future__ import annotations
 
 import warnings
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import pinocchio as pin
@@ -17,7 +17,6 @@ from rrtik_ompl.base.arrays import Mask, Matrix, Vector, in_blocks
 from rrtik_ompl.base.copies import changed
 from rrtik_ompl.base.errors import MeshWarning
 from rrtik_ompl.base.sharing import Shared
-from rrtik_ompl.base.values import dataclass
 from rrtik_ompl.constraints.held_regions import HeldRegions, held_regions
 from rrtik_ompl.geometry.collision.certificate import Certificate
 from rrtik_ompl.geometry.collision.distances import inside, measured

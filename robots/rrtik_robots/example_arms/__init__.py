@@ -5,12 +5,11 @@ from __future__ import annotations
 import sys
 import warnings
 from collections.abc import Mapping
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rrtik_ompl.base.errors import DescriptionWarning, InputError
-from rrtik_ompl.base.values import dataclass
 from rrtik_ompl.description.gripper import GripperJoints
 from rrtik_ompl.description.robot_build import JointLimits
 from rrtik_ompl.description.urdf import robot_from_urdf

@@ -12,13 +12,13 @@ which side along x it lies, the next ones along y and z.
 from __future__ import annotations
 
 import os
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Matrix, Vector, positive
 from rrtik_ompl.base.errors import InputError, at_most
-from rrtik_ompl.base.values import dataclass
 from rrtik_ompl.files.text import file_name, read_bytes
 from rrtik_ompl.model.shapes.octree import COARSER, MOST_CELLS, Octree, tell_size
 from rrtik_ompl.model.shapes.point_cloud import MOST_POINTS

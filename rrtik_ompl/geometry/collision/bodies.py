@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from itertools import chain, combinations, compress
 from operator import not_
 from random import Random
@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 from rrtik_ompl.base.collector import collector_waits
 from rrtik_ompl.base.errors import DescriptionWarning, InputError, UnknownNameError, few
 from rrtik_ompl.base.kept import kept_with
-from rrtik_ompl.base.values import dataclass
 from rrtik_ompl.geometry.collision.shape_table import Piece, pieces
 from rrtik_ompl.geometry.collision.solids import robot_solids
 from rrtik_ompl.geometry.collision.thickness import SHARE, least_width

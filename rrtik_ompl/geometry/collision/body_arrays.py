@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from itertools import combinations
 from weakref import WeakValueDictionary
 
@@ -11,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector
-from rrtik_ompl.base.values import dataclass
 from rrtik_ompl.geometry.collision.bodies import Body, contact_distance
 
 UNBOUNDED_METRES = 1e9  # [m] half extent of a half-space's box

@@ -8,6 +8,7 @@ support points as a first guess; data that were reused have been seen to miss ab
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TypeAlias
 
 import coal
@@ -15,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector
-from rrtik_ompl.base.values import dataclass
 from rrtik_ompl.geometry.collision.bodies import DISTANCE_TOLERANCE, Body
 from rrtik_ompl.geometry.collision.body_arrays import body_arrays
 from rrtik_ompl.geometry.collision.containment import Containment

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any
 
@@ -18,7 +18,6 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector, frozen
-from rrtik_ompl.base.values import dataclass
 from rrtik_ompl.geometry.collision.cloud_solid import CloudSolid, cloud_solid
 from rrtik_ompl.geometry.collision.solids import (
     bvh,

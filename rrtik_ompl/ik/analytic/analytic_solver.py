@@ -7,12 +7,12 @@ A robot's folder makes one `AnalyticSolver` and hands it to `Robot` as ``closed_
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import TAU, Mask, Matrix, Vector
-from rrtik_ompl.base.values import dataclass
 from rrtik_ompl.kernels.ik.branch_layout import DOUBLE_ROOT, REACH_TOLERANCE
 
 Limits = tuple[Vector, Vector]  # lowest and highest joint values, shape (dof,) each

@@ -5,7 +5,7 @@ Both give the same answers, the kernel many times faster. Numpy is used without 
 
 from __future__ import annotations
 
-from dataclasses import field
+from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any
 
@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import TAU, Matrix, Vector
 from rrtik_ompl.base.kept import kept_with
-from rrtik_ompl.base.values import dataclass
 from rrtik_ompl.ik.analytic.analytic_solver import AnalyticSolver, wrapped
 from rrtik_ompl.ik.kernel_tables import limb_of, pose_numbers
 from rrtik_ompl.ik.tip_columns import tip_columns

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import combinations_with_replacement
 
 import numpy as np
@@ -11,7 +12,6 @@ from rrtik_ompl.base.arrays import Matrix, finite_array
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.base.kept import kept_with
 from rrtik_ompl.base.poses import LAST_ROW, LAST_ROW_TOLERANCE, NOT_RIGID, left_handed
-from rrtik_ompl.base.values import dataclass
 from rrtik_ompl.ik.analytic.analytic_solver import AnalyticSolver
 from rrtik_ompl.ik.analytic.branches import kernel_branches, reference_branches, tip_fault
 from rrtik_ompl.ik.analytic.parallel_arm import parallel_form

@@ -14,7 +14,7 @@ rotation that is left gives q2 + q3 + q4 and q6; what is left of p is a triangle
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -22,7 +22,6 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import TAU, Mask, Matrix, Vector
 from rrtik_ompl.base.kept import kept_with
-from rrtik_ompl.base.values import dataclass
 from rrtik_ompl.ik.analytic.analytic_solver import AnalyticSolver, Branches, Limits, wrapped
 from rrtik_ompl.ik.tip_columns import frame_columns
 from rrtik_ompl.kernels.ik.branch_layout import DOUBLE_ROOT, REACH_TOLERANCE, SINGULAR

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.base.kept import kept_with
-from rrtik_ompl.base.values import dataclass
 from rrtik_ompl.ik.analytic.analytic_solver import AnalyticSolver, Branches, two_links, wrapped
 from rrtik_ompl.model.robot import Robot
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Vector
-from rrtik_ompl.base.values import dataclass
 
 ROUNDING = 3e-6  # relative error of a distance in float32, with room to spare; the margin covers the rest
 

@@ -8,14 +8,13 @@ interval ends the proof of its motion there, because no shorter interval could c
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector
-from rrtik_ompl.base.values import dataclass
 from rrtik_ompl.geometry.collision.shape_table import BOX_CORNERS
 from rrtik_ompl.kernels.proof import layout
 from rrtik_ompl.kernels.proof.layout import CLOUD, CONVEX_SOLID, DEEPEST, HALF_SPACE, UNKNOWN, WHOLE_BODY

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache, partial
 from types import MappingProxyType
 from typing import NamedTuple
@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.base.collector import collector_waits
-from rrtik_ompl.base.values import dataclass
 from rrtik_ompl.geometry.collision.bodies import Body
 from rrtik_ompl.geometry.collision.body_arrays import body_arrays
 from rrtik_ompl.geometry.collision.cloud_solid import CloudSolid

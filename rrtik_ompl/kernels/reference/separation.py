@@ -6,6 +6,7 @@ Rows are intervals. The pose of a solid in the frame of its pair is a rotation, 
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import partial
 from typing import NamedTuple, TypeAlias
 
@@ -14,7 +15,6 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector
 from rrtik_ompl.base.poses import joint_motions
-from rrtik_ompl.base.values import dataclass
 
 Numbers: TypeAlias = NDArray[np.int64]
 Stack: TypeAlias = NDArray[np.float64]  # matrices of shape (n, 3, 3)

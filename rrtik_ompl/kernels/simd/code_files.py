@@ -9,10 +9,10 @@ import json
 import os
 import re
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from rrtik_ompl.base.values import dataclass
 from rrtik_ompl.files.cache import nobody_else_s, one_at_a_time, write_whole
 from rrtik_ompl.files.digest import sha256
 from rrtik_ompl.kernels.simd.processor import WIDTH, processor_identity

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import platform
 import sys
+from dataclasses import dataclass
 from functools import cache
 
-from rrtik_ompl.base.values import dataclass
 from rrtik_ompl.kernels.simd.processor import WIDTH
 
 

@@ -13,14 +13,13 @@ were. Tests check it after each kernel.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.base.values import dataclass
 from rrtik_ompl.kernels.layout import ALIGNMENT
 from rrtik_ompl.kernels.record import WORD, Record, holds_array, holds_tables, word
 from rrtik_ompl.kernels.simd.processor import WIDTH

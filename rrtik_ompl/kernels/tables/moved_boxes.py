@@ -5,6 +5,7 @@ See :mod:`.scene_tables` and :mod:`.solid_tables`; for a single body numpy takes
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from math import dist, sqrt
 from typing import TypeAlias
 
@@ -12,7 +13,6 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from rrtik_ompl.base.values import dataclass
 from rrtik_ompl.geometry.collision.shape_table import Core
 from rrtik_ompl.kernels.tables import scene_tables, solid_tables
 from rrtik_ompl.kernels.tables.primitive_tables import above, below

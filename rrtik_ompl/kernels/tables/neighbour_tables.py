@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Mask
-from rrtik_ompl.base.values import dataclass
 from rrtik_ompl.kernels.layout import (
     NEIGHBOUR_COLUMN,
     NEIGHBOUR_INTS,

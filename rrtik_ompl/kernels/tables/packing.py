@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Mask, Vector, distinct
-from rrtik_ompl.base.values import dataclass
 from rrtik_ompl.geometry.collision.bodies import Body, kept_apart, pair_array
 from rrtik_ompl.geometry.collision.body_arrays import body_arrays
 from rrtik_ompl.kernels.layout import (

@@ -7,6 +7,7 @@ the same layout, so that one kernel serves both.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
@@ -14,7 +15,6 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector
 from rrtik_ompl.base.errors import InputError
-from rrtik_ompl.base.values import dataclass
 from rrtik_ompl.kernels.layout import (
     BLOCK,
     BOX_RUNS,

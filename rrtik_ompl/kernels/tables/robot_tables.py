@@ -7,6 +7,7 @@ holds. Every joint frame is turned so that its axis is z; the balls and the fram
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, TypeAlias
 
@@ -14,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Matrix, Vector, frozen
-from rrtik_ompl.base.values import dataclass
 from rrtik_ompl.geometry.collision.bodies import Body
 from rrtik_ompl.kernels.layout import (
     ALIGNED_TURN,

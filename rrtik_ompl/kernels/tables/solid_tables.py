@@ -8,14 +8,13 @@ apart from others but never to overlap them.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 
 import coal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.base.arrays import Matrix, Vector
-from rrtik_ompl.base.values import dataclass
 from rrtik_ompl.geometry.collision.cloud_solid import CloudSolid
 from rrtik_ompl.geometry.collision.shape_table import core_of
 from rrtik_ompl.geometry.collision.solids import is_mesh, once_per_geometry

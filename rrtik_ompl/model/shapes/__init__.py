@@ -7,6 +7,7 @@ the others.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any, overload
 
 import numpy as np
@@ -25,7 +26,6 @@ from rrtik_ompl.base.arrays import (
 )
 from rrtik_ompl.base.copies import as_value
 from rrtik_ompl.base.errors import InputError, at_most
-from rrtik_ompl.base.values import dataclass
 from rrtik_ompl.model.shapes.height_field import HeightField
 from rrtik_ompl.model.shapes.mesh import Mesh
 from rrtik_ompl.model.shapes.octree import Octree

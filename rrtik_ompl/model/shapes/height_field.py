@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import warnings
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,7 +12,6 @@ from numpy.typing import ArrayLike
 from rrtik_ompl.base.arrays import LARGEST, Matrix, finite_number, frozen, length, number_rows, positive, whole_number
 from rrtik_ompl.base.copies import as_value
 from rrtik_ompl.base.errors import CloudWarning, InputError, require
-from rrtik_ompl.base.values import dataclass
 from rrtik_ompl.files.kinds import read
 from rrtik_ompl.model.shapes.box_pile import BoxPile, few_enough, merged
 from rrtik_ompl.model.shapes.point_cloud import Invalid, known_choice

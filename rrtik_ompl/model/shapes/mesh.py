@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from dataclasses import field
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,7 +22,6 @@ from rrtik_ompl.base.arrays import (
 )
 from rrtik_ompl.base.copies import as_value, in_one_line
 from rrtik_ompl.base.errors import InputError, at_most, require
-from rrtik_ompl.base.values import dataclass
 from rrtik_ompl.files.kinds import read
 from rrtik_ompl.model.shapes.mesh_repair import edges_of, in_closed_parts, repaired
 from rrtik_ompl.model.shapes.shape import Shape

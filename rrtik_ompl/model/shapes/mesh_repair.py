@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Mask, Matrix
-from rrtik_ompl.base.values import dataclass
 
 Faces = NDArray[np.int64]
 ROUNDS = 8  # most times that triangles are cut at vertices on their edges

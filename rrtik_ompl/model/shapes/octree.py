@@ -7,6 +7,7 @@ whose tree the kernels search.
 from __future__ import annotations
 
 import os
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,7 +15,6 @@ from numpy.typing import ArrayLike
 from rrtik_ompl.base.arrays import Matrix, Vector, bounded_array, frozen, positive
 from rrtik_ompl.base.copies import as_value
 from rrtik_ompl.base.errors import InputError, at_most, require
-from rrtik_ompl.base.values import dataclass
 from rrtik_ompl.files.kinds import read
 from rrtik_ompl.files.notice import tell_once
 from rrtik_ompl.model.shapes.box_pile import BoxPile, surface_of_boxes

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
@@ -24,7 +25,6 @@ from rrtik_ompl.base.arrays import (
 )
 from rrtik_ompl.base.copies import as_value
 from rrtik_ompl.base.errors import CloudWarning, InputError, at_most, require
-from rrtik_ompl.base.values import dataclass
 from rrtik_ompl.files.kinds import read, write
 from rrtik_ompl.model.shapes.point_tree import PointTree, extremes, point_tree
 from rrtik_ompl.model.shapes.shape import Shape

@@ -7,12 +7,11 @@ level, and so on until one group contains all. No pointers are stored: child c o
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-
-from rrtik_ompl.base.values import dataclass
 
 LEAF = 16  # number of points in a block, and of boxes in a group
 FAR = 1e18  # [m] position of the sides of empty boxes; its square is still a float32

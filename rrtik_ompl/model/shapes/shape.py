@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import fields
+from dataclasses import dataclass, fields
 from typing import ClassVar, Literal, TypeAlias
 
 import numpy as np
 
-from rrtik_ompl.base.values import dataclass
 from rrtik_ompl.model.shapes.surfaces import Triangles
 
 # A length [m] is more than 0; a vector has three numbers; points are three or more pairs of numbers.
