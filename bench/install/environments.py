@@ -28,7 +28,7 @@ from rrtik_ompl.base.errors import InputError
 
 PYTHONS = ("3.10", "3.11", "3.12", "3.13", "3.14")
 PLATFORM = "x86_64-manylinux_2_39"
-PATIENCE = 120.0  # [s]
+PATIENCE = 400.0  # [s], as other programs may run beside it
 AT_ONCE = 4  # resolvers, which wait for the network most of the time
 TOOLKITS = (
     "lerobot",

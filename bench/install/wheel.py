@@ -26,6 +26,7 @@ from rrtik_bench.report.page import Report
 ROOT = Path(__file__).resolve().parents[2]
 ROUNDS = 5
 COMPILED = {".so", ".o", ".a", ".dylib", ".pyd", ".nbc", ".nbi"}
+STRAY = {"tests", "__pycache__", ".pytest_cache", ".mypy_cache", ".ruff_cache", ".hypothesis"}
 IMPORTS = {
     "`rrtik_ompl`": "import rrtik_ompl",
     "what `plan()` needs": "import rrtik_ompl as r; (r.plan, r.Problem, r.World, r.load_robot)",
@@ -79,7 +80,7 @@ def built(folder: Path) -> Path:
 
 
 def contents(report: Report, wheel: Path) -> None:
-    """What is in it, by kind; bitcode by triple."""
+    """What is in it, by kind."""
     with ZipFile(wheel) as archive:
         members = [item for item in archive.infolist() if not item.is_dir()]
     sizes: Counter[str] = Counter()
@@ -89,17 +90,16 @@ def contents(report: Report, wheel: Path) -> None:
         sizes[kind] += item.compress_size
         counts[kind] += 1
     rows = [[kind, str(counts[kind]), f"{size / 1e6:.2f}"] for kind, size in sizes.most_common(12)]
-    code = Counter(str(Path(item.filename).parent) for item in members if item.filename.endswith((".bc", ".bc.xz")))
     universal = wheel.name.endswith("py3-none-any.whl")
     report.bar("one wheel for all machines", "py3-none-any", wheel.name, universal)
     compiled = sum(counts[kind] for kind in COMPILED)
     report.bar("machine code in it", "none", f"{compiled} files", compiled == 0)
+    stray = [item.filename for item in members if STRAY & set(Path(item.filename).parts)]
+    report.bar("tests and caches in it", "none", f"{len(stray)} files", not stray)
     megabytes = wheel.stat().st_size / 1e6
     report.bar("size of the wheel", "<= 10 MB", f"{megabytes:.1f} MB", megabytes <= 10.0)
     text = f"`{wheel.name}`, {megabytes:.1f} MB."
     report.table("Contents", ("ending", "files", "compressed [MB]"), rows, text=text)
-    if code:
-        report.table("Bitcode", ("folder", "libraries"), [[where, str(count)] for where, count in sorted(code.items())])
 
 
 def installed(report: Report, wheel: Path, home: Path) -> Path:

@@ -15,7 +15,7 @@ from typing import Any
 
 from rrtik_ompl.base.collector import collector_waits
 from rrtik_ompl.base.errors import InputError
-from rrtik_ompl.base.floors import fitting_packages, name_old_packages
+from rrtik_ompl.base.floors import DependencyError, fitting_packages, name_old_packages
 
 
 def lazy_names(
@@ -42,8 +42,8 @@ def lazy_names(
         home = home_of.get(name)
         with fitting_packages(), collector_waits():
             module = import_module(f"{package}.{name}" if home is None else f"rrtik_ompl.{home}")
+            value = module if home is None else getattr(module, name)  # which may load more
         name_old_packages()
-        value = module if home is None else getattr(module, name)
         if isinstance(value, type):
             guided(value)
         setattr(sys.modules[package], name, value)
@@ -110,10 +110,16 @@ def _form(call: Callable[..., Any], name: str, *, whole: bool) -> str:
 
 
 def public_values(package: ModuleType) -> dict[str, Any]:
-    """Return all public names of a package and of its public modules, such as "plan" and "tip.straight"."""
+    """Return all public names of a package and of its public modules, such as "plan" and "tip.straight".
+
+    What needs a package that is not installed, as OMPL on Python 3.14, is left out.
+    """
     found: dict[str, Any] = {}
     for name in vars(package)["__all__"]:
-        value = getattr(package, name)
+        try:
+            value = getattr(package, name)
+        except DependencyError:
+            continue
         if isinstance(value, ModuleType) and "__all__" in vars(value):
             found |= {f"{name}.{inner}": member for inner, member in public_values(value).items()}
         else:

@@ -44,7 +44,7 @@ def task_plan(found: bool) -> rrtik.TaskPlan:
 def plan(found: bool) -> rrtik.Plan:
     if found:
         return rrtik.plan(rrtik.Problem(WORLD, HERE, HERE + 0.1))
-    return rrtik.plan(rrtik.load_problem("planar3_boxes"), "rrt", seconds=1e-3, restarts=0)
+    return rrtik.plan(rrtik.load_problem("planar3_boxes"), "mbrrt", seconds=1e-3, restarts=0)
 
 
 def run(found: bool) -> rrtik.replanning.ReplanRun:

@@ -23,6 +23,7 @@ for call in (
     lambda: rrtik.plan(problem, "geometric::ESTkConfigDefault"),
     lambda: rrtik.ompl.simple_setup(problem),
     lambda: rrtik.ompl.check_planner(rrtik.ompl.SafePlanner),
+    lambda: rrtik.ompl.objectives,
     lambda: rrtik.shorten(plan.path, problem, method="ompl"),
 ):
     try:
@@ -41,7 +42,7 @@ def test_what_needs_no_ompl_is_the_same_without_it_and_the_rest_is_told_in_a_lin
         path = rrtik.plan(rrtik.load_problem(name), planner, seed=1).require()
         assert line == f"{name} True {path.length:.9g}"
     said = [line for line in lines if line.startswith("said:")]
-    assert len(said) == 5
+    assert len(said) == 6
     assert all("OMPL is not installed" in line and "pip install ompl" in line for line in said)
     assert lines[-1] == "False []"
 
