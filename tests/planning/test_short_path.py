@@ -70,15 +70,6 @@ def test_kernels_that_return_often_find_nearly_the_same(problem, monkeypatch):
     assert again.path.length == pytest.approx(known.path.length, rel=0.05)
 
 
-def test_every_motion_is_proven_also_where_the_work_ends_among_the_jumps():
-    """Of this problem the routes have many waypoints, and the work was once spent before all were looked at."""
-    problem = rrtik.load_problem("titan4_sdu")
-    for seed in range(12):
-        found = short_path(problem, replace(REQUEST, budget=Budget(seed)), pull=True)
-        for path in () if found is None else (found.path, found.unshortened):
-            assert problem.world.prove(path, clearance=path.proof.clearance).proven
-
-
 def test_it_is_a_proven_path_to_one_of_the_goals(problem):
     found = short_path(problem, REQUEST, pull=True)
     own = short_path(problem, REQUEST, pull=False)

@@ -100,6 +100,14 @@ def test_a_point_goes_over_a_wall_by_nearly_the_shortest_way(obstacle):
     assert shortest < route_length(pull.waypoints) < 1.05 * shortest
 
 
+@pytest.mark.parametrize("work", [1, 2, 5, 20])
+def test_a_motion_that_no_work_is_left_for_is_not_called_proven(work):
+    through = np.array([[-1.0, 0.0], [-1.2, 0.3], [-1.4, 0.1], [-1.2, -0.3], [-1.0, 0.2], [1.0, 0.2]])
+    pull = pulling(point_among(rrtik.Obstacle("wall", WALL, IN_WALL)), through, work=work)
+    pull.run()
+    assert not pull.proven
+
+
 def test_bends_stay_in_the_box():
     motions = ProvenMotions(point_among(rrtik.Obstacle("wall", WALL, IN_WALL)), KEPT)
     lower = np.array([-1.5, 0.0])
