@@ -17,12 +17,12 @@ import typer
 from rrtik_ompl.base.errors import InputError, printable
 from rrtik_ompl.cli.table import Table, columns_of, folded
 from rrtik_ompl.files import notice
+from rrtik_ompl.files.text import PAGE_FORMATS as PAGE_FORMATS
 
 if TYPE_CHECKING:
     from rich.status import Status
 
 TRAJECTORY_FORMATS = (".json", ".csv", ".yaml", ".mcap")
-PAGE_FORMATS = (".html", ".htm")
 # [s]; a spinner appears only after this time, because shorter tasks end before the message can be read.
 SPINNER_AFTER = 0.3
 RANDOM = "random"  # a seed that is drawn

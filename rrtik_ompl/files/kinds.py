@@ -141,6 +141,7 @@ KINDS = MappingProxyType(
             words=("dh",),
             endings=(".urdf", ".xacro", ".mjcf", ".xml"),
             also=("Camera",),
+            command="rrtik show {}",
         ),
         "Roadmap": Kind(
             "a roadmap",

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 from numpy.typing import ArrayLike
 
 from rrtik_ompl.base.errors import InputError, called, require
-from rrtik_ompl.files.text import write_text
+from rrtik_ompl.files.text import PAGE_FORMATS, check_target, file_name, write_text
 
 if TYPE_CHECKING:
     from rrtik_ompl.replanning.record import ReplanRun
@@ -85,6 +85,7 @@ def view(
     require(title, str | None, "title of a page")
     require(still, bool, "still")
     require(inline, bool | None, "inline")
+    check_target(None if html is None else file_name(html), PAGE_FORMATS)
 
     played = path.played() if isinstance(path, TaskPlan) else path  # a TaskPlan brings its own timing and proof
     text = page(shown, played, before=before, ghosts=ghosts, marks=marks, run=run, title=title, still=still)

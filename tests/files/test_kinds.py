@@ -8,6 +8,7 @@ import pytest
 
 import rrtik_ompl as rrtik
 from rrtik_ompl.base.lazy import public_values
+from rrtik_ompl.cli.app import COMMANDS
 from rrtik_ompl.files.kinds import KINDS, found, kind_of
 from rrtik_tests.marker_files import CAMERA, MAP
 
@@ -167,6 +168,20 @@ def test_a_file_of_another_kind_says_in_one_line_what_it_is(kind, name, other, m
         found(KINDS[other].value).load(file, **NEEDS.get(other, dict)())
     assert str(error.value).startswith(f"{file}: {KINDS[kind].what}, not {KINDS[other].what}; use {kind}.load(file)")
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("name", [name for name, kind in KINDS.items() if kind.command])
+def test_the_command_that_takes_a_kind_of_file_exists(name):
+    program, command, *_ = KINDS[name].command.split()
+    assert program == "rrtik"
+    assert command in COMMANDS
+
+
+def test_a_robot_in_the_place_of_a_problem_is_named_with_the_command_that_takes_it(tmp_path):
+    file = tmp_path / "arm.urdf"
+    file.write_text(URDF)
+    with pytest.raises(rrtik.InputError, match=r"a robot, not a problem; .* or rrtik show arm\.urdf"):
+        rrtik.load_problem(file)
 
 
 @pytest.mark.parametrize("load", [rrtik.load_problem, rrtik.load_scene, rrtik.load_robot])

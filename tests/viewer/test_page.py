@@ -70,6 +70,13 @@ def test_a_folder_that_does_not_exist_is_named(crane: Robot, tmp_path: Path) -> 
         view(crane, html=tmp_path / "nowhere" / "view.html")
 
 
+@pytest.mark.parametrize("name", ["view.pdf", "view.png", "view"])
+def test_a_page_is_not_written_to_a_file_of_another_kind(crane: Robot, tmp_path: Path, name: str) -> None:
+    with pytest.raises(InputError, match=r"unknown ending.*use \.html, \.htm"):
+        view(crane, html=tmp_path / name)
+    assert not (tmp_path / name).exists()
+
+
 def test_a_page_is_made_without_an_import_of_meshcat_or_of_what_it_brings() -> None:
     command = "import sys; from rrtik_ompl import Scene; from rrtik_ompl.viewer.page import page; page(Scene())"
     command += "; print({'meshcat', 'IPython', 'zmq', 'tornado'} & set(sys.modules))"
