@@ -32,9 +32,7 @@ from rrtik_ompl.model.robot import Robot
 SLIDING_MARGIN = 1e-3  # [m] range beyond the limits of prismatic joints that the tables cover
 LOOKS = 64  # configurations by which it is told how often covers meet
 OFTEN = 0.1  # share of these, from which on balls tell too little of two links
-MOST_PIECES = (
-    32  # pairs of convex pieces of two links, up to which their cells are found in a few hundredths of a second
-)
+MOST_PIECES = 32  # pairs of convex pieces of two links; their cells are then found in a few hundredths of a second
 NO_SPHERES = np.empty((0, 4))
 
 Spheres = tuple[Matrix, Matrix]  # outer and inner cover of a body: centre and radius, shape (n, 4) [m]
