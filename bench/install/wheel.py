@@ -157,7 +157,7 @@ def imports(report: Report, python: Path) -> None:
 def first_command(report: Report, python: Path, folder: Path) -> None:
     """README's first command, with an empty cache; whether it compiles a kernel, and how large its page is."""
     command = [str(python.with_name("rrtik")), *FIRST_COMMAND]
-    environment = {**os.environ, "XDG_CACHE_HOME": str(folder / "cache")}
+    environment = own_environment(XDG_CACHE_HOME=str(folder / "cache"))
     spent, done = of_children(
         lambda: subprocess.run(command, env=environment, cwd=folder, capture_output=True, text=True, check=True)
     )
@@ -170,11 +170,17 @@ def first_command(report: Report, python: Path, folder: Path) -> None:
 
 def measured(python: Path, line: str) -> tuple[float, float]:
     """Processor time [s] and memory [MB] of a process that runs a line."""
-    done = subprocess.run([str(python), "-c", line + MEASURE], capture_output=True, text=True, check=True)
+    command = [str(python), "-c", line + MEASURE]
+    done = subprocess.run(command, env=own_environment(), capture_output=True, text=True, check=True)
     time, memory = done.stdout.split()
     return float(time), float(memory)
 
 
 def run(command: Sequence[str], **environment: str) -> float:
     """Run a command to its end; its processor time [s]."""
-    return of_children(lambda: subprocess.run(command, check=True, env={**os.environ, **environment}))[0]
+    return of_children(lambda: subprocess.run(command, check=True, env=own_environment(**environment)))[0]
+
+
+def own_environment(**more: str) -> dict[str, str]:
+    """The variables of this process and some more, but for the folders in which Python would find this checkout."""
+    return {name: value for name, value in os.environ.items() if name != "PYTHONPATH"} | more

@@ -210,6 +210,7 @@ def test_a_cloud_with_the_arm_in_it_is_told_with_the_remedy():
         rrtik.Problem(World(robot, Scene([Obstacle("scan", cloud)])), start, start)
 
 
+@pytest.mark.kernels
 def test_a_cloud_that_is_moved_is_where_it_is_now():
     robot = rrtik.load_robot("ur5")
     rng = np.random.default_rng(12)
