@@ -128,6 +128,7 @@ def test_the_error_of_one_configuration_is_that_of_many(name):
         np.testing.assert_allclose(one, np.transpose(goal.errors(robot, Q)), rtol=0, atol=ROUNDING)
 
 
+@pytest.mark.kernels
 def test_an_answer_that_misses_the_goal_is_not_returned(monkeypatch):
     """The solver's own word is not enough: the tip is placed anew, by Pinocchio."""
     robot = rrtik.load_robot("panda")
