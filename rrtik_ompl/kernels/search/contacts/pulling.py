@@ -20,7 +20,6 @@ WORK = 130.0  # in proofs of free motions
 LEAST_GAIN = 1e-2  # share of the length, see the table
 FEWEST_CONTACTS, MOST_CONTACTS = 32, 128  # that there is room for
 WORK_PER_CALL = 500  # of the kernel, about 10 ms, until the caller may stop it
-UNLIMITED = 1e18
 
 
 class Pulling:
