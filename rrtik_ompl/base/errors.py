@@ -218,7 +218,7 @@ def listed(values: object, what: str, most: int = MOST_MEMBERS) -> tuple[Any, ..
     """
     if isinstance(values, str) or not isinstance(values, Iterable) or getattr(values, "ndim", 1) == 0:
         raise InputError(f"{what} must be a list, got {type(values).__name__}")
-    members = tuple(islice(values, most + 1))
+    members = values if type(values) is tuple else tuple(islice(values, most + 1))
     if len(members) > most:
         raise InputError(f"{what}: more than the {most} members that are allowed")
     return members

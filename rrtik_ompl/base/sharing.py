@@ -16,7 +16,8 @@ PLAIN = {str, int, float, bool, type(None)}
 class Shared(Generic[Part]):
     """A cache of objects ("parts") by the arguments they are made of; a part stays as long as somebody refers to it.
 
-    Arguments are equal if they are the same object, equal numbers or texts, or tuples of equal members. A part with a
+    Arguments are equal if they are the same object, equal numbers or texts, tuples of equal members, or objects whose
+    attributes ``made_of`` are equal. A part with a
     method ``for_thread`` serves one thread at a time: every other thread gets its own copy, made by that method.
 
     Args:
@@ -78,4 +79,6 @@ def _key(value: object) -> Hashable:
     kind = type(value)
     if kind is tuple:
         return tuple([_key(member) for member in value])  # type: ignore[attr-defined]
-    return (kind, value) if kind in PLAIN else id(value)
+    if kind in PLAIN:
+        return (kind, value)
+    return getattr(value, "made_of", None) or id(value)

@@ -245,9 +245,10 @@ def held_region(robot: Robot, scene: Scene, region: TaskRegion, label: str) -> H
     T_joint_d = (T_joint_frame * region.T_w_tip.inverse()).homogeneous.copy()
     T_joint_d[:3, :3] = T_joint_d[:3, :3] @ after
 
-    carried = [(joint, T_joint_d[:3, 3], 0.0)]
     somewhere = bool((np.abs(region.bounds[:3]) < ANYWHERE).any())
-    levers = joint_weights(robot, carried) if joint and somewhere else np.zeros(len(robot.chain.parent))
+    levers = np.zeros(len(robot.chain.parent))
+    if joint and somewhere:
+        levers = joint_weights(robot, joint, T_joint_d[:3, 3], 0.0)
 
     turns = np.zeros(len(robot.chain.parent))
     rows = _rows_to(robot, joint)

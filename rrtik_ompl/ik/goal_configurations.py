@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from copy import copy
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -248,6 +249,10 @@ class GoalSearch:
         if round_number == 0 and _leaves_joints_free(robot, goal):
             return _with_nearer_ones(robot, goal, found, problem.start)
         return found
+
+    def reason_now(self) -> Callable[[], str]:
+        """Return a function that computes what `reason` is now, as it takes long; later rounds do not change it."""
+        return partial(getattr, copy(self), "reason")
 
     @property
     def reason(self) -> str:

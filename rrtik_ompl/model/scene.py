@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Hashable, Iterable
 from dataclasses import dataclass, replace
 from typing import TypeAlias
 
@@ -343,6 +343,16 @@ class Scene:
 
     def __repr__(self) -> str:
         return f"Scene({', '.join(self.names) or 'empty'})"
+
+    @property
+    def made_of(self) -> Hashable:
+        """What is equal for scenes that have the same obstacles and objects, and equal contacts and allowed pairs.
+
+        An empty scene has nothing in common with another one.
+        """
+        if not self.obstacles and not self.attached:
+            return id(self)
+        return id(self.obstacles), id(self.attached), self.allowed_collisions, self.contacts
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
+from typing import TypeAlias
 
 import numpy as np
 
@@ -28,6 +29,7 @@ from rrtik_ompl.tasks.stages import Alternatives, Attach, Detach, Gripper, MoveT
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
 
+Reason: TypeAlias = str | Callable[[], str]  # why a step has failed; a function where it takes long to find out
 TOLERANCE = Tolerance(DEVIATION, TURN_DEVIATION)
 THOROUGH = 1  # first round of the search in which straight lines are tried in all ways that a redundant arm has
 WHOLE = 1.0  # share of a line that is followed completely
@@ -115,13 +117,13 @@ class Expander:
     Attributes:
         rng: Random number generator for inverse kinematics.
         seed: Seed of the search along straight lines.
-        failures: Failed steps, in order: the branch, the step and the reason.
+        failures: Failed steps, in order: the branch, the step, and the reason, which is read if the whole task fails.
         choices: Goals of the tip for which more configurations may be found.
     """
 
     rng: np.random.Generator
     seed: int
-    failures: list[tuple[Branch, Step, str]] = field(default_factory=list)
+    failures: list[tuple[Branch, Step, Reason]] = field(default_factory=list)
     choices: list[Choices] = field(default_factory=list)
 
     def after(self, branch: Branch) -> Iterator[Branch]:
@@ -181,9 +183,10 @@ class Expander:
         Contacts at the goal, of things that are taken or set down there, are only allowed if no configuration is free
         without them.
         """
+        reason: Reason
         try:
             choices = self._choices(branch, branch.after, stage)
-            reason = choices.search.reason
+            reason = choices.search.reason_now()
         except ProblemError as error:
             choices = None
             reason = str(error)
@@ -192,9 +195,8 @@ class Expander:
             arriving = branch.after.arriving(may_touch(branch.after.world, branch.rest[1:]))
             if arriving is not branch.after:
                 choices = self._choices(branch, arriving, stage)
-                reason = choices.search.reason
-
-        if reason:
+                reason = choices.search.reason_now()
+        if choices is None or not len(choices.search.rows):
             self.failures.append((branch, step, reason))
         if choices is not None:
             if choices.more:
@@ -228,7 +230,8 @@ class Expander:
     def _after_line(self, branch: Branch, step: Step, stage: Straight) -> Iterator[Branch]:
         """Yield the branch at the end of a straight line of the tip; if it is not reached, the reason is noted."""
         world = branch.after.world
-        if touching := world.explain(branch.q):
+        # The line is proven next, by the tables of the same prover; the checks of collisions need others.
+        if not world.motion_proven(branch.q, branch.q) and (touching := world.explain(branch.q)):
             self.failures.append((branch, step, f"it cannot begin: {touching}; move it or allow the pair"))
             return
 
@@ -250,7 +253,7 @@ class Expander:
             self.failures.append((branch, step, followed.fault))
             return
 
-        setting_left = setting.with_contacts_only(followed.lasting)
+        setting_left = setting.with_contacts_only(followed.lasting, followed.world)
         contacts = followed.contacts
         yield _following_branch(
             branch, step, setting, path.end, followed.path, setting_left=setting_left, contacts=contacts

@@ -209,7 +209,7 @@ class FollowedContacts:
         lasting: The contacts that remain at its end.
         fault: "" if all things that parted stay apart, otherwise what touches again; the path then ends where the two
             have parted.
-        world: If there is a fault, the world at the end of the path, without the contact that has ended there.
+        world: The world at the end of the path, without the contacts that have ended; None if none has.
     """
 
     path: JointPath
@@ -258,6 +258,7 @@ def follow_contacts(
             later_distance = None if following is None else following.distance
             contacts.append(MotionContact(contact, waypoint_of_place[place], later_distance, of_grasp))
 
+    world_after = None
     for until in sorted(set(waypoint_of_place.values())):
         world_after = world_from(world, contacts, until)
         if violations := violations_of(world_after.checks, rows[until:]):
@@ -272,7 +273,7 @@ def follow_contacts(
     contacts_left = contacts_from(contacts, len(rows))
     lasting = tuple(contact for contact in contacts_left if end_contact_of_pair.get(contact.pair) != contact)
     stood_on = tuple(motion_contact for motion_contact in contacts if motion_contact.until != 0)
-    return FollowedContacts(new_path, stood_on, lasting)
+    return FollowedContacts(new_path, stood_on, lasting, world=world_after)
 
 
 def contacts_from(contacts: Iterable[MotionContact], number: int) -> tuple[Touching, ...]:

@@ -18,6 +18,7 @@ import pinocchio as pin
 from rrtik_ompl.base.arrays import Vector
 from rrtik_ompl.description.catalog import robot_from_entry
 from rrtik_ompl.geometry.collision.bodies import DISTANCE_TOLERANCE, Body, kept_apart
+from rrtik_ompl.geometry.collision.body_arrays import body_arrays
 from rrtik_ompl.geometry.collision.containment import Containment
 from rrtik_ompl.geometry.collision.distances import measured
 from rrtik_ompl.geometry.collision.solids import around
@@ -54,9 +55,8 @@ def finger_motion(before: Setting, after: Setting, q: Vector, things_taken: Sequ
     """
     bodies_before = before.world.bodies
     bodies_after = after.world.bodies
-    moving = {
-        k for k in range(len(bodies_before)) if not _same_pose(bodies_before[k].placement, bodies_after[k].placement)
-    }
+    placements, others = (body_arrays(bodies).placements for bodies in (bodies_before, bodies_after))
+    moving = set(np.flatnonzero(np.abs(placements - others).max(axis=(1, 2)) > SAME).tolist())
     if not moving:
         return FingerMotion()
     if not _on_screws(before.robot, after.robot):
@@ -64,10 +64,16 @@ def finger_motion(before: Setting, after: Setting, q: Vector, things_taken: Sequ
 
     note = _pressed_in(before, after, q, moving, things_taken)
     frames = before.robot.joint_frames(q[None])[0]
+    pairs = []
     for i, j in before.world.pairs:
         names = {bodies_before[i].name, bodies_before[j].name}
-        if not {i, j} & moving or not names & set(before.scene.names) or names & set(things_taken):
-            continue
+        if {i, j} & moving and names & set(before.scene.names) and not names & set(things_taken):
+            pairs.append((i, j))
+
+    speeds = np.zeros(len(bodies_before))
+    for k in moving:
+        speeds[k] = _speed(bodies_before[k], _twist(bodies_before[k], bodies_after[k]))
+    for i, j in _not_far_apart(bodies_before, pairs, frames, speeds):
         motion = PairMotion((bodies_before[i], bodies_before[j]), (bodies_after[i], bodies_after[j]), frames)
         if not motion.apart():
             names_in_order = " and ".join(f"'{body.name}'" for body in (bodies_before[i], bodies_before[j]))
@@ -123,7 +129,7 @@ class PairMotion:
     def __init__(self, first: tuple[Body, Body], last: tuple[Body, Body], frames: Vector) -> None:
         self._first = first
         self._frames = frames
-        self._twists = [pin.log6(a.placement.actInv(b.placement)).vector for a, b in zip(first, last, strict=True)]
+        self._twists = [_twist(a, b) for a, b in zip(first, last, strict=True)]
         self._speed = sum(_speed(body, twist) for body, twist in zip(first, self._twists, strict=True))
         self._required_distance = kept_apart(*first)
         # A thing that the fingers release may continue to touch them, but hardly deeper.
@@ -169,6 +175,42 @@ class PairMotion:
             first, second = (replace(body, geometry=around(body.geometry)) for body in bodies)
             bodies = first, second
         return next(measured(bodies, [(0, 1)], self._frames, near_only=False)).distance
+
+
+def _not_far_apart(
+    bodies: Sequence[Body], pairs: Sequence[tuple[int, int]], frames: Vector, speeds: Vector
+) -> list[tuple[int, int]]:
+    """Return the pairs of bodies that a motion may bring together, by the boxes around them.
+
+    Args:
+        bodies: All bodies, where they are before the motion.
+        pairs: Pairs of their numbers.
+        frames: Poses of all joint frames, shape (joints + 1, 4, 4).
+        speeds: How far each body moves at most [m], shape (n,).
+    """
+    if not pairs:
+        return []
+    arrays = body_arrays(bodies)
+    poses = frames[arrays.joints] @ arrays.placements
+    turns = poses[:, :3, :3]
+    centres = np.einsum("nij,nj->ni", turns, arrays.centres) + poses[:, :3, 3]
+    radii = np.linalg.norm(arrays.halves, axis=1)
+    numbers = np.array(pairs)
+
+    # The ball around one body is apart from the box around the other.
+    gaps = []
+    for one, other in (numbers.T, numbers.T[::-1]):
+        place = np.einsum("nji,nj->ni", turns[other], centres[one] - centres[other])
+        gaps.append(np.linalg.norm(np.maximum(np.abs(place) - arrays.halves[other], 0.0), axis=1) - radii[one])
+    required = np.maximum(arrays.kept_apart(numbers), CONTACT_GAP) + speeds[numbers].sum(axis=1) + DISTANCE_TOLERANCE
+    return [pair for pair, near in zip(pairs, np.max(gaps, axis=0) <= required, strict=True) if near]
+
+
+def _twist(first: Body, last: Body) -> Vector:
+    """Return the screw from the place of a body to another one, shape (6,)."""
+    if first.placement == last.placement:
+        return np.zeros(6)
+    return np.asarray(pin.log6(first.placement.actInv(last.placement)).vector)
 
 
 def _speed(body: Body, twist: Vector) -> float:

@@ -115,7 +115,8 @@ class TaskSearch:
         """Return why nothing was found: which steps failed, the latest stage first, how often, and for example why."""
         failures = self._expander.failures
         failures_of_step: dict[str, tuple[Step, Counter[str]]] = {}
-        for _, step, text in failures:
+        for _, step, reason in failures:
+            text = reason if isinstance(reason, str) else reason()
             failures_of_step.setdefault(step.number, (step, Counter()))[1][text] += 1
 
         latest_first = sorted(
@@ -243,7 +244,7 @@ class TaskSearch:
             world = world_of_motion(path, setting.world, link.step.stage)
             followed = follow_contacts(path, world, setting.grasp_pairs, link.arriving)
             # The path now ends where two things have parted that would touch again later.
-            if followed.world is not None:
+            if followed.fault and followed.world is not None:
                 detour = self._path_from_parting(link, followed.world, followed.path.end, path.end, effort)
                 if detour is None:
                     return False

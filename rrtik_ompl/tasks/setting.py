@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from rrtik_ompl.base.arrays import Vector
 from rrtik_ompl.base.errors import InputError, listed
+from rrtik_ompl.base.kept import kept_with
 from rrtik_ompl.description.catalog import robot_from_entry
 from rrtik_ompl.model.goal_kind import TaskRegion
 from rrtik_ompl.model.path import JointPath
@@ -76,9 +77,14 @@ class Setting:
         """Return the same robot in another scene."""
         return Setting(self._first_world, self.robot, scene, self.grasp_pairs)
 
-    def with_contacts_only(self, contacts: tuple[Touching, ...]) -> Setting:
-        """Return the same setting with exactly these contacts."""
-        return self if contacts == self.scene.contacts else self.with_scene(replace(self.scene, contacts=contacts))
+    def with_contacts_only(self, contacts: tuple[Touching, ...], world: World | None = None) -> Setting:
+        """Return the same setting with exactly these contacts; a world that has them may be known already."""
+        if contacts == self.scene.contacts:
+            return self
+        setting = self.with_scene(replace(self.scene, contacts=contacts))
+        if world is not None and world.scene.made_of == setting.scene.made_of:
+            setting.world = world
+        return setting
 
     def after(self, stage: Attach | Detach | Gripper, q: Vector) -> Setting:
         """Return the setting after a stage that the arm does at a configuration.
@@ -150,6 +156,7 @@ def world_of_motion(path: JointPath, world: World, stage: Stage) -> World:
     return Problem(world, path.start, path.end, constraints=stage.constraints).world
 
 
+@kept_with
 def with_gripper(robot: Robot, stage: Gripper) -> Robot:
     """Return the same robot with its fingers held elsewhere.
 

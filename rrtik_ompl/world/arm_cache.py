@@ -1,9 +1,9 @@
 """Data that all worlds of a robot share, so that a new scene does not cost the arm's part again.
 
 Kept for each robot are what depends on nothing else, the sphere covers and the placed solids of its links, and the
-tables that were packed last. A new world takes over the arm's part of these (joints, balls and solids) if the same
-pairs of the arm are checked. The cache never changes tables that it shares. A moving world, whose obstacles are moved
-in place, shares only the arm's part.
+arm's part of the tables that were packed last (joints, balls and solids). A new world takes over one of these if it has
+the same bodies, of which the same pairs are checked. The cache never changes tables that it shares. A moving world,
+whose obstacles are moved in place, shares only the arm's part.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.base.kept import kept_with
 from rrtik_ompl.geometry.collision.bodies import Body, link_bodies, pair_array
 from rrtik_ompl.geometry.collision.bodies import Pairs as Pairs
-from rrtik_ompl.geometry.collision.solids import of_each
+from rrtik_ompl.geometry.collision.solids import of_each, once_per_geometry
 from rrtik_ompl.kernels import FastWorld, needs_covers
 from rrtik_ompl.kernels.covers.cache import cached_inner_spheres, cached_outer_cover
 from rrtik_ompl.kernels.proof.groups import Members
@@ -29,7 +29,7 @@ from rrtik_ompl.kernels.proof.placed import PlacedBodies, bodies_in_place
 from rrtik_ompl.kernels.proof.rows import PROOF_KERNELS
 from rrtik_ompl.kernels.simd.library import library
 from rrtik_ompl.kernels.tables.neighbour_tables import Cells
-from rrtik_ompl.kernels.tables.packing import alike, partners
+from rrtik_ompl.kernels.tables.packing import ArmTables, alike, partners
 from rrtik_ompl.kernels.tables.robot_tables import usable_cover
 from rrtik_ompl.kernels.tables.solid_tables import convex_solids
 from rrtik_ompl.model.robot import Robot
@@ -38,13 +38,14 @@ SLIDING_MARGIN = 1e-3  # [m] range beyond the limits of prismatic joints that th
 LOOKS = 64  # configurations by which it is told how often covers meet
 OFTEN = 0.1  # share of these, from which on balls tell too little of two links
 MOST_PIECES = 32  # pairs of convex pieces of two links; their cells are then found in a few hundredths of a second
+KEPT_ARMS = 8  # tables of an arm: empty-handed, with each thing that it takes, with its fingers open or closed
 NO_SPHERES = np.empty((0, 4))
 
 Spheres = tuple[Matrix, Matrix]  # outer and inner cover of a body: centre and radius, shape (n, 4) [m]
 
 
 class ArmCache:
-    """The covers of a robot's links and the tables that were packed last for one of its worlds.
+    """The covers of a robot's links and the arm's part of the tables that were packed last for its worlds.
 
     Made by :func:`arm_cache`, one for each robot.
 
@@ -56,7 +57,7 @@ class ArmCache:
         self._robot = robot
         self.covers: tuple[Spheres, ...] = tuple(_spheres(body) for body in link_bodies(robot))
         self._cells: dict[Pairs, dict[tuple[int, int], Cells]] = {}  # of the pairs of links that a world has
-        self._latest: FastWorld | None = None
+        self._arms: list[ArmTables] = []  # of the arm with what it has held, the latest first
 
     def links_of(self, bodies: Sequence[Body]) -> PlacedBodies | None:
         """Return the links' convex solids as tables of proofs have them.
@@ -160,7 +161,7 @@ class ArmCache:
             bodies: The bodies; those of the robot's links first.
             pairs: Pairs of indices into ``bodies`` that must not touch.
             covers: See :meth:`covers_of`.
-            share: Whether to reuse the arm's part of the tables packed last, and to keep the new tables for reuse.
+            share: Whether to reuse the arm's part of tables packed before, and to keep that of the new ones for reuse.
         """
         tables = FastWorld(
             self._robot.chain,
@@ -171,10 +172,11 @@ class ArmCache:
             solids=of_each((body.geometry for body in bodies), convex_solids),
             strokes=strokes(self._robot),
             cells=self.cells(bodies, pairs),
-            like=self._latest if share else None,
+            like=tuple(self._arms) if share else (),
         )
         if share:
-            self._latest = tables
+            others = [each for each in self._arms if each is not tables.arm]
+            self._arms = [tables.arm, *others[: KEPT_ARMS - 1]]
         return tables
 
 
@@ -187,9 +189,14 @@ def arm_cache(robot: Robot) -> ArmCache:
 def _spheres(body: Body) -> Spheres:
     outer, inner = needs_covers(body)
     return (
-        cached_outer_cover(body.geometry) if outer else NO_SPHERES,
-        cached_inner_spheres(body.geometry) if inner else NO_SPHERES,
+        _outer_cover(body.geometry) if outer else NO_SPHERES,
+        _inner_spheres(body.geometry) if inner else NO_SPHERES,
     )
+
+
+# Files are read, and covers made, once for each geometry.
+_outer_cover = once_per_geometry(cached_outer_cover)
+_inner_spheres = once_per_geometry(cached_inner_spheres)
 
 
 def strokes(robot: Robot) -> Vector:

@@ -23,7 +23,7 @@ from rrtik_ompl.geometry.collision.bodies import (
     link_bodies,
     scene_bodies,
 )
-from rrtik_ompl.geometry.collision.bodies import in_contact as with_contacts
+from rrtik_ompl.geometry.collision.bodies import in_contact as bodies_in_contact
 from rrtik_ompl.geometry.collision.body_arrays import BodyArrays, body_arrays
 from rrtik_ompl.geometry.collision.certificate import fixed_contact
 from rrtik_ompl.geometry.collision.containment import Containment
@@ -48,6 +48,7 @@ class Arrangement:
         checked: Pairs of which at least one body moves and that must not overlap at all.
         in_contact: Pairs of which at least one body moves and that may overlap to a given depth. That they do not
             overlap deeper is proven; the collision kernels ignore them.
+        standing: Pairs of which both bodies never move.
         weights: No point of the arm moves farther than ``weights @ |b - a|`` [m] from a to b, shape (dof,).
         always_colliding: Whether two bodies that never move touch.
         self_margin: Distance that links and attached objects must keep from each other [m].
@@ -57,6 +58,7 @@ class Arrangement:
         numbers: Computes on first call the indices of obstacles and their bodies, which do not depend on poses.
         arrays: The bodies as arrays.
         doubts: Warnings about the description that were not given yet.
+        bare: The same arrangement without contacts; None if there are none, or if it is not known.
     """
 
     robot: Robot
@@ -65,6 +67,7 @@ class Arrangement:
     pairs: Pairs
     checked: Pairs
     in_contact: Pairs
+    standing: Pairs
     weights: Vector
     always_colliding: bool
     self_margin: float
@@ -73,6 +76,7 @@ class Arrangement:
     numbers: Once[Numbers]
     arrays: BodyArrays  # referenced here, so that the cache of body_arrays keeps them
     doubts: list[str] = field(default_factory=list)
+    bare: Arrangement | None = None
 
     @cached_property
     def moving(self) -> Pairs:
@@ -111,6 +115,7 @@ class Arrangement:
             self,
             scene=exchanged(self.scene, index, obstacle),
             bodies=bodies,
+            bare=None,
             always_colliding=_touching(self.robot, bodies, pairs_at_rest),
         )
         return other, tuple(placements)
@@ -143,30 +148,54 @@ def arranged(robot: Robot, scene: Scene, self_margin: float) -> Arrangement:
     Raises:
         InputError: If the scene does not fit the robot.
     """
-    solids = link_bodies(robot, self_margin) + scene_bodies(robot, scene.at(0.0), self_margin)
-    bodies = Items(with_contacts(robot, scene, solids))
+    bodies = Items(link_bodies(robot, self_margin) + scene_bodies(robot, scene.at(0.0), self_margin))
     pairs = colliding_pairs(robot, scene, bodies.as_tuple)
-
     moving, standing = by_motion(bodies, pairs)
-    arrays = body_arrays(bodies.as_tuple)
-    in_contact = tuple(pair for pair in moving if pair in arrays.contacts) if arrays.contacts else ()
-    checked = tuple(pair for pair in moving if pair not in arrays.contacts) if arrays.contacts else moving
 
-    return Arrangement(
+    bare = Arrangement(
         robot,
         scene,
         bodies,
         pairs,
-        checked,
-        in_contact,
+        checked=moving,
+        in_contact=(),
+        standing=standing,
         weights=displacement_weights(robot, [body for body in bodies if body.kind != "obstacle"]),
         always_colliding=fixed_contact(robot, bodies.as_tuple, standing) is not None,
         self_margin=self_margin,
         covers=Once(arm_cache(robot).covers_of, bodies),
-        approaches=Once(_approaches, robot, bodies, checked),
+        approaches=Once(_approaches, robot, bodies, moving),
         numbers=Once(Numbers.of, scene.obstacles, bodies, standing),
-        arrays=arrays,
+        arrays=body_arrays(bodies.as_tuple),
         doubts=list(_doubts(robot, scene)),
+    )
+    return with_contacts(bare, scene) if scene.contacts else bare
+
+
+def with_contacts(bare: Arrangement, scene: Scene) -> Arrangement:
+    """Return an arrangement with the contacts of a scene, from that of the same scene without contacts.
+
+    Raises:
+        UnknownNameError, InputError: If the contacts do not fit, see :func:`~.bodies.in_contact`.
+    """
+    robot = bare.robot
+    bodies = Items(bodies_in_contact(robot, scene, bare.bodies.as_tuple))
+    arrays = body_arrays(bodies.as_tuple)
+    checked = tuple(pair for pair in bare.checked if pair not in arrays.contacts)
+    always_colliding = bare.always_colliding
+    if any(pair in arrays.contacts for pair in bare.standing):
+        always_colliding = fixed_contact(robot, bodies.as_tuple, bare.standing) is not None
+
+    return replace(
+        bare,
+        scene=scene,
+        bodies=bodies,
+        checked=checked,
+        in_contact=tuple(pair for pair in bare.checked if pair in arrays.contacts),
+        always_colliding=always_colliding,
+        approaches=Once(_approaches, robot, bodies, checked),
+        arrays=arrays,
+        bare=bare,
     )
 
 

@@ -59,6 +59,8 @@ class Prover:
         constraints: Path constraints that a motion must keep as well; None if there are none.
         tables: The kernels' tables, made when they are first needed.
         kin: An object shared by all provers that accept each other's proofs.
+        bare: The prover of the same bodies without contacts, whose tables are the same but for a few numbers; None if
+            there are no contacts, or if it is not known.
     """
 
     robot: Robot
@@ -69,6 +71,7 @@ class Prover:
     constraints: HeldRegions | None = None
     tables: TakenProof = field(default_factory=TakenProof)
     kin: object = field(default_factory=object)
+    bare: Prover | None = None
     _coal: CoalProof | None = None
 
     _fixed: ClassVar[bool] = True  # whether obstacles stay at their poses
@@ -89,8 +92,9 @@ class Prover:
             numbers: Indices of the bodies that were moved.
             always_colliding: Whether two bodies that never move touch.
         """
-        tables = self.tables.take(numbers)
-        return replace(self, bodies=bodies, always_colliding=always_colliding, tables=tables, kin=object())
+        # Tables that are shared with those without contacts are not changed.
+        tables = self.tables.take(numbers) if self.bare is None else TakenProof()
+        return replace(self, bodies=bodies, always_colliding=always_colliding, tables=tables, kin=object(), bare=None)
 
     @property
     def digest(self) -> str:
@@ -195,6 +199,11 @@ class Prover:
         if not self.always_colliding:
             self.tables.get(self.bodies, self._new_table)
 
+    def lent_table(self) -> ProofPairs | None:
+        """Return the table with memory of its own to compute in; None if another prover has taken it."""
+        self.tables.get(self.bodies, self._new_table)
+        return self.tables.for_thread(self.bodies).packed
+
     def still_proven(self, rows: Matrix, *, clearance: float) -> Mask:
         """Return which configurations, shape (m, dof), are proven free with a clearance [m], shape (m,).
 
@@ -257,33 +266,34 @@ class Prover:
             return [Gap(k, float("nan"), "", "") for k in range(count)]
 
         packed = self._packed_for(*distances)
-        by_coal = self._coal_proof(packed)
         pairs = np.full(count, NOT_LOOKED_AT, dtype=np.int32)
         places = np.full(count, np.nan)
         prove = proof_of_rows(packed, tails, heads, pairs, places)
 
-        # Let the kernels prove all motions in batches, as long as there is time.
-        looked_at = 0
-        open_count = 0
+        # Let the kernels prove all motions in batches, as long as there is time. They begin with the planes that have
+        # proven the motion before, and in contact with the normals at the first motion.
         at_once = MOTIONS_AT_ONCE if seconds is None or library(PROOF_KERNELS) is not None else FEW_AT_ONCE
-        batch = 1 if packed.touching else at_once  # the planes of contacts differ from motion to motion
-        for first in range(0, count, batch):
+        for first in range(0, count, at_once):
             if first > 0 and seconds is not None and time.monotonic() - begin > seconds:
                 break
-            if packed.touching:
-                suggest_planes(self.robot, self.bodies, packed, np.stack([rows[0][first], rows[1][first]]))
-            number = min(batch, count - first)
-            open_count += prove(first, number)
-            looked_at += number
+            if packed.touching and first == 0:
+                suggest_planes(self.robot, self.bodies, packed, np.stack([rows[0][0], rows[1][0]]))
+            prove(first, min(at_once, count - first))
+
+        # Where bodies in contact turn about each other, the normals of each motion are tried.
+        for k in np.flatnonzero(np.isin(pairs, packed.touching)).tolist() if packed.touching else ():
+            suggest_planes(self.robot, self.bodies, packed, np.stack([rows[0][k], rows[1][k]]))
+            prove(k, 1)
 
         # A proof outside the bound on rounding errors does not count.
         if sound is not None:
             pairs[~sound] = NOT_LOOKED_AT
             places[~sound] = np.nan
-        elif open_count == 0 and looked_at == count:
+        elif (pairs == PROVEN).all():
             return []
 
         # Try the motions that failed at a pair of links again with coal's distances.
+        by_coal = self._coal_proof(packed)
         for k in (k for k in np.flatnonzero(pairs >= 0).tolist() if by_coal.links[pairs[k]]):
             motion = np.stack([rows[0][k], rows[1][k]])
             by_coal.settle(motion, pairs[k : k + 1], places[k : k + 1], partial(prove, k, 1))
@@ -303,6 +313,10 @@ class Prover:
 
     def _new_table(self) -> ProofPairs:
         bodies = tuple(self.bodies)
+        without_contacts = None if self.bare is None else self.bare.lent_table()
+        if without_contacts is not None:
+            return without_contacts.with_contacts(bodies)
+
         solids = of_each((body.geometry for body in bodies), convex_solids)
         known = arm_cache(self.robot)
         table = proof_pairs(

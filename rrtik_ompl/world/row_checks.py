@@ -27,12 +27,19 @@ from rrtik_ompl.model.judgement import Contact
 from rrtik_ompl.model.robot import Robot, inside_limits
 from rrtik_ompl.model.scene import AttachedObject, Scene
 from rrtik_ompl.model.world_settings import WorldSettings
-from rrtik_ompl.world.arrangement import Arrangement, arranged
+from rrtik_ompl.world.arrangement import Arrangement, arranged, with_contacts
 from rrtik_ompl.world.exact_checks import ExactChecker, one_way
 from rrtik_ompl.world.proof import Prover
 
 if TYPE_CHECKING:
     from rrtik_ompl.world.distances import Ruler
+
+
+def _arranged(robot: Robot, scene: Scene, self_margin: float) -> Arrangement:
+    """Arrange the solids of a scene; those of a scene with contacts are those of the one without."""
+    if not scene.contacts:
+        return arranged(robot, scene, self_margin)
+    return with_contacts(ARRANGEMENTS.of(robot, changed(scene, contacts=()), self_margin), scene)
 
 
 def _prover_of(solids: Arrangement, constraints: HeldRegions | None) -> Prover:
@@ -49,6 +56,7 @@ def _prover_of(solids: Arrangement, constraints: HeldRegions | None) -> Prover:
         solids.moving,
         self_margin=solids.self_margin,
         always_colliding=always_colliding,
+        bare=None if solids.bare is None else PROVERS.of(solids.bare, None),
     )
 
 
@@ -67,7 +75,7 @@ def _ruler_of(solids: Arrangement) -> Ruler:
 
 
 # The parts of worlds, each with the values that it depends on. Worlds with equal values share a part.
-ARRANGEMENTS = Shared(arranged)  # robot, scene, self_margin
+ARRANGEMENTS = Shared(_arranged)  # robot, scene, self_margin
 CHECKERS = Shared(ExactChecker.of)  # arrangement, clearance
 PROVERS = Shared(_prover_of)  # arrangement, held regions
 HELD = Shared(_held_regions)  # robot, attached objects, regions
@@ -82,20 +90,27 @@ class RowChecks:
     Attributes:
         settings: The settings of the world.
         solids: Its bodies, and which of them must not touch.
-        checker: Checks for collisions.
         prover: Proves motions free.
         constraints: The path constraints; None if there are none.
     """
 
     settings: WorldSettings
     solids: Arrangement
-    checker: ExactChecker
     prover: Prover
     constraints: HeldRegions | None
 
     def for_thread(self) -> RowChecks:
         """Return the same checks for another thread."""
-        return replace(self, checker=self.checker.for_thread(), prover=self.prover.for_thread())
+        return replace(self, prover=self.prover.for_thread())
+
+    @cached_property
+    def checker(self) -> ExactChecker:
+        """The checks for collisions; made when something is checked, as many worlds are only asked for their bodies."""
+        return CHECKERS.of(self.solids, self._clearance)
+
+    @property
+    def _clearance(self) -> float:
+        return self.settings.clearance + self.settings.inflation
 
     @property
     def unheld(self) -> RowChecks:
@@ -116,11 +131,11 @@ class RowChecks:
         unheld_prover = PROVERS.of(self.solids, None)
         prover = unheld_prover.moved(solids.bodies, numbers, always_colliding=solids.always_colliding)
         PROVERS.keep(prover, solids, None)
-        checker = self.checker.moved(solids, numbers)
+        checks = checks_of(changed(settings, scene=solids.scene))
+        checker = self.checker.moved(solids, numbers) if "checker" in vars(self) else None
         if checker is not None:
-            CHECKERS.keep(checker, solids, checker.clearance)
-
-        return checks_of(changed(settings, scene=solids.scene))
+            vars(checks)["checker"] = CHECKERS.keep(checker, solids, checker.clearance)
+        return checks
 
     @cached_property
     def certificate(self) -> Certificate:
@@ -182,6 +197,8 @@ class RowChecks:
 
     def explain(self, q: Vector) -> str:
         """Return the reason why q, shape (dof,), is not valid; see :meth:`rrtik_ompl.World.explain`."""
+        if self.free(q[None])[0]:
+            return ""
         if limit_fault := self.settings.robot.limit_fault(q):
             return limit_fault
         if touching := self.contacts(q):
@@ -193,8 +210,6 @@ class RowChecks:
         if self.constraints is not None and (breach := self.constraints.explain(q)):
             return breach
 
-        if self.free(q[None])[0]:
-            return ""
         nearest = self.closest(q)
         return "it is not proven free" if nearest is None else f"{nearest}, too near to be told free"
 
@@ -264,9 +279,8 @@ def checks_of(settings: WorldSettings) -> RowChecks:
     while solids.doubts:  # each warning is given once
         warnings.warn(solids.doubts.pop(0), MeshWarning, stacklevel=3)
 
-    checker = CHECKERS.of(solids, settings.clearance + settings.inflation)
     constraints = HELD.of(robot, scene.attached, settings.constraints) if settings.constraints else None
-    return RowChecks(settings, solids, checker, PROVERS.of(solids, constraints), constraints)
+    return RowChecks(settings, solids, PROVERS.of(solids, constraints), constraints)
 
 
 def _and_more(contacts: tuple[Contact, ...]) -> str:

@@ -112,7 +112,9 @@ def test_worlds_of_the_same_values_share_what_depends_on_them():
     assert rrtik.World(robot, scene, clearance=0.02).fast is wide.fast
     assert world.proving().prover is world.prover
     assert world.with_clearance(0.03).with_clearance(0.0).fast is world.fast
-    assert rrtik.World(robot, rrtik.Scene(scene.obstacles)).fast is not world.fast
+    assert rrtik.World(robot, rrtik.Scene(scene.obstacles)).fast is world.fast
+    other = rrtik.Scene(scene.obstacles, allowed_collisions=[("link1", "ball")])
+    assert rrtik.World(robot, other).fast is not world.fast
 
 
 @pytest.mark.parametrize("first", ["exact", "conservative"])

@@ -95,7 +95,9 @@ def test_the_rows_of_a_box_are_those_that_packing_makes(queries, monkeypatch):
 
 
 def rows_after(world, pose):
-    table = world.with_scene(replace(world.scene)).moved("box", pose).checks.checker.fast.table
+    fresh = world.with_scene(replace(world.scene, obstacles=list(world.scene.obstacles)))
+    assert fresh.fast is not world.fast
+    table = fresh.moved("box", pose).checks.checker.fast.table
     scene = (table.outer_primitives, table.inner_primitives, table.standing_solids)
     return [array.copy() for each in scene for array in each.memory.arrays.values()]
 
@@ -103,6 +105,7 @@ def rows_after(world, pose):
 @pytest.mark.kernels
 def test_nothing_is_packed_anew(queries, monkeypatch):
     world = rrtik.World(queries[0], scene_of(20))
+    assert world.fast is not None  # the tables are made when they are first needed
     moved = world.moved("3", [0.5, 0.5, 0.5])
     monkeypatch.setattr(FastWorld, "__init__", None)
     for name in shapes(np.random.default_rng(0)):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,15 +22,9 @@ def displacement_weights(robot: Robot, bodies: Iterable[Body]) -> Vector:
     Returns:
         The weights [m per rad, or 1 for prismatic joints], shape (dof,).
     """
-    return _displacement_weights(robot, tuple(bodies))
-
-
-@kept_with
-def _displacement_weights(robot: Robot, bodies: tuple[Body, ...]) -> Vector:
-    """Return the weights of `displacement_weights`; cached, as all worlds of a robot share the bodies of its links."""
-    tip = robot.model.frames[robot.model.getFrameId(robot.tip)]
-    points = [*_balls(bodies), (tip.parentJoint, tip.placement.translation, 0.0)]
-    return frozen(np.abs(robot.chain.gain).T @ joint_weights(robot, points))
+    # Each joint's reach is that of the body it moves farthest.
+    weights = np.max([_tip_weights(robot), *(_body_weights(robot, body) for body in bodies)], axis=0)
+    return frozen(np.abs(robot.chain.gain).T @ weights)
 
 
 def approach_weights(robot: Robot, bodies: Sequence[Body], pairs: Sequence[tuple[int, int]]) -> Matrix:
@@ -47,51 +42,83 @@ def approach_weights(robot: Robot, bodies: Sequence[Body], pairs: Sequence[tuple
 
 
 @kept_with
+def _tip_weights(robot: Robot) -> Vector:
+    """Return the `joint_weights` of the tip."""
+    tip = robot.model.frames[robot.model.getFrameId(robot.tip)]
+    return frozen(joint_weights(robot, tip.parentJoint, tip.placement.translation, 0.0))
+
+
+@kept_with
 def _body_weights(robot: Robot, body: Body) -> Vector:
-    """Return the `joint_weights` of one body; cached, as all worlds of a robot share the bodies of its links."""
-    return frozen(joint_weights(robot, _balls([body])))
+    """Return the `joint_weights` of a ball around a body; cached, as all worlds of a robot share its links' bodies."""
+    geometry = body.geometry
+    return frozen(joint_weights(robot, body.joint, body.placement.act(geometry.aabb_center), geometry.aabb_radius))
 
 
-def _balls(bodies: Iterable[Body]) -> list[tuple[int, Vector, float]]:
-    """Return a ball around each body: the number of its joint, the centre in the joint's frame, and the radius [m]."""
-    return [(b.joint, b.placement.act(b.geometry.aabb_center), b.geometry.aabb_radius) for b in bodies]
+def joint_weights(robot: Robot, joint: int, centre: Vector, radius: float) -> Vector:
+    """Return for each joint how far a point of a ball moves at most per unit of the joint, shape (joints,).
 
-
-def joint_weights(robot: Robot, balls: list[tuple[int, Vector, float]]) -> Vector:
-    """Return for each joint how far a point of the balls moves at most per unit of the joint, shape (joints,).
-
-    For a revolute joint this is the largest distance that a point beyond the joint can have from its axis in any
-    configuration; for a prismatic joint it is 1, and for a joint that carries none of the balls 0. The distances are
-    propagated from the tip to the base: each is bounded by the length of the child's offset plus the reach beyond the
+    For a revolute joint this is the largest distance that a point of the ball can have from its axis in any
+    configuration; for a prismatic joint it is 1, and for a joint that does not carry the ball 0. The distances are
+    propagated from the ball to the base: each is bounded by the length of the child's offset plus the reach beyond the
     child.
 
     Args:
         robot: The robot.
-        balls: Number of the joint, centre in the joint's frame [m] and radius [m] of each ball.
+        joint: Number of the joint that carries the ball, from 1 on; 0 for the base.
+        centre: Its centre in the joint's frame [m], shape (3,).
+        radius: Its radius [m].
     """
     chain = robot.chain
-    count = len(robot.chain.parent)
-    around_origin = np.zeros(count)
-    around_axis = np.zeros(count)
-    carries = np.zeros(count, dtype=bool)
+    levers = _levers(robot)
+    weights = np.zeros(len(levers))
+    row = joint - 1
+    if row < 0:
+        return weights
 
-    # Children have higher numbers than their parents, so this order visits them first.
-    for k in range(count - 1, -1, -1):
-        axis = chain.axis[k]
-        for joint, centre, radius in balls:
-            if joint == k + 1:
-                carries[k] = True
-                around_origin[k] = max(around_origin[k], float(np.linalg.norm(centre)) + radius)
-                around_axis[k] = max(around_axis[k], _from_axis(centre, axis) + radius)
+    around_origin = float(np.linalg.norm(centre)) + radius
+    around_axis = _from_axis(centre, chain.axis[row]) + radius
+    while True:
+        lever = levers[row]
+        weights[row] = 1.0 if lever.slides else around_axis
+        if lever.parent < 0:
+            return weights
+        reach = around_origin + lever.stroke
+        around_origin = lever.length + reach
+        around_axis = lever.from_axis + reach
+        row = lever.parent
 
-        for child in (int(c) for c in np.flatnonzero((chain.parent == k) & carries)):
-            carries[k] = True
-            reach = around_origin[child] + (_stroke(robot, child) if chain.prismatic[child] else 0.0)
-            origin = chain.placement[child][:3, 3]
-            around_origin[k] = max(around_origin[k], float(np.linalg.norm(origin)) + reach)
-            around_axis[k] = max(around_axis[k], _from_axis(origin, axis) + reach)
 
-    return np.where(carries, np.where(chain.prismatic, 1.0, around_axis), 0.0)
+class _Lever(NamedTuple):
+    """What a joint adds to the reach of what it carries.
+
+    Attributes:
+        parent: Row of the joint before; negative if there is none.
+        slides: Whether the joint is prismatic.
+        stroke: Its largest distance from its zero position if it is, else 0 [m].
+        length: Distance of its origin from that of the joint before [m].
+        from_axis: Distance of its origin from the axis of the joint before [m].
+    """
+
+    parent: int
+    slides: bool
+    stroke: float
+    length: float
+    from_axis: float
+
+
+@kept_with
+def _levers(robot: Robot) -> tuple[_Lever, ...]:
+    """Return the lever of each joint of the chain."""
+    chain = robot.chain
+    levers = []
+    for row, parent in enumerate(chain.parent.tolist()):
+        origin = chain.placement[row][:3, 3]
+        slides = bool(chain.prismatic[row])
+        stroke = _stroke(robot, row) if slides else 0.0
+        from_axis = _from_axis(origin, chain.axis[parent]) if parent >= 0 else 0.0
+        levers.append(_Lever(parent, slides, stroke, float(np.linalg.norm(origin)), from_axis))
+    return tuple(levers)
 
 
 def _from_axis(point: Vector, axis: Vector) -> float:

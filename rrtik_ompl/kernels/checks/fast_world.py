@@ -8,7 +8,7 @@ covered by a margin, so the first two answers are certain.
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from types import MappingProxyType
 
 import numpy as np
@@ -71,7 +71,7 @@ class FastWorld:
         solids: For each body convex solids around and inside it; None leaves undecided what spheres do not decide.
         strokes: Largest value of sliding joints [m], a number or shape (joints,).
         cells: Of neighbours, by their numbers, the smaller one first, where they are apart; not used without kernels.
-        like: A world of the same arm in another scene: what has not changed is not packed again.
+        like: Tables of the same arm in other worlds (:attr:`arm`): what has not changed is not packed again.
         compiled: Whether to use the kernels; False for plain numpy.
 
     Raises:
@@ -89,7 +89,7 @@ class FastWorld:
         solids: Sequence[Solids] | None = None,
         strokes: ArrayLike = inputs.STROKE,
         cells: Mapping[tuple[int, int], Cells] = MappingProxyType({}),
-        like: FastWorld | None = None,
+        like: Iterable[ArmTables] = (),
         compiled: bool = True,
     ) -> None:
         self._joints = len(chain.parent)
@@ -101,11 +101,10 @@ class FastWorld:
         standing = [k for k in distinct(pair_array(kept)).tolist() if bodies[k].joint == 0]
         self._pairs = kept
         solids = [NO_SOLIDS] * len(bodies) if solids is None else solids
-        same = like._arm if like is not None and like._joints == self._joints else None
         self._kernels = library("checks.check_kernels") if compiled else None
         near = {} if self._kernels is None else looked_up(bodies, moving, kept, cells)
         self._arm: ArmTables = arm_tables(
-            chain, bodies, moving, kept, outer, inner, solids, self._limits, looked_up=near, like=same
+            chain, bodies, moving, kept, outer, inner, solids, self._limits, looked_up=near, like=like
         )
         self._checked = checked_table(moving, standing, clear, near)
         self._primitives = standing_tables(bodies, standing, self._checked, outer, inner)
@@ -194,6 +193,11 @@ class FastWorld:
         if self._kernels is not None:
             tables += [self._scratch, self._solids, self._neighbours, self.table]
         return all(each.intact() for each in tables) and (self._probe is None or self._probe.intact())
+
+    @property
+    def arm(self) -> ArmTables:
+        """What depends on the moving bodies alone, for other worlds of the same arm."""
+        return self._arm
 
     @property
     def margin(self) -> float:

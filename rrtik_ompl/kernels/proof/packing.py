@@ -50,6 +50,7 @@ class ProofPairs:
         touching: Numbers of the pairs that are in contact.
         firsts: The first solid of each body, and the end of them.
         groups: Bodies that are one solid together; these solids come last.
+        first_group: Number of the first pair of several bodies, which come last.
         kept: What the kernels keep now beside the margins [m]: a clearance from obstacles, nan before the first
             :meth:`keep`, and what they keep between all bodies for rounding and slack.
     """
@@ -64,6 +65,7 @@ class ProofPairs:
     touching: Sequence[int]
     firsts: Sequence[int]
     groups: Sequence[Members]
+    first_group: int
     kept: tuple[float, float] = (float("nan"), ROOM)
 
     def keep(self, clearance: float, slack: float = 0.0) -> None:
@@ -79,6 +81,21 @@ class ProofPairs:
             own |= {name: getattr(self.table, name) for name in ("solids", "corners")}
         memory = with_own(self.table.memory, {ProofTable.places[name]: array for name, array in own.items()})
         return replace(self, table=ProofTable(memory), kept=(float("nan"), ROOM))
+
+    def with_contacts(self, bodies: Sequence[Body]) -> ProofPairs:
+        """The same pairs of bodies that are in contact, in the memory of this object.
+
+        Args:
+            bodies: The same bodies, but for their contacts.
+        """
+        margins, touching = _kept_apart(bodies, self.bodies, self.table.pairs, self.first_group)
+        return replace(
+            self,
+            margins=margins,
+            clear=self.beside_obstacle & ~touching,
+            touching=np.flatnonzero(touching).tolist(),
+            kept=(float("nan"), ROOM),
+        )
 
     def intact(self) -> bool:
         """Whether no kernel has written beyond an array."""
@@ -172,12 +189,8 @@ def proof_pairs(
         cloud_poses=cloud_poses(bodies),
     )
 
-    arrays = body_arrays(bodies)
-    beside = np.asarray(arrays.obstacles[named].any(axis=1))
-    touching = arrays.in_contact(named)
-    margins = arrays.kept_apart(named)
-    for number, row in enumerate(listed.of_groups, count):
-        margins[number] = margins[row[layout.PARTS_FIRST] : row[layout.PARTS_END]].max()
+    beside = np.asarray(body_arrays(bodies).obstacles[named].any(axis=1))
+    margins, touching = _kept_apart(bodies, named, made.pairs, count)
 
     return ProofPairs(
         table=made,
@@ -190,7 +203,27 @@ def proof_pairs(
         touching=np.flatnonzero(touching).tolist(),
         firsts=placed.firsts,
         groups=listed.together,
+        first_group=count,
     )
+
+
+def _kept_apart(
+    bodies: Sequence[Body], named: NDArray[np.int64], pairs: NDArray[np.int32], first_group: int
+) -> tuple[Vector, NDArray[np.bool_]]:
+    """How far each pair must stay apart [m], and which pairs are in contact, shapes (n,).
+
+    Args:
+        bodies: All bodies.
+        named: Numbers of the two bodies of each pair, shape (n, 2).
+        pairs: The pairs as the kernels read them.
+        first_group: Number of the first pair of several bodies: these keep the largest distance of theirs.
+    """
+    arrays = body_arrays(bodies)
+    margins = arrays.kept_apart(named)
+    rows = pairs.reshape(-1, layout.PAIR_SIZE)
+    for number in range(first_group, len(rows)):
+        margins[number] = margins[rows[number, layout.PARTS_FIRST] : rows[number, layout.PARTS_END]].max()
+    return margins, arrays.in_contact(named)
 
 
 class _ListedPairs(NamedTuple):

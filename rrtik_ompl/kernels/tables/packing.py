@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -80,8 +80,8 @@ class ArmTables:
             and tuple(pairs) == self.pairs
             and tuple(looked_up) == self.looked_up
             and np.array_equal(strokes, self.strokes)
-            and all(np.array_equal(a, b) for a, b in zip(covers, self.covers, strict=True))
             and all(_same(a, b) for a, b in zip(bodies, self.bodies, strict=True))
+            and all(a is b or np.array_equal(a, b) for a, b in zip(covers, self.covers, strict=True))
         )
 
 
@@ -122,9 +122,9 @@ def arm_tables(
     limits: Vector,
     *,
     looked_up: Collection[tuple[int, int]] = (),
-    like: ArmTables | None,
+    like: Iterable[ArmTables] = (),
 ) -> ArmTables:
-    """Tables of the moving bodies (see :func:`alike`); those of ``like`` if they are the same.
+    """Tables of the moving bodies (see :func:`alike`); those among ``like`` that are the same, if there are any.
 
     Balls do not look at the pairs ``looked_up``, of the first bodies of sets.
     """
@@ -137,8 +137,9 @@ def arm_tables(
     sizes = tuple(map(len, moving))
     covers = tuple(np.asarray(s[k], dtype=np.float64) for members in moving for k in members for s in (outer, inner))
     solids_of = tuple(solids[k] for members in moving for k in members)
-    if like is not None and like.serves(carried, sizes, covers, solids_of, own, by_cells, limits):
-        return like
+    for known in like:
+        if known.serves(carried, sizes, covers, solids_of, own, by_cells, limits):
+            return known
 
     reaches = [(bodies[k].joint, _reach(bodies[k], outer[k])) for members in moving for k in members]
     margin = rounding_margin(chain, reaches, limits)
@@ -331,7 +332,7 @@ def _reach(body: Body, outer: Spheres) -> float:
 
 def _same(first: Body, second: Body) -> bool:
     """Whether two bodies are the same solid on the same joint, placed alike, with the same margin and padding."""
-    return (
+    return first is second or (
         first.joint == second.joint
         and (first.margin, first.padding) == (second.margin, second.padding)
         and first.geometry is second.geometry

@@ -54,8 +54,10 @@ from rrtik_ompl.kernels.tables.memory import packed, whole_records
 from rrtik_ompl.model.robot import Chain
 
 Spheres: TypeAlias = NDArray[np.float64]  # shape (n, 4): centre and radius [m]
+_known_balls: dict[bytes, NDArray[np.float64]] = {}  # see enclosing_balls
 
 CLUSTER_SIZE = 8  # balls in the smallest neighbourhood, at most
+KEPT_SETS = 4096  # sets of balls whose neighbourhoods and enclosing balls are kept
 UNBOUNDED_RADIUS = 1e6  # [m] radius of the ball that stands for a body without end
 
 PARALLEL = 1e-6  # sine of the angle between two axes below which they count as parallel
@@ -215,6 +217,7 @@ def ball_table(
     groups: list[dict[int, int]] = []
     clusters: list[dict[int, int]] = []
     balls: list[Spheres] = []
+    count = 0  # of balls
     spans = [{BODY_FRAME: 0, BODY_FIRST: 0, BODY_END: 0} for _ in bodies]
 
     for frame in frames:
@@ -223,10 +226,10 @@ def ball_table(
             if body.frame == frame and len(shapes[number]):
                 first_cluster = len(clusters)
                 for part in neighbourhoods(shapes[number]):
-                    first = sum(len(b) for b in balls)
-                    span = {CLUSTER_FIRST: first, CLUSTER_END: first + len(part)}
+                    span = {CLUSTER_FIRST: count, CLUSTER_END: count + len(part)}
                     clusters.append({CLUSTER_BODY: number, CLUSTER_FRAME: frame} | span)
                     balls.append(part)
+                    count += len(part)
 
                 spans[number] = {BODY_FRAME: frame, BODY_FIRST: first_cluster, BODY_END: len(clusters)}
 
@@ -278,33 +281,52 @@ def _pair_groups(groups: Sequence[tuple[int, int]]) -> list[dict[int, int]]:
     return runs
 
 
-def neighbourhoods(spheres: Spheres) -> list[Spheres]:
-    """Split balls in halves across their widest spread until no part has more than ``CLUSTER_SIZE``; large first."""
+def neighbourhoods(spheres: Spheres) -> tuple[Spheres, ...]:
+    """Split balls in halves across their widest spread until no part has more than ``CLUSTER_SIZE``; large first.
+
+    What was split before is kept: a link has the same balls wherever the arm works and whatever it holds.
+    """
+    return _neighbourhoods(spheres.tobytes())
+
+
+@lru_cache(maxsize=KEPT_SETS)
+def _neighbourhoods(balls: bytes) -> tuple[Spheres, ...]:
+    return tuple(frozen(part) for part in _halved(np.frombuffer(balls).reshape(-1, BALL_FLOATS)))
+
+
+def _halved(spheres: Spheres) -> list[Spheres]:
     if len(spheres) <= CLUSTER_SIZE:
         return [spheres[np.argsort(-spheres[:, 3])]]
     axis = int(np.argmax(np.ptp(spheres[:, :3], axis=0)))
     order = np.argsort(spheres[:, axis], kind="stable")
     middle = len(spheres) // 2
-    return neighbourhoods(spheres[order[:middle]]) + neighbourhoods(spheres[order[middle:]])
+    return _halved(spheres[order[:middle]]) + _halved(spheres[order[middle:]])
 
 
 def enclosing_balls(sets: Sequence[Spheres]) -> Spheres:
     """A small ball around each of several sets of balls, shape (sets, 4): steps towards the farthest one [43].
 
-    The best ball of forty steps is kept; all sets take them together. No balls have the ball 0 around them.
+    The best ball of forty steps is kept; all sets take them together. No balls have the ball 0 around them. What was
+    found before is kept, as :func:`neighbourhoods` does.
     """
-    found = np.zeros((len(sets), BALL_FLOATS))
-    several = np.array([k for k, spheres in enumerate(sets) if len(spheres) > 1], dtype=int)
-    for k, spheres in enumerate(sets):
-        if len(spheres) == 1:
-            found[k] = spheres[0]
+    keys = [spheres.tobytes() for spheres in sets]
+    new = {key: spheres for key, spheres in zip(keys, sets, strict=True) if key not in _known_balls}
+    found = {key: _known_balls[key] for key in keys if key not in new}
+    found[b""] = np.zeros(BALL_FLOATS)
+    found |= {key: spheres[0] for key, spheres in new.items() if len(spheres) == 1}
+
     # Sets of like size share an array, in which the smaller ones are filled up by their first ball.
-    sizes = np.array([len(sets[k]) for k in several], dtype=int)
-    for alike in range(int(sizes.max(initial=0)).bit_length() + 1):
-        some = several[[size.bit_length() == alike for size in sizes.tolist()]]
-        if len(some):
-            found[some] = _balls_around([sets[k] for k in some])
-    return found
+    alike: dict[int, list[bytes]] = {}
+    for key, spheres in new.items():
+        if len(spheres) > 1:
+            alike.setdefault(len(spheres).bit_length(), []).append(key)
+    for some in alike.values():
+        found |= zip(some, _balls_around([new[key] for key in some]), strict=True)
+
+    if len(_known_balls) > KEPT_SETS:
+        _known_balls.clear()
+    _known_balls.update({key: found[key] for key in new})
+    return np.array([found[key] for key in keys]).reshape(-1, BALL_FLOATS)
 
 
 def _balls_around(sets: Sequence[Spheres]) -> Spheres:

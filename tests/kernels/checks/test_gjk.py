@@ -137,6 +137,6 @@ def test_without_solids_nothing_is_proven_by_them():
     nothing, V = [NOTHING] * 2, robot.joint_values(rows)
     bare = FastWorld(robot.chain, bodies, [(0, 1)], outer=nothing, inner=nothing)
     one = [convex_solids(bodies[0].geometry), NO_SOLIDS]
-    half = FastWorld(robot.chain, bodies, [(0, 1)], outer=nothing, inner=nothing, solids=one, like=bare)
+    half = FastWorld(robot.chain, bodies, [(0, 1)], outer=nothing, inner=nothing, solids=one, like=[bare.arm])
     assert (bare.classify(V) == UNDECIDED).any()
     np.testing.assert_array_equal(bare.classify(V), half.classify(V))
