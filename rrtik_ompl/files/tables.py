@@ -62,14 +62,24 @@ def json_object(text: str, kind: str, key: str) -> dict[str, Any]:
     return checked_object(json_value(text), kind, key)
 
 
+def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """Return an object of JSON, of which each key may stand there once: readers differ in which one they take."""
+    found = dict(pairs)
+    if len(found) < len(pairs):
+        names = [name for name, _ in pairs]
+        twice = next(name for name in names if names.count(name) > 1)
+        raise InputError(f"'{twice}' stands there twice; delete one of them")
+    return found
+
+
 def json_value(text: str) -> object:
     """Parse any JSON.
 
     Raises:
-        InputError: If it is malformed; the message names the line.
+        InputError: If it is malformed, with the line, or if a key stands there twice.
     """
     try:
-        return json.loads(text)
+        return json.loads(text, object_pairs_hook=_object)
     except json.JSONDecodeError as error:
         raise InputError(f"line {error.lineno}: not JSON: {error.msg}") from None
     except RecursionError:

@@ -1,0 +1,314 @@
+"""Two checkers of certificates beside each other: true ones and forged ones, judged in numpy and by the page's script.
+
+Each certificate is of a path among random obstacles of all kinds, for foreign and own arms that both checkers read from
+URDF; each is forged in many ways (`forgeries`). The script is run by node.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import subprocess
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from importlib.resources import files
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import pinocchio as pin
+from typer import Option
+
+from bench.proofs.cases import DENTED, FACES, random_path
+from bench.proofs.forgeries import FORGERS, Case, Forgery
+from bench.proofs.forgery_judge import Judge
+from bench.shared.parts import Parts
+from bench.shared.run import Run
+from rrtik_bench.report.machine import processes
+from rrtik_bench.report.page import Report
+from rrtik_ompl.base.errors import InputError, RrtikError
+from rrtik_ompl.description.urdf import robot_from_urdf
+from rrtik_ompl.files.tables import json_value
+from rrtik_ompl.model.certificate import from_document
+from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.scene import Obstacle, Scene
+from rrtik_ompl.model.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, PointCloud, Prism, Sphere
+from rrtik_ompl.world.certificate_check import certificate_fault
+from rrtik_ompl.world.world import World
+from rrtik_robots.example_arms import data_folder
+
+ARMS = {"planar": 10, "titan4": 10, "ur5": 6, "panda": 5, "so101": 1}  # how often each is taken
+ROUND = 8  # true certificates of a part
+CLEARANCE = 0.001  # [m]
+PLANAR = 4  # links of the planar arm
+FEWEST_PLANES = 3  # of a certificate, as those of paths far from everything offer little to forge
+PLANE = 9  # numbers of an entry with a plane
+
+
+def planar_urdf(links: int = PLANAR) -> str:
+    """Return the URDF of an arm that turns about z alone, of boxes and capsules."""
+    parts = ['<robot name="planar"><link name="base"/>']
+    for k in range(links):
+        shape = '<box size="0.5 0.06 0.06"/>' if k % 2 else '<capsule radius="0.03" length="0.5"/>'
+        turned = "0 0 0" if k % 2 else "0 1.5707963267948966 0"
+        parts.append(
+            f'<link name="link{k}"><collision><origin xyz="0.3 0 0" rpy="{turned}"/>'
+            f"<geometry>{shape}</geometry></collision></link>"
+            f'<joint name="joint{k}" type="revolute"><parent link="{f"link{k - 1}" if k else "base"}"/>'
+            f'<child link="link{k}"/><origin xyz="{0.65 if k else 0} 0 0"/><axis xyz="0 0 1"/>'
+            '<limit lower="-2.8" upper="2.8" velocity="1" effort="1"/></joint>'
+        )
+    return "\n".join([*parts, "</robot>\n"])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Arm:
+    """A robot, and the files that describe it."""
+
+    robot: Robot
+    files: tuple[str, ...]
+
+
+def arm_of(name: str, folder: Path) -> Arm:
+    """Return an arm by its name in `ARMS`."""
+    example = data_folder()
+    known: dict[str, list[Any]] = {
+        "titan4": [str(files("rrtik_robots.titan4").joinpath(f"titan4.{kind}")) for kind in ("urdf", "srdf")],
+        "ur5": [
+            example / "ur_description/urdf/ur5_robot.urdf",
+            example / "ur_description/srdf/ur5_joint_limited_robot.srdf",
+        ],
+        "panda": [example / "panda_description/urdf/panda.urdf", example / "panda_description/srdf/panda.srdf"],
+        "so101": [example / "so_arm_description/urdf/so101.urdf"],
+    }
+    if name in known:
+        from rrtik_ompl import load_robot
+
+        return Arm(load_robot(name), tuple(map(str, known[name])))
+    urdf = folder / "planar.urdf"
+    urdf.write_text(planar_urdf())
+    return Arm(robot_from_urdf(urdf), (str(urdf),))
+
+
+def random_scene(arm: str, folder: Path, rng: np.random.Generator) -> Scene:
+    """Return obstacles of every kind around an arm; those that come from files are written to a folder."""
+    reach = {"planar": 2.4, "titan4": 1.6, "so101": 0.4}.get(arm, 0.9)
+    size = reach / 0.9
+    mesh = _dented(folder, size)
+    points = 0.1 * size * rng.normal(size=(40, 3))
+    cloud = PointCloud(points, radius=0.02 * size).save(folder / f"cloud{rng.integers(1 << 30)}.ply")
+    corner = size * np.array([[0.0, 0.0], [0.3, 0.0], [0.3, 0.1], [0.1, 0.1], [0.1, 0.3], [0.0, 0.3]])
+    solids = [
+        Box(size * np.array([0.2, 0.1, 0.3])), Sphere(0.1 * size), Cylinder(0.05 * size, 0.4 * size),
+        Capsule(0.04 * size, 0.3 * size), Box(size * np.array([0.3, 0.3, 0.02])), Prism(corner, 0.2 * size),
+        mesh, cloud,
+    ]  # fmt: skip
+    chosen = rng.permutation(len(solids))[:6]
+    places = [pin.SE3(pin.exp3(rng.normal(size=3)), rng.uniform(-reach, reach, 3)) for _ in chosen]
+    obstacles = [
+        Obstacle(f"solid {k}", solids[k], place, margin=float(rng.choice([0.0, 0.002])))
+        for k, place in zip(chosen, places, strict=True)
+    ]
+    floor = Obstacle("floor", HalfSpace([0.1, 0.0, 1.0], -1.2 * reach), pin.SE3.Identity())
+    return Scene((*obstacles, floor))
+
+
+def _dented(folder: Path, size: float) -> Mesh:
+    """Return a mesh that is not convex, from a file of text."""
+    corners = size * np.array(DENTED)
+    lines = ["solid dented"]
+    for face in FACES:
+        rows = "\n".join("vertex " + " ".join(map(repr, corners[k].tolist())) for k in face)
+        lines.append(f"facet normal 0 0 0\nouter loop\n{rows}\nendloop\nendfacet")
+    file = folder / f"dented{size:.3f}.stl"
+    file.write_text("\n".join([*lines, "endsolid dented\n"]))
+    return Mesh.load(file)
+
+
+def cases_of(arm: str, robot: Robot, folder: Path, seed: int) -> Iterator[Case]:
+    """Yield true certificates of an arm in ever new scenes, each with some planes."""
+    rng = np.random.default_rng(seed)
+    while True:
+        world = World(robot, random_scene(arm, folder, rng))
+        for _ in range(3):
+            path = random_path(world, rng, CLEARANCE)
+            certificate = None if path is None else world.certificate(path, CLEARANCE)
+            if path is None or certificate is None:
+                continue
+            document = json.loads(json.dumps(certificate.document()))
+            if sum(len(row) == PLANE for rows in document["motions"] for row in rows) >= FEWEST_PLANES:
+                yield Case(world, path.waypoints, document, Judge(world))
+
+
+class Script:
+    """The checker of the page, run by node."""
+
+    def __init__(self, node: str = "node") -> None:
+        command = str(files("rrtik_ompl.viewer").joinpath("assets", "checker", "command.cjs"))
+        self._process = subprocess.Popen(
+            [node, command, "--batch"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, encoding="utf-8"
+        )
+
+    def fault(self, arm: Arm, forgery: Forgery, folder: Path) -> str:
+        """Return why a certificate does not hold, "" if it does."""
+        scene = folder / "scene.yaml"
+        forgery.world.scene.save(scene)
+        path = {"kind": "joint_path", "waypoints": np.asarray(forgery.waypoints).tolist()}
+        texts = {"certificate.json": forgery.text, "path.json": json.dumps(path), str(scene): scene.read_text()}
+        job = {"files": arm.files, "texts": texts, "clearance": forgery.clearance}
+        stdin, stdout = self._process.stdin, self._process.stdout
+        assert stdin is not None
+        assert stdout is not None
+        stdin.write(json.dumps(job) + "\n")
+        stdin.flush()
+        answer: dict[str, Any] = json.loads(stdout.readline())
+        return "" if answer["holds"] else answer["fault"] or "refused"
+
+    def close(self) -> None:
+        """End node."""
+        self._process.communicate()
+
+
+@contextmanager
+def script(node: str = "node") -> Iterator[Script]:
+    """Run the script as long as it is asked."""
+    running = Script(node)
+    try:
+        yield running
+    finally:
+        running.close()
+
+
+def fault_in_numpy(forgery: Forgery) -> str:
+    """Return why our own verifier refuses a certificate, "" if it does not."""
+    try:
+        document = json_value(forgery.text)
+        if not isinstance(document, dict):
+            return "not an object"
+        certificate = from_document(document)
+    except InputError as error:
+        return str(error)
+    return certificate_fault(certificate, forgery.world, forgery.waypoints, clearance=forgery.clearance)
+
+
+@dataclass(slots=True)
+class Count:
+    """What came of certificates.
+
+    Attributes:
+        true, accepted: Number of true ones, and of those that both have accepted.
+        forged, refused: By kind of forgery, the number of forged ones, and of those that both have refused.
+        wrong: What one of them got wrong, a line each.
+        seconds: Processor time of our verifier and wall time of the script, for true ones [s].
+    """
+
+    true: int = 0
+    accepted: int = 0
+    forged: dict[str, int] = field(default_factory=dict)
+    refused: dict[str, int] = field(default_factory=dict)
+    wrong: list[str] = field(default_factory=list)
+    seconds: list[tuple[float, float]] = field(default_factory=list)
+
+
+def compared(name: str, seed: int, true: int, forged: int) -> Count:
+    """Count what both checkers say of some certificates of an arm, and of so many forgeries of each."""
+    count = Count()
+    rng = np.random.default_rng(seed)
+    with tempfile.TemporaryDirectory() as place, script() as page:
+        folder = Path(place)
+        arm = arm_of(name, folder)
+        cases = cases_of(name, arm.robot, folder, seed)
+        for case in (next(cases) for _ in range(true)):
+            given = Forgery(json.dumps(case.document), case.world, case.waypoints, CLEARANCE)
+            begin = time.process_time()
+            ours = fault_in_numpy(given)
+            middle = time.perf_counter()
+            theirs = page.fault(arm, given, folder)
+            count.seconds.append((time.process_time() - begin, time.perf_counter() - middle))
+            count.true += 1
+            count.accepted += not ours and not theirs
+            if ours or theirs:
+                count.wrong.append(f"{name} {seed}: true, refused: {ours!r} {theirs!r}")
+            forge(count, case, arm, page, folder, forged, rng)
+    return count
+
+
+def forge(
+    count: Count, case: Case, arm: Arm, page: Script, folder: Path, forged: int, rng: np.random.Generator
+) -> None:
+    """Count what both checkers say of forgeries of one certificate, of each kind that there is something for."""
+    names = list(FORGERS)
+    done = 0
+    for name in rng.permutation(names * (2 + forged // len(names))):
+        if done == forged:
+            return
+        try:
+            forgery = FORGERS[name](case, rng)
+        except RrtikError:  # the scene that it would need is none
+            continue
+        if forgery is None:
+            continue
+        done += 1
+        ours, theirs = fault_in_numpy(forgery), page.fault(arm, forgery, folder)
+        count.forged[name] = count.forged.get(name, 0) + 1
+        count.refused[name] = count.refused.get(name, 0) + (bool(ours) and bool(theirs))
+        if not ours or not theirs:
+            count.wrong.append(
+                f"{case.world.robot.name}: {name}, accepted by {'us' if not ours else 'the script'}: {ours}{theirs}"
+            )
+
+
+def main(
+    run: Run,
+    parts: Parts,
+    *,
+    true: Annotated[int, Option(help="True certificates.")] = 1000,
+    forged: Annotated[int, Option(help="Forged ones of each.")] = 20,
+) -> Report:
+    """Make the page of both checkers."""
+    whole = sum(ARMS.values())
+    wanted = [
+        (name, 1000 * k + seed, ROUND, forged)
+        for k, (name, share) in enumerate(ARMS.items())
+        for seed in range(math.ceil(true * share / whole / ROUND))
+    ]
+    found = parts(compared, wanted)
+
+    report = Report("Two checkers of certificates", run.command, processes(run.jobs), intro=INTRO)
+    accepted, total = (sum(getattr(each, name) for each in found) for name in ("accepted", "true"))
+    forgeries, refused = (
+        sum((Counter(getattr(each, name)) for each in found), Counter[str]()) for name in ("forged", "refused")
+    )
+    report.bar("true certificates that both accept", "all", f"{accepted} of {total}", accepted == total)
+    text = f"{refused.total()} of {forgeries.total()}"
+    report.bar("forged certificates that both refuse", "all", text, refused == forgeries)
+
+    rows = []
+    for name in ARMS:
+        own = [each for part, each in zip(wanted, found, strict=True) if part[0] == name]
+        ours, script_s = 1e3 * np.array([pair for each in own for pair in each.seconds]).T
+        count = f"{sum(each.accepted for each in own)} of {sum(each.true for each in own)}"
+        rows.append([name, count, *(f"{np.median(x):.0f} / {x.max():.0f}" for x in (ours, script_s))])
+    report.table("True certificates", ["arm", "both accept", "ours [ms]", "the script [ms]"], rows, text=TRUE)
+    table = [[name, f"{forgeries[name]}", f"{refused[name]}"] for name in FORGERS]
+    report.table("Forged certificates, by kind", ["kind", "forged", "both refuse"], table, text=FORGED)
+    wrong = [line for each in found for line in each.wrong]
+    if wrong:
+        report.note("What one of them got wrong", "\n".join(f"- {line}" for line in wrong[:50]))
+    return report
+
+
+INTRO = (
+    "`rrtik_ompl/world/certificate_check.py`, in numpy and coal, and the JavaScript of the checker's page, run by "
+    "node, which reads the arm's URDF, SRDF and meshes and the scene's YAML, STL and PLY by itself. Paths of seven "
+    "waypoints among six obstacles of eight kinds and a half-space, clearance 1 mm."
+)
+TRUE = "Times of one certificate, median and worst: processor time of ours, wall time of the script with reading."
+FORGED = (
+    "What is forged is drawn at random. A forgery counts only if it is certain that it proves nothing: by "
+    "construction, or by a witness of Pinocchio and coal (`bench/proofs/forgery_judge.py`)."
+)

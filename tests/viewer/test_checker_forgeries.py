@@ -1,0 +1,16 @@
+"""Both checkers of certificates beside each other; `python -m bench checkers` does so a thousand times."""
+
+import pytest
+
+from bench.proofs.checkers import compared
+from bench.proofs.forgeries import FORGERS
+
+pytestmark = pytest.mark.kernels
+
+
+@pytest.mark.parametrize(("arm", "forged"), [("planar", len(FORGERS)), ("titan4", len(FORGERS)), ("panda", 12)])
+def test_both_accept_what_is_true_and_refuse_what_is_forged(arm, forged):
+    found = compared(arm, 3, 1, forged)
+    assert found.wrong == []
+    assert found.accepted == found.true == 1
+    assert sum(found.refused.values()) == sum(found.forged.values()) == forged
