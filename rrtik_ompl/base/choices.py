@@ -46,7 +46,7 @@ FrameAxis: TypeAlias = Literal["x", "y", "z"]
 DhConvention: TypeAlias = Literal["standard", "modified"]
 Replanner: TypeAlias = Literal["drrt-con", "rrt-connect", "drrt"]
 TickEvent: TypeAlias = Literal["plan", "walk", "repair", "wait", "evade", "arrive"]
-RunOutcome: TypeAlias = Literal["arrived", "out of time", "no scene", "interrupted"]
+RunOutcome: TypeAlias = Literal["arrived", "out of time", "no scene", "too fast", "interrupted"]
 
 Name = TypeVar("Name", bound=str)
 

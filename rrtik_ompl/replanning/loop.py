@@ -11,7 +11,7 @@ import numpy as np
 
 from rrtik_ompl.base.arrays import Matrix, Vector, finite_number
 from rrtik_ompl.base.budget import Stop
-from rrtik_ompl.base.choices import TickEvent
+from rrtik_ompl.base.choices import RunOutcome, TickEvent
 from rrtik_ompl.base.poses import pose_row
 from rrtik_ompl.model.goal import JOINT_TOLERANCE
 from rrtik_ompl.model.scene import Scene, pairs_that_may_touch
@@ -142,8 +142,10 @@ class Loop:
 
         seconds_of_part: dict[str, float] = {}
         changed = self._timed(seconds_of_part, "sense", self._read_scene, now)
+        if self._tracker.fault:
+            return self._give_up(now, "too fast", self._tracker.fault)
         if now - self._snapshot.time > self._patience:
-            return self._give_up(now)
+            return self._give_up(now, "no scene", self._silence())
         self._timed(seconds_of_part, "retarget", self._follow_goal)
 
         checked_before = self._world.checked
@@ -172,14 +174,17 @@ class Loop:
         self.q = q_after
         return True
 
-    def _give_up(self, now: float) -> bool:
-        """End the run, since the feed has nothing new."""
-        silence = f"no scene since {self._snapshot.time:.3g} s: the scene feed has ended, or has been silent for longer"
-        reason = f"{silence} than feed_patience ({self._patience:g} s)"
+    def _give_up(self, now: float, outcome: RunOutcome, reason: str) -> bool:
+        """End the run where the arm is, since what the feed brings does not let it go on."""
         self._record(now, self.q, "wait", {}, 0, reason)
-        self.run.outcome = "no scene"
+        self.run.outcome = outcome
         self.run.reason = reason
         return False
+
+    def _silence(self) -> str:
+        """Return the reason of a run that ends because the feed has nothing new."""
+        silence = f"no scene since {self._snapshot.time:.3g} s: the scene feed has ended, or has been silent for longer"
+        return f"{silence} than feed_patience ({self._patience:g} s)"
 
     def _read_feed(self, now: float) -> Snapshot:
         """Return the latest snapshot of the feed; an error unless the arm holds the same objects as in the problem."""

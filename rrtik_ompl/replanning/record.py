@@ -69,7 +69,8 @@ class ReplanRun:
         scenes: The scenes that were seen, in the order of time; a scene that states its motions stands for all times.
         scenes_end: Time from which on scenes were not kept, because their point clouds were too large [s]; inf if all
             were kept.
-        outcome: One of ``OUTCOMES``; "no scene" means that the feed had nothing new for too long.
+        outcome: One of ``OUTCOMES``; "no scene" means that the feed had nothing new for too long, "too
+            fast" that an obstacle was faster than ``speed_bound``.
         reason: Why the robot has not arrived, or "".
         prismatic, continuous: Names of the joints that slide, and of those that turn without limits; both empty in old
             records.

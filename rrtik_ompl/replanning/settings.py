@@ -48,7 +48,8 @@ class ReplanSettings:
         margin: Distance to obstacles that is always kept [m].
         clearance: Distance to obstacles that proven motions keep in addition to ``margin`` [m]; if None, 1 mm or half
             the world's motion resolution, whichever is less. If it is given, searches keep it too.
-        speed_bound: Speed that no point of an obstacle exceeds [m/s]. If one does, there is a ``SpeedWarning``.
+        speed_bound: Speed that no point of an obstacle exceeds [m/s]. If one does, the run ends, with
+            a ``SpeedWarning``.
         limits: Speed limits of the joints; those of the robot if None. Accelerations are not considered.
         lookahead_ticks: How many ticks ahead the motion of obstacles is predicted, by the motion that the scene states
             or else by the measured velocity. Obstacles are then avoided where they are now, where they will be then,

@@ -36,6 +36,7 @@ class MotionTracker:
         speeds: Largest speed measured so far of each obstacle that has moved [m/s]; a bound for all of its points.
         faster_since: Time since when an obstacle was faster than the bound, as the last update showed [s]; inf if none
             was.
+        fault: A line that says which obstacle was faster and by how much, as the last update showed; "" if none was.
 
     Args:
         scene: The first scene, which gives the shapes.
@@ -46,21 +47,22 @@ class MotionTracker:
         # The largest distance of a point of each obstacle from its origin [m] bounds the way of its points in a turn.
         self._radii = {o.name: farthest(o.shape, pin.SE3.Identity()) for o in scene.obstacles}
         self._bound = bound
-        self._warned = set[str]()
         self._sightings: dict[str, tuple[float, Obstacle]] = {}
         self._velocities: dict[str, tuple[Vector, Vector]] = {}
         self._reshaped = set[str]()
         self.speeds: dict[str, float] = {}
         self.faster_since = float("inf")
+        self.fault = ""
 
     def update(self, seen: Snapshot) -> bool:
         """Measure speeds from a new snapshot and return whether anything about the obstacles has changed.
 
         Names, shapes, poses and margins are compared with those of the last sighting; the first call returns True if
-        there are obstacles. Warns once for each obstacle that is faster than the bound.
+        there are obstacles. Gives a ``SpeedWarning`` for each obstacle that is faster than the bound.
         """
         changed = {o.name for o in seen.scene.obstacles} != self._sightings.keys()
         self.faster_since = float("inf")
+        self.fault = ""
 
         for obstacle in seen.scene.obstacles:
             name = obstacle.name
@@ -113,8 +115,8 @@ class MotionTracker:
         return dict.fromkeys(self._reshaped, (self._bound or 0.0) * seconds)
 
     def _measure(self, obstacle: Obstacle, old_pose: pin.SE3, last_time: float, now: float) -> None:
-        # Store the velocity and the largest speed of an obstacle that moved between two sightings, and warn once if it
-        # is faster than the bound.
+        # Store the velocity and the largest speed of an obstacle that moved between two sightings, and warn if it is
+        # faster than the bound.
         name = obstacle.name
         seconds = now - last_time
         shift = obstacle.pose.translation - old_pose.translation
@@ -133,9 +135,9 @@ class MotionTracker:
         if self._bound is None or travel <= SPEED_WARNING_RATIO * self._bound * (seconds + TIME_RESOLUTION):
             return
         self.faster_since = min(last_time, self.faster_since)
-        if name not in self._warned:
-            self._warned.add(name)
-            warnings.warn(SpeedWarning(speed_warning(name, speed, now, self._bound)), stacklevel=4)
+        fault = speed_warning(name, speed, now, self._bound)
+        self.fault = self.fault or fault
+        warnings.warn(SpeedWarning(fault), stacklevel=4)
 
 
 def turns_without_end(name: str) -> InputError:
@@ -161,8 +163,8 @@ def refuse_endless_turns(scene: Scene) -> None:
 def speed_warning(name: str, speed: float, time: float, bound: float) -> str:
     """Return the text of the warning that an obstacle is faster than the bound [m/s] at a time [s]."""
     return (
-        f"obstacle '{name}' moves at {speed:.3g} m/s at {time:.3g} s, faster than the stated speed_bound of "
-        f"{bound:g} m/s: a contact cannot be ruled out; raise speed_bound"
+        f"obstacle '{name}' moves at {speed:.3g} m/s at {time:.3g} s, {speed - bound:.3g} m/s faster than the stated "
+        f"speed_bound of {bound:g} m/s: a contact cannot be ruled out; raise speed_bound"
     )
 
 

@@ -125,14 +125,19 @@ def test_a_start_within_the_margin_says_what_to_lower():
         replan(plane(box("near", 1.0, 12.2)), margin=0.5, **OPTIONS)
 
 
-def test_an_obstacle_faster_than_the_bound_is_warned_about_once():
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        replan(crossing(2.0), speed_bound=1.0, **OPTIONS)
-    said = [str(w.message) for w in caught if w.category is SpeedWarning]
-    assert len(said) == 1
-    assert "'lift' moves at 2 m/s" in said[0]
-    assert "speed_bound of 1 m/s" in said[0]
+def test_a_run_ends_at_the_first_scene_that_shows_an_obstacle_faster_than_the_bound():
+    slow, fast = (crossing(speed).world.scene for speed in (0.5, 2.0))
+
+    def feed(time):
+        return slow.at(time) if time < 0.45 else fast.at(time - 0.375)
+
+    with pytest.warns(SpeedWarning, match="'lift'") as caught:
+        run = replan(crossing(0.5), feed, speed_bound=1.0, **OPTIONS)
+    assert len(caught) == 1
+    assert run.outcome == "too fast"
+    assert run.ticks[-1].time == pytest.approx(0.6)
+    assert (run.ticks[-1].event, run.ticks[-1].reason) == ("wait", run.reason)
+    assert "'lift' moves at 2 m/s at 0.6 s, 1 m/s faster than the stated speed_bound of 1 m/s" in run.reason
 
 
 def test_a_floor_that_slides_has_a_speed_like_any_obstacle():
@@ -142,7 +147,7 @@ def test_a_floor_that_slides_has_a_speed_like_any_obstacle():
         warnings.simplefilter("error")
         assert replan(plane(floor), speed_bound=0.6, **OPTIONS).found
     with pytest.warns(SpeedWarning, match="'floor' moves at 0.5 m/s"):
-        assert replan(plane(floor), speed_bound=0.4, **OPTIONS).found
+        assert replan(plane(floor), speed_bound=0.4, **OPTIONS).outcome == "too fast"
 
 
 @pytest.mark.parametrize("seen", [0.0, 0.2])
