@@ -145,6 +145,7 @@ def _flag(option: inspect.Parameter) -> list[str]:
 
 
 def _shown(value: Any, name: str) -> str:
-    if isinstance(value, Path) or "/" in str(value):
-        return name
+    key, equals, place = str(value).rpartition("=")
+    if isinstance(value, Path) or "/" in place:
+        return f"{key}{equals}{name}"
     return f"{value:g}" if isinstance(value, float) else str(value)

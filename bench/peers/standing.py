@@ -1,7 +1,7 @@
 """The standing comparison: planners that pip installs on generated families and on MotionBenchMaker's problems.
 
 Each path, ours and theirs, is judged by its ends and by `rrtik.prove`: proven free for its whole length, touching at a
-place that is named, or undecided. At each place where one touches, Pinocchio and coal are asked whether it does. Of
+place that is named, or undecided. Where one touches, Pinocchio and coal are asked whether these two do so there. Of
 ours a second program verifies the certificates. A peer that cannot live with our versions of numpy and Pinocchio is
 given an interpreter of its own, for instance ``--python mplib=venv_mplib/bin/python``; one that is absent is a row that
 says why. What is done is kept beside the page: the same command goes on from there.
@@ -26,7 +26,7 @@ from typer import Option
 
 import rrtik_ompl as rrtik
 from bench.peers.description import NoTask, task_of
-from bench.peers.host import Host
+from bench.peers.host import Answer, Host
 from bench.peers.libraries.pinocchio_model import model_and_geometry
 from bench.peers.task import Task
 from bench.shared.clocks import spent
@@ -37,8 +37,9 @@ from bench.shared.run import Pythons, Run, SetsOrNone
 from bench.speed.machine import machine
 from rrtik_bench.report.page import Report
 from rrtik_ompl import JointPath, Problem
-from rrtik_ompl.base.arrays import TAU, Matrix, Vector
+from rrtik_ompl.base.arrays import TAU, Matrix
 from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.model.judgement import Finding
 from rrtik_ompl.planning.generated_problems import FAMILIES, generated_problem
 
 PLANNER = "fastrrtconnect"
@@ -58,6 +59,7 @@ PEERS = {
     "Genesis World": "genesis",
     "pyroboplan": "pyroboplan",
 }
+EVERY = {"Genesis World": 8, "pyroboplan": 4}  # of how many problems these take one, for they take long
 GENERATED, SETS = ("titan4", "ur5", "panda"), ("panda", "ur5")
 
 
@@ -67,25 +69,29 @@ class Outcome:
 
     Attributes:
         group: Arm and family.
+        run: Number of the problem, and the seed.
         planner: Who.
         seconds: Of its process.
         found: Whether it gave a path.
         ends: Whether that leads from the start to the goal.
         status: What the proof says: "proven", "touching", "invalid" (outside the limits) or "undecided"; "" without a
             path.
-        confirmed: Whether Pinocchio and coal find a contact where the path is said to touch, or the certificate of a
-            path of ours is verified.
+        confirmed: Whether Pinocchio and coal find that the two bodies touch where the path is said to touch, or the
+            certificate of a path of ours is verified.
+        said: What the proof says of the worst place, where there is one.
         length: [rad]; NaN without a path.
         failed: Why it broke, or "".
     """
 
     group: str
+    run: tuple[int, int]
     planner: str
     seconds: float
     found: bool
     ends: bool
     status: str
     confirmed: bool
+    said: str
     length: float
     failed: str
 
@@ -113,28 +119,44 @@ def interpreters(words: Iterable[str]) -> dict[str, str]:
     return found
 
 
-def judged(
-    group: str, planner: str, problem: Problem, task: Task, rows: Matrix | None, seconds: float, failed: str
-) -> Outcome:
+def judged(group: str, run: tuple[int, int], planner: str, problem: Problem, task: Task, answer: Answer) -> Outcome:
     """A path and what the judges say of it."""
+    rows = answer.rows
     if rows is None:
-        return Outcome(group, planner, seconds, False, False, "", False, float("nan"), failed)
+        return Outcome(group, run, planner, answer.cpu, False, False, "", False, "", float("nan"), answer.failed)
+
     path = JointPath.of(problem.robot, rows)
     verdict = rrtik.prove(problem.world, path, clearance=0.0)
-    if verdict.worst is not None:
-        confirmed = verdict.status != "touching" or touches(task, verdict.worst.q)
-    elif planner in (OURS, NAMED):
+    worst = verdict.worst
+    confirmed = True
+    if verdict.status == "touching" and worst is not None:
+        confirmed = touches(task, worst)
+    elif verdict.proven and planner in (OURS, NAMED):
         certificate = problem.world.certificate(path)
         confirmed = certificate is not None and not problem.world.verify(certificate, path)
-    else:
-        confirmed = True
-    return Outcome(group, planner, seconds, True, joins(problem, rows), verdict.status, confirmed, path.length, failed)
+
+    said = "" if worst is None else str(worst)
+    ends = joins(problem, rows)
+    return Outcome(
+        group, run, planner, answer.cpu, True, ends, verdict.status, confirmed, said, path.length, answer.failed
+    )
 
 
-def touches(task: Task, q: Vector) -> bool:
-    """Whether anything touches at a configuration, by Pinocchio and coal, which read the files of the peers."""
+def touches(task: Task, finding: Finding) -> bool:
+    """Whether the two bodies of a finding touch there, by Pinocchio and coal, which read the files of the peers."""
     model, geometry = model_and_geometry(task)
-    return bool(pin.computeCollisions(model, model.createData(), geometry, pin.GeometryData(geometry), q, True))
+    found = pin.GeometryData(geometry)
+    pin.computeCollisions(model, model.createData(), geometry, found, finding.q, False)
+    pairs = zip(geometry.collisionPairs, found.collisionResults, strict=True)
+    names = [_body_of(each.name) for each in geometry.geometryObjects]
+    touching = [{names[pair.first], names[pair.second]} for pair, result in pairs if result.isCollision()]
+    return set(finding.pair) in touching
+
+
+def _body_of(name: str) -> str:
+    """Whose solid it is: Pinocchio numbers those of a link, and a capsule has caps."""
+    link, _, number = name.rpartition("_")
+    return link if number.isdecimal() and link else name.partition(", ")[0]
 
 
 @cache
@@ -144,8 +166,9 @@ def _host(module: str, python: str) -> Host:
     return host
 
 
-def _problem(arm: str, family: str, number: int, file: str) -> Problem:
+def _problem(group: str, number: int, file: str) -> Problem:
     if not file:
+        arm, _, family = group.partition(", ")
         return generated_problem(rrtik.load_robot(arm), family, number)
     found = problem_of(file, balls=False)
     assert found is not None
@@ -153,12 +176,11 @@ def _problem(arm: str, family: str, number: int, file: str) -> Problem:
 
 
 def compared(
-    arm: str, family: str, number: int, file: str, seeds: int, seconds: float, pythons: str, pages: str
+    turn: int, group: str, number: int, file: str, seeds: int, seconds: float, pythons: str, pages: str
 ) -> list[Outcome]:
-    """Everybody on one problem, in turns."""
+    """Everybody on one problem, in turns; those of `EVERY` if it is theirs."""
     own = interpreters(pythons.split())
-    group = f"{arm}, {family}"
-    problem = _problem(arm, family, number, file)
+    problem = _problem(group, number, file)
     outcomes = []
     calls = {
         OURS: partial(rrtik.plan, problem, seconds=seconds),
@@ -174,19 +196,20 @@ def compared(
             print(error, file=sys.stderr)
             return []
         for seed in range(1, seeds + 1):
-            found: dict[str, tuple[Matrix | None, float, str]] = {}
+            found: dict[str, Answer] = {}
             for name, call in calls.items():
                 taken, plan = spent(partial(call, seed=seed))
-                found[name] = (None if plan.path is None else plan.path.waypoints, taken, "")
+                found[name] = Answer(None if plan.path is None else plan.path.waypoints, taken, taken)
             for name, module in PEERS.items():
+                if name in EVERY and turn % EVERY[name]:
+                    continue
                 host = _host(module, own.get(module.split()[0], sys.executable))
                 if not host.absent:
-                    answer = host.ask(task, seed)
-                    found[name] = (answer.rows, answer.cpu, answer.failed)
-            for name, (rows, cpu, failed) in found.items():
-                outcomes.append(judged(group, name, problem, task, rows, cpu, failed))
-                if rows is not None and seed == 1:
-                    paths[name] = JointPath.of(problem.robot, rows)
+                    found[name] = host.ask(task, seed)
+            for name, answer in found.items():
+                outcomes.append(judged(group, (number, seed), name, problem, task, answer))
+                if answer.rows is not None and seed == 1:
+                    paths[name] = JointPath.of(problem.robot, answer.rows)
     if pages and number == 0:
         _show(Path(pages), group, problem, paths)
     return outcomes
@@ -202,31 +225,33 @@ def _show(folder: Path, group: str, problem: Problem, paths: dict[str, JointPath
 def comparisons(folder: Path | None, count: int, *rest: Any) -> list[tuple[Any, ...]]:
     """What `compared` is called with."""
     found: list[tuple[Any, ...]] = [
-        (arm, family, number, "", *rest) for arm in GENERATED for family in FAMILIES for number in range(count)
+        (f"{arm}, {family}", number, "", *rest) for arm in GENERATED for family in FAMILIES for number in range(count)
     ]
-    if folder is None:
-        return found
-    for arm in SETS:
+    for arm in SETS if folder else ():
+        assert folder is not None
         files = scene_files(folder, arm, count)
         for family, members in groupby(files, lambda file: Path(file).parent.name.rsplit("_", 1)[0]):
-            found += [(arm, f"MotionBenchMaker {family}", k, file, *rest) for k, file in enumerate(members)]
-    return found
+            found += [(f"{arm}, MotionBenchMaker {family}", k, file, *rest) for k, file in enumerate(members)]
+    found.sort(key=lambda each: each[1])  # the first of each family, then the second of each
+    return [(turn, *each) for turn, each in enumerate(found)]
 
 
 def fill(report: Report, outcomes: Sequence[Outcome], pythons: Mapping[str, str]) -> None:
     """All of them, then group by group."""
     names = list(dict.fromkeys(each.planner for each in outcomes))
-    ours = np.array([each.seconds for each in outcomes if each.planner == OURS])
+    ours = {(each.group, each.run): each.seconds for each in outcomes if each.planner == OURS}
     rows = []
     for name in names:
         mine = [each for each in outcomes if each.planner == name]
         ms = 1e3 * np.array([each.seconds for each in mine])
-        ratio = float(np.exp(np.log(ms / (1e3 * ours)).mean()))
+        beside = 1e3 * np.array([ours[each.group, each.run] for each in mine])
+        ratio = float(np.exp(np.log(ms / beside).mean()))
         counts = [str(sum(each.found for each in mine)), str(sum(each.ends for each in mine))]
         counts += [str(sum(each.status == status for each in mine)) for status in STATUSES]
         lengths = [each.length for each in mine if each.found]
+        length = f"{np.median(lengths):.3g}" if lengths else ""
         times = (np.median(ms), ms.mean(), np.quantile(ms, 0.95), ratio)
-        rows.append([name, str(len(mine)), *counts, *(f"{t:.3g}" for t in times), f"{np.median(lengths):.3g}"])
+        rows.append([name, str(len(mine)), *counts, *(f"{t:.3g}" for t in times), length])
     ours_found = [each for each in outcomes if each.planner in (OURS, NAMED) and each.found]
     sound = sum(each.ends and each.status == "proven" and each.confirmed for each in ours_found)
     report.bar("our paths: ends right, proven, certificate verified", "all", f"{sound} of {len(ours_found)}",
@@ -237,7 +262,7 @@ def fill(report: Report, outcomes: Sequence[Outcome], pythons: Mapping[str, str]
                unclear <= 0.005 * len(theirs))  # fmt: skip
     touching = [each for each in theirs if each.status == "touching"]
     confirmed = sum(each.confirmed for each in touching)
-    report.bar("their paths that touch: contact at the place named, by Pinocchio and coal", "all",
+    report.bar("their paths that touch: these two touch at the place named, by Pinocchio and coal", "all",
                f"{confirmed} of {len(touching)}", confirmed == len(touching))  # fmt: skip
     slower = {row[0]: float(row[TIMES_OVER]) for row in rows if row[0] not in (OURS, NAMED)}
     text = ", ".join(f"{name} {ratio:.3g}" for name, ratio in slower.items())
@@ -251,13 +276,17 @@ def fill(report: Report, outcomes: Sequence[Outcome], pythons: Mapping[str, str]
         for name in names:
             here = [each for each in outcomes if (each.group, each.planner) == (group, name)]
             sound = sum(each.ends and each.status == "proven" for each in here)
-            row.append(f"{sound} / {len(here)}, {1e3 * np.median([each.seconds for each in here]):.3g}")
+            row.append(f"{sound} / {len(here)}, {1e3 * np.median([each.seconds for each in here]):.3g}" if here else "")
         cells.append(row)
     report.table("By arm and family: right and proven of runs, median [ms]", ["", *names], cells)
     reasons = sorted({(each.planner, each.failed) for each in outcomes if each.failed})
     if reasons:
         counted = [[*pair, str(sum((e.planner, e.failed) == pair for e in outcomes))] for pair in reasons]
         report.table("Runs that broke", ["", "why", "runs"], counted)
+    doubtful = [e for e in outcomes if e.status == "undecided" or (e.found and not e.confirmed)]
+    if doubtful:
+        cells = [[e.planner, e.group, str(e.run), e.status, e.said] for e in doubtful]
+        report.table("Undecided, or not confirmed", ["", "group", "problem, seed", "", "what the proof says"], cells)
     hosts = {name: _host(module, pythons.get(module.split()[0], sys.executable)) for name, module in PEERS.items()}
     who = [(name, f"absent: {host.absent}" if host.absent else host.versions) for name, host in hosts.items()]
     report.table("Who", ["", "versions"], who)
@@ -267,10 +296,13 @@ HOW = f"""Ours are whole calls in a world that has planned before, the proofs of
 call, which shortens its path, and `{PLANNER}`, which does not. The others' is their search alone, 32 checks per
 radian (MPlib: 1 % of the space's extent; Tesseract casts, or its own steps; Genesis 0.05 rad), first path, no
 shortening but where a row says so. The same files for all: the arm's own solids, limits and pairs. {{seeds}} seeds on
-each of {{problems}} problems of a family, at most {{seconds:g}} s each, in turns; processor time of the process. A run
-without a path counts with the time that it took. Verdict: `rrtik.prove` with no clearance, straight motions between
-their points. A path that touches counts as confirmed if Pinocchio and coal, which read the same files as the peers,
-find a contact at the configuration that is named."""
+each of {{problems}} problems of a family, in turns. {{rare}} Times are processor times of the process; a run ends after
+{{seconds:g}} s by the clock, so that on a busy machine the slower ones find less. A run without a path counts with the
+time that it took, and a time over ours is that over our default call on the same problem with the same seed.
+
+Verdict: `rrtik.prove` with no clearance, straight motions between their points. A path that touches counts as confirmed
+if Pinocchio and coal, which read the same files as the peers, find that the two bodies that are named touch at the
+configuration that is named."""
 
 
 def main(
@@ -293,6 +325,7 @@ def main(
     outcomes = [each for some in parts(compared, asked) for each in some]
     report = run.report("The standing comparison", "a process for each planner")
     fill(report, outcomes, pythons)
-    how = HOW.format(problems=problems, seeds=seeds, seconds=seconds)
+    rare = " ".join(f"{name}, which takes long, has every {count}th problem." for name, count in EVERY.items())
+    how = HOW.format(problems=problems, seeds=seeds, seconds=seconds, rare=rare)
     report.note("How it was measured", f"{how}\n\n{machine()}")
     return report
