@@ -1,4 +1,8 @@
-"""Mend a motion: the stretches that are not proven free are replaced by proven ones near by, all else stays."""
+"""Mend a motion: the stretches that are not proven free are replaced by proven ones near by, all else stays.
+
+Ways around are found without regard to the motion. Each is then pulled towards it: its waypoints move straight to their
+places on the motion as far as proofs allow.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rrtik_ompl.base.arrays import Matrix, not_negative, positive, seed_of
+from rrtik_ompl.base.arrays import Matrix, Vector, not_negative, positive, seed_of
 from rrtik_ompl.base.choices import Between
 from rrtik_ompl.base.errors import InputError, NotFoundError, require
 from rrtik_ompl.model.path import JointPath, path_of
@@ -23,6 +27,10 @@ from rrtik_ompl.world.world import World
 CHORDS = 2e-4  # [m] largest distance of two bodies from a curved motion that is mended by straight lines
 SHORT = 0.05  # [rad; metres count like radians] longest part of a motion that is kept or replaced as a whole
 SEEDS = 4  # number of plans for a stretch, the nearest of which is taken
+PULLS = (1.0, 0.5, 0.25, 0.1, 0.03)  # shares of its distance from the motion by which a waypoint is moved
+MOST_SWEEPS = 60  # largest number of times that each waypoint is moved
+STILL = 1e-3  # [rad; metres count like radians] largest move of a waypoint in a sweep after which there is none
+THIN = 0.005  # [rad; metres count like radians] distance up to which waypoints are left out
 FINE = 0.01  # [rad; metres count like radians] step in which a departure is measured
 
 
@@ -60,9 +68,9 @@ def mended(
 ) -> Mended:
     """Return a proven path near a motion, with the same ends.
 
-    A stretch is replaced by a small detour where one is proven, or else by the nearest of several plans from the last
-    point before it that is proven free to the first one after it. A curved motion becomes straight lines whose bodies
-    stay within 0.2 mm of it.
+    A stretch is replaced from the last point before it that is proven free to the first one after it: by the nearest of
+    several detours and plans, all of which are pulled towards the motion as far as they are proven. A curved motion
+    becomes straight lines whose bodies stay within 0.2 mm of it.
 
     Args:
         world: The world.
@@ -146,7 +154,62 @@ def _way_around(world: World, stretch: Matrix, clearance: float, seconds: float,
     proven = [rows for rows in ways if world.prover.route(rows, clearance=clearance).proven]
     if not proven:
         raise NotFoundError(f"the motion cannot be mended: no way around: {reason or 'none is proven'}")
-    return min(proven, key=lambda rows: _departures(world.robot, rows, stretch)[0])
+    pulled = [_pulled(world, rows, stretch, clearance) for rows in proven]
+    return min(pulled, key=lambda rows: _departures(world.robot, rows, stretch)[0])
+
+
+def _pulled(world: World, way: Matrix, stretch: Matrix, clearance: float) -> Matrix:
+    """Pull a proven way towards a stretch with the same ends; return its waypoints, shape (k, dof)."""
+    rows = subdivided(way, part_counts(way, SHORT))[0]
+    aims = _at(stretch, _shares_along(rows))
+    shares = np.array(PULLS)[:, None, None]
+    inner = np.arange(1, len(rows) - 1)
+
+    for _ in range(MOST_SWEEPS):
+        largest = 0.0
+        for chosen in (inner[::2], inner[1::2]):  # neighbours of those that move stay
+            tried = (1.0 - shares) * rows[chosen] + shares * aims[chosen]  # shape (pulls, chosen, dof)
+            flat = world.robot.onto_limits(tried.reshape(-1, rows.shape[1]))
+            before, after = (np.tile(rows[chosen + side], (len(PULLS), 1)) for side in (-1, 1))
+            free = world.prover.proven(before, flat, clearance=clearance)
+            free[free] = world.prover.proven(flat[free], after[free], clearance=clearance)
+
+            # The largest pull of each that is proven.
+            proven = free.reshape(len(PULLS), -1)
+            moved = chosen[proven.any(axis=0)]
+            new = flat.reshape(tried.shape)[proven.argmax(axis=0), np.arange(len(chosen))][proven.any(axis=0)]
+            largest = max(largest, np.linalg.norm(new - rows[moved], axis=1).max(initial=0.0))
+            rows[moved] = new
+        if largest < STILL:
+            break
+    return _thinned(world, rows, clearance)
+
+
+def _thinned(world: World, rows: Matrix, clearance: float) -> Matrix:
+    """Leave out waypoints of a proven way, shape (k, dof), that lie near the way without them if that is proven."""
+    kept = [0]
+    while kept[-1] < len(rows) - 1:
+        begin = kept[-1]
+        end = begin + 2
+        while end < len(rows) and _farthest(rows[begin + 1 : end], rows[[begin, end]]) < THIN:
+            end += 1
+        ends = np.arange(begin + 1, end)
+        free = world.prover.proven(np.repeat(rows[[begin]], len(ends), axis=0), rows[ends], clearance=clearance)
+        free[0] = True
+        kept.append(int(ends[free][-1]))
+    return rows[kept]
+
+
+def _shares_along(rows: Matrix) -> Vector:
+    """Return how far along a way its waypoints are, from 0 to 1, shape (k,)."""
+    lengths = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(rows, axis=0), axis=1)))
+    return np.asarray(lengths / max(lengths[-1], 1e-300))
+
+
+def _at(rows: Matrix, shares: Vector) -> Matrix:
+    """Return the configurations on a way at shares of its length, shape (m, dof)."""
+    along = _shares_along(rows)
+    return np.stack([np.interp(shares, along, column) for column in rows.T], axis=1)
 
 
 def _departures(robot: Robot, way: Matrix, stretch: Matrix) -> tuple[float, float]:
