@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import queue
 import threading
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Generic, TypeAlias, TypeVar
 
@@ -15,6 +15,7 @@ import numpy as np
 
 from rrtik_ompl.base.errors import InputError, called, require
 from rrtik_ompl.model.scene import Scene
+from rrtik_ompl.replanning.faults import MOST_DROPPED, Fault, fault_of_time
 
 SILENCE_SECONDS = 2.0  # A run ends after so long without a new scene [s].
 TIME_RESOLUTION = 1e-6  # [s]: a double holds a time since 1970 to a quarter of this
@@ -30,6 +31,7 @@ class Snapshot:
         scene: The scene that was seen.
         unseen: For each obstacle that was out of view then, how long before ``time`` it was seen last [s].
         stated: Whether the scene states how its obstacles move; then obstacles without a motion are at rest.
+        faults: What was wrong with the feed since the snapshot before.
 
     Example:
         >>> from rrtik_ompl.replanning.feed import Snapshot
@@ -42,6 +44,7 @@ class Snapshot:
     scene: Scene
     unseen: Mapping[str, float] = field(default_factory=dict)
     stated: bool = False
+    faults: Sequence[Fault] = ()
 
     def __iter__(self) -> Iterator[Any]:
         return iter((self.time, self.scene))
@@ -62,7 +65,8 @@ class Snapshot:
 
 
 Feed: TypeAlias = Callable[[float], Scene]
-Source: TypeAlias = Scene | Feed | Iterable[tuple[float, Scene] | Snapshot]
+SeenFeed: TypeAlias = Callable[[float], Scene | Snapshot]
+Source: TypeAlias = Scene | SeenFeed | Iterable[tuple[float, Scene] | Snapshot]
 Watch: TypeAlias = Callable[[float], Snapshot]  # returns the last snapshot that is not later than a time
 
 
@@ -70,9 +74,9 @@ def feed_of(source: Source, patience: float = SILENCE_SECONDS) -> Watch:
     """Return a function from a time [s] to the last snapshot then, from any kind of source.
 
     Args:
-        source: A scene whose obstacles state their motion; a function from a time [s] to the scene at that time; or
-            pairs of a time and a scene (or a :class:`Snapshot`) in the order of time, as a sensor gives them.
-        patience: How far apart the first two of such pairs may be [s].
+        source: A scene whose obstacles state their motion; a function from a time [s] to the scene at that time, or to
+            a :class:`Snapshot` of an earlier one; or pairs of a time and a scene, or snapshots, as a sensor gives.
+        patience: How far apart the first two of such pairs may be, and how far out of order any of them [s].
 
     Raises:
         InputError: If the source is none of these. The function raises it later if times are impossible.
@@ -81,27 +85,55 @@ def feed_of(source: Source, patience: float = SILENCE_SECONDS) -> Watch:
         return lambda time: Snapshot(time, source.at(time), stated=True)
     if callable(source):
         called(source, "scene feed", "time [s]")
-        return _checked(source)
+        return Asked(source, patience)
     if isinstance(source, Iterable) and getattr(source, "ndim", 1) > 0:
         return Stream(source, patience)
     raise InputError(f"scene feed: expected a scene, a function of time or pairs, got {type(source).__name__}")
 
 
-def _checked(source: Feed) -> Watch:
-    """Return a function that calls ``source`` and checks that it returns a scene."""
+class Asked:
+    """A function of time as a feed; called with a time, it returns the snapshot of the function, or a later one before.
 
-    def at(time: float) -> Snapshot:
-        scene = source(time)
-        require(scene, Scene, f"scene feed: what it returns at {time:g} s", "return the scene at that time")
-        return Snapshot(time, scene)
+    Args:
+        source: Returns the scene at a time, or a snapshot of an earlier one.
+        patience: How far out of order snapshots may be [s].
+    """
 
-    return at
+    def __init__(self, source: SeenFeed, patience: float) -> None:
+        self._source = source
+        self._patience = patience
+        self._latest: Snapshot | None = None
+
+    def __call__(self, time: float) -> Snapshot:
+        """Return the last snapshot that is known at a time [s].
+
+        Raises:
+            InputError: If the function returns neither a scene nor a snapshot, one of a later time, or one of a time
+                that is too far back.
+        """
+        given = self._source(time)
+        if isinstance(given, Snapshot):
+            seen = _snapshot(given)
+        else:
+            require(given, Scene, f"scene feed: what it returns at {time:g} s", "return the scene at that time")
+            seen = Snapshot(time, given)
+
+        if seen.time > time + TIME_RESOLUTION:
+            future = f"at {time:g} s it gives the scene of {seen.time:g} s"
+            raise InputError(f"scene feed: {future}; give the last scene that was seen, and its time")
+        before = self._latest
+        fault = None if before is None else fault_of_time(seen.time, before.time, self._patience)
+        if before is not None and fault is not None:  # The same snapshot once more is no fault.
+            return replace(before, faults=(Fault(seen.time, fault),) if seen.time < before.time else ())
+        self._latest = seen
+        return seen
 
 
 class Stream:
     """A stream of snapshots; called with a time, it returns the last snapshot that is not later.
 
     Times are counted from the first snapshot and rounded to a microsecond, so any clock in seconds may be used.
+    Snapshots that are doubled or out of order are dropped, see :mod:`rrtik_ompl.replanning.faults`.
     """
 
     def __init__(self, snapshots: Iterable[tuple[float, Scene] | Snapshot], patience: float = SILENCE_SECONDS) -> None:
@@ -117,6 +149,7 @@ class Stream:
         self._first_time = first.time
         self._latest = replace(first, time=0.0)
         self._next: Snapshot | None = None
+        self._faults: list[Fault] = []  # of the snapshots that were dropped since the last call
         self._count = 1
         self._has_ended = False
 
@@ -124,38 +157,45 @@ class Stream:
         """Return the last snapshot that is not later than ``time`` [s].
 
         Raises:
-            InputError: If a snapshot is no pair of a time and a scene, or not later than the one before it, or if the
-                second one is later than the first by more than the patience.
+            InputError: If a snapshot is no pair of a time and a scene, if times stand still or go back by more than the
+                patience, or if the second one is later than the first by more than the patience.
         """
         while True:
             if self._next is None and not self._has_ended:
                 self._next = self._read()
                 self._has_ended = self._next is None
             if self._next is None or self._next.time > time + TIME_RESOLUTION:
-                return self._latest
+                faults = tuple(self._faults)
+                self._faults.clear()
+                return replace(self._latest, faults=faults)
             self._latest = self._next
             self._next = None
 
     def _read(self) -> Snapshot | None:
-        """Read the next snapshot, with its time counted from the first one; None at the end of the stream."""
-        snapshot = next(self._remaining, None)
-        if snapshot is None:
-            return None
+        """Read the next snapshot that is not dropped, its time counted from the first; None at the end."""
+        for _ in range(MOST_DROPPED):
+            snapshot = next(self._remaining, None)
+            if snapshot is None:
+                return None
 
-        time = round(snapshot.time - self._first_time, 6)
-        before = self._latest.time
-        if time < before:
-            times = f"{snapshot.time:.16g} s comes after {self._first_time + before:.16g} s"
-            raise InputError(f"scene feed: times go backwards: {times}; sort the snapshots by time")
-        if time == before:
-            repeated = f"{snapshot.time:.16g} s comes twice"
-            raise InputError(f"scene feed: times stand still: {repeated}; give the time at which each scene was taken")
-        if self._count == 1 and time > self._patience:
-            delay = f"the second scene comes {time:.6g} s after the first, feed_patience is {self._patience:g} s"
-            raise InputError(f"scene feed: {delay}; give times in seconds, not milliseconds, or raise feed_patience")
+            time = round(snapshot.time - self._first_time, 6)
+            before = self._latest.time
+            fault = fault_of_time(time, before, self._patience, self._first_time)
+            if fault is None:
+                return self._counted(replace(snapshot, time=time))
+            self._faults.append(Fault(time, fault))
 
+        still = f"times stand still: none of {MOST_DROPPED} scenes is later than {self._first_time + before:.16g} s"
+        raise InputError(f"scene feed: {still}; give the time at which each scene was taken")
+
+    def _counted(self, snapshot: Snapshot) -> Snapshot:
+        """Return a snapshot that is to be used; an error if it is the second one and far too late."""
+        delay = snapshot.time - self._latest.time
+        if self._count == 1 and delay > self._patience:
+            late = f"the second scene comes {delay:.6g} s after the first, feed_patience is {self._patience:g} s"
+            raise InputError(f"scene feed: {late}; give times in seconds, not milliseconds, or raise feed_patience")
         self._count += 1
-        return replace(snapshot, time=time)
+        return snapshot
 
 
 def _snapshot(item: object) -> Snapshot:

@@ -160,7 +160,7 @@ def _scene_at_tick(scene: Scene, tick: Tick) -> Scene:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Period:
-    """A part of a run in which shapes, margins and allowed pairs stay the same.
+    """A part of a run in which obstacles, shapes, margins and allowed pairs stay the same.
 
     Attributes:
         begin, end: Begin and end of the period [s].
@@ -178,7 +178,8 @@ class _Period:
 
 def _periods(snapshots: Sequence[Snapshot], end: float) -> Iterator[_Period]:
     """Yield the periods of a run until ``end`` [s]; a new one begins where more than the poses changes."""
-    motions = {o.name: _motion_of(snapshots, o) for o in snapshots[0].scene.obstacles}
+    obstacles = {o.name: o for each in snapshots for o in each.scene.obstacles}
+    motions = {name: _motion_of(snapshots, each) for name, each in obstacles.items()}
     knots = np.unique([time for motion in motions.values() if motion is not None for time in _turning_times(motion)])
     begins = [
         0,
@@ -201,7 +202,7 @@ def _motion_of(snapshots: Sequence[Snapshot], obstacle: Obstacle) -> Motion | No
     if snapshots[0].stated:
         return obstacle.motion
 
-    pose_of_time = {each.seen_at(name): each.scene.obstacle(name).pose for each in snapshots}
+    pose_of_time = {each.seen_at(name): o.pose for each in snapshots for o in each.scene.obstacles if o.name == name}
     times = sorted(pose_of_time)
     poses = [pose_of_time[time] for time in times]
     if all(np.array_equal(pose.homogeneous, poses[0].homogeneous) for pose in poses):
@@ -218,7 +219,10 @@ def _same_but_for_poses(first: Scene, second: Scene) -> bool:
     """Check whether two scenes have the same shapes, margins and allowed pairs, so that at most poses differ."""
     if first is second:
         return True
-    pairs = ((each, second.obstacle(each.name)) for each in first.obstacles)
+    given = {o.name: o for o in second.obstacles}
+    if {o.name for o in first.obstacles} != given.keys():
+        return False
+    pairs = ((each, given[each.name]) for each in first.obstacles)
     same_solids = all(same_shape(a.shape, b.shape) and a.margin == b.margin for a, b in pairs)
     return same_solids and pairs_that_may_touch(first) == pairs_that_may_touch(second)
 

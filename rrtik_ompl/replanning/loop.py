@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+import warnings
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -15,7 +16,9 @@ from rrtik_ompl.base.choices import RunOutcome, TickEvent
 from rrtik_ompl.base.poses import pose_row
 from rrtik_ompl.model.goal import JOINT_TOLERANCE
 from rrtik_ompl.model.scene import Scene, pairs_that_may_touch
+from rrtik_ompl.model.shapes import Shape, same_shape
 from rrtik_ompl.replanning.evading import evasion
+from rrtik_ompl.replanning.faults import UNFORESEEN, Fault, FaultKind, FeedWarning, SceneMemory
 from rrtik_ompl.replanning.feed import SILENCE_SECONDS, Snapshot, Watch
 from rrtik_ompl.replanning.record import ReplanRun, joints_of
 from rrtik_ompl.replanning.settings import PREDICTED_PLACES, ReplanSettings, make_planner
@@ -63,6 +66,8 @@ class Loop:
         self._patience = patience
 
         robot = problem.robot
+        self._memory = SceneMemory(patience, settings.speed_bound)
+        self._warned_faults = set[FaultKind]()
         self._snapshot = self._read_feed(0.0)
         scene = self._snapshot.scene
         refuse_endless_turns(scene)
@@ -187,10 +192,17 @@ class Loop:
         return f"{silence} than feed_patience ({self._patience:g} s)"
 
     def _read_feed(self, now: float) -> Snapshot:
-        """Return the latest snapshot of the feed; an error unless the arm holds the same objects as in the problem."""
-        snapshot = self._feed(now)
-        check_held(snapshot.scene, self._problem.world.scene)
-        return snapshot
+        """Return the latest snapshot of the feed, with what is remembered of obstacles that it does not show.
+
+        Raises:
+            InputError: If the arm holds other objects than in the problem.
+        """
+        seen = self._feed(now)
+        check_held(seen.scene, self._problem.world.scene)
+        if seen.stated:
+            return seen
+        known = self._memory.take(seen.time, seen.scene, seen.unseen)
+        return replace(seen, scene=known.scene, unseen=known.unseen, faults=(*seen.faults, *known.faults))
 
     def _read_scene(self, now: float) -> bool:
         """Read the scene, move the obstacles of the worlds and return whether anything changed.
@@ -205,6 +217,7 @@ class Loop:
         ages = snapshot.ages(now)
 
         renewed = self._renew_worlds(scene)
+        self._note_faults(snapshot.faults)
         changed = self._tracker.update(snapshot) or renewed
         self._doubt_moves_since(self._tracker.faster_since)
         self._snapshot = snapshot
@@ -239,13 +252,38 @@ class Loop:
         return True
 
     def _renew_worlds(self, scene: Scene) -> bool:
-        """Make new worlds and a new planner if the pairs that may touch have changed; return whether they have."""
-        scene_before = self._world.scene
-        if pairs_that_may_touch(scene) == pairs_that_may_touch(scene_before):
+        """Make new worlds and a new planner, with the path so far, if obstacles have come, gone or changed their shape.
+
+        The same is done if the pairs that may touch have changed. Returns whether it was done.
+        """
+        if _same_solids(scene, self._world.scene):
             return False
+        path = self._planner.path
         self._make_worlds(self._problem.world.with_accuracy("exact").with_scene(scene))
         self._planner = make_planner(self._settings, self._world, *self._box)
+        self._planner.path = path
         return True
+
+    def _note_faults(self, faults: Iterable[Fault]) -> None:
+        """Record what is wrong with the feed, warn once of each kind, and doubt moves that could not know of it."""
+        for fault in faults:
+            if fault.kind == "appears":
+                fault = self._where_it_appears(fault)
+            self.run.faults.append(fault)
+            if fault.kind in UNFORESEEN:
+                self._doubt_moves_since(self._snapshot.time)
+            if fault.kind not in self._warned_faults:
+                self._warned_faults.add(fault.kind)
+                warnings.warn(FeedWarning(f"scene feed: {fault}"), stacklevel=6)
+
+    def _where_it_appears(self, fault: Fault) -> Fault:
+        """Return the fault that an obstacle appears on the arm if it does, and else the given one."""
+        scene = self._world.scene
+        others = [o.name for o in scene.obstacles if o.name != fault.obstacle]
+        alone = self._problem.world.with_accuracy("exact").with_scene(scene.without(*others))
+        if alone.valid(self.q):
+            return fault
+        return replace(fault, kind="appears on the arm", detail=alone.explain(self.q))
 
     def _doubt_moves_since(self, time: float) -> None:
         """Mark the recorded moves that ended after a time [s] as not proven: an obstacle was faster than stated."""
@@ -484,9 +522,29 @@ class Loop:
         poses = {
             o.name: pose_row(o.pose)
             for o in self._world.scene.obstacles
-            if not np.array_equal(o.pose.homogeneous, self._first_poses[o.name].homogeneous)
+            if o.name in self._first_poses and (o.pose.homogeneous != self._first_poses[o.name].homogeneous).any()
         }
         self.run.ticks.append(Tick(now, q, event, path, poses, seconds_of_part, checked, reason, proven))
+
+
+def _same_solids(first: Scene, second: Scene) -> bool:
+    """Check whether one world serves for two scenes: their names, shapes and pairs that may touch are the same.
+
+    Clouds of points may have other points.
+    """
+    if first is second:
+        return True
+    shapes = {o.name: o.shape for o in first.obstacles}
+    others = {o.name: o.shape for o in second.obstacles}
+    return (
+        shapes.keys() == others.keys()
+        and all(_serves(shapes[name], others[name]) for name in shapes)
+        and pairs_that_may_touch(first) == pairs_that_may_touch(second)
+    )
+
+
+def _serves(shape: Shape, other: Shape) -> bool:
+    return (shape.sensed and type(shape) is type(other)) or same_shape(shape, other)
 
 
 def one_step(path: Matrix, step: float, max_change: Vector) -> tuple[Vector, int]:

@@ -9,7 +9,7 @@ import inspect
 import json
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import asdict, dataclass, field, fields, replace
 from functools import lru_cache
 from itertools import pairwise
 from typing import Any, get_args
@@ -42,6 +42,7 @@ from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import AttachedObject, ConstantVelocity, Motion, Obstacle, Scene, TimedPoses, Touching
 from rrtik_ompl.model.shapes import SHAPES, PointCloud, Shape
 from rrtik_ompl.model.transitions import route_length
+from rrtik_ompl.replanning.faults import ANSWERS, Fault
 from rrtik_ompl.replanning.feed import Feed, Snapshot
 from rrtik_ompl.replanning.judge import RunViolation, run_violations
 from rrtik_ompl.replanning.tick import Tick
@@ -74,6 +75,7 @@ class ReplanRun:
         reason: Why the robot has not arrived, or "".
         prismatic, continuous: Names of the joints that slide, and of those that turn without limits; both empty in old
             records.
+        faults: What was wrong with the feed of scenes, in the order in which it came.
 
     Example:
         >>> scenario = rrtik.replanning.Scenario.load("replan_walls")
@@ -102,6 +104,7 @@ class ReplanRun:
     reason: str = ""
     prismatic: tuple[str, ...] = ()
     continuous: tuple[str, ...] = ()
+    faults: list[Fault] = field(default_factory=list)
 
     def see(self, seen: Snapshot) -> None:
         """Add a snapshot to ``scenes`` if it is new.
@@ -112,6 +115,7 @@ class ReplanRun:
         scenes = self.scenes
         if seen.time >= self.scenes_end or (scenes and (scenes[0].stated or seen.time <= scenes[-1].time)):
             return
+        seen = replace(seen, faults=())  # They stand in ``faults``.
         self._points += _new_points(seen, scenes[-1] if scenes else None)
         if self._points > MOST_POINTS and scenes:
             self.scenes_end = seen.time
@@ -274,7 +278,8 @@ class ReplanRun:
         proven_moves = f", {proven} of {moves} moves proven" if moves else ""
 
         events = f"{counted('repair', 'repair')}{longest}, {counted('wait', 'wait')}, {counted('evade', 'evasion')}"
-        return f"{end}: {events}, length {self.length:.2f}{proven_moves}"
+        faults = f", {len(self.faults)} faults of the feed" if self.faults else ""
+        return f"{end}: {events}, length {self.length:.2f}{proven_moves}{faults}"
 
     @property
     def statistics(self) -> dict[str, Any]:
@@ -305,7 +310,9 @@ class ReplanRun:
             heads["scenes_end"] = self.scenes_end
         ticks = [_tick_data(tick) for tick in self.ticks]
         scenes = scenes_data(self.scenes) if self.scenes else {}
-        document = {"version": 1, "kind": KIND, **heads, "clearance": self.clearance, **scenes, "ticks": ticks}
+        faults = {"faults": [asdict(fault) for fault in self.faults]} if self.faults else {}
+        entries = {**heads, "clearance": self.clearance, **faults, **scenes, "ticks": ticks}
+        document = {"version": 1, "kind": KIND, **entries}
         write_text(file, json.dumps(document) + "\n")
 
     @staticmethod
@@ -352,7 +359,7 @@ def read_run(file: str | os.PathLike[str]) -> ReplanRun:
         heads = _heads(document)
         ticks = [_tick(entry, len(heads["joint_names"])) for entry in document["ticks"]]
         _check_times(ticks)
-        return ReplanRun(**heads, ticks=ticks, scenes=scenes_of(document))
+        return ReplanRun(**heads, ticks=ticks, scenes=scenes_of(document), faults=_faults_of(document))
     except (KeyError, TypeError, AttributeError) as error:
         raise InputError(f"{file}: not a whole record: {error!r}; write it again with rrtik replan --record") from None
     except InputError as error:
@@ -381,6 +388,19 @@ def _heads(document: Mapping[str, Any]) -> dict[str, Any]:
     for name in _JOINTS:
         heads[name] = tuple(listed(document.get(name, ()), f"{name} joints"))
     return {**heads, "outcome": outcome, "joint_names": tuple(heads["joint_names"])}
+
+
+def _faults_of(document: Mapping[str, Any]) -> list[Fault]:
+    """Return what was wrong with the feed of a record; older records do not say it."""
+    return [
+        Fault(
+            finite_number(entry["time"], "time of a fault"),
+            one_of(tuple(ANSWERS), str(entry["kind"]), "kind of a fault"),
+            str(entry["obstacle"]),
+            str(entry["detail"]),
+        )
+        for entry in listed(document.get("faults", ()), "faults")
+    ]
 
 
 def _check_times(ticks: list[Tick]) -> None:
@@ -455,6 +475,8 @@ def scenes_data(snapshots: Sequence[Snapshot]) -> Json:
         entry: Json = {"time": snapshot.time}
         rows = {o.name: _obstacle_data(o, number_of(o.shape)) for o in snapshot.scene.obstacles}
         entry["obstacles"] = [row for name, row in rows.items() if previous_rows.get(name) != row]
+        gone = [name for name in previous_rows if name not in rows]
+        entry |= {"gone": gone} if gone else {}
         previous_rows = rows
 
         pairs = [list(pair) for pair in snapshot.scene.allowed_collisions]
@@ -494,6 +516,8 @@ def scenes_of(document: Mapping[str, Any]) -> list[Snapshot]:
     contacts = list[list[Any]]()
 
     for entry in document["scenes"]:
+        gone = [str(name) for name in listed(entry.get("gone", ()), "gone obstacles of a scene")]
+        obstacle_of_name = {name: each for name, each in obstacle_of_name.items() if name not in gone}
         obstacle_of_name |= {o.name: o for o in (_obstacle(row, shapes) for row in entry["obstacles"])}
         allowed = entry.get("allowed_collisions", allowed)
         attached = tuple(_held(row, shapes) for row in entry["attached"]) if "attached" in entry else attached

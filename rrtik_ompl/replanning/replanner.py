@@ -67,9 +67,10 @@ def replan(  # noqa: D417 - the settings are described in one place
         problem: Robot, scene at the begin, start and goal. If the goal is a pose, position or region, all
             configurations that reach it are goals: if one is blocked, another one is tried.
         scene_feed: The scene over time: a scene whose obstacles state their motion, a function of time [s], or
-            pairs of a time and a scene (or a :class:`Snapshot`); the problem's scene if None. Names and shapes of the
-            obstacles must stay the same, and so must the attached objects, which are those of the problem; each scene
-            brings its own pairs that may touch. The times of pairs are counted from the first pair [s].
+            pairs of a time and a scene (or a :class:`Snapshot`); the problem's scene if None. Obstacles may come, go
+            and change (:mod:`rrtik_ompl.replanning.faults` says what follows); the attached objects must stay those of
+            the problem; each scene brings its own pairs that may touch. The times of pairs are counted from the first
+            pair [s].
         step: This and all arguments that are not explained here: see :class:`ReplanSettings`.
         goal_feed: A goal that moves: the configuration at a time [s], in place of the problem's goal.
             It counts as reached when the robot is where the goal was at the begin of the last tick.
@@ -77,7 +78,8 @@ def replan(  # noqa: D417 - the settings are described in one place
         clock: Measures the times of the ticks and the ``repair_budget`` [s]. ``time.process_time`` counts processor
             time, which suits a machine that does other work too.
         feed_patience: Two limits [s]; 2 s and 30 s if None. The first is how long a stream of pairs may bring nothing
-            new, in the time of the run; after that the run ends with the outcome "no scene". The second is how long a
+            new, in the time of the run; after that the run ends with the outcome "no scene". So long obstacles count
+            that scenes no longer show, and so far scenes may be out of order. The second is how long a
             feed may take to answer, in wall time; after that the run ends with an error, and the record holds all
             ticks before it.
 

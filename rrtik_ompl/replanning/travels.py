@@ -69,6 +69,7 @@ class MotionTracker:
             time = seen.seen_at(obstacle.name)
             last_time, last_seen = self._sightings.get(name, (time, obstacle))
             reshaped = not same_shape(obstacle.shape, last_seen.shape)
+            self._radii.setdefault(name, farthest(obstacle.shape, pin.SE3.Identity()))
             moved = not np.array_equal(last_seen.pose.homogeneous, obstacle.pose.homogeneous)
             changed |= reshaped or moved or obstacle.margin != last_seen.margin
 
@@ -82,6 +83,9 @@ class MotionTracker:
                     self._measure(obstacle, last_seen.pose, last_time, time)
             self._sightings[name] = (time, obstacle)
 
+        # What is gone is forgotten: should it come back, it may have been anywhere.
+        given = {o.name for o in seen.scene.obstacles}
+        self._sightings = {name: each for name, each in self._sightings.items() if name in given}
         return changed
 
     def later(self, scene: Scene, seconds: float, ages: Mapping[str, float] | None = None) -> Scene:
