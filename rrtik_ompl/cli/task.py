@@ -135,7 +135,10 @@ def task(
 
     if plan.found and out is not None:
         plan.save(out)
-    duration = None if trajectory is None or not plan.found else _timed(plan, trajectory, share, pause)
+    commands: Path | None = None
+    duration: float | None = None
+    if trajectory is not None and plan.found:
+        duration, commands = _timed(plan, trajectory, share, pause)
 
     if plan.found and html is not None:
         from rrtik_ompl.viewer import view
@@ -148,7 +151,7 @@ def task(
     elif plan.found:
         say(*plan_lines(loaded.name, plan))
         say(*([] if duration is None else [f"  in {duration:.2f} s, each rest of {pause:g} s"]))
-        say(*(f"wrote {file}" for file in (out, trajectory, html) if file is not None))
+        say(*(f"wrote {file}" for file in (out, trajectory, commands, html) if file is not None))
         seen = f"see it: {command('task', task, '--html', 'task.html')}" if html is None else f"open {html}"
         suggest(seen, *(["time it: --trajectory task.json"] if trajectory is None else []))
     else:
@@ -180,12 +183,17 @@ def plan_lines(name: str, plan: TaskPlan, wrong: frozenset[int] = frozenset()) -
     return [*lines, *(f"note: {note}" for note in plan.notes)]
 
 
-def _timed(plan: TaskPlan, file: Path, share: float, pause: float) -> float:
-    """Time a task and save its trajectory; return its duration [s]."""
+def _timed(plan: TaskPlan, file: Path, share: float, pause: float) -> tuple[float, Path | None]:
+    """Time a task and save its trajectory; return its duration [s], and the file of commands to the gripper, if any."""
     from rrtik_ompl import RateLimits
+    from rrtik_ompl.motion.trajectory.text import ROS_JSON
 
     with progress("timing"):
         timed = plan.time_parameterize(RateLimits.of(plan.worlds[0].robot, share=share), pause=pause)
 
-    timed.trajectory.save(file)
-    return timed.trajectory.duration
+    commands = None
+    for ending in (ROS_JSON, ".yaml") if timed.trajectory.gripper else ():
+        if file.name.lower().endswith(ending):
+            commands = file.with_name(f"{file.name[: -len(ending)]}.gripper.{ending.rpartition('.')[2]}")
+    timed.trajectory.save(file, gripper=commands)
+    return timed.trajectory.duration, commands

@@ -1,9 +1,8 @@
-"""Model the joints of a gripper, which are held fixed while the arm moves; tasks change their values."""
+"""Find the joints of a gripper, which are held fixed while the arm moves; tasks change their values."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import combinations
 from typing import Any
 
@@ -17,63 +16,11 @@ from rrtik_ompl.description.arm import arms_of
 from rrtik_ompl.description.robot_build import Mimic, drivers_of
 from rrtik_ompl.description.srdf import Srdf
 from rrtik_ompl.description.tree import Link, Tree
+from rrtik_ompl.model.gripper import STATES, GripperJoints
 from rrtik_ompl.model.robot import Robot
 
 MOST_JOINTS = 6  # most joints of a hand that opens and closes as one
-STATES = ("open", "closed")
 NAMES = {"open": ("open", "opened"), "closed": ("closed", "close")}  # names of states, in lower case
-
-
-@dataclass(frozen=True, slots=True)
-class GripperJoints:
-    """The joints of a gripper, and how far it opens.
-
-    The methods return joint values that `rrtik_ompl.load_robot` takes as ``locked``.
-
-    Attributes:
-        joints: Names of the joints, without those that mimic them.
-        opened, closed: Their values in the open and in the closed state [rad or m].
-        width: Distance between the fingers in the open state minus that in the closed state [m]; in between, it is
-            taken as proportional; 0 if it is not known.
-
-    Example:
-        >>> import rrtik_ompl as rrtik
-        >>> hand = rrtik.load_robot("panda").gripper
-        >>> hand.close_on(0.05)
-        {'panda_finger_joint1': 0.025}
-        >>> holding = rrtik.load_robot("panda", locked=hand.close_on(0.05))
-    """
-
-    joints: tuple[str, ...]
-    opened: tuple[float, ...]
-    closed: tuple[float, ...]
-    width: float
-
-    def posture(self, state: str) -> dict[str, float]:
-        """Return the joint values by name in the state "open" or "closed" ("close" is the same).
-
-        Raises:
-            UnknownNameError: If the state is another one.
-        """
-        if state not in (*STATES, "close"):
-            raise UnknownNameError("state of a gripper", state, STATES)
-        return dict(zip(self.joints, self.opened if state == "open" else self.closed, strict=True))
-
-    def close_on(self, width: float) -> dict[str, float]:
-        """Return the joint values by name at which the fingers are a width [m] apart.
-
-        Raises:
-            InputError: If the gripper does not open so far.
-        """
-        wanted = finite_number(width, "width of a gripper")
-        if self.width == 0.0:
-            raise InputError("width of a gripper: how far this one opens is not known; use its states open and closed")
-        if not 0.0 <= wanted <= self.width:
-            raise InputError(f"width of a gripper: it opens from 0 to {self.width:g} m, got {wanted:g}")
-
-        share = wanted / self.width
-        values = (shut + share * (wide - shut) for shut, wide in zip(self.closed, self.opened, strict=True))
-        return dict(zip(self.joints, values, strict=True))
 
 
 def gripper_of(
@@ -124,7 +71,7 @@ def srdf_gripper(semantics: Srdf, tree: Tree, mimics: Iterable[Mimic], robot: Ro
         states = [_named_state(semantics, end.group, joints, names) for names in NAMES.values()]
         if joints and not arm & set(joints) and None not in states:
             opened, closed = (dict(zip(joints, state or (), strict=True)) for state in states)
-            gripper_by_joints[joints] = hand.gripper(opened, closed)
+            gripper_by_joints[joints] = hand.gripper(opened, closed, end.group)
 
     return next(iter(gripper_by_joints.values())) if len(gripper_by_joints) == 1 else None
 
@@ -222,10 +169,21 @@ class _Hand:
         self.drivers = drivers_of(mimics)
         self.geometries = {item.name: item.geometry for item in robot.collision.geometryObjects}
 
-    def gripper(self, opened: Mapping[str, float], closed: Mapping[str, float]) -> GripperJoints:
-        """Return the gripper with these states, and how far it opens."""
+    def gripper(self, opened: Mapping[str, float], closed: Mapping[str, float], name: str = "") -> GripperJoints:
+        """Return the gripper with these states, how far it opens, and the limits of its joints."""
         width = max(self.distance(opened) - self.distance(closed), 0.0)
-        return GripperJoints(tuple(opened), tuple(opened.values()), tuple(closed[joint] for joint in opened), width)
+        by_name = {joint.name: joint for joint in self.tree.joints}
+        joints = [by_name[joint] for joint in opened]
+        velocity = tuple(joint.velocity for joint in joints)
+        return GripperJoints(
+            tuple(opened),
+            tuple(opened.values()),
+            tuple(closed[joint] for joint in opened),
+            width,
+            name,
+            tuple(joint.slides for joint in joints),
+            velocity if np.isfinite(velocity).all() and min(velocity) > 0.0 else (),
+        )
 
     def fingers(self, joints: Collection[str]) -> dict[str, list[Link]]:
         """Return the links of each finger that the joints move, by its first joint."""

@@ -14,13 +14,14 @@ import numpy as np
 from rrtik_ompl.base.errors import InputError, MeshWarning, UnknownNameError
 from rrtik_ompl.description.arm import arms_of
 from rrtik_ompl.description.faults import not_read, postures_outside, tell
-from rrtik_ompl.description.gripper import GripperJoints, gripper_of
+from rrtik_ompl.description.gripper import gripper_of
 from rrtik_ompl.description.robot_build import JointLimits, build_robot, drivers_of, merge_limits
 from rrtik_ompl.description.robot_source import source_entry
 from rrtik_ompl.description.srdf import Srdf, read_srdf
 from rrtik_ompl.description.tree import Tree
 from rrtik_ompl.description.urdf_read import UrdfDescription, located, read_urdf
 from rrtik_ompl.description.xacro_text import robot_text
+from rrtik_ompl.model.gripper import GripperJoints
 from rrtik_ompl.model.robot import LIMIT_TOLERANCE, Robot
 
 if TYPE_CHECKING:

@@ -96,7 +96,7 @@ class Robot(Keeper):
         model, collision: Pinocchio's model and geometry; do not change them.
         looks: Loads ``visual``.
         closed_form: The robot's own inverse kinematics, if it has one.
-        gripper: The joints that open and close its gripper, `rrtik_ompl.description.gripper.GripperJoints`, or None.
+        gripper: The joints that open and close its gripper, `rrtik_ompl.model.gripper.GripperJoints`, or None.
         padding, joint_weights: By name; options of :func:`rrtik_ompl.load_robot`.
 
     Example:

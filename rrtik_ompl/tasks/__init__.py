@@ -178,7 +178,8 @@ class TaskPlan:
             limits: Limits of the joints; None for those of the robot.
             blend: As there; rounded corners are checked in the world of their motion, and keep the constraints of
                 their stage.
-            pause: How long the arm rests where a gripper opens or closes and where an object is taken or put down [s].
+            pause: How long the arm rests at least where a gripper opens or closes and where an object is taken or put
+                down [s]; it rests longer where the fingers do, at the velocity limits of their joints.
             clearance: As there.
             tip_speed: As there.
             tip_acceleration: As there.

@@ -15,6 +15,7 @@ from rrtik_ompl.constraints.held_regions import held_regions
 from rrtik_ompl.model.judgement import Judged, PathContact, Verdict
 from rrtik_ompl.tasks import MoveTo, TaskPlan
 from rrtik_ompl.tasks.setting import world_of_motion
+from rrtik_ompl.tasks.timed import TimedTask
 from rrtik_ompl.world.judgement import contacts_at
 from rrtik_ompl.world.route_check import as_it_stands
 from rrtik_ompl.world.world import World
@@ -31,7 +32,8 @@ class PlayedTask:
         rate: Ticks per second.
         motions: Index of the motion of each tick, shape (ticks,).
         waypoints: Configuration at each tick, shape (ticks, dof).
-        rests: Share of a rest before the next motion that is over at each tick, 0 outside of rests, shape (ticks,).
+        rests: How far the fingers have come in the rest before the next motion at each tick, from 0 to 1, shape
+            (ticks,).
         judged: The verdict, by the ticks.
         held: The regions of path constraints, each with the configuration at which its motion begins, shape (dof,).
     """
@@ -59,8 +61,8 @@ def _ticks(plan: TaskPlan) -> tuple[NDArray[np.int64], Matrix, Vector]:
     A motion that leads nowhere takes no time, but has a tick too.
 
     Returns:
-        For each tick the index of its motion, shape (ticks,); its configuration, shape (ticks, dof); and the share of a
-        rest that is over, shape (ticks,).
+        For each tick the index of its motion, shape (ticks,); its configuration, shape (ticks, dof); and how far the
+        fingers have come in a rest, shape (ticks,).
     """
     numbers = np.arange(len(plan.paths))
     starts = np.array([path.start for path in plan.paths])
@@ -70,7 +72,7 @@ def _ticks(plan: TaskPlan) -> tuple[NDArray[np.int64], Matrix, Vector]:
     timed = plan.time_parameterize()
     samples = timed.trajectory.sample(RATE)
     motions = np.searchsorted(timed.begins, samples.times, side="right") - 1
-    rests = np.array([_share_of_rest(timed.pauses, time) for time in samples.times.tolist()])
+    rests = np.array([_share_of_rest(timed, time) for time in samples.times.tolist()])
 
     motions_without_tick = np.setdiff1d(numbers, motions)
     motions = np.append(motions, motions_without_tick)
@@ -80,10 +82,16 @@ def _ticks(plan: TaskPlan) -> tuple[NDArray[np.int64], Matrix, Vector]:
     return motions[order], rows[order], rests[order]
 
 
-def _share_of_rest(pauses: Matrix, time: float) -> float:
-    """Return the share that is over of the rest in which a time lies; 0 outside of the rests, shape (p, 2)."""
-    resting = pauses[(pauses[:, 0] < time) & (time < pauses[:, 1])]
-    return float((time - resting[0, 0]) / (resting[0, 1] - resting[0, 0])) if len(resting) else 0.0
+def _share_of_rest(timed: TimedTask, time: float) -> float:
+    """Return how far the fingers have come in the rest in which a time lies, from 0 to 1; 0 outside of the rests."""
+    begins, ends = timed.pauses.T
+    # At its end the next motion begins, unless there is none.
+    resting = timed.pauses[(begins < time) & ((time < ends) | (ends > timed.begins[-1]))]
+    if not len(resting):
+        return 0.0
+    begin, end = resting[0]
+    seconds = next((event.seconds for event in timed.trajectory.gripper if event.time == begin), end - begin)
+    return float(min((time - begin) / seconds, 1.0)) if seconds else 1.0
 
 
 def _judged(plan: TaskPlan, motions: NDArray[np.int64], rows: Matrix) -> Judged:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from rrtik_ompl.base.arrays import Matrix, Vector, frozen, not_negative
 from rrtik_ompl.base.copies import in_one_line
 from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.model.gripper import GripperJoints
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.motion.trajectory import RateLimits, Trajectory, time_parameterize
@@ -30,7 +31,8 @@ class TimedTask:
     """A task over time.
 
     Attributes:
-        trajectory: All motions one after the other; the arm rests where something is done.
+        trajectory: All motions one after the other; the arm rests where something is done. Its commands to the gripper
+            come where these rests begin; that at 0 says how the fingers are held on the first motion.
         begins: Time at which each motion of the plan begins [s], shape (k,).
         pauses: Times at which each rest for a gripper or an object begins and ends [s], shape (p, 2).
     """
@@ -55,7 +57,7 @@ def timed_task(
     payload: float,
 ) -> TimedTask:
     """Time the plan of a task; see :meth:`TaskPlan.time_parameterize`."""
-    rest = not_negative(pause, "pause")
+    least_rest = not_negative(pause, "pause")
     radius = not_negative(blend, "blend")
     if not any(path.length > 0.0 for path in plan.paths):
         raise InputError("task plan to time: it has no motion" + (f": {plan.reason}" if plan.reason else ""))
@@ -69,30 +71,108 @@ def timed_task(
         torque=torque,
         payload=payload,
     )
-    parts: list[Trajectory] = []
-    rests_before: list[float] = []  # [s] rest before each part
-    begins: list[float] = []
-    pauses: list[tuple[float, float]] = []
-    now = 0.0
-    rest_so_far = 0.0  # [s] rest since the last part that moves
+    schedule = _Schedule(plan.worlds[0], least_rest)
 
     for number, (path, world, stage) in enumerate(zip(plan.paths, plan.worlds, plan.stages, strict=True)):
-        if number and rest and _changed(plan.worlds[number - 1], world):
-            pauses.append((now, now + rest))
-            rest_so_far += rest
+        if number:
+            schedule.rest(plan.worlds[number - 1], world)
+        schedule.begins.append(schedule.now)
+        if path.length > 0.0:
+            contacts = plan.contacts[number] if plan.contacts else ()
+            schedule.move(_timed(path, world_of_motion(path, world, stage), contacts, timing, radius))
+
+    if plan.end is not None:
+        schedule.rest(plan.worlds[-1], plan.end)
+    return TimedTask(schedule.trajectory(), frozen(schedule.begins), frozen(np.reshape(schedule.pauses, (-1, 2))))
+
+
+class _Schedule:
+    """Motions and rests, which are added one after the other.
+
+    Attributes:
+        now: Time at which the last of them ends [s].
+        parts: The motions.
+        rests: The rest before each of them, and that since the last one [s].
+        begins, pauses: As in :class:`TimedTask`.
+        events: Commands to the gripper.
+    """
+
+    def __init__(self, world: World, least_rest: float) -> None:
+        self._least_rest = least_rest
+        self.now = 0.0
+        self.parts: list[Trajectory] = []
+        self.rests = [0.0]
+        self.begins: list[float] = []
+        self.pauses: list[tuple[float, float]] = []
+        gripper = world.robot.gripper
+        self.events = [] if gripper is None else [gripper.event(0.0, _held(gripper, world.robot))]
+
+    def rest(self, before: World, after: World) -> None:
+        """Rest if something is taken or put down, and if the fingers move, for as long as they take."""
+        if not _changed(before, after):
+            return
+        rest = self._least_rest
+        gripper = before.robot.gripper
+        if gripper is not None:
+            held, wanted = (_held(gripper, world.robot) for world in (before, after))
+            seconds = gripper.seconds(held, wanted) or rest
+            if held != wanted:
+                rest = max(rest, seconds)
+                self.events.append(gripper.event(self.now, wanted, seconds))
+        if rest > 0.0:
+            self.pauses.append((self.now, self.now + rest))
+            self.rests[-1] += rest
+            self.now += rest
+
+    def move(self, part: Trajectory) -> None:
+        """Add a motion."""
+        self.parts.append(part)
+        self.rests.append(0.0)
+        self.now += part.duration
+
+    def trajectory(self) -> Trajectory:
+        """Join the motions, each of which begins at rest where the one before ends."""
+        names = ("positions", "velocities", "accelerations")
+        times: list[Vector] = []
+        rows: dict[str, list[Matrix]] = {name: [] for name in names}
+        now = 0.0
+
+        def add(clock: Vector, part: Trajectory, knots: slice, *, still: bool = False) -> None:
+            times.append(clock)
+            for name, columns in rows.items():
+                # Velocities and accelerations are 0 during a rest.
+                columns.append(getattr(part, name)[knots] * (name == "positions" or not still))
+
+        for part, rest in zip(self.parts, self.rests, strict=False):
+            if rest > 0.0:
+                add(np.array([now]), part, slice(1), still=True)
             now += rest
-        begins.append(now)
-        if path.length == 0.0:
-            continue
+            # The last knot of a part is omitted, as the next part begins with it.
+            add(now + part.times[:-1], part, slice(-1))
+            now += part.duration
 
-        motion_world = world_of_motion(path, world, stage)
-        part = _timed(path, motion_world, plan.contacts[number] if plan.contacts else (), timing, radius)
-        parts.append(part)
-        rests_before.append(rest_so_far)
-        rest_so_far = 0.0
-        now += part.duration
+        first, end = self.parts[0], self.parts[-1]
+        rest = self.rests[-1]
+        if rest > 0.0:
+            add(np.array([now]), end, slice(-1, None), still=True)
+        add(np.array([now + rest]), end, slice(-1, None), still=rest > 0.0)
 
-    return TimedTask(_joined(parts, rests_before), frozen(begins), frozen(np.reshape(pauses, (-1, 2))))
+        clock = np.concatenate(times)
+        return Trajectory(
+            clock,
+            *(np.concatenate(rows[name]) for name in names),
+            joint_names=first.joint_names,
+            prismatic=first.prismatic,
+            robot_name=first.robot_name,
+            gripper=[replace(event, time=min(event.time, float(clock[-1]))) for event in self.events],
+        )
+
+
+def _held(gripper: GripperJoints, robot: Robot) -> tuple[float, ...]:
+    """Return the values of a gripper's joints at which a robot holds them [rad or m]."""
+    held = robot.source.get("locked", {})
+    ends = zip(gripper.joints, gripper.opened, gripper.closed, strict=True)
+    return tuple(float(held.get(name, np.clip(0.0, min(a, b), max(a, b)))) for name, a, b in ends)
 
 
 def _timed(
@@ -132,35 +212,3 @@ def _changed(before: World, after: World) -> bool:
     """Check whether the arm holds other objects than before, or holds its fingers differently."""
     attached = [{(item.name, item.link) for item in world.scene.attached} for world in (before, after)]
     return attached[0] != attached[1] or before.robot.source != after.robot.source
-
-
-def _joined(parts: list[Trajectory], rests_before: list[float]) -> Trajectory:
-    """Join motions, each of which begins at rest where the one before ends, with a rest [s] before each."""
-    times = []
-    rows: dict[str, list[Matrix]] = {"positions": [], "velocities": [], "accelerations": []}
-    now = 0.0
-
-    for part, rest in zip(parts, rests_before, strict=True):
-        values = {name: getattr(part, name) for name in rows}
-        if rest > 0.0:
-            times.append(np.array([now]))
-            for name, columns in rows.items():
-                # Velocities and accelerations are 0 during a rest.
-                columns.append(values[name][:1] * (name == "positions"))
-
-        now += rest
-        # The last knot of a part is omitted, as the next part begins with it.
-        last = -1 if part is not parts[-1] else len(part.times)
-        times.append(now + part.times[:last])
-        for name, columns in rows.items():
-            columns.append(values[name][:last])
-        now += part.duration
-
-    first = parts[0]
-    return Trajectory(
-        np.concatenate(times),
-        *(np.concatenate(rows[name]) for name in ("positions", "velocities", "accelerations")),
-        joint_names=first.joint_names,
-        prismatic=first.prismatic,
-        robot_name=first.robot_name,
-    )

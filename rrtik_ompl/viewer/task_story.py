@@ -118,7 +118,10 @@ def fingers_of(plan: TaskPlan, drawn: Robot, at: Vector) -> Fingers:
     """Return the finger motion of a plan relative to the robot that is drawn; ``at`` as in :class:`Fingers`."""
     nodes = joint_nodes(drawn)
     first = _placements(drawn)
-    places = [_placements(world.robot) for world in plan.worlds]
+    robots = [world.robot for world in plan.worlds]
+    if plan.end is not None and plan.end.robot is not robots[-1]:
+        robots.append(plan.end.robot)
+    places = [_placements(robot) for robot in robots]
 
     poses = {}
     for (joint, name), placement in first.items():

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import rrtik_ompl as rrtik
-from rrtik_ompl import MoveTo, Straight, Task
+from rrtik_ompl import Gripper, MoveTo, Straight, Task
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.cli.app import run
 
@@ -40,9 +40,42 @@ def test_the_arm_rests_where_the_cup_is_taken_and_put_down(served):
     for first, last in timed.pauses:
         rows = timed.trajectory(np.linspace(first, last, 11)).positions
         assert np.abs(rows - rows[0]).max() < 1e-9
+    # A rest is never shorter than the fingers take at the limit of their velocity.
     without = served.time_parameterize(pause=0.0)
-    assert without.pauses.shape == (0, 2)
-    assert timed.trajectory.duration == pytest.approx(without.trajectory.duration + 1.0)
+    fingers = np.abs(np.diff([event.positions[0] for event in without.trajectory.gripper])) / 0.2
+    assert np.diff(without.pauses, axis=1).ravel() == pytest.approx(fingers)
+    assert timed.trajectory.duration == pytest.approx(without.trajectory.duration + 1.0 - fingers.sum())
+
+
+@pytest.mark.kernels
+def test_the_gripper_is_told_what_the_worlds_of_the_motions_have(served):
+    timed = served.time_parameterize(pause=0.5)
+    motion, (taken, let_go) = timed.trajectory, timed.pauses
+    assert [event.time for event in motion.gripper] == pytest.approx([0.0, taken[0], let_go[0]])
+    assert [event.width for event in motion.gripper] == pytest.approx([0.08, 0.05, 0.08])
+    # While the arm moves, the fingers are where the world of the motion holds them, in which it is proven.
+    ends = [*timed.begins[1:], motion.duration]
+    for world, begin, end in zip(served.worlds, timed.begins, ends, strict=True):
+        rests = [pause[0] for pause in timed.pauses if begin < pause[0] < end]
+        clock = np.linspace(begin, min([end, *rests]), 20)
+        held = world.robot.source["locked"]["panda_finger_joint1"]
+        assert motion.gripper_positions(clock) == pytest.approx(held)
+
+
+@pytest.mark.kernels
+def test_what_the_fingers_do_last_is_waited_for():
+    """A task that ends with an open gripper is over when it is open."""
+    robot = rrtik.load_robot("so101", locked={"gripper": 0.0})
+    plan = Task([MoveTo([0.3, 0.0, 0.0, 0.0, 0.0]), Gripper("open")]).plan(rrtik.World(robot), np.zeros(5), seed=1)
+    timed = plan.time_parameterize(pause=0.0)
+    first, last = timed.trajectory.gripper
+    assert (first.positions, last.positions) == ((0.0,), robot.gripper.opened)
+    assert timed.pauses[0] == pytest.approx([last.time, timed.trajectory.duration])
+    assert timed.trajectory.gripper_positions([timed.trajectory.duration]) == pytest.approx(robot.gripper.opened[0])
+    rows = timed.trajectory(np.linspace(*timed.pauses[0], 5))
+    assert rows.positions == pytest.approx(np.tile(plan.paths[-1].end, (5, 1)))
+    played = plan.played()
+    assert played.rests[-1] == 1.0
 
 
 @pytest.mark.kernels
@@ -85,6 +118,15 @@ def test_a_motion_of_no_length_takes_no_time_and_none_at_all_is_refused(titan):
         with pytest.raises(InputError) as caught:
             plan.time_parameterize(**wrong)
         assert "\n" not in str(caught.value)
+
+
+@pytest.mark.kernels
+def test_the_command_writes_what_the_gripper_is_told_beside_a_message(tmp_path, capsys):
+    file = tmp_path / "task.ros.json"
+    assert run(["task", "panda_serve", "--seed", "2", "--trajectory", str(file), "--pause", "0.5"]) == 0
+    beside = tmp_path / "task.gripper.json"
+    assert str(beside) in capsys.readouterr().out
+    assert len(rrtik.Trajectory.load(file, gripper=beside).gripper) == 3
 
 
 @pytest.mark.kernels

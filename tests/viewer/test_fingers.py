@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import rrtik_ompl as rrtik
-from rrtik_ompl.description.gripper import GripperJoints
+from rrtik_ompl.model.gripper import GripperJoints
 from rrtik_ompl.tasks import Gripper, MoveTo, Task
 from rrtik_ompl.viewer.page import page
 from rrtik_ompl.viewer.task_story import subject_of_task

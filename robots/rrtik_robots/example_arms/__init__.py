@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rrtik_ompl.base.errors import DescriptionWarning, InputError
-from rrtik_ompl.description.gripper import GripperJoints
 from rrtik_ompl.description.robot_build import JointLimits
 from rrtik_ompl.description.urdf import robot_from_urdf
+from rrtik_ompl.model.gripper import GripperJoints
 from rrtik_ompl.model.robot import Robot
 
 if TYPE_CHECKING:
@@ -115,7 +115,9 @@ panda = ExampleArm(
     postures={
         "ready": (0.0, -0.7853981633974483, 0.0, -2.356194490192345, 0.0, 1.5707963267948966, 0.7853981633974483)
     },
-    gripper=GripperJoints(("panda_finger_joint1",), (0.04,), (0.0,), 0.08),  # the other finger follows
+    gripper=GripperJoints(  # the other finger follows
+        ("panda_finger_joint1",), (0.04,), (0.0,), 0.08, "hand", (True,), velocity=(0.2,)
+    ),
 )
 panda_primitives = replace(panda, name="panda_primitives", urdf="panda_description/urdf/panda_collision.urdf")
 ur3 = ExampleArm("ur3", "ur_description/urdf/ur3_robot.urdf", "tool0", _UR, _UR_SRDF, postures=_UR_UP)

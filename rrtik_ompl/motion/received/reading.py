@@ -27,7 +27,8 @@ from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.robot import LIMIT_TOLERANCE, Robot, inside_limits, joint_order, unnamed_joints
 from rrtik_ompl.motion.received.points import ReceivedMotion
 from rrtik_ompl.motion.trajectory import Trajectory
-from rrtik_ompl.motion.trajectory.text import seconds
+from rrtik_ompl.motion.trajectory.messages import seconds
+from rrtik_ompl.motion.trajectory.text import GRIPPER
 
 BAGS = (".bag", ".db3", ".mcap")
 ENDINGS = (".json", ".yaml", ".yml", ".csv", ".txt", ".npz", ".npy", *BAGS)
@@ -134,7 +135,8 @@ def _own(path: Path, robot: Robot) -> tuple[JointPath | Trajectory] | None:
         kind = document.get("kind") if isinstance(document, dict) else None
     elif ending == ".csv":
         first = read_text(path, LARGEST_FILE).partition("\n")[0]
-        timed = first.startswith("time,") and first.rstrip().endswith(" acceleration")
+        of_arm = [name for name in first.rstrip().split(",") if not name.startswith(GRIPPER)]
+        timed = first.startswith("time,") and of_arm[-1].endswith(" acceleration")
         kind = "joint_trajectory" if timed else None
     else:
         kind = "joint_path"

@@ -3,23 +3,29 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from rrtik_ompl.base.arrays import finite_array
+from rrtik_ompl.base.copies import changed
 from rrtik_ompl.base.errors import InputError, in_file, require
 from rrtik_ompl.files.kinds import kind_of
 from rrtik_ompl.files.tables import FORMATS as PATH_FORMATS
 from rrtik_ompl.files.text import known_ending, read_text
+from rrtik_ompl.model.gripper import Events, checked_events
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.robot import Robot, joint_order
 from rrtik_ompl.motion.trajectory.cubics import Cubics
+from rrtik_ompl.motion.trajectory.gripper_text import read_ros_commands
 from rrtik_ompl.motion.trajectory.motion import Trajectory
 from rrtik_ompl.motion.trajectory.text import FIELDS, FORMATS, loads
 
 
-def read_trajectory(file: str | os.PathLike[str], robot: Robot | None = None) -> Trajectory:
+def read_trajectory(
+    file: str | os.PathLike[str], robot: Robot | None = None, gripper: str | os.PathLike[str] | None = None
+) -> Trajectory:
     """Read a motion; see :meth:`Trajectory.load`.
 
     Raises:
@@ -31,9 +37,17 @@ def read_trajectory(file: str | os.PathLike[str], robot: Robot | None = None) ->
         document = loads(read_text(file), ending)
         if robot is not None and document["joint_names"] is not None:
             document = _sorted(document, robot)
-        return _from_document(document, robot)
+        document["gripper"] = _of_gripper(robot, document["gripper"])
+        motion = _from_document(document, robot)
     except InputError as error:
         raise in_file(file, error) from None
+    if gripper is None:
+        return motion
+    try:
+        events = checked_events(_of_gripper(robot, read_ros_commands(gripper)), motion.duration)
+    except InputError as error:
+        raise in_file(gripper, error) from None
+    return changed(motion, gripper=events)
 
 
 def load_motion_or_path(file: str | os.PathLike[str], robot: Robot) -> Trajectory | JointPath:
@@ -44,6 +58,23 @@ def load_motion_or_path(file: str | os.PathLike[str], robot: Robot) -> Trajector
     """
     known_ending(file, (*PATH_FORMATS, ".yaml"), "path or trajectory")
     return Trajectory.load(file, robot) if kind_of(file) == "Trajectory" else JointPath.load(file, robot)
+
+
+def _of_gripper(robot: Robot | None, events: Events) -> Events:
+    """Return commands with the name and units of a robot's gripper, if they are for its joints.
+
+    Raises:
+        InputError: If they are for other joints.
+    """
+    if robot is None or not events:
+        return events
+    own = robot.gripper
+    if own is None or own.joints != events[0].joints:
+        joints = "no gripper" if own is None else f"a gripper with {', '.join(own.joints)}"
+        raise InputError(
+            f"commands to a gripper with {', '.join(events[0].joints)}, but robot '{robot.name}' has {joints}"
+        )
+    return tuple(replace(event, gripper=own.name, units=own.units) for event in events)
 
 
 def _sorted(document: dict[str, Any], robot: Robot) -> dict[str, Any]:
@@ -73,6 +104,7 @@ def _from_document(document: dict[str, Any], robot: Robot | None) -> Trajectory:
     if sliding is None and robot is not None and document["joint_names"] == list(robot.joint_names):
         sliding = robot.prismatic.tolist()
     names = {"joint_names": document["joint_names"], "prismatic": sliding, "robot_name": document["robot"]}
+    names["gripper"] = document["gripper"]
 
     plain = Trajectory(document["times"], document["positions"], document["velocities"], **names)
     if document["accelerations"] is None:

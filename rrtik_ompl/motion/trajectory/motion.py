@@ -17,6 +17,14 @@ from rrtik_ompl.base.errors import InputError, PathWarning, at_most, require
 from rrtik_ompl.base.units import joint_units
 from rrtik_ompl.files.kinds import read
 from rrtik_ompl.files.text import write_text
+from rrtik_ompl.model.gripper import (
+    Events,
+    GripperEvent,
+    checked_events,
+    slowed_events,
+    states_at,
+    targets_at,
+)
 from rrtik_ompl.model.judgement import Played
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.proof import Proof
@@ -29,6 +37,7 @@ from rrtik_ompl.motion.trajectory.cubics import (
     hermite_accelerations,
     places,
 )
+from rrtik_ompl.motion.trajectory.gripper_text import write_ros_commands
 from rrtik_ompl.motion.trajectory.limits import RateLimits
 from rrtik_ompl.motion.trajectory.played import played_motion
 from rrtik_ompl.motion.trajectory.receiver import faults_as_received
@@ -83,6 +92,7 @@ class Trajectory:
         robot_name: Name of the robot that the motion is for, or "".
         set_points: Indices of the knots that are set points of a file at a control rate, see :meth:`load`;
             None if the motion is known between its knots too.
+        gripper: Commands to a gripper, in the order of their times; the first, at 0, says where it is at the beginning.
 
     Example:
         >>> path = rrtik.JointPath.of(rrtik.load_robot("planar3"), [[0.0, 0.0, 0.0], [0.5, 0.2, 0.0]])
@@ -101,6 +111,7 @@ class Trajectory:
     prismatic: Mask
     robot_name: str = ""
     set_points: NDArray[np.int64] | None = None
+    gripper: Events = ()
 
     __reduce__ = as_value
     _repr_html_ = in_notebook
@@ -115,12 +126,13 @@ class Trajectory:
         joint_names: Iterable[str] | None = None,
         prismatic: ArrayLike | None = None,
         robot_name: str = "",
+        gripper: Iterable[GripperEvent] = (),
     ) -> None:
         """Make a motion from knots; without accelerations its cubics are those through positions and velocities.
 
         Raises:
-            InputError: If the shapes differ, a number is not finite, the times do not increase from 0, or the
-                accelerations lead elsewhere than to the next knot.
+            InputError: If the shapes differ, a number is not finite, the times do not increase from 0, the
+                accelerations lead elsewhere than to the next knot, or the commands to the gripper do not fit it.
         """
         # Names and units obey the same rules as those of a path, so a path checks them.
         path = JointPath(positions, joint_names, prismatic, robot_name)
@@ -149,6 +161,7 @@ class Trajectory:
         for name in ("joint_names", "prismatic", "robot_name"):
             object.__setattr__(self, name, getattr(path, name))
         object.__setattr__(self, "set_points", None)
+        object.__setattr__(self, "gripper", checked_events(gripper, float(clock[-1])))
 
     def __repr__(self) -> str:
         return f"Trajectory({len(self.joint_names)} joints, {len(self.times)} knots, {self.duration:.3g} s)"
@@ -175,6 +188,28 @@ class Trajectory:
         wanted = finite_array(t, (None,) if many else (), "time of a trajectory")
         states = self.cubics.states(np.atleast_1d(wanted))
         return states if many else State(*(rows[0] for rows in states))
+
+    def gripper_positions(self, t: ArrayLike, *, commanded: bool = False) -> Matrix:
+        """Return the positions of the gripper's joints at times [s], (k,) -> (k, g) [rad or m].
+
+        Args:
+            t: The times.
+            commanded: Whether to return where the joints have been told to go, in place of where they are.
+
+        Raises:
+            InputError: If the motion has no commands to a gripper, or a time is not finite.
+
+        Example:
+            >>> from rrtik_ompl.model.gripper import GripperEvent
+            >>> events = [GripperEvent(0.0, ["jaw"], [1.0]), GripperEvent(1.0, ["jaw"], [0.0], seconds=0.5)]
+            >>> motion = rrtik.Trajectory([0.0, 2.0], [[0.0], [0.0]], [[0.0], [0.0]], gripper=events)
+            >>> motion.gripper_positions([0.5, 1.25, 2.0]).ravel(), motion.gripper_positions([1.25], commanded=True)
+            (array([1. , 0.5, 0. ]), array([[0.]]))
+        """
+        require(commanded, bool, "commanded")
+        if not self.gripper:
+            raise InputError("trajectory: it has no commands to a gripper; those of a task's robot with one have")
+        return targets_at(self.gripper, t) if commanded else states_at(self.gripper, t)[0]
 
     @property
     def jerks(self) -> Matrix:
@@ -219,6 +254,7 @@ class Trajectory:
         slow = Trajectory(
             slowed.times, slowed.positions, slowed.velocities, slowed.accelerations,
             joint_names=self.joint_names, prismatic=self.prismatic, robot_name=self.robot_name,
+            gripper=slowed_events(self.gripper, k),
         )  # fmt: skip
         return slow if self.set_points is None else slow.at_set_points(self.set_points)
 
@@ -335,12 +371,16 @@ class Trajectory:
         accelerations: bool = True,
         limits: RateLimits | None = None,
         world: World | None = None,
+        gripper: str | os.PathLike[str] | None = None,
     ) -> None:
         """Write the motion to a file.
 
         A .json or .csv file (``time,<joint>...``) can be read back as the same motion by :meth:`load`. A
         .yaml or .ros.json file holds a JointTrajectory message of ROS 2 and nothing else. A .mcap file holds joint
         states for Foxglove (it needs the package mcap). Each file is written whole or not at all.
+
+        Commands to a gripper are in all of them but in the message: a .csv file has columns ``gripper <joint>`` of
+        where the joints have been told to go, and no more of the commands.
 
         Args:
             file: Name of the file; its ending decides on the format.
@@ -351,9 +391,13 @@ class Trajectory:
                 .ros.json file. Between the points of a control rate it does not go as the motion goes; between knots
                 without accelerations it does, exactly.
             world: If given, a warning likewise says if the motion is not proven free as it is played.
+            gripper: For a message: a .yaml or .json file for the commands to the gripper, as goals of ROS's actions
+                GripperCommand and ParallelGripperCommand with their times. Without it a warning says that the message
+                has none.
 
         Raises:
-            InputError: If the ending is unknown, the world is of other joints, or the file cannot be written.
+            InputError: If the ending is unknown, the world is of other joints, there are no commands to write, or a
+                file cannot be written.
         """
         require(accelerations, bool, "accelerations of a file")
         require(limits, RateLimits | None, "limits of a file")
@@ -361,6 +405,10 @@ class Trajectory:
         if world is not None:
             require_joints(world.robot, self.joint_names, "trajectory")
         ending = written_ending(file)
+        message = ending in (".yaml", ROS_JSON)
+        if gripper is not None and not (message and self.gripper):
+            why = f"a {ending} file has the commands itself" if self.gripper else "this motion has no commands to one"
+            raise InputError(f"file for a gripper: {why}; leave gripper= out")
         if rate is None:
             at = slice(None) if self.set_points is None else self.set_points
             clock = self.times[at]
@@ -373,19 +421,27 @@ class Trajectory:
         # Adding 0.0 turns -0.0 into 0.0.
         columns = [(column + 0.0).tolist() for column in (clock, *state)]
         if ending == ".mcap":
-            write_mcap(file, self.robot_name, self.joint_names, columns)
+            write_mcap(file, self.robot_name, self.joint_names, columns, self.gripper)
             return
         if not accelerations and ending != ".csv":
             columns.pop()
-        if ending in (".yaml", ROS_JSON):
+        if message:
             played = Splines.through(clock, state.positions, state.velocities, state[2] if accelerations else None)
             for fault in faults_as_received(played, self.joint_names, limits, world):
                 remedy = "write knots: no rate=, and accelerations=False"
                 warnings.warn(f"{file}: as a controller of ROS plays it {fault}; {remedy}", PathWarning, stacklevel=2)
-        write_text(file, dumps(self.robot_name, self.joint_names, joint_units(self.prismatic), columns, ending))
+            if self.gripper and gripper is None:
+                remedy = "write them, too: gripper='gripper.yaml'"
+                warnings.warn(f"{file}: a message has no commands to the gripper; {remedy}", PathWarning, stacklevel=2)
+        units = joint_units(self.prismatic)
+        write_text(file, dumps(self.robot_name, self.joint_names, units, columns, ending, self.gripper))
+        if gripper is not None:
+            write_ros_commands(gripper, self.gripper)
 
     @staticmethod
-    def load(file: str | os.PathLike[str], robot: Robot | None = None) -> Trajectory:
+    def load(
+        file: str | os.PathLike[str], robot: Robot | None = None, *, gripper: str | os.PathLike[str] | None = None
+    ) -> Trajectory:
         """Read a motion written by :meth:`save`, or a JointTrajectory message as JSON or YAML.
 
         Points at a control rate (even steps of 20 ms or less, as ``save(file, rate=...)`` writes them) keep their
@@ -397,9 +453,10 @@ class Trajectory:
             file: A .json, .yaml or .csv file.
             robot: If given, the motion must have its joints; columns in another order are sorted by name, with a
                 warning.
+            gripper: The file of the commands to a gripper that was written beside a message.
 
         Raises:
-            InputError: If the file is missing, malformed, or does not fit the robot; the message names file and line.
+            InputError: If a file is missing, malformed, or does not fit the robot; the message names file and line.
 
         Example:
             >>> motion = rrtik.time_parameterize(rrtik.JointPath([[0.0], [1.0]]), rrtik.RateLimits(1.0, 4.0))
@@ -407,7 +464,7 @@ class Trajectory:
             >>> rrtik.Trajectory.load("motion.json").duration
             1.25
         """
-        return read(Trajectory, file, robot)
+        return read(Trajectory, file, robot, gripper)
 
 
 def motion_along(path: JointPath, motion: Cubics) -> Trajectory:
@@ -421,5 +478,6 @@ def motion_along(path: JointPath, motion: Cubics) -> Trajectory:
         "prismatic": path.prismatic,
         "robot_name": path.robot_name,
         "set_points": None,
+        "gripper": (),
     }
     return restored(Trajectory, fields)

@@ -10,28 +10,38 @@ from collections.abc import Iterable, Sequence
 from io import BytesIO
 from typing import Any
 
-import yaml
-
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.files.tables import json_object, table_rows
 from rrtik_ompl.files.text import file_name, known_ending, write_bytes
+from rrtik_ompl.model.gripper import Events, GripperEvent, states_at, targets_at
+from rrtik_ompl.motion.trajectory.gripper_text import events_of_document, gripper_document
+from rrtik_ompl.motion.trajectory.messages import NANOSECONDS, duration, from_yaml, seconds, to_yaml
 
 FORMATS = (".json", ".csv", ".yaml")
 ROS_JSON = ".ros.json"  # A file with just the message, as ROS rejects fields that it does not know.
 KIND = "joint_trajectory"
-_DURATION = (("sec", "secs"), ("nanosec", "nsecs"))
+GRIPPER = "gripper "  # begins the name of a column of CSV that has where a joint of the gripper has been told to go
 FIELDS = ("positions", "velocities", "accelerations")  # fields of a point; the last one may be missing
-NANOSECONDS = 1_000_000_000
 _SCHEMA = {
     "type": "object",
     "properties": {
         "name": {"type": "array", "items": {"type": "string"}},
-        **{key: {"type": "array", "items": {"type": "number"}} for key in ("position", "velocity", "acceleration")},
+        **{
+            key: {"type": "array", "items": {"type": "number"}}
+            for key in ("position", "velocity", "acceleration", "effort")
+        },
     },
 }
 
 
-def dumps(robot: str, names: Sequence[str], units: Sequence[str], columns: Sequence[list[Any]], ending: str) -> str:
+def dumps(
+    robot: str,
+    names: Sequence[str],
+    units: Sequence[str],
+    columns: Sequence[list[Any]],
+    ending: str,
+    gripper: Events = (),
+) -> str:
     """Return the text of a trajectory file.
 
     Args:
@@ -41,6 +51,7 @@ def dumps(robot: str, names: Sequence[str], units: Sequence[str], columns: Seque
         columns: Lists of m entries each: times [s], positions, velocities and, optionally, accelerations; entries but
             times have one number per joint.
         ending: An ending of ``FORMATS`` or ``ROS_JSON``.
+        gripper: Commands to a gripper, which .json and .csv have too.
     """
     if ending == ".yaml":
         return to_yaml(joint_trajectory(names, columns))
@@ -52,12 +63,14 @@ def dumps(robot: str, names: Sequence[str], units: Sequence[str], columns: Seque
             for time, *values in zip(*columns, strict=True)
         ]
         head = {"version": 1, "kind": KIND, "robot": robot, "joint_names": list(names), "units": list(units)}
-        return json.dumps(head | {"points": points}, indent=1) + "\n"
+        commands = {"gripper": gripper_document(gripper)} if gripper else {}
+        return json.dumps(head | {"points": points} | commands, indent=1) + "\n"
 
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
-    table.writerow(_header(names))
-    for time, *values in zip(*columns, strict=True):
+    table.writerow(_header(names) + [GRIPPER + joint for event in gripper[:1] for joint in event.joints])
+    commanded = [targets_at(gripper, columns[0]).tolist()] if gripper else []
+    for time, *values in zip(*columns, *commanded, strict=True):
         table.writerow([repr(number) for number in (time, *(x for value in values for x in value))])
     return text.getvalue()
 
@@ -91,28 +104,44 @@ def loads(text: str, ending: str) -> dict[str, Any]:
 
     Returns:
         A dictionary with ``times``, the lists ``FIELDS`` of one entry per point (accelerations may be None),
-        ``joint_names`` and ``units`` (may be None), and ``robot``.
+        ``joint_names`` and ``units`` (may be None), ``robot``, and the commands to a ``gripper``.
 
     Raises:
         InputError: If the text is malformed; the message names the line, the point or the key.
     """
     if ending == ".csv":
         return _from_csv(text)
-    return _from_message(json_object(text, KIND, "points") if ending == ".json" else from_yaml(text))
+    return _from_message(json_object(text, KIND, "points") if ending == ".json" else from_yaml(text, "points"))
 
 
 def _from_csv(text: str) -> dict[str, Any]:
     """Read the columns of a CSV file; see :func:`loads`."""
     names, rows = table_rows(text, ",")
-    count = (len(names or ()) - 1) // 3
-    joints = (names or [])[1 : 1 + count]
-    if count < 1 or names != _header(joints):
+    fingers = [name for name in names or () if name.startswith(GRIPPER)]
+    arm = (names or [])[: len(names or ()) - len(fingers)]
+    count = (len(arm) - 1) // 3
+    joints = arm[1 : 1 + count]
+    if count < 1 or names != _header(joints) + fingers:
         expected_columns = "time,<joint>...,<joint> velocity...,<joint> acceleration..."
         raise InputError(f"line 1: expected the columns {expected_columns}; is this a trajectory file?")
     document: dict[str, Any] = {"times": [row[0] for row in rows], "joint_names": joints, "units": None, "robot": ""}
     for k, field in enumerate(FIELDS):
         document[field] = [row[1 + k * count : 1 + (k + 1) * count] for row in rows]
+    document["gripper"] = _events_of_rows([name.removeprefix(GRIPPER) for name in fingers], rows)
     return document
+
+
+def _events_of_rows(joints: list[str], rows: list[list[float]]) -> Events:
+    """Return a command for each row in which the last columns, those of a gripper's joints, differ from the row before.
+
+    How long the joints take is not in such a file.
+    """
+    events: list[GripperEvent] = []
+    for time, *values in rows if joints else ():
+        positions = tuple(values[-len(joints) :])
+        if not events or positions != events[-1].positions:
+            events.append(GripperEvent(time, tuple(joints), positions))
+    return tuple(events)
 
 
 def _from_message(document: dict[str, Any]) -> dict[str, Any]:
@@ -142,18 +171,8 @@ def _from_message(document: dict[str, Any]) -> dict[str, Any]:
         "joint_names": document.get("joint_names"),
         "units": document.get("units"),
         "robot": str(document.get("robot", "")),
+        "gripper": events_of_document(document["gripper"]) if "gripper" in document else (),
     }
-
-
-def seconds(time: object) -> object:
-    """Return a duration as a number of seconds; it may also be written as in the messages of ROS 1 and 2."""
-    if not isinstance(time, dict):
-        return time
-    whole, fraction = (next((time[key] for key in keys if key in time), 0) for keys in _DURATION)
-    try:
-        return whole + 1e-9 * fraction
-    except TypeError:
-        raise InputError(f"time_from_start: expected seconds, or sec and nanosec, got {time!r}") from None
 
 
 def joint_trajectory(names: Sequence[str], columns: Sequence[list[Any]]) -> dict[str, Any]:
@@ -165,50 +184,29 @@ def joint_trajectory(names: Sequence[str], columns: Sequence[list[Any]]) -> dict
     """
     points = []
     for time, *values in zip(*columns, strict=True):
-        whole, rest = divmod(round(time * NANOSECONDS), NANOSECONDS)
-        points.append(dict(zip(FIELDS, values, strict=False)) | {"time_from_start": {"sec": whole, "nanosec": rest}})
+        points.append(dict(zip(FIELDS, values, strict=False)) | {"time_from_start": duration(time)})
     stamp = {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""}
     return {"header": stamp, "joint_names": list(names), "points": points}
 
 
-def to_yaml(message: dict[str, Any]) -> str:
-    """Return a message as YAML, as ``ros2 topic pub`` takes it, with one line for each field of a point."""
-    text: str = yaml.dump(message, Dumper=_dumper(), sort_keys=False, default_flow_style=None, width=10**6)
-    return text
-
-
-def _dumper() -> type[yaml.SafeDumper]:
-    dumper: type[yaml.SafeDumper] = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
-    return dumper
-
-
-def from_yaml(text: str) -> dict[str, Any]:
-    """Read a message from YAML.
-
-    Raises:
-        InputError: If the text is not such a message; the error names the line.
-    """
-    try:
-        document = yaml.load(text, Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader))
-    except yaml.YAMLError as error:
-        problem_mark = getattr(error, "problem_mark", None)
-        where = "" if problem_mark is None else f"line {problem_mark.line + 1}: "
-        raise InputError(f"{where}not YAML; is this a trajectory file?") from None
-    except (RecursionError, ValueError):
-        raise InputError("not YAML that can be read; is this a trajectory file?") from None
-    if not isinstance(document, dict) or "points" not in document:
-        raise InputError("expected an object with the key 'points'; is this a trajectory file?")
-    return document
-
-
-def write_mcap(file: str | os.PathLike[str], robot: str, names: Sequence[str], columns: Sequence[list[Any]]) -> None:
+def write_mcap(
+    file: str | os.PathLike[str],
+    robot: str,
+    names: Sequence[str],
+    columns: Sequence[list[Any]],
+    gripper: Events = (),
+) -> None:
     """Write joint states over time as JSON messages of the topic ``/joint_states``, for Foxglove and other programs.
+
+    The states of a gripper's joints are among them. The commands to it are messages of ``/gripper_command``, each with
+    names, positions and, if it is known, effort.
 
     Args:
         file: The file to write.
         robot: Name of the robot.
         names: Names of the joints.
         columns: Times [s], positions, velocities and accelerations, one entry each per message.
+        gripper: Commands to a gripper.
 
     Raises:
         InputError: If the package mcap is not installed, or the file cannot be written.
@@ -224,10 +222,23 @@ def write_mcap(file: str | os.PathLike[str], robot: str, names: Sequence[str], c
     schema = writer.register_schema("sensor_msgs/JointState", "jsonschema", json.dumps(_SCHEMA).encode())
     channel = writer.register_channel("/joint_states", "json", schema, {"robot": robot})
 
-    for number, (time, position, velocity, acceleration) in enumerate(zip(*columns, strict=True)):
+    joints = [*names, *(joint for event in gripper[:1] for joint in event.joints)]
+    none: list[list[float]] = [[]] * len(columns[0])
+    fingers = [states.tolist() for states in states_at(gripper, columns[0])] if gripper else [none, none]
+    for number, (time, *values, held, speed) in enumerate(zip(*columns, *fingers, strict=True)):
         stamp = round(time * NANOSECONDS)
-        state = {"name": list(names), "position": position, "velocity": velocity, "acceleration": acceleration}
+        of_fingers = (held, speed, [0.0] * len(held))
+        rows = (arm + more for arm, more in zip(values, of_fingers, strict=True))
+        state = {"name": joints, **dict(zip(("position", "velocity", "acceleration"), rows, strict=True))}
         writer.add_message(channel, stamp, json.dumps(state).encode(), stamp, number)
+
+    if gripper:
+        told = writer.register_channel("/gripper_command", "json", schema, {"gripper": gripper[0].gripper})
+    for number, event in enumerate(gripper):
+        stamp = round(event.time * NANOSECONDS)
+        effort = [] if event.effort is None else [event.effort] * len(event.joints)
+        command = {"name": event.joints, "position": event.positions, "effort": effort}
+        writer.add_message(told, stamp, json.dumps(command).encode(), stamp, number)
 
     writer.finish()
     write_bytes(file, sink.getvalue())
