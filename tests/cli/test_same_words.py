@@ -106,6 +106,7 @@ OF_COMMANDS = {  # arguments without an option, and options without an argument,
             "rrtik time has it, for a path",
         ),
     },
+    "time": {"gripper": "a path has no commands to a gripper"},
     "show": {"rate": "of films in Python", "size": "of films in Python"},
     "play": {**dict.fromkeys(("before", "html", "still"), "rrtik show has it")},
     "moves": {

@@ -19,6 +19,7 @@ import rrtik_ompl as rrtik
 import rrtik_ompl.model
 from rrtik_ompl.base.copies import changed
 from rrtik_ompl.model.certificate import Certificate, ModelBody, ModelJoint, MotionEntries
+from rrtik_ompl.model.gripper import GripperEvent, GripperJoints
 from rrtik_ompl.model.judgement import (
     ClearanceCurve,
     Contact,
@@ -70,6 +71,8 @@ SAMPLES = {
     "Finding": lambda: FOUND,
     "Gap": lambda: Gap(1, 0.5, "link1", "ball"),
     "GoalSet": lambda: rrtik.GoalSet([AT, rrtik.PositionGoal([1.0, 0.0, 0.0])], "z"),
+    "GripperEvent": lambda: GripperEvent(1.0, ("jaw",), (0.2,)),
+    "GripperJoints": lambda: GripperJoints(("jaw",), (0.2,), (0.0,), 0.4),
     "HalfSpace": lambda: rrtik.HalfSpace([0.0, 0.0, 1.0], 0.0),
     "HeightField": lambda: rrtik.HeightField([[0.1, 0.2], [0.3, 0.4]], 0.1),
     "JointGoal": lambda: rrtik.JointGoal([0.0, 0.0, 0.0]),

@@ -24,7 +24,7 @@ from rrtik_ompl.motion.trajectory.text import FIELDS, FORMATS, loads
 
 
 def read_trajectory(
-    file: str | os.PathLike[str], robot: Robot | None = None, gripper: str | os.PathLike[str] | None = None
+    file: str | os.PathLike[str], robot: Robot | None = None, *, gripper: str | os.PathLike[str] | None = None
 ) -> Trajectory:
     """Read a motion; see :meth:`Trajectory.load`.
 

@@ -464,7 +464,7 @@ class Trajectory:
             >>> rrtik.Trajectory.load("motion.json").duration
             1.25
         """
-        return read(Trajectory, file, robot, gripper)
+        return read(Trajectory, file, robot, gripper=gripper)
 
 
 def motion_along(path: JointPath, motion: Cubics) -> Trajectory:
