@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import product
+from itertools import islice, product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,6 +42,8 @@ from rrtik_ompl.kernels.tables.robot_tables import (
 from rrtik_ompl.kernels.tables.scene_tables import inner_primitives, outer_primitives
 from rrtik_ompl.kernels.tables.solid_tables import Solids, placed_bodies, solid_table
 from rrtik_ompl.model.robot import Chain
+
+MOST_LOOKED_UP = 62  # kernels hold a set of them as the bits of a signed 64-bit number
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -261,7 +263,8 @@ def looked_up(
 ) -> dict[tuple[int, int], Cells]:
     """The sets of bodies, each by its first one, whose cells tell enough.
 
-    All of their pairs have the same cells, and no more to keep than ``CELLS_APART``.
+    All of their pairs have the same cells, and no more to keep than ``CELLS_APART``. Those beyond ``MOST_LOOKED_UP``
+    are compared like all others.
     """
     if not cells:
         return {}
@@ -274,7 +277,7 @@ def looked_up(
         same = all(pair in checked and cells.get(pair) is own for pair in each)
         if same and all(kept_apart(bodies[i], bodies[j]) <= CELLS_APART for i, j in each):
             found[units[0][0], units[1][0]] = own
-    return found
+    return dict(islice(found.items(), MOST_LOOKED_UP))
 
 
 class Flags:

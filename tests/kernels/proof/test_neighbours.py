@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 from rrtik_ompl.description.catalog import load_robot
+from rrtik_ompl.description.urdf import robot_from_urdf_text
 from rrtik_ompl.geometry.collision.bodies import link_bodies
 from rrtik_ompl.geometry.collision.distances import measured
 from rrtik_ompl.kernels.layout import CELLS, CELLS_APART, COLLIDING, FREE, UNDECIDED
 from rrtik_ompl.kernels.proof.neighbours import joints_between
+from rrtik_ompl.kernels.tables.packing import MOST_LOOKED_UP
 from rrtik_ompl.world import arm_cache
 from rrtik_ompl.world.world import World
 
@@ -138,3 +140,21 @@ def test_cells_count_only_where_links_keep_no_more_than_they_prove(margin):
     free = world.valid_batch(rows)
     for k in np.flatnonzero(world.motions_proven(rows, rows)):
         assert free[k]
+
+
+LINK = """<link name="l{0}"><collision><origin xyz="0.1 0 0"/><geometry><box size="0.16 0.02 0.02"/></geometry>
+</collision></link><joint name="j{0}" type="revolute"><parent link="l{1}"/><child link="l{0}"/><origin xyz="0.2 0 0"/>
+<axis xyz="0 0 1"/><limit lower="-3" upper="3" effort="1" velocity="1"/></joint>"""
+
+
+def test_more_neighbours_than_a_set_of_bits_holds_are_compared_like_all_others():
+    count = MOST_LOOKED_UP + 8
+    links = "".join(LINK.format(k + 1, k) for k in range(count))
+    world = World(robot_from_urdf_text(f'<robot name="snake"><link name="l0"/>{links}</robot>'))
+    assert world.fast.table.neighbours.count == MOST_LOOKED_UP
+    folds = np.array(
+        [np.where((np.arange(count) == k) | (np.arange(count) == k + 1), 2.6, 0.0) for k in range(1, count - 1)]
+    )
+    assert (world.fast.classify(folds) == COLLIDING).all()
+    assert (world.fast.classify_edges(np.zeros_like(folds), folds, np.full(len(folds), 40)) != FREE).all()
+    assert world.fast.classify(np.zeros((1, count))) == FREE
