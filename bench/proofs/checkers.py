@@ -15,6 +15,7 @@ from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import lru_cache
 from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any
@@ -144,6 +145,13 @@ def cases_of(arm: str, robot: Robot, folder: Path, seed: int) -> Iterator[Case]:
                 yield Case(world, path.waypoints, document, Judge(world))
 
 
+@lru_cache(maxsize=8)
+def _written(scene: Scene, file: Path) -> str:
+    """Return the text of a scene's file; the scene of a case is asked for again and again."""
+    scene.save(file)
+    return file.read_text()
+
+
 class Script:
     """The checker of the page, run by node."""
 
@@ -156,9 +164,8 @@ class Script:
     def fault(self, arm: Arm, forgery: Forgery, folder: Path) -> str:
         """Return why a certificate does not hold, "" if it does."""
         scene = folder / "scene.yaml"
-        forgery.world.scene.save(scene)
         path = {"kind": "joint_path", "waypoints": np.asarray(forgery.waypoints).tolist()}
-        texts = {"certificate.json": forgery.text, "path.json": json.dumps(path), str(scene): scene.read_text()}
+        texts = {"certificate.json": forgery.text, "path.json": json.dumps(path), str(scene): _written(forgery.world.scene, scene)}
         job = {"files": arm.files, "texts": texts, "clearance": forgery.clearance}
         stdin, stdout = self._process.stdin, self._process.stdout
         assert stdin is not None

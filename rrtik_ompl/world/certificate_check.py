@@ -229,7 +229,8 @@ class Motions:
         self.required_gaps = np.array(required) + ROUNDING
         self._by_hulls = np.array(required) < 0.0
 
-        bounds = np.array([self._bounds(i, base) + self._bounds(j, base) for (i, j, base) in seen])
+        bounds_of = {k: self._bounds(k) for k in sorted({k for pair in self.pairs for k in pair})}
+        bounds = np.array([bounds_of[i][base] + bounds_of[j][base] for i, j, base in seen])
         bounds = bounds.reshape(-1, 2, self._course.count)
         self.approaches = bounds[:, 0]
         self.bends = bounds[:, 1]
@@ -257,30 +258,29 @@ class Motions:
         self._planes = np.array([each.elements.measures.get("half_space", [0.0] * 4)[:3] for each in named])
         self._mesh = np.array([tree.elements.key == "mesh" for tree in trees], dtype=bool)
 
-    def _bounds(self, number: int, base: int) -> Matrix:
-        """Bound speed and acceleration of all points of a body as seen from a frame (point 5.4).
+    def _bounds(self, number: int) -> dict[int, Matrix]:
+        """Bound speed and acceleration of all points of a body as seen from each frame that carries it (point 5.4).
 
         Args:
             number: Index of the body.
-            base: The joint whose frame it is; it has to carry the body.
 
         Returns:
-            Bounds of speed and acceleration in each motion, which takes time 1, shape (2, motions) [m].
+            For each joint that carries the body, 0 for the world: bounds of speed and acceleration in each motion,
+                which takes time 1, shape (2, motions) [m].
         """
         chain = self.chain
         course = self._course
         body = self.named[number].body
         velocity, acceleration = np.zeros((2, course.count))
         joint = body.joint
-        if joint == base:
-            return np.array([velocity, acceleration])
+        bounds = {joint: np.array([velocity, acceleration])}
+        if joint == 0:
+            return bounds
 
-        pose = body.placement.homogeneous
-        axis = chain.axis[joint - 1]
-        reach, off_axis = self._reaches(number, pose, axis)
+        reach, off_axis = self._reaches(number, body.placement.homogeneous, chain.axis[joint - 1])
 
         # A revolute joint adds centripetal and Coriolis terms, a prismatic joint none; both add their own acceleration.
-        while joint != base:
+        while joint != 0:
             k = joint - 1
             rate = course.rates[:, k]
             push = course.pushes[:, k]
@@ -291,15 +291,16 @@ class Motions:
             else:
                 acceleration = acceleration + rate * (2.0 * velocity + rate * off_axis) + push * off_axis
                 velocity = velocity + rate * off_axis
+            joint = int(chain.parent[k]) + 1
+            bounds[joint] = np.array([velocity, acceleration])
 
             # Bound the distances of the body's points from the axis and the origin of the next joint inwards.
-            joint = int(chain.parent[k]) + 1
             origin = chain.placement[k][:3, 3]
             stroke = course.strokes[:, k] if slides else 0.0
             off_axis = float(np.linalg.norm(np.cross(origin, chain.axis[joint - 1]))) + stroke + reach
             reach = reach + float(np.linalg.norm(origin)) + stroke
 
-        return np.array([velocity, acceleration])
+        return bounds
 
     def _reaches(self, number: int, pose: Matrix, axis: Vector) -> tuple[Vector | float, Vector | float]:
         """Return how far points of a body are at most from the origin and from an axis of its joint's frame [m]."""

@@ -205,7 +205,7 @@ def test_the_verifier_computes_the_frames_that_pinocchio_does_and_bounds_all_acc
         corners = corners + body.placement.translation
         points = np.einsum("nij,kj->nki", turns[:, body.joint], corners) + origins[:, body.joint][:, None]
         chords = points[0] + shares[:, None, None] * (points[-1] - points[0])
-        velocity, bend = motions._bounds(number, 0)[:, 0]
+        velocity, bend = motions._bounds(number)[0][:, 0]
         assert np.linalg.norm(points - chords, axis=2).max() <= bend / 8.0 + 1e-12
         assert np.linalg.norm(np.diff(points, axis=0), axis=2).max() <= velocity / 49.0 + 1e-12
 
