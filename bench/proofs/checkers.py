@@ -14,7 +14,7 @@ import time
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from importlib.resources import files
 from pathlib import Path
@@ -31,18 +31,22 @@ from bench.shared.parts import Parts
 from bench.shared.run import Run
 from rrtik_bench.report.machine import processes
 from rrtik_bench.report.page import Report
+from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.base.errors import InputError, RrtikError
 from rrtik_ompl.description.urdf import robot_from_urdf
 from rrtik_ompl.files.tables import json_value
-from rrtik_ompl.model.certificate import from_document
+from rrtik_ompl.model.certificate import Route, from_document
 from rrtik_ompl.model.robot import Robot
-from rrtik_ompl.model.scene import Obstacle, Scene
+from rrtik_ompl.model.scene import ConstantVelocity, Obstacle, Scene, TimedPoses
 from rrtik_ompl.model.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, PointCloud, Prism, Sphere
+from rrtik_ompl.motion.trajectory.splines import Splines
 from rrtik_ompl.world.certificate_check import certificate_fault
 from rrtik_ompl.world.world import World
 from rrtik_robots.example_arms import data_folder
 
 ARMS = {"planar": 10, "titan4": 10, "ur5": 6, "panda": 5, "so101": 1}  # how often each is taken
+# Arms whose certificates are of other kinds: of timed motions, of motions among obstacles that move.
+KINDS = {"planar timed": 2, "ur5 timed": 1, "planar moving": 2, "ur5 moving": 1}
 ROUND = 8  # true certificates of a part
 CLEARANCE = 0.001  # [m]
 PLANAR = 4  # links of the planar arm
@@ -75,7 +79,8 @@ class Arm:
 
 
 def arm_of(name: str, folder: Path) -> Arm:
-    """Return an arm by its name in `ARMS`."""
+    """Return an arm by its name in `ARMS` or `KINDS`."""
+    name = name.split()[0]
     example = data_folder()
     known: dict[str, list[Any]] = {
         "titan4": [str(files("rrtik_robots.titan4").joinpath(f"titan4.{kind}")) for kind in ("urdf", "srdf")],
@@ -97,6 +102,7 @@ def arm_of(name: str, folder: Path) -> Arm:
 
 def random_scene(arm: str, folder: Path, rng: np.random.Generator) -> Scene:
     """Return obstacles of every kind around an arm; those that come from files are written to a folder."""
+    arm, *kind = arm.split()
     reach = {"planar": 2.4, "titan4": 1.6, "so101": 0.4}.get(arm, 0.9)
     size = reach / 0.9
     mesh = _dented(folder, size)
@@ -114,8 +120,18 @@ def random_scene(arm: str, folder: Path, rng: np.random.Generator) -> Scene:
         Obstacle(f"solid {k}", solids[k], place, margin=float(rng.choice([0.0, 0.002])))
         for k, place in zip(chosen, places, strict=True)
     ]
+    if kind == ["moving"]:
+        obstacles = [replace(each, motion=_random_motion(each.pose, rng)) for each in obstacles[:3]] + obstacles[3:]
     floor = Obstacle("floor", HalfSpace([0.1, 0.0, 1.0], -1.2 * reach), pin.SE3.Identity())
     return Scene((*obstacles, floor))
+
+
+def _random_motion(pose: pin.SE3, rng: np.random.Generator) -> ConstantVelocity | TimedPoses:
+    """Return a motion of an obstacle that is at a pose at first."""
+    if rng.integers(2):
+        return ConstantVelocity(0.05 * rng.normal(size=3))
+    steps = [pin.SE3(pin.exp3(0.2 * rng.normal(size=3)), 0.1 * rng.normal(size=3)) for _ in range(3)]
+    return TimedPoses([0.0, 1.5, 4.0, 5.2], [pose, *(pose * step for step in steps)])
 
 
 def _dented(folder: Path, size: float) -> Mesh:
@@ -137,12 +153,34 @@ def cases_of(arm: str, robot: Robot, folder: Path, seed: int) -> Iterator[Case]:
         world = World(robot, random_scene(arm, folder, rng))
         for _ in range(3):
             path = random_path(world, rng, CLEARANCE)
-            certificate = None if path is None else world.certificate(path, CLEARANCE)
-            if path is None or certificate is None:
+            if path is None:
+                continue
+            route = _route(arm, path.waypoints, world.scene, rng)
+            certificate = world.certificate(route, CLEARANCE)
+            if certificate is None:
                 continue
             document = json.loads(json.dumps(certificate.document()))
             if sum(len(row) == PLANE for rows in document["motions"] for row in rows) >= FEWEST_PLANES:
-                yield Case(world, path.waypoints, document, Judge(world))
+                yield Case(world, route, document, Judge(world, route))
+
+
+def _route(arm: str, rows: Matrix, scene: Scene, rng: np.random.Generator) -> Route:
+    """Return a motion through waypoints, shape (k, dof): as the kind of an arm has it."""
+    kind = arm.split()[1:]
+    if not kind:
+        return Route(rows)
+    if kind == ["moving"]:
+        turns = [each.motion.times for each in scene.obstacles if isinstance(each.motion, TimedPoses)]
+        clock = np.linspace(0.0, 5.0, len(rows))
+        times = np.unique(np.concatenate([clock, *turns]))
+        times = times[times <= clock[-1]]
+        rows = np.column_stack([np.interp(times, clock, column) for column in rows.T])
+        return Route(rows, times, (np.diff(rows, axis=0) / np.diff(times)[:, None])[:, None], moving=True)
+    times = np.cumsum([0.0, *rng.uniform(0.5, 2.0, len(rows) - 1)])
+    rest = np.zeros_like(rows)
+    speeds = rest.copy()
+    speeds[1:-1] = 0.2 * (rows[2:] - rows[:-2]) / (times[2:] - times[:-2])[:, None]
+    return Splines.through(times, rows, speeds, rest if rng.integers(2) else None).route
 
 
 @lru_cache(maxsize=8)
@@ -164,8 +202,15 @@ class Script:
     def fault(self, arm: Arm, forgery: Forgery, folder: Path) -> str:
         """Return why a certificate does not hold, "" if it does."""
         scene = folder / "scene.yaml"
-        path = {"kind": "joint_path", "waypoints": np.asarray(forgery.waypoints).tolist()}
-        texts = {"certificate.json": forgery.text, "path.json": json.dumps(path), str(scene): _written(forgery.world.scene, scene)}
+        route = forgery.route
+        path: dict[str, Any] = {"kind": "joint_path", "waypoints": np.asarray(route.waypoints).tolist()}
+        if route.times is not None and route.rates is not None:
+            path |= {"kind": "joint_motion", "times": route.times.tolist(), "rates": route.rates.tolist()}
+        texts = {
+            "certificate.json": forgery.text,
+            "path.json": json.dumps(path),
+            str(scene): _written(forgery.world.scene, scene),
+        }
         job = {"files": arm.files, "texts": texts, "clearance": forgery.clearance}
         stdin, stdout = self._process.stdin, self._process.stdout
         assert stdin is not None
@@ -199,7 +244,7 @@ def fault_in_numpy(forgery: Forgery) -> str:
         certificate = from_document(document)
     except InputError as error:
         return str(error)
-    return certificate_fault(certificate, forgery.world, forgery.waypoints, clearance=forgery.clearance)
+    return certificate_fault(certificate, forgery.world, forgery.route, clearance=forgery.clearance)
 
 
 @dataclass(slots=True)
@@ -230,7 +275,7 @@ def compared(name: str, seed: int, true: int, forged: int) -> Count:
         arm = arm_of(name, folder)
         cases = cases_of(name, arm.robot, folder, seed)
         for case in (next(cases) for _ in range(true)):
-            given = Forgery(json.dumps(case.document), case.world, case.waypoints, CLEARANCE)
+            given = Forgery(json.dumps(case.document), case.world, case.route, CLEARANCE)
             begin = time.process_time()
             ours = fault_in_numpy(given)
             middle = time.perf_counter()
@@ -278,9 +323,10 @@ def main(
 ) -> Report:
     """Make the page of both checkers."""
     whole = sum(ARMS.values())
+    shares = ARMS | KINDS
     wanted = [
         (name, 1000 * k + seed, ROUND, forged)
-        for k, (name, share) in enumerate(ARMS.items())
+        for k, (name, share) in enumerate(shares.items())
         for seed in range(math.ceil(true * share / whole / ROUND))
     ]
     found = parts(compared, wanted)
@@ -295,7 +341,7 @@ def main(
     report.bar("forged certificates that both refuse", "all", text, refused == forgeries)
 
     rows = []
-    for name in ARMS:
+    for name in shares:
         own = [each for part, each in zip(wanted, found, strict=True) if part[0] == name]
         ours, script_s = 1e3 * np.array([pair for each in own for pair in each.seconds]).T
         count = f"{sum(each.accepted for each in own)} of {sum(each.true for each in own)}"

@@ -18,7 +18,8 @@ import numpy as np
 
 from bench.proofs.forgery_judge import Document, Judge, entries_of
 from rrtik_ompl.base.arrays import Matrix
-from rrtik_ompl.model.scene import Obstacle, Scene
+from rrtik_ompl.model.certificate import Route
+from rrtik_ompl.model.scene import ConstantVelocity, Obstacle, Scene, TimedPoses
 from rrtik_ompl.model.shapes import Box
 from rrtik_ompl.world.certificates import certificate_for
 from rrtik_ompl.world.world import World
@@ -33,9 +34,14 @@ class Case:
     """A true certificate, and what it is about."""
 
     world: World
-    waypoints: Matrix
+    route: Route
     document: Document
     judge: Judge
+
+    @property
+    def waypoints(self) -> Matrix:
+        """The waypoints, shape (k, dof)."""
+        return self.route.waypoints
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,21 +51,22 @@ class Forgery:
     Attributes:
         text: The certificate's file.
         world: The robot and the scene of the asker.
-        waypoints: The path of the asker, shape (k, dof).
+        route: The motion of the asker.
         clearance: What the asker wants to be kept [m].
     """
 
     text: str
     world: World
-    waypoints: Matrix
+    route: Route
     clearance: float = 0.0
 
 
 Forger = Callable[[Case, np.random.Generator], "Forgery | None"]
 
 
-def _given(case: Case, document: Document, **changes: Any) -> Forgery:
-    return replace(Forgery(json.dumps(document), case.world, case.waypoints), **changes)
+def _given(case: Case, document: Document, *, waypoints: Matrix | None = None, **changes: Any) -> Forgery:
+    route = case.route if waypoints is None else replace(case.route, waypoints=waypoints)
+    return replace(Forgery(json.dumps(document), case.world, route), **changes)
 
 
 def _pick(rng: np.random.Generator, items: Any) -> Any:
@@ -109,7 +116,8 @@ def colliding_path(case: Case, rng: np.random.Generator) -> Forgery | None:
     rows = np.array(case.waypoints)
     rows[int(rng.integers(len(rows)))] = colliding[0]
     document["waypoints"] = rows.tolist()
-    return _given(case, document, waypoints=rows) if case.judge.touches(rows) else None
+    route = replace(case.route, waypoints=rows)
+    return _given(case, document, route=route) if case.judge.touches(route) else None
 
 
 def outside_limits(case: Case, rng: np.random.Generator) -> Forgery:
@@ -310,7 +318,7 @@ def raised_clearance(case: Case, rng: np.random.Generator) -> Forgery | None:
     """More is said to be kept than coal finds along the path."""
     clearance = case.document["clearance"] + float(rng.uniform(0.05, 0.4))
     grown = tuple(replace(each, margin=each.margin + clearance) for each in case.world.scene.obstacles)
-    if not Judge(World(case.world.robot, Scene(grown))).touches(case.waypoints):
+    if not Judge(World(case.world.robot, Scene(grown)), case.route).touches(case.route):
         return None
     return _given(case, {**case.document, "clearance": clearance})
 
@@ -383,10 +391,12 @@ def _in_scene(case: Case, obstacles: tuple[Obstacle, ...]) -> World:
     return World(case.world.robot, Scene(obstacles))
 
 
-def moved_obstacle(case: Case, rng: np.random.Generator) -> Forgery:
+def moved_obstacle(case: Case, rng: np.random.Generator) -> Forgery | None:
     """An obstacle of the asker stands elsewhere, by a hundredth of a millimetre or more."""
     obstacles = list(case.world.scene.obstacles)
     k = int(rng.integers(len(obstacles)))
+    if isinstance(obstacles[k].motion, TimedPoses):
+        return None  # its poses are those of its motion
     pose = obstacles[k].pose.copy()
     pose.translation = pose.translation + np.array([SLIGHT, -SLIGHT, SLIGHT]) * 10 ** rng.uniform(0.0, 4.0)
     obstacles[k] = replace(obstacles[k], pose=pose)
@@ -418,10 +428,10 @@ def honest_model(case: Case, rng: np.random.Generator) -> Forgery | None:
     pose.translation = tip
     obstacles[solid] = replace(obstacles[solid], shape=Box([0.1, 0.1, 0.1]), pose=pose)
     world = _in_scene(case, tuple(obstacles))
-    if not Judge(world).touches(case.waypoints):
+    if not Judge(world, case.route).touches(case.route):
         return None
     still = np.array([row for row in case.waypoints if world.valid(row)][:1])
-    model = certificate_for(world, still, 0.0) if len(still) else None
+    model = certificate_for(world, still, 0.0) if len(still) and not case.route.moving else None
     if model is None:
         return None
     bodies = json.loads(json.dumps(model.document()))["bodies"]
@@ -432,6 +442,99 @@ def honest_model(case: Case, rng: np.random.Generator) -> Forgery | None:
     for new, body in zip(bodies, document["bodies"], strict=True):
         body["pose"] = new["pose"]
     return _given(case, document, world=world)
+
+
+# --- motions in time ---
+
+
+def untimed(case: Case, rng: np.random.Generator) -> Forgery | None:
+    """A timed motion is certified, and the path through its waypoints asked about; or the other way round."""
+    if case.route.times is None:
+        rows = case.waypoints
+        times = np.arange(float(len(rows)))
+        return _given(case, case.document, route=Route(rows, times, np.diff(rows, axis=0)[:, None]))
+    if rng.integers(2):
+        return _given(case, case.document, route=Route(case.waypoints))
+    return _given(case, {key: case.document[key] for key in case.document if key not in ("times", "rates", "tracks")})
+
+
+def other_times(case: Case, rng: np.random.Generator) -> Forgery | None:
+    """Times differ from those of the motion, do not ascend, or are too few."""
+    if case.route.times is None:
+        return None
+    document = deepcopy(case.document)
+    k = int(rng.integers(1, len(document["times"])))
+    way = int(rng.integers(3))
+    if way == 0:
+        document["times"][k] += 1e-9
+    elif way == 1:
+        document["times"][k] = document["times"][k - 1]
+    else:
+        document["times"].pop(k)
+    return _given(case, document)
+
+
+def other_rates(case: Case, rng: np.random.Generator) -> Forgery | None:
+    """A derivative differs from that of the motion, or is missing."""
+    if case.route.rates is None:
+        return None
+    document = deepcopy(case.document)
+    row = _pick(rng, document["rates"])
+    if rng.integers(4) == 0:
+        row.append([_pick(rng, (0.0, 1e308))] * len(row[0]))
+    else:
+        _pick(rng, row)[int(rng.integers(len(row[0])))] += 1e-3
+    return _given(case, document)
+
+
+def bulging_motion(case: Case, rng: np.random.Generator) -> Forgery | None:
+    """Motion and certificate go aside between two waypoints, and touch something there; the rest is kept."""
+    if case.route.rates is None or case.route.times is None:
+        return None
+    for _ in range(3):
+        m = int(rng.integers(len(case.route.rates)))
+        h = case.route.times[m + 1] - case.route.times[m]
+        rates = np.zeros((len(case.route.rates), 5, case.waypoints.shape[1]))
+        rates[:, : case.route.rates.shape[1]] = case.route.rates
+        # s^2 (1 - s)^2, which begins and ends with 0
+        size = 16.0 * rng.normal(size=rates.shape[2])
+        rates[m, 1:4] += np.outer([2.0 / h**2, -12.0 / h**3, 24.0 / h**4], size)
+        route = replace(case.route, rates=rates)
+        if case.judge.touches(route):
+            return _given(case, {**case.document, "rates": rates.tolist()}, route=route)
+    return None
+
+
+def other_track(case: Case, rng: np.random.Generator) -> Forgery | None:
+    """An obstacle of the certificate moves otherwise, not at all, or takes another one's way."""
+    if not case.route.moving:
+        return None
+    document = deepcopy(case.document)
+    way = int(rng.integers(4))
+    carried = [body for body in document["bodies"] if body["joint"] > len(document["joints"])]
+    if way == 0:
+        _pick(rng, _pick(rng, document["tracks"]))[int(rng.integers(12))] += SLIGHT
+    elif way == 1:
+        document["tracks"].append(document["tracks"][0])
+    elif way == 2:
+        _pick(rng, carried)["joint"] = 0
+    else:
+        body = _pick(rng, document["bodies"])
+        body["joint"] = len(document["joints"]) + 1 + int(rng.integers(len(document["tracks"])))
+        if body in carried and len(document["tracks"]) == 1:
+            body["joint"] += 1
+    return None if document == case.document else _given(case, document)
+
+
+def other_motion(case: Case, rng: np.random.Generator) -> Forgery | None:
+    """An obstacle of the asker moves otherwise than that of the certificate."""
+    if not case.route.moving:
+        return None
+    obstacles = list(case.world.scene.obstacles)
+    k = int(_pick(rng, [k for k, each in enumerate(obstacles) if each.motion is not None]))
+    velocity = np.asarray(rng.normal(size=3)) * 10 ** rng.uniform(-6.0, 0.0)
+    obstacles[k] = replace(obstacles[k], motion=_pick(rng, (None, ConstantVelocity(velocity))))
+    return _given(case, case.document, world=_in_scene(case, tuple(obstacles)))
 
 
 # --- malformed files ---
@@ -447,6 +550,8 @@ def odd_value(case: Case, rng: np.random.Generator) -> Forgery | None:
         (_pick(rng, document["joints"]), "parent"), (_pick(rng, document["joints"])["pose"], 0),
         (_pick(rng, document["bodies"])["pose"], 3),
     ]  # fmt: skip
+    holders += [(document["times"], 0), (document["rates"][0][0], 0)] if "times" in document else []
+    holders += [(document["tracks"][0][0], 3)] if "tracks" in document else []
     if place is not None:
         holders += [(document["motions"][place[0]][place[1]], k) for k in (0, 3)]
     holder, key = _pick(rng, holders)
@@ -483,6 +588,8 @@ def other_field(case: Case, rng: np.random.Generator) -> Forgery:
         document["trust"] = True
     elif way == 2:
         document["version"] = int(_pick(rng, (0, 1, 3)))
+    elif "times" in document:
+        document.pop(_pick(rng, ("times", "rates")))
     else:
         document["times"] = list(range(len(document["waypoints"])))
     return _given(case, document)
@@ -502,6 +609,7 @@ FORGERS: dict[str, Forger] = {
         other_part, no_such_part, swapped_bodies, other_count, other_cut,
         left_out_pair, raised_clearance, lowered_clearance, other_self_margin, other_margin,
         other_joint, other_body, missing_body, moved_obstacle, other_obstacles, honest_model,
+        untimed, other_times, other_rates, bulging_motion, other_track, other_motion,
         odd_value, raw_value, twice, other_field, cut_off,
     )
 }  # fmt: skip

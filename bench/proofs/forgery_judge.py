@@ -7,22 +7,27 @@ two parts that no entry, ball or box shows apart, or a configuration of the path
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import cache, cached_property
-from itertools import pairwise, product
-from typing import Any
+from itertools import product
+from math import factorial
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike
 
 from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.geometry.collision.bodies import Body
 from rrtik_ompl.geometry.collision.certificate import Certificate as ByCoal
 from rrtik_ompl.geometry.collision.elements import NamedBody, named_bodies
+from rrtik_ompl.model.certificate import Route
+from rrtik_ompl.model.scene import pose_at
 from rrtik_ompl.world.world import World
 
 CERTAIN = 1e-7  # [m] by which a witness has to be wrong
 SAMPLES = 60  # configurations of a motion that coal looks at
 SHORTEST_LEVEL = 10  # down to which intervals are tried
+MOVING_STEP = 6  # of these samples one in so many where obstacles move
 TRIES = 4  # places and pairs of parts that are looked at for a witness
 Document = dict[str, Any]
 
@@ -75,12 +80,33 @@ class Tree:
         return centre, float(np.linalg.norm(self.points(node) - centre, axis=1).max()) + self.radius + self.disc
 
 
-class Judge:
-    """Looks for witnesses against documents that are about one world."""
+class Place(NamedTuple):
+    """A configuration, and the time at which it is there [s]."""
 
-    def __init__(self, world: World) -> None:
+    q: Vector
+    time: float
+
+
+def _between(route: Route, m: int, shares: Vector) -> Matrix:
+    """Return configurations of a motion at shares of it, shape (n,): shape (n, dof)."""
+    rows = route.waypoints
+    if route.times is None or route.rates is None:
+        following = rows[min(m + 1, len(rows) - 1)]
+        return np.asarray(rows[m] + shares[:, None] * (following - rows[m]))
+    tau = (shares * (route.times[m + 1] - route.times[m]))[:, None]
+    terms = [rate * tau**order / factorial(order) for order, rate in enumerate(route.rates[m], 1)]
+    return np.asarray(rows[m] + sum(terms))
+
+
+class Judge:
+    """Looks for witnesses against documents that are about one world, and motions with the times of one."""
+
+    def __init__(self, world: World, route: Route) -> None:
         self.world = world
         self.named = named_bodies(world.bodies)
+        moving = [each for each in world.scene.obstacles if route.moving and each.motion is not None]
+        self._moving = {each.name: each for each in moving}
+        self._times = route.times
         self.joints = [each.body.joint for each in self.named]
         self._data = world.robot.model.createData()
         self._trees: dict[str, Tree] = {}
@@ -89,19 +115,34 @@ class Judge:
     def _coal(self) -> ByCoal:
         return ByCoal(self.world.robot, self.world.bodies, self.world.pairs)
 
-    def touches(self, waypoints: ArrayLike) -> bool:
-        """Return whether coal finds less than the required distance somewhere along a path."""
-        rows = np.asarray(waypoints, dtype=np.float64)
-        shares = np.linspace(0.0, 1.0, SAMPLES)[:, None]
-        ends = pairwise(rows) if len(rows) > 1 else [(rows[0], rows[0])]
-        path = np.concatenate([a + shares * (b - a) for a, b in ends])
-        return not self._coal.free(path).all()
+    def touches(self, route: Route) -> bool:
+        """Return whether coal finds less than the required distance somewhere along a motion."""
+        count = max(1, len(route.waypoints) - 1)
+        shares = np.linspace(0.0, 1.0, SAMPLES)
+        if not self._moving:
+            return not self._coal.free(np.concatenate([_between(route, m, shares) for m in range(count)])).all()
+        return any(self._touches_at(route, m, share) for m in range(count) for share in shares[::MOVING_STEP])
 
-    def _pose(self, k: int, base: int, q: Vector) -> pin.SE3:
+    def _touches_at(self, route: Route, m: int, share: float) -> bool:
+        time = self._time(m, share)
+        bodies = tuple(self._carried(body, time) for body in self.world.bodies)
+        return not ByCoal(self.world.robot, bodies, self.world.pairs).free(_between(route, m, np.array([share]))).all()
+
+    def _carried(self, body: Body, time: float) -> Body:
+        """Return a body where it is at a time, if it is of an obstacle that moves."""
+        if body.kind != "obstacle" or body.name not in self._moving:
+            return body
+        return replace(body, placement=pose_at(self._moving[body.name], time) * body.within)
+
+    def _time(self, m: int, share: float) -> float:
+        return 0.0 if self._times is None else float(self._times[m] + share * (self._times[m + 1] - self._times[m]))
+
+    def _pose(self, k: int, base: int, place: Place) -> pin.SE3:
         """Return the pose of a body in the frame of a joint, by Pinocchio."""
         robot = self.world.robot
-        pin.forwardKinematics(robot.model, self._data, robot.pinocchio_configuration(q[None])[0])
-        return self._data.oMi[base].actInv(self._data.oMi[self.joints[k]]) * self.named[k].body.placement
+        pin.forwardKinematics(robot.model, self._data, robot.pinocchio_configuration(place.q[None])[0])
+        body = self._carried(self.named[k].body, place.time)
+        return self._data.oMi[base].actInv(self._data.oMi[self.joints[k]]) * body.placement
 
     def _base(self, i: int, j: int) -> int:
         parents = self.world.robot.model.parents
@@ -135,11 +176,10 @@ class Judge:
             high = max(high, self._reach(trees[j], b, self._pose(j, base, q), normal))
         return bool(low - high < -CERTAIN)
 
-    @staticmethod
-    def _at(document: Document, m: int, share: float) -> Vector:
-        rows = np.array(document["waypoints"])
-        following = rows[min(m + 1, len(rows) - 1)]
-        return np.asarray(rows[m] + share * (following - rows[m]))
+    def _at(self, document: Document, m: int, share: float) -> Place:
+        times, rates = (np.array(document[name]) if name in document else None for name in ("times", "rates"))
+        route = Route(np.array(document["waypoints"]), times, rates)
+        return Place(_between(route, m, np.array([share]))[0], self._time(m, share))
 
     @staticmethod
     def _reach(tree: Tree, node: int, pose: pin.SE3, direction: Vector) -> float:
@@ -190,7 +230,7 @@ class Judge:
         p, q = (self._pose(i, base, end).act(one) for end in ends)
         places = [self._pose(j, base, end) for end in ends]
         c, d = (place.act(other) for place in places)
-        if self.joints[j] != base:
+        if self.joints[j] != base or self.named[j].body.name in self._moving:
             half_chords = 0.5 * (np.linalg.norm(q - p) + np.linalg.norm(d - c))
             return bool(0.5 * np.linalg.norm(p + q - c - d) - half_chords > radius + other_radius)
         chord = q - p

@@ -60,9 +60,7 @@ def prove(
     ] = None,
     degrees: Annotated[bool, typer.Option("--degrees", help="The angles in the files are degrees.")] = False,
     rate: Annotated[float | None, typer.Option(help="Points a second in a file without times [1/s].")] = None,
-    certificate: Annotated[
-        Path | None, typer.Option(help="Write the certificate of one motion of straight lines: .json.")
-    ] = None,
+    certificate: Annotated[Path | None, typer.Option(help="Write the certificate of one motion: .json.")] = None,
     mend: Annotated[Path | None, typer.Option(help="Write a proven path near one motion: .json, .csv or .txt.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")] = False,
 ) -> int:
@@ -91,7 +89,7 @@ def prove(
 
     written = []
     if certificate is not None and judged[0].verdict.proven:
-        _certify(world, judged[0], certificate)
+        _certify(world, judged[0], certificate, way)
         written.append(f"wrote {certificate}")
     if mend is not None:
         written.append(_mend(world, judged[0], mend, way))
@@ -201,20 +199,16 @@ def _finding(finding: Finding) -> dict[str, Any]:
     }
 
 
-def _certify(world: World, judged: Judged, file: Path) -> None:
-    """Write the certificate of a motion of straight lines that is proven.
+def _certify(world: World, judged: Judged, file: Path, between: Between | None) -> None:
+    """Write the certificate of a motion that is proven: of a path, or of a timed motion if it has curves.
 
     Raises:
-        InputError: If it has curves, or planes do not prove it.
+        InputError: If planes do not prove it.
     """
     from rrtik_ompl.motion.received.points import curve_of
 
-    curve = curve_of(judged.motion, world.robot, None)
-    if judged.verdict.curve != "lines":
-        raise InputError(
-            f"--certificate: {judged.name} goes by {judged.verdict.curve}; certificates are of straight lines"
-        )
-    found = world.certificate(curve.positions, judged.verdict.clearance)
+    curve = curve_of(judged.motion, world.robot, between)
+    found = world.certificate(curve.positions if curve.straight else curve, judged.verdict.clearance)
     if found is None:
         raise InputError(f"--certificate: {judged.name} is proven by distances that coal measures, and not by planes")
     found.save(file)

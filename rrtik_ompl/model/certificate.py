@@ -25,6 +25,8 @@ VERSION = 2
 KIND = "path_certificate"
 IN_PATHS = "certificate"  # key of the certificate in the file of a path
 TIMED = ("times", "rates")  # fields of timed motions alone
+FURTHER = (*TIMED, "tracks")  # fields that may be absent
+ORDERS = 5  # largest degree of the polynomials of timed motions
 FIELDS = (
     *("version", "kind", "robot", "joints", "bodies", "unchecked"),
     *("clearance", "self_margin", "waypoints", "motions"),
@@ -39,6 +41,27 @@ WHOLE = 6
 # An entry of two whole bodies whose distance is measured has four integers: body, body, level, number.
 MEASURED = 4
 LONGEST = 2.0  # largest size of a number of a normal
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Route:
+    """A motion as a certificate has it: straight between waypoints, or by polynomials in time; numbers are not checked.
+
+    Attributes:
+        waypoints: Shape (k, dof) [rad or m].
+        times: Times of the waypoints, increasing, shape (k,) [s]; None for a path.
+        rates: Derivatives by time at the beginning of each motion, of orders 1, 2, and so on up to 5 at most, shape
+            (k - 1, orders, dof); None for a path.
+        moving: Whether obstacles move as the scene states, at the times of the waypoints; if not they are at rest.
+    """
+
+    waypoints: Matrix
+    times: NDArray[np.float64] | None = None
+    rates: NDArray[np.float64] | None = None
+    moving: bool = False
+
+    __reduce__ = as_value
+    __repr__ = in_one_line
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +94,7 @@ class ModelBody:
         name: Name of the link, obstacle or attached object.
         number: Which geometry of that object it is, from 0.
         kind: "link", "obstacle" or "attached".
-        joint: Number of the joint that carries it, 0 for the world.
+        joint: Number of the joint that carries it, 0 for the world; behind the joints come the tracks of what moves.
         pose: Pose of the shape's frame in the joint's frame, 12 numbers.
         shape: Its kind and measures.
         margin: Distance that is kept from an obstacle [m].
@@ -127,8 +150,8 @@ class Certificate:
         waypoints: The path, shape (k, dof), read-only.
         motions: The entries of each motion; a path of one waypoint has one motion that stands still.
         times: Times of the waypoints of a timed motion [s], shape (k,); None for a path.
-        rates: Velocities, accelerations and jerks at the beginning of its motions, shape (k - 1, 3, dof); None for a
-            path.
+        rates: Derivatives at the beginning of its motions, as of :class:`Route`; None for a path.
+        tracks: Poses of each obstacle that moves, at the times of the waypoints, shape (tracks, k, 12).
         version: Version of the format.
 
     Example:
@@ -151,6 +174,7 @@ class Certificate:
     motions: tuple[MotionEntries, ...]
     times: NDArray[np.float64] | None = None
     rates: NDArray[np.float64] | None = None
+    tracks: NDArray[np.float64] | None = None
     version: int = VERSION
 
     __reduce__ = as_value
@@ -173,6 +197,8 @@ class Certificate:
         timed = {}
         if self.times is not None and self.rates is not None:
             timed = {"times": self.times.tolist(), "rates": self.rates.tolist()}
+        if self.tracks is not None:
+            timed["tracks"] = self.tracks.tolist()
         return {
             "version": self.version,
             "kind": KIND,
@@ -266,9 +292,9 @@ def from_document(document: Mapping[str, Any]) -> Certificate:
         remedy = "; make it again by rrtik plan --certificate" if document.get("version") == 1 else ""
         raise InputError(f"version: expected {VERSION}, got {document.get('version')!r}{remedy}")
 
-    timed = TIMED if any(name in document for name in TIMED) else ()
+    timed = TIMED if any(name in document for name in FURTHER) else ()
     for name in (*FIELDS, *timed, *document):
-        if name not in document or name not in (*FIELDS, *timed):
+        if name not in document or name not in (*FIELDS, *FURTHER):
             raise InputError(f"{name}: " + ("unknown field" if name in document else "missing; every field is needed"))
 
     robot = _text(document["robot"], "robot")
@@ -282,12 +308,16 @@ def from_document(document: Mapping[str, Any]) -> Certificate:
     if len(motions) != count:
         raise InputError(f"motions: expected a list of {count}, one for each motion between waypoints")
 
-    times = rates = None
+    times = rates = tracks = None
     if timed:
         times = _numbers(document["times"], (len(waypoints),), "times")
-        rates = _numbers(document["rates"], (count, 3, waypoints.shape[1]), "rates")
+        rates = _numbers(document["rates"], (count, None, waypoints.shape[1]), "rates")
         if len(waypoints) < 2 or not (np.diff(times) > 0.0).all():
             raise InputError("times: expected two or more, each later than the one before it")
+        if not 1 <= rates.shape[1] <= ORDERS:
+            raise InputError(f"rates: expected derivatives of 1 to {ORDERS} orders for each motion")
+    if "tracks" in document:
+        tracks = _numbers(document["tracks"], (None, len(waypoints), POSE), "tracks")
 
     return Certificate(
         robot,
@@ -300,6 +330,7 @@ def from_document(document: Mapping[str, Any]) -> Certificate:
         tuple(_entries(motion, f"motions[{k}]") for k, motion in enumerate(motions)),
         times,
         rates,
+        tracks,
     )
 
 

@@ -24,6 +24,7 @@ from rrtik_ompl.base.arrays import (
     Vector,
     finite_array,
     finite_number,
+    frozen,
     not_negative,
     positive,
     whole_number,
@@ -35,6 +36,7 @@ from rrtik_ompl.base.poses import pose_from_xyzw, pose_row
 from rrtik_ompl.files.kinds import read
 from rrtik_ompl.files.tables import json_object
 from rrtik_ompl.files.text import read_text, write_text
+from rrtik_ompl.model.certificate import Certificate, Route
 from rrtik_ompl.model.judgement import Contact, Judged, PathContact, Verdict
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.result import required
@@ -47,6 +49,7 @@ from rrtik_ompl.replanning.feed import Feed, Snapshot
 from rrtik_ompl.replanning.judge import RunViolation, run_violations
 from rrtik_ompl.replanning.tick import Tick
 from rrtik_ompl.world.problem import Problem
+from rrtik_ompl.world.world import World
 
 KIND = "replan_run"
 NOWHERE = np.full(3, np.nan)  # Violations have no known point of contact.
@@ -180,6 +183,50 @@ class ReplanRun:
         drawn = tuple(sorted({min(k, last_drawn) for k in unproven_ticks} if last_drawn >= 0 else ()))
         contacts = tuple(_contact(each) for each in violations)
         return Judged(Verdict(made > 0 and proven == made and not violations, text, drawn), None, contacts)
+
+    def certificate(self, world: World, *, clearance: float = 0.0) -> Certificate | None:
+        """Certify the motion at its times among obstacles that move as the scene states; None if it is not proven.
+
+        Between two ticks the arm goes straight at constant speed.
+
+        Args:
+            world: The robot and the scene, whose times are those of the ticks.
+            clearance: Distance kept from every obstacle on top of its margin [m].
+
+        Raises:
+            InputError: If there are fewer than two ticks.
+
+        Example:
+            >>> scenario = rrtik.replanning.Scenario.load("replan_planar_arm")
+            >>> plan = rrtik.replanning.plan_in_time(scenario.problem, rate=5.0, speed=1.6, seed=1)
+            >>> certificate = plan.require().certificate(scenario.problem.world)
+            >>> plan.require().verify(certificate, scenario.problem.world)
+            ''
+        """
+        return world.certificate(self._route(world), clearance)
+
+    def verify(self, certificate: Certificate, world: World, *, clearance: float = 0.0) -> str:
+        """Verify a certificate of the motion: return its first fault in one line, or "" if it proves the motion free.
+
+        Args:
+            certificate: The certificate; nothing in it is trusted.
+            world: The robot and the scene.
+            clearance: Least distance that the motion has to keep from obstacles on top of their margins [m].
+        """
+        return world.verify(certificate, self._route(world), clearance=clearance)
+
+    def _route(self, world: World) -> Route:
+        """Return the motion from tick to tick, with a waypoint wherever an obstacle changes its way."""
+        if len(self.ticks) < 2:
+            raise InputError("run: it has fewer than two ticks, and no motion between them")
+        motions = [each.motion for each in world.scene.obstacles]
+        turns = [each.times for each in motions if isinstance(each, TimedPoses)]
+        times = np.unique(np.concatenate([self.times, *turns]))
+        times = times[(times >= self.times[0]) & (times <= self.times[-1])]
+        columns = [np.interp(times, self.times, column) for column in self.configurations.T]
+        rows = np.column_stack(columns)
+        rates = np.diff(rows, axis=0) / np.diff(times)[:, None]
+        return Route(frozen(rows), frozen(times), frozen(rates[:, None]), moving=True)
 
     @property
     def found(self) -> bool:

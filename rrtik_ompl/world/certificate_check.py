@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator, Sequence
+from itertools import zip_longest
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,8 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector
 from rrtik_ompl.base.errors import InputError
-from rrtik_ompl.base.poses import joint_motions
-from rrtik_ompl.geometry.collision.bodies import DISTANCE_TOLERANCE, keeps_clearance, kept_apart
+from rrtik_ompl.geometry.collision.bodies import DISTANCE_TOLERANCE, Body, keeps_clearance, kept_apart
 from rrtik_ompl.geometry.collision.certificate import fixed_contact
 from rrtik_ompl.geometry.collision.containment import filled
 from rrtik_ompl.geometry.collision.distances import measured
@@ -32,62 +32,81 @@ from rrtik_ompl.geometry.collision.elements import (
     model_body,
     model_joints,
     named_bodies,
+    tracked_bodies,
     unchecked_pairs,
 )
-from rrtik_ompl.model.certificate import DEEPEST, VERSION, Certificate, ModelBody, ModelJoint, MotionEntries
-from rrtik_ompl.model.robot import Chain
+from rrtik_ompl.model.certificate import DEEPEST, VERSION, Certificate, ModelBody, ModelJoint, MotionEntries, Route
+from rrtik_ompl.model.robot import Chain, Robot
+from rrtik_ompl.model.scene import Scene
+from rrtik_ompl.world.certificate_course import LARGEST_VALUE, SAME, Course, Stack, powers_of
 from rrtik_ompl.world.certificate_intervals import Known, Numbers, Open, Rows, intervals_of, joined
 from rrtik_ompl.world.certificate_parts import Parts, enclosed, inside_mesh
 
 if TYPE_CHECKING:
     from rrtik_ompl.world.world import World
 
-Stack = NDArray[np.float64]  # matrices of shape (n, 3, 3) or (n, 4, 4)
-
 ROUNDING = 1e-8  # [m] added to every required gap, to cover rounding errors
-LARGEST_VALUE = 1e3  # [rad] or [m], joint values up to which ROUNDING is sufficient
-SAME = 1e-9  # up to which numbers of two models are equal
 SAME_EXTENT = 1e-6  # the same of extents, relative to the size of the shape and a metre
 SHORTEST = 0.5  # least length of a normal
 AT_ONCE = 20_000  # number of intervals that are computed together, to bound memory
 
 
-def certificate_fault(certificate: Certificate, world: World, waypoints: ArrayLike, *, clearance: float = 0.0) -> str:
+def certificate_fault(
+    certificate: Certificate, world: World, route: Route | ArrayLike, *, clearance: float = 0.0
+) -> str:
     """Verify a certificate, as :meth:`rrtik_ompl.World.verify` but without checking the types of arguments (point 8).
 
     Args:
         certificate: The certificate.
         world: The robot and the scene.
-        waypoints: Waypoints of the path, shape (k, dof).
+        route: The motion, or the waypoints of a path, shape (k, dof).
         clearance: Least distance that the path has to keep from obstacles on top of their margins [m].
 
     Returns:
         The first fault in one line; "" if the certificate proves the path free.
     """
-    rows = np.ascontiguousarray(waypoints, dtype=np.float64)
-    named = named_bodies(world.bodies)
-    pairs = compared_pairs(named, world.pairs)
-    fault = _fault_of_header(certificate, world, rows, clearance) or _fault_of_model(certificate, world, named, pairs)
+    asked = route if isinstance(route, Route) else Route(np.ascontiguousarray(route, dtype=np.float64))
+    fault = _fault_of_header(certificate, world, asked, clearance)
     if fault:
         return fault
-
     try:
+        named, tracks = bodies_of_route(world.robot, world.bodies, world.scene, asked)
+        pairs = compared_pairs(named, world.pairs)
+        fault = _fault_of_model(certificate, world, named, pairs) or _fault_of_tracks(certificate, tracks)
+        if fault:
+            return fault
         trees = [Parts(each.elements, body.cuts) for each, body in zip(named, certificate.bodies, strict=True)]
     except InputError as error:
         return str(error)
-    return Motions(world.robot.chain, named, trees, pairs, certificate).fault(certificate.motions)
+    course = Course(world.robot.chain, asked, tracks)
+    return Motions(world.robot.chain, named, trees, pairs, course, certificate.clearance).fault(certificate.motions)
+
+
+def bodies_of_route(
+    robot: Robot, bodies: Sequence[Body], scene: Scene | None, route: Route
+) -> tuple[list[NamedBody], Stack | None]:
+    """Return the bodies of a certificate, and the poses of the obstacles that move, shape (tracks, k, 4, 4).
+
+    Raises:
+        InputError: If an obstacle changes its way between two waypoints.
+    """
+    named = named_bodies(bodies)
+    if scene is None or not route.moving or route.times is None:
+        return named, None
+    return tracked_bodies(named, scene, len(robot.chain.parent), route.times)
 
 
 # --- what the certificate is about (point 3) -----------------------------------------------------------------------
 
 
-def _fault_of_header(certificate: Certificate, world: World, rows: Matrix, clearance: float) -> str:
-    """Return the first mismatch between a certificate and a path that concerns no entry; "" if there is none.
+def _fault_of_header(certificate: Certificate, world: World, route: Route, clearance: float) -> str:
+    """Return the first mismatch between a certificate and a motion that concerns no entry; "" if there is none.
 
-    Checked are the version, margins [m], clearance [m] and path, contacts between bodies that no joint moves (no entry
-    covers these), the bounds of the waypoints, shape (k, dof), and the number of motions.
+    Checked are the version, margins [m], clearance [m] and path, contacts between bodies that never move (no entry
+    covers these), the bounds of the waypoints, and the number of motions.
     """
     robot = world.robot
+    rows = route.waypoints
     if certificate.version != VERSION:
         return f"version {certificate.version} is not known here"
     if certificate.robot != robot.name or not _same_joints(certificate.joints, model_joints(robot)):
@@ -100,8 +119,12 @@ def _fault_of_header(certificate: Certificate, world: World, rows: Matrix, clear
     # The waypoints have to agree to the bit, except that 0.0 equals -0.0.
     if not np.array_equal(rows, certificate.waypoints):
         return "it is for another path: waypoints differ"
+    if fault := _fault_of_times(certificate, route):
+        return fault
 
-    pairs_at_rest = tuple(pair for pair in world.pairs if all(world.bodies[k].joint == 0 for k in pair))
+    passing = {each.name for each in world.scene.obstacles if route.moving and each.motion is not None}
+    at_rest = [body.joint == 0 and body.name not in passing for body in world.bodies]
+    pairs_at_rest = tuple(pair for pair in world.pairs if all(at_rest[k] for k in pair))
     touching = fixed_contact(robot, world.bodies, pairs_at_rest)
     if touching is not None:
         return f"{' and '.join(map(repr, touching))} touch and never move"
@@ -114,6 +137,34 @@ def _fault_of_header(certificate: Certificate, world: World, rows: Matrix, clear
     if len(certificate.motions) != motion_count:
         return f"it has {len(certificate.motions)} motions, not {motion_count}"
     return ""
+
+
+def _fault_of_times(certificate: Certificate, route: Route) -> str:
+    """Return how a certificate differs from a motion between the waypoints, which are the same; "" if it does not."""
+    if certificate.times is None or certificate.rates is None or route.times is None or route.rates is None:
+        both = certificate.times is None and route.times is None and certificate.tracks is None
+        return "" if both else "it is for another motion: one of them is timed, and the other a path"
+    if not np.array_equal(certificate.times, route.times):
+        return "it is for another motion: times differ"
+    theirs, own = (powers_of(each) for each in (Route(route.waypoints, route.times, certificate.rates), route))
+    with np.errstate(invalid="ignore"):
+        pairs = zip_longest(theirs, own, fillvalue=np.zeros_like(own[0]))
+        apart = np.sum([np.abs(a - b) for a, b in pairs], axis=0)
+    if not (apart <= SAME).all():
+        return "it is for another motion: rates differ"
+    return ""
+
+
+def _fault_of_tracks(certificate: Certificate, tracks: Stack | None) -> str:
+    """Return whether obstacles move otherwise than the certificate says; "" if they do not."""
+    if certificate.tracks is None and tracks is None:
+        return ""
+    if certificate.tracks is None or tracks is None:
+        return "it is for another scene: obstacles move in one of them alone"
+    same = certificate.tracks.shape[:2] == tracks.shape[:2] and _near(
+        certificate.tracks, tracks[:, :, :3].reshape(*tracks.shape[:2], -1)
+    )
+    return "" if same else "it is for another scene: obstacles move otherwise"
 
 
 def _fault_of_model(
@@ -191,7 +242,8 @@ class Motions:
         named: The bodies.
         trees: Their parts.
         pairs: Pairs of numbers of bodies that are compared, of which at least one moves, the smaller number first.
-        certificate: Gives waypoints, times, rates and clearance.
+        course: How joints and obstacles move.
+        clearance: Distance to keep from obstacles [m].
 
     Attributes:
         pairs: The same pairs, in the order of entries: a body that rests in the frame of the pair is second.
@@ -199,6 +251,8 @@ class Motions:
         required_gaps: Distance that each pair has to keep [m], including ``ROUNDING``.
         approaches, bends: Bounds of the sums of both bodies' speeds and accelerations for each pair and motion, if a
             motion takes time 1, shape (pairs, motions) [m].
+        pushes: What of the latter comes from the accelerations of joints alone: how far a curved motion bends more
+            than a straight one.
     """
 
     def __init__(
@@ -207,16 +261,18 @@ class Motions:
         named: Sequence[NamedBody],
         trees: Sequence[Parts],
         pairs: Sequence[tuple[int, int]],
-        certificate: Certificate,
+        course: Course,
+        clearance: float,
     ) -> None:
         self.chain = chain
         self.named = named
         self.trees = trees
-        self._course = Course(chain, certificate)
+        self._course = course
 
         joints = [each.body.joint for each in named]
-        seen = [(i, j, _common_joint(chain, joints[i], joints[j])) for i, j in pairs]
-        self.pairs = [(i, j) if joints[j] == base else (j, i) for i, j, base in seen]
+        endless = [tree.elements.key == "half_space" for tree in trees]
+        seen = [(i, j, _common_joint(course.parents, joints[i], joints[j])) for i, j in pairs]
+        self.pairs = [(i, j) if endless[j] or (joints[j] == base and not endless[i]) else (j, i) for i, j, base in seen]
         self.base_of_pair = np.array([base for _, _, base in seen], dtype=np.int64)
         self._bodies_of_pair = np.array(self.pairs, dtype=np.int64).reshape(-1, 2)
         self._rests = np.array([joints[j] == base for (_, j), (*_, base) in zip(self.pairs, seen, strict=True)], bool)
@@ -225,15 +281,19 @@ class Motions:
         for i, j in self.pairs:
             first, second = sorted((i, j))
             ends = named[first].body, named[second].body
-            required.append(kept_apart(*ends) + (certificate.clearance if keeps_clearance(*ends) else 0.0))
+            kept = kept_apart(*ends) + (clearance if keeps_clearance(*ends) else 0.0)
+            # What nothing moves cannot give way: an obstacle that passes it must not touch it, and that is all.
+            passes = min(joints[i], joints[j]) == 0 and max(joints[i], joints[j]) > len(chain.parent)
+            required.append(min(0.0, kept) if passes else kept)
         self.required_gaps = np.array(required) + ROUNDING
         self._by_hulls = np.array(required) < 0.0
 
         bounds_of = {k: self._bounds(k) for k in sorted({k for pair in self.pairs for k in pair})}
         bounds = np.array([bounds_of[i][base] + bounds_of[j][base] for i, j, base in seen])
-        bounds = bounds.reshape(-1, 2, self._course.count)
+        bounds = bounds.reshape(-1, 3, self._course.count)
         self.approaches = bounds[:, 0]
         self.bends = bounds[:, 1]
+        self.pushes = bounds[:, 2]
 
         # Frames of joints in the frames of pairs, each combination once.
         views = [
@@ -266,16 +326,19 @@ class Motions:
 
         Returns:
             For each joint that carries the body, 0 for the world: bounds of speed and acceleration in each motion,
-                which takes time 1, shape (2, motions) [m].
+                which takes time 1, and what joints' accelerations add to the latter, shape (3, motions) [m].
         """
         chain = self.chain
         course = self._course
         body = self.named[number].body
-        velocity, acceleration = np.zeros((2, course.count))
+        velocity, acceleration, pushed = np.zeros((3, course.count))
         joint = body.joint
-        bounds = {joint: np.array([velocity, acceleration])}
+        bounds = {joint: np.array([velocity, acceleration, pushed])}
         if joint == 0:
             return bounds
+        if joint > len(chain.parent):
+            reach, _ = self._reaches(number, body.placement.homogeneous, np.zeros(3))
+            return {**bounds, 0: course.bounds_on_track(joint, reach)}
 
         reach, off_axis = self._reaches(number, body.placement.homogeneous, chain.axis[joint - 1])
 
@@ -288,11 +351,13 @@ class Motions:
             if slides:
                 acceleration = acceleration + push
                 velocity = velocity + rate
+                pushed = pushed + push
             else:
                 acceleration = acceleration + rate * (2.0 * velocity + rate * off_axis) + push * off_axis
                 velocity = velocity + rate * off_axis
+                pushed = pushed + push * off_axis
             joint = int(chain.parent[k]) + 1
-            bounds[joint] = np.array([velocity, acceleration])
+            bounds[joint] = np.array([velocity, acceleration, pushed])
 
             # Bound the distances of the body's points from the axis and the origin of the next joint inwards.
             origin = chain.placement[k][:3, 3]
@@ -500,19 +565,25 @@ class Motions:
 
     def _fault_of_entries(self, entries: Rows, normals: Matrix) -> str:
         """Return the first entry that does not hold."""
+        for k in self._open_of(entries, normals).tolist():
+            motion, pair, _, _, begin, width = (column[k].item() for column in entries)
+            return self._what(motion, pair, begin, width)
+        return ""
+
+    def _open_of(self, entries: Rows, normals: Matrix) -> Numbers:
+        """Return the numbers of the entries that do not hold, in order."""
         # Where an overlap is allowed, meshes count as their hulls.
         bodies = self._bodies_of_pair[entries.pair]
         nodes = np.stack([entries.first, entries.second], axis=1)
         parted = (self._by_hulls[entries.pair][:, None] & self._mesh[bodies] & (nodes > 0)).any(axis=1)
         by_measure = entries.first < 0
-        open_rows = np.flatnonzero(by_measure | parted).tolist()
         shown = np.flatnonzero(~by_measure & ~parted)
-        open_rows += shown[self._not_apart(entries.of(shown), normals[shown])].tolist()
-        for k in sorted(open_rows):
+        open_rows = np.flatnonzero(parted).tolist() + shown[self._not_apart(entries.of(shown), normals[shown])].tolist()
+        for k in np.flatnonzero(by_measure & ~parted).tolist():
             motion, pair, _, _, begin, width = (column[k].item() for column in entries)
-            if not by_measure[k] or not self._measured_apart(motion, pair, begin, width):
-                return self._what(motion, pair, begin, width)
-        return ""
+            if not self._measured_apart(motion, pair, begin, width):
+                open_rows.append(k)
+        return np.array(sorted(open_rows), dtype=np.int64)
 
     def _fault_of_pairs(self, entries: Rows) -> str:
         """Return a pair that is not shown apart in a motion; "" if there is none."""
@@ -570,14 +641,94 @@ class Motions:
             rest = joined([halved, parted])
             stack += [rest.of(slice(k, k + AT_ONCE)) for k in range(0, len(rest.pair), AT_ONCE)]
 
+    def in_order(self, motion: MotionEntries) -> MotionEntries:
+        """Return entries whose bodies are in the order that entries have, planes turned over where they change."""
+        numbers = len(self.named)
+        pairs = self._bodies_of_pair @ [numbers, 1]
+        turned = ~np.isin(motion.solids[:, [0, 2]] @ [numbers, 1], pairs)
+        solids = np.where(turned[:, None], motion.solids[:, [2, 3, 0, 1]], motion.solids)
+        return MotionEntries(solids, motion.intervals, np.where(turned[:, None], -motion.normals, motion.normals))
+
+    def fitted(self, motions: Sequence[MotionEntries]) -> list[MotionEntries]:
+        """Halve the intervals of entries until each holds, then join halves where one plane holds on both.
+
+        Entries without a plane that do not hold get one; what holds on no interval is left out.
+        """
+        entries = self._entries(motions)
+        normals = np.concatenate([motion.normals for motion in motions])
+        by_balls = np.flatnonzero(~normals.any(axis=1) & (entries.first >= 0))
+        weak = by_balls[self._not_apart(entries.of(by_balls))]
+        normals[weak] = self._ways(entries.of(weak))
+        while len(bad := self._open_of(entries, normals)):
+            good = np.delete(np.arange(len(entries.pair)), bad)
+            bad = bad[(entries.width[bad] > 0.5**DEEPEST) & (normals[bad].any(axis=1) | (entries.first[bad] < 0))]
+            halves = np.repeat(bad, 2)
+            width = 0.5 * entries.width[halves]
+            later = np.arange(len(halves)) % 2
+            parts = entries.of(halves)._replace(begin=entries.begin[halves] + later * width, width=width)
+            entries = Rows(*(np.concatenate(both) for both in zip(entries.of(good), parts, strict=True)))
+            normals = np.concatenate([normals[good], normals[halves]])
+
+        level = DEEPEST
+        while level > 0:
+            # Both halves of an interval stand beside each other in this order.
+            order = np.lexsort((entries.begin, entries.second, entries.first, entries.pair, entries.motion))
+            entries = entries.of(order)
+            normals = normals[order]
+            same = np.ones(max(0, len(order) - 1), dtype=bool)
+            for column in entries[:4]:
+                same &= column[1:] == column[:-1]
+            half = entries.width == 0.5**level
+            even = np.round(entries.begin / entries.width) % 2 == 0
+            same &= half[1:] & half[:-1] & even[:-1] & (entries.begin[1:] == entries.begin[:-1] + entries.width[:-1])
+            firsts = np.flatnonzero(same & (entries.first[:-1] >= 0))
+            whole = entries.of(firsts)._replace(width=2.0 * entries.width[firsts])
+            for side in (0, 1):
+                open_ = np.isin(np.arange(len(firsts)), self._not_apart(whole, normals[firsts + side]))
+                joined_ = firsts[~open_]
+                normals[joined_] = normals[joined_ + side]
+                entries.width[joined_] *= 2.0
+                kept = np.delete(np.arange(len(entries.pair)), joined_ + 1)
+                firsts = np.searchsorted(kept, firsts[open_])
+                whole = whole.of(open_)
+                entries = entries.of(kept)
+                normals = normals[kept]
+            level -= 1
+        return self._motions_of(entries, normals)
+
+    def _ways(self, rows: Rows) -> Matrix:
+        """Return the ways from the second nodes' boxes to the first nodes' middles, halfway, shape (n, 3) [m]."""
+        places, where = np.unique(2.0 * rows.motion + rows.begin + 0.5 * rows.width, return_inverse=True)
+        frames = self._frames((places // 2.0).astype(np.int64), places % 2.0)
+        bodies = self._bodies_of_pair[rows.pair]
+        first, second = self._view_of_pair[rows.pair].T
+        pose = frames[where, first]
+        centre = np.einsum(
+            "nij,nj->ni", pose[:, :3, :3], self._carried_centres[self._firsts[bodies[:, 0]] + rows.first]
+        )
+        other = frames[where, second] @ self._placements[bodies[:, 1]]
+        seen = np.einsum("nji,nj->ni", other[:, :3, :3], centre + pose[:, :3, 3] - other[:, :3, 3])
+        node = self._firsts[bodies[:, 1]] + rows.second
+        ways = np.einsum("nij,nj->ni", other[:, :3, :3], seen - np.clip(seen, self._low[node], self._high[node]))
+        return np.asarray(ways / np.maximum(1e-300, np.linalg.norm(ways, axis=1))[:, None]).round(6)
+
+    def _motions_of(self, entries: Rows, normals: Matrix) -> list[MotionEntries]:
+        """Return entries as those of each motion."""
+        bodies = self._bodies_of_pair[entries.pair]
+        solids = np.column_stack([bodies[:, 0], entries.first, bodies[:, 1], entries.second])
+        intervals = np.column_stack(intervals_of(entries))
+        own = [entries.motion == motion for motion in range(self._course.count)]
+        return [MotionEntries(solids[k], intervals[k], normals[k]) for k in own]
+
     def needed(self, motions: Sequence[MotionEntries]) -> Mask:
         """Return which entries, all motions' one after the other, a certificate cannot do without."""
         entries = self._entries(motions)
         known = self._known(entries)
         if known.too_many:
             return np.ones(len(entries.pair), dtype=bool)
-        deque(self._stuck(self.everything, known), maxlen=0)
-        needed = known.used | (entries.first < 0)
+        everything = self.everything
+        deque(self._stuck(everything, known), maxlen=0)
+        used = known.used | (entries.first < 0)
 
         # What balls show at the ends and in the middle of an interval, they may show on its parts.
         doubtful = np.flatnonzero(known.used & (entries.first >= 0))
@@ -585,11 +736,16 @@ class Motions:
             some = entries.of(doubtful)
             still = some._replace(begin=some.begin + share * some.width, width=np.zeros(len(doubtful)))
             doubtful = np.delete(doubtful, self._not_apart(still))
-        some = entries.of(doubtful)
-        alone = Open(*some[:4], *intervals_of(some), np.arange(len(doubtful)))
-        of_none = self._known(entries.of(np.zeros(0, dtype=np.int64)))
-        stuck = [each.origin for each in self._stuck(alone, of_none)]
-        needed[np.delete(doubtful, np.unique(np.concatenate([*stuck, doubtful[:0]])))] = False
+        needed = used.copy()
+        needed[doubtful] = False
+
+        # Try without them, and take back what is about a pair and motion that is not shown apart then.
+        claims = everything.motion * len(self.pairs) + everything.pair
+        about = entries.motion * len(self.pairs) + entries.pair
+        tried = everything.of(np.isin(claims, about[doubtful]))
+        left = self._known(entries.of(needed))
+        stuck = [each.motion * len(self.pairs) + each.pair for each in self._stuck(tried, left)]
+        needed |= used & np.isin(about, np.concatenate([*stuck, about[:0]]))
         return needed
 
     def _known(self, entries: Rows) -> Known:
@@ -635,60 +791,6 @@ class Motions:
         return any(inside_mesh(corners, point) for point in points[inside, 0])
 
 
-class Course:
-    """How joints move over the motions of a certificate (point 5.1 and 5.2).
-
-    Attributes:
-        count: Number of motions.
-        rates, pushes: Bounds of the speeds and accelerations of joint values over a motion, which takes time 1, shape
-            (count, joints).
-        strokes: Largest size of the joint values in each motion, shape (count, joints).
-        fault: Where a timed motion jumps; "" if it does not.
-    """
-
-    def __init__(self, chain: Chain, certificate: Certificate) -> None:
-        self._chain = chain
-        rows = certificate.waypoints
-        # A single waypoint counts as a motion that stands still.
-        route = np.repeat(rows, 2, axis=0) if len(rows) == 1 else rows
-        self.count = len(route) - 1
-        self._starts = route[:-1]
-        self.fault = ""
-        gain = np.abs(chain.gain.T)
-        values = np.abs(chain.joint_values(route))
-        self._powers = [np.diff(route, axis=0)]
-        self.rates = np.abs(np.diff(chain.joint_values(route), axis=0))
-        self.pushes = np.zeros_like(self.rates)
-        self.strokes = np.maximum(values[:-1], values[1:])
-
-        if certificate.times is not None and certificate.rates is not None:
-            h = np.diff(certificate.times)[:, None]
-            v = h * certificate.rates[:, 0]
-            a = h**2 * certificate.rates[:, 1]
-            j = h**3 * certificate.rates[:, 2]
-            self._powers = [v, a / 2.0, j / 6.0]
-            jumps = np.abs(self._starts + v + a / 2.0 + j / 6.0 - route[1:]).max(axis=1)
-            if not (jumps <= SAME).all():
-                self.fault = f"motion {int(np.argmax(~(jumps <= SAME))) + 1} does not end where the next one begins"
-            last = v + a + j / 2.0
-            self.rates = (np.maximum(np.abs(v), np.abs(last)) + np.abs(j) / 8.0) @ gain
-            self.pushes = np.maximum(np.abs(a), np.abs(a + j)) @ gain
-            self.strokes = self.strokes + self.rates
-
-    def frames(self, motion: Numbers, share: Vector) -> NDArray[np.float64]:
-        """Compute the frames of all joints, the world first, at places of motions, shape (n, joints + 1, 4, 4)."""
-        chain = self._chain
-        rows = self._starts[motion]
-        for k, power in enumerate(self._powers, 1):
-            rows = rows + (share**k)[:, None] * power[motion]
-        moved = joint_motions(chain.axis, chain.prismatic, chain.joint_values(rows))
-        frames = np.empty((len(rows), len(chain.parent) + 1, 4, 4))
-        frames[:, 0] = np.eye(4)
-        for k, parent in enumerate(chain.parent.tolist()):
-            frames[:, k + 1] = frames[:, parent + 1] @ chain.placement[k] @ moved[:, k]
-        return frames
-
-
 def _groups(bodies: Numbers, nodes: Numbers) -> Iterator[Numbers]:
     """Yield the rows of each node of each body."""
     order = np.lexsort((nodes, bodies))
@@ -696,8 +798,8 @@ def _groups(bodies: Numbers, nodes: Numbers) -> Iterator[Numbers]:
     yield from np.split(order, changes)
 
 
-def _common_joint(chain: Chain, first: int, second: int) -> int:
+def _common_joint(parents: Numbers, first: int, second: int) -> int:
     """Return the last joint whose frame carries the frames of both joints, 0 for the world."""
     while first != second:  # parents have smaller numbers
-        first, second = min(first, second), int(chain.parent[max(first, second) - 1]) + 1
+        first, second = min(first, second), int(parents[max(first, second)])
     return first

@@ -8,13 +8,15 @@ near each other on the way are divided further, clouds and piles near the arm al
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, NamedTuple
 
 import coal
 import numpy as np
+import pinocchio as pin
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError, cKDTree
 
@@ -26,17 +28,18 @@ from rrtik_ompl.geometry.collision.elements import (
     compared_pairs,
     model_body,
     model_joints,
-    named_bodies,
     unchecked_pairs,
 )
 from rrtik_ompl.kernels.proof.log import logged
+from rrtik_ompl.kernels.proof.moving import MovedObstacles
 from rrtik_ompl.kernels.proof.packing import ProofPairs, proof_pairs
 from rrtik_ompl.kernels.proof.rows import proof_of_rows
 from rrtik_ompl.kernels.tables.solid_tables import ConvexSolid, Solids, convex_solids
-from rrtik_ompl.model.certificate import Certificate, MotionEntries
-from rrtik_ompl.model.robot import Robot
-from rrtik_ompl.world.arm_cache import Pairs, strokes
-from rrtik_ompl.world.certificate_check import Motions
+from rrtik_ompl.model.certificate import Certificate, MotionEntries, Route
+from rrtik_ompl.model.robot import Chain, Robot
+from rrtik_ompl.world.arm_cache import strokes
+from rrtik_ompl.world.certificate_check import Motions, bodies_of_route
+from rrtik_ompl.world.certificate_course import Course
 from rrtik_ompl.world.certificate_parts import Parts
 from rrtik_ompl.world.coal_proof import PROVEN, CoalProof, suggest_planes
 
@@ -53,7 +56,15 @@ PLACES = 12  # of each motion, around which clouds and piles are divided
 FINEST = 0.05  # [m] size of parts of clouds and piles, unless smaller ones are needed
 WIDE = 1.0  # largest size of such a part in units of its distance from the arm
 MOST_LEAVES = 4000  # of a cloud or a pile
+MOST_SLACK = 5e-4  # [m] by which a curved motion leaves its chords, at first
+MOST_TRAVEL = 0.02  # [m] of an obstacle during a chord, at first
+FINEST_CHORDS = 6  # level of chords at first
+FINER_CHORDS = 4  # number of levels that are tried
 CLOUDS = ("balls", "boxes")  # shapes of many elements that have nothing to do with each other
+
+if TYPE_CHECKING:
+    from rrtik_ompl.model.scene import Scene
+    from rrtik_ompl.world.proof import Prover
 
 
 class Cover:
@@ -149,51 +160,132 @@ class Cover:
         return ConvexSolid(points, radius=elements.radius, disc=elements.disc)
 
 
-def certificate_of(
-    robot: Robot, bodies: Sequence[Body], pairs: Pairs, self_margin: float, rows: Matrix, clearance: float
-) -> Certificate | None:
-    """Return the certificate of a path; None if no planes are found that prove it.
+class Chord(NamedTuple):
+    """A part of a motion that kernels prove as a straight motion among obstacles at rest.
+
+    Attributes:
+        motion: Number of the motion.
+        level, number: The interval of the motion that it goes over.
+        ends: Configurations at both ends, shape (2, dof).
+        bodies: All bodies, obstacles where they are in the middle of it.
+        room: For each body how far any point of an obstacle goes from there [m].
+    """
+
+    motion: int
+    level: int
+    number: int
+    ends: Matrix
+    bodies: Sequence[Body]
+    room: Sequence[float]
+
+
+def certificate_of(prover: Prover, route: Route, clearance: float, scene: Scene | None = None) -> Certificate | None:
+    """Return the certificate of a motion; None if no planes are found that prove it.
 
     Args:
-        robot: The arm.
-        bodies: All bodies of a world.
-        pairs: Numbers of those that must not touch.
-        self_margin: Distance that links and attached objects keep from each other [m].
-        rows: Waypoints of the path, shape (k, dof).
+        prover: Has the robot, the bodies and the pairs that are compared.
+        route: The motion.
         clearance: Distance to keep from obstacles [m].
+        scene: The scene, of a motion in which obstacles move.
+
+    Raises:
+        InputError: If an obstacle changes its way between two waypoints.
     """
-    named = named_bodies(bodies)
-    compared = compared_pairs(named, pairs)
+    robot = prover.robot
+    named, tracks = bodies_of_route(robot, prover.bodies, scene, route)
+    compared = compared_pairs(named, prover.pairs)
     if any(not named[k].elements.known for pair in compared for k in pair):
         return None
-
-    route = np.vstack([rows, rows]) if len(rows) == 1 else rows
-    covers = [Cover(each.elements) for each in named]
-    motions = _Table(robot, named, covers, compared, clearance).proven(route)
-    if motions is None:
+    course = Course(robot.chain, route, tracks)
+    if course.fault:
         return None
 
+    still = [Parts(each.elements, ()) for each in named]
+    slacks = Motions(robot.chain, named, still, compared, course, clearance).pushes.max(axis=0, initial=0.0) / 8.0
+    travels = course.travels(named, still)
+    levels = _levels(slacks, travels)
+    for finer in range(FINER_CHORDS if levels.any() else 1):
+        chords = list(_chords(named, course, levels + finer, still))
+        covers = [Cover(each.elements) for each in named]
+        slack = float((slacks * 0.25 ** (levels + finer)).max())
+        motions = _Table(robot, named, covers, compared, clearance, slack).proven(chords)
+        if motions is not None:
+            made = _model(prover, route, named, compared, covers, clearance, tracks)
+            held = _holding(made, motions, robot.chain, named, compared, course)
+            if held is not None:
+                return held
+    return None
+
+
+def _levels(slacks: Vector, travels: Matrix) -> NDArray[np.int64]:
+    """Return the level of the chords of each motion, at which they leave the motion by little, shape (motions,)."""
+    bent = np.log2(np.maximum(slacks / MOST_SLACK, 1.0)) / 2.0
+    passed = np.log2(np.maximum(travels.max(axis=0, initial=0.0) / MOST_TRAVEL, 1.0))
+    return np.asarray(np.minimum(np.ceil(np.maximum(bent, passed)), FINEST_CHORDS), dtype=np.int64)
+
+
+def _chords(
+    named: Sequence[NamedBody], course: Course, levels: NDArray[np.int64], trees: Sequence[Parts]
+) -> Iterator[Chord]:
+    """Yield the chords of all motions, one after the other."""
+    travels = course.travels(named, trees)
+    moving = [k for k, each in enumerate(named) if each.body.joint > course.joints]
+    for motion, level in enumerate(levels.tolist()):
+        shares = np.linspace(0.0, 1.0, (1 << level) + 1)
+        rows = course.positions(np.full(len(shares), motion), shares)
+        middles = shares[:-1] + 0.5 ** (level + 1) if moving else shares[:0]
+        frames = course.frames(np.full(len(middles), motion), middles)
+        for number in range(1 << level):
+            bodies = [each.body for each in named]
+            for k in moving:
+                pose = pin.SE3(frames[number, bodies[k].joint]) * bodies[k].placement
+                bodies[k] = replace(bodies[k], joint=0, placement=pose)
+            room = 0.5 ** (level + 1) * travels[:, motion]
+            yield Chord(motion, level, number, rows[number : number + 2], bodies, room.tolist())
+
+
+def _model(
+    prover: Prover,
+    route: Route,
+    named: Sequence[NamedBody],
+    pairs: Sequence[tuple[int, int]],
+    covers: Sequence[Cover],
+    clearance: float,
+    tracks: NDArray[np.float64] | None,
+) -> Certificate:
+    """Return a certificate without entries."""
+    robot = prover.robot
     listed = tuple(model_body(each, cover.cuts) for each, cover in zip(named, covers, strict=True))
-    unchecked = unchecked_pairs(robot, named, compared)
+    unchecked = unchecked_pairs(robot, named, pairs)
     model = robot.name, model_joints(robot), listed, unchecked
-    made = Certificate(*model, clearance, self_margin, frozen(rows), tuple(motions))
-    return _without_needless(made, robot, named, compared)
+    moved = None if tracks is None else frozen(tracks[:, :, :3].reshape(*tracks.shape[:2], -1))
+    return Certificate(
+        *model, clearance, prover.self_margin, frozen(route.waypoints), (), route.times, route.rates, moved
+    )
 
 
-def _without_needless(
-    certificate: Certificate, robot: Robot, named: Sequence[NamedBody], pairs: Sequence[tuple[int, int]]
+def _holding(
+    certificate: Certificate,
+    motions: Sequence[MotionEntries],
+    chain: Chain,
+    named: Sequence[NamedBody],
+    pairs: Sequence[tuple[int, int]],
+    course: Course,
 ) -> Certificate | None:
-    """Return a certificate without the entries that balls and boxes make needless; None if it does not hold."""
+    """Return a certificate with entries, without those that balls and boxes make needless; None if it does not hold."""
     trees = [Parts(each.elements, body.cuts) for each, body in zip(named, certificate.bodies, strict=True)]
-    verifier = Motions(robot.chain, named, trees, pairs, certificate)
-    needed = verifier.needed(certificate.motions)
-    ends = np.cumsum([len(motion.solids) for motion in certificate.motions])
-    kept = [
-        MotionEntries(motion.solids[own], motion.intervals[own], motion.normals[own])
-        for motion, own in zip(certificate.motions, np.split(needed, ends[:-1]), strict=True)
-    ]
-    made = replace(certificate, motions=tuple(kept))
-    return None if verifier.fault(made.motions) else made
+    verifier = Motions(chain, named, trees, pairs, course, certificate.clearance)
+    ordered = [verifier.in_order(motion) for motion in motions]
+    fitting = ordered if certificate.times is None else verifier.fitted(ordered)
+    needed = verifier.needed(fitting)
+    ends = np.cumsum([len(motion.solids) for motion in fitting])
+    kept = tuple(
+        MotionEntries(
+            frozen(motion.solids[own], np.int64), frozen(motion.intervals[own], np.int64), frozen(motion.normals[own])
+        )
+        for motion, own in zip(fitting, np.split(needed, ends[:-1]), strict=True)
+    )
+    return None if verifier.fault(kept) else replace(certificate, motions=kept)
 
 
 @dataclass(eq=False)
@@ -205,9 +297,11 @@ class _Table:
     covers: Sequence[Cover]
     pairs: Sequence[tuple[int, int]]
     clearance: float
+    slack: float
 
-    def proven(self, route: Matrix) -> list[MotionEntries] | None:
-        """Return the entries of each motion of a route, shape (k, dof); None if one is not proven."""
+    def proven(self, chords: Sequence[Chord]) -> list[MotionEntries] | None:
+        """Return the entries of each motion, from the chords of all of them; None if one is not proven."""
+        route = np.stack([chord.ends for chord in chords])
         compared = {k for pair in self.pairs for k in pair}
         for number in sorted(compared):
             cover = self.covers[number]
@@ -217,11 +311,11 @@ class _Table:
         self._divide_clouds(route, scale)
 
         for _ in range(ROUNDS):
-            packed, nodes = self._packed()
+            packed, nodes = self._packed(chords[0].bodies)
             entries: list[MotionEntries] = []
-            stuck = self._run(packed, nodes, route, entries)
+            stuck = self._run(packed, nodes, chords, entries)
             if stuck is None:
-                return entries
+                return _joined(chords, entries)
             divided = [self._divide(body, node) for body, node in stuck]
             if not any(divided):
                 return None
@@ -244,7 +338,7 @@ class _Table:
             return node in cover.leaves and cover.divide(node)
         return cover.divide_into(min(MOST_PARTS, FINER * len(cover.leaves)))
 
-    def _packed(self) -> tuple[ProofPairs, list[list[int]]]:
+    def _packed(self, bodies: Sequence[Body]) -> tuple[ProofPairs, list[list[int]]]:
         """Return the table of the kernels, and for each body the nodes of its parts."""
         nodes = [list(cover.leaves) for cover in self.covers]
         solids = []
@@ -254,43 +348,63 @@ class _Table:
                 solids.append(Solids(tuple(map(cover.solid, cover.leaves))))
             else:
                 solids.append(convex_solids(geometry))
-        # Kernels take a cloud for one by its geometry, but here its parts are solids like others.
-        bodies = [
-            replace(each.body, geometry=_box_around(each.elements)) if each.elements.key in CLOUDS else each.body
-            for each in self.named
-        ]
-        packed = proof_pairs(self.robot.chain, bodies, self.pairs, solids, strokes(self.robot))
-        packed.keep(self.clearance, SPARE)
+        moving = [each for each, body in zip(self.named, bodies, strict=True) if each.body is not body]
+        plain = self._plain(bodies)
+        packed = proof_pairs(self.robot.chain, plain, self._arm_pairs, solids, strokes(self.robot), fixed=not moving)
+        packed.keep(self.clearance, SPARE + self.slack)
         return packed, nodes
 
+    @cached_property
+    def _arm_pairs(self) -> list[tuple[int, int]]:
+        """The pairs of which a joint moves a body: those that kernels compare."""
+        joints = len(self.robot.chain.parent)
+        return [pair for pair in self.pairs if any(0 < self.named[k].body.joint <= joints for k in pair)]
+
+    def _plain(self, bodies: Sequence[Body]) -> list[Body]:
+        """Return bodies with boxes in place of clouds: kernels take a cloud for one by its geometry."""
+        return [
+            replace(body, geometry=_box_around(each.elements)) if each.elements.key in CLOUDS else body
+            for each, body in zip(self.named, bodies, strict=True)
+        ]
+
     def _run(
-        self, packed: ProofPairs, nodes: Sequence[Sequence[int]], route: Matrix, entries: list[MotionEntries]
+        self,
+        packed: ProofPairs,
+        nodes: Sequence[Sequence[int]],
+        chords: Sequence[Chord],
+        entries: list[MotionEntries],
     ) -> list[tuple[int, int]] | None:
-        """Prove the motions and append their entries.
+        """Prove the chords and append their entries.
 
         Returns:
             Two bodies that are not proven apart, each with the node of the part; None if all are.
         """
-        values = self.robot.chain.joint_values(route)
-        values = np.ascontiguousarray(values)
+        ends = np.stack([chord.ends for chord in chords])
+        values = self.robot.chain.joint_values(ends.reshape(-1, ends.shape[-1])).reshape(*ends.shape[:2], -1)
+        values = np.ascontiguousarray(values.transpose(1, 0, 2))
         pair = np.zeros(1, dtype=np.int32)
         place = np.zeros(1)
-        bodies = [each.body for each in self.named]
-        coal_proof = CoalProof(self.robot, bodies, packed)
-        for k in range(len(route) - 1):
-            run = partial(proof_of_rows(packed, values[k : k + 1], values[k + 1 : k + 2], pair, place), 0, 1)
+        first = chords[0].bodies
+        moves = any(each.body is not body for each, body in zip(self.named, first, strict=True))
+        moved = MovedObstacles(packed, self._plain(first)) if moves else None
+        coal_proof = CoalProof(self.robot, first, packed)
+        for k, chord in enumerate(chords):
+            if moved is not None:
+                moved.put(self._plain(chord.bodies), chord.room)
+                packed.keep(self.clearance, SPARE + self.slack)
+            run = partial(proof_of_rows(packed, values[0, k : k + 1], values[1, k : k + 1], pair, place), 0, 1)
             if packed.touching:
-                suggest_planes(self.robot, bodies, packed, route[k : k + 2])
+                suggest_planes(self.robot, chord.bodies, packed, chord.ends)
             log = logged(packed, run)
             measured = np.zeros((0, 4), dtype=np.int64)
             if pair[0] != PROVEN:
                 stuck = self._parts_of(packed, int(pair[0]), nodes)
                 if any(self._can_be_finer(body) for body, _ in stuck):
                     return stuck
-                log, measured = coal_proof.logged(route[k : k + 2], pair, place, run)
+                log, measured = coal_proof.logged(chord.ends, pair, place, run)
                 if pair[0] != PROVEN:
                     return self._parts_of(packed, int(pair[0]), nodes)
-            entries.append(self._entries(log, measured, nodes))
+            entries.append(self._entries(log, measured, nodes, whole_log=chord.level > 0))
         return None
 
     def _parts_of(self, packed: ProofPairs, pair: int, nodes: Sequence[Sequence[int]]) -> list[tuple[int, int]]:
@@ -304,17 +418,18 @@ class _Table:
         return number not in self._hulls and len(cover.leaves) < min(most, len(cover.elements.points))
 
     def _entries(
-        self, log: MotionEntries, measured: NDArray[np.int64], nodes: Sequence[Sequence[int]]
+        self, log: MotionEntries, measured: NDArray[np.int64], nodes: Sequence[Sequence[int]], *, whole_log: bool
     ) -> MotionEntries:
-        """Return the entries of a motion that have planes.
+        """Return the entries of a chord.
 
-        Entries without one are dropped: a verifier finds them by balls and boxes. So are entries of bodies whose
-        distances are measured, which get the intervals of these measurements instead.
+        Entries of bodies whose distances are measured are dropped; they get the intervals of these measurements.
 
         Args:
             log: The kernels' log of the motion.
             measured: Numbers of two bodies, and level and number of an interval, shape (n, 4).
             nodes: For each body the nodes of its parts.
+            whole_log: Whether entries without a plane are kept. A verifier finds those of a whole motion by balls and
+                boxes.
         """
         over = np.array([cover.elements.key == "half_space" for cover in self.covers], dtype=bool)
         normals = np.where(over[log.solids[:, 2]][:, None], 0.0, np.round(log.normals, DIGITS))
@@ -324,7 +439,7 @@ class _Table:
             intervals[:] = 0
 
         settled = (log.solids[:, None, ::2] == measured[None, :, :2]).all(axis=2).any(axis=1)
-        needed = normals.any(axis=1) & ~settled
+        needed = (normals.any(axis=1) | whole_log) & ~settled
         solids = log.solids[needed]
         for side in (0, 2):
             parts = zip(solids[:, side].tolist(), solids[:, side + 1].tolist(), strict=True)
@@ -341,7 +456,7 @@ class _Table:
         """Divide clouds and piles: their parts are small near the arm on its way, and large far away.
 
         Args:
-            route: The waypoints, shape (k, dof).
+            route: Both ends of each chord, shape (chords, 2, dof).
             scale: Factor on the size of the parts.
         """
         wide = [k for k in sorted({k for pair in self.pairs for k in pair}) if len(self.covers[k].elements.points) > 1]
@@ -351,7 +466,7 @@ class _Table:
 
         # Balls around the parts of the arm at some places of each motion.
         shares = np.linspace(0.0, 1.0, PLACES)[:, None]
-        rows = (route[:-1, None] + shares * (route[1:] - route[:-1])[:, None]).reshape(-1, route.shape[1])
+        rows = (route[:, :1] + shares * (route[:, 1:] - route[:, :1])).reshape(-1, route.shape[2])
         frames = self.robot.chain.joint_frames(distinct_rows(rows))
         centres = []
         radii = []
@@ -382,6 +497,23 @@ class _Table:
                 for leaf in chosen:
                     if cover.divide(leaf):
                         candidates += [2 * len(cover.cuts) - 1, 2 * len(cover.cuts)]
+
+
+def _joined(chords: Sequence[Chord], entries: Sequence[MotionEntries]) -> list[MotionEntries]:
+    """Return the entries of each motion, of those of its chords, with intervals of the motion."""
+    parts: dict[int, list[MotionEntries]] = {chord.motion: [] for chord in chords}
+    for chord, own in zip(chords, entries, strict=True):
+        level, number = own.intervals.T
+        intervals = np.column_stack([chord.level + level, (chord.number << level) + number])
+        parts[chord.motion].append(replace(own, intervals=intervals))
+    return [
+        MotionEntries(
+            np.concatenate([each.solids for each in own]),
+            np.concatenate([each.intervals for each in own]),
+            np.concatenate([each.normals for each in own]),
+        )
+        for own in parts.values()
+    ]
 
 
 class _Nearest:

@@ -123,9 +123,11 @@ class Parts:
 
         It is evaluated at the points of the elements; the disc and the radius around them are added.
         """
-        if not self.bounded or self._half is not None:
+        if not self.bounded:
             return np.inf
         lengths = np.linalg.norm(mapping(self._points.reshape(-1, 3)), axis=1)
+        if self._half is not None:
+            lengths = lengths + np.linalg.norm(self._half, axis=1)
         return float(lengths.max()) + self.elements.disc + self.elements.radius
 
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Protocol, TypeAlias, runtime_checkable
 
 from numpy.typing import ArrayLike
 
 from rrtik_ompl.base.arrays import Matrix, finite_array, not_negative, number_rows
 from rrtik_ompl.base.errors import require
-from rrtik_ompl.model.certificate import Certificate
+from rrtik_ompl.model.certificate import Certificate, Route
 from rrtik_ompl.model.robot import require_joints, unnamed_joints
 
 if TYPE_CHECKING:
@@ -24,22 +24,38 @@ class HasWaypoints(Protocol):
         """The waypoints, shape (k, dof)."""
 
 
-def certificate_for(world: World, path: HasWaypoints | ArrayLike, clearance: float) -> Certificate | None:
-    """Certify a path; see :meth:`rrtik_ompl.World.certificate`.
+@runtime_checkable
+class HasRoute(Protocol):
+    """An object that moves by a route, such as a trajectory."""
+
+    @property
+    def route(self) -> Route:
+        """How it moves."""
+
+
+Certifiable: TypeAlias = Route | HasRoute | HasWaypoints | ArrayLike
+
+
+def certificate_for(world: World, path: Certifiable, clearance: float) -> Certificate | None:
+    """Certify a path or a timed motion; see :meth:`rrtik_ompl.World.certificate`.
 
     Raises:
         InputError: If the path is another robot's, or the clearance is negative or infinite.
     """
     required_clearance = not_negative(clearance, "clearance")
     robot = world.robot
-    waypoints = path.waypoints if isinstance(path, HasWaypoints) else path
-    rows = finite_array(waypoints, (None, None), "path of a certificate")
+    route = _route(path)
+    rows = finite_array(route.waypoints, (None, None), "path of a certificate")
     require_joints(robot, getattr(path, "joint_names", unnamed_joints(rows.shape[1])), "path")
-    return world.prover.certificate(rows, required_clearance)
+    if route.times is None:
+        return world.prover.certificate(rows, required_clearance)
+    from rrtik_ompl.world.certificate_making import certificate_of  # few need it, and it loads scipy
+
+    return certificate_of(world.prover, route, required_clearance, world.scene)
 
 
-def fault_of(certificate: Certificate, world: World, path: HasWaypoints | ArrayLike, clearance: float) -> str:
-    """Verify a certificate of a path; see :meth:`rrtik_ompl.World.verify`.
+def fault_of(certificate: Certificate, world: World, path: Certifiable, clearance: float) -> str:
+    """Verify a certificate of a path or a timed motion; see :meth:`rrtik_ompl.World.verify`.
 
     Raises:
         InputError: If an argument has the wrong type.
@@ -47,6 +63,14 @@ def fault_of(certificate: Certificate, world: World, path: HasWaypoints | ArrayL
     from rrtik_ompl.world.certificate_check import certificate_fault  # a plan does not need it
 
     require(certificate, Certificate, "certificate", "World.certificate(path) makes one")
+    return certificate_fault(certificate, world, _route(path), clearance=not_negative(clearance, "clearance"))
+
+
+def _route(path: Certifiable) -> Route:
+    """Return how something moves."""
+    if isinstance(path, Route):
+        return path
+    if isinstance(path, HasRoute):
+        return path.route
     waypoints = path.waypoints if isinstance(path, HasWaypoints) else path
-    rows = number_rows(waypoints, "waypoints of a certificate")
-    return certificate_fault(certificate, world, rows, clearance=not_negative(clearance, "clearance"))
+    return Route(number_rows(waypoints, "waypoints of a certificate"))

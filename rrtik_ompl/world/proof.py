@@ -32,7 +32,7 @@ from rrtik_ompl.kernels.proof.rows import PROOF_KERNELS, proof_of_rows
 from rrtik_ompl.kernels.proof.taken_proof import TakenProof
 from rrtik_ompl.kernels.simd.library import library
 from rrtik_ompl.kernels.tables.solid_tables import convex_solids
-from rrtik_ompl.model.certificate import Certificate
+from rrtik_ompl.model.certificate import Certificate, Route
 from rrtik_ompl.model.proof import Gap, Proof
 from rrtik_ompl.model.robot import Robot, inside_limits
 from rrtik_ompl.world.arm_cache import Pairs, arm_cache, strokes
@@ -150,7 +150,7 @@ class Prover:
             return None
         from rrtik_ompl.world.certificate_making import certificate_of  # few need it, and it loads scipy
 
-        return certificate_of(self.robot, self.bodies, self.pairs, self.self_margin, rows, clearance)
+        return certificate_of(self, Route(rows), clearance)
 
     def proven(self, starts: Matrix, ends: Matrix, *, clearance: float = 0.0, slack: float = 0.0) -> Mask:
         """Return which motions starts[k] -> ends[k], shapes (m, dof), are proven free, shape (m,).

@@ -37,7 +37,7 @@ from rrtik_ompl.model.proof import Proof
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import Scene
 from rrtik_ompl.model.world_settings import MOTION_RESOLUTION, WorldSettings, checked_settings
-from rrtik_ompl.world.certificates import HasWaypoints, certificate_for, fault_of
+from rrtik_ompl.world.certificates import Certifiable, certificate_for, fault_of
 from rrtik_ompl.world.judgement import judged_path
 from rrtik_ompl.world.proof import Prover
 from rrtik_ompl.world.route_check import violations_of
@@ -365,11 +365,11 @@ class World(Judge):
         rows = self._rows(waypoints, 2)
         return self.prover.route(rows, clearance=required_clearance, slack=required_slack, seconds=time_limit)
 
-    def certificate(self, path: HasWaypoints | ArrayLike, clearance: float = 0.0) -> Certificate | None:
-        """Certify a path: return a proof that others can verify, or None if not every motion is proven free.
+    def certificate(self, path: Certifiable, clearance: float = 0.0) -> Certificate | None:
+        """Certify a motion: return a proof that others can verify, or None if not every part of it is proven free.
 
         Args:
-            path: A path of this robot, or its waypoints, shape (k, dof).
+            path: A path of this robot, or its waypoints, shape (k, dof); or a :class:`Trajectory`, with its curves.
             clearance: Distance kept from every obstacle on top of its margin [m].
 
         Raises:
@@ -382,14 +382,15 @@ class World(Judge):
         """
         return certificate_for(self, path, clearance)
 
-    def verify(self, certificate: Certificate, path: HasWaypoints | ArrayLike, *, clearance: float = 0.0) -> str:
-        """Verify a certificate of a path: return its first fault in one line, or "" if it proves the path free.
+    def verify(self, certificate: Certificate, path: Certifiable, *, clearance: float = 0.0) -> str:
+        """Verify a certificate of a motion: return its first fault in one line, or "" if it proves the motion free.
 
         Only the bodies, pairs and the chain of joints of this world are read; none of its own checks are used.
 
         Args:
             certificate: The certificate; nothing in it is trusted.
-            path: A path, or its waypoints, shape (k, dof); they have to equal those of the certificate to the bit.
+            path: A path, or its waypoints, shape (k, dof), or a :class:`Trajectory`; waypoints and times have to equal
+                those of the certificate to the bit.
             clearance: Least distance that the path has to keep from obstacles on top of their margins [m].
 
         Raises:

@@ -18,7 +18,7 @@ import pytest
 import rrtik_ompl as rrtik
 import rrtik_ompl.model
 from rrtik_ompl.base.copies import changed
-from rrtik_ompl.model.certificate import Certificate, ModelBody, ModelJoint, MotionEntries
+from rrtik_ompl.model.certificate import Certificate, ModelBody, ModelJoint, MotionEntries, Route
 from rrtik_ompl.model.gripper import GripperEvent, GripperJoints
 from rrtik_ompl.model.judgement import (
     ClearanceCurve,
@@ -96,6 +96,7 @@ SAMPLES = {
     "Prism": lambda: rrtik.Prism(POINTS[:, :2]),
     "Proof": lambda: Proof(2, 0.001, (Gap(1, 0.5, "link1", "ball"),), 0.0, "12"),
     "Robot": arm,
+    "Route": lambda: Route(POINTS, np.arange(3.0), np.ones((2, 1, 3)), moving=True),
     "Scene": lambda: rrtik.Scene([BALL]),
     "Sphere": lambda: rrtik.Sphere(0.1),
     "TaskRegion": lambda: rrtik.TaskRegion(AT, np.zeros((6, 2))),

@@ -8,7 +8,16 @@ from bench.proofs.forgeries import FORGERS
 pytestmark = pytest.mark.kernels
 
 
-@pytest.mark.parametrize(("arm", "forged"), [("planar", len(FORGERS)), ("titan4", len(FORGERS)), ("panda", 12)])
+@pytest.mark.parametrize(
+    ("arm", "forged"),
+    [
+        ("planar", len(FORGERS)),
+        ("titan4", len(FORGERS)),
+        ("panda", 12),
+        ("planar timed", len(FORGERS)),
+        ("planar moving", len(FORGERS)),
+    ],
+)
 def test_both_accept_what_is_true_and_refuse_what_is_forged(arm, forged):
     found = compared(arm, 3, 1, forged)
     assert found.wrong == []

@@ -17,12 +17,13 @@ from bench.proofs.tampering import TAMPERINGS, with_model_of
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.geometry.collision.elements import compared_pairs, named_bodies
 from rrtik_ompl.kernels.proof import log
-from rrtik_ompl.model.certificate import MotionEntries, from_document
+from rrtik_ompl.model.certificate import MotionEntries, Route, from_document
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.scene import AttachedObject, Obstacle, Scene
 from rrtik_ompl.model.shapes import Box, Sphere
 from rrtik_ompl.world import certificate_making
 from rrtik_ompl.world.certificate_check import Motions, certificate_fault
+from rrtik_ompl.world.certificate_course import Course
 from rrtik_ompl.world.certificate_parts import Parts
 from rrtik_ompl.world.coal_proof import CoalProof
 from rrtik_ompl.world.world import World
@@ -169,7 +170,8 @@ def motions_of(world, certificate):
     """What the verifier makes of a certificate."""
     named = named_bodies(world.bodies)
     trees = [Parts(each.elements, body.cuts) for each, body in zip(named, certificate.bodies, strict=True)]
-    return Motions(world.robot.chain, named, trees, compared_pairs(named, world.pairs), certificate)
+    course = Course(world.robot.chain, Route(certificate.waypoints, certificate.times, certificate.rates))
+    return Motions(world.robot.chain, named, trees, compared_pairs(named, world.pairs), course, certificate.clearance)
 
 
 def test_links_that_touch_are_not_measured_apart_whatever_a_certificate_says():
@@ -205,7 +207,7 @@ def test_the_verifier_computes_the_frames_that_pinocchio_does_and_bounds_all_acc
         corners = corners + body.placement.translation
         points = np.einsum("nij,kj->nki", turns[:, body.joint], corners) + origins[:, body.joint][:, None]
         chords = points[0] + shares[:, None, None] * (points[-1] - points[0])
-        velocity, bend = motions._bounds(number)[0][:, 0]
+        velocity, bend, _ = motions._bounds(number)[0][:, 0]
         assert np.linalg.norm(points - chords, axis=2).max() <= bend / 8.0 + 1e-12
         assert np.linalg.norm(np.diff(points, axis=0), axis=2).max() <= velocity / 49.0 + 1e-12
 

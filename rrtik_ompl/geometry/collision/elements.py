@@ -7,7 +7,7 @@ whole convex solid. `docs/science/certificate.md` describes the model, so that o
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import groupby
 from typing import Any
 
@@ -16,12 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.geometry.collision.bodies import Body, joined_links
 from rrtik_ompl.geometry.collision.cloud_solid import CloudSolid
 from rrtik_ompl.geometry.collision.shape_table import core_of, sizes_of
 from rrtik_ompl.geometry.collision.solids import is_mesh, mesh_arrays, once_per_geometry, vertices_of
 from rrtik_ompl.model.certificate import ModelBody, ModelJoint
 from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.scene import Scene, TimedPoses, pose_at
 
 FEW_POINTS = 64  # up to which the points of a hull stand in a certificate
 # Directions in which the extents of a shape are measured: along the axes, and along the diagonals of a cube.
@@ -89,6 +91,41 @@ def named_bodies(bodies: Sequence[Body]) -> list[NamedBody]:
                 for k, (number, body) in enumerate(zip(numbers, own, strict=True))
             ]
     return named
+
+
+def tracked_bodies(
+    named: Sequence[NamedBody], scene: Scene, joints: int, times: Vector
+) -> tuple[list[NamedBody], NDArray[np.float64]]:
+    """Let tracks carry the bodies of obstacles that move: a track is numbered as if it were a further joint.
+
+    Args:
+        named: The bodies.
+        scene: The scene, whose obstacles state their motions.
+        joints: Number of the robot's joints.
+        times: Times [s], shape (k,), at which the poses of each track are wanted.
+
+    Returns:
+        The bodies, and the poses of each track, shape (tracks, k, 4, 4).
+
+    Raises:
+        InputError: If an obstacle changes its way between two times.
+    """
+    moving = [each for each in scene.obstacles if each.motion is not None]
+    for each in moving:
+        turns = each.motion.times if isinstance(each.motion, TimedPoses) else times
+        between = turns[(turns > times[0]) & (turns < times[-1]) & ~np.isin(turns, times)]
+        if len(between):
+            raise InputError(f"'{each.name}' changes its way at {between[0]:g} s, between two waypoints")
+
+    tracks = [[pose_at(each, time).homogeneous for time in times.tolist()] for each in moving]
+    numbers = {each.name: joints + 1 + k for k, each in enumerate(moving)}
+    found = [
+        replace(each, body=replace(each.body, joint=numbers[each.body.name], placement=each.body.within))
+        if each.body.kind == "obstacle" and each.body.name in numbers
+        else each
+        for each in named
+    ]
+    return found, np.array(tracks).reshape(-1, len(times), 4, 4)
 
 
 def _is_pile(bodies: Sequence[Body]) -> bool:

@@ -17,6 +17,7 @@ from rrtik_ompl.base.errors import InputError, PathWarning, at_most, require
 from rrtik_ompl.base.units import joint_units
 from rrtik_ompl.files.kinds import read
 from rrtik_ompl.files.text import write_text
+from rrtik_ompl.model.certificate import Route
 from rrtik_ompl.model.gripper import (
     Events,
     GripperEvent,
@@ -308,6 +309,11 @@ class Trajectory:
         require_joints(world.robot, self.joint_names, "trajectory")
         kept_clearance = None if clearance is None else not_negative(clearance, "clearance")
         return proof_of_motion(self.cubics, world, kept_clearance)
+
+    @property
+    def route(self) -> Route:
+        """The motion as a certificate has it, for :meth:`World.certificate` and :meth:`World.verify`."""
+        return Splines.of(self.cubics).route
 
     def played(self, world: World | None) -> Played:
         """Return the motion as a picture plays it, with the verdict of :meth:`prove` and :meth:`faults`.

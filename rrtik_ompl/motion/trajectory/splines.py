@@ -7,14 +7,15 @@ accelerations, by a cubic if both have velocities, and straight otherwise.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import comb
+from math import comb, factorial
 from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.base.arrays import Matrix, Vector, frozen
 from rrtik_ompl.kernels.timing.run_layout import JUMP_SHARE
+from rrtik_ompl.model.certificate import Route
 from rrtik_ompl.motion.trajectory.cubics import Cubics, Peaks, State
 
 ROUNDING = 1e-9  # share of the largest velocity by which two velocities differ that are the same
@@ -94,6 +95,14 @@ class Splines:
     def positions(self) -> Matrix:
         """Return the positions at the points, shape (m, n) [rad or m]."""
         return np.vstack([self.powers[:, 0], self.end])
+
+    @property
+    def route(self) -> Route:
+        """Return the motion as a certificate has it."""
+        h = np.diff(self.times)[:, None]
+        degree = max(1, int(np.flatnonzero(self.powers.any(axis=(0, 2)))[-1:].sum()))
+        rates = [self.powers[:, k] * (factorial(k) / h**k) for k in range(1, degree + 1)]
+        return Route(frozen(self.positions), frozen(self.times), frozen(np.stack(rates, axis=1)))
 
     @property
     def straight(self) -> bool:

@@ -7,13 +7,11 @@
 const VERSION = 2;
 const ROUNDING = 1e-8; // [m] added to every required gap
 const MEASURED = 1e-5; // [m] further gap where a distance of surfaces is measured
-const LARGEST_VALUE = 1e3; // [rad or m] of a joint
-const LIMIT_TOLERANCE = 1e-6; // [rad or m] by which a waypoint may exceed a limit
-const JUMP = 1e-9; // [rad or m] between the end of a timed motion and the next waypoint
 const DEEPEST = 10; // level of an interval
 const MOST = { numbers: 1e6, bodies: 1e5, cuts: 1e5, entries: 1e6 };
 const FIELDS = ["kind", "version", "robot", "joints", "bodies", "unchecked", "clearance", "self_margin", "waypoints", "motions"];
-const FURTHER_FIELDS = ["times", "rates", "held", "base"];
+const FURTHER_FIELDS = ["times", "rates", "tracks", "held", "base"];
+const ORDERS = 5; // derivatives of a timed motion
 const JOINT_FIELDS = ["name", "parent", "pose", "axis", "slides", "gain", "offset"];
 const BODY_FIELDS = ["name", "number", "kind", "joint", "pose", "shape", "margin", "padding", "contacts"];
 
@@ -26,7 +24,7 @@ const demand = (condition, reason) => { if (!condition) refuse(reason); };
 /**
  * Verify a certificate, the value of its JSON.
  *
- * `own` is what the asker has: {robot, srdf, scene, waypoints, clearance}, each null if it is not there. Without a robot
+ * `own` is what the asker has: {robot, srdf, scene, waypoints, timed, clearance}, each null if it is not there; `timed` has {times, rates}. Without a robot
  * or a scene the model in the file is taken for what it says, and the answer says so. Returns {holds, fault, facts}.
  */
 function checkCertificate(certificate, own) {
@@ -34,7 +32,7 @@ function checkCertificate(certificate, own) {
     checkForm(certificate); // section 8.1
     const world = worldOf(certificate, own); // 8.2
     demand(certificate.clearance >= (own.clearance ?? 0), `it is for a clearance of ${certificate.clearance} m, not ${own.clearance} m`);
-    checkWaypoints(certificate, world, own.waypoints ?? null); // 8.3 and 8.4
+    checkWaypoints(certificate, world, own); // 8.3 and 8.4
     const proof = new Proof(certificate, world);
     proof.checkEntries(); // 8.5
     proof.checkPairs(); // 8.6
@@ -81,12 +79,15 @@ function checkForm(file) {
     demand(areNumbers(joint.pose, 12) && areNumbers(joint.axis, 3) && areNumbers(joint.gain, dof), `${where}: wrong numbers`);
   });
 
+  demand(file.tracks === undefined || (Array.isArray(file.tracks) && file.tracks.length > 0 && file.tracks.length <= MOST.bodies), "tracks: expected a list, not too long");
+  const tracks = file.tracks?.length ?? 0;
   demand(Array.isArray(file.bodies) && file.bodies.length <= MOST.bodies, "bodies: expected a list, not too long");
   file.bodies.forEach((body, k) => {
     const where = `bodies[${k}]`;
     checkKeys(body, BODY_FIELDS, ["cuts"], where);
     demand(isText(body.name) && isCount(body.number, MOST.bodies) && ["link", "obstacle", "attached"].includes(body.kind), `${where}: name, number or kind`);
-    demand(isCount(body.joint, file.joints.length + 1) && areNumbers(body.pose, 12) && isObject(body.shape), `${where}: joint, pose or shape`);
+    const carriers = file.joints.length + 1 + (body.kind === "obstacle" ? tracks : 0);
+    demand(isCount(body.joint, carriers) && areNumbers(body.pose, 12) && isObject(body.shape), `${where}: joint, pose or shape`);
     demand([body.margin, body.padding].every((value) => isNumber(value) && value >= 0), `${where}: margin or padding`);
     demand(Array.isArray(body.contacts) && body.contacts.every((each) => Array.isArray(each) && each.length === 2 && isText(each[0]) && isNumber(each[1])), `${where}: contacts`);
     checkShape(body.shape, where);
@@ -111,11 +112,20 @@ function checkForm(file) {
     demand(level <= DEEPEST && number < 2 ** level, `${where}: no interval ${number} of level ${level}`);
   }));
 
-  demand((file.times === undefined) === (file.rates === undefined), "times and rates: one of them is missing");
-  if (file.times === undefined) return;
-  const { times, rates, waypoints } = file;
-  demand(areNumbers(times, waypoints.length) && times.every((time, k) => k === 0 || time > times[k - 1]), "times: expected as many as waypoints, ascending");
-  demand(Array.isArray(rates) && rates.length === waypoints.length - 1 && rates.every((row) => Array.isArray(row) && row.length === 3 && row.every((each) => areNumbers(each, dof))), "rates: expected a velocity, acceleration and jerk for each motion");
+  checkTimes(file, dof);
+}
+
+/** The fields of timed motions. */
+function checkTimes({ times, rates, tracks, waypoints }, dof) {
+  const count = waypoints.length;
+  demand((times === undefined) === (rates === undefined), "times and rates: one of them is missing");
+  demand(times !== undefined || tracks === undefined, "tracks: obstacles move where motions have times");
+  if (times === undefined) return;
+  demand(count > 1 && areNumbers(times, count) && times.every((time, k) => k === 0 || time > times[k - 1]), "times: expected as many as waypoints, ascending");
+  demand(Array.isArray(rates) && rates.length === count - 1 && rates.every(Array.isArray), "rates: expected a list for each motion");
+  const orders = rates[0].length;
+  demand(orders >= 1 && orders <= ORDERS && rates.every((row) => row.length === orders && row.every((each) => areNumbers(each, dof))), `rates: expected 1 to ${ORDERS} derivatives for each motion`);
+  for (const track of tracks ?? []) demand(Array.isArray(track) && track.length === count && track.every((pose) => areNumbers(pose, 12) && isRigid(poseOf(pose))), "tracks: expected a pose for each waypoint");
 }
 
 const SHAPE_FORMS = {
@@ -153,7 +163,7 @@ function readingOf(file, own) {
   const base = poseOf(file.base ?? poseNumbers(IDENTITY));
   const arm = robot === null ? { joints: stated, carriers: statedCarriers(file, scene) } : armOf(robot, columnNames(file, robot), file.held ?? {}, base, stated);
   const links = robot === null ? null : linkBodies(robot, arm, padding);
-  const others = scene === null ? null : sceneBodies(scene, arm, padding);
+  const others = scene === null ? null : sceneBodies(scene, arm, padding, file.tracks !== undefined);
 
   // The file's bodies, one after the other: read, where a robot or a scene was given, else as the file states them.
   const next = new Map([[links, 0], [others, 0]]);
@@ -168,20 +178,23 @@ function readingOf(file, own) {
   for (const [list, number] of next) {
     if (list !== null && number < list.length) refuse(`it is for another ${ownerOf(list[number])}: '${list[number].name}' is not in the certificate`);
   }
-  return { joints: arm.joints, bodies, readRobot: robot !== null, readScene: scene !== null };
+  const tracks = (file.tracks ?? []).map((track) => track.map(poseOf));
+  return { joints: arm.joints, bodies, tracks, readRobot: robot !== null, readScene: scene !== null };
 }
 
 const ownerOf = (body) => (body.kind === "link" ? "robot" : "scene");
 
 /** Joints, bodies and the pairs that must be apart, after comparison with what the file says of them: section 3. */
 function worldOf(file, own) {
-  const { joints, bodies, readRobot, readScene } = readingOf(file, own);
+  const { joints, bodies, tracks, readRobot, readScene } = readingOf(file, own);
   const difference = readRobot ? jointsDifference(file.joints, joints) : "";
   demand(difference === "", `it is for another robot: ${difference}`);
   file.bodies.forEach((body, k) => {
     const other = bodies[k].read ? bodyDifference(body, bodies[k]) : "";
     demand(other === "", `it is for another ${ownerOf(body)}: ${other}`);
   });
+  const elsewhere = readScene ? tracksDifference(file, own.scene, tracks) : "";
+  demand(elsewhere === "", `it is for another scene: ${elsewhere}`);
   const selfMargin = readScene ? own.scene.selfMargin : file.self_margin;
   demand(Math.abs(file.self_margin - selfMargin) <= SAME, `it is for a self margin of ${file.self_margin} m, not ${selfMargin} m`);
 
@@ -200,7 +213,7 @@ function worldOf(file, own) {
       if (isCompared(bodies[i], bodies[j]) && !unchecked.has(`${i} ${j}`)) pairs.push(pairOf(i, j, file, joints, bodies));
     }
   }
-  return { joints, bodies, pairs, facts: { readRobot, readScene, pairs: pairs.length, unchecked: [...unchecked.values()] } };
+  return { joints, bodies, tracks, pairs, facts: { readRobot, readScene, pairs: pairs.length, unchecked: [...unchecked.values()] } };
 }
 
 /** Names of the joints that the numbers of a waypoint are of: those with a gain of 1 that follow no other. */
@@ -243,11 +256,14 @@ function pairOf(i, j, file, joints, bodies) {
   const usual = (obstacle === undefined ? file.self_margin : obstacle.margin) + a.padding + b.padding;
   const touching = a.contacts.filter(([name]) => name === b.name).map(([, distance]) => distance);
   const inContact = touching.length > 0 && b.contacts.length > 0;
-  const gap = inContact ? Math.min(usual, ...touching) : usual + (obstacle === undefined ? 0 : file.clearance);
+  const kept = inContact ? Math.min(usual, ...touching) : usual + (obstacle === undefined ? 0 : file.clearance);
+  // What nothing moves cannot give way: an obstacle that passes it must not touch it, and that is all.
+  const passes = Math.min(a.joint, b.joint) === 0 && Math.max(a.joint, b.joint) >= joints.length;
+  const gap = passes ? Math.min(0, kept) : kept;
 
   const base = commonJoint(joints, a.joint, b.joint);
-  const firstRests = a.joint === base;
-  const [first, second] = firstRests ? [j, i] : b.joint === base ? [i, j] : [j, i];
+  const isSecond = (body, other) => body.solid.plane !== undefined || (body.joint === base && other.solid.plane === undefined);
+  const [first, second] = isSecond(b, a) ? [i, j] : [j, i];
   // How deep two overlap is measured between convex solids.
   const divided = gap >= 0 || !(a.solid.surface || b.solid.surface);
   return { first, second, base, gap, divided, rests: bodies[second].joint === base };
@@ -289,81 +305,15 @@ function nodesOf(body, cuts) {
   return nodes;
 }
 
-// ---- section 5: motions -----------------------------------------------------------------------------------------
-
-function checkWaypoints(file, world, waypoints) {
-  const { joints } = world;
-  if (waypoints !== null) {
-    const same = waypoints.length === file.waypoints.length && waypoints.every((row, k) => row.length === file.waypoints[k].length && row.every((value, j) => value === file.waypoints[k][j]));
-    demand(same, "it is for another path: waypoints differ");
-  }
-  for (const [k, row] of file.waypoints.entries()) {
-    jointValues(joints, row).forEach((value, j) => {
-      demand(Math.abs(value) <= LARGEST_VALUE, `waypoint ${k + 1}: joint '${joints[j].name}' is at ${value}, too far`);
-      const driven = joints[j].gain.some((gain) => gain !== 0) && joints[j].follows === null;
-      const inside = value >= joints[j].lower - LIMIT_TOLERANCE && value <= joints[j].upper + LIMIT_TOLERANCE;
-      demand(!driven || inside, `waypoint ${k + 1}: joint '${joints[j].name}' is at ${value}, outside its limits`);
-    });
-  }
-}
-
-/** Motions of all joints: values at any share s, and bounds of their first and second derivative over s. */
-function motionsOf(file, joints) {
-  const { waypoints, times, rates } = file;
-  const rows = waypoints.length === 1 ? [waypoints[0], waypoints[0]] : waypoints;
-  const still = joints.map(() => 0);
-  return rows.slice(1).map((row, m) => {
-    const from = jointValues(joints, rows[m]);
-    const to = jointValues(joints, row);
-    if (times === undefined) {
-      const rate = to.map((value, j) => Math.abs(value - from[j]));
-      return { at: (s) => from.map((value, j) => value + s * (to[j] - value)), rate, bend: still, stroke: from.map((value, j) => Math.max(Math.abs(value), Math.abs(to[j]))) };
-    }
-
-    const h = times[m + 1] - times[m];
-    const [v, a, jerk] = rates[m].map((each) => joints.map(({ gain }) => gain.reduce((sum, value, k) => sum + value * each[k], 0)));
-    const along = (tau) => from.map((value, j) => value + tau * (v[j] + tau * (a[j] / 2 + (tau * jerk[j]) / 6)));
-    const jump = along(h).findIndex((value, j) => Math.abs(value - to[j]) > JUMP);
-    demand(jump < 0, `motion ${m + 1} does not end at its waypoint`);
-    const rate = joints.map((_, j) => h * (Math.max(Math.abs(v[j]), Math.abs(v[j] + h * (a[j] + (h * jerk[j]) / 2))) + (h * h * Math.abs(jerk[j])) / 8));
-    const bend = joints.map((_, j) => h * h * Math.max(Math.abs(a[j]), Math.abs(a[j] + h * jerk[j])));
-    return { at: (s) => along(s * h), rate, bend, stroke: from.map((value, j) => Math.max(Math.abs(value), Math.abs(to[j])) + rate[j]) };
-  });
-}
-
-/** Bounds {speed, bend} of all points of a body in a motion, over s, seen from a joint that carries it: section 5.4. */
-function boundsOf(body, base, joints, motion) {
-  const { points, disc, radius, plane } = body.solid;
-  if (body.joint === base) return { speed: 0, bend: 0 };
-  if (plane !== undefined) return { speed: Infinity, bend: Infinity };
-  const placed = points.map((point) => moved(body.pose, point));
-  const reach = (measure) => placed.reduce((most, point) => Math.max(most, measure(point)), 0) + disc + radius;
-  let toOrigin = reach(length);
-  let toAxis = reach((point) => length(cross(point, joints[body.joint].axis)));
-  let [speed, bend] = [0, 0];
-
-  for (let k = body.joint; k !== base; k = joints[k].parent) {
-    const { slides, placement, parent } = joints[k];
-    const [w, b] = [motion.rate[k], motion.bend[k]];
-    bend += slides ? b : w * (2 * speed + w * toAxis) + b * toAxis;
-    speed += slides ? w : w * toAxis;
-    // How far the points are from the axis and the origin of the next joint inwards.
-    const stroke = slides ? motion.stroke[k] : 0;
-    toAxis = length(cross(placement.at, joints[parent].axis)) + stroke + toOrigin;
-    toOrigin += length(placement.at) + stroke;
-  }
-  return { speed, bend };
-}
-
 // ---- sections 6 to 8: entries, and whether they are sufficient --------------------------------------------------
 
 /** The intervals that contain one, itself first, each as words: level and number. */
 const larger = (level, number) => Array.from({ length: level + 1 }, (_, k) => `${level - k} ${Math.floor(number / 2 ** k)}`);
 
 class Proof {
-  constructor(file, { joints, bodies, pairs }) {
+  constructor(file, { joints, bodies, tracks, pairs }) {
     Object.assign(this, { file, joints, bodies, pairs });
-    this.motions = motionsOf(file, joints);
+    this.motions = motionsOf(file, joints, tracks);
     this.nodes = bodies.map((body, k) => nodesOf(body, file.bodies[k].cuts ?? []));
     this.pairOf = new Map(pairs.map((pair) => [`${pair.first} ${pair.second}`, pair]));
     this.kept = new Map(); // frames by motion and share, bounds by body, base and motion
@@ -377,7 +327,7 @@ class Proof {
 
   /** The pose of a body in the frame of a joint at a share of a motion. */
   pose(k, base, m, share) {
-    const frames = this.keep(`frames ${m} ${share}`, () => jointFrames(this.joints, this.motions[m].at(share)));
+    const frames = this.keep(`frames ${m} ${share}`, () => this.motions[m].frames(share));
     return this.keep(`pose ${k} ${base} ${m} ${share}`, () => chained(seenFrom(frames[base], frames[this.bodies[k].joint]), this.bodies[k].pose));
   }
 

@@ -81,10 +81,11 @@ function jointFrames(joints, values) {
   return frames;
 }
 
-/** The last joint that carries both joints, 0 for the world. */
+/** The last joint that carries both, 0 for the world, which carries the tracks: these have greater numbers than joints. */
 function commonJoint(joints, first, second) {
   let [a, b] = [first, second];
-  while (a !== b) [a, b] = a > b ? [joints[a].parent, b] : [a, joints[b].parent];
+  const parent = (k) => joints[k]?.parent ?? 0;
+  while (a !== b) [a, b] = a > b ? [parent(a), b] : [a, parent(b)];
   return a;
 }
 

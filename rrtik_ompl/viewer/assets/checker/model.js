@@ -19,11 +19,13 @@ function linkBodies(robot, arm, padding) {
   });
 }
 
-/** The bodies of a scene: those of obstacles, then those of attached objects, whose links an arm carries. */
-function sceneBodies(scene, arm, padding) {
+/** The bodies of a scene: those of obstacles, on tracks if they move; then attached objects, whose links an arm carries. */
+function sceneBodies(scene, arm, padding, tracked) {
+  const moving = tracked ? scene.obstacles.filter((each) => each.motion !== null) : [];
+  const placeOf = (each) => (moving.includes(each) ? { joint: arm.joints.length + moving.indexOf(each), pose: IDENTITY } : { joint: 0, pose: each.placement });
   const contactsOf = (name) => scene.contacts.filter(({ pair }) => pair.includes(name)).map(({ pair, distance }) => [pair[0] === name ? pair[1] : pair[0], distance]);
   const bodiesOf = (each, rest) => solidsOf(each.shape, false).map((solid, number) => ({ name: each.name, number, solid, shape: each.shape, contacts: contactsOf(each.name), ...rest }));
-  const obstacles = scene.obstacles.flatMap((each) => bodiesOf(each, { kind: "obstacle", joint: 0, pose: each.placement, margin: each.margin, padding: 0 }));
+  const obstacles = scene.obstacles.flatMap((each) => bodiesOf(each, { kind: "obstacle", ...placeOf(each), margin: each.margin, padding: 0 }));
   const attached = scene.attached.flatMap((each) => {
     const carrier = arm.carriers.get(each.link);
     if (carrier === undefined) throw new Error(`attached '${each.name}': the robot has no link '${each.link}'`);
@@ -145,6 +147,30 @@ function bodyDifference(stated, body) {
   if (words(stated.contacts) !== words(body.contacts)) return `${where} has other contacts`;
   const difference = shapeDifference(stated.shape, body);
   return difference === "" ? "" : `${where}: ${difference}`;
+}
+
+/** Why obstacles do not move as the file says: a few words, or "". */
+function tracksDifference(file, scene, tracks) {
+  const moving = scene.obstacles.filter((each) => each.motion !== null);
+  if (tracks.length !== (file.tracks === undefined ? 0 : moving.length)) return "other obstacles move";
+  if (file.tracks === undefined) return moving.length === 0 ? "" : `'${moving[0].name}' moves, and the certificate is of obstacles at rest`;
+  if (moving.length === 0) return "nothing moves here";
+  const { times } = file;
+  for (const [k, { name, motion, placement }] of moving.entries()) {
+    const turns = motion.times.find((time) => time > times[0] && time < times[times.length - 1] && !times.includes(time));
+    if (turns !== undefined) return `'${name}' changes its way at ${turns} s, between two waypoints`;
+    const same = times.every((time, n) => near(poseNumbers(tracks[k][n]), poseNumbers(poseAt(motion, placement, time))));
+    if (!same) return `'${name}' moves otherwise`;
+  }
+  return "";
+}
+
+/** The pose of an obstacle that moves, {velocity, times, poses}, at a time; `placement` is that at time 0. */
+function poseAt({ velocity, times, poses }, placement, time) {
+  if (velocity !== null) return { turn: placement.turn, at: add(placement.at, scaled(velocity, time)) };
+  const next = times.findIndex((each) => each > time);
+  if (next <= 0) return poses[next < 0 ? poses.length - 1 : 0];
+  return wayBetween(poses[next - 1], poses[next], 0).at((time - times[next - 1]) / (times[next] - times[next - 1]));
 }
 
 /** Why the joints in the file are not these: a few words, or "". */

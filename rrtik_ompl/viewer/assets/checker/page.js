@@ -85,10 +85,11 @@ function tellUnchecked(rows) {
 /** Draw what the certificate is about, even if it does not hold: as far as files describe it. */
 function show(given, holds) {
   const file = given.certificate;
-  let world = null;
+  let [world, motions] = [null, null];
   try {
     checkForm(file);
     world = readingOf(file, given);
+    motions = motionsOf(file, world.joints, world.tracks);
   } catch (error) {
     return; // the verdict says what is wrong
   }
@@ -98,7 +99,6 @@ function show(given, holds) {
     const triangles = body.solid.plane === undefined ? bodyTriangles(body) : planeTriangles(scaled(body.solid.plane.normal, body.solid.plane.offset), body.solid.plane.normal, 2);
     return stage.add(triangles, colour, body.joint === 0 ? body.pose : IDENTITY);
   });
-  const motions = motionsOf(file, world.joints);
   state.shown = { file, world, solids, motions, proof: holds ? new Proof(file, worldOf(file, given)) : null };
   stage.look([0, 0, 0.3], extentOf(world, motions));
 
@@ -112,8 +112,8 @@ function bodyTriangles(body) {
 }
 
 /** A radius that the robot and what is near it fit into. */
-function extentOf({ joints, bodies }, motions) {
-  const frames = jointFrames(joints, motions[0].at(0));
+function extentOf({ bodies }, motions) {
+  const frames = motions[0].frames(0);
   const reaches = bodies.filter((body) => body.kind === "link").flatMap((body) => body.solid.points.map((point) => length(moved(chained(frames[body.joint], body.pose), point))));
   return reaches.reduce((most, reach) => Math.max(most, reach), 0.3);
 }
@@ -124,7 +124,7 @@ function goTo(place) {
   byId("time").value = String(place);
   const along = Math.min(place * motions.length, motions.length - 1e-9);
   const m = Math.floor(along);
-  const frames = jointFrames(world.joints, motions[m].at(along - m));
+  const frames = motions[m].frames(along - m);
   world.bodies.forEach((body, k) => { solids[k].pose = chained(frames[body.joint], body.pose); });
   byId("place").textContent = `motion ${m + 1} of ${motions.length}, ${(along - m).toFixed(3)} of it`;
   if (byId("entry").dataset.motion !== String(m)) listEntries(m, file, world);

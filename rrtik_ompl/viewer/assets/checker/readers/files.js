@@ -1,13 +1,13 @@
 // What a heap of files says: which is the certificate, the robot, the scene, the path, and what they refer to.
 
 /**
- * What was given, {certificate, robot, srdf, scene, waypoints, padding, told}, each null if no file has it.
+ * What was given, {certificate, robot, srdf, scene, waypoints, timed, padding, told}, each null if no file has it.
  *
  * `files` are {name, buffer} of all files that were named by themselves; `lookup(name, from)` returns the buffer of a
  * mesh or a cloud that the file `from` refers to, or null. `told` says in words which file was taken for what.
  */
 function readFiles(files, lookup) {
-  const found = { certificate: null, robot: null, srdf: null, scene: null, waypoints: null, padding: {}, told: [] };
+  const found = { certificate: null, robot: null, srdf: null, scene: null, waypoints: null, timed: null, padding: {}, told: [] };
   const take = (key, value, what, name) => {
     if (found[key] !== null) throw new Error(`${name}: a second ${what}; give one`);
     found[key] = value;
@@ -32,9 +32,27 @@ function readJsonFile(data, name, found, take, lookup) {
   else if (data !== null && data.kind === "joint_path") {
     take("waypoints", data.waypoints, "path", name);
     if ((data.certificate ?? null) !== null) take("certificate", data.certificate, "certificate", name);
+  } else if (data !== null && data.kind === "joint_motion") {
+    take("waypoints", data.waypoints, "motion", name);
+    found.timed = { times: data.times, rates: data.rates };
+  } else if (data !== null && data.kind === "joint_trajectory") {
+    take("waypoints", data.points.map((point) => point.positions), "trajectory", name);
+    found.timed = cubicsOf(data.points);
   } else if (data !== null && Object.hasOwn(data, "scene")) {
     take("scene", sceneWithFiles(sceneOf(data, name), name, lookup), "scene", name);
   } else throw new Error(`${name}: neither a certificate, nor a path, nor a scene`);
+}
+
+/** The cubics of a trajectory, {times, rates}: each reaches the velocity at the next point. */
+function cubicsOf(points) {
+  const times = points.map((point) => point.time_from_start);
+  const rates = points.slice(1).map((next, k) => {
+    const { positions, velocities, accelerations } = points[k];
+    const h = times[k + 1] - times[k];
+    const bends = accelerations ?? velocities.map((v, j) => (6 * (next.positions[j] - positions[j])) / h ** 2 - (4 * v + 2 * next.velocities[j]) / h);
+    return [velocities, bends, velocities.map((v, j) => (2 * (next.velocities[j] - v - h * bends[j])) / h ** 2)];
+  });
+  return { times, rates };
 }
 
 function fileOf(name, from, lookup) {
@@ -53,8 +71,6 @@ function paddingOf(robot) {
 /** The scene with the meshes, clouds, heights and octrees of its files in place of their names. */
 function sceneWithFiles(scene, from, lookup) {
   const loaded = (each) => ({ ...each, shape: shapeOfFile(each.shape, from, lookup) });
-  const moving = scene.obstacles.find((each) => each.moves);
-  if (moving !== undefined) throw new Error(`${from}: obstacle '${moving.name}' moves; certificates are of obstacles at rest`);
   return { ...scene, obstacles: scene.obstacles.map(loaded), attached: scene.attached.map(loaded) };
 }
 

@@ -20,7 +20,11 @@ function sceneOf(data, file) {
   const obstacles = listOf(scene.obstacles, file).map((each) => {
     const where = `${file}: obstacle '${each.name}'`;
     only(each, [...OBSTACLE_KEYS, ...SHAPE_KEYS], where);
-    return { ...namedSolid(each, where), moves: (each.motion ?? null) !== null, margin: notNegative(each.margin ?? margin, where) };
+    const motion = motionOf(each.motion ?? null, where);
+    const solid = namedSolid(each, where);
+    // An obstacle whose poses are stated with times needs none of its own.
+    const placement = motion !== null && motion.velocity === null && (each.pose ?? null) === null ? poseAt(motion, IDENTITY, 0) : solid.placement;
+    return { ...solid, placement, motion, margin: notNegative(each.margin ?? margin, where) };
   });
   const attached = listOf(scene.attached, file).map((each) => {
     const where = `${file}: attached '${each.name}'`;
@@ -43,6 +47,17 @@ function sceneOf(data, file) {
     selfMargin: notNegative(data.self_margin ?? 0, `${file}: self_margin`),
     robot: data.robot ?? null,
   };
+}
+
+/** How an obstacle moves: {velocity, times, poses}, of which velocity or the other two are there; null at rest. */
+function motionOf(given, where) {
+  if (given === null) return null;
+  only(given, ["velocity", "waypoints"], `${where}: motion`);
+  if ((given.velocity ?? null) !== null) return { velocity: numbersOf(given.velocity, 3, `${where}: velocity`), times: [], poses: [] };
+  const stations = listOf(given.waypoints, where);
+  const times = stations.map((each) => finite(each.time, `${where}: time`));
+  if (times.length === 0 || times.some((time, k) => k > 0 && !(time > times[k - 1]))) throw new Error(`${where}: motion: times must increase`);
+  return { velocity: null, times, poses: stations.map((each) => posedBy(each.pose, where)) };
 }
 
 function only(data, keys, where) {
