@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from rrtik_ompl import benchmark as benchmark
     from rrtik_ompl import compat as compat
     from rrtik_ompl import constraints as constraints
+    from rrtik_ompl import demos as demos
     from rrtik_ompl import following as following
     from rrtik_ompl import ik as ik
     from rrtik_ompl import ompl as ompl
@@ -83,6 +84,7 @@ if TYPE_CHECKING:
     from rrtik_ompl.tasks import Straight as Straight
     from rrtik_ompl.tasks import Task as Task
     from rrtik_ompl.tasks import TaskPlan as TaskPlan
+    from rrtik_ompl.tasks import Variation as Variation
     from rrtik_ompl.tasks.task_file import list_tasks as list_tasks
     from rrtik_ompl.viewer import view as view
     from rrtik_ompl.viewer.plots.joints import plot_joints as plot_joints
@@ -171,6 +173,7 @@ else:
             "Straight",
             "Task",
             "TaskPlan",
+            "Variation",
         ),
         "tasks.task_file": ("list_tasks",),
         "viewer": ("view",),
@@ -183,6 +186,7 @@ else:
             "benchmark",
             "compat",
             "constraints",
+            "demos",
             "following",
             "ik",
             "ompl",

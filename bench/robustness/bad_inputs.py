@@ -35,6 +35,7 @@ GOOD: dict[tuple[str, ...], tuple[str, ...]] = {
     ("plan",): ("planar3_a",),
     ("straight",): ("planar3_a", "--by", "0", "0.01", "0"),
     ("task",): ("titan4_drawer",),
+    ("demos",): ("panda_pick_place", "--out", "demos", "--count", "1", "--jobs", "1"),
     ("check",): ("planar3_a",),
     ("prove",): ("planar3_a", "path3.json"),
     ("checker",): ("checker.html",),
@@ -58,7 +59,7 @@ GOOD: dict[tuple[str, ...], tuple[str, ...]] = {
 }
 NO_NUMBERS = {int: ("x", "", "1.5", "nan", "1e3", "0x10"), float: ("x", "", "nan", "inf", "-inf", "1e999", "1,5")}
 NO_NAMES = ("nowhere/none.xyz", "\ud800", "\x00")
-FOLDERS = {(("bench",), "--out"), (("reproduce",), "--plot")}  # options that make folders
+FOLDERS = {(("bench",), "--out"), (("demos",), "--out"), (("reproduce",), "--plot")}  # options that make folders
 NO_FOLDER = "suite.yaml/none"  # where none can be made
 ANY_TEXT = {"--token", "--grasp"}  # a word as good as any other
 NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?![\w.])")

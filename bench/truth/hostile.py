@@ -213,6 +213,7 @@ def command_calls(folder: Path) -> dict[str, list[list[str]]]:
         "plan": [[problem]],
         "straight": [[problem, "--xyz", "0,0,0"]],
         "task": [[str(folder / "task.yaml")]],
+        "demos": [[str(folder / "task.yaml"), "--out", str(folder / "demos")]],
         "check": [*with_paths, [problem, files[0], "--certificate", files[2]]],
         "prove": [*([problem, each] for each in files), [arm, files[0], "--scene", files[2]]],
         "show": [*with_paths, [arm]],

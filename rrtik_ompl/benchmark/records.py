@@ -5,17 +5,14 @@ An interruption can at worst leave an incomplete line at the end, which is remov
 
 from __future__ import annotations
 
-import fcntl
 import json
-import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from types import TracebackType
 from typing import Any, TypeAlias
 
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.benchmark.run import SOLVED, STATUSES
-from rrtik_ompl.files.text import make_folder
+from rrtik_ompl.files.line_file import LineFile, complete_lines
 
 Record: TypeAlias = dict[str, Any]
 Key: TypeAlias = tuple[str, str, int]  # problem, planner's label, number of the run
@@ -91,14 +88,8 @@ def _fault(data: Record) -> str:
 
 def _lines(file: Path) -> Iterator[tuple[int, Record]]:
     """Yield the complete lines with their numbers."""
-    try:
-        with open(file, "rb") as stream:
-            for number, line in enumerate(stream, start=1):
-                if not line.endswith(b"\n"):
-                    return
-                yield number, _decoded(file, number, line)
-    except OSError as error:
-        raise InputError(f"{file}: cannot be read: {error.strerror or error}") from error
+    for number, line in complete_lines(file):
+        yield number, _decoded(file, number, line)
 
 
 def _decoded(file: Path, number: int, line: bytes) -> Record:
@@ -115,73 +106,11 @@ def _corrupt(file: Path, number: int, why: str) -> InputError:
     return InputError(f"{file}:{number}: not a record of a run ({why}); delete this line to have its run done again")
 
 
-class RecordFile:
-    """A file of records, opened for appending.
+class RecordFile(LineFile):
+    """The file of a campaign, opened for appending; its head names suite and machine."""
 
-    Args:
-        file: The file; it is created, with its folder, if it does not exist.
-        head: First line of a new file.
-
-    Raises:
-        InputError: If it cannot be written, or another process is writing it.
-    """
-
-    def __init__(self, file: Path, head: Mapping[str, Any]) -> None:
-        self._name = file
-        make_folder(file.parent)
-
-        try:
-            self._file = open(file, "ab", buffering=0)  # noqa: SIM115 - closed by __exit__
-            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            self._cut_half_line()
-        except BlockingIOError:
-            self._file.close()
-            raise InputError(
-                f"{file}: another campaign is writing it; wait for its end, or choose another --out"
-            ) from None
-        except OSError as error:
-            raise self._failed(error) from error
-
-        if self._end == 0:
-            self.append(head)
-
-    def append(self, record: Mapping[str, Any]) -> None:
-        """Write a record without buffering; if there is no space, the incomplete line is removed.
-
-        Raises:
-            InputError: If it cannot be written.
-        """
-        line = (json.dumps(record) + "\n").encode()
-        written = 0
-        try:
-            while written < len(line):
-                written += self._file.write(line[written:])
-        except OSError as error:
-            os.truncate(self._name, self._end)
-            raise self._failed(error) from error
-
-        self._end += len(line)
-
-    def __enter__(self) -> RecordFile:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._file.close()
-
-    def _cut_half_line(self) -> None:
-        """Remove an incomplete last line, and also a head without runs, which this campaign's head replaces."""
-        data = self._name.read_bytes()
-        self._end = data.rfind(b"\n") + 1 if data.count(b"\n") > 1 else 0
-        if self._end < len(data):
-            os.truncate(self._name, self._end)
-
-    def _failed(self, error: OSError) -> InputError:
-        return InputError(
-            f"{self._name}: cannot be written: {error.strerror or error}; all runs before are kept: "
-            f"make room, then continue with --resume"
-        )
+    busy = "another campaign is writing it; wait for its end, or choose another --out"
+    full = "all runs before are kept: make room, then continue with --resume"
 
 
 def json_like(data: Mapping[str, Any]) -> Record:

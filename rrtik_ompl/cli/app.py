@@ -17,6 +17,7 @@ from rrtik_ompl.base.floors import fitting_packages
 from rrtik_ompl.cli import BAD_INPUT, FOUND, INTERRUPTED, NOT_FOUND
 from rrtik_ompl.cli.bench import bench
 from rrtik_ompl.cli.check import check
+from rrtik_ompl.cli.demos import demos
 from rrtik_ompl.cli.drawing import checker, overlay, play, show
 from rrtik_ompl.cli.ik import inverse_kinematics
 from rrtik_ompl.cli.markers import markers
@@ -144,6 +145,7 @@ COMMANDS: dict[str, Callable[..., int]] = {
     "plan": plan,
     "straight": straight,
     "task": task,
+    "demos": demos,
     "check": check,
     "prove": prove,
     "checker": checker,

@@ -27,6 +27,8 @@ from rrtik_ompl.tasks.contact_life import MotionContact as MotionContact
 from rrtik_ompl.tasks.contact_life import world_from
 from rrtik_ompl.tasks.handling import never_set_down
 from rrtik_ompl.tasks.program import check_program, steps_of
+from rrtik_ompl.tasks.randomness import Displacement as Displacement
+from rrtik_ompl.tasks.randomness import Randomness as Randomness
 from rrtik_ompl.tasks.search import Done, TaskSearch
 from rrtik_ompl.tasks.setting import Setting, placed_constraints, world_of_motion
 from rrtik_ompl.tasks.stages import Alternatives as Alternatives
@@ -38,6 +40,8 @@ from rrtik_ompl.tasks.stages import Stage as Stage
 from rrtik_ompl.tasks.stages import Straight as Straight
 from rrtik_ompl.tasks.stages import checked_regions, checked_stages, holding
 from rrtik_ompl.tasks.standing import standing_faults
+from rrtik_ompl.tasks.variations import Variation as Variation
+from rrtik_ompl.tasks.variations import moved_scene, moved_stages
 from rrtik_ompl.world.problem import usable_configuration
 from rrtik_ompl.world.world import World
 
@@ -265,6 +269,7 @@ class Task:
         name: Name used in messages.
         constraints: Regions that a frame must not leave on the way of any `MoveTo`, in addition to those of the stage;
             those ``from_start`` refer to where the task begins.
+        random: What is random in the instances of the task that `rrtik_ompl.demos.record` plans; None if nothing is.
 
     Raises:
         InputError: If there are no stages, or something else is among them.
@@ -283,6 +288,7 @@ class Task:
     stages: tuple[Stage, ...]
     constraints: tuple[TaskRegion, ...]
     name: str
+    random: Randomness | None = field(repr=False)
     _world: World | None = field(repr=False)
     _start: Vector | str | None = field(repr=False)
 
@@ -294,13 +300,16 @@ class Task:
         *,
         name: str = "task",
         constraints: Iterable[TaskRegion] = (),
+        random: Randomness | None = None,
     ) -> None:
         require(world, World | None, "world of a task", "use World(robot, scene)")
+        require(random, Randomness | None, "what is random in a task")
         placed = start if start is None or isinstance(start, str) else frozen(finite_array(start, (None,), "start"))
         values = {
             "stages": checked_stages(stages, "task"),
             "constraints": checked_regions(constraints, "a task"),
             "name": name,
+            "random": random,
             "_world": world,
             "_start": placed,
         }
@@ -411,6 +420,25 @@ class Task:
             seconds=taken,
             statistics=search.statistics,
         )
+
+    def varied(self, variation: Variation) -> Task:
+        """Return one instance of the task, with its own world and start.
+
+        Raises:
+            InputError: If the task has no world or start of its own, or a goal cannot be moved.
+            UnknownNameError: If there is no obstacle of a name, or no stage sets it down.
+
+        Example:
+            >>> task = rrtik.Task.load("panda_pick_place")
+            >>> moved = task.varied(rrtik.Variation({"cup": [0.5, 0.2, 0.25]}))
+            >>> moved.world.scene.obstacle("cup").pose.translation.tolist()
+            [0.5, 0.2, 0.25]
+        """
+        require(variation, Variation, "variation of a task", "use Variation(poses, places, start)")
+        start = self.start if variation.start is None else variation.start
+        stages = moved_stages(self.stages, self.world, variation)
+        scene = moved_scene(self.world.scene, variation.poses)
+        return Task(stages, self.world.with_scene(scene), start, name=self.name, constraints=self.constraints)
 
 
 def _joined(paths: Sequence[JointPath]) -> JointPath:

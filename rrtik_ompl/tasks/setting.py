@@ -19,7 +19,7 @@ from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import Scene, Touching
 from rrtik_ompl.tasks.contact_life import EXTRA_DEPTH, SMALL_OVERLAP, allowed, left_inside, touching_at, with_contacts
-from rrtik_ompl.tasks.stages import Attach, Detach, Gripper, MoveTo, Stage
+from rrtik_ompl.tasks.stages import Attach, Detach, Gripper, GripperState, MoveTo, Stage
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World, form_of
 
@@ -156,17 +156,22 @@ def world_of_motion(path: JointPath, world: World, stage: Stage) -> World:
     return Problem(world, path.start, path.end, constraints=stage.constraints).world
 
 
-@kept_with
 def with_gripper(robot: Robot, stage: Gripper) -> Robot:
     """Return the same robot with its fingers held elsewhere.
 
     Raises:
         InputError: If the robot has no gripper joints, or does not open so far.
     """
+    return _with_fingers(robot, stage.state, stage.width)
+
+
+@kept_with
+def _with_fingers(robot: Robot, state: GripperState, width: float | None) -> Robot:
+    """Return the robot with its fingers in a state, or a width [m] apart; robots keep no stages of tasks alive."""
     joints = robot.gripper
     if joints is None:
         raise InputError(f"robot '{robot.name}' has no gripper joints: leave the stage Gripper out")
-    values = joints.posture(stage.state) if stage.width is None else joints.close_on(stage.width)
+    values = joints.posture(state) if width is None else joints.close_on(width)
     source: dict[str, Any] = dict(robot.source)
     source["locked"] = {**source.get("locked", {}), **values}
     return robot_from_entry(source)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any, Literal, TypeAlias, get_args
 
@@ -256,6 +256,16 @@ def holding(stages: Iterable[Stage], regions: tuple[TaskRegion, ...]) -> tuple[S
         else:
             changed.append(stage)
     return tuple(changed)
+
+
+def every_stage(stages: Iterable[Stage]) -> Iterator[Stage]:
+    """Yield stages, and in place of alternatives those of all their rows."""
+    for stage in stages:
+        if isinstance(stage, Alternatives):
+            for row in stage.options:
+                yield from every_stage(row)
+        else:
+            yield stage
 
 
 def _row(stages: object) -> tuple[Stage, ...]:

@@ -5,11 +5,12 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from rrtik_ompl.base.arrays import Vector
+from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.base.errors import InputError, UnknownNameError
 from rrtik_ompl.description.catalog import list_problems, robot_from_entry, task_files
 from rrtik_ompl.description.xacro_text import expanding
@@ -17,12 +18,16 @@ from rrtik_ompl.files.pose_entry import PoseEntry, pose_data
 from rrtik_ompl.files.sections import (
     NAME,
     NOT_NEGATIVE,
+    POSITIVE,
+    TEXT,
+    VECTOR2,
     VECTOR3,
     VERSION,
     Choice,
     Kind,
     Later,
     Listed,
+    Mapped,
     Refused,
     Section,
     ToldApart,
@@ -49,12 +54,14 @@ from rrtik_ompl.problem_files.robot import ROBOT, robot_data
 from rrtik_ompl.problem_files.scene import SceneEntry, scene_data
 from rrtik_ompl.tasks import Task
 from rrtik_ompl.tasks.program import check_program, steps_of
+from rrtik_ompl.tasks.randomness import Displacement, Randomness, check_random
 from rrtik_ompl.tasks.setting import Setting, placed_constraints
 from rrtik_ompl.tasks.stages import Alternatives, Attach, Detach, Gripper, MoveTo, Stage, Straight, holding
 from rrtik_ompl.world.problem import usable_configuration
 from rrtik_ompl.world.world import World
 
 NUMBER = re.compile(r"stage (\d+)")
+DISPLACED = ("x", "y", "z", "roll_deg", "pitch_deg", "yaw_deg")
 OF_TASKS = ("task", "goals")  # A task file has exactly one of these keys.
 
 
@@ -175,6 +182,86 @@ STAGE: Kind[StageEntry] = ToldApart(
 )
 
 
+class DisplacementEntry(Section):
+    """Ranges from which a displacement is drawn, evenly, in the axes of the world."""
+
+    x = key(VECTOR2, "lowest and highest displacement [m]", default=[0.0, 0.0])
+    y = key(VECTOR2, "[m]", default=[0.0, 0.0])
+    z = key(VECTOR2, "[m]", default=[0.0, 0.0])
+    roll_deg = key(VECTOR2, "lowest and highest turn about the fixed x axis [deg]", default=[0.0, 0.0])
+    pitch_deg = key(VECTOR2, "about the fixed y axis, after roll [deg]", default=[0.0, 0.0])
+    yaw_deg = key(VECTOR2, "about the fixed z axis, after roll and pitch [deg]", default=[0.0, 0.0])
+    about = key(VECTOR3, "point about which it is turned [m]; of an obstacle its own origin if absent", default=None)
+    along_with = key(NAME, "obstacle whose own displacement comes on top", default=None)
+
+    def build(self) -> Displacement:
+        """Return the displacement."""
+        return Displacement(
+            x=self.x,
+            y=self.y,
+            z=self.z,
+            roll=np.radians(self.roll_deg),
+            pitch=np.radians(self.pitch_deg),
+            yaw=np.radians(self.yaw_deg),
+            about=self.about,
+            along_with=self.along_with,
+        )
+
+
+class RandomStartEntry(Section):
+    """Ranges of the joints at the beginning."""
+
+    within = key(POSITIVE, "how far each joint is from the start at most [rad; m]", default=None)
+    within_deg = key(POSITIVE, "the same for joints that turn [deg]; others stay", default=None)
+    joints = key(Listed(VECTOR2, 1), "lowest and highest value of each joint [rad; m]", default=None)
+    joints_deg = key(Listed(VECTOR2, 1), "the same, in degrees where they turn [deg; m]", default=None)
+
+    def check_together(self) -> None:
+        """Refuse none or several."""
+        self.only_one(("within", "within_deg", "joints", "joints_deg"), "a random start")
+
+    def build(self, robot: Robot, start: Vector) -> Matrix:
+        """Return the ranges, shape (dof, 2) [rad or m]."""
+        if self.joints is not None or self.joints_deg is not None:
+            name = "joints" if self.joints is not None else "joints_deg"
+            configuration = robot.configuration if name == "joints" else robot.configuration_deg
+            ranges = np.array(getattr(self, name))
+            return np.stack([configuration(bound, f"random: start: {name}") for bound in ranges.T], axis=1)
+        reach = np.full(robot.dof, self.within)
+        if self.within_deg is not None:
+            reach = np.where(robot.prismatic, 0.0, np.radians(self.within_deg))
+        return np.stack([robot.clamp(start - reach), robot.clamp(start + reach)], axis=1)
+
+
+class ApartEntry(Section):
+    """Two obstacles whose origins stay apart."""
+
+    pair = key(Listed(NAME, 2, 2))
+    least = key(NOT_NEGATIVE, "[m]")
+
+
+class RandomEntry(Section):
+    """What is drawn anew for each demonstration (rrtik demos)."""
+
+    objects = key(Mapped(DisplacementEntry), "obstacles, displaced from where the scene has them", default={})
+    places = key(Mapped(DisplacementEntry), "where objects are set down, by the names of the objects", default={})
+    goals = key(DisplacementEntry, "goals that lead neither to attach nor to detach", default=None)
+    start = key(RandomStartEntry, default=None)
+    apart = key(Listed(ApartEntry), "distances that drawn obstacles keep between their origins", default=[])
+    instruction = key(TEXT, "what the arm does, in words, for whoever learns from it", default="")
+
+    def build(self, robot: Robot, start: Vector) -> Randomness:
+        """Return what is random."""
+        return Randomness(
+            {name: entry.build() for name, entry in self.objects.items()},
+            {name: entry.build() for name, entry in self.places.items()},
+            None if self.goals is None else self.goals.build(),
+            None if self.start is None else self.start.build(robot, start),
+            [(entry.pair[0], entry.pair[1], entry.least) for entry in self.apart],
+            self.instruction,
+        )
+
+
 class TaskFile(WorldKeys):
     """A task. Lengths in metres; angles in radians, in degrees where a key ends in _deg."""
 
@@ -187,6 +274,7 @@ class TaskFile(WorldKeys):
     path_constraints = key(
         Listed(CONSTRAINT), "regions that a frame must not leave on the way through all goals", default=[]
     )
+    random = key(RandomEntry, default=None)
 
     def check_together(self) -> None:
         """Refuse both or none, and constraints that belong to stages."""
@@ -241,10 +329,15 @@ def _task(name_or_file: str | os.PathLike[str]) -> Task:
         begun = Setting.beginning(world, robot.configuration(given, "start"))
         start = usable_configuration(begun.world, given, "start")
 
-    task = Task(_stages(document, entry, world, start), world, start, name=path.stem)
+    with document.at(("random",)):
+        random = None if entry.random is None else entry.random.build(robot, start)
+    task = Task(_stages(document, entry, world, start), world, start, name=path.stem, random=random)
     for name in OF_TASKS:
         if getattr(entry, name) is not None:
             _check(document, name, task, world)
+    if random is not None:
+        with document.at(("random",)):
+            check_random(random, task)
     return task
 
 
@@ -255,18 +348,46 @@ def write_task(task: Task, file: str | os.PathLike[str]) -> None:
         InputError: If the task has no world or start, the format cannot express a part of it, or the file cannot be
             written.
     """
+    write_yaml(file, task_data(task, file_name(file).parent))
+
+
+def task_data(task: Task, folder: Path) -> dict[str, Any]:
+    """Return the content of a task file in a folder.
+
+    Raises:
+        InputError: If the task has no world or start, or the format cannot express a part of it.
+    """
     world = task.world
     start = {"posture": task.start} if isinstance(task.start, str) else {"joints": task.start.tolist()}
     if world.constraints is not None:
         raise InputError("task: its world has path constraints, which the file has no key for; give MoveTo them")
 
-    folder = file_name(file).parent
     data: dict[str, Any] = {"version": 1, "robot": robot_data(world.robot.source, folder)}
     scene = scene_data(world.scene, folder)
     data |= {"scene": scene} if scene else {}
     stages = holding(task.stages, placed_constraints(world, task.start, task.constraints))
     data |= {"start": start, **world_data(world.settings), "task": [stage_data(stage) for stage in stages]}
-    write_yaml(file, data)
+    return data | ({} if task.random is None else {"random": _random_data(task.random)})
+
+
+def _random_data(random: Randomness) -> dict[str, Any]:
+    """Return the section of a task file for what is random."""
+    objects = {name: _displacement_data(each) for name, each in random.objects.items()}
+    places = {name: _displacement_data(each) for name, each in random.places.items()}
+    data: dict[str, Any] = {name: group for name, group in (("objects", objects), ("places", places)) if group}
+    data |= {} if random.goals is None else {"goals": _displacement_data(random.goals)}
+    data |= {} if random.start is None else {"start": {"joints": random.start.tolist()}}
+    apart = [{"pair": [first, second], "least": least} for first, second, least in random.apart]
+    data |= {"apart": apart} if apart else {}
+    return data | ({"instruction": random.instruction} if random.instruction else {})
+
+
+def _displacement_data(displacement: Displacement) -> dict[str, Any]:
+    """Return the entry of a task file for a displacement."""
+    rows = dict(zip(DISPLACED, [*displacement.bounds[:3], *np.degrees(displacement.bounds[3:])], strict=True))
+    data: dict[str, Any] = {name: row.tolist() for name, row in rows.items() if row.any()}
+    data |= {} if displacement.about is None else {"about": displacement.about.tolist()}
+    return data | ({} if displacement.along_with is None else {"along_with": displacement.along_with})
 
 
 def _check(document: YamlDocument, key: str, task: Task, world: World) -> None:

@@ -18,10 +18,13 @@ POSES = "x,y,z,qx,qy,qz,qw\n0.4,0.2,0.5,1,0,0,0\n3,0,0,1,0,0,0\n"
 SUITE = "version: 1\nproblems: [planar3_a]\nplanners: [bicrdt]\nruns: 1\nseconds: 2.0\n"
 TASK = "version: 1\nrobot: ur5\nstart: {posture: up}\ntask: [{move_to: {position: [0.5, 0.1, 0.4]}}]\n"
 
+RANDOM = TASK + "random: {start: {within_deg: 5}}\n"
+
 GOOD = {  # commands that end well, each with an exit code of 0
     "plan": ["plan panda_shelf --seed 1 --out path.json", "plan planar3_a --planner bicrdt --out moves.json"],
     "straight": ["straight titan4_sdu --by 0 0 0.02"],
     "task": ["task task.yaml --out plan.json"],
+    "demos": ["demos random.yaml --out demos --count 2 --jobs 1"],
     "check": ["check panda_shelf path.json", "check plan.json", "check replan_planar_arm run.json"],
     "prove": ["prove panda_shelf path.json"],
     "checker": ["checker checker.html"],
@@ -45,6 +48,7 @@ BAD = {  # commands that find nothing, or that are wrong
     "plan": ["plan far.yaml --seconds 1", "plan titan5", "plan panda_shelf --proof perhaps", "plan path.json"],
     "straight": ["straight titan4_sdu --by 1 0 0", "straight titan4_sdu"],
     "task": ["task panda_shelf", "task titan4_sdu"],
+    "demos": ["demos titan4_drawer --out drawers", "demos random.yaml --out demos --seed 7"],
     "check": ["check titan4_sdu path.json", "check path.json", "check run.json"],
     "prove": ["prove titan4_sdu path.json", "prove panda_shelf none.npz"],
     "checker": ["checker checker.txt"],
@@ -81,7 +85,8 @@ MARKERS = [f"markers {each.name}" for each in markers.registered_commands]
 def folder(tmp_path_factory):
     """A folder in which files are found."""
     made = tmp_path_factory.mktemp("widths")
-    for name, text in (("far.yaml", FAR), ("poses.csv", POSES), ("suite.yaml", SUITE), ("task.yaml", TASK)):
+    files = {"far.yaml": FAR, "poses.csv": POSES, "suite.yaml": SUITE, "task.yaml": TASK, "random.yaml": RANDOM}
+    for name, text in files.items():
         (made / name).write_text(text)
     return made
 

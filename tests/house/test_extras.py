@@ -8,6 +8,7 @@ import pytest
 from rrtik_ompl import load_motions, load_robot
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.base.floors import FLOORS
+from rrtik_ompl.demos.formats import check_format
 from rrtik_ompl.many.spread import cluster
 from rrtik_ompl.motion.trajectory.text import write_mcap
 from rrtik_tests.places import ROOT
@@ -39,7 +40,9 @@ def xacro(folder):
 NEEDED_BY = {
     "mcap": lambda folder: write_mcap(folder / "a.mcap", "robot", ["a"], []),
     "distributed": lambda folder: next(cluster([], "tcp://nowhere:1")),
+    "h5py": lambda folder: check_format("hdf5", 30.0),
     "mujoco": mjcf,
+    "pyarrow": lambda folder: check_format("lerobot", 30.0),
     "rosbags": lambda folder: load_motions(folder / "run.mcap", load_robot("planar3")),
     "xacro": xacro,
 }
@@ -66,7 +69,7 @@ def test_an_extra_that_is_missing_is_named_with_its_command(package, tmp_path, m
     with pytest.raises(InputError, match=r"^[^\n]*pip install [^\n]*$") as caught:
         NEEDED_BY[package](tmp_path)
     named = re.findall(r"pip install '?([\w\[\]-]+)", str(caught.value))
-    assert named in ([package], [f"rrtik-ompl[{package}]"], ["rrtik-ompl[cluster]"])
+    assert named in ([package], [f"rrtik-ompl[{package}]"], ["rrtik-ompl[cluster]"], ["rrtik-ompl[data]"])
 
 
 @pytest.mark.parametrize("folder", ["rrtik_ompl", "planners", "robots", "bench", "docs", "examples"])

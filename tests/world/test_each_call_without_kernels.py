@@ -73,6 +73,10 @@ def task_planned(problem, _):
     return motion_of(task_of(problem).plan(**MANNERS))
 
 
+def varied_task_planned(problem, _):
+    return motion_of(task_of(problem).varied(rrtik.Variation(start=START)).plan(**MANNERS))
+
+
 def timed(problem):
     return rrtik.time_parameterize(path_of(problem), problem.robot)
 
@@ -116,6 +120,7 @@ CALLS = {
     "Roadmap.load": saved_roadmap,
     "Task": task_planned,
     "Task.plan": task_planned,
+    "Task.varied": varied_task_planned,
     "Task.save": saved_task,
     "Task.load": saved_task,
     "JointPath.violations": lambda p, _: path_of(p).violations(p.world),
