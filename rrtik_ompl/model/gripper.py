@@ -79,8 +79,18 @@ class GripperJoints:
         if not 0.0 <= wanted <= self.width:
             raise InputError(f"width of a gripper: it opens from 0 to {self.width:g} m, got {wanted:g}")
 
-        share = wanted / self.width
-        values = (shut + share * (wide - shut) for shut, wide in zip(self.closed, self.opened, strict=True))
+        return self.at(wanted / self.width)
+
+    def at(self, share: float) -> dict[str, float]:
+        """Return the joint values by name at which the gripper is open by a share, from 0 (closed) to 1 (open).
+
+        Raises:
+            InputError: If the share is not within 0 and 1.
+        """
+        wanted = finite_number(share, "share of a gripper's opening")
+        if not 0.0 <= wanted <= 1.0:
+            raise InputError(f"share of a gripper's opening: expected 0 to 1, got {wanted:g}")
+        values = (shut + wanted * (wide - shut) for shut, wide in zip(self.closed, self.opened, strict=True))
         return dict(zip(self.joints, values, strict=True))
 
     def share(self, positions: ArrayLike) -> Matrix:

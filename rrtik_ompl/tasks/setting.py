@@ -162,16 +162,22 @@ def with_gripper(robot: Robot, stage: Gripper) -> Robot:
     Raises:
         InputError: If the robot has no gripper joints, or does not open so far.
     """
-    return _with_fingers(robot, stage.state, stage.width)
+    return _with_fingers(robot, stage.state, stage.width, stage.opening)
 
 
 @kept_with
-def _with_fingers(robot: Robot, state: GripperState, width: float | None) -> Robot:
-    """Return the robot with its fingers in a state, or a width [m] apart; robots keep no stages of tasks alive."""
+def _with_fingers(robot: Robot, state: GripperState, width: float | None, opening: float | None) -> Robot:
+    """Return the robot with its fingers in a state, a width [m] apart, or open by a share.
+
+    Robots keep no stages of tasks alive.
+    """
     joints = robot.gripper
     if joints is None:
         raise InputError(f"robot '{robot.name}' has no gripper joints: leave the stage Gripper out")
-    values = joints.posture(state) if width is None else joints.close_on(width)
+    if opening is not None:
+        values = joints.at(opening)
+    else:
+        values = joints.posture(state) if width is None else joints.close_on(width)
     source: dict[str, Any] = dict(robot.source)
     source["locked"] = {**source.get("locked", {}), **values}
     return robot_from_entry(source)

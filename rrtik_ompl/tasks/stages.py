@@ -174,23 +174,33 @@ class Gripper(Stage):
     Attributes:
         state: "open" or "close".
         width: Distance between the fingers afterwards [m]; None for wide open or shut.
+        opening: In place of the width, which is not known of jaws that turn: how far its joints are open afterwards, 0
+            shut to 1 wide open.
 
     Example:
         >>> rrtik.Gripper("close", width=0.04).width
         0.04
+        >>> print(rrtik.Gripper("close", opening=0.25))
+        Gripper 'close' to 25 %
     """
 
     state: GripperState
     width: float | None = None
+    opening: float | None = None
 
     def __post_init__(self) -> None:
         one_of(get_args(GripperState), self.state, "state of a gripper")
         if self.width is not None:
             not_negative(self.width, "width of Gripper")
+        if self.opening is not None and not_negative(self.opening, "opening of Gripper") > 1.0:
+            raise InputError(f"opening of Gripper: expected 0 (shut) to 1 (wide open), got {self.opening:g}")
+        if self.width is not None and self.opening is not None:
+            raise InputError("Gripper: give its width or its opening, not both")
 
     def __str__(self) -> str:
         width = "" if self.width is None else f" to {1e3 * self.width:g} mm"
-        return f"Gripper '{self.state}'{width}"
+        opening = "" if self.opening is None else f" to {100.0 * self.opening:g} %"
+        return f"Gripper '{self.state}'{width}{opening}"
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -152,11 +152,12 @@ class GripperEntry(StageEntry):
 
     gripper = key(Choice("open", "close"))
     width = key(NOT_NEGATIVE, "how far apart the fingers are afterwards [m]", default=None)
+    opening = key(NOT_NEGATIVE, "or how far its joints are open, 0 to 1", default=None)
 
     def build(self, robot: Robot) -> Gripper:
         """Build the stage."""
         del robot
-        return Gripper(self.gripper, self.width)
+        return Gripper(self.gripper, self.width, self.opening)
 
 
 class AlternativesEntry(StageEntry):
@@ -440,7 +441,8 @@ def stage_data(stage: Stage) -> dict[str, Any]:
     if isinstance(stage, Detach):
         return {"detach": stage.object}
     assert isinstance(stage, Gripper)
-    return {"gripper": stage.state} | ({} if stage.width is None else {"width": stage.width})
+    said = {"width": stage.width, "opening": stage.opening}
+    return {"gripper": stage.state} | {key: value for key, value in said.items() if value is not None}
 
 
 def _goal_data(goal: Goal | Vector | str) -> dict[str, Any]:

@@ -318,6 +318,8 @@ def test_what_a_planner_cannot_be_made_of_is_refused(planner, tmp_path):
         mplib.Planner(URDF, HAND, SRDF, user_joint_names=["panda_jont1"])
     with pytest.raises(InputError, match="expected 7 numbers"):
         mplib.Planner(URDF, HAND, SRDF, joint_vel_limits=np.ones(9))
+    with pytest.raises(InputError, match="1 objects, but 2 normal_object_names"):
+        mplib.Planner(URDF, HAND, SRDF, normal_objects=[object()], normal_object_names=["a", "b"])
     with pytest.raises(InputError, match="constraint_function"):
         planner.plan_pose(GOAL, START, constraint_function=print)
     with pytest.raises(InputError, match="one configuration"):

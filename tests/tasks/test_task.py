@@ -185,6 +185,9 @@ def test_a_robot_without_gripper_joints_and_a_start_in_collision(titan):
         (lambda: Straight(by=UP, frame="hand"), "frame of Straight"),
         (lambda: Gripper("shut"), "state of a gripper"),
         (lambda: Gripper("close", width=-0.1), "width"),
+        (lambda: Gripper("close", opening=1.1), "expected 0"),
+        (lambda: Gripper("close", opening="half"), "opening of Gripper"),
+        (lambda: Gripper("close", width=0.1, opening=0.5), "not both"),
         (lambda: Alternatives([]), "none of them empty"),
         (lambda: Alternatives([[]]), "none of them empty"),
         (lambda: Task([]), "at least one stage"),
@@ -220,6 +223,22 @@ def test_fingers_close_on_a_width():
     assert np.linalg.norm(left - right) == pytest.approx(0.05)
     with pytest.raises(UnknownNameError, match="state of a gripper"):
         gripper.posture("ajar")
+
+
+@pytest.mark.kernels
+def test_jaws_that_turn_close_by_a_share_and_a_pose_leaves_a_turn_free(tmp_path):
+    """An SO-101 has five joints and one jaw that turns, so it has no width."""
+    robot = rrtik.load_robot("so101", locked=rrtik.load_robot("so101").gripper.at(0.6))
+    pose = rrtik.pose([0.22, 0.05, 0.08], rpy=[np.pi, 0.0, 0.7])
+    stages = [MoveTo(rrtik.GoalSet([pose], free_rotation_axis="z")), Gripper("close", opening=0.2)]
+    Task(stages, rrtik.World(robot), np.zeros(5)).save(tmp_path / "task.yaml")
+    task = Task.load(tmp_path / "task.yaml")
+    plan = task.plan(seed=1)
+    shares = robot.gripper.share([event.positions for event in plan.time_parameterize().trajectory.gripper])
+    assert shares == pytest.approx([0.6, 0.2])
+    tip = plan.worlds[0].robot.fk(plan.path.end)
+    assert tip.translation == pytest.approx(pose.translation, abs=1e-3)
+    assert tip.rotation[:, 2] == pytest.approx([0.0, 0.0, -1.0], abs=0.02)
 
 
 @pytest.fixture

@@ -194,7 +194,10 @@ class Planner:
         self.planning_world = PlanningWorld(self)
         for thing in objects:
             self.planning_world.add_object(thing)
-        for name, thing in zip(normal_object_names, normal_objects, strict=True):
+        names, things = list(normal_object_names), list(normal_objects)
+        if len(names) != len(things):
+            raise InputError(f"normal_objects: {len(things)} objects, but {len(names)} normal_object_names; name each")
+        for name, thing in zip(names, things, strict=True):
             self.put_object(name, thing)
 
     # -- joints ----------------------------------------------------------------------------------------------------
