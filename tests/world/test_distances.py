@@ -237,3 +237,14 @@ def test_a_wrong_argument_is_told_in_a_line(arm, options, told):
     world = world_with(arm, rrtik.Sphere(0.1))
     with pytest.raises(rrtik.InputError, match=told):
         world.distances(np.zeros(arm.dof), **options)
+
+
+@pytest.mark.kernels
+def test_a_triangle_that_is_nearer_by_less_than_a_nanometre_is_not_left_out():
+    """Its nearest point is micrometres away, so the gradient would be off by 4e-5."""
+    box = Obstacle("box", rrtik.Box([0.1176, 0.1011, 0.1025]), [0.2393, -0.6892, 0.2644])
+    world = World(rrtik.load_robot("ur5"), Scene([box]))
+    q = np.array([-5.622532, -2.13688, 1.543254, -5.971369, -5.67198, 1.973021])
+    pair = [("wrist_1_link", "box")]
+    found = world.distances(q, pair).gradients
+    assert np.allclose(found, differences(world, q, pairs=pair), rtol=0.0, atol=GRADIENT)

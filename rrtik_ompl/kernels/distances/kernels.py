@@ -50,7 +50,10 @@ MOST_STEPS = 100
 CONVERGED = 1e-12  # [m] of upper and lower bound of a distance
 ACCURATE = 1e-7  # [m] the same where rounding, or a disc, lets no more be found
 SHORTEST = 1e-10  # [m] of a vector that has a direction
-SAME = 1e-10  # [m] distances that are not told apart
+# [m] by which a pair has to be nearer to be looked at. A nearest point that is wrong by s changes a distance d by
+# s^2 / 2 d only, and its gradient by s / d: what looks like rounding would cost the gradient half of its digits.
+NEARER = 1e-14
+SAME = 1e-10  # [m] depths that are not told apart
 FLAT = 1e-12  # [m] height of a polytope without an inside
 THIN = 1e-14  # [m^2] twice the area of a face without a normal
 NO_WEIGHT = 1e-12
@@ -164,7 +167,7 @@ def distance(table: DistanceTable, column: ColumnRows, frames: Frame, limit: flo
     while height > 0:
         height -= 1
         bounds = row_at(table.bounds, layout.BOUND_SIZE, height)
-        if bounds[layout.BOUND] >= best - SAME:
+        if bounds[layout.BOUND] >= best - NEARER:
             continue
         pair = row_at(table.stack, layout.STACK_SIZE, height)
         one = node_at(table, pair[0])
@@ -172,7 +175,7 @@ def distance(table: DistanceTable, column: ColumnRows, frames: Frame, limit: flo
         way = vector_at(bounds, layout.BOUND_WAY)
         parent = bounds[layout.PARENT_BOUND]
         at_leaf = is_leaf(one) and is_leaf(other)
-        if at_leaf or bounds[layout.BOUND] > parent + SAME or bounds[layout.BOUND] == LOWEST:
+        if at_leaf or bounds[layout.BOUND] > parent + NEARER or bounds[layout.BOUND] == LOWEST:
             state, low, value, way, a, b, exact = compared(table, one, other, one_frame, other_frame, way, best)
             if state == FAR or low >= best:
                 continue
