@@ -596,9 +596,11 @@ def weights_on_triangle(a: Any, b: Any, c: Any) -> Any:
     if of_a <= 0.0 and d4 >= d3 and d5 >= d6 and (d4 - d3) + (d5 - d6) > 0.0:
         share = (d4 - d3) / ((d4 - d3) + (d5 - d6))
         return 0.0, 1.0 - share, share
-    whole = of_a + of_b + of_c
-    v = of_b / whole
-    w = of_c / whole
+    # By cross products: of long thin triangles the products above leave few digits.
+    normal = cross(ab, ac)
+    whole = dot(normal, normal)
+    v = dot(cross(ac, a), normal) / whole
+    w = dot(cross(a, ab), normal) / whole
     if not (v >= 0.0 and w >= 0.0 and v + w <= 1.0):
         return 1.0, 0.0, 0.0
     return 1.0 - v - w, v, w
