@@ -237,7 +237,7 @@ def _judged(
     ways = [world.weights @ np.abs(at(share) - at(other)) for share, other in zip(ends, named, strict=True)]
     there = judge.gap(worst.q, thing)
     touches = judge.touching(worst.q, thing, worst.first)
-    return Clip(ball, depth, verdict.status, max(ways), max(depth + there, 0.0), touches, there < 0.0, seconds)
+    return Clip(ball, depth, verdict.status, float(max(ways)), max(depth + there, 0.0), touches, there < 0.0, seconds)
 
 
 def _end(judge: Judge, thing: rrtik.Obstacle, at: Callable[[float], Vector], blocked: float, free: float) -> float:

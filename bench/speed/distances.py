@@ -118,11 +118,21 @@ def distances(name: str, count: int) -> Measured:
 
     deepest = Q[np.argsort(found.values.min(axis=1))[:10]]
     deep = [min(_seconds(lambda q=q: world.distances(q)) for _ in range(3)) for q in deepest]  # type: ignore[misc]
-    coal = times[4] if judge is not None else float("nan")
     return Measured(
-        len(found.names), *times[:4], coal, off.size, float(off.max(initial=0.0)), int(inside.sum()), error.size,
-        float(error.max(initial=0.0)), int((error > GRADIENT).sum()), deep,
-    )  # fmt: skip
+        pairs=len(found.names),
+        all_pairs=times[0],
+        nearest=times[1],
+        within=times[2],
+        one=times[3],
+        coal=times[4] if judge is not None else float("nan"),
+        compared=off.size,
+        off=float(off.max(initial=0.0)),
+        inside=int(inside.sum()),
+        gradients=error.size,
+        wrong=float(error.max(initial=0.0)),
+        beyond=int((error > GRADIENT).sum()),
+        deep=deep,
+    )
 
 
 def count_of_points(world: rrtik.World) -> int:

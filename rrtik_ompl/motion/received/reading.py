@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Matrix, Vector, positive
@@ -27,7 +26,7 @@ from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.robot import LIMIT_TOLERANCE, Robot, inside_limits, joint_order, unnamed_joints
 from rrtik_ompl.motion.received.points import ReceivedMotion
 from rrtik_ompl.motion.trajectory import Trajectory
-from rrtik_ompl.motion.trajectory.messages import seconds
+from rrtik_ompl.motion.trajectory.messages import seconds, yaml_documents
 from rrtik_ompl.motion.trajectory.text import GRIPPER
 
 BAGS = (".bag", ".db3", ".mcap")
@@ -156,7 +155,7 @@ def _columns_of(path: Path) -> Iterator[Columns]:
     elif ending == ".json":
         yield from _motions(_json(path), "")
     elif ending in (".yaml", ".yml"):
-        documents = list(_yaml(read_text(path, LARGEST_FILE)))
+        documents = yaml_documents(read_text(path, LARGEST_FILE))
         for number, document in enumerate(documents, start=1):
             yield from _motions(document, f"document {number}" if len(documents) > 1 else "")
     elif ending == ".csv":
@@ -173,19 +172,6 @@ def _json(path: Path) -> object:
         return json_value(read_text(path, LARGEST_FILE))
     except InputError as error:
         raise in_file(path, error) from None
-
-
-def _yaml(text: str) -> Iterator[object]:
-    """Yield the documents of a YAML file, such as ``ros2 topic echo`` prints one for each message."""
-    try:
-        for document in yaml.load_all(text, Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader)):
-            if document is not None:
-                yield document
-    except yaml.YAMLError as error:
-        mark = getattr(error, "problem_mark", None)
-        raise InputError(f"{'' if mark is None else f'line {mark.line + 1}: '}not YAML") from None
-    except (RecursionError, ValueError):
-        raise InputError("not YAML that can be read") from None
 
 
 def _array(path: Path) -> NDArray[Any]:

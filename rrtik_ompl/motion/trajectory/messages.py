@@ -9,6 +9,7 @@ import yaml
 from rrtik_ompl.base.errors import InputError
 
 NANOSECONDS = 1_000_000_000
+MOST_UNFOLDED = 10_000_000  # largest number of values of a file of YAML, its aliases written out
 _DURATION = (("sec", "secs"), ("nanosec", "nsecs"))
 
 
@@ -46,14 +47,37 @@ def from_yaml(text: str, key: str) -> dict[str, Any]:
     Raises:
         InputError: If the text is not such an object; the error names the line.
     """
+    document, *others = yaml_documents(text) or [None]
+    if others or not isinstance(document, dict) or key not in document:
+        raise InputError(f"expected one object with the key '{key}'; is this a trajectory file?")
+    return document
+
+
+def yaml_documents(text: str) -> list[object]:
+    """Read the documents of YAML that any program wrote, without empty ones; tags are refused.
+
+    Raises:
+        InputError: If it is malformed, where the error names the line, or if its aliases unfold to very many values.
+    """
     try:
-        document = yaml.load(text, Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader))
+        read = list(yaml.load_all(text, Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader)))
+        if "*" in text and _unfolded(read, {}) > MOST_UNFOLDED:
+            raise InputError(f"its aliases unfold to more than {MOST_UNFOLDED} values; write them out")
+        return [document for document in read if document is not None]
     except yaml.YAMLError as error:
-        problem_mark = getattr(error, "problem_mark", None)
-        where = "" if problem_mark is None else f"line {problem_mark.line + 1}: "
+        mark = getattr(error, "problem_mark", None)
+        where = "" if mark is None else f"line {mark.line + 1}: "
         raise InputError(f"{where}not YAML; is this a trajectory file?") from None
     except (RecursionError, ValueError):
         raise InputError("not YAML that can be read; is this a trajectory file?") from None
-    if not isinstance(document, dict) or key not in document:
-        raise InputError(f"expected an object with the key '{key}'; is this a trajectory file?")
-    return document
+
+
+def _unfolded(value: object, known: dict[int, int]) -> int:
+    """Return the number of values that a value has with all aliases written out; one inside itself has too many."""
+    if not isinstance(value, dict | list):
+        return 1
+    if id(value) not in known:
+        known[id(value)] = MOST_UNFOLDED + 1
+        parts = value.values() if isinstance(value, dict) else value
+        known[id(value)] = 1 + sum(_unfolded(part, known) for part in parts)
+    return known[id(value)]

@@ -44,6 +44,7 @@ def arrays(**values):
     return lambda file: np.savez(file, **values)
 
 
+ALIASES = "a0: &a0 [1, 1]\n" + "\n".join(f"a{k}: &a{k} [{', '.join([f'*a{k - 1}'] * 9)}]" for k in range(1, 11))
 ECHO = "joint_names: [joint1, joint2, joint3]\npoints:\n" + "".join(
     f"- positions: [{a}, {b}, 1e-17]\n  velocities: []\n  time_from_start: {{sec: {k}, nanosec: 0}}\n"
     for k, (a, b, _) in enumerate(ROWS)
@@ -186,6 +187,8 @@ def test_other_files_are_refused_in_one_line(robot, tmp_path):
     for name, content, words in (
         ("a.yaml", cut_short(), "--full-length"),
         ("a.yaml", "a: [", "not YAML"),
+        ("a.yaml", ALIASES, "aliases"),
+        ("a.yaml", "joint_names: [a]\npoints: &points [*points]", "aliases"),
         ("a.csv", "0,0,0\n1,0,0\n", "names of the joints"),
         ("a.npy", "no array", "not a whole .npy"),
         ("a.npz", "no array", "not a whole .npz"),
