@@ -37,7 +37,7 @@ def search(task: Task) -> Search:
 
     def solve(seed: int) -> Rows | None:
         torch.manual_seed(seed)
-        path, failed = arm.plan_path(
+        path, valid = arm.plan_path(
             **placed,
             max_nodes=MOST_NODES,
             resolution=RESOLUTION,
@@ -46,7 +46,7 @@ def search(task: Task) -> Search:
             num_waypoints=POINTS,
             return_valid_mask=True,
         )
-        return None if bool(failed.any()) else path.cpu().numpy().astype(np.float64)[:, order]
+        return None if not bool(valid.all()) else path.cpu().numpy().astype(np.float64)[:, order]
 
     solve(0)  # its kernels are compiled
     return solve
