@@ -13,7 +13,8 @@ from rrtik_ompl.motion.trajectory.limits import RateLimits
 from rrtik_ompl.replanning import in_time
 from rrtik_ompl.replanning.in_time import foreseen, plan_in_time
 from rrtik_ompl.replanning.in_time.foreseen import ForeseenWorlds
-from rrtik_ompl.replanning.in_time.search import NEVER, Pace, retimed
+from rrtik_ompl.replanning.in_time.pace import NEVER, Pace
+from rrtik_ompl.replanning.in_time.search import timed
 from rrtik_ompl.world.world import World
 from rrtik_tests.moving_plane import FAST, box, crossing, place, plane
 
@@ -45,9 +46,9 @@ def test_a_ball_that_touches_the_base_between_the_middles_of_slots_ends_all_that
     assert not plan.found
     assert "'ball' reaches 'base' at 0.49" in plan.reason
     assert plan.statistics == {"iterations": 0}
-    late = ball((0.0, 1.0), (2.0, 1.0), (2.5, 0.2), (3.0, 1.0))
+    late = ball((0.0, 1.0), (3.0, 1.0), (3.5, 0.2), (4.0, 1.0))
     plan = plan_in_time(beside_pedestal(tmp_path, late), seed=1)
-    assert plan.arrival == pytest.approx(2.0)  # before the ball is there
+    assert plan.arrival == pytest.approx(2.5)  # before the ball is there
 
 
 def test_what_passes_the_base_or_stands_beside_it_does_not_reach_it(tmp_path):
@@ -116,21 +117,22 @@ def test_what_a_search_has_to_wait_for_is_not_taken_from_its_time(monkeypatch):
     assert plan_in_time(crossing(), speed=5.0, limits=FAST, seconds=1.0, seed=1).found
 
 
-def test_a_retiming_that_is_stopped_keeps_the_path_that_there_is():
+def test_a_timing_that_is_stopped_is_none():
     problem = plane()
-    rows = np.linspace(problem.start, problem.goal.q, 50)
-    worlds, pace = ForeseenWorlds(problem.world, 0.1, 0.0), Pace(np.ones(2), np.inf)
-    assert len(retimed(rows, pace, worlds, 48, lambda: False)) == 19
-    assert retimed(rows, pace, worlds, 48, lambda: True) is None
+    way = np.array([problem.start, problem.goal.q])
+    worlds, pace = ForeseenWorlds(problem.world, 0.1, 0.0), Pace(np.ones(2), np.full(2, 0.5), np.inf)
+    assert timed(way, pace, worlds, 48, lambda: False).arrival == 18 + 2
+    assert timed(way, pace, worlds, 19, lambda: False) is None
+    assert timed(way, pace, worlds, 48, lambda: True) is None
 
 
 def test_the_slowest_speeds_are_too_slow_and_nothing_else():
     problem = crossing()
     for options in ({"speed": 1e-20}, {"speed": 5e-324}, {"limits": RateLimits([1e-300, 1.0], [1.0, 1.0])}):
         plan = plan_in_time(problem, **options)
-        assert "speeds allow no arrival" in plan.reason
+        assert "limits allow no arrival" in plan.reason
         assert plan.least_seconds > 1e9
-    assert Pace(np.full(2, 1e-300), np.inf).whole_slots(np.ones((1, 2))).tolist() == [NEVER]
+    assert Pace(*np.full((2, 2), 1e-300), np.inf).whole_slots(np.ones((1, 2))).tolist() == [NEVER]
     assert "rate" in plan_in_time(problem, rate=1e-3, limits=FAST).reason
 
 
@@ -145,7 +147,7 @@ def test_obstacles_are_recorded_where_they_are_not_where_the_scene_has_written_t
 
 def test_a_slot_in_which_the_arm_stands_is_a_wait(tmp_path):
     low, high = (pin.SE3(np.eye(3), np.array([0.5 * np.cos(0.85), -0.5 * np.sin(0.85), z])) for z in (0.1, 0.5))
-    leaves = Obstacle("leaves", Sphere(0.03), low, TimedPoses([0.0, 1.0, 3.0], [low, low, high]))
+    leaves = Obstacle("leaves", Sphere(0.03), low, TimedPoses([0.0, 4.0, 6.0], [low, low, high]))
     run = plan_in_time(beside_pedestal(tmp_path, leaves), seed=1).motion
     assert run.ticks[0].event == "wait"
     for tick in run.ticks[:-1]:

@@ -16,7 +16,8 @@ from rrtik_ompl.model.scene import ConstantVelocity, Obstacle, Scene, TimedPoses
 from rrtik_ompl.model.shapes import Box, HalfSpace, Sphere
 from rrtik_ompl.replanning.in_time import plan_in_time
 from rrtik_ompl.replanning.in_time.foreseen import travel
-from rrtik_ompl.replanning.in_time.search import Pace, TimeTree, at_full_speed, each_slot
+from rrtik_ompl.replanning.in_time.pace import Pace, stretch
+from rrtik_ompl.replanning.in_time.search import TimeTree
 from rrtik_ompl.world.world import World
 from rrtik_tests.moving_plane import FAST, box, crossing, place, plane
 
@@ -47,6 +48,16 @@ def faults_of(problem, run, velocity, speed=np.inf):
             if not world.valid(rows[k] + share * (rows[k + 1] - rows[k])):
                 faults.append(now)
     return faults, check_contacts(problem.robot, run, problem.world.scene).contacts
+
+
+def keeps_accelerations(plan, limits):
+    """The exported motion, differentiated by differences alone, keeps its limits; it is where the record has it."""
+    motion, step = plan.trajectory, 1e-3
+    assert np.abs(motion(plan.motion.times).positions - plan.motion.configurations).max() < 1e-9
+    rows = motion(np.arange(-5, round(motion.duration / step) + 5) * step).positions
+    speeds = np.diff(rows, axis=0) / step
+    assert (np.abs(speeds) <= limits.velocity * (1.0 + 1e-6)).all()
+    assert (np.abs(np.diff(speeds, axis=0) / step) <= limits.acceleration * (1.0 + 1e-6)).all()
 
 
 def test_a_crossing_box_is_not_met_at_any_time():
@@ -87,7 +98,7 @@ def test_a_goal_that_stays_blocked_is_named():
 
 def test_nothing_in_the_way_arrives_as_soon_as_speed_allows():
     plan = plan_in_time(plane(box("far", 10.0, 18.0, 1.0, 1.0)), seed=1, **PLANE)
-    assert plan.arrival == pytest.approx(plan.least_seconds) == pytest.approx(3.6)
+    assert plan.arrival == pytest.approx(plan.least_seconds) == pytest.approx(3.7)  # 3.6 s at full speed
 
 
 @pytest.mark.kernels
@@ -100,6 +111,7 @@ def test_arms_among_what_moves_are_free_at_every_time_with_margin(name):
     assert plan.found, plan.reason
     velocity = settings.max_change(problem.robot) * settings.rate
     assert faults_of(problem, plan.motion, velocity, speed) == ([], ())
+    keeps_accelerations(plan, settings.limits or rrtik.RateLimits.of(problem.robot))
     nearest = check_contacts(problem.robot, plan.motion, problem.world.scene, samples_per_tick=40).nearest
     assert nearest >= settings.margin
 
@@ -120,7 +132,7 @@ def test_the_command_plans_in_time_and_says_when_there_is_no_way(tmp_path, capsy
     assert "moves proven" in capsys.readouterr().out
     assert run_command(["replan", "replan_planar_arm", "--foreseen", "--horizon", "0.5", "--json"]) == 1
     reason = json.loads(capsys.readouterr().out)["reason"]
-    assert "speeds allow no arrival" in reason
+    assert "limits allow no arrival" in reason
     assert "raise --horizon" in reason
     assert run_command(["replan", "replan_planar_arm", "--foreseen", "--clearance", "5"]) == 1
     assert "lower --clearance" in capsys.readouterr().err
@@ -145,7 +157,7 @@ def test_the_way_of_an_obstacle_bounds_every_point_of_it():
 
 
 def test_a_vertex_is_reached_only_onwards_in_time_and_at_a_speed_that_is_allowed():
-    pace = Pace(np.array([1.0, 0.5]), np.inf)
+    pace = Pace(np.array([1.0, 0.5]), np.full(2, 1e12), np.inf)
     for onward in (1, -1):
         tree = TimeTree(pace, onward)
         tree.add(np.zeros(2), 10, -1)
@@ -155,13 +167,37 @@ def test_a_vertex_is_reached_only_onwards_in_time_and_at_a_speed_that_is_allowed
         assert tree.nearest(np.zeros(2), 10) is None
 
 
-def test_full_pace_takes_the_fewest_slots_and_keeps_the_ends():
-    rows = np.array([[0.0, 0.0], [3.0, 0.0], [3.0, 0.0], [3.0, 2.5]])
-    places = at_full_speed(rows, Pace(np.ones(2), np.inf))
-    assert len(places) - 1 == 6
-    assert (np.abs(np.diff(places, axis=0)) <= 1.0 + 1e-12).all()
-    assert (places[[0, -1]] == rows[[0, -1]]).all()
-    assert len(each_slot(rows[:2], np.array([0, 6]))) == 7
+@pytest.mark.parametrize("slots", [3, 4, 7, 40])
+def test_a_stretch_keeps_its_limits_and_ends_where_it_should(slots):
+    pace = Pace(np.array([1.0, 0.6]), np.array([0.5, 0.3]), np.inf)
+    move = np.array([1.0, -0.6])
+    share = pace.reach(move, slots)
+    assert pace.slots(share * move[None])[0] <= slots + 1e-9
+    assert share == 1.0 or pace.slots(1.001 * share * move[None])[0] > slots
+    rows = stretch(np.zeros(2), share * move, slots, pace)
+    assert rows[[0, -1]].tolist() == [[0.0, 0.0], (share * move).tolist()]
+    steps = np.abs(np.diff(rows, axis=0))
+    assert (steps <= pace.change + 1e-9).all()
+    assert (np.abs(np.diff(steps, axis=0)) <= pace.rise + 1e-9).all()
+
+
+def test_no_motion_is_faster_than_the_bound_and_straight_ones_may_be_slower():
+    pace = Pace(np.array([0.1, 9.0]), np.array([9.0, 0.1]), np.inf)
+    move = np.array([[1.0, 1.0]])
+    assert pace.least_slots(move) == [11]  # the first joint at full speed for 10 slots, and some to speed up
+    assert pace.whole_slots(move) == [11]
+    assert pace.least_slots(np.array([[1.0, 2.0]])) == [11]
+    assert pace.whole_slots(np.array([[1.0, 2.0]])) == [12]  # the second joint's 20 square slots of acceleration
+
+
+def test_a_goal_that_is_free_only_later_is_waited_for():
+    lid = TimedPoses([0.0, 6.0, 6.5], [place(19.0, 10.0), place(19.0, 10.0), place(19.0, -30.0)])
+    problem = plane(box("lid", 19.0, 10.0, 2.0, 2.0, lid), goal=(1.0, 10.0))
+    plan = plan_in_time(problem, goal=[19.0, 10.0], seed=1, iterations=50, **PLANE)
+    assert plan.found, plan.reason
+    assert 6.0 < plan.arrival < 7.5
+    assert faults_of(problem, plan.motion, 1e3, 5.0) == ([], ())
+    keeps_accelerations(plan, FAST)
 
 
 def test_bad_input_names_what_is_wrong():
@@ -175,6 +211,8 @@ def test_bad_input_names_what_is_wrong():
         ({"seed": -1}, "seed"),
         ({"horizon": 1e9}, "slots of time"),
         ({"limits": 3.0}, "limits"),
+        ({"goal": [1.0]}, "goal"),
+        ({"goal": [1.0, 99.0]}, "goal: joint 'y' is at 99 m, outside its limits"),
     ):
         with pytest.raises(InputError, match=words):
             plan_in_time(problem, **options)

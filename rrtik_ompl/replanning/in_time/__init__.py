@@ -6,21 +6,25 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from rrtik_ompl.base.arrays import Matrix, not_negative, positive, seed_of, whole_number
 from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.choices import TickEvent
 from rrtik_ompl.base.copies import in_one_line
-from rrtik_ompl.base.errors import at_most, require
+from rrtik_ompl.base.errors import InputError, at_most, require
 from rrtik_ompl.base.poses import pose_row
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.result import required
+from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import Scene
 from rrtik_ompl.motion.trajectory.limits import RateLimits
+from rrtik_ompl.motion.trajectory.motion import Trajectory
 from rrtik_ompl.replanning.drrt_con import without_points_between
 from rrtik_ompl.replanning.feed import Snapshot
 from rrtik_ompl.replanning.in_time.foreseen import ForeseenWorlds
-from rrtik_ompl.replanning.in_time.search import Ends, Pace, TimeSearch
+from rrtik_ompl.replanning.in_time.pace import Pace, Timing
+from rrtik_ompl.replanning.in_time.search import Ends, TimeSearch
 from rrtik_ompl.replanning.record import ReplanRun, joints_of
 from rrtik_ompl.replanning.start_and_goals import every_goal, held_pairs, refuse_constraints, sampling_box
 from rrtik_ompl.replanning.tick import Tick
@@ -30,7 +34,7 @@ from rrtik_ompl.world.problem import Problem
 
 NAME = "in-time"  # of the planner, in records
 MOST_SLOTS = 10_000
-SLOWEST = 1e-300  # least motion in a slot [rad or m], so that it can be divided by
+SLOWEST = 1e-300  # least motion in a slot [rad or m], and its growth, so that they can be divided by
 ROUNDING = 1e-9
 WAITS = "what moves has to pass first"
 
@@ -43,16 +47,18 @@ class TimedPlan:
         motion: The motion, one tick for each slot of time, as :func:`rrtik_ompl.replan` records it: it can be saved,
             drawn and judged. None if no motion was found.
         reason: Why no motion was found, or "".
-        least_seconds: Lower bound on the time of arrival by the speed limits alone [s].
+        least_seconds: Lower bound on the time of arrival by the limits of speed and acceleration alone [s].
         seconds: Wall time of the search [s].
         statistics: "iterations", the number of iterations of the search.
         free_until: Until when the arm may stay where the motion ends [s]: by then it is proven to keep margins and
             clearance; inf if for ever, at most the horizon if an obstacle never comes to rest. 0 if there is no motion.
+        trajectory: The motion to be executed, which keeps the limits of speed and acceleration at every time; None if
+            there is none. ``motion`` has its configurations at the begin of each slot.
 
     Example:
         >>> scenario = rrtik.replanning.Scenario.load("replan_planar_arm")
         >>> plan = rrtik.replanning.plan_in_time(scenario.problem, rate=5.0, horizon=0.4)
-        >>> plan.found, plan.reason.startswith("speeds allow no arrival")
+        >>> plan.found, plan.reason.startswith("limits allow no arrival")
         (False, True)
     """
 
@@ -62,6 +68,7 @@ class TimedPlan:
     seconds: float
     statistics: Mapping[str, int]
     free_until: float = 0.0
+    trajectory: Trajectory | None = None
 
     __repr__ = in_one_line
 
@@ -102,6 +109,7 @@ class TimedPlan:
 def plan_in_time(
     problem: Problem,
     *,
+    goal: ArrayLike | None = None,
     rate: float = 10.0,
     horizon: float = 30.0,
     speed: float | None = None,
@@ -117,10 +125,11 @@ def plan_in_time(
     [1, ch. 5.2] describes this space, configurations at times from 0 on in which a path never goes backwards in time,
     for fully predictable scenes, and prefers DRRT-Con, which assumes nothing. The search follows [70].
 
-    Within each slot of time the motion is straight at constant speed, and no joint exceeds its speed limit. Speeds jump
-    between slots, since accelerations are not considered, as in :func:`rrtik_ompl.replan`. The motion is **proven**
+    The motion consists of straight stretches from rest to rest and of waits. In a stretch the speed grows evenly,
+    stays, and falls evenly, and no joint exceeds its limits of speed and acceleration. The motion is **proven**
     free at every time, not only at steps: in each slot the arm keeps margins, clearance, and the largest travel of any
-    point of an obstacle between the middle of the slot and its ends from that obstacle's place in the middle. Motions
+    point of an obstacle between the middle of the slot and its ends from that obstacle's place in the middle. So it
+    does not matter at which speed the arm goes from the begin to the end of a slot. Motions
     that kernels cannot prove count as blocked. The arm arrives before an obstacle reaches a part that no joint moves,
     or there is no plan. The proof holds as far as obstacles follow their stated motions: one that deviates by more than
     margin and clearance can be hit. After the arrival the arm is proven free where it stands until ``free_until`` of
@@ -129,6 +138,8 @@ def plan_in_time(
     Args:
         problem: Robot, scene whose obstacles state their motions, start and goal. If the goal is a pose, position or
             region, all configurations that reach it are goals.
+        goal: A configuration to reach in place of the problem's goal, shape (n,). Obstacles may stand there at first,
+            which a problem does not allow of its own goal; the arm waits until it is free.
         rate: Number of slots per second [Hz]. With more slots the arm can pass nearer to fast obstacles, and searches
             take longer.
         horizon: The latest arrival [s].
@@ -137,7 +148,7 @@ def plan_in_time(
         margin: Distance to obstacles that is always kept, in addition to their own margins [m].
         clearance: Distance that is proven in addition to ``margin`` [m]; if None 1 mm, or as much as the world asks
             proofs for if that is more.
-        limits: Speed limits of the joints; those of the robot if None.
+        limits: Limits of speed and acceleration of the joints; those of the robot if None. Jerks are not limited.
         iterations: Largest number of iterations; the search goes on for earlier arrivals until it has found no more for
             a while.
         seconds: Largest wall time of the search [s].
@@ -161,6 +172,7 @@ def plan_in_time(
     wanted_clearance = CLEARANCE if clearance is None else not_negative(clearance, "clearance")
     options = _Options(
         slot=1.0 / positive(rate, "rate", "give slots a second, such as 10"),
+        goal=None if goal is None else _goal(problem.robot, goal),
         horizon=positive(horizon, "horizon", "give the latest arrival [s]"),
         speed=float("inf") if speed is None else positive(speed, "speed", "give it in rad/s or m/s"),
         margin=not_negative(margin, "margin"),
@@ -173,17 +185,25 @@ def plan_in_time(
     search, reaches_base = _search(problem, options)
     reason = _why_impossible(search, options, reaches_base)
     # The time limit begins here, after kernels were compiled and goals were looked for.
-    rows = None if reason else search.run(options.budget.begun_now())
-    if rows is None and not reason:
+    timing = None if reason else search.run(options.budget.begun_now())
+    if timing is None and not reason:
         reason = _why_not_found(search, reaches_base)
 
-    motion = None if rows is None else _record(problem, search, rows, options)
     counts = {"iterations": search.iterations}
     least = options.slot * search.least_slots
-    if motion is None or rows is None:
+    if timing is None:
         return TimedPlan(None, reason, least, options.budget.elapsed, counts)
-    free_until = search.worlds.rest_ends(rows[-1], motion.ticks[-1].time, options.horizon)
-    return TimedPlan(motion, "", least, options.budget.elapsed, counts, free_until)
+    motion = _record(problem, search, timing.each_slot(search.pace), options)
+    trajectory = _trajectory(problem, search.pace, timing, options)
+    free_until = search.worlds.rest_ends(timing.rows[-1], motion.ticks[-1].time, options.horizon)
+    return TimedPlan(motion, "", least, options.budget.elapsed, counts, free_until, trajectory)
+
+
+def _trajectory(problem: Problem, pace: Pace, timing: Timing, options: _Options) -> Trajectory:
+    """Return the motion with its speeds and accelerations."""
+    robot = problem.robot
+    path = JointPath(timing.rows, robot.joint_names, robot.prismatic, robot.name)
+    return timing.trajectory(pace, options.slot, path)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -191,12 +211,25 @@ class _Options:
     """The checked arguments of :func:`plan_in_time`; ``slot`` is the length of a slot [s]."""
 
     slot: float
+    goal: Matrix | None
     horizon: float
     speed: float
     margin: float
     clearance: float
     limits: RateLimits | None
     budget: Budget
+
+
+def _goal(robot: Robot, goal: ArrayLike) -> Matrix:
+    """Return a configuration to reach, shape (1, n).
+
+    Raises:
+        InputError: If it is no configuration of the robot, or outside the limits.
+    """
+    q = robot.configuration(goal, "goal")
+    if fault := robot.limit_fault(q):
+        raise InputError(f"goal: {fault}")
+    return robot.onto_limits(q)[None]
 
 
 def _search(problem: Problem, options: _Options) -> tuple[TimeSearch, str]:
@@ -214,21 +247,22 @@ def _search(problem: Problem, options: _Options) -> tuple[TimeSearch, str]:
     rates = RateLimits.of(robot) if options.limits is None else options.limits.for_joints(robot.dof)
 
     world_of_arm = problem.world.with_accuracy("conservative").with_scene(Scene((), scene.attached, held_pairs(scene)))
-    goals = every_goal(problem, world_of_arm, rng)
+    goals = every_goal(problem, world_of_arm, rng) if options.goal is None else options.goal
     lower, upper = sampling_box(robot, np.vstack([problem.start, goals]))
 
     worlds = ForeseenWorlds(problem.world, options.slot, options.margin + options.clearance)
     base_reached_at, reaches_base = worlds.base_reached(options.horizon)
     last_slot = int(min(options.horizon, base_reached_at) / options.slot + ROUNDING)
 
-    pace = Pace(np.maximum(rates.velocity * options.slot, SLOWEST), max(options.speed * options.slot, SLOWEST))
+    change, rise = rates.velocity * options.slot, rates.acceleration * options.slot**2
+    pace = Pace(np.maximum(change, SLOWEST), np.maximum(rise, SLOWEST), max(options.speed * options.slot, SLOWEST))
     return TimeSearch(worlds, pace, Ends(problem.start, goals, lower, upper, last_slot), rng), reaches_base
 
 
 def _why_impossible(search: TimeSearch, options: _Options, reaches_base: str) -> str:
     """Return the reason why there cannot be a plan, so that the search need not begin, or ""."""
     if options.slot * search.least_slots > options.horizon + ROUNDING:
-        return f"speeds allow no arrival before {options.slot * search.least_slots:g} s; raise horizon, speed or rate"
+        return f"limits allow no arrival before {options.slot * search.least_slots:g} s; raise horizon, speed or rate"
     if search.least_slots > search.ends.last:
         return f"{reaches_base}, before the goal can be reached"
     if not search.worlds.free(0, search.ends.start, search.ends.start):

@@ -26,7 +26,7 @@ from rrtik_ompl.world.world import World
 
 ROUNDING = 1e-9  # [m]: rounding of places that are computed from times
 MOST_WORLDS = 1024  # Worlds that are kept at once: each takes 0.5 to 1.5 MB, and there may be ten thousand slots.
-FINEST = 1e-4  # [m]: an obstacle that may touch the base within a way of this length counts as touching it
+FINEST = 5e-5  # [m]: an obstacle that may touch the base within a way of this length counts as touching it
 
 
 class ForeseenWorlds:

@@ -2,15 +2,17 @@
 
 It is RRT-Connect [4] in a space in which time only goes forward, as in ST-RRT* [70]. A sample has a time at which it
 can be reached from the start and from which a goal can be reached. The tree from the goals has many roots, one for each
-tried time of arrival. The latest arrival is early at first and is put off while nothing is found. Each motion that is
-found is shortened and made earlier. Then new trees look for others: in one round only for earlier arrivals, in the next
-round for any.
+tried time of arrival. The latest arrival is early at first and is put off while nothing is found. Each edge is a
+straight stretch from rest to rest that keeps the limits of speed and acceleration. The straight way to each goal is
+tried first. Each motion that is found is shortened and made earlier. Then new trees look for others: in one round only
+for earlier arrivals, in the next round for any.
 """
 
 from __future__ import annotations
 
-from collections import deque
 from dataclasses import dataclass
+from heapq import heappop, heappush
+from itertools import pairwise
 from typing import TypeAlias
 
 import numpy as np
@@ -18,22 +20,31 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.base.budget import Budget, Stop, no_stop
+from rrtik_ompl.model.transitions import without_repeats
+from rrtik_ompl.replanning.drrt_con import without_points_between
 from rrtik_ompl.replanning.in_time.foreseen import ForeseenWorlds
+from rrtik_ompl.replanning.in_time.pace import ROUNDING, Pace, Timing, stretch
 
-EXTENSION_SLOTS = 8  # largest number of slots of one extension
+EXTENSION_SLOTS = 8  # largest number of slots of one extension at full speed
 FIRST_HORIZON_RATIO = 1.5  # latest arrival at first, as a multiple of the least time
 HORIZON_ITERATIONS = 150  # The latest arrival is doubled after so many iterations without a motion.
 ROUND_ITERATIONS = 600  # iterations of a further round that looks for any arrival
 MAX_FRUITLESS_ROUNDS = 12  # The search ends after so many rounds running without an earlier arrival.
 WAIT_PROBABILITY = 0.1  # share of the extensions in which the robot stands still
-SHORTCUT_TRIES = 200  # random shortcuts that are tried for each motion
+SHORTCUT_TRIES = 30  # random shortcuts that are tried for each motion
+MOST_GOALS = 8  # goals to which the straight way is tried first
+PART_SLOTS = 8  # slots at full speed from a place where the arm may stop to the next one
+SLOWER = (0, 1, 3)  # slots that a stretch may take more than it needs
+
+# Stops along a straight piece of a way, its end included, and stretches that are checked, for the earliest timing of a
+# way: coarse for every way that is tried, fine for the straight ones and for the best so far.
+COARSE = (2, 300)
+FINE = (4, 3000)
 
 WAIT_WEIGHT = 0.2  # weight of a slot between two vertices, where a slot of necessary motion has weight 1
-ROUNDING = 1e-9  # [slots]
-NEVER = 1 << 40  # a finite number of slots that is larger than that of any plan
 
 Aim: TypeAlias = tuple[int, tuple[Vector, int]]  # a vertex, and the configuration and slot to grow towards
-Place: TypeAlias = tuple[int, int]  # slot, and index of a place along a motion
+Place: TypeAlias = tuple[int, int]  # slot, and index of a place along a way
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -75,7 +86,9 @@ class TimeSearch:
         self.pace = pace
         self.ends = ends
         self._rng = rng
-        self._least_slots_of_goals: NDArray[np.int64] = np.maximum(pace.whole_slots(ends.goals - ends.start), 1)
+        self._least_slots_of_goals: NDArray[np.int64] = np.maximum(pace.least_slots(ends.goals - ends.start), 1)
+        # An extension also speeds up and slows down.
+        self._extension = EXTENSION_SLOTS + int(np.ceil(min((pace.change / pace.rise).max(), 1e3)))
         self.least_slots = int(self._least_slots_of_goals.min())
         self.iterations = 0
         self._over: Stop = no_stop  # says whether the budget of the run is used up
@@ -97,36 +110,37 @@ class TimeSearch:
         self._trees[0].add(self.ends.start, 0, -1)
         self._arrivals_tried: set[tuple[int, int]] = set()
         self._must_be_earlier = earlier is not None
-        first_last_slot = int(np.ceil(FIRST_HORIZON_RATIO * self.least_slots)) + EXTENSION_SLOTS
+        first_last_slot = int(np.ceil(FIRST_HORIZON_RATIO * self.least_slots)) + self._extension
         self._last = min(self.ends.last, first_last_slot) if earlier is None else earlier
 
-    def run(self, budget: Budget) -> Matrix | None:
+    def run(self, budget: Budget) -> Timing | None:
         """Search until the budget is used up or no earlier arrival can be hoped for.
 
         Args:
             budget: Limits of wall time and iterations.
 
         Returns:
-            The motion with the earliest arrival: the configuration at the begin of each slot, shape (k, n); None if
-            none was found.
+            The motion with the earliest arrival; None if none was found.
         """
         self._over = budget.over
         most_iterations = np.inf if budget.iterations is None else budget.iterations
-        best: Matrix | None = None
+        best = self._straight()
         fruitless = 0  # rounds running without an earlier arrival
         iterations_of_round = 0
+        if best is not None:
+            self._begin_anew(best.arrival - 1)
 
         while self.iterations < most_iterations and not (self._over() or self._is_done(best, fruitless)):
             self.iterations += 1
             iterations_of_round += 1
             patience = HORIZON_ITERATIONS if self._must_be_earlier else ROUND_ITERATIONS
-            rows = self._iterate()
-            rows = None if rows is None else self._improved(rows)
+            found = self._iterate()
+            found = None if found is None else self._improved(found)
 
-            if rows is not None and (best is None or len(rows) < len(best)):
-                best = rows
+            if found is not None and (best is None or found.arrival < best.arrival):
+                best = self._refined(found)
                 fruitless = 0
-            elif best is not None and (rows is not None or iterations_of_round >= patience):
+            elif best is not None and (found is not None or iterations_of_round >= patience):
                 fruitless += 1
             else:
                 if iterations_of_round % HORIZON_ITERATIONS == 0:
@@ -134,17 +148,30 @@ class TimeSearch:
                 continue
 
             iterations_of_round = 0
-            self._begin_anew(None if self._must_be_earlier else len(best) - 2)
+            self._begin_anew(None if self._must_be_earlier else best.arrival - 1)
         return best
 
-    def _is_done(self, best: Matrix | None, fruitless: int) -> bool:
-        """Check whether no earlier arrival than that of ``best`` is possible, or too many rounds were fruitless."""
-        return best is not None and (fruitless >= MAX_FRUITLESS_ROUNDS or len(best) - 1 <= self.least_slots)
+    def _straight(self) -> Timing | None:
+        """Return the earliest motion that goes straight to a goal, with waits; None if none was found."""
+        best: Timing | None = None
+        for goal in np.argsort(self._least_slots_of_goals, kind="stable")[:MOST_GOALS].tolist():
+            way = without_repeats(np.vstack([self.ends.start, self.ends.goals[goal]]))
+            last = self.ends.last if best is None else best.arrival - 1
+            best = self._timed(way, last, FINE) or best
+        return best
 
-    def _iterate(self) -> Matrix | None:
+    def _timed(self, way: Matrix, last: int, effort: tuple[int, int]) -> Timing | None:
+        """Return the earliest motion along a way, shape (k, n), see :func:`timed`."""
+        return timed(way, self.pace, self.worlds, last, self._over, effort)
+
+    def _is_done(self, best: Timing | None, fruitless: int) -> bool:
+        """Check whether no earlier arrival than that of ``best`` is possible, or too many rounds were fruitless."""
+        return best is not None and (fruitless >= MAX_FRUITLESS_ROUNDS or best.arrival <= self.least_slots)
+
+    def _iterate(self) -> Timing | None:
         """Add an arrival, extend one tree, and try to connect the other tree to the new vertex.
 
-        The trees take turns. Returns the motion, shape (k, n), if they meet, and else None.
+        The trees take turns. Returns the motion if they meet, and else None.
         """
         self._add_arrival()
         grown, other = self._trees[:: 1 if self.iterations % 2 else -1]
@@ -163,7 +190,7 @@ class TimeSearch:
             return None
 
         forward, backward = (new_vertex, end[0]) if grown.onward > 0 else (end[0], new_vertex)
-        return self._rows_through(forward, backward)
+        return self._through(forward, backward)
 
     def _add_arrival(self) -> None:
         """Add a root to the tree from the goals: a random goal in a random slot, if the goal is free then."""
@@ -184,14 +211,14 @@ class TimeSearch:
         if aim is None:
             return None
         vertex, to = aim
-        end = self._grow(tree, vertex, to, EXTENSION_SLOTS)
+        end = self._grow(tree, vertex, to, self._extension)
         return None if end is None else end[0]
 
     def _waiting(self, tree: TimeTree) -> Aim | None:
         """Return a random vertex and its own configuration some slots on, to wait; None if no slots are left."""
         vertex = int(self._rng.integers(tree.size))
         q = tree.q[vertex].copy()
-        slot = int(tree.slot[vertex]) + tree.onward * EXTENSION_SLOTS
+        slot = int(tree.slot[vertex]) + tree.onward * self._extension
         slot = min(max(slot, 0), self._last)
         return (vertex, (q, slot)) if tree.onward * (slot - int(tree.slot[vertex])) > 0 else None
 
@@ -201,8 +228,8 @@ class TimeSearch:
         Returns None if speed limits leave no slot for the configuration, or no vertex from which to reach it.
         """
         q = self._rng.uniform(self.ends.lower, self.ends.upper)
-        earliest = int(self.pace.whole_slots((q - self.ends.start)[None])[0])
-        latest = self._last - int(self.pace.whole_slots(self.ends.goals - q).min())
+        earliest = int(self.pace.least_slots((q - self.ends.start)[None])[0])
+        latest = self._last - int(self.pace.least_slots(self.ends.goals - q).min())
         if earliest > latest:
             return None
 
@@ -220,94 +247,71 @@ class TimeSearch:
             max_slots: Largest number of slots to go.
 
         Returns:
-            The new vertex, and whether it is the target; None if the first slot is blocked.
+            The new vertex, and whether it is the target; None if no stretch is free.
         """
         rows, complete = tree.rows_towards(vertex, *to, max_slots)
-        begin = int(tree.slot[vertex])
-        steps_free = self.worlds.steps_free(begin if tree.onward > 0 else begin - 1, rows, tree.onward, self._over)
-        if steps_free == 0:
-            return None
-        new_vertex = tree.add(rows[steps_free], begin + tree.onward * steps_free, vertex)
-        return new_vertex, complete and steps_free == len(rows) - 1
+        free = self._steps_free(tree, vertex, rows)
 
-    def _rows_through(self, forward: int, backward: int) -> Matrix:
+        # Where the stretch is blocked midway the arm is not at rest, so that it has to be shorter.
+        if 1 < free < len(rows) - 1:
+            rows, complete = tree.rows_towards(vertex, rows[free], int(tree.slot[vertex]) + tree.onward * free, free)
+            complete = False
+            free = self._steps_free(tree, vertex, rows)
+        if free == 0 or free < len(rows) - 1:
+            return None
+        return tree.add(rows[-1], int(tree.slot[vertex]) + tree.onward * free, vertex), complete
+
+    def _steps_free(self, tree: TimeTree, vertex: int, rows: Matrix) -> int:
+        """Return how many of the steps from row to row, shape (k, n), that begin at a vertex are free."""
+        begin = int(tree.slot[vertex])
+        return self.worlds.steps_free(begin if tree.onward > 0 else begin - 1, rows, tree.onward, self._over)
+
+    def _through(self, forward: int, backward: int) -> Timing:
         """Return the motion from the start to a goal through two vertices at the same place, one of each tree.
 
         Args:
             forward: Vertex of the tree from the start.
             backward: Vertex of the tree from the goals.
-
-        Returns:
-            The configuration at the begin of each slot, shape (k, n).
         """
         first, before = self._trees[0].branch(forward)
         second, after = self._trees[1].branch(backward)
         rows = np.vstack([first, second[::-1][1:]])
-        slots = np.concatenate([before, after[::-1][1:]])
-        return each_slot(rows, slots)
+        return Timing(rows, np.concatenate([before, after[::-1][1:]]))
 
-    def _improved(self, rows: Matrix) -> Matrix:
-        """Shorten a motion, shape (k, n), and make it earlier, in turn, until it no longer becomes earlier."""
-        while True:
-            rows = self._shortened(rows)
-            earlier = retimed(rows, self.pace, self.worlds, len(rows) - 2, self._over)
-            if earlier is None:
-                return rows
-            rows = earlier
+    def _improved(self, motion: Timing) -> Timing:
+        """Make a motion earlier: along its own way, then by random shortcuts of the way that take fewer slots."""
+        way = without_points_between(without_repeats(motion.rows))
+        motion = self._timed(way, motion.arrival - 1, COARSE) or motion
 
-    def _shortened(self, rows: Matrix) -> Matrix:
-        """Replace random pieces of a motion, shape (k, n), by straight ones if shorter and free; same arrival."""
         for _ in range(SHORTCUT_TRIES):
-            if len(rows) < 3 or self._over():
+            if len(way) < 3 or self._over():
                 break
-            a, b = sorted(self._rng.choice(len(rows), 2, replace=False).tolist())
-            straight = each_slot(rows[[a, b]], np.array([0, b - a]))
-            shorter = _length(straight) < _length(rows[a : b + 1]) - 1e-9
-            if shorter and self.worlds.steps_free(a, straight, 1, self._over) == b - a:
-                rows = np.vstack([rows[:a], straight, rows[b + 1 :]])
+            shorter = self._shortcut(way)
+            if self._least(shorter) >= self._least(way) - ROUNDING:
+                continue
+            found = self._timed(shorter, motion.arrival, COARSE)
+            if found is not None:
+                motion = found
+                way = shorter
+        return motion
 
-        return rows
+    def _refined(self, motion: Timing) -> Timing:
+        """Make a motion earlier along its own way, with more places where the arm may stop."""
+        way = without_points_between(without_repeats(motion.rows))
+        return self._timed(way, motion.arrival - 1, FINE) or motion
 
+    def _shortcut(self, way: Matrix) -> Matrix:
+        """Return a way, shape (k, n), with the piece between two random points on it replaced by a straight one."""
+        a, b = np.sort(self._rng.uniform(0.0, len(way) - 1.0, 2))
+        # Half of the ends are corners, so that corners can vanish.
+        a, b = (float(np.round(x)) if self._rng.random() < 0.5 else float(x) for x in (a, b))
+        ends = [way[int(x)] + (x - int(x)) * (way[min(int(x) + 1, len(way) - 1)] - way[int(x)]) for x in (a, b)]
+        pieces = [way[: int(np.floor(a)) + 1], np.array(ends), way[int(np.ceil(b)) :]]
+        return without_points_between(without_repeats(np.vstack(pieces)))
 
-def each_slot(rows: Matrix, slots: NDArray[np.int64]) -> Matrix:
-    """Interpolate configurations linearly, for every slot from the first to the last one.
-
-    Args:
-        rows: Configurations, shape (m, n).
-        slots: The slot of each row, increasing, shape (m,).
-
-    Returns:
-        Shape (k, n), one row for each slot.
-    """
-    clock = np.arange(slots[0], slots[-1] + 1)
-    return np.stack([np.interp(clock, slots, column) for column in rows.T], axis=1)
-
-
-def _length(rows: Matrix) -> float:
-    return float(np.linalg.norm(np.diff(rows, axis=0), axis=1).sum())
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Pace:
-    """How far a robot goes in a slot.
-
-    Attributes:
-        change: Largest change of each joint [rad or m], shape (n,).
-        step: Largest step of the configuration, joints counted alike [unit of the space]; inf for no bound.
-    """
-
-    change: Vector
-    step: float
-
-    def slots(self, moves: Matrix) -> Vector:
-        """Return the least number of slots that each of the moves, shape (m, n), takes, as fractions; shape (m,)."""
-        joints = (np.abs(moves) / self.change).max(axis=1)
-        slots: Vector = np.maximum(joints, np.linalg.norm(moves, axis=1) / self.step)
-        return slots
-
-    def whole_slots(self, moves: Matrix) -> NDArray[np.int64]:
-        """Return the same number rounded up to whole slots, at most ``NEVER``; shape (m,)."""
-        return np.minimum(np.ceil(self.slots(moves) - ROUNDING), NEVER).astype(np.int64)
+    def _least(self, way: Matrix) -> float:
+        """Return the slots that a way, shape (k, n), takes with a stop at each corner."""
+        return float(self.pace.slots(np.diff(way, axis=0)).sum())
 
 
 class TimeTree:
@@ -368,7 +372,7 @@ class TimeTree:
         return int(reachable[(needed[reachable] + WAIT_WEIGHT * gap[reachable]).argmin()])
 
     def rows_towards(self, vertex: int, q: Vector, slot: int, max_slots: int) -> tuple[Matrix, bool]:
-        """Interpolate slot by slot from a vertex straight towards a configuration.
+        """Return a stretch from a vertex straight towards a configuration, slot by slot, as far as the slots suffice.
 
         Args:
             vertex: The vertex to start from.
@@ -379,12 +383,13 @@ class TimeTree:
         Returns:
             Configurations, shape (k, n), that of the vertex first, and whether the last one is the target.
         """
+        begin = self._q[vertex]
         gap = abs(slot - int(self._slot[vertex]))
-        shares = np.arange(min(gap, max_slots) + 1)[:, None] / gap
-        rows: Matrix = self._q[vertex] + shares * (q - self._q[vertex])
-        if gap <= max_slots:
-            rows[-1] = q
-        return rows, gap <= max_slots
+        slots = min(gap, max_slots)
+        share = min(slots / gap, self._pace.reach(q - begin, slots))
+        complete = gap <= max_slots and share >= 1.0 - ROUNDING
+        end = q if complete else begin + share * (q - begin)
+        return stretch(begin, end, slots, self._pace), complete
 
     def branch(self, vertex: int) -> tuple[Matrix, NDArray[np.int64]]:
         """Return the branch from the root to a vertex: configurations, shape (k, n), and slots, shape (k,)."""
@@ -394,70 +399,98 @@ class TimeTree:
         return self._q[numbers[::-1]], self._slot[numbers[::-1]]
 
 
-def at_full_speed(rows: Matrix, pace: Pace) -> Matrix:
-    """Return places along a polyline, shape (k, n), about one slot at full speed apart; both ends stay.
+def timed(
+    way: Matrix, pace: Pace, worlds: ForeseenWorlds, last: int, stop: Stop, effort: tuple[int, int] = FINE
+) -> Timing | None:
+    """Follow a way with the earliest arrival.
 
-    The number of slots is rounded up and they are made equal, so no speed limit is exceeded. Shape (m, n).
-    """
-    slots_along = np.concatenate([[0.0], np.cumsum(pace.slots(np.diff(rows, axis=0)))])
-    moving = np.concatenate([[True], np.diff(slots_along) > 0.0])
-    count = max(int(np.ceil(slots_along[-1] - 1e-9)), 1)
-    slots_of_places = slots_along[-1] * np.arange(count + 1) / count
-    places = np.stack([np.interp(slots_of_places, slots_along[moving], column) for column in rows[moving].T], axis=1)
-    places[[0, -1]] = rows[[0, -1]]
-    return places
-
-
-def retimed(rows: Matrix, pace: Pace, worlds: ForeseenWorlds, max_slots: int, stop: Stop) -> Matrix | None:
-    """Follow a path with the fewest slots of time.
-
-    Along a fixed path only its timing is left to choose, as in the decomposition of [71]. Here it is chosen in whole
-    slots: in each slot the robot goes on at full speed to the next place, or stands still. A breadth-first search with
-    a double-ended queue (going on costs 0, standing still costs 1) finds the timing with the fewest slots of waiting.
+    Along a fixed path only its timing is left to choose, as in the decomposition of [71]. Here the arm stops at the
+    corners, and may stop at some places between them. It goes from stop to stop in a stretch that may take more slots
+    than it needs, or waits. A best-first search finds the earliest arrival; stretches are checked when they are due.
 
     Args:
-        rows: The configuration at the begin of each slot, shape (k, n).
-        pace: How far the robot can go in a slot.
+        way: The corners, shape (k, n).
+        pace: How fast the robot can go.
         worlds: Checks which motions are free in which slot.
-        max_slots: Largest number of slots of the result.
+        last: The last slot in which to arrive.
         stop: Ends the search without a result when it returns True.
+        effort: Largest number of stops along a straight piece, and of stretches that are checked.
 
     Returns:
-        The configuration at the begin of each slot, shape (m, n); None if there is no such timing.
+        The motion; None if there is none or too many were tried.
     """
-    places = at_full_speed(rows, pace)
-    last = len(places) - 1
-    begin = (0, 0)
-    previous: dict[Place, Place] = {begin: begin}
-    queue = deque([begin])  # ordered by the number of slots spent standing still
+    most_parts, most_stretches = effort
+    places, end_of_piece = _stops(way, pace, most_parts)
+    goal = len(places) - 1
+    least = _least_slots_left(places, end_of_piece, pace)
+    previous: dict[Place, Place] = {}
+    queue: list[tuple[int, int, int, Place]] = [(int(least[0]), 0, 0, (0, 0))]  # arrival, -place, slot, from where
 
-    while queue and not stop():
-        slot, k = queue.popleft()
-        if k == last:
-            return places[_numbers(previous, (slot, k))]
-        if slot + last - k > max_slots:
+    checked = 0
+    while queue and checked < most_stretches and not stop():
+        _, minus_place, slot, before = heappop(queue)
+        number = -minus_place
+        if (slot, number) in previous:
             continue
+        checked += slot > 0
+        if slot and not _stretch_free(places, before, (slot, number), pace, worlds, stop):
+            continue
+        previous[slot, number] = before
+        if number == goal and slot:
+            return _timing(places, previous, (slot, number))
 
-        # Going on comes last and is added on the left, so it is taken before standing still.
-        for advance in (0, 1):
-            place = (slot + 1, k + advance)
-            if place in previous or (not advance and slot + 1 + last - k > max_slots):
-                continue
-            if worlds.free(slot, places[k], places[k + advance]):
-                previous[place] = (slot, k)
-                if advance:
-                    queue.appendleft(place)
-                else:
-                    queue.append(place)
-
+        for after in range(number, int(end_of_piece[number]) + 1):
+            for slots in _slots_of(places[after] - places[number], pace):
+                arrival = slot + slots + int(least[after])
+                if arrival <= last:
+                    heappush(queue, (arrival, -after, slot + slots, (slot, number)))
     return None
 
 
-def _numbers(previous: dict[Place, Place], end: Place) -> list[int]:
-    """Return the index of the place in each slot, from the first slot to ``end``."""
-    numbers = [end[1]]
-    place = end
-    while previous[place] != place:
-        place = previous[place]
-        numbers.append(place[1])
-    return numbers[::-1]
+def _slots_of(move: Vector, pace: Pace) -> list[int]:
+    """Return how many slots a stretch may take, or 1 for a wait."""
+    if not move.any():
+        return [1]
+    needed = int(pace.whole_slots(move[None])[0])
+    return [needed + more for more in SLOWER]
+
+
+def _stops(way: Matrix, pace: Pace, most_parts: int) -> tuple[Matrix, NDArray[np.int64]]:
+    """Return the places of a way where the arm may stop, and the last place that is straight ahead of each."""
+    places = [way[:1]]
+    counts = []
+    for a, b in pairwise(way):
+        parts = int(np.clip(pace.slots((b - a)[None])[0] / PART_SLOTS, 1, most_parts))
+        shares = np.arange(1, parts + 1)[:, None] / parts
+        places.append(a + shares * (b - a))
+        places[-1][-1] = b
+        counts.append(parts)
+    piece_ends = np.cumsum(counts, dtype=np.int64)
+    last = int(piece_ends[-1]) if counts else 0
+    ends = np.append(np.repeat(piece_ends, counts), last)
+    return np.vstack(places), ends
+
+
+def _least_slots_left(places: Matrix, end_of_piece: NDArray[np.int64], pace: Pace) -> NDArray[np.int64]:
+    """Return the least number of slots from each place to the last one, shape (k,)."""
+    least = np.zeros(len(places), dtype=np.int64)
+    for k in range(len(places) - 2, -1, -1):
+        end = int(end_of_piece[k])
+        least[k] = least[end] + int(pace.whole_slots((places[end] - places[k])[None])[0])
+    return least
+
+
+def _stretch_free(places: Matrix, begin: Place, end: Place, pace: Pace, worlds: ForeseenWorlds, stop: Stop) -> bool:
+    """Check whether the stretch from place to place, or the wait at one, is free in each of its slots."""
+    (slot, a), (end_slot, b) = begin, end
+    rows = stretch(places[a], places[b], end_slot - slot, pace)
+    return worlds.steps_free(slot, rows, 1, stop) == end_slot - slot
+
+
+def _timing(places: Matrix, previous: dict[Place, Place], end: Place) -> Timing:
+    """Return the motion that ends at a place and a slot."""
+    stops = [end]
+    while stops[-1] != (0, 0):
+        stops.append(previous[stops[-1]])
+    slots, numbers = np.array(stops[::-1], dtype=np.int64).T
+    return Timing(places[numbers], slots)
