@@ -109,9 +109,9 @@ class FeedOutcome:
         seconds: Processor time of its ticks [s].
         duration: Time of the run [s].
         faults: How many of each kind there were.
-        proven, moving, told, untold: Ticks with contact in which the move is called proven; that go along a path
-            without a proof; in which the arm stands or evades, and the record says that an obstacle is too near or has
-            just come or grown; and in which it does not.
+        proven, moving, told, untold: Ticks with contact in which the move is called proven; and of the others those in
+            which the arm goes along its path without a word, those of which the record says that an obstacle is too
+            near or has come or changed, and those in which the arm stands or evades without a word.
     """
 
     outcome: str
@@ -229,14 +229,14 @@ def feed_outcome(name: str, seed: int, patience: float) -> FeedOutcome:
     for moment, event, *bodies in report.contacts:
         tick = run.ticks[min(int(moment * place.rate + 1e-6), len(run.ticks) - 1)]
         name = bodies[-1].partition("#")[0]
-        news = any(name in f.obstacle and f.kind in NEWS and moment - 1.0 <= f.time <= moment for f in run.faults)
+        news = any(name in f.obstacle and f.kind in NEWS and abs(moment - f.time) <= 1.0 for f in run.faults)
         told = tick.reason.startswith(WORDS) or news
         if tick.proven:
             kinds["proven"] += 1
-        elif event in ("plan", "walk", "repair"):
-            kinds["moving"] += 1
+        elif told:
+            kinds["told"] += 1
         else:
-            kinds["told" if told else "untold"] += 1
+            kinds["moving" if event in ("plan", "walk", "repair") else "untold"] += 1
 
     faults: Counter[str] = Counter(fault.kind for fault in run.faults)
     return FeedOutcome(
@@ -261,7 +261,7 @@ def main(
     report.table("Arrivals", head, rows)
 
     head = ["where", "feed_patience [s]", "runs with contact"]
-    head += ["move called proven", "move not proven", "with a word", "without"]
+    head += ["move called proven", "other move without a word", "with a word", "stands without a word"]
     rows = [[WHERE[name], f"{wait:g}", *_contacts(found)] for (name, wait), found in each.items()]
     report.table("Runs with contact, and ticks with contact", head, rows)
 
@@ -297,9 +297,8 @@ READING = (
     f"shape, from one moment to the next and in truth, and {SHARE:.0%} more appear, in truth too, on the arm if it is "
     f"there; once in each run, for {GLARE_SCENES} scenes, the feed shows a ball on the arm that is not there. The "
     f"UR5 reads the feed {RATE:g} times a second and keeps {1e3 * MARGIN:g} mm, the point {scenes.RATE:g} times and "
-    "keeps no margin; the speed bound is that of the "
-    "obstacles. A contact is judged by coal alone, five times a tick, against where everything was in truth. It has a "
-    "word if the arm stands or evades and the record says in that tick that an obstacle is too near, or within the "
-    "second before that this obstacle has appeared or has changed its size or shape. A contact in a move along a path "
-    "counts as one without a word, proven or not."
+    "keeps no margin; the speed bound is that of the obstacles. A contact is judged by coal alone, five times a tick, "
+    "against where everything was in truth. It has a word if the record does not call the move proven, and says in "
+    "that tick that an obstacle is too near, or within a second that this obstacle has appeared or has changed its "
+    "size or shape: before a scene shows that, nobody can say it."
 )

@@ -271,7 +271,7 @@ class Loop:
                 fault = self._where_it_appears(fault)
             self.run.faults.append(fault)
             if fault.kind in UNFORESEEN:
-                self._doubt_moves_since(self._snapshot.time)
+                self._doubt_moves_since(self._snapshot.seen_at(fault.obstacle))
             if fault.kind not in self._warned_faults:
                 self._warned_faults.add(fault.kind)
                 warnings.warn(FeedWarning(f"scene feed: {fault}"), stacklevel=6)

@@ -127,6 +127,7 @@ OF_COMMANDS = {  # arguments without an option, and options without an argument,
     "replan --foreseen": {
         **dict.fromkeys(("rate", "speed", "margin"), "keys of the scenario's file"),
         "iterations": "what --seconds limits",
+        "goal": "that of the scenario's problem",
         "foreseen": "the function",
         "planner": "refused",
         "lookahead_ticks": "refused",
