@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from rrtik_ompl.ik.solve import solve_ik as solve_ik
     from rrtik_ompl.many import plan_many as plan_many
     from rrtik_ompl.model.certificate import Certificate as Certificate
+    from rrtik_ompl.model.certificate import TaskCertificate as TaskCertificate
     from rrtik_ompl.model.goal import GoalSet as GoalSet
     from rrtik_ompl.model.goal import JointGoal as JointGoal
     from rrtik_ompl.model.goal import MultiGoal as MultiGoal
@@ -128,7 +129,10 @@ else:
         ),
         "model.goal_kind": ("TaskRegion",),
         "model.path": ("JointPath",),
-        "model.certificate": ("Certificate",),
+        "model.certificate": (
+            "Certificate",
+            "TaskCertificate",
+        ),
         "files.kinds": ("load",),
         "description.catalog": (
             "list_problems",

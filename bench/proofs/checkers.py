@@ -12,8 +12,9 @@ import subprocess
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from copy import deepcopy
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from importlib.resources import files
@@ -27,6 +28,7 @@ from typer import Option
 from bench.proofs.cases import DENTED, FACES, random_path
 from bench.proofs.forgeries import FORGERS, Case, Forgery
 from bench.proofs.forgery_judge import Judge
+from bench.proofs.task_forgeries import TASK_FORGERS
 from bench.shared.parts import Parts
 from bench.shared.run import Run
 from rrtik_bench.report.machine import processes
@@ -35,11 +37,12 @@ from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.base.errors import InputError, RrtikError
 from rrtik_ompl.description.urdf import robot_from_urdf
 from rrtik_ompl.files.tables import json_value
-from rrtik_ompl.model.certificate import Route, from_document
+from rrtik_ompl.model.certificate import Route, from_document, task_from_document
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import ConstantVelocity, Obstacle, Scene, TimedPoses
 from rrtik_ompl.model.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, PointCloud, Prism, Sphere
 from rrtik_ompl.motion.trajectory.splines import Splines
+from rrtik_ompl.tasks import Task
 from rrtik_ompl.world.certificate_check import certificate_fault
 from rrtik_ompl.world.world import World
 from rrtik_robots.example_arms import data_folder
@@ -211,7 +214,11 @@ class Script:
             "path.json": json.dumps(path),
             str(scene): _written(forgery.world.scene, scene),
         }
-        job = {"files": arm.files, "texts": texts, "clearance": forgery.clearance}
+        return self.fault_of(arm, texts, forgery.clearance)
+
+    def fault_of(self, arm: Arm, texts: Mapping[str, str], clearance: float) -> str:
+        """Return why the certificate among files that are given by name does not hold, "" if it does."""
+        job = {"files": arm.files, "texts": dict(texts), "clearance": clearance}
         stdin, stdout = self._process.stdin, self._process.stdout
         assert stdin is not None
         assert stdout is not None
@@ -289,6 +296,50 @@ def compared(name: str, seed: int, true: int, forged: int) -> Count:
     return count
 
 
+TASKS = {"titan4_drawer": "titan4", "panda_pick_place": "panda"}  # each with its arm
+
+
+def tasks_compared(name: str, seed: int, forged: int) -> Count:
+    """Count what both checkers say of the certificate of a task, and of so many forgeries of it."""
+    count = Count()
+    rng = np.random.default_rng(seed)
+    with tempfile.TemporaryDirectory() as place, script() as page:
+        arm = arm_of(TASKS[name], Path(place))
+        plan = Task.load(name).plan(seed=seed)
+        made = plan.certificate()
+        plan.save(Path(place) / "plan.json")
+        text = (Path(place) / "plan.json").read_text()
+
+        def faults(document: dict[str, Any]) -> tuple[str, str]:
+            texts = {"certificate.json": json.dumps(document), "plan.json": text}
+            begin = time.process_time()
+            try:
+                ours = plan.verify(task_from_document(document))
+            except InputError as error:
+                ours = str(error)
+            middle = time.perf_counter()
+            theirs = page.fault_of(arm, texts, 0.0)
+            count.seconds.append((time.process_time() - begin, time.perf_counter() - middle))
+            return ours, theirs
+
+        document = json.loads(json.dumps(made.document())) if made is not None else {}
+        said = faults(document)
+        count.true = 1
+        count.accepted = int(not any(said))
+        if any(said):
+            count.wrong.append(f"{name}: true, refused: {said}")
+        for k in range(forged):
+            kind, forger = list(TASK_FORGERS.items())[k % len(TASK_FORGERS)]
+            changed = forger(deepcopy(document), rng)
+            if changed is not None:
+                said = faults(changed)
+                count.forged[kind] = count.forged.get(kind, 0) + 1
+                count.refused[kind] = count.refused.get(kind, 0) + all(said)
+                count.wrong += [] if all(said) else [f"{name}: {kind}, accepted: {said}"]
+        del count.seconds[1:]
+    return count
+
+
 def forge(
     count: Count, case: Case, arm: Arm, page: Script, folder: Path, forged: int, rng: np.random.Generator
 ) -> None:
@@ -330,26 +381,31 @@ def main(
         for seed in range(math.ceil(true * share / whole / ROUND))
     ]
     found = parts(compared, wanted)
+    of_tasks = parts(tasks_compared, [(name, 1, 10 * forged) for name in TASKS])
 
     report = Report("Two checkers of certificates", run.command, processes(run.jobs), intro=INTRO)
-    accepted, total = (sum(getattr(each, name) for each in found) for name in ("accepted", "true"))
+    everything = [*found, *of_tasks]
+    accepted, total = (sum(getattr(each, name) for each in everything) for name in ("accepted", "true"))
     forgeries, refused = (
-        sum((Counter(getattr(each, name)) for each in found), Counter[str]()) for name in ("forged", "refused")
+        sum((Counter(getattr(each, name)) for each in everything), Counter[str]()) for name in ("forged", "refused")
     )
     report.bar("true certificates that both accept", "all", f"{accepted} of {total}", accepted == total)
     text = f"{refused.total()} of {forgeries.total()}"
     report.bar("forged certificates that both refuse", "all", text, refused == forgeries)
 
     rows = []
-    for name in shares:
+    for name in (*shares, *TASKS):
         own = [each for part, each in zip(wanted, found, strict=True) if part[0] == name]
+        own += [each for task, each in zip(TASKS, of_tasks, strict=True) if task == name]
         ours, script_s = 1e3 * np.array([pair for each in own for pair in each.seconds]).T
         count = f"{sum(each.accepted for each in own)} of {sum(each.true for each in own)}"
         rows.append([name, count, *(f"{np.median(x):.0f} / {x.max():.0f}" for x in (ours, script_s))])
-    report.table("True certificates", ["arm", "both accept", "ours [ms]", "the script [ms]"], rows, text=TRUE)
-    table = [[name, f"{forgeries[name]}", f"{refused[name]}"] for name in FORGERS]
+    report.table(
+        "True certificates", ["arm, kind or task", "both accept", "ours [ms]", "the script [ms]"], rows, text=TRUE
+    )
+    table = [[name, f"{forgeries[name]}", f"{refused[name]}"] for name in (*FORGERS, *TASK_FORGERS)]
     report.table("Forged certificates, by kind", ["kind", "forged", "both refuse"], table, text=FORGED)
-    wrong = [line for each in found for line in each.wrong]
+    wrong = [line for each in everything for line in each.wrong]
     if wrong:
         report.note("What one of them got wrong", "\n".join(f"- {line}" for line in wrong[:50]))
     return report

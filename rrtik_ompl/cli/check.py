@@ -12,7 +12,7 @@ import typer
 from rrtik_ompl.base.errors import InputError, in_file
 from rrtik_ompl.cli import FOUND, NOT_FOUND
 from rrtik_ompl.cli.task import plan_lines
-from rrtik_ompl.cli.terminal import ProblemName, command, progress, say, suggest
+from rrtik_ompl.cli.terminal import ProblemName, command, plural, progress, say, suggest
 
 if TYPE_CHECKING:
     from rrtik_ompl.model.certificate import Certificate
@@ -50,9 +50,9 @@ def check(
     from rrtik_ompl.files.kinds import kind_of
 
     if kind_of(problem) == "TaskPlan":
-        if path is not None or certificate is not None:
-            raise typer.BadParameter("the plan of a task holds its paths; leave the path and '--certificate' out.")
-        return _check_task_plan(problem)
+        if path is not None:
+            raise typer.BadParameter("the plan of a task holds its paths; leave the path out.")
+        return _check_task_plan(problem) if certificate is None else _check_task_certificate(problem, certificate)
     if certificate is not None and path is None:
         raise typer.BadParameter("'--certificate' needs the path that the certificate is for.")
 
@@ -261,3 +261,16 @@ def _check_task_plan(name: str) -> int:
         say(*(f"  motion {number + 1} stands on a contact: {each}" for each in (*for_a_while, *throughout)))
     say(*(f"not valid: {fault.reason}" for motion in faults for fault in motion))
     return NOT_FOUND if wrong else FOUND
+
+
+def _check_task_certificate(name: str, file: Path) -> int:
+    """Check the certificate of a saved plan; print the result and return the exit code."""
+    from rrtik_ompl.model.certificate import TaskCertificate
+    from rrtik_ompl.tasks import TaskPlan
+
+    certificate = TaskCertificate.load(file)
+    fault = TaskPlan.load(name).verify(certificate)
+    entries = sum(part.entries for part in certificate.parts)
+    proven = f"holds: {plural(len(certificate.parts), 'part')} proven free, {entries} entries"
+    say(f"{file}: does not hold: {fault}" if fault else f"{file}: {proven}")
+    return NOT_FOUND if fault else FOUND

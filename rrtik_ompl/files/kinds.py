@@ -66,6 +66,12 @@ KINDS = MappingProxyType(
             kind="path_certificate",
             words=("motions",),
         ),
+        "TaskCertificate": Kind(
+            "a certificate of a task",
+            "model.certificate:TaskCertificate",
+            "model.certificate:read_task_certificate",
+            kind="task_certificate",
+        ),
         "JointPath": Kind(
             "a path",
             "model.path:JointPath",

@@ -23,9 +23,11 @@ from rrtik_ompl.files.text import known_ending, read_text, write_text
 
 VERSION = 2
 KIND = "path_certificate"
+TASK_KIND = "task_certificate"
+MOST_PARTS = 10_000  # of a task
 IN_PATHS = "certificate"  # key of the certificate in the file of a path
 TIMED = ("times", "rates")  # fields of timed motions alone
-FURTHER = (*TIMED, "tracks")  # fields that may be absent
+FURTHER = (*TIMED, "tracks", "held", "base")  # fields that may be absent
 ORDERS = 5  # largest degree of the polynomials of timed motions
 FIELDS = (
     *("version", "kind", "robot", "joints", "bodies", "unchecked"),
@@ -152,6 +154,9 @@ class Certificate:
         times: Times of the waypoints of a timed motion [s], shape (k,); None for a path.
         rates: Derivatives at the beginning of its motions, as of :class:`Route`; None for a path.
         tracks: Poses of each obstacle that moves, at the times of the waypoints, shape (tracks, k, 12).
+        held: Values of joints that stand still where they are held, such as fingers, by name [rad or m].
+        base: Pose of the robot's root link in the world, 12 numbers; None if it is that of its description. Like
+            ``held`` it is for readers of the description: joints and bodies have it in their poses.
         version: Version of the format.
 
     Example:
@@ -175,6 +180,8 @@ class Certificate:
     times: NDArray[np.float64] | None = None
     rates: NDArray[np.float64] | None = None
     tracks: NDArray[np.float64] | None = None
+    held: tuple[tuple[str, float], ...] = ()
+    base: tuple[float, ...] | None = None
     version: int = VERSION
 
     __reduce__ = as_value
@@ -194,11 +201,15 @@ class Certificate:
             ways = [way if any(way) else [] for way in (motion.normals + 0.0).tolist()]
             motions.append([row + way for row, way in zip(rows, ways, strict=True)])
 
-        timed = {}
+        timed: dict[str, Any] = {}
         if self.times is not None and self.rates is not None:
             timed = {"times": self.times.tolist(), "rates": self.rates.tolist()}
         if self.tracks is not None:
             timed["tracks"] = self.tracks.tolist()
+        if self.held:
+            timed["held"] = dict(self.held)
+        if self.base is not None:
+            timed["base"] = list(self.base)
         return {
             "version": self.version,
             "kind": KIND,
@@ -235,6 +246,83 @@ class Certificate:
             rrtik_ompl.base.errors.InputError: absent.json: ...
         """
         return read(Certificate, file)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TaskCertificate:
+    """A proof that all motions of a task are free, each with what is held and what is in contact then.
+
+    Attributes:
+        parts: The certificates of the motions in their order. A motion during which contacts end has several.
+
+    Example:
+        >>> plan = rrtik.Task.load("titan4_drawer").plan(seed=1)
+        >>> certificate = plan.certificate()
+        >>> plan.verify(certificate)
+        ''
+    """
+
+    parts: tuple[Certificate, ...]
+
+    __reduce__ = as_value
+    __repr__ = in_one_line
+
+    def document(self) -> dict[str, Any]:
+        """Return plain data for JSON."""
+        return {"version": VERSION, "kind": TASK_KIND, "parts": [part.document() for part in self.parts]}
+
+    def save(self, file: str | os.PathLike[str]) -> None:
+        """Write the certificate to a JSON file, completely or not at all.
+
+        Raises:
+            InputError: If the file has another ending or cannot be written.
+        """
+        known_ending(file, (".json",), "certificate")
+        write_text(file, json.dumps(self.document(), separators=(",", ":")) + "\n")
+
+    @staticmethod
+    def load(file: str | os.PathLike[str]) -> TaskCertificate:
+        """Read a certificate of a task.
+
+        Raises:
+            InputError: If the file is missing, too large, or no such certificate; the message names file and field.
+        """
+        return read(TaskCertificate, file)
+
+
+def read_task_certificate(file: str | os.PathLike[str]) -> TaskCertificate:
+    """Read a certificate of a task; see :meth:`TaskCertificate.load`.
+
+    Raises:
+        InputError: If the file is missing, too large, or no such certificate; the message names file and field.
+    """
+    known_ending(file, (".json",), "certificate")
+    text = read_text(file)
+    try:
+        return task_from_document(json_value(text))
+    except InputError as error:
+        raise in_file(file, error) from None
+
+
+def task_from_document(document: object) -> TaskCertificate:
+    """Create a certificate of a task from plain data, the inverse of :meth:`TaskCertificate.document`.
+
+    Raises:
+        InputError: If a field is missing, unknown or of the wrong type; the message names it.
+    """
+    if not isinstance(document, dict) or set(document) != {"version", "kind", "parts"}:
+        raise InputError("expected an object with version, kind and parts; is this a certificate of a task?")
+    if document["kind"] != TASK_KIND or type(document["version"]) is not int or document["version"] != VERSION:
+        raise InputError(f"kind: expected {TASK_KIND!r}, version {VERSION}")
+    found = []
+    for k, part in enumerate(_list(document["parts"], "parts", MOST_PARTS)):
+        try:
+            if not isinstance(part, dict):
+                raise InputError("expected an object")
+            found.append(from_document(part))
+        except InputError as error:
+            raise InputError(f"parts[{k}]: {error}") from None
+    return TaskCertificate(tuple(found))
 
 
 def read_certificate(file: str | os.PathLike[str]) -> Certificate:
@@ -292,7 +380,7 @@ def from_document(document: Mapping[str, Any]) -> Certificate:
         remedy = "; make it again by rrtik plan --certificate" if document.get("version") == 1 else ""
         raise InputError(f"version: expected {VERSION}, got {document.get('version')!r}{remedy}")
 
-    timed = TIMED if any(name in document for name in FURTHER) else ()
+    timed = TIMED if any(name in document for name in (*TIMED, "tracks")) else ()
     for name in (*FIELDS, *timed, *document):
         if name not in document or name not in (*FIELDS, *FURTHER):
             raise InputError(f"{name}: " + ("unknown field" if name in document else "missing; every field is needed"))
@@ -331,7 +419,15 @@ def from_document(document: Mapping[str, Any]) -> Certificate:
         times,
         rates,
         tracks,
+        _held(document.get("held", {})),
+        tuple(_numbers(document["base"], (POSE,), "base").tolist()) if "base" in document else None,
     )
+
+
+def _held(given: object) -> tuple[tuple[str, float], ...]:
+    if not isinstance(given, dict):
+        raise InputError("held: expected names of joints with values")
+    return tuple((name, _number(value, f"held: '{name}'")) for name, value in given.items())
 
 
 def _joint(given: object, where: str) -> ModelJoint:

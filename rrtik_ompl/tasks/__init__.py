@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.base.arrays import Vector, finite_array, frozen, positive, seed_of
+from rrtik_ompl.base.arrays import Vector, finite_array, frozen, not_negative, positive, seed_of
 from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.copies import in_one_line
 from rrtik_ompl.base.errors import InputError, require
 from rrtik_ompl.files.kinds import read, write
 from rrtik_ompl.geometry.collision.distances import measured
+from rrtik_ompl.model.certificate import TaskCertificate
 from rrtik_ompl.model.goal_kind import TaskRegion
 from rrtik_ompl.model.judgement import Violation
 from rrtik_ompl.model.path import JointPath, path_through
@@ -163,6 +164,38 @@ class TaskPlan:
                 faults += rest.violations(world_from(world, stood_on, until))
             faults_of_motions.append(tuple(faults))
         return tuple(faults_of_motions)
+
+    def certificate(self, clearance: float = 0.0) -> TaskCertificate | None:
+        """Certify all motions, each with what is held and what is in contact then; None if one is not proven.
+
+        Motions of fingers between them, and path constraints, are not part of it.
+
+        Args:
+            clearance: Distance kept from every obstacle on top of its margin [m].
+
+        Example:
+            >>> plan = rrtik.Task.load("titan4_drawer").plan(seed=1)
+            >>> plan.certificate().save("proof.json")
+        """
+        from rrtik_ompl.tasks.certified import certificate_of_task
+
+        return certificate_of_task(self, not_negative(clearance, "clearance"))
+
+    def verify(self, certificate: TaskCertificate, *, clearance: float = 0.0) -> str:
+        """Verify a certificate of the plan: return its first fault in one line, or "" if it proves all motions free.
+
+        The contacts that the plan states have to be true, and all things where the motion before has left them.
+
+        Args:
+            certificate: The certificate; nothing in it is trusted.
+            clearance: Least distance that motions have to keep from obstacles on top of their margins [m].
+        """
+        from rrtik_ompl.tasks.certified import fault_of_task
+
+        require(certificate, TaskCertificate, "certificate", "TaskPlan.certificate() makes one")
+        untrue = next((each for motion in self._standing_faults() for each in motion), None)
+        fault = "" if untrue is None else untrue.reason
+        return fault or fault_of_task(certificate, self, not_negative(clearance, "clearance"))
 
     def time_parameterize(
         self,

@@ -12,7 +12,6 @@ verifier searches for nothing: it only checks what the certificate states.
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Iterator, Sequence
 from itertools import zip_longest
 from typing import TYPE_CHECKING
@@ -91,7 +90,7 @@ def bodies_of_route(
         InputError: If an obstacle changes its way between two waypoints.
     """
     named = named_bodies(bodies)
-    if scene is None or not route.moving or route.times is None:
+    if scene is None or not route.moving or route.times is None or all(o.motion is None for o in scene.obstacles):
         return named, None
     return tracked_bodies(named, scene, len(robot.chain.parent), route.times)
 
@@ -521,15 +520,21 @@ class Motions:
         names = " and ".join(f"'{self.named[k].body.name}'" for k in self.pairs[pair])
         return f"motion {motion + 1}: {names} are not shown apart from {begin:g} to {begin + width:g} of it"
 
-    def fault(self, motions: Sequence[MotionEntries]) -> str:
-        """Return the first fault of the entries of a certificate; "" if they prove all pairs apart in all motions."""
+    def fault(self, motions: Sequence[MotionEntries], *, sufficient: bool = False) -> str:
+        """Return the first fault of the entries of a certificate; "" if they prove all pairs apart in all motions.
+
+        Args:
+            motions: The entries of each motion.
+            sufficient: Whether it is known that they are sufficient if they hold, as :meth:`needed` finds.
+        """
         if fault := self._course.fault:
             return fault
         if fault := self._fault_of_numbers(motions):
             return fault
         entries = self._entries(motions)
         normals = np.concatenate([motion.normals for motion in motions])
-        return self._fault_of_entries(entries, normals) or self._fault_of_pairs(entries) or self._fault_of_insides()
+        fault = self._fault_of_entries(entries, normals) or ("" if sufficient else self._fault_of_pairs(entries))
+        return fault or self._fault_of_insides()
 
     def _fault_of_numbers(self, motions: Sequence[MotionEntries]) -> str:
         """Return the first entry that names no pair, node or interval."""
@@ -720,14 +725,13 @@ class Motions:
         own = [entries.motion == motion for motion in range(self._course.count)]
         return [MotionEntries(solids[k], intervals[k], normals[k]) for k in own]
 
-    def needed(self, motions: Sequence[MotionEntries]) -> Mask:
-        """Return which entries, all motions' one after the other, a certificate cannot do without."""
+    def needed(self, motions: Sequence[MotionEntries]) -> Mask | None:
+        """Return which entries, one motion after the other, a certificate cannot do without; None if some lack."""
         entries = self._entries(motions)
         known = self._known(entries)
-        if known.too_many:
-            return np.ones(len(entries.pair), dtype=bool)
         everything = self.everything
-        deque(self._stuck(everything, known), maxlen=0)
+        if known.too_many or next(self._stuck(everything, known), None) is not None:
+            return None
         used = known.used | (entries.first < 0)
 
         # What balls show at the ends and in the middle of an interval, they may show on its parts.

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError, cKDTree
 
 from rrtik_ompl.base.arrays import Matrix, Vector, distinct, frozen
+from rrtik_ompl.base.poses import pose_from_xyzw
 from rrtik_ompl.geometry.collision.bodies import Body
 from rrtik_ompl.geometry.collision.elements import (
     Elements,
@@ -47,6 +48,9 @@ from rrtik_ompl.world.coal_proof import PROVEN, CoalProof, suggest_planes
 # normals of planes are written with few digits.
 SPARE = 2e-6
 DIGITS = 6  # decimals of a normal
+# The same for bodies that come nearer to each other than SPARE allows, such as what is put down.
+CLOSE_SPARE = 1e-9
+CLOSE_DIGITS = 12
 FIRST_PARTS = 4  # of a mesh
 MOST_PARTS = 512  # of a mesh
 FINER = 4  # factor on the number of parts of what is not proven apart
@@ -200,15 +204,19 @@ def certificate_of(prover: Prover, route: Route, clearance: float, scene: Scene 
     if course.fault:
         return None
 
-    still = [Parts(each.elements, ()) for each in named]
-    slacks = Motions(robot.chain, named, still, compared, course, clearance).pushes.max(axis=0, initial=0.0) / 8.0
-    travels = course.travels(named, still)
+    slacks = np.zeros(course.count)
+    travels = np.zeros((len(named), course.count))
+    if route.times is not None:
+        whole = [Parts(each.elements, ()) for each in named]
+        slacks = Motions(robot.chain, named, whole, compared, course, clearance).pushes.max(axis=0, initial=0.0) / 8.0
+        travels = course.travels(named, whole)
     levels = _levels(slacks, travels)
-    for finer in range(FINER_CHORDS if levels.any() else 1):
-        chords = list(_chords(named, course, levels + finer, still))
+    finest = FINER_CHORDS if levels.any() else 1
+    for spare, digits, finer in [(SPARE, DIGITS, k) for k in range(finest)] + [(CLOSE_SPARE, CLOSE_DIGITS, finest - 1)]:
+        chords = list(_chords(named, course, levels + finer, travels))
         covers = [Cover(each.elements) for each in named]
-        slack = float((slacks * 0.25 ** (levels + finer)).max())
-        motions = _Table(robot, named, covers, compared, clearance, slack).proven(chords)
+        spare += float((slacks * 0.25 ** (levels + finer)).max())
+        motions = _Table(robot, named, covers, compared, clearance, spare, digits).proven(chords)
         if motions is not None:
             made = _model(prover, route, named, compared, covers, clearance, tracks)
             held = _holding(made, motions, robot.chain, named, compared, course)
@@ -224,11 +232,15 @@ def _levels(slacks: Vector, travels: Matrix) -> NDArray[np.int64]:
     return np.asarray(np.minimum(np.ceil(np.maximum(bent, passed)), FINEST_CHORDS), dtype=np.int64)
 
 
-def _chords(
-    named: Sequence[NamedBody], course: Course, levels: NDArray[np.int64], trees: Sequence[Parts]
-) -> Iterator[Chord]:
-    """Yield the chords of all motions, one after the other."""
-    travels = course.travels(named, trees)
+def _chords(named: Sequence[NamedBody], course: Course, levels: NDArray[np.int64], travels: Matrix) -> Iterator[Chord]:
+    """Yield the chords of all motions, one after the other.
+
+    Args:
+        named: The bodies.
+        course: The motions.
+        levels: Of the chords of each motion.
+        travels: How far each body goes at most in each motion, shape (bodies, motions) [m].
+    """
     moving = [k for k, each in enumerate(named) if each.body.joint > course.joints]
     for motion, level in enumerate(levels.tolist()):
         shares = np.linspace(0.0, 1.0, (1 << level) + 1)
@@ -260,8 +272,19 @@ def _model(
     model = robot.name, model_joints(robot), listed, unchecked
     moved = None if tracks is None else frozen(tracks[:, :, :3].reshape(*tracks.shape[:2], -1))
     return Certificate(
-        *model, clearance, prover.self_margin, frozen(route.waypoints), (), route.times, route.rates, moved
-    )
+        *model, clearance, prover.self_margin, frozen(route.waypoints), (), route.times, route.rates, moved,
+        *_description(robot),
+    )  # fmt: skip
+
+
+def _description(robot: Robot) -> tuple[tuple[tuple[str, float], ...], tuple[float, ...] | None]:
+    """Return the joints that are held, by name, and the pose of the base, as a robot's source states them."""
+    held = tuple((name, float(value)) for name, value in (robot.source.get("locked") or {}).items())
+    stated = robot.source.get("base_pose")
+    if stated is None:
+        return held, None
+    base = pose_from_xyzw(stated["xyz"], stated["quat_xyzw"])
+    return held, tuple(base.homogeneous[:3].ravel().tolist())
 
 
 def _holding(
@@ -278,6 +301,8 @@ def _holding(
     ordered = [verifier.in_order(motion) for motion in motions]
     fitting = ordered if certificate.times is None else verifier.fitted(ordered)
     needed = verifier.needed(fitting)
+    if needed is None:
+        return None
     ends = np.cumsum([len(motion.solids) for motion in fitting])
     kept = tuple(
         MotionEntries(
@@ -285,7 +310,7 @@ def _holding(
         )
         for motion, own in zip(fitting, np.split(needed, ends[:-1]), strict=True)
     )
-    return None if verifier.fault(kept) else replace(certificate, motions=kept)
+    return None if verifier.fault(kept, sufficient=True) else replace(certificate, motions=kept)
 
 
 @dataclass(eq=False)
@@ -297,7 +322,8 @@ class _Table:
     covers: Sequence[Cover]
     pairs: Sequence[tuple[int, int]]
     clearance: float
-    slack: float
+    spare: float
+    digits: int
 
     def proven(self, chords: Sequence[Chord]) -> list[MotionEntries] | None:
         """Return the entries of each motion, from the chords of all of them; None if one is not proven."""
@@ -351,7 +377,7 @@ class _Table:
         moving = [each for each, body in zip(self.named, bodies, strict=True) if each.body is not body]
         plain = self._plain(bodies)
         packed = proof_pairs(self.robot.chain, plain, self._arm_pairs, solids, strokes(self.robot), fixed=not moving)
-        packed.keep(self.clearance, SPARE + self.slack)
+        packed.keep(self.clearance, self.spare)
         return packed, nodes
 
     @cached_property
@@ -391,7 +417,7 @@ class _Table:
         for k, chord in enumerate(chords):
             if moved is not None:
                 moved.put(self._plain(chord.bodies), chord.room)
-                packed.keep(self.clearance, SPARE + self.slack)
+                packed.keep(self.clearance, self.spare)
             run = partial(proof_of_rows(packed, values[0, k : k + 1], values[1, k : k + 1], pair, place), 0, 1)
             if packed.touching:
                 suggest_planes(self.robot, chord.bodies, packed, chord.ends)
@@ -432,7 +458,7 @@ class _Table:
                 boxes.
         """
         over = np.array([cover.elements.key == "half_space" for cover in self.covers], dtype=bool)
-        normals = np.where(over[log.solids[:, 2]][:, None], 0.0, np.round(log.normals, DIGITS))
+        normals = np.where(over[log.solids[:, 2]][:, None], 0.0, np.round(log.normals, self.digits))
         intervals = log.intervals.copy()
         # A motion that stands still is logged as one interval, and covers all of it.
         if len(intervals) and (intervals == intervals[0]).all():

@@ -78,6 +78,7 @@ FILES = {
     },
     "Certificate": {"proof.json": saved(lambda: world().certificate(path()))},
     "ReplanRun": {"run.json": saved(lambda: rrtik.replan(problem(), step=0.1, rate=10.0, seconds=0.5, seed=1))},
+    "TaskCertificate": {"task_proof.json": saved(lambda: task().plan(seed=1).certificate())},
     "Task": {"task.yaml": saved(task)},
     "TaskPlan": {"plan.json": saved(lambda: task().plan(seed=1))},
     "Roadmap": {"map.npz": saved(lambda: rrtik.Roadmap(world(), vertices=5, seed=1))},

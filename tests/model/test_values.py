@@ -18,7 +18,7 @@ import pytest
 import rrtik_ompl as rrtik
 import rrtik_ompl.model
 from rrtik_ompl.base.copies import changed
-from rrtik_ompl.model.certificate import Certificate, ModelBody, ModelJoint, MotionEntries, Route
+from rrtik_ompl.model.certificate import Certificate, ModelBody, ModelJoint, MotionEntries, Route, TaskCertificate
 from rrtik_ompl.model.gripper import GripperEvent, GripperJoints
 from rrtik_ompl.model.judgement import (
     ClearanceCurve,
@@ -99,6 +99,7 @@ SAMPLES = {
     "Route": lambda: Route(POINTS, np.arange(3.0), np.ones((2, 1, 3)), moving=True),
     "Scene": lambda: rrtik.Scene([BALL]),
     "Sphere": lambda: rrtik.Sphere(0.1),
+    "TaskCertificate": lambda: TaskCertificate((SAMPLES["Certificate"](),)),
     "TaskRegion": lambda: rrtik.TaskRegion(AT, np.zeros((6, 2))),
     "TimedPoses": lambda: rrtik.replanning.TimedPoses([0.0, 1.0], [AT, AT]),
     "Touching": lambda: rrtik.Touching("cup", "table", -0.001),

@@ -2,7 +2,7 @@
 
 import pytest
 
-from bench.proofs.checkers import compared
+from bench.proofs.checkers import compared, tasks_compared
 from bench.proofs.forgeries import FORGERS
 
 pytestmark = pytest.mark.kernels
@@ -23,3 +23,10 @@ def test_both_accept_what_is_true_and_refuse_what_is_forged(arm, forged):
     assert found.wrong == []
     assert found.accepted == found.true == 1
     assert sum(found.refused.values()) == sum(found.forged.values()) == forged
+
+
+def test_both_accept_the_certificate_of_a_task_and_refuse_forged_ones():
+    found = tasks_compared("panda_pick_place", 1, 11)
+    assert found.wrong == []
+    assert found.accepted == 1
+    assert sum(found.refused.values()) >= 10

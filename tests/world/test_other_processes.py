@@ -64,6 +64,7 @@ VALUES = {
     "SingularityReport": lambda: singularity_report(planar(), [0, 0, 0]),
     "ReachMap": lambda: rrtik.ik.reach_map(planar(), samples=100),
     "Certificate": lambda: world().certificate(plan().path),
+    "TaskCertificate": lambda: rrtik.TaskCertificate((world().certificate(plan().path),)),
     "HeightField": lambda: rrtik.HeightField([[0.1, 0.2], [0.3, 0.4]], 0.1),
     "PointCloud": lambda: rrtik.PointCloud([[0, 0, 0], [0, 0, 1]], 0.1),
     "Roadmap": lambda: rrtik.Roadmap(world(), vertices=20, seed=1),

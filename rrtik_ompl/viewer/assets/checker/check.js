@@ -8,7 +8,7 @@ const VERSION = 2;
 const ROUNDING = 1e-8; // [m] added to every required gap
 const MEASURED = 1e-5; // [m] further gap where a distance of surfaces is measured
 const DEEPEST = 10; // level of an interval
-const MOST = { numbers: 1e6, bodies: 1e5, cuts: 1e5, entries: 1e6 };
+const MOST = { numbers: 1e6, bodies: 1e5, cuts: 1e5, entries: 1e6, parts: 1e4 };
 const FIELDS = ["kind", "version", "robot", "joints", "bodies", "unchecked", "clearance", "self_margin", "waypoints", "motions"];
 const FURTHER_FIELDS = ["times", "rates", "tracks", "held", "base"];
 const ORDERS = 5; // derivatives of a timed motion
@@ -162,7 +162,7 @@ function readingOf(file, own) {
   const stated = statedJoints(file);
   const base = poseOf(file.base ?? poseNumbers(IDENTITY));
   const arm = robot === null ? { joints: stated, carriers: statedCarriers(file, scene) } : armOf(robot, columnNames(file, robot), file.held ?? {}, base, stated);
-  const links = robot === null ? null : linkBodies(robot, arm, padding);
+  const links = robot === null ? null : linkBodies(robot, arm, padding, scene);
   const others = scene === null ? null : sceneBodies(scene, arm, padding, file.tracks !== undefined);
 
   // The file's bodies, one after the other: read, where a robot or a scene was given, else as the file states them.
@@ -173,7 +173,8 @@ function readingOf(file, own) {
     const number = next.get(list);
     next.set(list, number + 1);
     demand(number < list.length, `it is for another ${ownerOf(body)}: '${body.name}' is in the certificate alone`);
-    return { ...list[number], read: true };
+    // Without a scene nobody else tells what links are in contact with.
+    return { ...list[number], ...(scene === null ? { contacts: body.contacts } : {}), read: true };
   });
   for (const [list, number] of next) {
     if (list !== null && number < list.length) refuse(`it is for another ${ownerOf(list[number])}: '${list[number].name}' is not in the certificate`);
