@@ -377,6 +377,22 @@ def other_body(case: Case, rng: np.random.Generator) -> Forgery:
     return _given(case, document)
 
 
+def moved_base(case: Case, rng: np.random.Generator) -> Forgery:
+    """The certificate is of a robot that stands far away from everything, and says so in its `base`."""
+    document = deepcopy(case.document)
+    document["base"] = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, float(rng.uniform(20.0, 90.0))]
+    rooted = [joint for joint in document["joints"] if joint["parent"] == 0]
+    still = [body for body in document["bodies"] if body["joint"] == 0 and body["kind"] != "obstacle"]
+    for each in rooted + still:
+        each["pose"][11] += document["base"][11]
+    among = range(len(document["bodies"]))
+    links = {k for k in among if document["bodies"][k]["kind"] == "link"}
+    document["motions"] = [
+        [row for row in rows if {row[0], row[2 if len(row) > 4 else 1]} <= links] for rows in document["motions"]
+    ]
+    return _given(case, document)
+
+
 def missing_body(case: Case, rng: np.random.Generator) -> Forgery:
     """A body of the certificate is missing, or there twice."""
     document = deepcopy(case.document)
@@ -608,7 +624,7 @@ FORGERS: dict[str, Forger] = {
         turned_plane, tilted_plane, short_normal, dropped_entry, dropped_pair, dropped_motion, other_interval,
         other_part, no_such_part, swapped_bodies, other_count, other_cut,
         left_out_pair, raised_clearance, lowered_clearance, other_self_margin, other_margin,
-        other_joint, other_body, missing_body, moved_obstacle, other_obstacles, honest_model,
+        other_joint, other_body, moved_base, missing_body, moved_obstacle, other_obstacles, honest_model,
         untimed, other_times, other_rates, bulging_motion, other_track, other_motion,
         odd_value, raw_value, twice, other_field, cut_off,
     )

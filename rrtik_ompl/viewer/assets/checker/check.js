@@ -96,6 +96,8 @@ function checkForm(file) {
     cuts.forEach((cut, n) => demand(Array.isArray(cut) && cut.length === 3 && isCount(cut[0], 2 * n + 1) && isCount(cut[1], 3) && isNumber(cut[2]), `${where}: cut ${n}`));
   });
 
+  demand(file.held === undefined || (isObject(file.held) && Object.values(file.held).every(isNumber)), "held: expected values of joints by name");
+  demand(file.base === undefined || (areNumbers(file.base, 12) && isRigid(poseOf(file.base))), "base: expected a pose");
   demand(Array.isArray(file.unchecked), "unchecked: expected a list");
   const count = file.bodies.length;
   for (const pair of file.unchecked) demand(Array.isArray(pair) && pair.length === 3 && isCount(pair[1], count) && isCount(pair[0], pair[1]) && isText(pair[2]), "unchecked: expected rows [i, j, reason] with i < j");
@@ -161,6 +163,7 @@ function readingOf(file, own) {
   const padding = own.padding ?? {};
   const stated = statedJoints(file);
   const base = poseOf(file.base ?? poseNumbers(IDENTITY));
+  if (robot !== null) checkStance(file, base, own);
   const arm = robot === null ? { joints: stated, carriers: statedCarriers(file, scene) } : armOf(robot, columnNames(file, robot), file.held ?? {}, base, stated);
   const links = robot === null ? null : linkBodies(robot, arm, padding, scene);
   const others = scene === null ? null : sceneBodies(scene, arm, padding, file.tracks !== undefined);
@@ -182,6 +185,16 @@ function readingOf(file, own) {
   const tracks = (file.tracks ?? []).map((track) => track.map(poseOf));
   return { joints: arm.joints, bodies, tracks, readRobot: robot !== null, readScene: scene !== null };
 }
+
+/** The robot stands, and holds its joints, where the asker says: at the origin and at rest if nothing is said. */
+function checkStance(file, base, own) {
+  demand(near(poseNumbers(base), poseNumbers(own.base ?? IDENTITY)), `it is for another robot: its base stands at ${base.at.join(", ")}, which nothing here says (robot: {base_pose: ...} of a problem)`);
+  const held = file.held ?? {};
+  const words = Object.entries(held).map(([name, value]) => `${name} at ${value}`).join(", ");
+  demand(sameValues(held, own.held ?? {}), `it is for another robot: held are ${words || "no joints"}, which is not what is said here (robot: {locked: ...} of a problem)`);
+}
+
+const sameValues = (one, other) => Object.keys(one).length === Object.keys(other).length && Object.keys(one).every((key) => Math.abs(one[key] - other[key]) <= SAME);
 
 const ownerOf = (body) => (body.kind === "link" ? "robot" : "scene");
 

@@ -23,7 +23,7 @@ function readFiles(files, lookup) {
       take("robot", withMeshes(readUrdf(textOf(buffer), name), (mesh) => readMesh(fileOf(mesh, name, lookup), mesh)), "robot", name);
     }
   }
-  if (found.scene !== null) found.padding = paddingOf(found.scene.robot);
+  if (found.scene !== null) Object.assign(found, stanceOf(found.scene.robot, "robot"), { padding: paddingOf(found.scene.robot) });
   return found;
 }
 
@@ -61,6 +61,12 @@ function fileOf(name, from, lookup) {
   const buffer = lookup(name, from);
   if (buffer === null) throw new Error(`${from}: no file '${name}' here; give it too, or its folder`);
   return buffer;
+}
+
+/** Where a robot stands and which joints it holds, by a problem or a plan: {held, base}. */
+function stanceOf(robot, where) {
+  if (robot === null || typeof robot !== "object") return { held: {}, base: IDENTITY };
+  return { held: robot.locked ?? {}, base: posedBy(robot.base_pose ?? null, `${where}: base_pose`) };
 }
 
 /** The thickness that a problem file gives links: a number for all, or numbers by name. */

@@ -1,6 +1,6 @@
 // Plans of tasks of rrtik-ompl, in JSON: the parts that a certificate of the task has.
 
-/** Parts {scene, waypoints, held} of a plan: its motions, divided where contacts end. */
+/** Parts {scene, waypoints, held, base} of a plan: its motions, divided where contacts end. */
 function partsOfPlan(plan, file, lookup) {
   return listOf(plan.motions, file).flatMap((motion, k) => {
     const where = `${file}: motion ${k + 1}`;
@@ -10,7 +10,7 @@ function partsOfPlan(plan, file, lookup) {
     const last = motion.waypoints.length - 1;
     const partings = [...new Set(contacts.map((each) => each.until))].filter((until) => until !== null && until > 0 && until < last);
     const cuts = [0, ...partings.sort((a, b) => a - b), last];
-    const held = motion.robot?.locked ?? {};
+    const stance = stanceOf(motion.robot ?? null, where);
     return cuts.slice(0, -1).map((first, n) => {
       const known = (pair) => contacts.some((each) => [...each.pair].sort().join("|") === [...pair].sort().join("|"));
       const left = contacts.flatMap(({ pair, distance, until, then }) => {
@@ -18,7 +18,7 @@ function partsOfPlan(plan, file, lookup) {
         return then === null ? [] : [{ pair, distance: then }];
       });
       const scene = { ...whole, contacts: [...whole.contacts.filter(({ pair }) => !known(pair)), ...left] };
-      return { scene, waypoints: motion.waypoints.slice(first, cuts[n + 1] + 1), held };
+      return { scene, waypoints: motion.waypoints.slice(first, cuts[n + 1] + 1), ...stance };
     });
   });
 }
