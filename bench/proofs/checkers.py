@@ -381,7 +381,7 @@ def main(
         for seed in range(math.ceil(true * share / whole / ROUND))
     ]
     found = parts(compared, wanted)
-    of_tasks = parts(tasks_compared, [(name, 1, 10 * forged) for name in TASKS])
+    of_tasks = parts(tasks_compared, [(name, 1, 2 * forged) for name in TASKS])
 
     report = Report("Two checkers of certificates", run.command, processes(run.jobs), intro=INTRO)
     everything = [*found, *of_tasks]

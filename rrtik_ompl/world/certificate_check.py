@@ -654,6 +654,18 @@ class Motions:
         solids = np.where(turned[:, None], motion.solids[:, [2, 3, 0, 1]], motion.solids)
         return MotionEntries(solids, motion.intervals, np.where(turned[:, None], -motion.normals, motion.normals))
 
+    def with_passing(self, motion: MotionEntries) -> MotionEntries:
+        """Return entries, and one without a plane for each obstacle that passes what nothing moves."""
+        joints = [each.body.joint for each in self.named]
+        passing = [[i, 0, j, 0] for i, j in self.pairs if not any(0 < joints[k] <= self._course.joints for k in (i, j))]
+        if not passing:
+            return motion
+        return MotionEntries(
+            np.vstack([motion.solids, passing]),
+            np.vstack([motion.intervals, np.zeros((len(passing), 2), dtype=np.int64)]),
+            np.vstack([motion.normals, np.zeros((len(passing), 3))]),
+        )
+
     def fitted(self, motions: Sequence[MotionEntries]) -> list[MotionEntries]:
         """Halve the intervals of entries until each holds, then join halves where one plane holds on both.
 

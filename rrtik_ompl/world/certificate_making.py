@@ -67,8 +67,8 @@ FINER_CHORDS = 4  # number of levels that are tried
 CLOUDS = ("balls", "boxes")  # shapes of many elements that have nothing to do with each other
 
 if TYPE_CHECKING:
-    from rrtik_ompl.model.scene import Scene
     from rrtik_ompl.world.proof import Prover
+    from rrtik_ompl.world.world import World
 
 
 class Cover:
@@ -183,21 +183,21 @@ class Chord(NamedTuple):
     room: Sequence[float]
 
 
-def certificate_of(prover: Prover, route: Route, clearance: float, scene: Scene | None = None) -> Certificate | None:
+def certificate_of(prover: Prover, route: Route, clearance: float, world: World | None = None) -> Certificate | None:
     """Return the certificate of a motion; None if no planes are found that prove it.
 
     Args:
-        prover: Has the robot, the bodies and the pairs that are compared.
+        prover: Has the robot, the bodies, and the pairs of which a joint moves one.
         route: The motion.
         clearance: Distance to keep from obstacles [m].
-        scene: The scene, of a motion in which obstacles move.
+        world: Has the motions of obstacles, and all pairs, of a timed motion.
 
     Raises:
         InputError: If an obstacle changes its way between two waypoints.
     """
     robot = prover.robot
-    named, tracks = bodies_of_route(robot, prover.bodies, scene, route)
-    compared = compared_pairs(named, prover.pairs)
+    named, tracks = bodies_of_route(robot, prover.bodies, None if world is None else world.scene, route)
+    compared = compared_pairs(named, prover.pairs if world is None else world.pairs)
     if any(not named[k].elements.known for pair in compared for k in pair):
         return None
     course = Course(robot.chain, route, tracks)
@@ -298,7 +298,7 @@ def _holding(
     """Return a certificate with entries, without those that balls and boxes make needless; None if it does not hold."""
     trees = [Parts(each.elements, body.cuts) for each, body in zip(named, certificate.bodies, strict=True)]
     verifier = Motions(chain, named, trees, pairs, course, certificate.clearance)
-    ordered = [verifier.in_order(motion) for motion in motions]
+    ordered = [verifier.with_passing(verifier.in_order(motion)) for motion in motions]
     fitting = ordered if certificate.times is None else verifier.fitted(ordered)
     needed = verifier.needed(fitting)
     if needed is None:

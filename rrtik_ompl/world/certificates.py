@@ -51,7 +51,7 @@ def certificate_for(world: World, path: Certifiable, clearance: float) -> Certif
         return world.prover.certificate(rows, required_clearance)
     from rrtik_ompl.world.certificate_making import certificate_of  # few need it, and it loads scipy
 
-    return certificate_of(world.prover, route, required_clearance, world.scene)
+    return certificate_of(world.prover, route, required_clearance, world)
 
 
 def fault_of(certificate: Certificate, world: World, path: Certifiable, clearance: float) -> str:

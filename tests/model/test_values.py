@@ -55,12 +55,16 @@ def arm():
     return rrtik.load_robot("planar3")
 
 
+def certificate():
+    return Certificate("arm", (HINGE,), (LINK,), ((0, 1, "held"),), 0.001, 0.0, POINTS[:2], (ENTRIES,))
+
+
 SAMPLES = {
     "AttachedObject": lambda: rrtik.AttachedObject("tool", "tip", rrtik.Sphere(0.1), AT),
     "Box": lambda: rrtik.Box([1.0, 2.0, 3.0]),
     "Capsule": lambda: rrtik.Capsule(1.0, 2.0),
     "Cells": lambda: rrtik.Octree([[0, 0, 0]], [0.1]).clouds[0],
-    "Certificate": lambda: Certificate("arm", (HINGE,), (LINK,), ((0, 1, "held"),), 0.001, 0.0, POINTS[:2], (ENTRIES,)),
+    "Certificate": certificate,
     "Chain": lambda: arm().chain,
     "ClearanceCurve": lambda: CURVE,
     "ConstantVelocity": lambda: rrtik.replanning.ConstantVelocity([1.0, 0.0, 0.0]),
@@ -99,7 +103,7 @@ SAMPLES = {
     "Route": lambda: Route(POINTS, np.arange(3.0), np.ones((2, 1, 3)), moving=True),
     "Scene": lambda: rrtik.Scene([BALL]),
     "Sphere": lambda: rrtik.Sphere(0.1),
-    "TaskCertificate": lambda: TaskCertificate((SAMPLES["Certificate"](),)),
+    "TaskCertificate": lambda: TaskCertificate((certificate(),)),
     "TaskRegion": lambda: rrtik.TaskRegion(AT, np.zeros((6, 2))),
     "TimedPoses": lambda: rrtik.replanning.TimedPoses([0.0, 1.0], [AT, AT]),
     "Touching": lambda: rrtik.Touching("cup", "table", -0.001),

@@ -16,6 +16,7 @@ pytestmark = pytest.mark.kernels
         ("panda", 12),
         ("planar timed", len(FORGERS)),
         ("planar moving", len(FORGERS)),
+        ("ur5 moving", 3),
     ],
 )
 def test_both_accept_what_is_true_and_refuse_what_is_forged(arm, forged):
