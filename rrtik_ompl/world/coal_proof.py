@@ -9,12 +9,14 @@ apart, coal's distances between the meshes are used instead (:class:`CoalProof`)
 [16]: if the distance of two bodies at one configuration of a motion exceeds a bound on their approach within an
 interval around it, they are apart in the whole interval. Coal measures distances between surfaces, so one body could be
 wholly inside the other. This is checked once per motion, which suffices: a body cannot leave a closed surface without
-touching it. An open mesh of a link is measured with the faces of the boxes that it encloses.
+touching it. Parts of a motion that kernels prove for themselves need neither distances nor that check. An open mesh
+of a link is measured with the faces of the boxes that it encloses.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import cache
 from typing import TypeAlias
 
 import coal
@@ -41,7 +43,11 @@ DEEPEST_LEVEL = 9  # largest level of an interval in a bisection, 2^-9 of a moti
 # Factor on the bound of the approach of two bodies, because a verifier may bound it by other balls.
 APPROACH_SPARE = 1.01
 FAR_APART = 1e6  # [m]; a pair with the margin -FAR_APART is always proven apart
+HOPEFUL = 4.0  # factor on the width of an interval around a place that its distance makes sure of
+SLOWEST = 1e-9  # [m] least approach of two bodies over a motion that is divided by
 Numbers: TypeAlias = NDArray[np.int32]
+FramesAt: TypeAlias = Callable[[float], Matrix]
+PartProven: TypeAlias = Callable[[float, float], bool]  # of shares of a motion, its begin and its end
 Told: TypeAlias = tuple[MotionEntries, NDArray[np.int64]]  # the kernels' log of a motion; see CoalProof.settle
 
 
@@ -70,7 +76,14 @@ class CoalProof:
         has_mesh = is_solid[packed.bodies].any(axis=1) & ~is_hollow[packed.bodies].any(axis=1)
         self.links: Mask = has_mesh & ~packed.beside_obstacle & ~_groups(packed)
 
-    def settle(self, motion: Matrix, pair: Numbers, place: Vector, again: Callable[[], object]) -> NDArray[np.int64]:
+    def settle(
+        self,
+        motion: Matrix,
+        pair: Numbers,
+        place: Vector,
+        again: Callable[[], object],
+        part_proven: PartProven = lambda begin, end: False,
+    ) -> NDArray[np.int64]:
         """Prove pairs of links apart by coal, until a motion has no unproven pair or one that coal cannot settle.
 
         Each pair that coal proves apart is excluded from the table, and the kernels prove the motion again. The table
@@ -81,6 +94,7 @@ class CoalProof:
             pair: Index of the pair of the table that is not proven apart, shape (1,). Written in place; -1 for none.
             place: Share of the motion where its proof failed, shape (1,). Written in place.
             again: Lets the kernels prove the motion once more, and write ``pair`` and ``place``.
+            part_proven: Whether kernels prove a part of the motion, given as two shares; nothing is measured on it.
 
         Returns:
             Intervals on which coal proves two links apart, shape (n, 4): the numbers of the links, and the level and
@@ -90,15 +104,19 @@ class CoalProof:
         bodies = self.packed.bodies
         solids = self.packed.sides
 
+        @cache
+        def frames_at(share: float) -> Matrix:
+            return self._robot.chain.joint_frames((motion[0] + share * (motion[1] - motion[0]))[None])[0]
+
         original_margins = margins.copy()
         intervals_of_links = list[list[int]]()
         try:
             while pair[0] >= 0 and self.links[pair[0]]:
-                intervals = self._intervals(motion, int(pair[0]), float(place[0]))
-                if not intervals:
+                intervals = self._intervals(motion, int(pair[0]), float(place[0]), part_proven, frames_at)
+                if intervals is None:
                     break
                 intervals_of_links += [[*solids[pair[0], ::2].tolist(), *interval] for interval in intervals]
-                margins[self.links & (bodies == bodies[pair[0]]).all(axis=1)] = -FAR_APART
+                margins[np.flatnonzero(self.links & (bodies == bodies[pair[0]]).all(axis=1))] = -FAR_APART
                 again()
         finally:
             margins[:] = original_margins
@@ -118,8 +136,10 @@ class CoalProof:
         intervals_of_links = self.settle(motion, pair, place, lambda: logs.append(logged(self.packed, run)))
         return logs[-1], intervals_of_links
 
-    def _intervals(self, motion: Matrix, row: int, place: float) -> list[tuple[int, int]]:
-        """Cover a motion by intervals on each of which two bodies are apart, by bisection.
+    def _intervals(
+        self, motion: Matrix, row: int, place: float, part_proven: PartProven, frames_at: FramesAt
+    ) -> list[tuple[int, int]] | None:
+        """Cover what kernels do not prove of a motion by intervals on each of which two bodies are apart, by bisection.
 
         The distance in the middle of an interval is compared with a bound on how far the bodies approach each other in
         half of it. Where it is too small the interval is halved.
@@ -128,9 +148,11 @@ class CoalProof:
             motion: Start and end configuration, shape (2, dof).
             row: Index of the pair in the table.
             place: Share of the motion where the kernels failed; it is measured first.
+            part_proven: As of :meth:`settle`.
+            frames_at: The pose of every joint frame at a share of the motion.
 
         Returns:
-            Level and number of each interval; number k of level n is [k, k + 1] / 2^n of the motion. Empty if the
+            Level and number of each interval; number k of level n is [k, k + 1] / 2^n of the motion. None if the
             bodies are not proven apart on the whole motion.
         """
         pair = [self._bodies[k] for k in self.packed.bodies[row].tolist()]
@@ -141,45 +163,61 @@ class CoalProof:
         )
         # Bodies that may overlap cannot be settled, for coal measures the distance of surfaces alone.
         if required_gap <= 0.0:
-            return []
-        if Containment((*pair,), ((0, 1),)).holds((0, 1), self._robot.chain.joint_frames(motion[:1])[0]):
-            return []
+            return None
 
         def spare_at(share: float) -> float:
             """Return the distance of the bodies at a share of the motion minus the required gap [m]."""
-            return _gap_at(self._robot, solid, motion[0] + share * (motion[1] - motion[0])) - required_gap
+            return _gap(solid, frames_at(share)) - required_gap
 
-        if spare_at(place) <= 0.0:
-            return []
+        spare_at_place = spare_at(place)
+        if spare_at_place <= 0.0:
+            return None
 
+        # Around the place nothing is measured on intervals that are much too wide for its distance.
+        widest = HOPEFUL * spare_at_place / max(approach, SLOWEST)
         intervals = list[tuple[int, int]]()
         undecided = [(0, 0)]
+        some_by_kernels = False
         measured_count = 0
         while undecided and measured_count < MOST_DISTANCES:
             level, number = undecided.pop()
-            measured_count += 1
             width = 0.5**level
+            begin = number * width
+            if level > 0 and part_proven(begin, begin + width):
+                some_by_kernels = True
+                continue
+            if width > widest and begin <= place <= begin + width and level < DEEPEST_LEVEL:
+                undecided += [(level + 1, 2 * number + 1), (level + 1, 2 * number)]
+                continue
+
+            measured_count += 1
             # From the middle to either end of the interval the bodies approach by at most 0.5 * approach * width.
             spare = spare_at((number + 0.5) * width)
             apart_on_interval = spare > 0.5 * approach * width
             if spare <= 0.0 or (not apart_on_interval and level == DEEPEST_LEVEL):
-                return []
+                return None
             if apart_on_interval:
                 intervals.append((level, number))
             else:
                 undecided += [(level + 1, 2 * number + 1), (level + 1, 2 * number)]
 
-        return [] if undecided else intervals
+        # Where kernels prove something, neither body is inside the other.
+        if undecided:
+            return None
+        if not some_by_kernels and Containment((*pair,), ((0, 1),)).holds((0, 1), frames_at(0.0)):
+            return None
+        return intervals
 
 
 def distance_between(robot: Robot, bodies: Sequence[Body], names: tuple[str, str], q: Vector) -> float:
     """Return the least distance [m] between bodies with two names at q, shape (dof,); NaN if there are none."""
     first, second = ([body for body in bodies if body.name == name] for name in names)
-    return min((_gap_at(robot, [a, b], q) for a in first for b in second), default=float("nan"))
+    frames = robot.chain.joint_frames(q[None])[0]
+    return min((_gap([a, b], frames) for a in first for b in second), default=float("nan"))
 
 
-def _gap_at(robot: Robot, pair: Sequence[Body], q: Vector) -> float:
-    return next(measured(pair, [(0, 1)], robot.chain.joint_frames(q[None])[0], near_only=False)).distance
+def _gap(pair: Sequence[Body], frames: Matrix) -> float:
+    return next(measured(pair, [(0, 1)], frames, near_only=False)).distance
 
 
 def _groups(packed: ProofPairs) -> Mask:
@@ -209,6 +247,7 @@ def suggest_planes(robot: Robot, bodies: Sequence[Body], packed: ProofPairs, end
             normal_of_solids[first, second] = _normal((bodies[second], bodies[first]), frames)
         end, normal = normal_of_solids[first, second]
         normals_of_rows[row] = frames[end, bases[row], :3, :3].T @ normal
+        packed.table.way_stamps[row] = layout.SUGGESTED
 
 
 def _normal(pair: tuple[Body, Body], frames: Matrix) -> tuple[int, Vector]:

@@ -296,7 +296,8 @@ class Prover:
         by_coal = self._coal_proof(packed)
         for k in (k for k in np.flatnonzero(pairs >= 0).tolist() if by_coal.links[pairs[k]]):
             motion = np.stack([rows[0][k], rows[1][k]])
-            by_coal.settle(motion, pairs[k : k + 1], places[k : k + 1], partial(prove, k, 1))
+            part_proven = partial(_part_proven, packed, tails[k], heads[k])
+            by_coal.settle(motion, pairs[k : k + 1], places[k : k + 1], partial(prove, k, 1), part_proven)
         return [self._gap(packed, k, int(pairs[k]), float(places[k])) for k in np.flatnonzero(pairs != PROVEN).tolist()]
 
     def _packed_for(self, clearance: float, slack: float) -> ProofPairs:
@@ -337,6 +338,15 @@ class Prover:
         if pair < 0:
             return Gap(motion, float("nan"), "", "")
         return Gap(motion, place, *(self.bodies[k].name for k in packed.bodies[pair].tolist()))
+
+
+def _part_proven(packed: ProofPairs, tail: Vector, head: Vector, begin: float, end: float) -> bool:
+    """Check whether kernels prove the part of a motion, joint values of shape (joints,), between two shares of it."""
+    starts = (tail + begin * (head - tail))[None]
+    ends = (tail + end * (head - tail))[None]
+    pair = np.zeros(1, dtype=np.int32)  # a name keeps it alive: the kernel only knows where it is
+    place = np.zeros(1)
+    return proof_of_rows(packed, starts, ends, pair, place)(0, 1) == 0
 
 
 @kept_with

@@ -15,7 +15,7 @@ from rrtik_ompl.kernels.distances import layout
 from rrtik_ompl.kernels.distances.layout import DistanceTable
 from rrtik_ompl.kernels.distances.trees import tree_of
 from rrtik_ompl.kernels.proof.layout import FRAME_SIZE
-from rrtik_ompl.kernels.proof.packing import joint_rows
+from rrtik_ompl.kernels.proof.packing import angle_lanes, joint_rows
 from rrtik_ompl.kernels.proof.placed import KINDS, block_count, corner_blocks, size_rows
 from rrtik_ompl.kernels.simd.library import library
 from rrtik_ompl.kernels.tables.memory import packed
@@ -135,6 +135,7 @@ def distance_rows(chain: Chain, objects: Sequence[Sequence[Body]]) -> DistanceRo
         sizes=size_rows([(solid,) for solid in solids], np.tile(np.eye(3), (len(solids), 1, 1))),
         corners=corner_blocks([solid.corners for solid in solids]),
         frames=np.zeros((len(chain.parent) + 1) * FRAME_SIZE),
+        angles=angle_lanes(len(chain.parent)),
         nodes=np.concatenate([np.zeros((0, layout.NODE_SIZE)), *nodes]).astype(np.int32),
         element=len(solids) - 1,
         dof=chain.gain.shape[1],

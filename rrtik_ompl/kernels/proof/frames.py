@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from math import cos, sin
 from typing import Any
 
 from rrtik_ompl.kernels.checks.gjk import dot
 from rrtik_ompl.kernels.layout import JointValues
 from rrtik_ompl.kernels.proof import layout
 from rrtik_ompl.kernels.proof.layout import CarriedSolids, Frame, ProofTable
-from rrtik_ompl.kernels.simd.compiled import inlined, kernel
+from rrtik_ompl.kernels.simd.compiled import WIDTH, inlined, kernel
+from rrtik_ompl.kernels.simd.lanes import set_wide_lanes, spread_wide, wide_lanes_at
 from rrtik_ompl.kernels.simd.records import row_at
+from rrtik_ompl.kernels.simd.wide_angles import wide_sine_and_cosine
 
 
 @inlined
@@ -29,6 +30,12 @@ def frame_at(frames: Frame, number: int) -> Frame:
 def node_frames(proof: CarriedSolids, node: int) -> Frame:
     """The frames of a node; the first one is the world."""
     return row_at(proof.frames, layout.FRAME_SIZE * (proof.joint_count + 1), node)
+
+
+@inlined
+def blocks_of(count: int) -> int:
+    """How many blocks of lanes hold so many numbers."""
+    return (count + WIDTH - 1) // WIDTH
 
 
 @inlined
@@ -70,10 +77,22 @@ def place_frames(proof: CarriedSolids, start: JointValues, end: JointValues, sha
     frames = node_frames(proof, node)
     for place in range(layout.FRAME_SIZE):
         frames[place] = 1.0 if place in (0, 4, 8) else 0.0
-    for k in range(proof.joint_count):
-        value = start[k] + share * (end[k] - start[k])
+    joints = proof.joint_count
+    angles = proof.angles
+    blocks = blocks_of(joints)
+    for k in range(joints):
+        angles[k] = start[k] + share * (end[k] - start[k])
+    for block in range(blocks):
+        sine, cosine = wide_sine_and_cosine(wide_lanes_at(angles, block))
+        set_wide_lanes(angles, blocks + block, sine)
+        set_wide_lanes(angles, 2 * blocks + block, cosine)
+
+    sines = row_at(angles, blocks * WIDTH, 1)
+    cosines = row_at(angles, blocks * WIDTH, 2)
+    for k in range(joints):
+        value = angles[k]
         slides = proof.sliding[k] != 0
-        cosine, sine = (1.0, 0.0) if slides else (cos(value), sin(value))
+        cosine, sine = (1.0, 0.0) if slides else (cosines[k], sines[k])
         joint = row_at(proof.joints, layout.JOINT_SIZE, k)
         move_frame(joint, value, slides, cosine, sine, frame_at(frames, proof.parents[k]), frame_at(frames, k + 1))
 
@@ -118,21 +137,21 @@ def bound_bends(proof: ProofTable, start: JointValues, end: JointValues) -> None
     """Bound the acceleration of each sweep's points over a whole motion, time running from 0 to 1 [m].
 
     From the body inwards: what turns at rate w about an axis at most r away adds the centripetal w^2 r and the Coriolis
-    term 2 w V of the velocity V that it has already; what slides adds velocity alone.
+    term 2 w V of the velocity V that it has already; what slides adds velocity alone. Here lanes hold sweeps.
     """
-    for number in range(proof.sweep_count):
-        sweep = row_at(proof.sweeps, layout.SWEEP_SIZE, number)
-        reaches = row_at(proof.reaches, proof.joint_count, number)
-        velocity = 0.0
-        bend = 0.0
-        frame = sweep[layout.SWEEP_FRAME]
-        while frame != sweep[layout.SWEEP_BASE]:
-            joint = frame - 1
+    joints = proof.joint_count
+    for block in range(blocks_of(proof.sweep_count)):
+        velocity = spread_wide(0.0)
+        bend = spread_wide(0.0)
+        joint = joints
+        while joint > 0:  # parents have smaller numbers
+            joint -= 1
             rate = abs(end[joint] - start[joint])
+            own = wide_lanes_at(proof.carries, block * joints + joint) * rate
             if proof.sliding[joint] != 0:
-                velocity += rate
-            else:
-                bend += rate * (2.0 * velocity + rate * reaches[joint])
-                velocity += rate * reaches[joint]
-            frame = proof.parents[joint]
-        proof.bends[number] = bend
+                velocity = velocity + own
+            elif rate > 0.0:
+                turned = wide_lanes_at(proof.reaches, block * joints + joint) * rate
+                bend = bend + own * (2.0 * velocity + turned)
+                velocity = velocity + turned
+        set_wide_lanes(proof.bends, block, bend)

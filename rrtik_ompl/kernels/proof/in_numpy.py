@@ -44,7 +44,8 @@ MOST_CORNERS = 1 << 18  # that are compared together, to bound memory
 PATIENT = 0.1  # width of an interval down to which whole bodies are kept together, if only the sagitta is in the way
 EAGER = 0.9  # of a ball's radius beyond the body's least half side, which planes may gain; else no plane is searched
 SINGLE_ROUNDING = 1e-6  # of a point's place, relative and [m]
-NARROW = 0.01  # width of an interval from which on they are compared nevertheless
+BENT = 0.05  # of a ball's radius: up to this sagitta they are searched nevertheless, as halves would hardly bend less
+NARROW = 0.01  # width of an interval from which on they are searched in any case
 PROVEN, LATER, IN_PARTS, NOT = range(4)  # answers for a pair on an interval
 
 
@@ -151,7 +152,8 @@ class _Proof:
         """
         table = self._packed.table
         rates = np.abs(self._changes).T
-        reaches = table.reaches.reshape(-1, table.joint_count)
+        lanes = table.reaches.reshape(-1, table.joint_count, WIDTH)
+        reaches = lanes.transpose(0, 2, 1).reshape(-1, table.joint_count)
         bends = np.zeros((table.sweep_count + 1, len(self._changes)))  # the last row is that of number -1
 
         for number, (frame, base) in enumerate(table.sweeps.reshape(-1, layout.SWEEP_SIZE).tolist()):
@@ -257,7 +259,7 @@ class _Proof:
         known = (kind == CONVEX_SOLID) & (other_kind != UNKNOWN) & (other_kind != WHOLE_BODY)
         alone = (answers == NOT) & known
         hidden = EAGER * (first.radii - first.halves.min(axis=1))  # what planes may gain
-        hasty = (width > NARROW) & (bend > 0.0) & (gaps + hidden <= wanted) & (other_kind != HALF_SPACE)
+        hasty = (width > NARROW) & (bend > BENT * first.radii) & (gaps + hidden <= wanted) & (other_kind != HALF_SPACE)
         answers[alone & hasty] = LATER
         alone &= ~hasty
 

@@ -26,6 +26,10 @@ class Corners(Doubles):
     """Blocks of x, y and z of as many corners as there are lanes; the last block of a solid is filled up."""
 
 
+class StillBlocks(Doubles):
+    """Blocks of as many solids at rest as there are lanes: of each measure, up to those of the box, a row of lanes."""
+
+
 class SweepRows(Ints):
     """Of each sweep the frame of the body, and the frame that it is seen from."""
 
@@ -60,6 +64,7 @@ class CarriedSolids(Record):
     sizes: SizeRows
     corners: Corners
     frames: Frame  # at each node that of the world, then those of all joints
+    angles: Doubles  # lanes of the joints' values, then of their sines and of their cosines
 
 
 class ProofTable(CarriedSolids):
@@ -72,12 +77,16 @@ class ProofTable(CarriedSolids):
 
     sweep_count: int
     sweeps: SweepRows
-    reaches: Doubles  # [m] of each sweep, ``joint_count`` of them: how far its points come from the axis of each joint
+    # Blocks of lanes for as many sweeps, of each joint a row: how far a sweep's points come from its axis [m], and
+    # whether it moves them (1 or 0).
+    reaches: Doubles
+    carries: Doubles
 
     body_pair_count: int  # pairs of whole bodies, which come first
     pair_count: int
     pairs: PairRows
-    margins: Doubles  # what each pair keeps [m], rounding included
+    margins: Doubles  # what each pair keeps [m], rounding included; behind them as many numbers as there are lanes
+    still: StillBlocks
     top_count: int
     top_pairs: Ints  # the pairs to begin with, groups of bodies before their bodies
     looked_up: Ints  # of each of them its number among the neighbours, -1 for others
@@ -90,6 +99,7 @@ class ProofTable(CarriedSolids):
     stamp: int  # number of this motion
     bends: Doubles  # largest acceleration of each sweep in this motion [m]
     ways: Doubles  # of each pair the normal of its last plane
+    way_stamps: Ints  # number of the motion that this plane is of, or SUGGESTED
     lists: Ints  # open pairs at each level, ``pair_count`` places for each
     counts: Ints  # how many of them
     stack: Ints  # levels and numbers of intervals
@@ -125,13 +135,17 @@ CLOUD = 4  # and its number among the clouds; its corners are the points that ar
 SIZE_COUNT = 24
 BALL_CENTRE, BALL_RADIUS, BOX_AXES, BOX_MIDDLE, BOX_HALF, DISC, DISC_AXIS, ROUND = 0, 3, 4, 13, 16, 19, 20, 23
 
+STILL_SIZE = DISC  # of these measures those that balls on chords are compared with
+
 SWEEP_SIZE = 2
 SWEEP_FRAME, SWEEP_BASE = range(2)
 
 # Pair: two solids, the frame that both are seen from, their sweeps (-1: it stands still there), pairs of their parts
-# from, to, the chord of the first one (-1: one of them has no ball), that of the other one (-1: it stands still).
-PAIR_SIZE = 9
+# from, to, the chord of the first one (-1: one of them has no ball), that of the other one (-1: it stands still); of a
+# run that begins with it how many pairs it has, and its block. A run is of pairs with one chord and others at rest.
+PAIR_SIZE = 11
 PAIR_ONE, PAIR_OTHER, PAIR_BASE, ONE_SWEEP, OTHER_SWEEP, PARTS_FIRST, PARTS_END, PAIR_CHORD, OTHER_CHORD = range(9)
+RUN_LENGTH, RUN_BLOCK = 9, 10
 
 CHORD_KEY_SIZE = 2
 CHORD_SOLID, CHORD_BASE = range(2)
@@ -144,6 +158,8 @@ CHORD_BEGIN, CHORD_WAY, CHORD_INVERSE, CHORD_RADIUS, CHORD_HALF = 0, 3, 6, 7, 8
 LOG_SIZE = 4
 LOG_PAIR, LOG_LEVEL, LOG_NUMBER, LOG_MEANS = range(4)
 OPEN, BY_BALL, BY_PLANE = range(3)  # not proven; by a ball and a ball or box; by a plane
+
+SUGGESTED = -1  # a plane to begin with in every motion
 
 DEEPEST = 9  # an interval of a motion is 1 / 2**DEEPEST of it at least
 NODES = (1 << DEEPEST) + 1

@@ -83,6 +83,7 @@ class MovedObstacles:
         blocks = turns[self._block_owners] @ self._blocks + shifts[self._block_owners][:, :, None]
         packed.table.corners.reshape(-1, 3, WIDTH)[self._block_places] = blocks
         self._put_clouds(bodies)
+        packed.spread_sizes()
 
     def _put_clouds(self, bodies: Sequence[Body]) -> None:
         """Put the clouds where they are now, and other points in their place where these have changed."""
@@ -149,6 +150,8 @@ class MovedSolids:
             else:
                 solids = [self._solid(k) for member in members for k in self._parts(member)]
             self._sizes[place] = size_rows([solids], np.eye(3)[None])
+        around = [self._packed.firsts[-1] + group for group in self._groups.get(number, ())]
+        self._packed.spread_sizes([*range(first, end), *around])
         return True
 
     def _parts(self, number: int) -> range:

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,6 +20,7 @@ from rrtik_ompl.kernels.proof import layout
 from rrtik_ompl.kernels.proof.groups import Members, compared_as_one, group_rows
 from rrtik_ompl.kernels.proof.layout import CLOUD, HALF_SPACE, NODES, UNKNOWN, WHOLE_BODY, ProofTable
 from rrtik_ompl.kernels.proof.placed import PlacedBodies, bodies_in_place
+from rrtik_ompl.kernels.simd.processor import WIDTH
 from rrtik_ompl.kernels.tables.cloud_layout import CloudTable
 from rrtik_ompl.kernels.tables.cloud_tables import cloud_table
 from rrtik_ompl.kernels.tables.memory import packed, with_own
@@ -27,10 +28,11 @@ from rrtik_ompl.kernels.tables.neighbour_tables import Cells, neighbour_table
 from rrtik_ompl.kernels.tables.solid_tables import Solids
 from rrtik_ompl.model.robot import Chain
 
+SHORTEST_RUN = 4  # pairs that are compared in lanes
 ROOM = 1e-8  # [m] for rounding: float64 misplaces points of an arm of 30 joints and 100 m by less than a tenth of it
 COMPUTED = (
-    *("margins", "frames", "stamps", "bends", "ways", "lists", "counts", "stack"),
-    *("chords", "chord_stamps", "seen", "log", "log_ways"),
+    *("margins", "frames", "angles", "stamps", "bends", "ways", "way_stamps", "lists", "counts"),
+    *("stack", "chords", "chord_stamps", "seen", "log", "log_ways"),
 )
 
 
@@ -41,6 +43,7 @@ class ProofPairs:
     Attributes:
         table: For the kernels.
         clouds: Tables whose addresses it holds.
+        still: Numbers of the solids at rest that its blocks hold, shape (blocks, WIDTH).
         bodies: Numbers of the two bodies of each of the table's pairs, shape (n, 2).
         sides: The same pairs as the kernels have them: body above the plane, its part, body below, its part, shape
             (n, 4); part -1 is a body of several parts as a whole.
@@ -57,6 +60,7 @@ class ProofPairs:
 
     table: ProofTable
     clouds: Sequence[CloudTable]
+    still: NDArray[np.int64]
     bodies: NDArray[np.int64]
     sides: NDArray[np.int64]
     margins: Vector
@@ -72,7 +76,13 @@ class ProofPairs:
         """Let the kernels keep a clearance from obstacles beside the margins, and a slack between all bodies [m]."""
         if (clearance, ROOM + slack) != self.kept:
             self.kept = clearance, ROOM + slack
-            self.table.margins[:] = self.margins + self.kept[1] + clearance * self.clear
+            self.table.margins[: len(self.margins)] = self.margins + self.kept[1] + clearance * self.clear
+
+    def spread_sizes(self, solids: ArrayLike | None = None) -> None:
+        """Let the blocks hold the sizes of some solids, or of all, as they are now."""
+        blocks = slice(None) if solids is None else np.isin(self.still, solids).any(axis=1)
+        sizes = self.table.sizes.reshape(-1, layout.SIZE_COUNT)[self.still[blocks], : layout.STILL_SIZE]
+        self.table.still.reshape(-1, layout.STILL_SIZE, WIDTH)[blocks] = sizes.transpose(0, 2, 1)
 
     def for_thread(self) -> ProofPairs:
         """The same pairs in a table with memory of its own to compute in."""
@@ -143,14 +153,19 @@ def proof_pairs(
     known = list({id(own): own for own in cells.values()}.values())
     numbers = {pair: known.index(own) for pair, own in cells.items()}
 
-    def looked_up(row: int) -> int:
+    def looked_up_of(row: int) -> int:
         """The number among the neighbours of all that a row stands for, -1 if these have none or several."""
         own = [row] if row < len(listed.whole) else range(rows[row, layout.PARTS_FIRST], rows[row, layout.PARTS_END])
         found = {numbers.get((int(named[k, 0]), int(named[k, 1])), -1) for k in own}
         return found.pop() if len(found) == 1 and max(own) < len(listed.whole) else -1
 
     chord_keys, chords = _chords(rows, records[:, layout.SOLID_KIND], joints)
+    top = np.array(listed.top, dtype=np.int64)
+    looked_up = np.array([looked_up_of(k) for k in listed.top], dtype=np.int32)
+    lengths, blocks, still = _runs(rows, chords[:, 0], top, top[looked_up >= 0])
     clouds = [cloud_table(bodies[k].geometry.cloud) for k in cloud_bodies(bodies)]
+    reaches = np.array([placed.reaches[list(them)].max(axis=0) for them, _ in sweeps]).reshape(-1, joints)
+    carries = np.array([_carried(chain, bodies[k].joint, base) for (k, *_), base in sweeps]).reshape(-1, joints)
     made = packed(
         ProofTable,
         joint_count=joints,
@@ -162,21 +177,25 @@ def proof_pairs(
         corners=placed.corners,
         sweep_count=len(sweeps),
         sweeps=np.array([(bodies[k].joint, base) for (k, *_), base in sweeps], dtype=np.int32),
-        reaches=np.array([placed.reaches[list(them)].max(axis=0) for them, _ in sweeps]),
+        reaches=_in_lanes(np.where(carries, reaches, 0.0)),
+        carries=_in_lanes(carries),
         body_pair_count=len(listed.whole),
         pair_count=len(rows),
-        pairs=np.column_stack([rows[:, : layout.PAIR_CHORD], chords]).astype(np.int32),
-        margins=np.zeros(len(rows)),
-        top_count=len(listed.top),
-        top_pairs=np.array(listed.top, dtype=np.int32),
-        looked_up=np.array([looked_up(k) for k in listed.top], dtype=np.int32),
+        pairs=np.column_stack([rows[:, : layout.PAIR_CHORD], chords, lengths, blocks]).astype(np.int32),
+        margins=np.zeros(len(rows) + WIDTH),
+        still=np.zeros(still.size * layout.STILL_SIZE),
+        top_count=len(top),
+        top_pairs=top.astype(np.int32),
+        looked_up=looked_up,
         neighbours=neighbour_table([(own, 0) for own in known]),
         chord_count=len(chord_keys),
         chord_keys=chord_keys.astype(np.int32),
         frames=np.zeros(NODES * (joints + 1) * layout.FRAME_SIZE),
         stamps=np.zeros(NODES, dtype=np.int32),
-        bends=np.zeros(len(sweeps)),
+        angles=angle_lanes(joints),
+        bends=np.zeros(len(sweeps) + -len(sweeps) % WIDTH),
         ways=np.zeros(3 * len(rows)),
+        way_stamps=np.zeros(len(rows), dtype=np.int32),
         lists=np.zeros((layout.DEEPEST + 2) * len(rows), dtype=np.int32),
         counts=np.zeros(layout.DEEPEST + 2, dtype=np.int32),
         stack=np.zeros(2 * (layout.DEEPEST + 3), dtype=np.int32),
@@ -192,8 +211,9 @@ def proof_pairs(
     beside = np.asarray(body_arrays(bodies).obstacles[named].any(axis=1))
     margins, touching = _kept_apart(bodies, named, made.pairs, count)
 
-    return ProofPairs(
+    pairs_of_bodies = ProofPairs(
         table=made,
+        still=still,
         clouds=clouds,
         bodies=named,
         sides=sides,
@@ -205,6 +225,8 @@ def proof_pairs(
         groups=listed.together,
         first_group=count,
     )
+    pairs_of_bodies.spread_sizes()
+    return pairs_of_bodies
 
 
 def _kept_apart(
@@ -259,16 +281,16 @@ def _listed_pairs(
 
     # those that groups are made of come first
     groups = compared_as_one(bodies, parts, moving, common, fixed=fixed)
-    grouped = {(k, s): None for members, (blocks, *_) in groups for block in blocks for s in block for k in members}
+    grouped = {(k, s): None for members, (blocks, *_) in groups for block in blocks for k in members for s in block}
     others = [pair for pair in moving if pair not in grouped and pair[::-1] not in grouped]
+    others = [(i, j) if common(joints[i], joints[j]) == joints[j] else (j, i) for i, j in others]
 
     sweeps: dict[tuple[Members, int], int] = {}
     whole: list[tuple[int, ...]] = []
     several: list[tuple[int, ...]] = []  # their solids, the frame, and their sweeps
     begin = 0
-    for i, j in [*grouped, *others]:
-        base = common(joints[i], joints[j])
-        one, other = (i, j) if base == joints[j] else (j, i)  # what stands still, seen from there, is below
+    for one, other in [*grouped, *sorted(others)]:  # what stands still, seen from there, is below
+        base = common(joints[one], joints[other])
         own = [sweeps.setdefault(((k,), base), len(sweeps)) if joints[k] != base else -1 for k in (one, other)]
         counts = [len(parts[k]) for k in (one, other)]
         end = begin
@@ -332,6 +354,69 @@ def _chords(
     chords = np.full(solids.shape, -1)
     chords[compared] = numbers
     return np.column_stack(np.divmod(keys, joints + 1)), chords
+
+
+def _carried(chain: Chain, frame: int, base: int) -> NDArray[np.bool_]:
+    """Which joints move a frame as seen from another one that carries it, shape (joints,)."""
+    moved = np.zeros(len(chain.parent), dtype=bool)
+    while frame != base:
+        moved[frame - 1] = True
+        frame = int(chain.parent[frame - 1]) + 1
+    return moved
+
+
+def _in_lanes(rows: NDArray[Any]) -> NDArray[np.float64]:
+    """Numbers of some rows, shape (n, k), in blocks of as many rows as there are lanes, shape (blocks, k, WIDTH)."""
+    filled = np.zeros((len(rows) + -len(rows) % WIDTH, rows.shape[1]))
+    filled[: len(rows)] = rows
+    return filled.reshape(-1, WIDTH, rows.shape[1]).transpose(0, 2, 1)
+
+
+def angle_lanes(joints: int) -> NDArray[np.float64]:
+    """Room for values, sines and cosines of joints in lanes, shape (3, n)."""
+    return np.zeros((3, joints + -joints % WIDTH))
+
+
+def _runs(
+    rows: NDArray[np.int64], chords: NDArray[np.int64], top: NDArray[np.int64], looked_up: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """Find the runs: pairs that kernels compare in lanes.
+
+    Args:
+        rows: All pairs, shape (n, PAIR_CHORD or more).
+        chords: The chord of the first solid of each, or -1, shape (n,).
+        top: Numbers of the pairs to begin with.
+        looked_up: Those of them that are no part of a run.
+
+    Returns:
+        For each pair how many there are in the run that it begins, 1 if it begins none, and the number of the block of
+        the others in it, shapes (n,); for each block the numbers of its solids, shape (blocks, WIDTH).
+    """
+    count = len(rows)
+    lengths = np.ones(count, dtype=np.int64)
+    blocks = np.zeros(count, dtype=np.int64)
+    compared = (chords >= 0) & (rows[:, layout.OTHER_SWEEP] < 0)
+    compared[looked_up] = False
+
+    # a run ends where another chord or another list of pairs begins
+    listed = np.zeros(count + 1, dtype=np.int64)
+    listed[rows[:, layout.PARTS_FIRST : layout.PARTS_END + 1].ravel()] = 1
+    listed[top[np.diff(top, prepend=-2) != 1]] = 1
+    listed[top[np.diff(top, append=-2) != 1] + 1] = 1
+    keys = np.column_stack([chords, rows[:, layout.ONE_SWEEP], listed[:-1].cumsum(), ~compared])
+    begins = np.diff(keys, axis=0, prepend=-2).any(axis=1)
+    within = np.arange(count) - np.maximum.accumulate(np.where(begins, np.arange(count), 0))
+    starts = np.flatnonzero(within % WIDTH == 0)
+    own = np.diff(starts, append=count)
+    worth = compared[starts] & (own >= SHORTEST_RUN)
+    starts, own = starts[worth], own[worth]
+
+    lengths[starts] = own
+    places = np.minimum(np.arange(WIDTH), own[:, None] - 1)
+    others = rows[starts[:, None] + places, layout.PAIR_OTHER]
+    still, numbers = np.unique(others, axis=0, return_inverse=True)
+    blocks[starts] = numbers.ravel()
+    return lengths, blocks, still
 
 
 def common_frame(chain: Chain, first: int, second: int) -> int:

@@ -12,15 +12,26 @@ from typing import Any
 from rrtik_ompl.kernels.checks.gjk import dot, minus, nearest_on_triangle, scaled
 from rrtik_ompl.kernels.proof import layout
 from rrtik_ompl.kernels.proof.frames import carried, frame_at, origin_of, turned_back, vector_at
-from rrtik_ompl.kernels.proof.layout import CarriedSolids, ChordRows, Corners, Frame, ProofTable, SizeRows, SolidRows
+from rrtik_ompl.kernels.proof.layout import (
+    CarriedSolids,
+    ChordRows,
+    Corners,
+    Frame,
+    ProofTable,
+    SizeRows,
+    SolidRows,
+    StillBlocks,
+)
 from rrtik_ompl.kernels.simd.compiled import WIDTH, inlined, kernel
 from rrtik_ompl.kernels.simd.lanes import (
     bits,
     choose,
     first_bit,
     highest_of_wide,
+    larger,
     lowest_of_wide,
     rounded_sum,
+    smaller,
     spread_wide,
     wide_lanes_at,
 )
@@ -234,6 +245,44 @@ def clears(chord: ChordRows, other: SizeRows, wanted: float) -> bool:
         return False
     to_box = outside_box(chord, other)
     return bool(dot(to_box, to_box) > reach * reach)
+
+
+@kernel
+def near_in_block(chord: ChordRows, block: StillBlocks, wanted: Any) -> int:
+    """The solids of a block, as bits, from which ``clears`` does not show a ball on a chord. Here lanes hold solids."""
+    way = vector_at(chord, layout.CHORD_WAY)
+    apart = minus(vector_at(chord, layout.CHORD_BEGIN), lanes_from(block, layout.BALL_CENTRE))
+    share = smaller(larger(dot(apart, way) * -chord[layout.CHORD_INVERSE], 0.0), 1.0)
+    apart = ahead(apart, (share * way[0], share * way[1], share * way[2]))
+    square = dot(apart, apart)
+    reach = wanted + chord[layout.CHORD_RADIUS]
+    far = reach + wide_lanes_at(block, layout.BALL_RADIUS)
+    clear = (far < 0.0) | (square > far * far)
+
+    x = lanes_outside(chord, block, 0)
+    y = lanes_outside(chord, block, 1)
+    z = lanes_outside(chord, block, 2)
+    square_to_box = x * x + y * y + z * z
+    near: int = ~bits(clear | (square_to_box > reach * reach))
+    return near
+
+
+@inlined
+def lanes_from(block: StillBlocks, row: int) -> Any:
+    """Three rows of a block."""
+    return wide_lanes_at(block, row), wide_lanes_at(block, row + 1), wide_lanes_at(block, row + 2)
+
+
+@inlined
+def lanes_outside(chord: ChordRows, block: StillBlocks, axis: int) -> Any:
+    """As ``outside_along``, of solids in lanes."""
+    along = lanes_from(block, layout.BOX_AXES + 3 * axis)
+    half = wide_lanes_at(block, layout.BOX_HALF + axis)
+    one = dot(along, vector_at(chord, layout.CHORD_BEGIN)) - wide_lanes_at(block, layout.BOX_MIDDLE + axis)
+    way = dot(along, vector_at(chord, layout.CHORD_WAY))
+    below = one + smaller(way, 0.0)
+    above = one + larger(way, 0.0)
+    return larger(below - half, 0.0) + smaller(above + half, 0.0)
 
 
 @inlined

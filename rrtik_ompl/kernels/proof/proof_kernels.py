@@ -29,18 +29,22 @@ from rrtik_ompl.kernels.proof.planes import (
     chords_clear,
     clears,
     make_chord,
+    near_in_block,
     put_vector,
     sizes_at,
     solid_at,
     way_to_chord,
 )
 from rrtik_ompl.kernels.record import Doubles, Ints
-from rrtik_ompl.kernels.simd.compiled import entry, inlined, kernel
+from rrtik_ompl.kernels.simd.compiled import WIDTH, entry, inlined, kernel
+from rrtik_ompl.kernels.simd.lanes import first_bit
 from rrtik_ompl.kernels.simd.records import row_at
+from rrtik_ompl.kernels.simd.unaligned import unaligned_lanes
 
 EAGER = 0.9  # of a ball's radius beyond the body's least half side, which planes may gain; else no plane is searched
+BENT = 0.05  # of a ball's radius: up to this sagitta they are searched nevertheless, as halves would hardly bend less
 SHARE = 0.25  # of a ball's radius: up to this sagitta planes are searched to the points of a cloud
-NARROW = 0.01  # width of an interval from which on they are searched nevertheless
+NARROW = 0.01  # width of an interval from which on they are searched in any case
 STILL = 2  # level at which what does not move is given up: by then groups of bodies have been taken apart
 PATIENT = 0.1  # width of an interval down to which whole bodies are kept together, if only the sagitta is in the way
 FORGET = 1 << 30  # motions or intervals, after which their numbers begin anew
@@ -76,7 +80,6 @@ def prove_motion(proof: ProofTable, start: JointValues, end: JointValues) -> Any
     Intervals are halved until no pair is left open on them, depth first, the first half first.
     """
     begin_motion(proof, start, end)
-    open_first_pairs(proof, start, end)
     moves = False
     for k in range(proof.joint_count):
         moves |= start[k] != end[k]
@@ -92,7 +95,7 @@ def prove_motion(proof: ProofTable, start: JointValues, end: JointValues) -> Any
         nodes = (layout.NODES - 1) >> level  # from one end of the interval to the other
         visit(proof, start, end, number * nodes)
         visit(proof, start, end, number * nodes + nodes)
-        if settle(proof, level, number) == 0:
+        if settle(proof, start, end, level, number) == 0:
             continue
         if level == layout.DEEPEST or (level == STILL and not moves):
             return proof.lists[proof.pair_count * (level + 1)], (number + 0.5) / (1 << level)
@@ -110,6 +113,8 @@ def begin_motion(proof: ProofTable, start: JointValues, end: JointValues) -> Non
     if proof.stamp >= FORGET:
         for node in range(layout.NODES):
             proof.stamps[node] = 0
+        for pair in range(proof.pair_count):
+            proof.way_stamps[pair] = min(proof.way_stamps[pair], 0)
         proof.stamp = 1
     bound_bends(proof, start, end)
 
@@ -133,8 +138,12 @@ def visit(proof: ProofTable, start: JointValues, end: JointValues, node: int) ->
 
 
 @kernel
-def open_first_pairs(proof: ProofTable, start: JointValues, end: JointValues) -> None:
-    """List the pairs that the whole motion begins with, but neighbours that are known to be apart on it.
+def open_first_pairs(
+    proof: ProofTable, start: JointValues, end: JointValues, start_frames: Frame, end_frames: Frame
+) -> None:
+    """List the pairs that the whole motion begins with, but those that are known to be apart on it.
+
+    Neighbours are looked up, and the balls of others are compared in lanes.
 
     The log is told of each body by planes: its reader knows neither groups nor neighbours.
     """
@@ -145,9 +154,16 @@ def open_first_pairs(proof: ProofTable, start: JointValues, end: JointValues) ->
         return
 
     count = 0
-    for k in range(proof.top_count):
+    k = 0
+    while k < proof.top_count:
         pair = proof.top_pairs[k]
+        length = pair_at(proof, pair)[layout.RUN_LENGTH]
+        if length > 1:
+            count = list_near(proof, pair, start_frames, end_frames, 1.0, proof.lists, count)
+            k += length
+            continue
         number = proof.looked_up[k]
+        k += 1
         if number >= 0 and proof.margins[pair] <= CELLS_APART and apart_on_way(proof.neighbours, number, start, end):
             continue
         proof.lists[count] = pair
@@ -156,18 +172,21 @@ def open_first_pairs(proof: ProofTable, start: JointValues, end: JointValues) ->
 
 
 @kernel
-def settle(proof: ProofTable, level: int, number: int) -> int:
+def settle(proof: ProofTable, start: JointValues, end: JointValues, level: int, number: int) -> int:
     """Go through the open pairs of an interval and list those that stay open for its halves; returns how many do.
 
     Where several bodies, or a whole one, cannot be proven apart, what they consist of joins the list.
     """
     nodes = (layout.NODES - 1) >> level
-    begin = node_frames(proof, number * nodes)
-    end = node_frames(proof, number * nodes + nodes)
+    width = 1.0 / (1 << level)
+    begin_frames = node_frames(proof, number * nodes)
+    end_frames = node_frames(proof, number * nodes + nodes)
     pairs = row_at(proof.lists, proof.pair_count, level)
     left_open = row_at(proof.lists, proof.pair_count, level + 1)
     telling = proof.log_room > 0
     begin_interval(proof)
+    if level == 0:
+        open_first_pairs(proof, start, end, begin_frames, end_frames)
 
     count = proof.counts[level]
     left = 0
@@ -179,11 +198,11 @@ def settle(proof: ProofTable, level: int, number: int) -> int:
         first = parts[layout.PARTS_FIRST]
         last = parts[layout.PARTS_END]
         if first == last or telling:
-            if settled(proof, pair, begin, end, level, number):
+            if settled(proof, pair, begin_frames, end_frames, level, number):
                 continue
             answer = 0 if first == last else -1
         else:
-            answer = beyond(proof, pair, begin, end, 1.0 / (1 << level))
+            answer = beyond(proof, pair, begin_frames, end_frames, width)
             if answer == 1:
                 continue
 
@@ -191,11 +210,42 @@ def settle(proof: ProofTable, level: int, number: int) -> int:
             left_open[left] = pair
             left += 1
             continue
-        for part in range(first, last):
-            pairs[count] = part
-            count += 1
+        while first < last:
+            length = parts_in_run(proof, first, telling)
+            if length > 1:
+                count = list_near(proof, first, begin_frames, end_frames, width, pairs, count)
+            else:
+                pairs[count] = first
+                count += 1
+            first += length
     proof.counts[level + 1] = left
     return left
+
+
+@inlined
+def parts_in_run(proof: ProofTable, first: int, telling: bool) -> int:
+    """How many pairs are compared in lanes from one on, or 1; the log is told of each."""
+    return 1 if telling else pair_at(proof, first)[layout.RUN_LENGTH]
+
+
+@kernel
+def list_near(proof: ProofTable, first: int, begin: Frame, end: Frame, width: float, pairs: Ints, count: int) -> int:
+    """List the pairs of a run whose balls do not show them apart on an interval behind ``count`` others.
+
+    Returns:
+        How many are in the list.
+    """
+    run = pair_at(proof, first)
+    number = run[layout.PAIR_CHORD]
+    make_chord(proof, number, begin, end)
+    wanted = unaligned_lanes(proof.margins, first) + sagitta(proof, run[layout.ONE_SWEEP], width)
+    block = row_at(proof.still, layout.STILL_SIZE * WIDTH, run[layout.RUN_BLOCK])
+    near = near_in_block(chord_at(proof, number), block, wanted) & ((1 << run[layout.RUN_LENGTH]) - 1)
+    while near != 0:
+        pairs[count] = first + first_bit(near)
+        count += 1
+        near &= near - 1  # without the lowest bit
+    return count
 
 
 @inlined
@@ -271,14 +321,18 @@ def apart(proof: ProofTable, number: int, begin: Frame, end: Frame, width: float
         frames = pair_frames(proof, pair, begin, end)
         return layout.BY_PLANE if cloud_apart(proof, one, other, frames, wanted, searching) else layout.OPEN
     hidden = EAGER * (sizes[layout.BALL_RADIUS] - least(vector_at(sizes, layout.BOX_HALF)))
-    if width > NARROW and bend > 0.0 and not balls_clear(proof, pair, begin, end, wanted - hidden):
+    bent = width > NARROW and bend > BENT * sizes[layout.BALL_RADIUS]
+    if bent and not balls_clear(proof, pair, begin, end, wanted - hidden):
         return layout.OPEN
 
     way = row_at(proof.ways, 3, number)
     first = vector_at(way, 0)
     frames = pair_frames(proof, pair, begin, end)
-    if dot(first, first) == 0.0:
+    stamp = proof.way_stamps[number]
+    if dot(first, first) == 0.0 or (stamp != proof.stamp and stamp != layout.SUGGESTED):
         first = first_way(proof, pair)
+    if stamp != layout.SUGGESTED:
+        proof.way_stamps[number] = proof.stamp
     found, normal = best_plane(proof, one, other, frames, wanted, first)
     put_vector(way, 0, normal)
     return layout.BY_PLANE if found > wanted else layout.OPEN
