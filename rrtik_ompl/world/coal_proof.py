@@ -106,7 +106,8 @@ class CoalProof:
 
         @cache
         def frames_at(share: float) -> Matrix:
-            return self._robot.chain.joint_frames((motion[0] + share * (motion[1] - motion[0]))[None])[0]
+            (frames,) = self._robot.chain.joint_frames((motion[0] + share * (motion[1] - motion[0]))[None])
+            return frames
 
         original_margins = margins.copy()
         intervals_of_links = list[list[int]]()

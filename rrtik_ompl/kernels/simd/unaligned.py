@@ -10,7 +10,8 @@ from numba import types
 from numba.extending import intrinsic
 
 from rrtik_ompl.kernels.record import Doubles
-from rrtik_ompl.kernels.simd.lanes import DOUBLE, WIDE_LANES, WIDTH, pointer
+from rrtik_ompl.kernels.simd.lanes import DOUBLE, WIDE_LANES, pointer
+from rrtik_ompl.kernels.simd.processor import WIDTH
 
 
 def _unaligned_lanes(typingctx: Any, array: Any, first: Any) -> Any:
