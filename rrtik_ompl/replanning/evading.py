@@ -1,7 +1,7 @@
 """Evasive moves: where a robot goes when an obstacle comes nearer than it should.
 
 DRRT-Con [1, ch. 5.2] leaves this open ("optional evasive move"). Here the robot makes the first tick of the straight
-motion that keeps the largest distance to obstacles.
+motion that keeps the largest distance to obstacles. Where a bound on their speed is stated, see :mod:`.refuge`.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def evasion(
         rng: Source of the random directions.
     """
     # The motions of one tick, standing still first.
-    moves = max_change * _directions(q, max_change, rng, path)
+    moves = max_change * directions(q, max_change, rng, path, RANDOM_DIRECTIONS)
     moves *= np.minimum(step / np.linalg.norm(moves, axis=1), 1.0)[:, None]
     moves = np.vstack([np.zeros_like(q), *(speed * moves for speed in SPEED_SHARES)])
 
@@ -82,13 +82,13 @@ def evasion(
     return ends[best] if best else None
 
 
-def _directions(q: Vector, max_change: Vector, rng: np.random.Generator, path: Matrix | None) -> Matrix:
+def directions(q: Vector, max_change: Vector, rng: np.random.Generator, path: Matrix | None, count: int) -> Matrix:
     """Return directions to try in units of ``max_change``, shape (m, n); the largest entry of each is 1 or -1.
 
-    They are each joint by itself in both senses, random directions, and the direction to the path's next waypoint and
-    its opposite.
+    They are each joint by itself in both senses, ``count`` random directions, and the direction to the path's next
+    waypoint and its opposite.
     """
-    random = rng.uniform(-1.0, 1.0, (RANDOM_DIRECTIONS, len(q)))
+    random = rng.uniform(-1.0, 1.0, (count, len(q)))
     rows = [np.eye(len(q)), -np.eye(len(q)), random / np.abs(random).max(axis=1, keepdims=True)]
     if path is not None and len(path) > 1 and (path[1] != q).any():
         to_waypoint = (path[1] - q) / max_change

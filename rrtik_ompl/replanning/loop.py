@@ -21,10 +21,12 @@ from rrtik_ompl.replanning.evading import evasion
 from rrtik_ompl.replanning.faults import UNFORESEEN, Fault, FaultKind, FeedWarning, SceneMemory
 from rrtik_ompl.replanning.feed import SILENCE_SECONDS, Snapshot, Watch
 from rrtik_ompl.replanning.record import ReplanRun, joints_of
+from rrtik_ompl.replanning.refuge import SPARE, Guard, ticks_of
 from rrtik_ompl.replanning.settings import PREDICTED_PLACES, ReplanSettings, make_planner
 from rrtik_ompl.replanning.start_and_goals import GoalFeed, check_start, every_goal, goal_now, held_pairs, sampling_box
 from rrtik_ompl.replanning.tick import Tick
 from rrtik_ompl.replanning.travels import MotionTracker, Travels, refuse_endless_turns, required_distances
+from rrtik_ompl.replanning.unavoidable import ContactWarning, Unavoidable, unavoidable
 from rrtik_ompl.world.clearances import CLEARANCE
 from rrtik_ompl.world.moving_world import MovingWorld, check_held
 from rrtik_ompl.world.problem import Problem
@@ -32,6 +34,7 @@ from rrtik_ompl.world.world import World
 
 Clock = Callable[[], float]
 
+NO_WAY_OUT = "no motion was found that nothing can reach in time"
 PROOF_TRIES = 3  # searches for a path that is proven
 REACTION_TICKS = 6  # The arm evades a cloud that would be too near within so many ticks at its present speed.
 
@@ -72,17 +75,17 @@ class Loop:
         scene = self._snapshot.scene
         refuse_endless_turns(scene)
         first_world = problem.world.with_accuracy("exact").with_scene(scene)
-        self._make_worlds(first_world)
+        self._rng = np.random.default_rng(settings.seed)
+        self._max_change = settings.max_change(robot)
 
         # A search checks a motion only at steps. Keeping half a step more makes its answer hold between them too [m].
         half_resolution = 0.5 * first_world.motion_resolution
         self._proven_clearance = min(CLEARANCE, half_resolution) if settings.clearance is None else settings.clearance
         self._search_clearance = half_resolution + (settings.clearance or 0.0)
+        self._make_worlds(first_world)
 
         self._tracker = MotionTracker(scene, settings.speed_bound)
         self._travels = Travels(settings.tick, settings.speed_bound, self._tracker.speeds)
-        self._max_change = settings.max_change(robot)
-        self._rng = np.random.default_rng(settings.seed)
 
         self.q = problem.start
         if goal_feed is None:
@@ -91,6 +94,7 @@ class Loop:
             self._goals = goal_now(robot, goal_feed, 0.0)
 
         self._first_poses = {o.name: o.pose for o in scene.obstacles}  # The record holds only poses that differ.
+        self._has_warned = False  # whether a contact was said to be unavoidable
         self._cut_short = False  # whether the last search for a path has ended with its time
         self._distance_left_before = np.nan  # distance left at the end of the previous tick [m]
         self._required_distances: dict[str, float] = {}  # distance to keep from each obstacle now [m]
@@ -112,7 +116,7 @@ class Loop:
         self._required_distances = {}  # This makes the first tick enter the predicted places.
 
     def _make_worlds(self, first_world: World) -> None:
-        """Make the three worlds of a run and store them as attributes.
+        """Make the worlds of a run and store them as attributes.
 
         ``_world`` serves searches and holds the predicted places of obstacles too. ``_world_of_obstacles`` ignores
         self-collision, so its clearance is that to obstacles. ``_world_of_arm`` has no obstacles. From then on
@@ -124,6 +128,11 @@ class Loop:
         self._world_of_obstacles = MovingWorld(first_world, self_collision=False)
         empty_scene = Scene((), scene.attached, held_pairs(scene))
         self._world_of_arm = first_world.with_accuracy("conservative").with_scene(empty_scene)
+        # With a bound on the speed of obstacles, motions are chosen that nothing can reach in time.
+        self._guard: Guard | None = None
+        if self._settings.speed_bound is not None:
+            keep = self._settings.margin + self._proven_clearance
+            self._guard = Guard(first_world, self._world_of_arm, self._settings, keep, self._max_change, self._rng)
 
     def tick(self, number: int) -> bool:
         """Do one tick, add it to the record and return whether the run goes on.
@@ -165,8 +174,16 @@ class Loop:
             event = "walk" if free and self._planner.path is path_before else event
 
         q_before = self.q
-        event, reason, q_after = self._early_evasion() or (self._go(event) if free else self._wait_or_evade())
-        self._distance_left_before = self._distance_left(q_after)
+        safe_seconds: float | None = None
+        lost: Unavoidable | None = None
+        if self._guard is None:
+            event, reason, q_after = self._early_evasion() or (self._go(event) if free else self._wait_or_evade())
+            self._distance_left_before = self._distance_left(q_after)
+        else:
+            event, reason, q_after, safe_seconds = self._guarded(self._guard, event, free)
+            if safe_seconds < self._settings.tick - SPARE:
+                lost = self._unavoidable(now)
+                reason = NO_WAY_OUT if lost is None else lost.sentence
 
         path = self._planner.path
         moves = (q_after != q_before).any()
@@ -175,7 +192,8 @@ class Loop:
             proven = self._timed(seconds_of_part, "prove", self._proven_whatever_moves, q_before, q_after)
 
         seconds_of_part["all"] = self._clock() - begin
-        self._record(now, q_before, event, seconds_of_part, checked, reason, path, proven)
+        told = {"proven": proven, "safe_seconds": safe_seconds, "unavoidable": lost}
+        self._record(now, q_before, event, seconds_of_part, checked, reason, path, **told)
         self.q = q_after
         return True
 
@@ -242,6 +260,9 @@ class Loop:
         if self._possible_travels is not None:
             required_if_moving = required_distances(scene, distance, self._possible_travels)
         self._required_if_moving = required_if_moving
+        if self._guard is not None and self._possible_travels is not None:
+            may_move = frozenset(name for name, travel in self._possible_travels.items() if travel > 0.0)
+            self._guard.see(scene, ages, may_move)
 
         if not changed and distances == self._required_distances:
             return False
@@ -415,23 +436,30 @@ class Loop:
     def _step(self) -> Vector:
         """Go one step along the path and return the next configuration, shape (n,).
 
+        The robot stays where it is if the scene is old and the step is not proven.
+        """
+        q, passed = self._next_on_path()
+        if q is self.q or (self._scene_is_old and not self._proven_whatever_moves(self.q, q)):
+            return self.q
+        self._planner.advance(q, passed, self._world)
+        return q
+
+    def _next_on_path(self) -> tuple[Vector, int]:
+        """Return the configuration after a step along the path, shape (n,), and how many waypoints it has passed.
+
         A step may cut across the corners of the path if the straight motion is free and proven; otherwise it ends at
-        the first corner. The robot stays where it is if the scene is old and the step is not proven.
+        the first corner.
         """
         path = self._planner.path
         settings = self._settings
         if path is None or len(path) < 2:
-            return self.q
+            return self.q, 0
 
         q, passed = one_step(path, settings.step, self._max_change)
         round_corner = bool(passed) and self._world.motion_valid(self.q, q)
         if passed and not (round_corner and self._proven(self.q[None], q[None])):
             q, passed = to_first_corner(path, settings.step, self._max_change)
-
-        if self._scene_is_old and not self._proven_whatever_moves(self.q, q):
-            return self.q
-        self._planner.advance(q, passed, self._world)
-        return q
+        return q, passed
 
     def _closes_in(self) -> bool:
         """Check whether a cloud will be too near within ``REACTION_TICKS`` ticks at its present speed.
@@ -447,6 +475,56 @@ class Loop:
             return np.nan
         return float(self._world_ahead(0).clearance(q[None])[0]) - max(self._required_in_tick.values())
 
+    def _guarded(self, guard: Guard, event: TickEvent, free: bool) -> tuple[TickEvent, str, Vector, float]:
+        """Go along the path if a way out is left then, or else where nothing can reach the arm for the longest time.
+
+        Args:
+            guard: Knows what obstacles can reach.
+            event: The event if the robot goes along its path: "walk", "plan" or "repair".
+            free: Whether the path is free.
+
+        Returns:
+            Event, reason, next configuration, shape (n,), and how long the arm is safe [s].
+        """
+        if self._world.blocked:
+            return "wait", self._world.blocked, self.q, 0.0
+        base_is_safe = self._world.base_apart(self._possible_travels or {})
+
+        path = self._planner.path
+        if free:
+            q, passed = self._next_on_path()
+            if q is not self.q and guard.seconds_after(self.q, q, path) >= guard.needed:
+                self._planner.advance(q, passed, self._world)
+                return event, "", q, guard.needed * base_is_safe
+
+        refuge = guard.refuge(self.q, path, self._world_ahead)
+        if refuge.moves:
+            self._planner.rejoin(refuge.q)
+            return "evade", "an obstacle is too near", refuge.q, refuge.seconds * base_is_safe
+        return "wait", self._why_stay(free), self.q, refuge.seconds * base_is_safe
+
+    def _unavoidable(self, now: float) -> Unavoidable | None:
+        """Return a proof that no motion of the arm rules out a contact in this tick, or None; warn of the first one."""
+        settings = self._settings
+        world = self._problem.world.with_accuracy("exact").with_scene(self._world.scene)
+        lost = unavoidable(
+            world, self.q, self._possible_travels or {}, settings.tick, step=settings.step, max_change=self._max_change
+        )
+        if lost is not None and not self._has_warned:
+            self._has_warned = True
+            warnings.warn(ContactWarning(f"at {now:.3g} s {lost.sentence}"), stacklevel=6)
+        return lost
+
+    def _why_stay(self, free: bool) -> str:
+        """Return why the robot does not go along a path."""
+        path = self._planner.path
+        goals = self._goals if path is None else path[-1:]
+        if not self._world.valid_batch(goals).any():
+            return "the goal is not free"
+        if not free:
+            return self._why_no_path()
+        return "what was seen is too old to go on" if self._scene_is_old else "a step would leave no way out"
+
     def _wait_or_evade(self) -> tuple[TickEvent, str, Vector]:
         """Wait, or evade an obstacle that is too near, when there is no free path.
 
@@ -457,11 +535,7 @@ class Loop:
             return "wait", self._world.blocked, self.q
 
         if self._world.valid(self.q):
-            path = self._planner.path
-            goals = self._goals if path is None else path[-1:]
-            if not self._world.valid_batch(goals).any():
-                return "wait", "the goal is not free", self.q
-            return "wait", self._why_no_path(), self.q
+            return "wait", self._why_stay(free=False), self.q
 
         q = self._evasion()
         if q is None:
@@ -516,7 +590,7 @@ class Loop:
 
     def _record(
         self, now: float, q: Vector, event: TickEvent, seconds_of_part: Mapping[str, float], checked: int, reason: str,
-        path: Matrix | None = None, proven: bool | None = None,
+        path: Matrix | None = None, **told: Any,
     ) -> None:  # fmt: skip
         # Only the poses of obstacles that have moved since the first tick are recorded.
         poses = {
@@ -524,7 +598,7 @@ class Loop:
             for o in self._world.scene.obstacles
             if o.name in self._first_poses and (o.pose.homogeneous != self._first_poses[o.name].homogeneous).any()
         }
-        self.run.ticks.append(Tick(now, q, event, path, poses, seconds_of_part, checked, reason, proven))
+        self.run.ticks.append(Tick(now, q, event, path, poses, seconds_of_part, checked, reason, **told))
 
 
 def _same_solids(first: Scene, second: Scene) -> bool:
@@ -565,7 +639,7 @@ def one_step(path: Matrix, step: float, max_change: Vector) -> tuple[Vector, int
 
     for end in path[1:]:
         edge = end - q
-        ticks_of_edge = _ticks_of(edge, step, max_change)
+        ticks_of_edge = float(ticks_of(edge[None], step, max_change)[0])
         if ticks_of_edge > ticks_left:
             return q + edge * (ticks_left / ticks_of_edge), passed
         ticks_left -= ticks_of_edge
@@ -577,10 +651,3 @@ def one_step(path: Matrix, step: float, max_change: Vector) -> tuple[Vector, int
 def to_first_corner(path: Matrix, step: float, max_change: Vector) -> tuple[Vector, int]:
     """Follow a path for one tick like :func:`one_step`, but no farther than the next waypoint."""
     return one_step(path[:2], step, max_change)
-
-
-def _ticks_of(edge: Vector, step: float, max_change: Vector) -> float:
-    """Return how many ticks the motion by ``edge``, shape (n,), takes; fractions count."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        rates = np.where(edge == 0.0, 0.0, np.abs(edge) / max_change)
-    return max(float(np.linalg.norm(edge)) / step, float(rates.max()))

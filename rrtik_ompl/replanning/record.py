@@ -48,6 +48,7 @@ from rrtik_ompl.replanning.faults import ANSWERS, Fault
 from rrtik_ompl.replanning.feed import Feed, Snapshot
 from rrtik_ompl.replanning.judge import RunViolation, run_violations
 from rrtik_ompl.replanning.tick import Tick
+from rrtik_ompl.replanning.unavoidable import Unavoidable
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
 
@@ -323,6 +324,8 @@ class ReplanRun:
         end = f"{self.problem}: {self.outcome}{reason} after {self.ticks[-1].time:.2f} s"
         moves, proven = self.moves
         proven_moves = f", {proven} of {moves} moves proven" if moves else ""
+        lost = sum(tick.unavoidable is not None for tick in self.ticks)
+        proven_moves += f", contact could not be ruled out in {lost} tick{'s' * (lost != 1)}, proven" if lost else ""
 
         events = f"{counted('repair', 'repair')}{longest}, {counted('wait', 'wait')}, {counted('evade', 'evasion')}"
         faults = f", {len(self.faults)} faults of the feed" if self.faults else ""
@@ -384,6 +387,7 @@ def joints_of(robot: Robot, chosen: Mask) -> tuple[str, ...]:
 
 
 _JOINTS = ("prismatic", "continuous")  # not in older records
+_SIDES = ("lower", "upper")
 _HEADS: tuple[str, ...] = ("problem", "robot", "joint_names", "planner", "seed", "step", "rate", "margin")
 _HEADS += ("speed_bound", "outcome", "reason")
 
@@ -464,7 +468,23 @@ def _tick_data(tick: Tick) -> dict[str, Any]:
     data |= {"path": None if tick.path is None else tick.path.tolist()}
     data |= {"poses": {name: pose.tolist() for name, pose in tick.poses.items()}, "seconds": dict(tick.seconds)}
     data |= {"checked": tick.checked} | ({"reason": tick.reason} if tick.reason else {})
-    return data | ({} if tick.proven is None else {"proven": tick.proven})
+    data |= {} if tick.proven is None else {"proven": tick.proven}
+    data |= {} if tick.safe_seconds is None else {"safe_seconds": tick.safe_seconds}
+    return data | ({} if tick.unavoidable is None else {"unavoidable": _unavoidable_data(tick.unavoidable)})
+
+
+def _unavoidable_data(lost: Unavoidable) -> dict[str, Any]:
+    boxes = {"lower": lost.lower.tolist(), "upper": lost.upper.tolist()}
+    return {"seconds": lost.seconds, **boxes, "pairs": lost.pairs, "distances": lost.distances.tolist()}
+
+
+def _unavoidable(entry: Mapping[str, Any], joints: int) -> Unavoidable:
+    distances = finite_array(entry["distances"], (None,), "distances of a contact that cannot be avoided")
+    lower, upper = (finite_array(entry[side], (len(distances), joints), f"{side} corners") for side in _SIDES)
+    pairs = tuple((str(link), str(obstacle)) for link, obstacle in entry["pairs"])
+    if len(pairs) != len(distances):
+        raise InputError(f"pairs: expected {len(distances)}, one for each box, got {len(pairs)}")
+    return Unavoidable(positive(entry["seconds"], "seconds"), lower, upper, pairs, distances)
 
 
 def _tick(entry: Mapping[str, Any], joints: int) -> Tick:
@@ -479,6 +499,8 @@ def _tick(entry: Mapping[str, Any], joints: int) -> Tick:
         whole_number(entry["checked"], "checked"),
         str(entry.get("reason", "")),
         None if entry.get("proven") is None else bool(entry["proven"]),
+        None if entry.get("safe_seconds") is None else not_negative(entry["safe_seconds"], "safe_seconds"),
+        None if entry.get("unavoidable") is None else _unavoidable(entry["unavoidable"], joints),
     )
 
 

@@ -60,8 +60,10 @@ def replan(  # noqa: D417 - the settings are described in one place
     they were seen and do in the tick (they may even begin to move just now), as long as none is faster than
     ``speed_bound``. The record says which steps are not proven (:attr:`Tick.proven`). Without a ``speed_bound`` no step
     is proven while there is an obstacle that may move and does not state its motion.
-    Contact cannot be avoided where the arm waits or evades and every escape is blocked, or where an obstacle reaches
-    the fixed base. :meth:`ReplanRun.violations` judges a record.
+    With a ``speed_bound`` a step along the path is made only if after it a motion is left on which nothing can touch
+    the arm for a while; else it waits or evades in such a way, where it can. :attr:`Tick.safe_seconds` says for how
+    long nothing can. Where it is proven that no motion of the arm rules out a contact, :attr:`Tick.unavoidable` has the
+    proof, and a ``ContactWarning`` is given. :meth:`ReplanRun.violations` judges a record.
 
     Args:
         problem: Robot, scene at the begin, start and goal. If the goal is a pose, position or region, all

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.base.choices import TickEvent
 from rrtik_ompl.base.copies import as_value
+from rrtik_ompl.replanning.unavoidable import Unavoidable
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,6 +30,10 @@ class Tick:
         reason: Why the robot waits or evades, or "".
         proven: Whether the motion to the next tick's configuration is proven to keep margin and clearance, as long as
             no obstacle is faster than stated; None if there is no motion.
+        safe_seconds: How long, from the begin of the tick, the arm can go on so that no obstacle can touch it, whatever
+            obstacles do that are not faster than stated [s]; at most as long as is looked ahead, 0 if nothing is
+            proven. None without a bound on speeds.
+        unavoidable: The proof that no motion of the arm rules out a contact in this tick; None if there is none.
     """
 
     time: float
@@ -40,5 +45,7 @@ class Tick:
     checked: int = 0
     reason: str = ""
     proven: bool | None = None
+    safe_seconds: float | None = None
+    unavoidable: Unavoidable | None = None
 
     __reduce__ = as_value

@@ -165,7 +165,7 @@ class MovingWorld:
 
         Clearance is the distance to contact, minus margins and inflation.
         """
-        return self._fast.clearance(self.robot.chain.joint_values(Q)).lower
+        return self._fast.least_clearance(self.robot.chain.joint_values(Q))
 
     def valid(self, q: Vector) -> bool:
         """Check whether q, shape (dof,), is free."""

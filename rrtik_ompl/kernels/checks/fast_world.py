@@ -294,6 +294,16 @@ class FastWorld:
         pairs = [self._flagged[flag][0] if flag >= 0 else (-1, -1) for flag in nearest.tolist()]
         return Clearance(rounded(lowest, -1.0), rounded(highest, 1.0), np.array(pairs, dtype=np.int64).reshape(-1, 2))
 
+    def least_clearance(self, V: ArrayLike) -> Vector:
+        """Lower bounds of the distance to contact for rows of joint values V, shape (m, joints), shape (m,).
+
+        Raises:
+            InputError: If V has the wrong shape or a value that is not finite.
+        """
+        rows, beyond = self._values(V, "joint values")
+        lowest = self._measured(rows, 0)[0]
+        return rounded(lowest if beyond is None else np.where(beyond, -np.inf, lowest), -1.0)
+
     def _measured(self, rows: Matrix, level: int) -> tuple[Vector, NDArray[np.int32]]:
         """Distances between outer (0) or inner (1) solids and the flags of the nearest pairs, -1 for none."""
         balls = self._arm.balls[level]

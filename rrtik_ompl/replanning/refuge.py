@@ -1,0 +1,282 @@
+"""Where an arm goes so that nothing can reach it in time, if no obstacle is faster than stated.
+
+An obstacle that was seen ``age`` seconds ago is, ``t`` seconds from now, within ``speed * (age + t)`` of where it was
+seen. A motion that keeps farther than that from all seen places, at each time of it, touches nothing, whatever the
+obstacles do [78]. docs/science/evasion.md has the theorem. Accelerations of the arm are not considered.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rrtik_ompl.base.arrays import Mask, Matrix, Vector
+from rrtik_ompl.model.scene import Scene
+from rrtik_ompl.replanning.evading import directions
+from rrtik_ompl.replanning.feed import TIME_RESOLUTION
+from rrtik_ompl.replanning.settings import ReplanSettings
+from rrtik_ompl.replanning.travels import SPEED_WARNING_RATIO
+from rrtik_ompl.world.moving_world import MovingWorld
+from rrtik_ompl.world.world import World
+
+# Motions are looked at some times within the first tick [ticks], and then at others, in units of one tick or more; a
+# bound on the motion closes the gaps between looks.
+FIRST_LOOKS = (0.0, 0.25, 0.5, 0.75, 1.0)
+FURTHER_LOOKS = (0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0, 5.0, 6.0)
+# In a unit of several ticks obstacles come at most so far as a share of the arm's fastest point in a tick. So the arm
+# gives slow obstacles a wide berth, which costs little.
+UNIT_SHARE = 0.3
+LONGEST_UNIT = 0.1  # [s]
+NEEDED = 5.0  # A step along the path is made if with it there is a motion that is safe for so many units.
+RATED = (1.0, 2.0, 3.0, 4.0, 6.0)  # when ways out are rated by where obstacles are predicted to be [units]
+ENOUGH = 1.0  # Of ways out that are safe for so many units the prediction decides.
+DIRECTIONS = 64  # random directions in which refuges are looked for
+LENGTHS = (0.25, 1.0, 2.0, 4.0)  # how far away, in units at full speed
+MOST_TARGETS = 64  # refuges with most room, to which ways are looked at
+MOST_TRIED = 16  # best ways that are checked for self-collision
+PIECES = 8  # parts of a tick in each of which obstacles are grown to their size at its end
+SPARE = 1e-9  # [s]: rounding of times
+
+Ways = NDArray[np.float64]  # configurations at some times, shape (m, k, n)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Refuge:
+    """The begin of a motion that is safe for a while.
+
+    Attributes:
+        q: Where the arm is after a tick, shape (n,).
+        seconds: How long the motion is proven safe [s], from the begin of the tick; 0 if it is not.
+        moves: Whether the arm moves in the tick.
+    """
+
+    q: Vector
+    seconds: float
+    moves: bool
+
+
+class Guard:
+    """Chooses motions that no obstacle can reach in time.
+
+    Args:
+        world: The robot and the first scene, with exact checks.
+        alone: The robot without obstacles, which checks and proves that it does not touch itself.
+        settings: Step, ticks and the bound on speeds, which must be stated.
+        keep: Distance to obstacles that is kept where that is possible [m].
+        max_change: How far each joint can move in a tick [rad or m], shape (n,).
+        rng: Source of random directions.
+    """
+
+    def __init__(
+        self,
+        world: World,
+        alone: World,
+        settings: ReplanSettings,
+        keep: float,
+        max_change: Vector,
+        rng: np.random.Generator,
+    ) -> None:
+        assert settings.speed_bound is not None
+        self._world = world
+        self._alone = alone
+        self._step = settings.step
+        self._tick = settings.tick
+        self._speed = settings.speed_bound * SPEED_WARNING_RATIO
+        self._keep = keep
+        self._max_change = max_change
+        self._rng = rng
+        fastest = float((world.weights * np.minimum(settings.step, max_change)).max())  # [m] in a tick
+        slow_ticks = int(min(UNIT_SHARE * fastest / (self._speed * self._tick), LONGEST_UNIT / self._tick))
+        self._unit = max(slow_ticks, 1)  # [ticks]
+        self._looks = np.unique([*FIRST_LOOKS, *(self._unit * np.array(FURTHER_LOOKS))])
+        self._parts: dict[bool, tuple[frozenset[str], MovingWorld | None]] = {}
+
+    @property
+    def needed(self) -> float:
+        """How long motions have to be safe, the tick included, so that the arm goes on [s]."""
+        return NEEDED * self._unit * self._tick
+
+    def see(self, scene: Scene, ages: Mapping[str, float], may_move: frozenset[str]) -> None:
+        """Take over where obstacles were seen.
+
+        Args:
+            scene: The last scene.
+            ages: How long ago each obstacle was seen [s], by name.
+            may_move: Names of the obstacles that may move; the others stay where they are.
+        """
+        stay = frozenset(o.name for o in scene.obstacles) - may_move
+        for moving, names in ((True, may_move), (False, stay)):
+            part = _part_of(scene, names)
+            known = self._parts.get(moving)
+            if known is None or known[0] != names:
+                world = MovingWorld(self._world.with_scene(part), self_collision=False) if names else None
+                self._parts[moving] = names, world
+            world = self._parts[moving][1]
+            if world is not None:
+                seconds = {name: ages[name] + TIME_RESOLUTION if moving else 0.0 for name in names}
+                world.move(part, inflation={name: self._speed * age for name, age in seconds.items()})
+
+    def seconds_after(self, q: Vector, after: Vector, path: Matrix | None) -> float:
+        """Return how long the best motion that begins with a tick from ``q`` to ``after`` keeps its distance [s].
+
+        The answer is at most :attr:`needed`.
+
+        Args:
+            q: The robot's configuration, shape (n,).
+            after: Where it would be after the tick, shape (n,).
+            path: Its path, shape (k, n), or None.
+        """
+        looks = self._looks[self._looks <= NEEDED * self._unit]
+        step = q + np.minimum(looks, 1.0)[:, None] * (after - q)
+        seconds = float(self._safe_seconds(step[None], looks)[0, 0])  # It may stand where the step ends.
+        if seconds >= self.needed - SPARE or seconds < self._tick - SPARE:
+            return seconds
+        ways = self._ways(after, self._targets(after, path), np.maximum(looks - 1.0, 0.0))
+        ways = np.where((looks <= 1.0)[None, :, None], step[None], ways)
+        return float(self._safe_seconds(ways, looks)[:, 0].max())
+
+    def refuge(self, q: Vector, path: Matrix | None, ahead: Callable[[int], MovingWorld]) -> Refuge:
+        """Return the begin of the best motion from ``q``.
+
+        What counts is first how long nothing can touch the arm, then how long nothing can come nearer than ``keep``,
+        then the room beside obstacles where they are predicted to be. Standing still is one of the motions, and is
+        preferred where it keeps that distance for as long as is needed.
+
+        Args:
+            q: The robot's configuration, shape (n,).
+            path: Its path, shape (k, n), or None.
+            ahead: Returns the world predicted so many ticks ahead, without self-collision. It may move and return the
+                same object each time.
+        """
+        soon = ahead(round(3 * self._unit))
+        ways = self._ways(q, np.vstack([q, self._targets(q, path, soon)]), self._looks)
+        if path is not None and len(path) > 1:
+            ways = np.concatenate([ways, self._along(path)[None]])
+        kept_seconds, seconds = self._safe_seconds(ways, self._looks).T
+        if kept_seconds[0] >= self.needed - SPARE:
+            return Refuge(q, float(seconds[0]), moves=False)
+
+        room = np.full(len(ways), np.inf)
+        for ticks in (1, *(round(self._unit * units) for units in RATED)):
+            room = np.minimum(room, ahead(ticks).clearance(ways[:, self._look_at(ticks)]))
+        ends = ways[:, self._look_at(1)]
+        if seconds.max() < self._tick - SPARE:
+            seconds = np.where(self._out_of_reach(q, ends), self._tick, seconds)
+        enough = ENOUGH * self._unit * self._tick
+        ranks = -room, -np.minimum(kept_seconds, enough), -np.minimum(seconds, enough)
+        order = np.lexsort(ranks)[:MOST_TRIED]
+        for k in order.tolist():
+            if not (ends[k] != q).any():
+                return Refuge(q, float(seconds[k]), moves=False)
+            if self._alone.motion_valid(q, ends[k]):
+                return Refuge(ends[k], float(seconds[k]), moves=True)
+        return Refuge(q, float(seconds[0]), moves=False)
+
+    def _safe_seconds(self, ways: Ways, looks: Vector) -> Matrix:
+        """Return how long motions keep the distance ``keep``, and how long they touch nothing [s], shape (m, 2).
+
+        Both are at most the time of the last look.
+
+        Args:
+            ways: Configurations at the looks, between which the joints go straight, shape (m, k, n).
+            looks: Times in ticks, increasing from 0, shape (k,).
+        """
+        count, _, joints = ways.shape
+        travels = np.abs(np.diff(ways, axis=1)) @ self._world.weights
+        safe = np.ones((count, len(looks), 2), dtype=bool)
+        safe[:, -1] = False  # Nothing is known of what comes after the last look.
+        for moving, (_, world) in self._parts.items():
+            if world is not None:
+                room = world.clearance(ways.reshape(-1, joints)).reshape(count, -1)
+                growth = self._speed * self._tick * looks if moving else np.zeros_like(looks)
+                for k, keep in enumerate((self._keep, 0.0)):
+                    safe[:, :-1, k] &= _kept(room, travels, keep + growth)
+        return np.asarray(self._tick * looks[safe.argmin(axis=1)])
+
+    def _out_of_reach(self, q: Vector, ends: Matrix) -> Mask:
+        """Return which motions of one tick from ``q`` to ends, shape (m, n), are proven safe by planes, shape (m,).
+
+        It is exact where :meth:`_safe_seconds` has only bounds of distances, and takes longer.
+        """
+        free = np.ones(len(ends), dtype=bool)
+        for before, after in pairwise(np.linspace(0.0, 1.0, PIECES + 1).tolist()):
+            for moving, (_, world) in self._parts.items():
+                if world is not None and free.any():
+                    growth = self._speed * self._tick * after if moving else 0.0
+                    edges = ends[free] - q
+                    proven = world.motions_proven(q + before * edges, q + after * edges, less=-growth)
+                    free[free] = proven
+        return free
+
+    def _targets(self, q: Vector, path: Matrix | None, soon: MovingWorld | None = None) -> Matrix:
+        """Return configurations around ``q`` with the most room, shape (m, n)."""
+        moves = self._max_change * directions(q, self._max_change, self._rng, path, DIRECTIONS)
+        moves *= np.minimum(self._step / np.linalg.norm(moves, axis=1), 1.0)[:, None]
+        robot = self._world.robot
+        targets = np.vstack([np.clip(q + self._unit * length * moves, robot.lower, robot.upper) for length in LENGTHS])
+        world = self._parts[True][1] or self._parts[False][1]
+        if world is None:
+            return targets[:MOST_TARGETS]
+        best = np.argsort(-world.clearance(targets), kind="stable")[:MOST_TARGETS]
+        if soon is not None:
+            best = np.union1d(best, np.argsort(-soon.clearance(targets), kind="stable")[:MOST_TARGETS])
+        return targets[best]
+
+    def _ways(self, q: Vector, targets: Matrix, looks: Vector) -> Ways:
+        """Return where the arm is on its straight ways at full speed from ``q`` to targets, shape (m, n), and stays."""
+        edges = targets - q
+        ticks = ticks_of(edges, self._step, self._max_change)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            shares = np.where(ticks[:, None] > 0.0, looks / ticks[:, None], 1.0)
+        return np.asarray(q + np.minimum(shares, 1.0)[:, :, None] * edges[:, None, :])
+
+    def _along(self, path: Matrix) -> Matrix:
+        """Return where the arm is on its way along the path, shape (k, n), at the looks."""
+        ends = np.concatenate([[0.0], np.cumsum(ticks_of(np.diff(path, axis=0), self._step, self._max_change))])
+        return np.column_stack([np.interp(self._looks, ends, values) for values in path.T])
+
+    def _look_at(self, ticks: int) -> int:
+        """Return the number of the look after so many ticks."""
+        return int(np.searchsorted(self._looks, ticks))
+
+
+def ticks_of(edges: Matrix, step: float, max_change: Vector) -> Vector:
+    """Return how many ticks straight motions by ``edges``, shape (m, n), take; fractions count; shape (m,)."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        rates = np.where(edges == 0.0, 0.0, np.abs(edges) / max_change)
+    return np.asarray(np.maximum(np.linalg.norm(edges, axis=1) / step, rates.max(axis=1)))
+
+
+def _kept(room: Matrix, travels: Matrix, growth: Vector) -> Mask:
+    """Return in which pieces of motions there is always more room than obstacles have grown, shape (m, k - 1).
+
+    From one end of a piece to the other no point of the arm goes farther than ``travels``. So the room in between is at
+    least the larger of two lines that fall from the ends inwards; beside the growth it is least where they meet, or at
+    the end.
+
+    Args:
+        room: Lower bounds of the distance to obstacles at the ends of the pieces [m], shape (m, k).
+        travels: Bounds of the motion in each piece [m], shape (m, k - 1).
+        growth: How much obstacles have grown at the ends [m], increasing, shape (k,).
+    """
+    first, last = room[:, :-1], room[:, 1:]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        meeting = np.clip(np.where(travels > 0.0, 0.5 + 0.5 * (first - last) / travels, 1.0), 0.0, 1.0)
+        least = np.where(travels > 0.0, 0.5 * (first + last - travels), last)
+    grown = growth[:-1] + meeting * np.diff(growth)
+    return np.asarray((first > growth[:-1]) & (last > growth[1:]) & (least > grown))
+
+
+def _part_of(scene: Scene, names: frozenset[str]) -> Scene:
+    """Return a scene with only some of its obstacles."""
+    gone = {o.name for o in scene.obstacles} - names
+    return replace(
+        scene,
+        obstacles=tuple(o for o in scene.obstacles if o.name in names),
+        allowed_collisions=tuple(pair for pair in scene.allowed_collisions if not gone & set(pair)),
+        contacts=tuple(each for each in scene.contacts if not gone & {each.first, each.second}),
+    )
