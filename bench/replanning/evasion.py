@@ -107,7 +107,7 @@ def holds(problem: rrtik.Problem, tick: Tick, step: float) -> bool:
         poses = frames[number, own.joint] @ own.placement.homogeneous, other.placement.homogeneous
         places = [coal.Transform3s(pose[:3, :3], pose[:3, 3]) for pose in poses]
         solids = own.geometry, places[0], other.geometry, places[1]
-        distance = max(coal.distance(*solids, coal.DistanceRequest(), coal.DistanceResult()), 0.0)
+        distance = coal.distance(*solids, coal.DistanceRequest(), coal.DistanceResult())
         if distance + half_ways[number] > BOUND * proof.seconds + ROUNDING:
             return False
     return covered

@@ -35,6 +35,7 @@ from rrtik_ompl.world.world import World
 Clock = Callable[[], float]
 
 NO_WAY_OUT = "no motion was found that nothing can reach in time"
+PROOF_SHARES = (1.0, 0.5, 0.25, 0.125)  # of a tick, by whose end a contact may be proven unavoidable
 PROOF_TRIES = 3  # searches for a path that is proven
 REACTION_TICKS = 6  # The arm evades a cloud that would be too near within so many ticks at its present speed.
 
@@ -507,9 +508,13 @@ class Loop:
         """Return a proof that no motion of the arm rules out a contact in this tick, or None; warn of the first one."""
         settings = self._settings
         world = self._problem.world.with_accuracy("exact").with_scene(self._world.scene)
-        lost = unavoidable(
-            world, self.q, self._possible_travels or {}, settings.tick, step=settings.step, max_change=self._max_change
-        )
+        travels = self._possible_travels or {}
+        lost: Unavoidable | None = None
+        for share in PROOF_SHARES:
+            later = (1.0 - share) * settings.tick * (settings.speed_bound or 0.0)  # what obstacles do after it [m]
+            growths = {name: max(travel - later, 0.0) for name, travel in travels.items()}
+            reach = {"step": share * settings.step, "max_change": share * self._max_change}
+            lost = lost or unavoidable(world, self.q, growths, share * settings.tick, **reach)  # type: ignore[arg-type]
         if lost is not None and not self._has_warned:
             self._has_warned = True
             warnings.warn(ContactWarning(f"at {now:.3g} s {lost.sentence}"), stacklevel=6)

@@ -38,7 +38,7 @@ DIRECTIONS = 64  # random directions in which refuges are looked for
 LENGTHS = (0.25, 1.0, 2.0, 4.0)  # how far away, in units at full speed
 MOST_TARGETS = 64  # refuges with most room, to which ways are looked at
 MOST_TRIED = 16  # best ways that are checked for self-collision
-PIECES = 8  # parts of a tick in each of which obstacles are grown to their size at its end
+PIECES = 32  # parts of a tick in each of which obstacles are grown to their size at its end
 SPARE = 1e-9  # [s]: rounding of times
 
 Ways = NDArray[np.float64]  # configurations at some times, shape (m, k, n)
