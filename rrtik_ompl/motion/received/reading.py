@@ -30,7 +30,8 @@ from rrtik_ompl.motion.trajectory.messages import seconds, yaml_documents
 from rrtik_ompl.motion.trajectory.text import GRIPPER
 
 BAGS = (".bag", ".db3", ".mcap")
-ENDINGS = (".json", ".yaml", ".yml", ".csv", ".txt", ".npz", ".npy", *BAGS)
+PARQUET = ".parquet"
+ENDINGS = (".json", ".yaml", ".yml", ".csv", ".txt", ".npz", ".npy", PARQUET, *BAGS)
 LARGEST_FILE = 512 * 1024 * 1024  # [bytes]
 DEEPEST = 20  # largest depth of lists and groups in which motions are sought
 FAR_OUTSIDE = 0.5  # [rad] outside the limits, where a value is probably one of degrees
@@ -80,7 +81,8 @@ def load_motions(
     the package rosbags: these messages, or else the stream of ``JointState``); ``.csv`` with names of joints in its
     first line, and perhaps times, velocities and accelerations (``<joint> velocity``); ``.npz`` and ``.npy`` with
     arrays such as MPlib (``position``, ``velocity``, ``time``), cuRobo (``position``, ``dt``), roboplan (``positions``,
-    ``times``, ``joint_names``) and LeRobot (``action``, ``observation.state``) have them; and the paths and
+    ``times``, ``joint_names``) and LeRobot (``action``, ``observation.state``) have them; ``.parquet``, a table of a
+    dataset of LeRobot (with the package pyarrow), whose episodes and streams are a motion each; and the paths and
     trajectories of this library. Nothing in a file is executed.
 
     Columns are found by the names of joints. Joints that the robot does not move may be in the file if they stay where
@@ -115,7 +117,7 @@ def load_motions(
         return own
 
     try:
-        found = list(_columns_of(path))
+        found = list(_columns_of(path, robot))
         if not found:
             raise InputError("holds no motion: no joint_names with points, and no array of positions")
         return tuple(_fitted(each, robot, path, step, degrees=degrees) for each in found)
@@ -126,7 +128,7 @@ def load_motions(
 def _own(path: Path, robot: Robot) -> tuple[JointPath | Trajectory] | None:
     """Return the motion in a file of this library; None if it is another program's."""
     ending = path.suffix.lower()
-    if path.is_dir() or ending in (".yaml", ".yml", ".npz", ".npy", *BAGS):
+    if path.is_dir() or ending in (".yaml", ".yml", ".npz", ".npy", PARQUET, *BAGS):
         return None
     known_ending(path, ENDINGS, "motion")
     if ending == ".json":
@@ -144,7 +146,7 @@ def _own(path: Path, robot: Robot) -> tuple[JointPath | Trajectory] | None:
     return (Trajectory.load(path, robot),) if kind == "joint_trajectory" else None
 
 
-def _columns_of(path: Path) -> Iterator[Columns]:
+def _columns_of(path: Path, robot: Robot) -> Iterator[Columns]:
     """Yield what a file holds of each motion."""
     ending = path.suffix.lower()
     if path.is_dir() or ending in BAGS:
@@ -152,6 +154,11 @@ def _columns_of(path: Path) -> Iterator[Columns]:
 
         for topic, message in messages_of_bag(path):
             yield from _messages(message, topic)
+    elif ending == PARQUET:
+        from rrtik_ompl.motion.received.parquet import streams_of_parquet
+
+        for label, arrays in streams_of_parquet(path, tuple(robot.movable)):
+            yield from _of_arrays(arrays, label)
     elif ending == ".json":
         yield from _motions(_json(path), "")
     elif ending in (".yaml", ".yml"):

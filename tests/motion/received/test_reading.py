@@ -230,3 +230,33 @@ def test_a_bag_is_read(robot, tmp_path):
         (found,) = rrtik.load_motions(tmp_path / name, robot)
         assert np.allclose(found.positions, ROWS)
         assert np.allclose(found.times, [0.0, 1.0, 2.0])
+
+
+def test_a_table_of_lerobot_has_a_motion_for_each_episode_in_degrees(robot, tmp_path):
+    pa = pytest.importorskip("pyarrow")
+    pq = pytest.importorskip("pyarrow.parquet")
+    file = tmp_path / "data" / "chunk-000" / "file-000.parquet"
+    file.parent.mkdir(parents=True)
+    (tmp_path / "meta").mkdir()
+    motors = [*(f"{name}.pos" for name in NAMES[::-1]), "gripper.pos"]
+    (tmp_path / "meta" / "info.json").write_text(json.dumps({"features": {"action": {"names": motors}}}))
+    rows = np.rad2deg(ROWS)[:2, ::-1] * 2.0
+    action = np.column_stack([rows, [30.0, 100.0]]).tolist() * 2
+    columns = {"action": action, "timestamp": [0.0, 0.5, 0.0, 0.5], "episode_index": [0, 0, 1, 1]}
+    pq.write_table(pa.table(columns), file)
+
+    with pytest.warns(PathWarning, match=r"'gripper' is left out|another order"):
+        first, second = rrtik.load_motions(file, robot, degrees=True)
+    assert np.allclose(first.positions, 2.0 * np.array(ROWS)[:2], atol=1e-12)
+    assert np.array_equal(first.positions, second.positions)
+    assert np.array_equal(first.times, [0.0, 0.5])
+    assert "episode 1" in second.name
+    with pytest.warns(PathWarning), pytest.raises(InputError, match=r"file-000\.parquet: episode 0.*degrees=True"):
+        rrtik.load_motions(file, robot)
+
+    file.write_bytes(b"PAR1 and no more")
+    with pytest.raises(InputError, match=r"file-000\.parquet: not Parquet"):
+        rrtik.load_motions(file, robot)
+    pq.write_table(pa.table({"other": [1.0]}), file)
+    with pytest.raises(InputError, match="no column action"):
+        rrtik.load_motions(file, robot)
