@@ -81,7 +81,7 @@ def time_parameterize(
 
     Example:
         >>> problem = rrtik.load_problem("planar3_boxes")
-        >>> path = rrtik.plan(problem, seed=1).path
+        >>> path = rrtik.plan(problem).path
         >>> stops = rrtik.time_parameterize(path, rrtik.RateLimits(1.0, 2.0, 20.0))
         >>> smooth = rrtik.time_parameterize(path, rrtik.RateLimits(1.0, 2.0, 20.0), blend=0.05, world=problem.world)
         >>> smooth.duration < stops.duration
