@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -19,7 +20,7 @@ POCKET = [(4, 2), (12, 2), (12, 3), (5, 3), (5, 8), (4, 8)]
 UPPER = [(9, 10), (17, 10), (17, 17), (16, 17), (16, 11), (9, 11)]
 CENTRES = [(5, 5), (5, 14), (10, 9), (10, 16), (14, 5), (15, 12)]
 CIRCUMRADIUS, TURN_CHANCE = 1.8, 0.03
-OPTIONS = {"step": STEP, "rate": RATE, "max_edge": EPS, "repair_budget": 0.5}
+OPTIONS: dict[str, Any] = {"step": STEP, "rate": RATE, "max_edge": EPS, "repair_budget": 0.5}
 
 
 def limits() -> rrtik.RateLimits:

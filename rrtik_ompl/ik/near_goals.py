@@ -51,10 +51,8 @@ def near_goals(problem: Problem, most: int) -> Matrix | None:
     """
     robot = problem.robot
     goal = problem.goal
-    if not isinstance(goal, (PoseGoal, PositionGoal)) or problem.constraints:
-        return None
-    arm = _arm_of(robot)
-    if arm is None:
+    arm = _arm_of(robot) if looked_for(problem) else None
+    if arm is None or not isinstance(goal, (PoseGoal, PositionGoal)):
         return None
 
     branches: Matrix | None = None
@@ -72,6 +70,12 @@ def near_goals(problem: Problem, most: int) -> Matrix | None:
         found = search.turned(branches, problem.start, most)
     arm.spare.append(search)
     return found if len(found) else None
+
+
+def looked_for(problem: Problem) -> bool:
+    """Check whether :func:`near_goals` looks for configurations at the goal of a problem."""
+    of_the_tip = isinstance(problem.goal, (PoseGoal, PositionGoal)) and not problem.constraints
+    return of_the_tip and _arm_of(problem.robot) is not None
 
 
 def starts_at_goal(problem: Problem) -> bool:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,9 +14,10 @@ from numpy.typing import ArrayLike
 from rrtik_ompl.base.arrays import Vector, finite_array, frozen, not_negative, positive, seed_of
 from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.copies import in_one_line
-from rrtik_ompl.base.errors import InputError, require
+from rrtik_ompl.base.errors import InputError, ProblemError, listed, require
 from rrtik_ompl.files.kinds import read, write
 from rrtik_ompl.geometry.collision.distances import measured
+from rrtik_ompl.kernels.threads import in_threads
 from rrtik_ompl.model.certificate import TaskCertificate
 from rrtik_ompl.model.goal_kind import TaskRegion
 from rrtik_ompl.model.judgement import Violation
@@ -43,6 +44,7 @@ from rrtik_ompl.tasks.stages import checked_regions, checked_stages, holding
 from rrtik_ompl.tasks.standing import standing_faults
 from rrtik_ompl.tasks.variations import Variation as Variation
 from rrtik_ompl.tasks.variations import moved_scene, moved_stages
+from rrtik_ompl.tasks.worlds import Left, Worlds, worlds_from
 from rrtik_ompl.world.problem import usable_configuration
 from rrtik_ompl.world.world import World
 
@@ -52,6 +54,8 @@ if TYPE_CHECKING:
     from rrtik_ompl.tasks.played import PlayedTask
     from rrtik_ompl.tasks.timed import TimedTask
 
+Made = TypeVar("Made")
+MOST_INSTANCES = 1_000_000  # in one call
 SECONDS = 10.0  # [s] default time limit for planning a task
 BLEND = 0.05  # [rad] or [m] default blend of corners
 PAUSE = 1.0  # [s] default rest for a gripper or an object
@@ -426,11 +430,15 @@ class Task:
         world = self.world if world is None else world
         start = self.start if start is None else start
         require(world, World, "world of a task", "use World(robot, scene)")
+        return self._planned(world, start, budget, Worlds(world))
+
+    def _planned(self, world: World, start: ArrayLike | str, budget: Budget, worlds: Worlds) -> TaskPlan:
+        """Plan the task; arguments and errors as of :meth:`plan`, but for the worlds, which make further ones."""
         steps = steps_of(holding(self.stages, placed_constraints(world, start, self.constraints)))
         check_program(steps, world)
 
         given: Any = world.robot.posture(start) if isinstance(start, str) else start
-        setting = Setting.beginning(world, world.robot.configuration(given, "start"))
+        setting = Setting.beginning(world, world.robot.configuration(given, "start"), worlds)
         q = usable_configuration(setting.world, given, "start")
         if reason := never_set_down(steps, setting.world, np.array(q)):
             return TaskPlan(False, (), (), (), (), reason, seconds=budget.elapsed)
@@ -472,6 +480,101 @@ class Task:
         stages = moved_stages(self.stages, self.world, variation)
         scene = moved_scene(self.world.scene, variation.poses)
         return Task(stages, self.world.with_scene(scene), start, name=self.name, constraints=self.constraints)
+
+    @overload
+    def plan_many(
+        self,
+        variations: Iterable[Variation],
+        *,
+        seconds: float = SECONDS,
+        seed: int | None = 0,
+        threads: int | None = None,
+        then: None = None,
+    ) -> list[TaskPlan]: ...
+    @overload
+    def plan_many(
+        self,
+        variations: Iterable[Variation],
+        *,
+        seconds: float = SECONDS,
+        seed: int | None = 0,
+        threads: int | None = None,
+        then: Callable[[TaskPlan], Made],
+    ) -> list[Made]: ...
+    def plan_many(
+        self,
+        variations: Iterable[Variation],
+        *,
+        seconds: float = SECONDS,
+        seed: int | None = 0,
+        threads: int | None = None,
+        then: Callable[[TaskPlan], Made] | None = None,
+    ) -> list[TaskPlan] | list[Made]:
+        """Plan many instances of the task, in threads of this process.
+
+        Each plan is that of ``task.varied(variation).plan(seed=...)`` with a seed that depends on ``seed`` and the
+        number of the instance alone, however many threads there are, unless a time limit ends a search.
+
+        Args:
+            variations: What differs in each instance.
+            seconds: Limit of wall time for each instance [s].
+            seed: Seed of all instances: the k-th one has the k-th number of
+                ``numpy.random.SeedSequence(seed).generate_state(count)``. None draws one.
+            threads: Number of instances at a time; None for the number of cores.
+            then: Called with each plan in its thread, such as ``lambda plan: plan.time_parameterize()``; what it
+                returns is returned in the place of the plan. An instance's worlds are taken over by the next one, so
+                what is done with a plan takes less time here than later on.
+
+        Returns:
+            One plan for each instance, in their order. If the start of one cannot be used, its plan is not found, and
+            its ``reason`` says why.
+
+        Raises:
+            InputError: If the task has no world or start of its own, a goal cannot be moved, or a start has another
+                number of joints.
+            UnknownNameError: If there is no obstacle or posture of a name, or no stage sets an object down.
+
+        Example:
+            >>> task = rrtik.Task.load("titan4_drawer")
+            >>> plans = task.plan_many([rrtik.Variation({"tool": [1.6, 0.3 + y, 0.0]}) for y in (0.0, 0.01)])
+            >>> len(plans)
+            2
+        """
+        given = listed(variations, "variations of a task", MOST_INSTANCES)
+        for number, variation in enumerate(given):
+            require(variation, Variation, f"variations[{number}]", "use Variation(poses, places, start)")
+            _check_start(self.start if variation.start is None else variation.start, self.world, number)
+            moved_stages(self.stages, self.world, variation)
+
+        limit = positive(seconds, "seconds")
+        numbers = np.random.SeedSequence(seed_of(seed)).generate_state(max(len(given), 1), np.uint32).tolist()
+
+        left = Left()
+
+        def planned(instance: tuple[Variation, int]) -> TaskPlan:
+            variation, own_seed = instance
+            budget = Budget(own_seed, limit)
+            start = self.start if variation.start is None else variation.start
+            task = Task(moved_stages(self.stages, self.world, variation), constraints=self.constraints)
+            with worlds_from(self.world, left) as worlds:
+                world = worlds.of(self.world.robot, moved_scene(self.world.scene, variation.poses))
+                try:
+                    return task._planned(world, start, budget, worlds)
+                except ProblemError as error:
+                    return TaskPlan(False, (), (), (), (), str(error))
+
+        instances = list(zip(given, numbers, strict=False))
+        if then is None:
+            return in_threads(planned, instances, threads)
+        return in_threads(lambda instance: then(planned(instance)), instances, threads)
+
+
+def _check_start(start: ArrayLike | str, world: World, number: int) -> None:
+    """Refuse a start of an instance of a task that is no configuration of the robot, or an unknown posture."""
+    if isinstance(start, str):
+        world.robot.posture(start)
+    else:
+        world.robot.configuration(start, f"start of variations[{number}]")
 
 
 def _joined(paths: Sequence[JointPath]) -> JointPath:

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import pairwise
 from typing import TypeAlias
 
 import numpy as np
 
-from rrtik_ompl.base.arrays import Vector
+from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.base.errors import InputError, ProblemError
 from rrtik_ompl.description.joint_weights import weighted_difference
 from rrtik_ompl.ik.goal_configurations import GoalSearch
+from rrtik_ompl.ik.method_interface import SAME_POSTURE
+from rrtik_ompl.ik.near_goals import looked_for, near_goals
+from rrtik_ompl.model.goal import PoseGoal, Target
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import Touching
@@ -22,15 +26,17 @@ from rrtik_ompl.planning.tip_motion.following import Tolerance, centred, follow
 from rrtik_ompl.planning.tip_motion.rails import straight_rail
 from rrtik_ompl.tasks.contact_life import MotionContact, follow_contacts, parted
 from rrtik_ompl.tasks.finger_motion import finger_motion
-from rrtik_ompl.tasks.handling import contacts_on_arrival, fault_of_setting_down, handled, may_touch
+from rrtik_ompl.tasks.handling import arrival, handled, may_touch
 from rrtik_ompl.tasks.program import Step, options_of
 from rrtik_ompl.tasks.setting import Setting
 from rrtik_ompl.tasks.stages import Alternatives, Attach, Detach, Gripper, MoveTo, Straight
-from rrtik_ompl.world.problem import Problem
+from rrtik_ompl.world.problem import Problem, known_problem
 from rrtik_ompl.world.world import World
 
 Reason: TypeAlias = str | Callable[[], str]  # why a step has failed; a function where it takes long to find out
-TOLERANCE = Tolerance(DEVIATION, TURN_DEVIATION)
+# Poses are reached to a ten-billionth of a metre, so that what the arm grasps is held alike in all instances of a task.
+TOLERANCE = Tolerance(DEVIATION, TURN_DEVIATION, arrived=1e-6)
+NEAREST = 6  # configurations at a goal that are tried first, where kernels find them
 THOROUGH = 1  # first round of the search in which straight lines are tried in all ways that a redundant arm has
 WHOLE = 1.0  # share of a line that is followed completely
 
@@ -97,17 +103,26 @@ class Choices:
 
     Attributes:
         branch: The branch that continues to the goal.
-        search: The search for configurations.
+        problem: The problem to get there.
+        search: The search for configurations; the nearest ones may have been found without it.
         arrives: Whether things that are taken or set down there may touch at these configurations.
         more: Whether there may be further configurations.
-        used: Number of configurations that have become branches.
+        rows: The configurations that have become branches, shape (k, dof).
     """
 
     branch: Branch
+    problem: Problem
     search: GoalSearch
-    arrives: bool = False
-    more: bool = True
-    used: int = 0
+    arrives: bool
+    more: bool
+    rows: Matrix
+
+    def new(self, rows: Matrix) -> Matrix:
+        """Return which of some configurations are no branches yet; they become some now. Shapes (k, dof)."""
+        known = self.rows
+        new = [q for q in rows if not len(known) or (np.abs(known - q).max(axis=1) > SAME_POSTURE).all()]
+        self.rows = np.array([*known, *new])
+        return self.rows[len(known) :]
 
 
 @dataclass(slots=True, eq=False)
@@ -119,12 +134,16 @@ class Expander:
         seed: Seed of the search along straight lines.
         failures: Failed steps, in order: the branch, the step, and the reason, which is read if the whole task fails.
         choices: Goals of the tip for which more configurations may be found.
+        put_off: Branches before goals at which kernels have found nothing, which are searched if nothing else is left.
+        put_off_before: Those for which that time has come.
     """
 
     rng: np.random.Generator
     seed: int
     failures: list[tuple[Branch, Step, Reason]] = field(default_factory=list)
     choices: list[Choices] = field(default_factory=list)
+    put_off: list[Branch] = field(default_factory=list)
+    put_off_before: list[Branch] = field(default_factory=list)
 
     def after(self, branch: Branch) -> Iterator[Branch]:
         """Yield the branches that are one step further; if the step fails, there are none, and the reason is noted."""
@@ -132,6 +151,8 @@ class Expander:
         rest = branch.rest[1:]
         stage = step.stage
 
+        if isinstance(stage, Straight | Attach | Detach):
+            branch = _at_pose(branch)
         try:
             if isinstance(stage, Alternatives):
                 for number, row in enumerate(options_of(step)):
@@ -152,7 +173,14 @@ class Expander:
         for choices in self.choices:
             if not choices.search.exhausted:
                 choices.search.more()
-                yield from self._branches_of_choices(choices)
+                yield from self._branches_of_choices(choices, choices.new(choices.search.rows))
+
+    def take_up(self) -> list[Branch]:
+        """Return the branches that were put off; their goals will be searched thoroughly."""
+        branches = self.put_off
+        self.put_off = []
+        self.put_off_before += branches
+        return branches
 
     def ends(self, branch: Branch) -> bool:
         """Check whether a branch with nothing left to do may end; if not, the reason is noted.
@@ -175,7 +203,7 @@ class Expander:
         if motion.fault:
             self.failures.append((branch, step, motion.fault))
             return
-        yield replace(_following_branch(branch, step, setting, branch.q), note=motion.note)
+        yield replace(_following_branch(branch, step, _without_parted(setting, branch.q), branch.q), note=motion.note)
 
     def _after_move(self, branch: Branch, step: Step, stage: MoveTo) -> Iterator[Branch]:
         """Yield a branch for each configuration of a goal.
@@ -183,49 +211,63 @@ class Expander:
         Contacts at the goal, of things that are taken or set down there, are only allowed if no configuration is free
         without them.
         """
-        reason: Reason
         try:
             choices = self._choices(branch, branch.after, stage)
-            reason = choices.search.reason_now()
         except ProblemError as error:
             choices = None
-            reason = str(error)
+            reason: Reason = str(error)
 
-        if choices is None or not len(choices.search.rows):
+        if choices is None or not len(choices.rows):
             arriving = branch.after.arriving(may_touch(branch.after.world, branch.rest[1:]))
             if arriving is not branch.after:
                 choices = self._choices(branch, arriving, stage)
-                reason = choices.search.reason_now()
-        if choices is None or not len(choices.search.rows):
+        if choices is None:
             self.failures.append((branch, step, reason))
-        if choices is not None:
-            if choices.more:
-                self.choices.append(choices)
-            yield from self._branches_of_choices(choices)
+            return
+        if not len(choices.rows) and self._put_off(branch, choices.problem):
+            self.put_off.append(branch)
+            return
+        if not len(choices.rows):
+            self.failures.append((branch, step, choices.search.reason_now()))
+        if choices.more:
+            self.choices.append(choices)
+        yield from self._branches_of_choices(choices, choices.rows)
 
     def _choices(self, branch: Branch, setting: Setting, stage: MoveTo) -> Choices:
-        """Start the search for configurations of a stage's goal in a setting."""
-        problem = Problem(setting.world, branch.q, stage.goal, constraints=stage.constraints)
+        """Find configurations of a stage's goal in a setting: the nearest ones, if that is quick, else the first."""
+        known = self._known_problem(branch.q, setting, stage)
+        problem = known or Problem(setting.world, branch.q, stage.goal, constraints=stage.constraints)
         # A plan may reach the goal in either direction of a continuous joint, so whole turns need not be tried.
         search = GoalSearch(problem, self.rng, all_turns=False)
-        search.first()
-        return Choices(branch, search, setting is not branch.after, problem.goal.q is None)
+        rows = near_goals(problem, NEAREST)
+        if rows is None:
+            rows = search.rows if self._put_off(branch, problem) else search.first()
+        return Choices(branch, problem, search, setting is not branch.after, problem.goal.q is None, rows)
 
-    def _branches_of_choices(self, choices: Choices) -> Iterator[Branch]:
-        """Yield a branch for each configuration of a goal that has not become one yet."""
+    def _put_off(self, branch: Branch, problem: Problem) -> bool:
+        """Check whether a goal at which kernels find nothing is searched later: another one may do."""
+        return branch not in self.put_off_before and looked_for(problem)
+
+    def _known_problem(self, q: Vector, setting: Setting, stage: MoveTo) -> Problem | None:
+        """Return the problem of a goal of the tip without constraints, if its start is proven free."""
+        world = setting.world
+        if not isinstance(stage.goal, Target) or stage.constraints or world.constraints is not None:
+            return None
+        return known_problem(world, q, stage.goal) if world.motion_proven(q, q) else None
+
+    def _branches_of_choices(self, choices: Choices, rows: Matrix) -> Iterator[Branch]:
+        """Yield a branch for each of some configurations of a goal, shape (k, dof)."""
         branch = choices.branch
-        rows = choices.search.rows
-        for q in rows[choices.used :]:
+        for q in rows:
             arriving = self._arriving(branch, q) if choices.arrives or branch.after.scene.contacts else ()
             setting = branch.after.arriving(arriving)
             lasting = tuple(each for each in branch.after.scene.contacts if not parted(setting.world, q, each))
             setting_left = setting.with_contacts_only(lasting)
             yield _following_branch(branch, branch.rest[0], setting, q, setting_left=setting_left, arriving=arriving)
-        choices.used = len(rows)
 
     def _arriving(self, branch: Branch, q: Vector) -> tuple[Touching, ...]:
         """Return the contacts of things that are taken or set down at the end of a motion to q, shape (dof,)."""
-        return contacts_on_arrival(branch.after.world, branch.rest[1:], q)
+        return arrival(branch.after.world, branch.rest[1:], q).contacts
 
     def _after_line(self, branch: Branch, step: Step, stage: Straight) -> Iterator[Branch]:
         """Yield the branch at the end of a straight line of the tip; if it is not reached, the reason is noted."""
@@ -243,12 +285,12 @@ class Expander:
 
         setting, arriving, attempted, reason = self._follow_line(branch, line)
         if attempted.fraction < WHOLE:
-            self.failures.append((branch, step, f"ends at {100.0 * attempted.fraction:.3g} %: {reason}"))
+            self.failures.append((branch, step, reason))
             return
 
         path = path_of(setting.world, attempted)
         assert path is not None, "it has come to its end"
-        followed = follow_contacts(path, setting.world, setting.grasp_pairs, arriving)
+        followed = follow_contacts(path, setting.world, setting.grasp_pairs, arriving, setting.worlds)
         if followed.fault:
             self.failures.append((branch, step, followed.fault))
             return
@@ -259,7 +301,7 @@ class Expander:
             branch, step, setting, path.end, followed.path, setting_left=setting_left, contacts=contacts
         )
 
-    def _follow_line(self, branch: Branch, line: Way) -> tuple[Setting, tuple[Touching, ...], Attempt, str]:
+    def _follow_line(self, branch: Branch, line: Way) -> tuple[Setting, tuple[Touching, ...], Attempt, Reason]:
         """Follow a straight line, with contacts at its end only if it cannot be followed without them.
 
         To find these contacts, the line is first followed without collision checks.
@@ -271,31 +313,66 @@ class Expander:
         setting = branch.after
         steps = branch.rest[1:]
         world = setting.world
-        attempted = self._attempt(branch, line, world)
-
+        attempted: Attempt | None = None
         if not handled(steps, world.robot):
-            return setting, (), attempted, attempted.reason
-        if attempted.fraction == WHOLE:
-            arriving = self._arriving(branch, attempted.rows[-1]) if setting.scene.contacts else ()
-            return setting.arriving(arriving), arriving, attempted, attempted.reason
+            attempted = self._attempt(branch, line, world)
+            return setting, (), attempted, partial(_ended, attempted)
 
         unchecked = follow(world.robot, line.rails[0], branch.q, line.tolerance, centred(world.robot))
-        if not unchecked.complete:
-            return setting, (), attempted, attempted.reason
-        if too_deep := fault_of_setting_down(world, steps, unchecked.rows[-1]):
-            return setting, (), attempted, too_deep
+        end = unchecked.rows[-1]
+        free_at_end = not unchecked.complete or world.motion_proven(end, end)
+        if free_at_end or branch.effort >= THOROUGH:
+            attempted = self._attempt(branch, line, world)
+            if attempted.fraction == WHOLE:
+                arriving = self._arriving(branch, attempted.rows[-1]) if setting.scene.contacts else ()
+                return setting.arriving(arriving), arriving, attempted, ""
+            if not unchecked.complete:
+                return setting, (), attempted, partial(_ended, attempted)
 
-        arriving = self._arriving(branch, unchecked.rows[-1])
-        if arriving:
-            setting = setting.arriving(arriving)
+        reached = arrival(world, steps, end)
+        if reached.contacts and not reached.fault:
+            setting = setting.arriving(reached.contacts)
             attempted = self._attempt(branch, line, setting.world)
-        return setting, arriving, attempted, attempted.reason
+        elif attempted is None:
+            attempted = self._attempt(branch, line, world)
+        arriving = () if reached.fault else reached.contacts
+        return setting, arriving, attempted, partial(_ended, attempted, reached.fault)
 
     def _attempt(self, branch: Branch, line: Way, world: World) -> Attempt:
         """Follow a line in a world: thoroughly, in all ways of a redundant arm, in later rounds of the search."""
         if branch.effort >= THOROUGH:
             return farthest(world, line, branch.q[None])
         return attempt(world, line, branch.q, centred(world.robot))
+
+
+def _without_parted(setting: Setting, q: Vector) -> Setting:
+    """Return a setting without the contacts of things that are apart at q, shape (dof,), as fingers have let go."""
+    lasting = tuple(
+        each
+        for each in setting.scene.contacts
+        if each.pair in setting.grasp_pairs or not parted(setting.world, q, each)
+    )
+    return setting.with_contacts_only(lasting)
+
+
+def _ended(attempted: Attempt, fault: str = "") -> str:
+    """Return where and why a straight line ended."""
+    return f"ends at {100.0 * attempted.fraction:.3g} %: {fault or attempted.reason}"
+
+
+def _at_pose(branch: Branch) -> Branch:
+    """Return a branch whose motion has a pose as its goal with the tip at that pose to the last digits.
+
+    Inverse kinematics ends within a share of the tolerances. So near to the pose, what the arm grasps is held alike in
+    all instances of a task.
+    """
+    step = branch.step
+    if step is None or not isinstance(step.stage, MoveTo) or not isinstance(step.stage.goal, PoseGoal):
+        return branch
+    robot = branch.setting.robot
+    rail = straight_rail(robot.fk(branch.q), step.stage.goal.pose)
+    followed = follow(robot, rail, branch.q, TOLERANCE, centred(robot))
+    return replace(branch, q=followed.rows[-1]) if followed.complete else branch
 
 
 def weighted_length(robot: Robot, a: Vector, b: Vector) -> float:

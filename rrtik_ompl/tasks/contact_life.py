@@ -26,6 +26,7 @@ from rrtik_ompl.geometry.collision.solids import is_mesh
 from rrtik_ompl.model.path import JointPath, path_through
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import Scene, Touching
+from rrtik_ompl.tasks.worlds import Worlds
 from rrtik_ompl.world.clearances import proved
 from rrtik_ompl.world.exact_checks import distance
 from rrtik_ompl.world.proof import Prover
@@ -224,6 +225,7 @@ def follow_contacts(
     world: World,
     grasp_pairs: frozenset[frozenset[str]],
     contacts_at_end: Iterable[Touching] = (),
+    worlds: Worlds | None = None,
 ) -> FollowedContacts:
     """Find where the contacts of a motion end, and check that things stay apart after they have parted.
 
@@ -235,6 +237,7 @@ def follow_contacts(
         world: The world of the motion, with all contacts.
         grasp_pairs: Pairs that a grasp allows: after they have parted, they may touch again.
         contacts_at_end: Contacts of things that are taken or set down at the end of the motion.
+        worlds: Further worlds of the task, if they are known.
     """
     end_contact_of_pair = {contact.pair: contact for contact in contacts_at_end}
     parting_of_contact = {
@@ -260,7 +263,7 @@ def follow_contacts(
 
     world_after = None
     for until in sorted(set(waypoint_of_place.values())):
-        world_after = world_from(world, contacts, until)
+        world_after = world_from(world, contacts, until, worlds)
         if violations := violations_of(world_after.checks, rows[until:]):
             fault = f"what has parted touches again: {violations[0].reason}"
             return FollowedContacts(path_through(path, rows[: until + 1]), (), (), fault, world_after)
@@ -284,12 +287,16 @@ def contacts_from(contacts: Iterable[MotionContact], number: int) -> tuple[Touch
     return tuple(contacts_left)
 
 
-def world_from(world: World, contacts: Iterable[MotionContact], number: int) -> World:
-    """Return the world of a motion from the waypoint with this index on, without the contacts that have ended there."""
+def world_from(world: World, contacts: Iterable[MotionContact], number: int, worlds: Worlds | None = None) -> World:
+    """Return the world of a motion from the waypoint with this index on, without the contacts that have ended there.
+
+    It may be known among the ``worlds`` of the task.
+    """
     stood_on = tuple(contacts)
     known_pairs = {each.touching.pair for each in stood_on}
     others = tuple(contact for contact in world.scene.contacts if contact.pair not in known_pairs)
-    return form_of(world, scene=replace(world.scene, contacts=(*others, *contacts_from(stood_on, number))))
+    scene = replace(world.scene, contacts=(*others, *contacts_from(stood_on, number)))
+    return form_of(world, scene=scene) if worlds is None else worlds.of(world.robot, scene)
 
 
 def touching_again(contact: Touching) -> Touching:

@@ -8,7 +8,7 @@ interval if their distance at its middle exceeds what they can approach each oth
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -16,6 +16,7 @@ import numpy as np
 import pinocchio as pin
 
 from rrtik_ompl.base.arrays import Vector
+from rrtik_ompl.base.kept import kept_with
 from rrtik_ompl.description.catalog import robot_from_entry
 from rrtik_ompl.geometry.collision.bodies import DISTANCE_TOLERANCE, Body, kept_apart
 from rrtik_ompl.geometry.collision.body_arrays import body_arrays
@@ -55,8 +56,8 @@ def finger_motion(before: Setting, after: Setting, q: Vector, things_taken: Sequ
     """
     bodies_before = before.world.bodies
     bodies_after = after.world.bodies
-    placements, others = (body_arrays(bodies).placements for bodies in (bodies_before, bodies_after))
-    moving = set(np.flatnonzero(np.abs(placements - others).max(axis=(1, 2)) > SAME).tolist())
+    both = zip(bodies_before, bodies_after, strict=True)
+    moving = {k for k, (a, b) in enumerate(both) if a.joint > 0 and not _same_pose(a.placement, b.placement)}
     if not moving:
         return FingerMotion()
     if not _on_screws(before.robot, after.robot):
@@ -70,9 +71,8 @@ def finger_motion(before: Setting, after: Setting, q: Vector, things_taken: Sequ
         if {i, j} & moving and names & set(before.scene.names) and not names & set(things_taken):
             pairs.append((i, j))
 
-    speeds = np.zeros(len(bodies_before))
-    for k in moving:
-        speeds[k] = _speed(bodies_before[k], _twist(bodies_before[k], bodies_after[k]))
+    speeds = dict.fromkeys(range(len(bodies_before)), 0.0)
+    speeds |= {k: _speed(bodies_before[k], _twist(bodies_before[k], bodies_after[k])) for k in moving}
     for i, j in _not_far_apart(bodies_before, pairs, frames, speeds):
         motion = PairMotion((bodies_before[i], bodies_before[j]), (bodies_after[i], bodies_after[j]), frames)
         if not motion.apart():
@@ -178,7 +178,7 @@ class PairMotion:
 
 
 def _not_far_apart(
-    bodies: Sequence[Body], pairs: Sequence[tuple[int, int]], frames: Vector, speeds: Vector
+    bodies: Sequence[Body], pairs: Sequence[tuple[int, int]], frames: Vector, speeds: Mapping[int, float]
 ) -> list[tuple[int, int]]:
     """Return the pairs of bodies that a motion may bring together, by the boxes around them.
 
@@ -186,23 +186,26 @@ def _not_far_apart(
         bodies: All bodies, where they are before the motion.
         pairs: Pairs of their numbers.
         frames: Poses of all joint frames, shape (joints + 1, 4, 4).
-        speeds: How far each body moves at most [m], shape (n,).
+        speeds: How far each body moves at most [m].
     """
     if not pairs:
         return []
-    arrays = body_arrays(bodies)
+    near = sorted({k for pair in pairs for k in pair})
+    place = {k: number for number, k in enumerate(near)}
+    arrays = body_arrays(tuple(bodies[k] for k in near))
     poses = frames[arrays.joints] @ arrays.placements
     turns = poses[:, :3, :3]
     centres = np.einsum("nij,nj->ni", turns, arrays.centres) + poses[:, :3, 3]
     radii = np.linalg.norm(arrays.halves, axis=1)
-    numbers = np.array(pairs)
+    numbers = np.array([(place[i], place[j]) for i, j in pairs])
+    moved = np.array([speeds[k] for k in near])
 
     # The ball around one body is apart from the box around the other.
     gaps = []
     for one, other in (numbers.T, numbers.T[::-1]):
         place = np.einsum("nji,nj->ni", turns[other], centres[one] - centres[other])
         gaps.append(np.linalg.norm(np.maximum(np.abs(place) - arrays.halves[other], 0.0), axis=1) - radii[one])
-    required = np.maximum(arrays.kept_apart(numbers), CONTACT_GAP) + speeds[numbers].sum(axis=1) + DISTANCE_TOLERANCE
+    required = np.maximum(arrays.kept_apart(numbers), CONTACT_GAP) + moved[numbers].sum(axis=1) + DISTANCE_TOLERANCE
     return [pair for pair, near in zip(pairs, np.max(gaps, axis=0) <= required, strict=True) if near]
 
 
@@ -220,9 +223,10 @@ def _speed(body: Body, twist: Vector) -> float:
 
 
 def _same_pose(first: pin.SE3, second: pin.SE3) -> bool:
-    return bool(np.abs(first.homogeneous - second.homogeneous).max() <= SAME)
+    return first == second or bool(np.abs(first.homogeneous - second.homogeneous).max() <= SAME)
 
 
+@kept_with
 def _on_screws(before: Robot, after: Robot) -> bool:
     """Check whether every finger is, at the middle of its motion, where a single screw would take it."""
     middle = _robot_of_entry(_entry_of_middle(before, after))

@@ -70,23 +70,30 @@ def may_touch(world: World, steps: Sequence[Step]) -> list[Touching]:
     return sorted(contact_of_pair.values(), key=lambda contact: contact.names)
 
 
-def fault_of_setting_down(world: World, steps: Sequence[Step], q: Vector) -> str:
-    """Return why something would be set down too deep inside another at q, shape (dof,); "" if nothing would."""
+@dataclass(frozen=True, slots=True)
+class Arrival:
+    """What touches where things are taken or set down.
+
+    Attributes:
+        contacts: The contacts, without those too deep.
+        fault: Why something would be set down too deep inside another; "" if nothing would.
+    """
+
+    contacts: tuple[Touching, ...]
+    fault: str = ""
+
+
+def arrival(world: World, steps: Sequence[Step], q: Vector) -> Arrival:
+    """Return what touches where things are taken or set down at q, shape (dof,)."""
     obstacle_names = frozenset(world.scene.names)
-    for thing in handled(steps, world.robot):
-        for near in touching_at(world, q, thing.name) if thing.by is None else ():
-            if near.second in obstacle_names and near.too_deep:
-                return left_inside(near)
-    return ""
-
-
-def contacts_on_arrival(world: World, steps: Sequence[Step], q: Vector) -> tuple[Touching, ...]:
-    """Return the contacts of things that are taken or set down at q, shape (dof,), without those too deep."""
     contact_of_pair: dict[frozenset[str], Touching] = {}
+    faults = []
     for thing in handled(steps, world.robot):
-        near = (each for each in touching_at(world, q, thing.name) if thing.by is None or each.second in thing.by)
+        near = [each for each in touching_at(world, q, thing.name) if thing.by is None or each.second in thing.by]
         contact_of_pair |= {each.pair: each.arriving() for each in near if not each.too_deep}
-    return tuple(contact_of_pair.values())
+        if thing.by is None:
+            faults += [left_inside(each) for each in near if each.second in obstacle_names and each.too_deep]
+    return Arrival(tuple(contact_of_pair.values()), faults[0] if faults else "")
 
 
 @dataclass(frozen=True, slots=True)

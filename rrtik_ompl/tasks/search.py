@@ -20,6 +20,7 @@ from rrtik_ompl.description.catalog import AUTO
 from rrtik_ompl.model.path import JointPath, path_through
 from rrtik_ompl.planning.outcome import Request
 from rrtik_ompl.planning.plan import planned
+from rrtik_ompl.planning.short_path import short_path
 from rrtik_ompl.tasks.branches import Branch, Expander
 from rrtik_ompl.tasks.contact_life import MotionContact, follow_contacts
 from rrtik_ompl.tasks.program import Step
@@ -137,7 +138,10 @@ class TaskSearch:
 
     def _run_round(self, effort: int) -> Done | None:
         """Expand branches until one has done the whole task; None if none is left or the time is up."""
-        while self._queue:
+        while self._queue or self._expander.put_off:
+            if not self._queue:
+                for branch in self._expander.take_up():
+                    self._push(branch)
             if self._budget.over():
                 self._out_of_time = True
                 return None
@@ -205,6 +209,10 @@ class TaskSearch:
     def _path_of(self, problem: Problem, link: Branch, effort: int) -> JointPath | None:
         """Plan a path for a motion's problem; if there is none, note the reason and return None."""
         seconds = max(self._budget.left, LEAST_SECONDS)
+        short = short_path(problem, Request(Budget(self._budget.seed, seconds)), pull=True)
+        if short is not None and short.path is not None:
+            return short.path
+
         # Limited by iterations too, so that the result depends on the seed alone.
         budget = Budget(self._budget.seed, seconds, FIRST_ITERATIONS * GROWTH**effort)
         result = planned(problem, AUTO, Request(budget))
@@ -242,14 +250,14 @@ class TaskSearch:
         setting = link.setting
         if setting.scene.contacts:
             world = world_of_motion(path, setting.world, link.step.stage)
-            followed = follow_contacts(path, world, setting.grasp_pairs, link.arriving)
+            followed = follow_contacts(path, world, setting.grasp_pairs, link.arriving, setting.worlds)
             # The path now ends where two things have parted that would touch again later.
             if followed.fault and followed.world is not None:
                 detour = self._path_from_parting(link, followed.world, followed.path.end, path.end, effort)
                 if detour is None:
                     return False
                 joined = proved(path_through(path, np.vstack([followed.path.waypoints, detour.waypoints[1:]])), world)
-                followed = follow_contacts(joined, world, setting.grasp_pairs, link.arriving)
+                followed = follow_contacts(joined, world, setting.grasp_pairs, link.arriving, setting.worlds)
             if followed.fault:
                 self._note_failure(link, followed.fault)
                 return False

@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from rrtik_ompl.base.arrays import Vector
@@ -20,8 +21,11 @@ from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import Scene, Touching
 from rrtik_ompl.tasks.contact_life import EXTRA_DEPTH, SMALL_OVERLAP, allowed, left_inside, touching_at, with_contacts
 from rrtik_ompl.tasks.stages import Attach, Detach, Gripper, GripperState, MoveTo, Stage
+from rrtik_ompl.tasks.worlds import Worlds
 from rrtik_ompl.world.problem import Problem
-from rrtik_ompl.world.world import World, form_of
+from rrtik_ompl.world.world import World
+
+DIGITS = 9  # of poses of grasps and places [m], and of their axes; a thing may move by a thousand times as much
 
 
 class Setting:
@@ -31,37 +35,38 @@ class Setting:
         robot: The robot, with its fingers as they are held.
         scene: Obstacles, attached objects, and contacts.
         grasp_pairs: Pairs of names that an :class:`Attach` allows as long as it holds something.
+        worlds: Makes the worlds of the task, or has them already.
     """
 
     def __init__(
-        self, first_world: World, robot: Robot, scene: Scene, grasp_pairs: frozenset[frozenset[str]] = frozenset()
+        self, worlds: Worlds, robot: Robot, scene: Scene, grasp_pairs: frozenset[frozenset[str]] = frozenset()
     ) -> None:
-        self._first_world = first_world
+        self.worlds = worlds
         self.robot = robot
         self.scene = scene
         self.grasp_pairs = grasp_pairs
 
     @classmethod
-    def of(cls, world: World) -> Setting:
-        """Return the setting of an existing world."""
-        setting = cls(world, world.robot, world.scene)
+    def of(cls, world: World, worlds: Worlds | None = None) -> Setting:
+        """Return the setting of an existing world; further ones are made from it, or by ``worlds``."""
+        setting = cls(worlds or Worlds(world), world.robot, world.scene)
         setting.world = world
         return setting
 
     @classmethod
-    def beginning(cls, world: World, q: Vector) -> Setting:
+    def beginning(cls, world: World, q: Vector, worlds: Worlds | None = None) -> Setting:
         """Return the setting of a world at q, shape (dof,): held objects may continue to touch what they touch."""
         touching = [near for item in world.scene.attached for near in touching_at(world, q, item.name)]
         known_pairs = {contact.pair for contact in world.scene.contacts}
         contacts = [
             near.going_on() for near in touching if near.distance >= -SMALL_OVERLAP and near.pair not in known_pairs
         ]
-        return cls.of(world).with_contacts(contacts)
+        return cls.of(world, worlds).with_contacts(contacts)
 
     @cached_property
     def world(self) -> World:
         """Return the world of the robot in the scene, with the other settings of the first world of the task."""
-        return form_of(self._first_world, robot=self.robot, scene=self.scene)
+        return self.worlds.of(self.robot, self.scene)
 
     def with_contacts(self, contacts: Iterable[Touching]) -> Setting:
         """Return the same setting with further contacts; a new contact replaces an old one of the same pair."""
@@ -75,7 +80,7 @@ class Setting:
 
     def with_scene(self, scene: Scene) -> Setting:
         """Return the same robot in another scene."""
-        return Setting(self._first_world, self.robot, scene, self.grasp_pairs)
+        return Setting(self.worlds, self.robot, scene, self.grasp_pairs)
 
     def with_contacts_only(self, contacts: tuple[Touching, ...], world: World | None = None) -> Setting:
         """Return the same setting with exactly these contacts; a world that has them may be known already."""
@@ -99,18 +104,18 @@ class Setting:
             UnknownNameError: If an object or a link does not exist.
         """
         if isinstance(stage, Gripper):
-            return Setting(self._first_world, with_gripper(self.robot, stage), self.scene, self.grasp_pairs)
+            return Setting(self.worlds, with_gripper(self.robot, stage), self.scene, self.grasp_pairs)
         return self._attached(stage, q) if isinstance(stage, Attach) else self._detached(stage, q)
 
     def _attached(self, stage: Attach, q: Vector) -> Setting:
         """Return the setting after an obstacle is attached, with its contacts and permitted contacts."""
-        pose = self.robot.fk(q, stage.link).actInv(self.scene.obstacle(stage.object).pose)
+        pose = _settled(self.robot.fk(q, stage.link).actInv(self.scene.obstacle(stage.object).pose))
         links = tuple(name for name in stage.allow if name in self.robot.link_names)
         scene = self.scene.attaching(stage.object, stage.link, links, pose=pose, padding=stage.padding)
 
         others = frozenset(stage.allow) - frozenset(links)
         grasp_pairs = self.grasp_pairs | {frozenset((stage.object, other)) for other in others}
-        setting = Setting(self._first_world, self.robot, scene, grasp_pairs)
+        setting = Setting(self.worlds, self.robot, scene, grasp_pairs)
 
         bodies = setting.world.bodies
         contacts = {frozenset((stage.object, other)): allowed(bodies, stage.object, other) for other in sorted(others)}
@@ -130,11 +135,17 @@ class Setting:
                 raise InputError(left_inside(near))
 
         attached = next(item for item in self.scene.attached if item.name == stage.object)
-        pose = self.robot.fk(q, attached.link) * attached.pose
+        pose = _settled(self.robot.fk(q, attached.link) * attached.pose)
         grasp_pairs = frozenset(pair for pair in self.grasp_pairs if stage.object not in pair)
-        setting = Setting(self._first_world, self.robot, self.scene.detaching(stage.object, pose), grasp_pairs)
+        setting = Setting(self.worlds, self.robot, self.scene.detaching(stage.object, pose), grasp_pairs)
         touching = touching_at(setting.world, q, stage.object)
         return setting.with_contacts(each.going_on() for each in touching if each.distance >= -EXTRA_DEPTH)
+
+
+def _settled(pose: pin.SE3) -> pin.SE3:
+    """Return a pose with its numbers rounded: the same for the same grasp, or place, in all branches and instances."""
+    rounded = np.round(pose.homogeneous, DIGITS) + 0.0
+    return pin.SE3(pin.Quaternion(rounded[:3, :3]).normalized().matrix(), rounded[:3, 3])
 
 
 def placed_constraints(

@@ -106,8 +106,8 @@ class CoalProof:
 
         @cache
         def frames_at(share: float) -> Matrix:
-            (frames,) = self._robot.chain.joint_frames((motion[0] + share * (motion[1] - motion[0]))[None])
-            return frames
+            row = motion[0] + share * (motion[1] - motion[0])
+            return np.asarray(self._robot.chain.joint_frames(row[None])[0])
 
         original_margins = margins.copy()
         intervals_of_links = list[list[int]]()

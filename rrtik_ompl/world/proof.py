@@ -199,6 +199,11 @@ class Prover:
         if not self.always_colliding:
             self.tables.get(self.bodies, self._new_table)
 
+    def forget(self) -> None:
+        """Forget the planes of earlier proofs, with which the next ones would begin."""
+        if self.tables.packed is not None:
+            self.tables.packed.table.ways[:] = 0.0
+
     def lent_table(self) -> ProofPairs | None:
         """Return the table with memory of its own to compute in; None if another prover has taken it."""
         self.tables.get(self.bodies, self._new_table)

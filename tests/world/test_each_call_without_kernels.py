@@ -120,6 +120,7 @@ CALLS = {
     "Roadmap.load": saved_roadmap,
     "Task": task_planned,
     "Task.plan": task_planned,
+    "Task.plan_many": lambda p, _: motion_of(task_of(p).plan_many([rrtik.Variation()], threads=1)[0]),
     "Task.varied": varied_task_planned,
     "Task.save": saved_task,
     "Task.load": saved_task,

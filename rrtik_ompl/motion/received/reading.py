@@ -170,8 +170,8 @@ def _columns_of(path: Path, robot: Robot) -> Iterator[Columns]:
     elif ending == ".npy":
         yield Columns("", _array(path))
     else:
-        arrays = NamedArrays(path)
-        yield from _of_arrays({name: arrays[name] for name in arrays.names}, "")
+        named = NamedArrays(path)
+        yield from _of_arrays({name: named[name] for name in named.names}, "")
 
 
 def _json(path: Path) -> object:

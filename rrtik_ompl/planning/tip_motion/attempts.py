@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -79,15 +80,20 @@ class Attempt:
         rows: Configurations, shape (k, dof).
         proof: Their proof, or None.
         fraction: Share of the way that they cover, from 0 to 1.
-        reason: Why they end there; "" if they cover the whole way.
+        why: Tells why they end there, which may take long to find out; "" if they cover the whole way.
         attempts: Number of attempts of which this is the best.
     """
 
     rows: Matrix
     proof: Proof | None
     fraction: float
-    reason: str
+    why: Callable[[], str]
     attempts: int = 1
+
+    @property
+    def reason(self) -> str:
+        """Why the configurations end where they do; "" if they cover the whole way."""
+        return self.why()
 
     @property
     def length(self) -> float:
@@ -148,7 +154,7 @@ def leanings(world: World, way: Way, q: Vector) -> Iterator[Leaning]:
 def attempt(world: World, way: Way, q: Vector, leaning: Leaning) -> Attempt:
     """Follow the rails from a configuration, shape (dof,), and return the part that is proven free."""
     robot = world.robot
-    reason = ""
+    why: Callable[[], str] = str
     parts = [robot.clamp(q)[None]]
     places = [np.zeros(1)]
     lengths = way.measures(robot)
@@ -158,7 +164,7 @@ def attempt(world: World, way: Way, q: Vector, leaning: Leaning) -> Attempt:
         parts.append(followed.rows[1:])
         places.append((lengths[:number].sum() + lengths[number] * followed.shares[1:]) / total)
         if not followed.complete:
-            reason = why_stopped(robot, rail, followed)
+            why = partial(why_stopped, robot, rail, followed)
             break
 
     # Prove the motions, and cut the path off at the first one that is not proven.
@@ -169,9 +175,9 @@ def attempt(world: World, way: Way, q: Vector, leaning: Leaning) -> Attempt:
         return _proven_part(world, way, rows, shares, proof)
 
     fraction = float(shares[-1])
-    if not reason and fraction >= 1.0 - SMALLEST_STEP:
+    if why is str and fraction >= 1.0 - SMALLEST_STEP:
         fraction = 1.0
-    return Attempt(rows, proof, fraction, reason)
+    return Attempt(rows, proof, fraction, why)
 
 
 def _proven_part(world: World, way: Way, rows: Matrix, shares: Vector, proof: Proof) -> Attempt:
@@ -202,14 +208,14 @@ def _proven_part(world: World, way: Way, rows: Matrix, shares: Vector, proof: Pr
 
     # Append the proven share of this motion, and prove the whole part.
     end = a + proven_share * (b - a)
-    reason = why_blocked(world, end, b, (gap.first, gap.second))
+    why = partial(why_blocked, world, end, b, (gap.first, gap.second))
     proven_rows = rows[: gap.motion + 1]
     fraction = float(shares[gap.motion])
     if proven_share > 0.0:
         proven_rows = np.vstack([proven_rows, end])
         fraction += proven_share * float(shares[gap.motion + 1] - shares[gap.motion])
     proven = world.prover.route(proven_rows, clearance=clearance) if len(proven_rows) > 1 else None
-    return Attempt(proven_rows, proven, fraction, reason)
+    return Attempt(proven_rows, proven, fraction, why)
 
 
 def path_of(world: World, found: Attempt) -> JointPath | None:

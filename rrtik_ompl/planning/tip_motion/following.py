@@ -58,10 +58,17 @@ class Leaning:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tolerance:
-    """How far the tip may deviate from a rail: ``deviation`` [m] in position, ``turn`` [rad] in orientation."""
+    """How far the tip may deviate from a rail.
+
+    Attributes:
+        deviation: In position [m].
+        turn: In orientation [rad].
+        arrived: Share of both within which the tip is at a point of the rail, up to `ARRIVED`.
+    """
 
     deviation: float
     turn: float
+    arrived: float = ARRIVED
 
     @property
     def chord(self) -> float:
@@ -139,8 +146,8 @@ def follow(robot: Robot, rail: Rail, q: Vector, tolerance: Tolerance, leaning: L
         return follow_plainly(robot, rail, q, tolerance, leaning)
 
     aim = np.zeros((1, AIM_FLOATS))
-    aim[0, POSITION_TOLERANCE] = rail_layout.ARRIVED * tolerance.deviation
-    aim[0, CHORD_TOLERANCE] = rail_layout.ARRIVED * tolerance.chord
+    aim[0, POSITION_TOLERANCE] = tolerance.arrived * tolerance.deviation
+    aim[0, CHORD_TOLERANCE] = tolerance.arrived * tolerance.chord
     aim[0, FREE_TURN] = NO_TURN
     call = KernelCall(limb, aim, robot.clamp(q)[None], rail_layout.NEWTON_STEPS, rail_layout.NEWTON_STEPS + 1)
     table = packed_rail(robot, rail, q, tolerance, leaning)
@@ -239,7 +246,7 @@ def _correct(robot: Robot, rail: Rail, share: float, q: Vector, tolerance: Toler
         rail: The rail.
         share: Place on the rail, from 0 to 1.
         q: Initial guess, shape (dof,).
-        tolerance: Allowed deviation, of which only the share `ARRIVED` is used up here.
+        tolerance: Allowed deviation, of which only the share ``arrived`` is used up here.
     """
     aim = rail.poses(share)[0]
     scale = np.repeat([1.0 / reach_of(robot), PER_CHORD], 3)
@@ -248,7 +255,7 @@ def _correct(robot: Robot, rail: Rail, share: float, q: Vector, tolerance: Toler
         error = _residual(aim, tip)
         distance = np.linalg.norm(error[:3])
         chord = np.linalg.norm(error[3:])
-        if distance <= ARRIVED * tolerance.deviation and chord <= ARRIVED * tolerance.chord:
+        if distance <= tolerance.arrived * tolerance.deviation and chord <= tolerance.arrived * tolerance.chord:
             return q
         if k < NEWTON_STEPS:
             q = robot.clamp(q + _newton_step(robot, q, jacobian * scale[:, None], error * scale))
