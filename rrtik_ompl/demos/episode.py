@@ -14,7 +14,7 @@ from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.base.errors import RrtikError
 from rrtik_ompl.base.poses import pose_row
 from rrtik_ompl.motion.trajectory import RateLimits
-from rrtik_ompl.tasks import Attach, Task, TaskPlan
+from rrtik_ompl.tasks import Attach, Task, TaskPlan, plan_after
 from rrtik_ompl.tasks.randomness import Draws, Randomness
 from rrtik_ompl.tasks.stages import every_stage
 from rrtik_ompl.world.world import World
@@ -93,7 +93,7 @@ def attempted(draws: Draws, seed: int, number: int, timing: Timing) -> Episode:
     drawn = {name: pose_row(draw.poses[name]).tolist() for name in names}
     own_seed = int(np.random.default_rng([seed, number, 1]).integers(2**31))
     try:
-        plan = draw.task.plan(seed=own_seed, seconds=timing.seconds)
+        plan = plan_after(draw.task, draws.left, seed=own_seed, seconds=timing.seconds)
         if not plan.found:
             return Episode(number, plan.reason, draw.rejected, drawn)
         if not plan.proven:

@@ -430,37 +430,7 @@ class Task:
         world = self.world if world is None else world
         start = self.start if start is None else start
         require(world, World, "world of a task", "use World(robot, scene)")
-        return self._planned(world, start, budget, Worlds(world))
-
-    def _planned(self, world: World, start: ArrayLike | str, budget: Budget, worlds: Worlds) -> TaskPlan:
-        """Plan the task; arguments and errors as of :meth:`plan`, but for the worlds, which make further ones."""
-        steps = steps_of(holding(self.stages, placed_constraints(world, start, self.constraints)))
-        check_program(steps, world)
-
-        given: Any = world.robot.posture(start) if isinstance(start, str) else start
-        setting = Setting.beginning(world, world.robot.configuration(given, "start"), worlds)
-        q = usable_configuration(setting.world, given, "start")
-        if reason := never_set_down(steps, setting.world, np.array(q)):
-            return TaskPlan(False, (), (), (), (), reason, seconds=budget.elapsed)
-
-        search = TaskSearch(budget.begun_now())
-        done = search.run(Branch(setting, np.array(q), steps))
-        taken = budget.elapsed
-        if done is None:
-            return TaskPlan(False, (), (), (), (), search.reason(), seconds=taken, statistics=search.statistics)
-        return TaskPlan(
-            found=True,
-            paths=tuple(path for _, path in done.motions),
-            worlds=tuple(branch.setting.world for branch, _ in done.motions),
-            stages=tuple(branch.step.stage for branch, _ in done.motions if branch.step is not None),
-            chosen=done.last.chosen,
-            reason="",
-            end=done.last.after.world,
-            notes=_notes_of(done),
-            contacts=done.contacts,
-            seconds=taken,
-            statistics=search.statistics,
-        )
+        return _planned(self, world, start, budget, Worlds(world))
 
     def varied(self, variation: Variation) -> Task:
         """Return one instance of the task, with its own world and start.
@@ -559,7 +529,7 @@ class Task:
             with worlds_from(self.world, left) as worlds:
                 world = worlds.of(self.world.robot, moved_scene(self.world.scene, variation.poses))
                 try:
-                    return task._planned(world, start, budget, worlds)
+                    return _planned(task, world, start, budget, worlds)
                 except ProblemError as error:
                     return TaskPlan(False, (), (), (), (), str(error))
 
@@ -567,6 +537,49 @@ class Task:
         if then is None:
             return in_threads(planned, instances, threads)
         return in_threads(lambda instance: then(planned(instance)), instances, threads)
+
+
+def _planned(task: Task, world: World, start: ArrayLike | str, budget: Budget, worlds: Worlds) -> TaskPlan:
+    """Plan a task; arguments and errors as of :meth:`Task.plan`, but for the worlds, which make further ones."""
+    steps = steps_of(holding(task.stages, placed_constraints(world, start, task.constraints)))
+    check_program(steps, world)
+
+    given: Any = world.robot.posture(start) if isinstance(start, str) else start
+    setting = Setting.beginning(world, world.robot.configuration(given, "start"), worlds)
+    q = usable_configuration(setting.world, given, "start")
+    if reason := never_set_down(steps, setting.world, np.array(q)):
+        return TaskPlan(False, (), (), (), (), reason, seconds=budget.elapsed)
+
+    search = TaskSearch(budget.begun_now())
+    done = search.run(Branch(setting, np.array(q), steps))
+    taken = budget.elapsed
+    if done is None:
+        return TaskPlan(False, (), (), (), (), search.reason(), seconds=taken, statistics=search.statistics)
+    return TaskPlan(
+        found=True,
+        paths=tuple(path for _, path in done.motions),
+        worlds=tuple(branch.setting.world for branch, _ in done.motions),
+        stages=tuple(branch.step.stage for branch, _ in done.motions if branch.step is not None),
+        chosen=done.last.chosen,
+        reason="",
+        end=done.last.after.world,
+        notes=_notes_of(done),
+        contacts=done.contacts,
+        seconds=taken,
+        statistics=search.statistics,
+    )
+
+
+def plan_after(task: Task, left: Left, *, seed: int, seconds: float) -> TaskPlan:
+    """Plan a task that has a world and a start, with the worlds that earlier instances of it have left.
+
+    The plan is that of ``task.plan(seed=seed, seconds=seconds)``. Its worlds are left to the next instance, which moves
+    them: whoever needs them uses them before.
+    """
+    budget = Budget(seed, seconds)
+    with worlds_from(task.world, left) as worlds:
+        world = worlds.of(task.world.robot, task.world.scene)
+        return _planned(task, world, task.start, budget, worlds)
 
 
 def _check_start(start: ArrayLike | str, world: World, number: int) -> None:

@@ -218,6 +218,8 @@ def _twist(first: Body, last: Body) -> Vector:
 
 def _speed(body: Body, twist: Vector) -> float:
     """Return an upper bound on how far any point of a body moves along a screw from beginning to end [m]."""
+    if not twist.any():
+        return 0.0  # also of a half-space, which has no reach
     reach = float(np.linalg.norm(body.geometry.aabb_center)) + float(body.geometry.aabb_radius)
     return float(np.linalg.norm(twist[:3]) + np.linalg.norm(twist[3:]) * reach)
 

@@ -21,6 +21,7 @@ from rrtik_ompl.model.goal_kind import COORDINATES, displacements
 from rrtik_ompl.tasks.setting import Setting
 from rrtik_ompl.tasks.stages import Attach, Detach, MoveTo, Stage, every_stage
 from rrtik_ompl.tasks.variations import Variation, moved_stages
+from rrtik_ompl.tasks.worlds import Left
 from rrtik_ompl.world.problem import usable_configuration
 from rrtik_ompl.world.world import World
 
@@ -201,6 +202,11 @@ class Draws:
     Args:
         task: A task with a world and a start of its own, and with something random.
 
+    Attributes:
+        task: The task.
+        random: What is random in it.
+        left: The worlds that the plans of earlier instances have left to the next one.
+
     Raises:
         InputError: If nothing is random in it, or what is random does not fit it.
         UnknownNameError: If there is no obstacle of a name, or the task does not set it down.
@@ -219,6 +225,7 @@ class Draws:
         self._start = task.world.robot.posture(task.start) if isinstance(task.start, str) else task.start
         self._pairs = self._measured_pairs(task.world)
         self._as_written = self._distances(task.world)
+        self.left = Left()
 
     def draw(self, rng: np.random.Generator) -> Drawn:
         """Draw an instance; draws of which the scene or the start cannot be are counted and drawn anew."""

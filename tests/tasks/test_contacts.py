@@ -537,6 +537,13 @@ def test_fingers_do_not_pass_through_what_is_between_their_places(panda, away, f
         assert "attach the object" in reason
 
 
+def test_fingers_open_and_close_beside_half_spaces_which_have_no_end(panda):
+    _, stages = plate_beside(0.0)
+    floor = rrtik.Obstacle("floor", rrtik.HalfSpace([0.0, 0.0, 1.0], -0.01))
+    wall = rrtik.Obstacle("wall", rrtik.HalfSpace([0.0, -1.0, 0.0], -0.4))
+    assert planned(panda, rrtik.Scene([wall, floor]), stages).found
+
+
 def test_fingers_may_press_on_what_is_attached_next(panda):
     reach = [MoveTo(above(*PLACE[:2])), Straight(by=DOWN)]
     shut = Gripper("close", width=0.046)
