@@ -15,7 +15,6 @@ from rrtik_bench.crdt import published as crdt_published
 from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.kernels import warm_up
 from rrtik_ompl.kernels.simd import library
-from rrtik_ompl.kernels.threads import cores
 from rrtik_ompl.model.proof import Gap
 from rrtik_ompl.model.shapes import Mesh
 from rrtik_ompl.world.proof import Prover
@@ -43,11 +42,6 @@ def pytest_sessionstart(session):
     config = session.config
     if config.args_source is config.ArgsSource.TESTPATHS and not hasattr(config, "workerinput"):
         warm_up(lambda _: None)
-
-
-def pytest_xdist_auto_num_workers(config):
-    """One worker more than there are cores: many tests wait for a child process, a browser or a clock."""
-    return cores() + 1
 
 
 def pytest_configure(config):

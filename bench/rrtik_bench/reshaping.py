@@ -100,12 +100,12 @@ class ReshapedLoop(Loop):
     def _bent(self, path: Matrix) -> Matrix | None:
         return bent(path, 0.5 * self._edge, self._reshaper.shift, self._world, self._rng)
 
-    def _step(self) -> Vector:
-        """A step, shorter by the pace."""
+    def _next_on_path(self) -> tuple[Vector, int]:
+        """A step along the path, shorter by the pace."""
         settings, change = self._settings, self._max_change
         self._settings = replace(settings, step=settings.step * self._pace)
         self._max_change = change * self._pace
-        place = super()._step()
+        place = super()._next_on_path()
         self._settings, self._max_change = settings, change
         return place
 

@@ -74,6 +74,8 @@ def guided(kind: type) -> None:
 
     @wraps(made)
     def constructor(self: object, *args: Any, **options: Any) -> None:
+        if type(self) is kind and getattr(kind, "_is_protocol", False):
+            raise InputError(f"{kind.__name__} is a protocol: write a class with its methods")
         try:
             made(self, *args, **options)
         except TypeError as error:

@@ -41,7 +41,9 @@ def demos(
     scheduler: Annotated[str | None, typer.Option(help="Address of a Dask scheduler whose workers plan.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")] = False,
 ) -> int:
-    """Record demonstrations of a task: drawn, planned, proven, timed, one after the other until there are enough.
+    """Record demonstrations of a task at random.
+
+    Instances are drawn, planned, proven and timed, one after the other until there are enough.
 
     What is done is kept when it is interrupted; the same seed gives the same data. Exit code 1 if too few attempts
     succeed.
@@ -70,14 +72,14 @@ def demos(
     if as_json:
         said = {name: getattr(made, name) for name in ("count", "wanted", "attempts", "failures", "rejected", "reason")}
         print(json.dumps({**said, "dataset": str(made.dataset)}))
-        return FOUND if made.found else NOT_FOUND
+        return FOUND if made.complete else NOT_FOUND
 
     draws = plural(sum(made.rejected.values()), "draw")
     say(f"{loaded.name}: {made.count} demonstrations of {made.attempts} attempts; {draws} could not be used")
     say(*(f"  {number} failed: {why}" for why, number in made.failures.items()))
     say(*(f"  {number} drawn anew: {why}" for why, number in made.rejected.items()))
     say(f"wrote {made.dataset}")
-    if not made.found:
+    if not made.complete:
         note(f"{loaded.name}: {made.reason}")
     suggest(f"more of them: {command('demos', task, '--out', out, '--count', 10 * count)}")
-    return FOUND if made.found else NOT_FOUND
+    return FOUND if made.complete else NOT_FOUND

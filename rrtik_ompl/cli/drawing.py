@@ -194,7 +194,7 @@ def play(
 def checker(
     out: Annotated[Path, typer.Argument(metavar="OUT", help="The page: .html.")] = Path("checker.html"),
 ) -> int:
-    """Write the page that checks certificates of motions by itself.
+    """Write the page that checks certificates of motions.
 
     One file that needs neither this library nor a network: drop a certificate, a robot (URDF) and a scene on it.
     """

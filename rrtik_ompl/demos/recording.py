@@ -65,7 +65,7 @@ class Recording:
 
     Example:
         >>> demos = rrtik.demos.record("panda_pick_place", 2, "demos", seed=1)
-        >>> demos.found, demos.count
+        >>> demos.complete, demos.count
         (True, 2)
     """
 
@@ -78,14 +78,14 @@ class Recording:
     dataset: Path
 
     @property
-    def found(self) -> bool:
+    def complete(self) -> bool:
         """Whether there are as many as were wanted."""
         return self.count >= self.wanted
 
     @property
     def reason(self) -> str:
         """Why there are too few; "" if there are enough."""
-        if self.found:
+        if self.complete:
             return ""
         why, number = Counter(self.failures).most_common(1)[0]
         return f"{self.count} of {self.wanted} demonstrations after {self.attempts} attempts; {number} times: {why}"
@@ -96,7 +96,7 @@ def record(
     count: int,
     out: FilePath,
     *,
-    seed: int = 0,
+    seed: int | None = 0,
     rate: float = 30.0,
     share: float = 1.0,
     pause: float = 0.5,
@@ -117,7 +117,7 @@ def record(
         task: A task with something random: of a file, by the name of a shipped one, or made in Python.
         count: Number of demonstrations.
         out: The folder; it holds `attempts.jsonl`, a file of arrays for each demonstration, and the dataset.
-        seed: Seed of all attempts.
+        seed: Seed of all attempts; None draws one.
         rate: Ticks per second.
         share: Share of the joints' limits, above 0 to 1.
         pause: Rest where a gripper moves or an object is taken or put down [s].

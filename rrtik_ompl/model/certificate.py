@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, field, fields
 from typing import Any
 
 import numpy as np
@@ -179,9 +179,9 @@ class Certificate:
     motions: tuple[MotionEntries, ...]
     times: NDArray[np.float64] | None = None
     rates: NDArray[np.float64] | None = None
-    tracks: NDArray[np.float64] | None = None
+    tracks: NDArray[np.float64] | None = field(default=None, repr=False)
     held: tuple[tuple[str, float], ...] = ()
-    base: tuple[float, ...] | None = None
+    base: tuple[float, ...] | None = field(default=None, repr=False)
     version: int = VERSION
 
     __reduce__ = as_value

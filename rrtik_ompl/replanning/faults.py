@@ -15,7 +15,7 @@ import pinocchio as pin
 
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.model.scene import Obstacle, Scene
-from rrtik_ompl.model.shapes import Box, Capsule, Cylinder, HalfSpace, Shape, Sphere, same_shape
+from rrtik_ompl.model.shapes import HalfSpace, Shape, same_shape
 
 FaultKind: TypeAlias = Literal[
     "appears", "appears on the arm", "vanishes", "stays away", "changes size", "changes shape", "changes name",
@@ -227,10 +227,11 @@ def shape_around(first: Shape, second: Shape) -> Shape | None:
     if isinstance(first, HalfSpace) and isinstance(second, HalfSpace):
         alike = np.array_equal(first.normal, second.normal)
         return max(second, first, key=lambda each: each.offset) if alike else None
-    if not isinstance(first, Box | Sphere | Cylinder | Capsule):
+    names = [each.name for each in fields(first)]  # type: ignore[arg-type]  # every shape is a dataclass
+    if set(names) != {each.name for each in kind.measures if each.kind in ("length", "three lengths")}:
         return None
 
-    larger: list[Any] = [np.maximum(getattr(first, f.name), getattr(second, f.name)) for f in fields(first)]
+    larger: list[Any] = [np.maximum(getattr(first, name), getattr(second, name)) for name in names]
     around = kind(*(each if each.ndim else float(each) for each in larger))
     return second if same_shape(around, second) else around
 

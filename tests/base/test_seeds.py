@@ -1,6 +1,7 @@
 """Whatever draws random numbers takes seed=: 0 if nothing is said, and None to draw one."""
 
 import inspect
+import tempfile
 from collections.abc import Iterator
 from typing import Any
 
@@ -28,14 +29,25 @@ TIP = ARM.robot.fk(POSTURE)
 TURNED = rrtik.pose([0.0, 0.0, 0.0], rpy=[0.0, 0.0, 0.1]) * TIP
 NEAR, NEARER, ABOVE = (TIP.translation + np.array(by) for by in ([0.1, 0.0, 0.0], [0.05, 0.02, 0.0], [0.0, 0.0, 0.05]))
 
+TASK = rrtik.Task([rrtik.MoveTo(END)], WORLD, START)
+RANDOM = rrtik.Task([rrtik.MoveTo(END)], WORLD, START, random=rrtik.demos.Randomness(start=np.zeros((3, 2))))
+
+
+def recorded(seed: Any) -> rrtik.demos.Recording:
+    with tempfile.TemporaryDirectory() as folder:
+        return rrtik.demos.record(RANDOM, 1, folder, seed=seed, jobs=1)
+
+
 CALLS = {
     "Roadmap": lambda seed: rrtik.Roadmap(WORLD, vertices=3, seed=seed),
+    "Task.plan_many": lambda seed: TASK.plan_many([rrtik.Variation()], seed=seed),
     "Task.plan": lambda seed: rrtik.Task([rrtik.MoveTo(END)]).plan(WORLD, START, seed=seed),
     "ik.reach_map": lambda seed: rrtik.ik.reach_map(ROBOT, samples=50, seed=seed),
     "ik.solve_trajectory": lambda seed: rrtik.ik.solve_trajectory(ARM.robot, [TIP.homogeneous] * 2, seed=seed),
     "ompl.GoalSampler": lambda seed: rrtik.ompl.GoalSampler(MARK, seed=seed),
     "ompl.simple_setup": lambda seed: rrtik.ompl.simple_setup(MARK, seed=seed),
     "plan": lambda seed: rrtik.plan(PROBLEM, seed=seed),
+    "demos.record": lambda seed: recorded(seed),
     "plan_many": lambda seed: rrtik.plan_many(WORLD, [START], [END], seed=seed),
     "replan": lambda seed: rrtik.replan(PROBLEM, step=0.2, rate=20.0, seconds=0.2, seed=seed),
     "replanning.Scenario.run": lambda seed: rrtik.replanning.Scenario.load("replan_walls").run(seconds=0.1, seed=seed),

@@ -46,7 +46,7 @@ def content(folder):
 def test_the_same_data_come_out_by_processes_after_interruptions_and_in_parts(tmp_path):
     made = record("reach.yaml", 5, "whole", seed=3, jobs=1)
     whole = content(tmp_path / "whole")
-    assert made.found
+    assert made.complete
     assert made.count == 5
     assert len(whole) == 7
 
@@ -84,7 +84,7 @@ def test_failed_attempts_are_counted_and_made_up_for(tmp_path):
     (tmp_path / "hard.yaml").write_text(hard)
     made = record("hard.yaml", 4, "out", jobs=1)
     lines = [json.loads(line) for line in (tmp_path / "out" / ATTEMPTS).read_text().splitlines()[1:]]
-    assert made.found
+    assert made.complete
     assert sum(made.failures.values()) == made.attempts - 4 > 0
     assert [line["attempt"] for line in lines] == list(range(made.attempts))
     assert lines[-1]["found"]  # no attempt more than it takes

@@ -48,7 +48,7 @@ def plan(found: bool) -> rrtik.Plan:
 
 
 def run(found: bool) -> rrtik.replanning.ReplanRun:
-    return SCENARIO.run(seconds=20.0 if found else 0.1, speed_bound=4.0, repair_budget=30.0)
+    return SCENARIO.run(seconds=20.0 if found else 0.1, speed_bound=3.5, repair_budget=30.0)
 
 
 def timed_plan(found: bool) -> rrtik.replanning.TimedPlan:

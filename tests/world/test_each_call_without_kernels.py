@@ -105,6 +105,12 @@ def first_rates(problem):
     return np.round(rates, 6)
 
 
+def run_certificate_fault(problem, _):
+    run = run_of(problem)
+    certificate = run.certificate(problem.world)
+    return certificate is None or run.verify(certificate, problem.world)
+
+
 ENGINES = {"World", "Roadmap", "Task"}  # of which all methods are tried
 MERE_VALUES = {"Plan", "TaskPlan", "World"}
 CALLS = {
@@ -176,6 +182,8 @@ CALLS = {
     "plan and improve": lambda p, _: planned(near(p), improve=0.1),
     "plan_many": lambda p, _: [motion_of(each) for each in rrtik.plan_many(p.world, LINE[:2], LINE[1:], **MANNERS)],
     "replan": lambda p, _: run_of(p).found,
+    "replanning.ReplanRun.certificate": run_certificate_fault,
+    "replanning.ReplanRun.verify": run_certificate_fault,
     "replanning.ReplanRun.violations": lambda p, _: run_of(p).violations(p),
     "replanning.ReplanRun.judged": lambda p, _: run_of(p).judged(p).verdict.text,
     "replanning.Scenario": lambda p, _: (
