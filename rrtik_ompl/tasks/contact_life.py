@@ -290,13 +290,15 @@ def contacts_from(contacts: Iterable[MotionContact], number: int) -> tuple[Touch
 def world_from(world: World, contacts: Iterable[MotionContact], number: int, worlds: Worlds | None = None) -> World:
     """Return the world of a motion from the waypoint with this index on, without the contacts that have ended there.
 
-    It may be known among the ``worlds`` of the task.
+    It may be known among the ``worlds`` of the task, which have no path constraints of a stage.
     """
     stood_on = tuple(contacts)
     known_pairs = {each.touching.pair for each in stood_on}
     others = tuple(contact for contact in world.scene.contacts if contact.pair not in known_pairs)
     scene = replace(world.scene, contacts=(*others, *contacts_from(stood_on, number)))
-    return form_of(world, scene=scene) if worlds is None else worlds.of(world.robot, scene)
+    if worlds is None:
+        return form_of(world, scene=scene)
+    return form_of(worlds.of(world.robot, scene), constraints=world.settings.constraints)
 
 
 def touching_again(contact: Touching) -> Touching:

@@ -13,7 +13,10 @@ import rrtik_ompl as rrtik
 from rrtik_ompl import Alternatives, Attach, MoveTo, Straight, Task
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.problem_files.path_constraints import constraint_data
+from rrtik_ompl.tasks.contact_life import follow_contacts
+from rrtik_ompl.tasks.setting import Setting
 from rrtik_ompl.tasks.task_file import stage_data
+from rrtik_ompl.tasks.worlds import Worlds
 from rrtik_ompl.viewer.page import page
 
 
@@ -125,3 +128,26 @@ def test_a_region_from_the_start_is_written_as_upright_or_not_at_all(serving):
     other = rrtik.TaskRegion(pin.SE3.Identity(), np.zeros((6, 2)), from_start=True)
     with pytest.raises(InputError, match="other than upright"):
         constraint_data(other)
+
+
+@pytest.mark.kernels
+def test_a_motion_keeps_its_constraints_after_a_contact_has_ended():
+    """What is held stands on a table, is lifted, and tilts when the table is far away."""
+    robot = rrtik.load_robot("ur5")
+    q = np.array([0.0, -1.6, 1.8, -0.2, 1.6, 0.0])
+    up = np.array([0.0, 0.0, 1.0])
+    cup = rrtik.Obstacle("cup", rrtik.Box([0.06, 0.06, 0.1]), robot.fk(q).translation - 0.12 * up)
+    table = rrtik.Obstacle("table", rrtik.Box([0.5, 0.5, 0.02]), cup.pose.translation - 0.06 * up)
+    standing = rrtik.World(robot, rrtik.Scene([cup, table]))
+    worlds = Worlds(standing)
+    held = Setting.of(standing, worlds).after(Attach("cup", "tool0"), q).world
+    level = rrtik.constraints.upright(robot, frame="cup", tolerance_deg=5.0)
+    world = rrtik.Problem(held, q, q, constraints=[level]).world
+
+    lifted = np.add(q, [0.0, -0.2, 0.0, 0.2, 0.0, 0.0])
+    ends = np.add(lifted, [[0.3, 0.0, 0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.5, 0.0, 0.0]])
+    paths = [rrtik.JointPath.of(robot, [q, lifted, end]) for end in ends]
+    level_all_along, tilted = (follow_contacts(path, world, frozenset(), (), worlds) for path in paths)
+    assert level_all_along.fault == ""
+    assert "path constraint 1 (frame 'cup')" in tilted.fault
+    assert tilted.world.constraints is not None  # in which a detour is planned
