@@ -295,7 +295,7 @@ class Expander:
             self.failures.append((branch, step, followed.fault))
             return
 
-        setting_left = setting.with_contacts_only(followed.lasting, followed.world)
+        setting_left = setting.with_contacts_only(followed.lasting)
         contacts = followed.contacts
         yield _following_branch(
             branch, step, setting, path.end, followed.path, setting_left=setting_left, contacts=contacts

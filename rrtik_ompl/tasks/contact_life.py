@@ -210,7 +210,7 @@ class FollowedContacts:
         lasting: The contacts that remain at its end.
         fault: "" if all things that parted stay apart, otherwise what touches again; the path then ends where the two
             have parted.
-        world: The world at the end of the path, without the contacts that have ended; None if none has.
+        world: If there is a fault, the world at the end of the path, without the contact that has ended there.
     """
 
     path: JointPath
@@ -224,8 +224,8 @@ def follow_contacts(
     path: JointPath,
     world: World,
     grasp_pairs: frozenset[frozenset[str]],
-    contacts_at_end: Iterable[Touching] = (),
-    worlds: Worlds | None = None,
+    contacts_at_end: Iterable[Touching],
+    worlds: Worlds,
 ) -> FollowedContacts:
     """Find where the contacts of a motion end, and check that things stay apart after they have parted.
 
@@ -237,7 +237,7 @@ def follow_contacts(
         world: The world of the motion, with all contacts.
         grasp_pairs: Pairs that a grasp allows: after they have parted, they may touch again.
         contacts_at_end: Contacts of things that are taken or set down at the end of the motion.
-        worlds: Further worlds of the task, if they are known.
+        worlds: The worlds of the task.
     """
     end_contact_of_pair = {contact.pair: contact for contact in contacts_at_end}
     parting_of_contact = {
@@ -261,7 +261,6 @@ def follow_contacts(
             later_distance = None if following is None else following.distance
             contacts.append(MotionContact(contact, waypoint_of_place[place], later_distance, of_grasp))
 
-    world_after = None
     for until in sorted(set(waypoint_of_place.values())):
         world_after = world_from(world, contacts, until, worlds)
         if violations := violations_of(world_after.checks, rows[until:]):
@@ -276,7 +275,7 @@ def follow_contacts(
     contacts_left = contacts_from(contacts, len(rows))
     lasting = tuple(contact for contact in contacts_left if end_contact_of_pair.get(contact.pair) != contact)
     stood_on = tuple(motion_contact for motion_contact in contacts if motion_contact.until != 0)
-    return FollowedContacts(new_path, stood_on, lasting, world=world_after)
+    return FollowedContacts(new_path, stood_on, lasting)
 
 
 def contacts_from(contacts: Iterable[MotionContact], number: int) -> tuple[Touching, ...]:

@@ -252,7 +252,7 @@ class TaskSearch:
             world = world_of_motion(path, setting.world, link.step.stage)
             followed = follow_contacts(path, world, setting.grasp_pairs, link.arriving, setting.worlds)
             # The path now ends where two things have parted that would touch again later.
-            if followed.fault and followed.world is not None:
+            if followed.world is not None:
                 detour = self._path_from_parting(link, followed.world, followed.path.end, path.end, effort)
                 if detour is None:
                     return False

@@ -82,14 +82,9 @@ class Setting:
         """Return the same robot in another scene."""
         return Setting(self.worlds, self.robot, scene, self.grasp_pairs)
 
-    def with_contacts_only(self, contacts: tuple[Touching, ...], world: World | None = None) -> Setting:
-        """Return the same setting with exactly these contacts; a world that has them may be known already."""
-        if contacts == self.scene.contacts:
-            return self
-        setting = self.with_scene(replace(self.scene, contacts=contacts))
-        if world is not None and world.scene.made_of == setting.scene.made_of:
-            setting.world = world
-        return setting
+    def with_contacts_only(self, contacts: tuple[Touching, ...]) -> Setting:
+        """Return the same setting with exactly these contacts."""
+        return self if contacts == self.scene.contacts else self.with_scene(replace(self.scene, contacts=contacts))
 
     def after(self, stage: Attach | Detach | Gripper, q: Vector) -> Setting:
         """Return the setting after a stage that the arm does at a configuration.
