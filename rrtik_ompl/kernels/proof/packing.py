@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from types import MappingProxyType
@@ -48,7 +48,7 @@ class ProofPairs:
         sides: The same pairs as the kernels have them: body above the plane, its part, body below, its part, shape
             (n, 4); part -1 is a body of several parts as a whole.
         margins: How far each must stay apart [m], shape (n,).
-        beside_obstacle: Which pairs are of what moves and an obstacle, shape (n,).
+        beside_obstacle: Which pairs are of what moves and an obstacle, or of several bodies with one, shape (n,).
         clear: Which of these are not in contact, and keep a clearance, shape (n,).
         touching: Numbers of the pairs that are in contact.
         firsts: The first solid of each body, and the end of them.
@@ -209,6 +209,8 @@ def proof_pairs(
     )
 
     beside = np.asarray(body_arrays(bodies).obstacles[named].any(axis=1))
+    for number, parts in _groups_of(made.pairs, count):
+        beside[number] = beside[parts].any()
     margins, touching = _kept_apart(bodies, named, made.pairs, count)
 
     pairs_of_bodies = ProofPairs(
@@ -238,14 +240,23 @@ def _kept_apart(
         bodies: All bodies.
         named: Numbers of the two bodies of each pair, shape (n, 2).
         pairs: The pairs as the kernels read them.
-        first_group: Number of the first pair of several bodies: these keep the largest distance of theirs.
+        first_group: Number of the first pair of several bodies: these keep the largest distance of theirs, and are in
+            contact if all of theirs are.
     """
     arrays = body_arrays(bodies)
     margins = arrays.kept_apart(named)
+    touching = arrays.in_contact(named)
+    for number, parts in _groups_of(pairs, first_group):
+        margins[number] = margins[parts].max()
+        touching[number] = touching[parts].all()
+    return margins, touching
+
+
+def _groups_of(pairs: NDArray[np.int32], first_group: int) -> Iterator[tuple[int, slice]]:
+    """The pairs of several bodies, from the first one on, each with the pairs that it stands for, which come before."""
     rows = pairs.reshape(-1, layout.PAIR_SIZE)
     for number in range(first_group, len(rows)):
-        margins[number] = margins[rows[number, layout.PARTS_FIRST] : rows[number, layout.PARTS_END]].max()
-    return margins, arrays.in_contact(named)
+        yield number, slice(*rows[number, layout.PARTS_FIRST : layout.PARTS_END + 1].tolist())
 
 
 class _ListedPairs(NamedTuple):
