@@ -83,9 +83,10 @@ class Loop:
         half_resolution = 0.5 * first_world.motion_resolution
         self._proven_clearance = min(CLEARANCE, half_resolution) if settings.clearance is None else settings.clearance
         self._search_clearance = half_resolution + (settings.clearance or 0.0)
+        self._required = settings.margin + self._search_clearance  # from each obstacle, whether it moves or not [m]
         self._make_worlds(first_world)
 
-        self._tracker = MotionTracker(scene, settings.speed_bound)
+        self._tracker = MotionTracker(settings.speed_bound)
         self._travels = Travels(settings.tick, settings.speed_bound, self._tracker.speeds)
 
         self.q = problem.start
@@ -227,9 +228,9 @@ class Loop:
         """Read the scene, move the obstacles of the worlds and return whether anything changed.
 
         A change of the required distances counts too: an obstacle may have gone on since it was seen. The distances
-        that are required from each obstacle [m] are stored as attributes: ``_required_in_tick`` allows for the motion
-        within the tick, ``_required_distances`` also for the time since the obstacle was seen, and
-        ``_required_if_moving`` also for obstacles at rest that may begin to move.
+        that are required from each obstacle [m] are stored as attributes: ``_required_distances`` allows for the motion
+        since the obstacle was seen and within the tick, and ``_required_if_moving`` also for obstacles at rest that may
+        begin to move.
         """
         snapshot = self._read_feed(now)
         scene = snapshot.scene
@@ -242,24 +243,19 @@ class Loop:
         self._snapshot = snapshot
         self.run.see(snapshot)
 
-        is_old = max(ages.values(), default=0.0) > self._settings.tick
-        self._scene_is_old = self._settings.speed_bound is not None and is_old
+        self._scene_is_old = max(ages.values(), default=0.0) > self._settings.tick
         self._travels_since_seen = self._travels.since_seen(scene, ages)
 
-        # The distance to keep from each obstacle [m] allows first for its motion within the tick,
-        distance = self._settings.margin + self._search_clearance
+        # The distance to keep from each obstacle [m] allows for its motion since it was seen and within the tick,
         travels_in_tick = self._travels.in_tick(scene)
-        self._required_in_tick = required_distances(scene, distance, travels_in_tick)
-
-        # then also for its motion since it was seen,
         travels = {name: travel + self._travels_since_seen[name] for name, travel in travels_in_tick.items()}
-        distances = required_distances(scene, distance, travels)
+        distances = required_distances(scene, self._required, travels)
 
         # and in proofs of moves for every motion that nothing rules out; None where no bound is known.
         self._possible_travels = self._travels.possible(snapshot, ages)
         required_if_moving: dict[str, float] | None = None
         if self._possible_travels is not None:
-            required_if_moving = required_distances(scene, distance, self._possible_travels)
+            required_if_moving = required_distances(scene, self._required, self._possible_travels)
         self._required_if_moving = required_if_moving
         if self._guard is not None and self._possible_travels is not None:
             may_move = frozenset(name for name, travel in self._possible_travels.items() if travel > 0.0)
@@ -429,21 +425,11 @@ class Loop:
         Returns:
             Event, reason ("" unless the robot waits) and next configuration, shape (n,).
         """
-        q = self._step()
-        if q is not self.q:
-            return event, "", q
-        return "wait", "what was seen is too old to go on" if self._scene_is_old else "the goal is not free", q
-
-    def _step(self) -> Vector:
-        """Go one step along the path and return the next configuration, shape (n,).
-
-        The robot stays where it is if the scene is old and the step is not proven.
-        """
         q, passed = self._next_on_path()
-        if q is self.q or (self._scene_is_old and not self._proven_whatever_moves(self.q, q)):
-            return self.q
+        if q is self.q:
+            return "wait", "the goal is not free", q
         self._planner.advance(q, passed, self._world)
-        return q
+        return event, "", q
 
     def _next_on_path(self) -> tuple[Vector, int]:
         """Return the configuration after a step along the path, shape (n,), and how many waypoints it has passed.
@@ -474,10 +460,12 @@ class Loop:
         """Return the clearance to obstacles less the required distance [m]; NaN if all their motion is predictable."""
         if not self._tracker.unforeseen(0.0):
             return np.nan
-        return float(self._world_ahead(0).clearance(q[None])[0]) - max(self._required_in_tick.values())
+        return float(self._world_ahead(0).clearance(q[None])[0]) - self._required
 
     def _guarded(self, guard: Guard, event: TickEvent, free: bool) -> tuple[TickEvent, str, Vector, float]:
         """Go along the path if a way out is left then, or else where nothing can reach the arm for the longest time.
+
+        While the scene is old, only proven steps are made along the path.
 
         Args:
             guard: Knows what obstacles can reach.
@@ -494,7 +482,8 @@ class Loop:
         path = self._planner.path
         if free:
             q, passed = self._next_on_path()
-            if q is not self.q and guard.seconds_after(self.q, q, path) >= guard.needed:
+            leaves_way_out = q is not self.q and guard.seconds_after(self.q, q, path) >= guard.needed
+            if leaves_way_out and not (self._scene_is_old and not self._proven_whatever_moves(self.q, q)):
                 self._planner.advance(q, passed, self._world)
                 return event, "", q, guard.needed * base_is_safe
 
@@ -556,8 +545,7 @@ class Loop:
         """Return the configuration after an evasive tick, or None to stand still; the path then starts from there."""
         q = evasion(
             self.q, self._planner.path, step=self._settings.step, max_change=self._max_change,
-            distance=max(self._required_in_tick.values()), ahead=self._world_ahead, alone=self._world_of_arm,
-            rng=self._rng,
+            distance=self._required, ahead=self._world_ahead, alone=self._world_of_arm, rng=self._rng,
         )  # fmt: skip
         if q is not None:
             self._planner.rejoin(q)

@@ -39,13 +39,12 @@ class MotionTracker:
         fault: A line that says which obstacle was faster and by how much, as the last update showed; "" if none was.
 
     Args:
-        scene: The first scene, which gives the shapes.
         bound: Largest speed that was stated for obstacles [m/s]; None if none was.
     """
 
-    def __init__(self, scene: Scene, bound: float | None) -> None:
+    def __init__(self, bound: float | None) -> None:
         # The largest distance of a point of each obstacle from its origin [m] bounds the way of its points in a turn.
-        self._radii = {o.name: farthest(o.shape, pin.SE3.Identity()) for o in scene.obstacles}
+        self._radii: dict[str, float] = {}
         self._bound = bound
         self._sightings: dict[str, tuple[float, Obstacle]] = {}
         self._velocities: dict[str, tuple[Vector, Vector]] = {}
@@ -60,7 +59,8 @@ class MotionTracker:
         Names, shapes, poses and margins are compared with those of the last sighting; the first call returns True if
         there are obstacles. Gives a ``SpeedWarning`` for each obstacle that is faster than the bound.
         """
-        changed = {o.name for o in seen.scene.obstacles} != self._sightings.keys()
+        given = {o.name for o in seen.scene.obstacles}
+        changed = given != self._sightings.keys()
         self.faster_since = float("inf")
         self.fault = ""
 
@@ -69,9 +69,11 @@ class MotionTracker:
             time = seen.seen_at(obstacle.name)
             last_time, last_seen = self._sightings.get(name, (time, obstacle))
             reshaped = not same_shape(obstacle.shape, last_seen.shape)
-            self._radii.setdefault(name, farthest(obstacle.shape, pin.SE3.Identity()))
             moved = not np.array_equal(last_seen.pose.homogeneous, obstacle.pose.homogeneous)
             changed |= reshaped or moved or obstacle.margin != last_seen.margin
+
+            if name not in self._sightings:
+                self._radii[name] = farthest(obstacle.shape, pin.SE3.Identity())
 
             # A cloud that was seen anew has new points, which may have moved; its speed cannot be measured.
             if reshaped:
@@ -83,9 +85,11 @@ class MotionTracker:
                     self._measure(obstacle, last_seen.pose, last_time, time)
             self._sightings[name] = (time, obstacle)
 
-        # What is gone is forgotten: should it come back, it may have been anywhere.
-        given = {o.name for o in seen.scene.obstacles}
-        self._sightings = {name: each for name, each in self._sightings.items() if name in given}
+        # What is gone is forgotten, but for its speed: should it come back, it may have been anywhere.
+        for name in self._sightings.keys() - given:
+            del self._sightings[name]
+            self._velocities.pop(name, None)
+            self._reshaped.discard(name)
         return changed
 
     def later(self, scene: Scene, seconds: float, ages: Mapping[str, float] | None = None) -> Scene:

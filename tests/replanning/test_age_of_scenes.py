@@ -18,8 +18,10 @@ from rrtik_ompl.replanning.feed import Snapshot, Stream
 from rrtik_ompl.replanning.record import ReplanRun
 from rrtik_ompl.replanning.replanner import replan
 from rrtik_ompl.replanning.travels import MotionTracker, SpeedWarning
+from rrtik_ompl.replanning.unavoidable import ContactWarning
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
+from rrtik_tests.pedestal import beside_pedestal
 from rrtik_tests.run_judge import judged
 
 SPEED, RATE, MARGIN = 0.2, 50.0, 0.02
@@ -271,12 +273,25 @@ def test_a_stream_gives_the_last_scene_that_is_not_later_and_reads_no_further():
 
 
 def test_the_speed_of_what_was_hidden_is_that_of_its_whole_way():
-    tracker = MotionTracker(at(0.0), SPEED)
+    tracker = MotionTracker(SPEED)
     with warnings.catch_warnings():
         warnings.simplefilter("error", SpeedWarning)
         for time, hidden in ((0.0, 0.0), (0.5, 0.5), (1.0, 0.0)):
             tracker.update(Snapshot(time, at(time - hidden), {"plate": hidden}))
     assert tracker.speeds["plate"] == pytest.approx(SPEED)
+
+
+def test_beside_what_may_have_come_to_the_base_unseen_the_arm_waits_for_the_next_scene(tmp_path):
+    ball = Obstacle("ball", Sphere(0.06), pin.SE3(np.eye(3), np.array([0.5, 0.0, -0.8])))
+    problem = beside_pedestal(tmp_path, ball)
+    seen = [(time, Scene([ball])) for time in (0.0, 1.5, *np.arange(1.6, 4.0, 0.1))]
+    with pytest.warns(ContactWarning, match="'ball'"):
+        run = replan(problem, seen, step=0.05, rate=10.0, speed_bound=0.3, seconds=2.0)
+    moves, proven = run.moves
+    assert moves == proven
+    waits = [tick.time for tick in run.ticks if tick.event == "wait"]
+    assert 0.5 < waits[0] < waits[-1] < 1.5
+    assert all(tick.unavoidable.pairs == (("base", "ball"),) for tick in run.ticks if tick.event == "wait")
 
 
 def test_no_move_is_proven_in_a_tick_in_which_an_obstacle_may_reach_the_base():

@@ -14,7 +14,7 @@ import pytest
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.model.scene import Obstacle, Scene
-from rrtik_ompl.model.shapes import Box, Capsule, Cylinder, HalfSpace, Sphere, same_shape
+from rrtik_ompl.model.shapes import Box, Capsule, Cylinder, HalfSpace, PointCloud, Sphere, same_shape
 from rrtik_ompl.motion.trajectory.limits import RateLimits
 from rrtik_ompl.replanning.faults import ANSWERS, FeedWarning, SceneMemory, shape_around
 from rrtik_ompl.replanning.feed import Snapshot
@@ -111,6 +111,18 @@ def test_a_run_that_never_sees_an_obstacle_again_keeps_away_from_where_it_may_be
     remembered = [each for each in runs[1].scenes if "post" in each.scene.names]
     assert remembered[-1].time == pytest.approx(0.4 + 2 / RATE)  # it was seen last at 0.08 s
     assert remembered[-1].unseen["post"] == pytest.approx(0.4)
+
+
+def test_a_cloud_that_goes_leaves_the_arm_alone():
+    def feed(time):
+        points = np.array([[0.1 * time, 0.5, 0.0], [0.0, 0.6, 0.0]])
+        return Scene([Obstacle("cloud", PointCloud(points, 0.02))] if time < 0.5 else [])
+
+    problem = Problem(World(ball().robot, feed(0.0)), [-0.6, 0.0], [0.6, 0.0])
+    with pytest.warns(FeedWarning):
+        run = replan(problem, feed, **{**OPTIONS, "speed_bound": None})
+    assert [fault.kind for fault in run.faults] == ["vanishes", "stays away"]
+    assert run.found, run.reason
 
 
 def take(*scenes, patience=1.0, bound=SPEED):

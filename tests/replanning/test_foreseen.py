@@ -6,8 +6,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-import rrtik_ompl as rrtik
-from rrtik_ompl.model.scene import ConstantVelocity, Obstacle, Scene, TimedPoses
+from rrtik_ompl.model.scene import ConstantVelocity, Obstacle, TimedPoses
 from rrtik_ompl.model.shapes import Box, Sphere
 from rrtik_ompl.motion.trajectory.limits import RateLimits
 from rrtik_ompl.replanning import in_time
@@ -15,24 +14,12 @@ from rrtik_ompl.replanning.in_time import foreseen, plan_in_time
 from rrtik_ompl.replanning.in_time.foreseen import ForeseenWorlds
 from rrtik_ompl.replanning.in_time.pace import NEVER, Pace
 from rrtik_ompl.replanning.in_time.search import timed
-from rrtik_ompl.world.world import World
 from rrtik_tests.moving_plane import FAST, box, crossing, place, plane
-
-PEDESTAL = """<robot name="pedestal">
-<link name="base"><collision><origin xyz="0 0 -0.5"/><geometry><box size="0.3 0.3 1.0"/></geometry></collision></link>
-<link name="arm"><collision><origin xyz="0.3 0 0.1"/><geometry><box size="0.6 0.05 0.05"/></geometry></collision></link>
-<joint name="turn" type="revolute"><parent link="base"/><child link="arm"/><axis xyz="0 0 1"/>
-<limit lower="-3" upper="3" velocity="1" effort="1"/></joint></robot>"""
+from rrtik_tests.pedestal import beside_pedestal
 
 
 def at(x):
     return pin.SE3(np.eye(3), np.array([x, 0.0, -0.8]))
-
-
-def beside_pedestal(tmp_path, *obstacles):
-    (tmp_path / "pedestal.urdf").write_text(PEDESTAL)
-    robot = rrtik.load_robot(tmp_path / "pedestal.urdf", tip="arm")
-    return rrtik.Problem(World(robot, Scene(obstacles)), [-1.0], [1.0])
 
 
 def ball(*stations):

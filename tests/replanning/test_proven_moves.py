@@ -135,7 +135,18 @@ def test_a_cloud_that_has_grown_and_turns_is_as_fast_as_its_farthest_point():
         turned = pin.SE3(pin.exp3(np.array([0.0, 0.0, angle])), np.zeros(3))
         return Scene([Obstacle("seen", PointCloud([[reach, 0.0, 0.0], [0.0, 0.1, 0.0]], 0.01), turned)])
 
-    tracker = MotionTracker(seen(0.1, 0.0), None)
+    tracker = MotionTracker(None)
     for number, (reach, angle) in enumerate([(0.1, 0.0), (2.0, 0.0), (2.0, 0.3)]):
         tracker.update(Snapshot(0.1 * number, seen(reach, angle)))
+    assert tracker.speeds["seen"] >= 2.0 * 0.3 / 0.1
+
+
+def test_what_comes_back_in_another_shape_is_as_fast_as_its_farthest_point_now():
+    def seen(length, angle):
+        turned = pin.SE3(pin.exp3(np.array([0.0, 0.0, angle])), np.zeros(3))
+        return Scene([Obstacle("seen", Box([length, 0.1, 0.1]), turned)])
+
+    tracker = MotionTracker(None)
+    for number, scene in enumerate([seen(0.1, 0.0), Scene(), seen(4.0, 0.0), seen(4.0, 0.3)]):
+        tracker.update(Snapshot(0.1 * number, scene))
     assert tracker.speeds["seen"] >= 2.0 * 0.3 / 0.1
