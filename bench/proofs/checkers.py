@@ -206,7 +206,11 @@ class Script:
         """Return why a certificate does not hold, "" if it does."""
         scene = folder / "scene.yaml"
         route = forgery.route
-        path: dict[str, Any] = {"kind": "joint_path", "waypoints": np.asarray(route.waypoints).tolist()}
+        path: dict[str, Any] = {
+            "kind": "joint_path",
+            "joint_names": forgery.world.robot.joint_names,
+            "waypoints": np.asarray(route.waypoints).tolist(),
+        }
         if route.times is not None and route.rates is not None:
             path |= {"kind": "joint_motion", "times": route.times.tolist(), "rates": route.rates.tolist()}
         texts = {

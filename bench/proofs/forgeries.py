@@ -105,6 +105,23 @@ def reordered_waypoints(case: Case, rng: np.random.Generator) -> Forgery:
     return _given(case, document)
 
 
+def other_columns(case: Case, rng: np.random.Generator) -> Forgery | None:
+    """The certificate's joints take the numbers of the waypoints in another order than the path's."""
+    order = rng.permutation(case.waypoints.shape[1])
+    document = deepcopy(case.document)
+    rows = np.array(document["waypoints"])[:, order]
+    if np.array_equal(rows, case.waypoints):
+        return None
+    document["waypoints"] = rows.tolist()
+    if "rates" in document:
+        document["rates"] = np.array(document["rates"])[:, :, order].tolist()
+    for joint in document["joints"]:
+        joint["gain"] = [joint["gain"][k] for k in order]
+    rates = case.route.rates
+    route = replace(case.route, waypoints=rows, rates=None if rates is None else rates[:, :, order])
+    return _given(case, document, route=route)
+
+
 def colliding_path(case: Case, rng: np.random.Generator) -> Forgery | None:
     """Path and certificate lead through a configuration that touches; the rest is kept."""
     lower, upper = case.world.robot.finite_range()
@@ -620,7 +637,7 @@ def cut_off(case: Case, rng: np.random.Generator) -> Forgery:
 FORGERS: dict[str, Forger] = {
     forger.__name__.replace("_", " "): forger
     for forger in (
-        moved_waypoint, moved_path, reordered_waypoints, colliding_path, outside_limits,
+        moved_waypoint, moved_path, reordered_waypoints, other_columns, colliding_path, outside_limits,
         turned_plane, tilted_plane, short_normal, dropped_entry, dropped_pair, dropped_motion, other_interval,
         other_part, no_such_part, swapped_bodies, other_count, other_cut,
         left_out_pair, raised_clearance, lowered_clearance, other_self_margin, other_margin,

@@ -58,11 +58,15 @@ def fault_of(certificate: Certificate, world: World, path: Certifiable, clearanc
     """Verify a certificate of a path or a timed motion; see :meth:`rrtik_ompl.World.verify`.
 
     Raises:
-        InputError: If an argument has the wrong type.
+        InputError: If an argument has the wrong type, or the path moves other joints than the world's robot, or these
+            in another order.
     """
     from rrtik_ompl.world.certificate_check import certificate_fault  # a plan does not need it
 
     require(certificate, Certificate, "certificate", "World.certificate(path) makes one")
+    names = getattr(path, "joint_names", None)
+    if names is not None:
+        require_joints(world.robot, names, "path")
     return certificate_fault(certificate, world, _route(path), clearance=not_negative(clearance, "clearance"))
 
 

@@ -394,7 +394,8 @@ class World(Judge):
             clearance: Least distance that the path has to keep from obstacles on top of their margins [m].
 
         Raises:
-            InputError: If an argument has the wrong type.
+            InputError: If an argument has the wrong type, or the path moves other joints than the world's robot, or
+                these in another order.
 
         Example:
             >>> problem = rrtik.load_problem("planar3_boxes")

@@ -49,6 +49,15 @@ def test_a_certificate_may_be_asked_for_waypoints(problem, path):
     assert of_rows.document() == problem.world.certificate(path, path.proof.clearance).document()
 
 
+def test_a_path_whose_numbers_are_of_other_joints_is_not_verified(problem, path):
+    certificate = problem.world.certificate(path)
+    assert problem.world.verify(certificate, path) == ""
+    assert problem.world.verify(certificate, rrtik.JointPath(path.waypoints)) == ""
+    turned = rrtik.JointPath(path.waypoints, path.joint_names[::-1])
+    with pytest.raises(InputError, match="put its columns in that order"):
+        problem.world.verify(certificate, turned)
+
+
 def test_a_self_margin_and_held_obstacles_are_in_the_certificate(problem, path, tmp_path):
     world = rrtik.World(problem.robot, problem.world.scene, self_margin=0.001)
     path.proved(world).save(tmp_path / "path.json", proof=True)

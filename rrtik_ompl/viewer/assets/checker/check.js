@@ -24,8 +24,9 @@ const demand = (condition, reason) => { if (!condition) refuse(reason); };
 /**
  * Verify a certificate, the value of its JSON.
  *
- * `own` is what the asker has: {robot, srdf, scene, waypoints, timed, clearance}, each null if it is not there; `timed` has {times, rates}. Without a robot
- * or a scene the model in the file is taken for what it says, and the answer says so. Returns {holds, fault, facts}.
+ * `own` is what the asker has: {robot, srdf, scene, names, waypoints, timed, clearance}, each null if it is not there;
+ * `names` are those of the joints that the waypoints' numbers are of, `timed` has {times, rates}. Without a robot or a
+ * scene the model in the file is taken for what it says, and the answer says so. Returns {holds, fault, facts}.
  */
 function checkCertificate(certificate, own) {
   try {

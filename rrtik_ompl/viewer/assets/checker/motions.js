@@ -12,6 +12,7 @@ function checkWaypoints(file, world, own) {
   if (waypoints !== null) {
     const same = waypoints.length === file.waypoints.length && waypoints.every((row, k) => row.length === file.waypoints[k].length && row.every((value, j) => value === file.waypoints[k][j]));
     demand(same, "it is for another path: waypoints differ");
+    checkColumns(joints, own.names ?? null, waypoints[0].length);
     checkTimed(file, own.timed ?? null);
   }
   for (const [k, row] of file.waypoints.entries()) {
@@ -22,6 +23,14 @@ function checkWaypoints(file, world, own) {
       demand(!driven || inside, `waypoint ${k + 1}: joint '${joints[j].name}' is at ${value}, outside its limits`);
     });
   }
+}
+
+/** The numbers of a waypoint are of the joints that the motion which is asked about names, in that order. */
+function checkColumns(joints, names, count) {
+  // What a path is written as whose joints have no names fits every robot.
+  if (names === null || (names.every((name, k) => name === `joint${k + 1}`) && !names.some((name) => joints.some((joint) => joint.name === name)))) return;
+  const isMoved = (name, column) => joints.some((joint) => joint.name === name && joint.offset === 0 && joint.gain.every((gain, k) => gain === (k === column ? 1 : 0)));
+  demand(names.length === count && names.every(isMoved), `it is for another path: that which is asked about moves ${names.join(", ")}`);
 }
 
 /** Between the waypoints, which are the same, the motion is that which is asked about: straight, or by these rates. */

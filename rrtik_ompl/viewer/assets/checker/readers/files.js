@@ -1,13 +1,13 @@
 // What a heap of files says: which is the certificate, the robot, the scene, the path, and what they refer to.
 
 /**
- * What was given, {certificate, robot, srdf, scene, waypoints, timed, parts, padding, told}, each null if no file has it.
+ * What was given, {certificate, robot, srdf, scene, names, waypoints, timed, parts, padding, told}, each null if no file has it.
  *
  * `files` are {name, buffer} of all files that were named by themselves; `lookup(name, from)` returns the buffer of a
  * mesh or a cloud that the file `from` refers to, or null. `told` says in words which file was taken for what.
  */
 function readFiles(files, lookup) {
-  const found = { certificate: null, robot: null, srdf: null, scene: null, waypoints: null, timed: null, parts: null, padding: {}, told: [] };
+  const found = { certificate: null, robot: null, srdf: null, scene: null, names: null, waypoints: null, timed: null, parts: null, padding: {}, told: [] };
   const take = (key, value, what, name) => {
     if (found[key] !== null) throw new Error(`${name}: a second ${what}; give one`);
     found[key] = value;
@@ -28,6 +28,9 @@ function readFiles(files, lookup) {
 }
 
 function readJsonFile(data, name, found, take, lookup) {
+  if (["joint_path", "joint_motion", "joint_trajectory", "task_plan"].includes(data?.kind) && Object.hasOwn(data, "joint_names")) {
+    found.names = listOf(data.joint_names, name).map((each) => words(each, `${name}: joint_names`));
+  }
   if (data !== null && ["path_certificate", "task_certificate"].includes(data.kind)) take("certificate", data, "certificate", name);
   else if (data !== null && data.kind === "joint_path") {
     take("waypoints", data.waypoints, "path", name);
