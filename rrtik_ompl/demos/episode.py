@@ -93,7 +93,7 @@ def attempted(draws: Draws, seed: int, number: int, timing: Timing) -> Episode:
     drawn = {name: pose_row(draw.poses[name]).tolist() for name in names}
     own_seed = int(np.random.default_rng([seed, number, 1]).integers(2**31))
     try:
-        plan = plan_after(draw.task, draws.left, seed=own_seed, seconds=timing.seconds)
+        plan = plan_after(draw.task, draw.poses, draws.left, seed=own_seed, seconds=timing.seconds)
         if not plan.found:
             return Episode(number, plan.reason, draw.rejected, drawn)
         if not plan.proven:

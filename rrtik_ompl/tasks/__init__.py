@@ -9,6 +9,7 @@ from itertools import product
 from typing import TYPE_CHECKING, Any, TypeVar, overload
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from rrtik_ompl.base.arrays import Vector, finite_array, frozen, not_negative, positive, seed_of
@@ -523,15 +524,13 @@ class Task:
 
         def planned(instance: tuple[Variation, int]) -> TaskPlan:
             variation, own_seed = instance
-            budget = Budget(own_seed, limit)
             start = self.start if variation.start is None else variation.start
-            task = Task(moved_stages(self.stages, self.world, variation), constraints=self.constraints)
-            with worlds_from(self.world, left) as worlds:
-                world = worlds.of(self.world.robot, moved_scene(self.world.scene, variation.poses))
-                try:
-                    return _planned(task, world, start, budget, worlds)
-                except ProblemError as error:
-                    return TaskPlan(False, (), (), (), (), str(error))
+            stages = moved_stages(self.stages, self.world, variation)
+            task = Task(stages, self.world, start, constraints=self.constraints)
+            try:
+                return plan_after(task, variation.poses, left, seed=own_seed, seconds=limit)
+            except ProblemError as error:
+                return TaskPlan(False, (), (), (), (), str(error))
 
         instances = list(zip(given, numbers, strict=False))
         if then is None:
@@ -570,15 +569,24 @@ def _planned(task: Task, world: World, start: ArrayLike | str, budget: Budget, w
     )
 
 
-def plan_after(task: Task, left: Left, *, seed: int, seconds: float) -> TaskPlan:
-    """Plan a task that has a world and a start, with the worlds that earlier instances of it have left.
+def plan_after(task: Task, poses: Mapping[str, pin.SE3], left: Left, *, seed: int, seconds: float) -> TaskPlan:
+    """Plan an instance of a task, with the worlds that earlier instances of it have left.
 
-    The plan is that of ``task.plan(seed=seed, seconds=seconds)``. Its worlds are left to the next instance, which moves
-    them: whoever needs them uses them before.
+    Its worlds are left to the next instance, which moves them: whoever needs them uses them before.
+
+    Args:
+        task: The instance's stages and start, in the world of the task as it is written.
+        poses: Where obstacles of the instance stand, T_world_obstacle, by name.
+        left: The worlds.
+        seed: As of :meth:`Task.plan`.
+        seconds: As there [s].
+
+    Raises:
+        ProblemError: As there.
     """
     budget = Budget(seed, seconds)
     with worlds_from(task.world, left) as worlds:
-        world = worlds.of(task.world.robot, task.world.scene)
+        world = worlds.of(task.world.robot, moved_scene(task.world.scene, poses))
         return _planned(task, world, task.start, budget, worlds)
 
 

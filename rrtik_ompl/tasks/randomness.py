@@ -20,8 +20,8 @@ from rrtik_ompl.geometry.collision.distances import measured
 from rrtik_ompl.model.goal_kind import COORDINATES, displacements
 from rrtik_ompl.tasks.setting import Setting
 from rrtik_ompl.tasks.stages import Attach, Detach, MoveTo, Stage, every_stage
-from rrtik_ompl.tasks.variations import Variation, moved_stages
-from rrtik_ompl.tasks.worlds import Left
+from rrtik_ompl.tasks.variations import Variation, moved_scene, moved_stages
+from rrtik_ompl.tasks.worlds import Left, Worlds, worlds_from
 from rrtik_ompl.world.problem import usable_configuration
 from rrtik_ompl.world.world import World
 
@@ -178,8 +178,8 @@ class Drawn:
     """An instance of a task.
 
     Attributes:
-        task: The instance; None if no draw was usable.
-        poses: Where the drawn obstacles stand, by name.
+        task: Its stages and start, in the world of the task as it is written; None if no draw was usable.
+        poses: Where the drawn obstacles stand, T_world_obstacle, by name.
         rejected: How many draws were not usable, by the reason.
     """
 
@@ -205,7 +205,7 @@ class Draws:
     Attributes:
         task: The task.
         random: What is random in it.
-        left: The worlds that the plans of earlier instances have left to the next one.
+        left: The worlds that earlier draws and plans have left to the next ones.
 
     Raises:
         InputError: If nothing is random in it, or what is random does not fit it.
@@ -232,15 +232,15 @@ class Draws:
         rejected: Counter[str] = Counter()
         poses: Mapping[str, pin.SE3] = {}
         for _ in range(MOST_DRAWS):
-            instance, poses = self._instance(rng)
-            fault = self._fault(instance)
+            task, poses = self._instance(rng)
+            fault = self._fault(task, poses)
             if not fault:
-                return Drawn(instance, poses, rejected)
+                return Drawn(task, poses, rejected)
             rejected[fault] += 1
         return Drawn(None, poses, rejected)
 
     def _instance(self, rng: np.random.Generator) -> tuple[Task, Mapping[str, pin.SE3]]:
-        """Draw all that is random, in the order of the section; the instance, and where its obstacles stand."""
+        """Draw all that is random, in the order of the section; the instance as :class:`Drawn` has it."""
         scene = self.task.world.scene
         random = self.random
         moves = {name: each.drawn(rng, scene.obstacle(name).pose.translation) for name, each in random.objects.items()}
@@ -252,27 +252,33 @@ class Draws:
         whole = {name: _on_top(move, random.objects[name], moves) for name, move in moves.items()}
         poses = {name: move * scene.obstacle(name).pose for name, move in whole.items()}
         set_down = {name: _on_top(move, random.places[name], moves) for name, move in places.items()}
-        instance = self.task.varied(Variation(poses, set_down, start))
+        task = self.task
+        stages = moved_stages(task.stages, task.world, Variation(poses, set_down))
         if random.goals is not None and goals is not None:
-            instance = _with_goals_moved(instance, _on_top(goals, random.goals, moves))
-        return instance, poses
+            stages = _with_goals_moved(stages, task.world, _on_top(goals, random.goals, moves))
+        return type(task)(stages, task.world, start, name=task.name, constraints=task.constraints), poses
 
-    def _fault(self, instance: Task) -> str:
+    def _fault(self, task: Task, poses: Mapping[str, pin.SE3]) -> str:
         """Return why an instance cannot be; "" if nothing speaks against it."""
-        scene = instance.world.scene
+        scene = moved_scene(task.world.scene, poses)
         for first, second, least in self.random.apart:
             away = scene.obstacle(first).pose.translation - scene.obstacle(second).pose.translation
             if np.linalg.norm(away) < least:
                 return f"'{first}' and '{second}' are nearer than {least:g} m"
 
-        for pair, before, now in zip(self._pairs, self._as_written, self._distances(instance.world), strict=True):
+        with worlds_from(task.world, self.left) as worlds:
+            return self._fault_in(worlds.of(task.world.robot, scene), worlds, task.start)
+
+    def _fault_in(self, world: World, worlds: Worlds, start: ArrayLike | str) -> str:
+        """Return what overlaps in the world of an instance, or why its start cannot be used; "" if nothing does."""
+        for pair, before, now in zip(self._pairs, self._as_written, self._distances(world), strict=True):
             if now < min(before, 0.0) - DEEPER or now <= 0.0 < before - DEEPER:  # meshes have no depth
-                first, second = (instance.world.bodies[number].name for number in pair)
+                first, second = (world.bodies[number].name for number in pair)
                 return f"'{first}' overlaps '{second}'"
 
         try:
-            q = instance.world.robot.configuration(instance.start, "start")
-            usable_configuration(Setting.beginning(instance.world, q).world, q, "start")
+            q = world.robot.configuration(start, "start")
+            usable_configuration(Setting.beginning(world, q, worlds).world, q, "start")
         except ProblemError as error:
             pairs = [f"'{first}' and '{second}'" for first, second in error.contacts]
             return f"start is in collision: {pairs[0]}" if pairs else str(error).partition(";")[0]
@@ -298,16 +304,15 @@ class Draws:
         return [contact.distance for contact in measured(world.bodies, self._pairs, frames, near_only=False)]
 
 
-def _with_goals_moved(task: Task, motion: pin.SE3) -> Task:
-    """Return a task with the goals moved that lead to nothing that is taken or set down."""
-    stages = task.stages
+def _with_goals_moved(stages: tuple[Stage, ...], world: World, motion: pin.SE3) -> tuple[Stage, ...]:
+    """Return the stages of a task with the goals moved that lead to nothing that is taken or set down."""
     last = max((k for k, stage in enumerate(stages) if any(map(_handles, every_stage([stage])))), default=-1)
     first = next((k for k in range(last + 1, len(stages)) if isinstance(stages[k], MoveTo)), len(stages))
 
     # They are moved as they would be if something were set down behind them.
     behind = (*stages[first:], Detach("goals"))
-    moved = moved_stages(behind, task.world, Variation(places={"goals": motion}))[:-1]
-    return type(task)((*stages[:first], *moved), task.world, task.start, name=task.name, constraints=task.constraints)
+    moved = moved_stages(behind, world, Variation(places={"goals": motion}))[:-1]
+    return (*stages[:first], *moved)
 
 
 def _handles(stage: Stage) -> bool:

@@ -7,6 +7,7 @@ import pytest
 import rrtik_ompl as rrtik
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.demos import Displacement, Randomness
+from rrtik_ompl.kernels import FastWorld
 from rrtik_ompl.tasks.randomness import Draws
 
 BENCH = """\
@@ -111,6 +112,19 @@ def test_draws_stay_in_their_ranges_and_apart_and_the_same_seed_draws_the_same(b
         assert all(again.poses[name].isApprox(pose, 0.0) for name, pose in poses.items())
         rejected += sum(drawn.rejected.values())
     assert rejected > 0
+
+
+@pytest.mark.kernels
+def test_draws_take_over_the_worlds_of_earlier_ones(bench, monkeypatch):
+    made = []
+    pack = FastWorld.__init__
+    monkeypatch.setattr(FastWorld, "__init__", lambda *args, **options: [made.append(1), pack(*args, **options)][-1])
+    draws = Draws(bench)
+    counts = []
+    for number in range(6):
+        assert draws.draw(np.random.default_rng(number)).task is not None
+        counts.append(len(made))
+    assert 0 < counts[1] == counts[-1]
 
 
 def test_a_draw_in_which_things_overlap_is_drawn_anew():
