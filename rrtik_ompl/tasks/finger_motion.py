@@ -203,8 +203,8 @@ def _not_far_apart(
     # The ball around one body is apart from the box around the other.
     gaps = []
     for one, other in (numbers.T, numbers.T[::-1]):
-        place = np.einsum("nji,nj->ni", turns[other], centres[one] - centres[other])
-        gaps.append(np.linalg.norm(np.maximum(np.abs(place) - arrays.halves[other], 0.0), axis=1) - radii[one])
+        inside = np.einsum("nji,nj->ni", turns[other], centres[one] - centres[other])
+        gaps.append(np.linalg.norm(np.maximum(np.abs(inside) - arrays.halves[other], 0.0), axis=1) - radii[one])
     required = np.maximum(arrays.kept_apart(numbers), CONTACT_GAP) + moved[numbers].sum(axis=1) + DISTANCE_TOLERANCE
     return [pair for pair, near in zip(pairs, np.max(gaps, axis=0) <= required, strict=True) if near]
 

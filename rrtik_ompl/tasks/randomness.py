@@ -19,8 +19,8 @@ from rrtik_ompl.base.errors import InputError, ProblemError, UnknownNameError, l
 from rrtik_ompl.geometry.collision.distances import measured
 from rrtik_ompl.model.goal_kind import COORDINATES, displacements
 from rrtik_ompl.tasks.setting import Setting
-from rrtik_ompl.tasks.stages import Attach, Detach, MoveTo, Stage, every_stage
-from rrtik_ompl.tasks.variations import Variation, moved_scene, moved_stages
+from rrtik_ompl.tasks.stages import Detach, MoveTo, Stage, every_stage
+from rrtik_ompl.tasks.variations import Variation, moved_scene, moved_stages, next_handled
 from rrtik_ompl.tasks.worlds import Left, Worlds, worlds_from
 from rrtik_ompl.world.problem import usable_configuration
 from rrtik_ompl.world.world import World
@@ -306,17 +306,13 @@ class Draws:
 
 def _with_goals_moved(stages: tuple[Stage, ...], world: World, motion: pin.SE3) -> tuple[Stage, ...]:
     """Return the stages of a task with the goals moved that lead to nothing that is taken or set down."""
-    last = max((k for k, stage in enumerate(stages) if any(map(_handles, every_stage([stage])))), default=-1)
+    last = max((k for k, stage in enumerate(stages) if next_handled([stage])), default=-1)
     first = next((k for k in range(last + 1, len(stages)) if isinstance(stages[k], MoveTo)), len(stages))
 
     # They are moved as they would be if something were set down behind them.
     behind = (*stages[first:], Detach("goals"))
     moved = moved_stages(behind, world, Variation(places={"goals": motion}))[:-1]
     return (*stages[:first], *moved)
-
-
-def _handles(stage: Stage) -> bool:
-    return isinstance(stage, Attach | Detach)
 
 
 def _on_top(move: pin.SE3, displacement: Displacement, moves: Mapping[str, pin.SE3]) -> pin.SE3:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
@@ -17,7 +17,7 @@ from rrtik_ompl.base.poses import PoseLike, rigid
 from rrtik_ompl.model.goal import Goal, GoalSet, PoseGoal, PositionGoal
 from rrtik_ompl.model.goal_kind import TaskRegion
 from rrtik_ompl.model.scene import Scene
-from rrtik_ompl.tasks.stages import Alternatives, Attach, Detach, MoveTo, Stage, Straight
+from rrtik_ompl.tasks.stages import Alternatives, Attach, Detach, MoveTo, Stage, Straight, every_stage
 from rrtik_ompl.world.world import World
 
 
@@ -88,7 +88,7 @@ def moved_stages(stages: tuple[Stage, ...], world: World, variation: Variation) 
     Raises:
         UnknownNameError: If no stage sets down an object that is to be set down elsewhere.
     """
-    set_down = {each.object for each in _flat(stages) if isinstance(each, Detach)}
+    set_down = {each.object for each in every_stage(stages) if isinstance(each, Detach)}
     for name in variation.places:
         if name not in set_down:
             raise UnknownNameError("object that is set down", name, sorted(set_down), where="places of a variation")
@@ -98,19 +98,9 @@ def moved_stages(stages: tuple[Stage, ...], world: World, variation: Variation) 
     return _Moved(changes, variation.places).row(stages, ())
 
 
-def _flat(stages: Iterable[Stage]) -> Iterator[Stage]:
-    """Yield all stages, those of alternatives too."""
-    for stage in stages:
-        if isinstance(stage, Alternatives):
-            for row in stage.options:
-                yield from _flat(row)
-        else:
-            yield stage
-
-
-def _next_handled(stages: Iterable[Stage]) -> Attach | Detach | None:
+def next_handled(stages: Iterable[Stage]) -> Attach | Detach | None:
     """Return the stage that takes or sets down something next."""
-    return next((each for each in _flat(stages) if isinstance(each, Attach | Detach)), None)
+    return next((each for each in every_stage(stages) if isinstance(each, Attach | Detach)), None)
 
 
 class _Moved:
@@ -142,7 +132,7 @@ class _Moved:
         if isinstance(stage, Detach):
             self._where[stage.object] = self._places.get(stage.object, pin.SE3.Identity())
         if isinstance(stage, MoveTo) or (isinstance(stage, Straight) and self._change is None):
-            self._change = self._change_of(_next_handled(rest))
+            self._change = self._change_of(next_handled(rest))
         return stage if self._change is None else _stage_moved(stage, self._change)
 
     def _change_of(self, following: Attach | Detach | None) -> pin.SE3:
