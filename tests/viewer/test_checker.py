@@ -1,5 +1,6 @@
 """The page's checker: what it accepts is free, by arithmetic of a plane; what is no proof it refuses."""
 
+import json
 import math
 import re
 from copy import deepcopy
@@ -77,6 +78,44 @@ def test_a_body_deep_in_a_box_is_no_slight_contact():
     assert not in_script(CHECK, [touching])[0]["holds"]
 
 
+def through_the_ball(**changes):
+    """Certificates of an arm that goes through the ball, whose file says that this does not matter."""
+    file = certificate(centre=(0.25, 0.0), ends=(0.0, 0.0))
+    file["bodies"][1] |= changes
+    return file
+
+
+def test_a_name_of_two_things_hides_nothing():
+    found = in_script(CHECK, [through_the_ball(), through_the_ball(name="arm"), through_the_ball(name="arm", number=1)])
+    assert "not shown apart" in found[0]["fault"]
+    assert all("is the name of another thing" in each["fault"] for each in found[1:])
+
+
+def test_links_are_in_no_contact():
+    file = through_the_ball(kind="link")
+    for body, other in zip(file["bodies"], ("ball", "arm"), strict=True):
+        body["contacts"] = [[other, -9.0]]
+    [found] = in_script(CHECK, [file])
+    assert found["fault"] == "contacts: 'arm' and 'ball' are links"
+
+
+def test_contacts_are_those_of_the_scene_even_if_the_robot_is_the_file_s():
+    # The ball is in contact with the table, and the file says that it is in contact with the arm too.
+    obstacles = [{"name": "ball", "pose": {"xyz": [0.25, 0, 0]}, "sphere": BALL}, {"name": "table", "sphere": 0.1}]
+    obstacles[1]["pose"] = {"xyz": [5, 0, 0]}
+    contacts = [{"pair": ["ball", "table"], "distance": -0.01}]
+    scene = {"version": 1, "scene": {"obstacles": obstacles, "contacts": contacts}}
+    file = through_the_ball(contacts=[["table", -0.01]])
+    table = {**file["bodies"][1], "name": "table", "contacts": [["ball", -0.01]]}
+    table["pose"] = [*STILL[:3], 5, *STILL[4:]]
+    file["bodies"].append(table)
+    file["bodies"][0]["contacts"] = [["ball", -9.0]]
+    [found] = in_script(
+        f"data.map((file) => checkCertificate(file, {{ scene: sceneOf({json.dumps(scene)}, '') }}))", [file]
+    )
+    assert "'arm' and 'ball', from 0 to 1 of it: not shown apart" in found["fault"]
+
+
 CHANGES = {
     "clearance": [0.5, -1, None, "0", True], "version": [1, 3, "2"], "kind": ["joint_path"],
     "waypoints": [[], [[0, 1], [0]], [[1e4], [0]]], "motions": [[], [[], []], [[[0, 0, 1, 0, 0]]]],
@@ -118,8 +157,6 @@ def test_the_command_writes_a_page_that_asks_nobody(tmp_path, capsys):
 @pytest.mark.slow
 @needs_chromium
 def test_the_page_says_what_the_checker_says(tmp_path):
-    import json
-
     with planning_page(checker_page(), Path(tmp_path), "globalThis.checkerPage !== undefined") as browser:
         for centre, expected in (
             ((1.2, 0.0), "holds: 1 motion"),

@@ -83,6 +83,8 @@ function checkForm(file) {
   demand(file.tracks === undefined || (Array.isArray(file.tracks) && file.tracks.length > 0 && file.tracks.length <= MOST.bodies), "tracks: expected a list, not too long");
   const tracks = file.tracks?.length ?? 0;
   demand(Array.isArray(file.bodies) && file.bodies.length <= MOST.bodies, "bodies: expected a list, not too long");
+  const carrierOf = new Map(); // of each name, what and on which joint it is
+  const numbered = new Set();
   file.bodies.forEach((body, k) => {
     const where = `bodies[${k}]`;
     checkKeys(body, BODY_FIELDS, ["cuts"], where);
@@ -95,7 +97,16 @@ function checkForm(file) {
     const cuts = body.cuts ?? [];
     demand(Array.isArray(cuts) && cuts.length <= MOST.cuts, `${where}: cuts`);
     cuts.forEach((cut, n) => demand(Array.isArray(cut) && cut.length === 3 && isCount(cut[0], 2 * n + 1) && isCount(cut[1], 3) && isNumber(cut[2]), `${where}: cut ${n}`));
+    const carrier = `${body.kind} ${body.joint}`;
+    demand((carrierOf.get(body.name) ?? carrier) === carrier, `${where}: '${body.name}' is the name of another thing too`);
+    carrierOf.set(body.name, carrier);
+    demand(!numbered.has(`${body.name} ${body.number}`), `${where}: '${body.name}' has two bodies of number ${body.number}`);
+    numbered.add(`${body.name} ${body.number}`);
   });
+  for (const { name, kind, contacts } of file.bodies) {
+    const links = kind === "link" ? contacts.filter(([other]) => carrierOf.get(other)?.startsWith("link")) : [];
+    demand(links.length === 0, `contacts: '${name}' and '${links[0]?.[0]}' are links`);
+  }
 
   demand(file.held === undefined || (isObject(file.held) && Object.values(file.held).every(isNumber)), "held: expected values of joints by name");
   demand(file.base === undefined || (areNumbers(file.base, 12) && isRigid(poseOf(file.base))), "base: expected a pose");
@@ -166,19 +177,20 @@ function readingOf(file, own) {
   const base = poseOf(file.base ?? poseNumbers(IDENTITY));
   if (robot !== null) checkStance(file, base, own);
   const arm = robot === null ? { joints: stated, carriers: statedCarriers(file, scene) } : armOf(robot, columnNames(file, robot), file.held ?? {}, base, stated);
-  const links = robot === null ? null : linkBodies(robot, arm, padding, scene);
+  const links = robot === null ? null : linkBodies(robot, arm, padding);
   const others = scene === null ? null : sceneBodies(scene, arm, padding, file.tracks !== undefined);
 
   // The file's bodies, one after the other: read, where a robot or a scene was given, else as the file states them.
   const next = new Map([[links, 0], [others, 0]]);
   const bodies = file.bodies.map((body) => {
+    // Contacts are the scene's, those of links too.
+    const contacts = scene === null ? body.contacts : contactsOf(scene, body.name);
     const list = body.kind === "link" ? links : others;
-    if (list === null) return { ...statedBody(body), read: false };
+    if (list === null) return { ...statedBody(body), contacts, read: false };
     const number = next.get(list);
     next.set(list, number + 1);
     demand(number < list.length, `it is for another ${ownerOf(body)}: '${body.name}' is in the certificate alone`);
-    // Without a scene nobody else tells what links are in contact with.
-    return { ...list[number], ...(scene === null ? { contacts: body.contacts } : {}), read: true };
+    return { ...list[number], contacts, read: true };
   });
   for (const [list, number] of next) {
     if (list !== null && number < list.length) refuse(`it is for another ${ownerOf(list[number])}: '${list[number].name}' is not in the certificate`);

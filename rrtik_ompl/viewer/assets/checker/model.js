@@ -11,14 +11,14 @@ const DIRECTIONS = [0, 1, 2].flatMap((axis) => [1, -1].map((sign) => [0, 1, 2].m
 const contactsOf = (scene, name) => scene.contacts.filter(({ pair }) => pair.includes(name)).map(({ pair, distance }) => [pair[0] === name ? pair[1] : pair[0], distance]);
 
 /** The bodies of a robot's links: each solid with its link's joint; numbered within the link. */
-function linkBodies(robot, arm, padding, scene) {
+function linkBodies(robot, arm, padding) {
   const thickness = (link) => (typeof padding === "number" ? padding : padding[link] ?? 0);
   return robot.solids.map((solid, k) => {
     const carrier = arm.carriers.get(solid.link);
     const number = robot.solids.slice(0, k).filter((other) => other.link === solid.link).length;
     const place = { joint: carrier.joint, pose: chained(carrier.pose, solid.placement) };
     const [own] = solidsOf(solid.shape, true);
-    return { name: solid.link, number, kind: "link", ...place, solid: own, shape: solid.shape, margin: 0, padding: thickness(solid.link), contacts: scene === null ? [] : contactsOf(scene, solid.link) };
+    return { name: solid.link, number, kind: "link", ...place, solid: own, shape: solid.shape, margin: 0, padding: thickness(solid.link) };
   });
 }
 
@@ -26,7 +26,7 @@ function linkBodies(robot, arm, padding, scene) {
 function sceneBodies(scene, arm, padding, tracked) {
   const moving = tracked ? scene.obstacles.filter((each) => each.motion !== null) : [];
   const placeOf = (each) => (moving.includes(each) ? { joint: arm.joints.length + moving.indexOf(each), pose: IDENTITY } : { joint: 0, pose: each.placement });
-  const bodiesOf = (each, rest) => solidsOf(each.shape, false).map((solid, number) => ({ name: each.name, number, solid, shape: each.shape, contacts: contactsOf(scene, each.name), ...rest }));
+  const bodiesOf = (each, rest) => solidsOf(each.shape, false).map((solid, number) => ({ name: each.name, number, solid, shape: each.shape, ...rest }));
   const obstacles = scene.obstacles.flatMap((each) => bodiesOf(each, { kind: "obstacle", ...placeOf(each), margin: each.margin, padding: 0 }));
   const attached = scene.attached.flatMap((each) => {
     const carrier = arm.carriers.get(each.link);
