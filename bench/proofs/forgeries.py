@@ -199,6 +199,19 @@ def short_normal(case: Case, rng: np.random.Generator) -> Forgery | None:
     )
 
 
+def other_plane_of_a_half_space(case: Case, rng: np.random.Generator) -> Forgery | None:
+    """A link and a half-space are shown apart by another plane than the half-space's, or by a distance."""
+    bodies = case.document["bodies"]
+    floors = [k for k, body in enumerate(bodies) if "half_space" in body["shape"]]
+    links = [k for k, body in enumerate(bodies) if body["kind"] == "link" and body["joint"] > 0]
+    if not floors or not links:
+        return None
+    i, j = _pick(rng, links), _pick(rng, floors)
+    document = deepcopy(case.document)
+    _pick(rng, document["motions"]).append(_pick(rng, ([i, 0, j, 0, 0, 0, 0.0, 0.0, 1.0], [i, j, 10, 1])))
+    return _given(case, document)
+
+
 def dropped_entry(case: Case, rng: np.random.Generator) -> Forgery | None:
     """An entry is missing."""
     place = _entry(case, rng)
@@ -638,7 +651,8 @@ FORGERS: dict[str, Forger] = {
     forger.__name__.replace("_", " "): forger
     for forger in (
         moved_waypoint, moved_path, reordered_waypoints, other_columns, colliding_path, outside_limits,
-        turned_plane, tilted_plane, short_normal, dropped_entry, dropped_pair, dropped_motion, other_interval,
+        turned_plane, tilted_plane, short_normal, other_plane_of_a_half_space,
+        dropped_entry, dropped_pair, dropped_motion, other_interval,
         other_part, no_such_part, swapped_bodies, other_count, other_cut,
         left_out_pair, raised_clearance, lowered_clearance, other_self_margin, other_margin,
         other_joint, other_body, moved_base, missing_body, moved_obstacle, other_obstacles, honest_model,

@@ -582,9 +582,12 @@ class Motions:
         nodes = np.stack([entries.first, entries.second], axis=1)
         parted = (self._by_hulls[entries.pair][:, None] & self._mesh[bodies] & (nodes > 0)).any(axis=1)
         by_measure = entries.first < 0
-        shown = np.flatnonzero(~by_measure & ~parted)
-        open_rows = np.flatnonzero(parted).tolist() + shown[self._not_apart(entries.of(shown), normals[shown])].tolist()
-        for k in np.flatnonzero(by_measure & ~parted).tolist():
+        # A half-space has its own plane; no other one and no distance counts.
+        refused = parted | (self._half_space[bodies[:, 1]] & (by_measure | normals.any(axis=1)))
+        shown = np.flatnonzero(~by_measure & ~refused)
+        open_rows = np.flatnonzero(refused).tolist()
+        open_rows += shown[self._not_apart(entries.of(shown), normals[shown])].tolist()
+        for k in np.flatnonzero(by_measure & ~refused).tolist():
             motion, pair, _, _, begin, width = (column[k].item() for column in entries)
             if not self._measured_apart(motion, pair, begin, width):
                 open_rows.append(k)
@@ -673,7 +676,8 @@ class Motions:
         """
         entries = self._entries(motions)
         normals = np.concatenate([motion.normals for motion in motions])
-        by_balls = np.flatnonzero(~normals.any(axis=1) & (entries.first >= 0))
+        over = self._half_space[self._bodies_of_pair[entries.pair, 1]]
+        by_balls = np.flatnonzero(~normals.any(axis=1) & (entries.first >= 0) & ~over)
         weak = by_balls[self._not_apart(entries.of(by_balls))]
         normals[weak] = self._ways(entries.of(weak))
         while len(bad := self._open_of(entries, normals)):
