@@ -21,6 +21,7 @@ LAST_ROW = frozen([0.0, 0.0, 0.0, 1.0])  # last row of every homogeneous matrix
 LAST_ROW_TOLERANCE = 1e-8
 NOT_RIGID = 1e-6  # largest entry of R R^T - 1 that counts as a rounding error, which is removed
 ROUNDING = 1e-12  # largest entry of R R^T - 1 with which a rotation is used unchanged
+ROTATION_NOISE = 1e-9  # [rad]: a smaller rotation between two poses of a solid that moves is rounding
 SAME_QUATERNION = 1e-6  # largest difference of a number of equal quaternions
 ORDER_DOUBT = (
     "quat_xyzw [1, 0, 0, 0] is read as x, y, z, w: half a turn about x. No rotation is [0, 0, 0, 1], or quat_wxyz "
@@ -153,6 +154,22 @@ def apart(first: pin.SE3, second: pin.SE3) -> tuple[float, float]:
     """Return the distance [m] and the rotation angle [rad] between two poses."""
     off = first.actInv(second)
     return float(np.linalg.norm(off.translation)), float(np.linalg.norm(pin.log3(off.rotation)))
+
+
+def travel_bound(a: pin.SE3, b: pin.SE3, radius: float) -> float:
+    """Return an upper bound on the way of any point of a solid from one pose to another [m].
+
+    The bound is the way of the origin plus the arc of the farthest point.
+
+    Args:
+        a: First pose.
+        b: Second pose.
+        radius: Distance of the farthest point from the origin [m]; inf for an unbounded shape, and then the bound is
+            inf if the solid turns.
+    """
+    angle = float(np.linalg.norm(pin.log3(a.rotation.T @ b.rotation)))
+    arc = radius * angle if angle > ROTATION_NOISE else 0.0
+    return float(np.linalg.norm(b.translation - a.translation)) + arc
 
 
 def working_memory(model: pin.Model) -> pin.Data:

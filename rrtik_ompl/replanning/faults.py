@@ -7,15 +7,16 @@ The rule behind the answers: what a scene adds counts at once, and what it takes
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
-from typing import Any, Literal, TypeAlias
+from dataclasses import dataclass, replace
+from typing import Literal, TypeAlias
 
 import numpy as np
-import pinocchio as pin
 
 from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.poses import travel_bound
 from rrtik_ompl.model.scene import Obstacle, Scene
 from rrtik_ompl.model.shapes import HalfSpace, Shape, same_shape
+from rrtik_ompl.model.shapes.shape import same_but_for_points
 
 FaultKind: TypeAlias = Literal[
     "appears", "appears on the arm", "vanishes", "stays away", "changes size", "changes shape", "changes name",
@@ -36,7 +37,6 @@ ANSWERS: Mapping[FaultKind, str] = {
 UNFORESEEN: tuple[FaultKind, ...] = ("appears", "appears on the arm", "changes size", "changes shape")
 MOST_DROPPED = 1000  # scenes in a row; a feed that goes on like that stands still
 PLACE_NOISE = 1e-6  # [m]: what is nearer to its last place than that has not moved
-TURN_NOISE = 1e-9  # [rad]
 BEFORE = " (before)"  # is added to the name of an obstacle whose shape has changed, for its old shape
 
 
@@ -191,7 +191,7 @@ class SceneMemory:
         name = obstacle.name
         shape = obstacle.shape
 
-        if (shape.sensed and type(shape) is type(before.reported)) or same_shape(shape, before.reported):
+        if same_but_for_points(shape, before.reported):
             counts = before.obstacle.shape
             is_old = shape.sensed or same_shape(shape, counts) or now.time - before.since >= self._patience
             believed = obstacle if is_old else replace(obstacle, shape=counts)
@@ -211,7 +211,8 @@ class SceneMemory:
         for name, sighting in missing.items():
             reach = self._speed_bound * (time - sighting.time) + PLACE_NOISE
             there = sighting.obstacle
-            if same_shape(obstacle.shape, there.shape) and _way(there.pose, obstacle.pose, obstacle.shape) <= reach:
+            way = travel_bound(there.pose, obstacle.pose, obstacle.shape.bounding_radius)
+            if same_shape(obstacle.shape, there.shape) and way <= reach:
                 return name
         return None
 
@@ -227,20 +228,12 @@ def shape_around(first: Shape, second: Shape) -> Shape | None:
     if isinstance(first, HalfSpace) and isinstance(second, HalfSpace):
         alike = np.array_equal(first.normal, second.normal)
         return max(second, first, key=lambda each: each.offset) if alike else None
-    names = [each.name for each in fields(first)]  # type: ignore[arg-type]  # every shape is a dataclass
-    if set(names) != {each.name for each in kind.measures if each.kind in ("length", "three lengths")}:
+    lengths = [each.name for each in kind.measures if each.kind in ("length", "three lengths")]
+    if not lengths or len(lengths) < len(kind.measures):
         return None
 
-    larger: list[Any] = [np.maximum(getattr(first, name), getattr(second, name)) for name in names]
-    around = kind(*(each if each.ndim else float(each) for each in larger))
+    around = kind(*(np.maximum(getattr(first, name), getattr(second, name)) for name in lengths))
     return second if same_shape(around, second) else around
-
-
-def _way(a: pin.SE3, b: pin.SE3, shape: Shape) -> float:
-    """Return an upper bound on how far any point of a shape is from one pose to another [m]."""
-    angle = float(np.linalg.norm(pin.log3(a.rotation.T @ b.rotation)))
-    turn = shape.bounding_radius * angle if angle > TURN_NOISE else 0.0
-    return float(np.linalg.norm(b.translation - a.translation)) + turn
 
 
 def _scene_of(sightings: Mapping[str, _Sighting], given: Scene) -> Scene:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Vector
 from rrtik_ompl.base.copies import as_value
-from rrtik_ompl.base.poses import pose_from_xyzw
+from rrtik_ompl.base.poses import pose_from_xyzw, travel_bound
 from rrtik_ompl.geometry.collision.bodies import Body, contact_distance, keeps_clearance, kept_apart
 from rrtik_ompl.geometry.collision.cloud_solid import Ends
 from rrtik_ompl.geometry.collision.distances import gap_beyond, is_ours, own_nearest
@@ -29,7 +29,6 @@ from rrtik_ompl.model.shapes import same_shape
 from rrtik_ompl.model.world_settings import WorldSettings
 from rrtik_ompl.replanning.feed import Feed, Snapshot
 from rrtik_ompl.replanning.tick import Tick
-from rrtik_ompl.replanning.travels import travel_bound
 from rrtik_ompl.world.arrangement import arrangement_of
 from rrtik_ompl.world.problem import Problem
 

@@ -16,7 +16,7 @@ from rrtik_ompl.base.choices import RunOutcome, TickEvent
 from rrtik_ompl.base.poses import pose_row
 from rrtik_ompl.model.goal import JOINT_TOLERANCE
 from rrtik_ompl.model.scene import Scene, pairs_that_may_touch
-from rrtik_ompl.model.shapes import Shape, same_shape
+from rrtik_ompl.model.shapes.shape import same_but_for_points
 from rrtik_ompl.replanning.evading import evasion
 from rrtik_ompl.replanning.faults import UNFORESEEN, Fault, FaultKind, FeedWarning, SceneMemory
 from rrtik_ompl.replanning.feed import SILENCE_SECONDS, Snapshot, Watch
@@ -605,13 +605,9 @@ def _same_solids(first: Scene, second: Scene) -> bool:
     others = {o.name: o.shape for o in second.obstacles}
     return (
         shapes.keys() == others.keys()
-        and all(_serves(shapes[name], others[name]) for name in shapes)
+        and all(same_but_for_points(shapes[name], others[name]) for name in shapes)
         and pairs_that_may_touch(first) == pairs_that_may_touch(second)
     )
-
-
-def _serves(shape: Shape, other: Shape) -> bool:
-    return (shape.sensed and type(shape) is type(other)) or same_shape(shape, other)
 
 
 def one_step(path: Matrix, step: float, max_change: Vector) -> tuple[Vector, int]:

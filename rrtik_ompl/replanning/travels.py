@@ -15,6 +15,7 @@ import pinocchio as pin
 
 from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.poses import ROTATION_NOISE, travel_bound
 from rrtik_ompl.geometry.collision.shape_table import farthest
 from rrtik_ompl.model.scene import ConstantVelocity, Obstacle, Scene, TimedPoses
 from rrtik_ompl.model.shapes import same_shape
@@ -22,7 +23,6 @@ from rrtik_ompl.replanning.feed import TIME_RESOLUTION, Snapshot
 
 SPEED_WARNING_RATIO = 1.0 + 1e-6  # ratio of a speed to the bound above which a warning is given
 ROUNDING = 1e-9  # [m]: rounding of places that are computed from times
-ROTATION_NOISE = 1e-9  # [rad]: a smaller rotation between two snapshots is rounding
 
 
 class SpeedWarning(UserWarning):
@@ -193,22 +193,6 @@ def stated_way(obstacle: Obstacle, seconds: float) -> float:
     poses = [motion.pose_at(obstacle.pose, time) for time in times]
     radius = farthest(obstacle.shape, pin.SE3.Identity())
     return sum(travel_bound(a, b, radius) for a, b in pairwise(poses)) + ROUNDING
-
-
-def travel_bound(a: pin.SE3, b: pin.SE3, radius: float) -> float:
-    """Return an upper bound on the way of any point of an obstacle from one pose to another [m].
-
-    The bound is the way of the origin plus the arc of the farthest point.
-
-    Args:
-        a: First pose.
-        b: Second pose.
-        radius: Distance of the farthest point from the origin [m]; inf for an unbounded shape, and then the bound is
-            inf if the obstacle turns.
-    """
-    angle = float(np.linalg.norm(pin.log3(a.rotation.T @ b.rotation)))
-    arc = radius * angle if angle > ROTATION_NOISE else 0.0
-    return float(np.linalg.norm(b.translation - a.translation)) + arc
 
 
 class Travels:

@@ -24,6 +24,7 @@ from rrtik_ompl.kernels.search.motions.motion_table import FastMotions, motions_
 from rrtik_ompl.model.robot import Robot, inside_limits
 from rrtik_ompl.model.scene import AttachedObject, Obstacle, Scene, pairs_that_may_touch
 from rrtik_ompl.model.shapes import PointCloud, same_shape
+from rrtik_ompl.model.shapes.shape import same_but_for_points
 from rrtik_ompl.world.arm_cache import arm_cache
 from rrtik_ompl.world.proof import Prover
 from rrtik_ompl.world.world import World
@@ -281,9 +282,7 @@ def _check_obstacles(scene: Scene, known: Mapping[str, Obstacle]) -> None:
     if {o.name for o in scene.obstacles} != known.keys():
         raise InputError(f"scene: expected the obstacles {', '.join(sorted(known))}, got {scene}")
     for obstacle in scene.obstacles:
-        known_shape = known[obstacle.name].shape
-        both_clouds = known_shape.sensed and type(known_shape) is type(obstacle.shape)
-        if not both_clouds and not same_shape(obstacle.shape, known_shape):
+        if not same_but_for_points(obstacle.shape, known[obstacle.name].shape):
             raise InputError(f"scene: '{obstacle.name}' has another shape than before; make a new world")
 
 

@@ -91,3 +91,8 @@ def same_shape(first: Shape, second: Shape) -> bool:
         type(first) is type(second)
         and all(np.array_equal(getattr(first, f.name), getattr(second, f.name)) for f in fields(first))  # type: ignore[arg-type]
     )
+
+
+def same_but_for_points(first: Shape, second: Shape) -> bool:
+    """Check whether two shapes are the same, or measured by a sensor in the same way, where their points may differ."""
+    return (first.sensed and type(first) is type(second)) or same_shape(first, second)

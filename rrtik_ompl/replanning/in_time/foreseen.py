@@ -16,11 +16,12 @@ import pinocchio as pin
 
 from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.base.budget import Stop
+from rrtik_ompl.base.poses import travel_bound
 from rrtik_ompl.geometry.collision.bodies import Body, kept_apart
 from rrtik_ompl.geometry.collision.certificate import distance
 from rrtik_ompl.geometry.collision.shape_table import farthest
 from rrtik_ompl.model.scene import ConstantVelocity, Obstacle, Scene, TimedPoses, pose_at
-from rrtik_ompl.replanning.travels import travel_bound, turns_without_end
+from rrtik_ompl.replanning.travels import turns_without_end
 from rrtik_ompl.world.moving_world import MovingWorld
 from rrtik_ompl.world.world import World
 
