@@ -153,7 +153,8 @@ class FastWorld:
         if other._kernels is not None:
             outer, inner = other._primitives
             if outer.clouds or inner.clouds:  # of a cloud, a point is put among the solids
-                other._solids = with_own_arrays(other._solids, "sizes", "corners")
+                solids = other._solids
+                other._solids = with_own_arrays(solids, sizes=solids.sizes, corners=solids.corners)
             other._take_memory()
 
         return other

@@ -23,7 +23,7 @@ from rrtik_ompl.kernels.proof.placed import PlacedBodies, bodies_in_place
 from rrtik_ompl.kernels.simd.processor import WIDTH
 from rrtik_ompl.kernels.tables.cloud_layout import CloudTable
 from rrtik_ompl.kernels.tables.cloud_tables import cloud_table
-from rrtik_ompl.kernels.tables.memory import packed, with_own
+from rrtik_ompl.kernels.tables.memory import packed, with_own_arrays
 from rrtik_ompl.kernels.tables.neighbour_tables import Cells, neighbour_table
 from rrtik_ompl.kernels.tables.solid_tables import Solids
 from rrtik_ompl.model.robot import Chain
@@ -89,8 +89,9 @@ class ProofPairs:
         own = {name: np.zeros_like(getattr(self.table, name)) for name in COMPUTED}
         if self.clouds:  # points that are compared stand among the solids
             own |= {name: getattr(self.table, name) for name in ("solids", "corners")}
-        memory = with_own(self.table.memory, {ProofTable.places[name]: array for name, array in own.items()})
-        return replace(self, table=ProofTable(memory), kept=(float("nan"), ROOM))
+        table = with_own_arrays(self.table, **own)
+        table.log_room = 0  # which the thread of this one may just have given to a log of its own
+        return replace(self, table=table, kept=(float("nan"), ROOM))
 
     def with_contacts(self, bodies: Sequence[Body]) -> ProofPairs:
         """The same pairs of bodies that are in contact, in the memory of this object.

@@ -127,19 +127,14 @@ def sizes_of(kind: type[Record], **fields: float) -> TablePlan:
     return TablePlan({kind.places[name]: int(fields[name]) for name in arrays}, numbers)
 
 
-def with_own(shared: Table, own: Mapping[int, NDArray[Any]]) -> Table:
-    """A table of the same fields whose arrays are shared but for some, which are copied: for another thread."""
-    placed = {place: _placed(array) for place, array in own.items()}
-    header = aligned(shared.header)
+def with_own_arrays(shared: R, **own: NDArray[Any]) -> R:
+    """A table of the same fields for another thread: its arrays and tables are shared, but for copies of ``own``."""
+    placed = {shared.places[name]: _placed(array) for name, array in own.items()}
+    header = aligned(shared.memory.header)
     for place, (_, address) in placed.items():
         header[place] = address
-    return Table(header, shared.arrays | {place: array for place, (array, _) in placed.items()})
 
-
-def with_own_arrays(shared: R, *names: str) -> R:
-    """The same for a table that is declared: ``names`` are the arrays to copy."""
-    places = [shared.places[name] for name in names]
-    made = type(shared)(with_own(shared.memory, {place: shared.memory[place] for place in places}))
+    made = type(shared)(Table(header, shared.memory.arrays | {place: array for place, (array, _) in placed.items()}))
     made.tables |= shared.tables
     return made
 

@@ -1,5 +1,7 @@
 """Neighbours of an arm: what a table of cells says of two links is what coal says of them at each configuration."""
 
+import gc
+import weakref
 from dataclasses import replace
 
 import numpy as np
@@ -140,6 +142,19 @@ def test_cells_count_only_where_links_keep_no_more_than_they_prove(margin):
     free = world.valid_batch(rows)
     for k in np.flatnonzero(world.motions_proven(rows, rows)):
         assert free[k]
+
+
+def test_a_copy_for_another_thread_keeps_the_cells_that_it_reads_and_takes_over_no_log():
+    world, _ = tables("ur5")
+    packed = world.prover._packed_for(0.0, 0.0)
+    packed.table.log_room = 8
+    cells = weakref.ref(packed.table.neighbours)
+    own = packed.for_thread()
+    assert packed.table.neighbours.count > 0
+    del world, packed
+    gc.collect()
+    assert own.table.neighbours is cells() is not None
+    assert own.table.log_room == 0
 
 
 LINK = """<link name="l{0}"><collision><origin xyz="0.1 0 0"/><geometry><box size="0.16 0.02 0.02"/></geometry>
