@@ -54,7 +54,6 @@ from rrtik_ompl.kernels.tables.memory import packed, whole_records
 from rrtik_ompl.model.robot import Chain
 
 Spheres: TypeAlias = NDArray[np.float64]  # shape (n, 4): centre and radius [m]
-_known_balls: dict[bytes, NDArray[np.float64]] = {}  # see enclosing_balls
 
 CLUSTER_SIZE = 8  # balls in the smallest neighbourhood, at most
 KEPT_SETS = 4096  # sets of balls whose neighbourhoods and enclosing balls are kept
@@ -303,6 +302,9 @@ def _halved(spheres: Spheres) -> list[Spheres]:
     return _halved(spheres[order[:middle]]) + _halved(spheres[order[middle:]])
 
 
+_known_balls: dict[bytes, NDArray[np.float64]] = {}
+
+
 def enclosing_balls(sets: Sequence[Spheres]) -> Spheres:
     """A small ball around each of several sets of balls, shape (sets, 4): steps towards the farthest one [43].
 
@@ -310,8 +312,8 @@ def enclosing_balls(sets: Sequence[Spheres]) -> Spheres:
     found before is kept, as :func:`neighbourhoods` does.
     """
     keys = [spheres.tobytes() for spheres in sets]
-    new = {key: spheres for key, spheres in zip(keys, sets, strict=True) if key not in _known_balls}
-    found = {key: _known_balls[key] for key in keys if key not in new}
+    found = {key: ball for key in keys if (ball := _known_balls.get(key)) is not None}  # others may forget meanwhile
+    new = {key: spheres for key, spheres in zip(keys, sets, strict=True) if key not in found}
     found[b""] = np.zeros(BALL_FLOATS)
     found |= {key: spheres[0] for key, spheres in new.items() if len(spheres) == 1}
 
