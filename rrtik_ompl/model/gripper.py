@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.base.arrays import Matrix, Vector, finite_array, finite_number, not_negative
+from rrtik_ompl.base.copies import set_fields
 from rrtik_ompl.base.errors import InputError, UnknownNameError, listed, require
 from rrtik_ompl.base.units import joint_units
 
@@ -50,7 +51,7 @@ class GripperJoints:
     velocity: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "name", self.name or self.joints[0])
+        set_fields(self, name=self.name or self.joints[0])
 
     @property
     def units(self) -> tuple[str, ...]:
@@ -170,8 +171,7 @@ class GripperEvent:
         for key in ("width", "effort"):
             given = getattr(self, key)
             values[key] = None if given is None else not_negative(given, f"{key} of a {what}")
-        for key, value in values.items():
-            object.__setattr__(self, key, value)
+        set_fields(self, **values)
 
 
 Events: TypeAlias = tuple[GripperEvent, ...]
@@ -229,7 +229,8 @@ def states_at(events: Events, times: ArrayLike) -> tuple[Matrix, Matrix]:
         begins.append(_followed(event, begins[-1], np.array([following.time]))[0][0])
 
     given = _given(events, clock)
-    positions, velocities = np.empty((2, len(clock), len(begins[0])))
+    positions = np.empty((len(clock), len(begins[0])))
+    velocities = np.empty_like(positions)
     for k, event in enumerate(events):
         held = given == k
         positions[held], velocities[held] = _followed(event, begins[k], clock[held])

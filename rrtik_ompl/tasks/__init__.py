@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from rrtik_ompl.base.arrays import Vector, finite_array, frozen, not_negative, positive, seed_of
 from rrtik_ompl.base.budget import Budget
-from rrtik_ompl.base.copies import in_one_line
+from rrtik_ompl.base.copies import in_one_line, set_fields
 from rrtik_ompl.base.errors import InputError, ProblemError, listed, require
 from rrtik_ompl.files.kinds import read, write
 from rrtik_ompl.geometry.collision.distances import measured
@@ -343,16 +343,15 @@ class Task:
         require(world, World | None, "world of a task", "use World(robot, scene)")
         require(random, Randomness | None, "what is random in a task")
         placed = start if start is None or isinstance(start, str) else frozen(finite_array(start, (None,), "start"))
-        values = {
-            "stages": checked_stages(stages, "task"),
-            "constraints": checked_regions(constraints, "a task"),
-            "name": name,
-            "random": random,
-            "_world": world,
-            "_start": placed,
-        }
-        for attribute, value in values.items():
-            object.__setattr__(self, attribute, value)
+        set_fields(
+            self,
+            stages=checked_stages(stages, "task"),
+            constraints=checked_regions(constraints, "a task"),
+            name=name,
+            random=random,
+            _world=world,
+            _start=placed,
+        )
 
     @property
     def world(self) -> World:
