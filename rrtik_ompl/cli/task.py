@@ -186,14 +186,14 @@ def plan_lines(name: str, plan: TaskPlan, wrong: frozenset[int] = frozenset()) -
 def _timed(plan: TaskPlan, file: Path, share: float, pause: float) -> tuple[float, Path | None]:
     """Time a task and save its trajectory; return its duration [s], and the file of commands to the gripper, if any."""
     from rrtik_ompl import RateLimits
-    from rrtik_ompl.motion.trajectory.text import ROS_JSON
+    from rrtik_ompl.motion.trajectory.text import ROS_JSON, written_ending
 
     with progress("timing"):
         timed = plan.time_parameterize(RateLimits.of(plan.worlds[0].robot, share=share), pause=pause)
 
     commands = None
-    for ending in (ROS_JSON, ".yaml") if timed.trajectory.gripper else ():
-        if file.name.lower().endswith(ending):
-            commands = file.with_name(f"{file.name[: -len(ending)]}.gripper.{ending.rpartition('.')[2]}")
+    ending = written_ending(file)
+    if timed.trajectory.gripper and ending in (ROS_JSON, ".yaml"):
+        commands = file.with_name(f"{file.name[: -len(ending)]}.gripper{file.suffix.lower()}")
     timed.trajectory.save(file, gripper=commands)
     return timed.trajectory.duration, commands
