@@ -77,7 +77,8 @@ def _jump(one: Part, other: Part) -> str:
     same_arm = one.world.robot.joint_names == other.world.robot.joint_names
     if not same_arm or np.abs(one.rows[-1] - other.rows[0]).max() > SAME:
         return "the arm jumps"
-    before, after = _places(one.world, one.rows[-1]), _places(other.world, other.rows[0])
+    before = _places(one.world, one.rows[-1])
+    after = _places(other.world, other.rows[0])
     if before.keys() != after.keys():
         return f"'{sorted(before.keys() ^ after.keys())[0][0]}' comes or goes"
     for key, place in before.items():

@@ -114,7 +114,8 @@ class _Schedule:
         rest = self._least_rest
         gripper = before.robot.gripper
         if gripper is not None:
-            held, wanted = (_held(gripper, world.robot) for world in (before, after))
+            held = _held(gripper, before.robot)
+            wanted = _held(gripper, after.robot)
             seconds = gripper.seconds(held, wanted) or rest
             if held != wanted:
                 rest = max(rest, seconds)
@@ -151,7 +152,8 @@ class _Schedule:
             add(now + part.times[:-1], part, slice(-1))
             now += part.duration
 
-        first, end = self.parts[0], self.parts[-1]
+        first = self.parts[0]
+        end = self.parts[-1]
         rest = self.rests[-1]
         if rest > 0.0:
             add(np.array([now]), end, slice(-1, None), still=True)

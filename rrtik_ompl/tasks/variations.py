@@ -123,10 +123,12 @@ class _Moved:
     def _moved(self, stage: Stage, rest: tuple[Stage, ...]) -> Stage:
         """Return a stage moved; ``rest`` begins with it."""
         if isinstance(stage, Alternatives):
-            before = dict(self._where), self._change
+            where = self._where
+            change = self._change
             rows = []
             for option in stage.options:
-                self._where, self._change = dict(before[0]), before[1]
+                self._where = dict(where)
+                self._change = change
                 rows.append(self.row(option, rest[1:]))
             return Alternatives(rows)
         if isinstance(stage, Detach):

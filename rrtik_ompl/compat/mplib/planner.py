@@ -194,7 +194,8 @@ class Planner:
         self.planning_world = PlanningWorld(self)
         for thing in objects:
             self.planning_world.add_object(thing)
-        names, things = list(normal_object_names), list(normal_objects)
+        names = list(normal_object_names)
+        things = list(normal_objects)
         if len(names) != len(things):
             raise InputError(f"normal_objects: {len(things)} objects, but {len(names)} normal_object_names; name each")
         for name, thing in zip(names, things, strict=True):

@@ -39,7 +39,9 @@ def test_a_slower_motion_has_its_commands_later():
 
 @pytest.mark.parametrize("ending", ["json", "csv", "yaml", "ros.json"])
 def test_files_give_the_commands_back(tmp_path, ending):
-    motion, file, beside = moving(), tmp_path / f"motion.{ending}", None
+    motion = moving()
+    file = tmp_path / f"motion.{ending}"
+    beside = None
     if ending in ("yaml", "ros.json"):
         beside = tmp_path / f"gripper.{ending.rpartition('.')[2]}"
     motion.save(file, gripper=beside)
