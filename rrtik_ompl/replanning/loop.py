@@ -502,8 +502,12 @@ class Loop:
         for share in PROOF_SHARES:
             later = (1.0 - share) * settings.tick * (settings.speed_bound or 0.0)  # what obstacles do after it [m]
             growths = {name: max(travel - later, 0.0) for name, travel in travels.items()}
-            reach = {"step": share * settings.step, "max_change": share * self._max_change}
-            lost = lost or unavoidable(world, self.q, growths, share * settings.tick, **reach)  # type: ignore[arg-type]
+            lost = unavoidable(
+                world, self.q, growths, share * settings.tick, step=share * settings.step,
+                max_change=share * self._max_change,
+            )  # fmt: skip
+            if lost is not None:
+                break
         if lost is not None and not self._has_warned:
             self._has_warned = True
             warnings.warn(ContactWarning(f"at {now:.3g} s {lost.sentence}"), stacklevel=6)

@@ -15,6 +15,8 @@ import numpy as np
 
 from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.base.copies import as_value
+from rrtik_ompl.geometry.collision.distances import measured
+from rrtik_ompl.model.judgement import Contact
 from rrtik_ompl.world.world import World
 
 MOST_BOXES = 4096  # after which a proof is given up, for an arm of few joints
@@ -97,16 +99,26 @@ def unavoidable(
 
 
 def _base_touched(world: World, q: Vector, growths: Mapping[str, float]) -> tuple[tuple[str, str], float] | None:
-    """Return a link that never moves and an obstacle that can touch it, with their distance [m]; None without any."""
+    """Return a link that never moves and an obstacle that can touch it, with their distance [m]; None without any.
+
+    Coal measures these few pairs: to pack a new scene for kernels would take far longer.
+    """
     bodies = world.bodies
-    at_rest = [[bodies[k].name for k in pair] for pair in world.pairs if all(bodies[k].joint == 0 for k in pair)]
-    pairs = list({(a, b) if b in growths else (b, a): None for a, b in at_rest})
-    if not pairs:
+    pairs_at_rest = [pair for pair in world.pairs if all(bodies[k].joint == 0 for k in pair)]
+    frames = world.robot.chain.joint_frames(q[None])[0]
+
+    def beside(contact: Contact) -> float:
+        return contact.distance - growths[_link_first(contact.first, contact.second, growths)[1]]
+
+    nearest = min(measured(bodies, pairs_at_rest, frames, near_only=False), key=beside, default=None)
+    if nearest is None or beside(nearest) >= -ROUNDING:
         return None
-    measured = world.distances(q, pairs)
-    beside = measured.values - [growths[name] for _, name in pairs]
-    nearest = int(beside.argmin())
-    return (pairs[nearest], float(measured.values[nearest])) if beside[nearest] < -ROUNDING else None
+    return _link_first(nearest.first, nearest.second, growths), nearest.distance
+
+
+def _link_first(first: str, second: str, growths: Mapping[str, float]) -> tuple[str, str]:
+    """Return the names of a pair, that of the obstacle last."""
+    return (first, second) if second in growths else (second, first)
 
 
 def _nearest(world: World, rows: Matrix, growths: Mapping[str, float]) -> tuple[list[tuple[str, str]], Vector, Vector]:
@@ -115,12 +127,12 @@ def _nearest(world: World, rows: Matrix, growths: Mapping[str, float]) -> tuple[
     Returns:
         The pairs, their distances, and their distances less the growth [m], shape (m,).
     """
-    measured = world.distances(rows)
-    pairs = [pair if pair[1] in growths else pair[::-1] for pair in measured.names]
-    beside = measured.values - [growths.get(obstacle, -np.inf) for _, obstacle in pairs]
+    found = world.distances(rows)
+    pairs = [_link_first(*pair, growths) for pair in found.names]
+    beside = found.values - [growths.get(obstacle, -np.inf) for _, obstacle in pairs]
     nearest = np.argmin(beside, axis=1)
     at = np.arange(len(rows)), nearest
-    return [pairs[k] for k in nearest.tolist()], measured.values[at], beside[at]
+    return [pairs[k] for k in nearest.tolist()], found.values[at], beside[at]
 
 
 def _halves(lower: Matrix, upper: Matrix, weights: Vector) -> tuple[Matrix, Matrix]:
