@@ -9,7 +9,7 @@ import json
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field, fields
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,6 +43,7 @@ WHOLE = 6
 # An entry of two whole bodies whose distance is measured has four integers: body, body, level, number.
 MEASURED = 4
 LONGEST = 2.0  # largest size of a number of a normal
+Made = TypeVar("Made")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -230,8 +231,7 @@ class Certificate:
         Raises:
             InputError: If the file has another ending or cannot be written.
         """
-        known_ending(file, (".json",), "certificate")
-        write_text(file, json.dumps(self.document(), separators=(",", ":")) + "\n")
+        _write(self.document(), file)
 
     @staticmethod
     def load(file: str | os.PathLike[str]) -> Certificate:
@@ -277,8 +277,7 @@ class TaskCertificate:
         Raises:
             InputError: If the file has another ending or cannot be written.
         """
-        known_ending(file, (".json",), "certificate")
-        write_text(file, json.dumps(self.document(), separators=(",", ":")) + "\n")
+        _write(self.document(), file)
 
     @staticmethod
     def load(file: str | os.PathLike[str]) -> TaskCertificate:
@@ -296,12 +295,7 @@ def read_task_certificate(file: str | os.PathLike[str]) -> TaskCertificate:
     Raises:
         InputError: If the file is missing, too large, or no such certificate; the message names file and field.
     """
-    known_ending(file, (".json",), "certificate")
-    text = read_text(file)
-    try:
-        return task_from_document(json_value(text))
-    except InputError as error:
-        raise in_file(file, error) from None
+    return _read(file, task_from_document)
 
 
 def task_from_document(document: object) -> TaskCertificate:
@@ -331,17 +325,27 @@ def read_certificate(file: str | os.PathLike[str]) -> Certificate:
     Raises:
         InputError: If the file is missing, too large, or no certificate; the message names the file and the field.
     """
+    return _read(file, lambda document: from_document(_inside(document)))
+
+
+def _write(document: dict[str, Any], file: str | os.PathLike[str]) -> None:
+    """Write plain data as the file of a certificate."""
+    known_ending(file, (".json",), "certificate")
+    write_text(file, json.dumps(document, separators=(",", ":")) + "\n")
+
+
+def _read(file: str | os.PathLike[str], parse: Callable[[object], Made]) -> Made:
+    """Return what ``parse`` makes of the JSON in the file of a certificate, whose name then is in messages."""
     known_ending(file, (".json",), "certificate")
     text = read_text(file)
     try:
-        return from_document(_inside(text))
+        return parse(json_value(text))
     except InputError as error:
         raise in_file(file, error) from None
 
 
-def _inside(text: str) -> dict[str, Any]:
-    """Return the JSON object of a certificate from its own file, or from the file of a path that contains one."""
-    document = json_value(text)
+def _inside(document: object) -> dict[str, Any]:
+    """Return the JSON object of a certificate from that of its own file, or of a path's that contains one."""
     if isinstance(document, dict) and document.get("kind", KIND) != KIND and IN_PATHS in document:
         document = checked_object(document, "joint_path", IN_PATHS)[IN_PATHS]
     if not isinstance(document, dict) or "motions" not in document:
