@@ -143,6 +143,39 @@ def test_a_timed_motion_bends_and_may_swing_beyond_its_ends():
     assert [each["holds"] for each in in_script(CHECK, [free, there, jumps, straight])] == [True, False, False, True]
 
 
+def task(*parts):
+    return {"kind": "task_certificate", "version": 2, "parts": list(parts)}
+
+
+ARM = f"""<robot name="one"><link name="base"/>
+<link name="arm"><collision><origin xyz="{LENGTH / 2} 0 0" rpy="0 {math.pi / 2!r} 0"/>
+<geometry><capsule radius="{RADIUS}" length="{LENGTH}"/></geometry></collision></link>
+<joint name="turn" type="continuous"><parent link="base"/><child link="arm"/><axis xyz="0 0 1"/></joint></robot>"""
+
+
+@pytest.mark.parametrize("padding", [0.0, 0.01])
+def test_links_are_as_thick_as_the_plan_of_a_task_says(padding):
+    file = certificate()
+    scene = {"obstacles": [{"name": "ball", "pose": {"xyz": [2, 0, 0]}, "sphere": BALL}]}
+    motion = {"robot": {"padding": {"arm": padding}}, "scene": scene, "waypoints": file["waypoints"]}
+    own = "{ scene: null, waypoints: null, robot: readUrdf(data[1], ''), parts: partsOfPlan(data[2], '') }"
+    found = in_script(f"checkAnyCertificate(data[0], {own})", [task(file), ARM, {"motions": [motion]}])
+    other = f"part 1: it is for another robot: 'arm' has a padding of 0 m there, {padding} m here"
+    assert found["fault"] == (other if padding else "")
+
+
+def test_what_moves_in_a_task_is_where_the_part_before_has_left_it():
+    passing = certificate() | {"times": [0, 1], "rates": [[[0.5]]], "tracks": [[STILL, [*STILL[:11], 0.5]]]}
+    passing["bodies"][1]["joint"] = 2
+    back = deepcopy(passing) | {"waypoints": [[0.5], [0.0]], "rates": [[[-0.5]]]}
+    there = [back["tracks"][0][1], STILL]
+    found = in_script(
+        "data.map((file) => checkAnyCertificate(file, { scene: null, waypoints: null }).fault)",
+        [task(passing, back | {"tracks": [there]}), task(passing, back)],
+    )
+    assert found == ["", "from part 1 to the next: a thing jumps: ball 0"]
+
+
 def test_the_command_writes_a_page_that_asks_nobody(tmp_path, capsys):
     code, said, _ = rrtik(capsys, "checker", tmp_path / "page.html")
     text = (tmp_path / "page.html").read_text(encoding="utf-8")
@@ -158,11 +191,12 @@ def test_the_command_writes_a_page_that_asks_nobody(tmp_path, capsys):
 @needs_chromium
 def test_the_page_says_what_the_checker_says(tmp_path):
     with planning_page(checker_page(), Path(tmp_path), "globalThis.checkerPage !== undefined") as browser:
-        for centre, expected in (
-            ((1.2, 0.0), "holds: 1 motion"),
-            ((0.4, 0.1), "does not hold: motion 1: 'arm' and 'ball'"),
+        for file, expected in (
+            (certificate((1.2, 0.0)), "holds: 1 motion"),
+            (certificate((0.4, 0.1)), "does not hold: motion 1: 'arm' and 'ball'"),
+            (task(*[certificate((1.2, 0.0), ends=(0.0, 0.0))] * 2), "holds: 2 motions"),
         ):
-            text = json.dumps(json.dumps(certificate(centre)))
+            text = json.dumps(json.dumps(file))
             browser.ask("document.getElementById('again').click()")
             browser.ask(f"checkerPage.takeFiles([new File([{text}], 'certificate.json')])")
             browser.wait("!document.getElementById('verdict').textContent.startsWith('Drop')")

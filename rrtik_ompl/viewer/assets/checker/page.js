@@ -58,11 +58,14 @@ function checkAll() {
 }
 
 function factsInWords(file, facts) {
-  const motions = Math.max(1, file.waypoints.length - 1);
-  const entries = file.motions.reduce((sum, motion) => sum + motion.length, 0);
+  const parts = file.parts ?? [file];
+  const listed = parts.flatMap((part) => part.motions);
+  const motions = listed.length;
+  const entries = listed.reduce((sum, motion) => sum + motion.length, 0);
+  const clearance = Math.min(...parts.map((part) => part.clearance));
   const believed = [facts.readRobot ? null : "the robot", facts.readScene ? null : "the scene"].filter((word) => word !== null);
   const taken = believed.length > 0 ? `; of ${believed.join(" and ")} that the certificate describes` : "";
-  return `${motions} motion${motions === 1 ? "" : "s"} proven free, ${(1000 * file.clearance).toPrecision(3)} mm kept from obstacles, ${facts.pairs} pairs, ${entries} entries${taken}`;
+  return `${motions} motion${motions === 1 ? "" : "s"} proven free, ${(1000 * clearance).toPrecision(3)} mm kept from obstacles, ${facts.pairs} pairs, ${entries} entries${taken}`;
 }
 
 function make(tag, text) {
@@ -85,10 +88,11 @@ function tellUnchecked(rows) {
 /** Draw what the certificate is about, even if it does not hold: as far as files describe it. */
 function show(given, holds) {
   const file = given.certificate.parts?.[0] ?? given.certificate; // of a task the first motion
+  const own = { ...given, ...given.parts?.[0] };
   let [world, motions] = [null, null];
   try {
     checkForm(file);
-    world = readingOf(file, given);
+    world = readingOf(file, own);
     motions = motionsOf(file, world.joints, world.tracks);
   } catch (error) {
     return; // the verdict says what is wrong
@@ -99,7 +103,7 @@ function show(given, holds) {
     const triangles = body.solid.plane === undefined ? bodyTriangles(body) : planeTriangles(scaled(body.solid.plane.normal, body.solid.plane.offset), body.solid.plane.normal, 2);
     return stage.add(triangles, colour, body.joint === 0 ? body.pose : IDENTITY);
   });
-  state.shown = { file, world, solids, motions, proof: holds ? new Proof(file, worldOf(file, given)) : null };
+  state.shown = { file, world, solids, motions, proof: holds ? new Proof(file, worldOf(file, own)) : null };
   stage.look([0, 0, 0.3], extentOf(world, motions));
 
   for (const id of ["motion", "entries"]) byId(id).hidden = false;

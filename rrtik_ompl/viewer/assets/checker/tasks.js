@@ -7,7 +7,7 @@ function checkAnyCertificate(file, own) {
   return isTask ? checkTask(file, own) : checkCertificate(file, own);
 }
 
-/** Verify a certificate of a task. `own.parts` are {scene, waypoints, held, base} of the asker's plan, null without one. */
+/** Verify a certificate of a task. `own.parts` are {scene, waypoints, held, base, padding} of the asker's plan, null without one. */
 function checkTask(file, own) {
   try {
     checkKeys(file, ["kind", "version", "parts"], [], "certificate");
@@ -50,7 +50,8 @@ function checkJunction(one, other, where) {
 /** Poses in the world and shapes of the bodies of obstacles and attached objects at a waypoint, by name and number. */
 function placesOf(part, waypoint) {
   const joints = statedJoints(part);
-  const frames = jointFrames(joints, jointValues(joints, part.waypoints[waypoint]));
+  const tracks = (part.tracks ?? []).map((track) => poseOf(track[waypoint]));
+  const frames = [...jointFrames(joints, jointValues(joints, part.waypoints[waypoint])), ...tracks];
   const things = part.bodies.filter((body) => body.kind !== "link");
   return new Map(things.map((body) => [`${body.name} ${body.number}`, { pose: poseNumbers(chained(frames[body.joint], poseOf(body.pose))), shape: JSON.stringify(body.shape) }]));
 }

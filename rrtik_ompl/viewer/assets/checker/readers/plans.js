@@ -1,6 +1,6 @@
 // Plans of tasks of rrtik-ompl, in JSON: the parts that a certificate of the task has.
 
-/** Parts {scene, waypoints, held, base} of a plan: its motions, divided where contacts end. */
+/** Parts {scene, waypoints, held, base, padding} of a plan: its motions, divided where contacts end. */
 function partsOfPlan(plan, file, lookup) {
   return listOf(plan.motions, file).flatMap((motion, k) => {
     const where = `${file}: motion ${k + 1}`;
@@ -10,7 +10,7 @@ function partsOfPlan(plan, file, lookup) {
     const last = motion.waypoints.length - 1;
     const partings = [...new Set(contacts.map((each) => each.until))].filter((until) => until !== null && until > 0 && until < last);
     const cuts = [0, ...partings.sort((a, b) => a - b), last];
-    const stance = stanceOf(motion.robot ?? null, where);
+    const stance = { ...stanceOf(motion.robot ?? null, where), padding: paddingOf(motion.robot ?? null) };
     return cuts.slice(0, -1).map((first, n) => {
       const known = (pair) => contacts.some((each) => [...each.pair].sort().join("|") === [...pair].sort().join("|"));
       const left = contacts.flatMap(({ pair, distance, until, then }) => {
