@@ -308,8 +308,11 @@ def task_from_document(document: object) -> TaskCertificate:
         raise InputError("expected an object with version, kind and parts; is this a certificate of a task?")
     if document["kind"] != TASK_KIND or type(document["version"]) is not int or document["version"] != VERSION:
         raise InputError(f"kind: expected {TASK_KIND!r}, version {VERSION}")
+    parts = _list(document["parts"], "parts", MOST_PARTS)
+    if not parts:
+        raise InputError("parts: expected at least one")
     found = []
-    for k, part in enumerate(_list(document["parts"], "parts", MOST_PARTS)):
+    for k, part in enumerate(parts):
         try:
             if not isinstance(part, dict):
                 raise InputError("expected an object")

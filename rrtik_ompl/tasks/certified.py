@@ -48,14 +48,17 @@ def parts_of(plan: TaskPlan) -> Iterator[Part]:
 
 
 def certificate_of_task(plan: TaskPlan, clearance: float) -> TaskCertificate | None:
-    """Return the certificate of a plan; None if a motion is not proven. See :meth:`TaskPlan.certificate`."""
+    """Return the certificate of a plan; None without motions, or if one is not proven.
+
+    See :meth:`TaskPlan.certificate`.
+    """
     found = []
     for part in parts_of(plan):
         made = part.world.certificate(part.rows, clearance)
         if made is None:
             return None
         found.append(made)
-    return TaskCertificate(tuple(found))
+    return TaskCertificate(tuple(found)) if found else None
 
 
 def fault_of_task(certificate: TaskCertificate, plan: TaskPlan, clearance: float) -> str:
