@@ -16,7 +16,7 @@ from rrtik_ompl.base.errors import RrtikError
 from rrtik_ompl.benchmark.sources import build, from_plain
 from rrtik_ompl.benchmark.suite import BY_KIND, NONE
 from rrtik_ompl.description.catalog import AUTO
-from rrtik_ompl.many.guard import CRASH, HANG, OUT_OF_MEMORY
+from rrtik_ompl.many.guard import CRASH, HANG, OUT_OF_MEMORY, out_of_memory
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.world_settings import FINEST_RESOLUTION
 from rrtik_ompl.planning.outcome import Request
@@ -53,7 +53,7 @@ def execute(job: Mapping[str, Any]) -> dict[str, Any]:
     except RrtikError as error:
         return {"status": ERROR, "reason": str(error)}
     except MemoryError as error:
-        return {"status": OUT_OF_MEMORY, "reason": f"more than {job['memory_mb']:g} MB: {error}".rstrip(": ")}
+        return out_of_memory(job, error)
     except Exception as error:  # errors of other packages' planners must not end the campaign
         return {"status": ERROR, "reason": f"{type(error).__name__}: {error}"}
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import pickle
 import re
 from collections import Counter
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
@@ -12,8 +11,6 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any, Literal, TypeAlias, get_args
-
-import numpy as np
 
 from rrtik_ompl.base.arrays import not_negative, positive, seed_of, whole_number
 from rrtik_ompl.base.choices import one_of
@@ -26,7 +23,8 @@ from rrtik_ompl.files.digest import sha256
 from rrtik_ompl.files.kinds import FilePath
 from rrtik_ompl.files.text import file_name
 from rrtik_ompl.many import spread
-from rrtik_ompl.many.guard import OUT_OF_MEMORY, PARCEL
+from rrtik_ompl.many.guard import PARCEL, out_of_memory
+from rrtik_ompl.many.parcels import packed, unpacked
 from rrtik_ompl.motion.trajectory import RateLimits
 from rrtik_ompl.tasks import Task
 from rrtik_ompl.tasks.randomness import Draws
@@ -270,34 +268,20 @@ def _episodes(run: _Run, numbers: list[int], processes: int, scheduler: str | No
 def _jobs(run: _Run, numbers: Iterable[int]) -> Iterator[dict[str, Any]]:
     """Yield the attempts as jobs for other processes; see `many.child.guarded`."""
     times, more = PATIENCE
-    parcel = np.frombuffer(pickle.dumps((run.draws.task, run.seed, run.timing)), np.uint8)
+    parcel = packed((run.draws, run.seed, run.timing))
     limits = {"patience": times * run.timing.seconds + more, "memory_mb": MEMORY_MB, "planner": None}
     for number in numbers:
         yield {"run": {"number": number}, "module": __name__, **limits, PARCEL: parcel}
 
 
-class _Held:
-    """What the last parcel holds, in another process."""
-
-    parcel: object = None
-    draws: Draws
-    seed: int
-    timing: Timing
-
-
 def prepared(job: Mapping[str, Any]) -> Callable[[], dict[str, Any]]:
-    """Unpack the task of a job, and return what makes the attempt; see `many.child.guarded`."""
-    if _Held.parcel is not job[PARCEL]:
-        task, _Held.seed, _Held.timing = pickle.loads(job[PARCEL].data)
-        _Held.draws = Draws(task)
-        _Held.parcel = job[PARCEL]
-    return partial(_made, job)
+    """Unpack the draws of a job, and return what makes the attempt; see `many.child.guarded`."""
+    return partial(_made, job, *unpacked(job[PARCEL]))
 
 
-def _made(job: Mapping[str, Any]) -> dict[str, Any]:
+def _made(job: Mapping[str, Any], draws: Draws, seed: int, timing: Timing) -> dict[str, Any]:
     """Make the attempt, and return its record."""
     try:
-        number = job["run"]["number"]
-        return {"status": DONE, "episode": attempted(_Held.draws, _Held.seed, number, _Held.timing)}
+        return {"status": DONE, "episode": attempted(draws, seed, job["run"]["number"], timing)}
     except MemoryError as error:
-        return {"status": OUT_OF_MEMORY, "reason": f"more than {job['memory_mb']:g} MB: {error}".rstrip(": ")}
+        return out_of_memory(job, error)

@@ -18,7 +18,8 @@ from rrtik_ompl.base.errors import InputError, ProblemError, require
 from rrtik_ompl.description.catalog import AUTO, is_auto
 from rrtik_ompl.many import spread
 from rrtik_ompl.many.guard import PARCEL
-from rrtik_ompl.many.one_plan import DONE, job_of, parcel_of
+from rrtik_ompl.many.one_plan import DONE, job_of
+from rrtik_ompl.many.parcels import packed
 from rrtik_ompl.many.queries import Asked, Ends, Named, Problems, queries_in, queries_of
 from rrtik_ompl.ompl_bridge.planner_names import is_planner_file, planner_in_folder
 from rrtik_ompl.ompl_bridge.planner_options import check_options
@@ -238,7 +239,7 @@ def _with_worlds(asked: Sequence[Asked], jobs: Sequence[dict[str, Any]]) -> Iter
     for query, job in zip(asked, jobs, strict=True):
         if isinstance(query, Query) and query.world is not world:
             world = query.world
-            parcel = parcel_of(world)
+            parcel = packed(world)
         yield job if isinstance(query, Named) else {**job, PARCEL: parcel}
 
 

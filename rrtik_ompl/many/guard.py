@@ -125,6 +125,11 @@ class Guard:
             return file.read().decode(errors="replace")
 
 
+def out_of_memory(job: Mapping[str, Any], error: MemoryError) -> dict[str, Any]:
+    """Return the record of a job that has met its limit of memory."""
+    return {"status": OUT_OF_MEMORY, "reason": f"more than {job['memory_mb']:g} MB: {error}".rstrip(": ")}
+
+
 def _asked(process: subprocess.Popen[bytes], job: Mapping[str, Any]) -> dict[str, Any] | None:
     """Send a job to a process, and return its record; None if the process is lost."""
     if process.stdin is None or process.stdout is None:

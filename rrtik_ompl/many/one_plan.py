@@ -7,12 +7,10 @@ from collections.abc import Callable, Mapping
 from functools import lru_cache, partial
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from rrtik_ompl.base.errors import InputError, PlannerError, ProblemError
 from rrtik_ompl.description.catalog import AUTO
-from rrtik_ompl.many.guard import OUT_OF_MEMORY, PARCEL
+from rrtik_ompl.many.guard import PARCEL, out_of_memory
+from rrtik_ompl.many.parcels import Parcel, unpacked
 from rrtik_ompl.many.queries import Asked, Named
 from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory
 from rrtik_ompl.planning.many import Answer, no_plan
@@ -55,11 +53,6 @@ def job_of(
     return {"run": {"number": number}, "module": __name__, "planner": label, "content": content}
 
 
-def parcel_of(world: World) -> NDArray[np.uint8]:
-    """Return a world as the bytes that are sent to another process."""
-    return np.frombuffer(pickle.dumps(world), np.uint8)
-
-
 def prepared(job: Mapping[str, Any]) -> Callable[[], dict[str, Any]]:
     """Make the problem of a job, and return what plans it; see `many.child.guarded`."""
     try:
@@ -78,27 +71,13 @@ def prepared(job: Mapping[str, Any]) -> Callable[[], dict[str, Any]]:
     return partial(_run, job, problem, planner, options)
 
 
-def _problem(sent: Any, parcel: NDArray[np.uint8]) -> Problem:  # noqa: ANN401 - what `job_of` has pickled
+def _problem(sent: Any, parcel: Parcel) -> Problem:  # noqa: ANN401 - what `job_of` has pickled
     """Return the problem of a query; made already if another query has had the same name or world."""
     if isinstance(sent, str):
         return _load(sent)
     start, goal, known = sent
-    world = _world_of(parcel)
+    world: World = unpacked(parcel)
     return Problem(world, start, goal) if known is None else known_problem(world, start, goal, **known)
-
-
-class _Held:
-    """The world of the last parcel."""
-
-    parcel: NDArray[np.uint8] | None = None
-    world: World
-
-
-def _world_of(parcel: NDArray[np.uint8]) -> World:
-    if _Held.parcel is not parcel:
-        _Held.world = pickle.loads(parcel.data)
-        _Held.parcel = parcel
-    return _Held.world
 
 
 def _run(
@@ -110,7 +89,7 @@ def _run(
     except (InputError, PlannerError) as error:
         return _done(error)
     except MemoryError as error:
-        return {"status": OUT_OF_MEMORY, "reason": f"more than {job['memory_mb']:g} MB: {error}".rstrip(": ")}
+        return out_of_memory(job, error)
     except Exception as error:  # whatever another package's planner raises
         return {"status": ERROR, "reason": f"{type(error).__name__}: {error}"}
 

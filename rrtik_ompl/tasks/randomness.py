@@ -227,6 +227,10 @@ class Draws:
         self._as_written = self._distances(task.world)
         self.left = Left()
 
+    def __reduce__(self) -> tuple[type[Draws], tuple[Task]]:
+        """Pickle the task alone: worlds do not go to another process."""
+        return Draws, (self.task,)
+
     def draw(self, rng: np.random.Generator) -> Drawn:
         """Draw an instance; draws of which the scene or the start cannot be are counted and drawn anew."""
         rejected: Counter[str] = Counter()
