@@ -73,9 +73,13 @@ def guided(kind: type) -> None:
         return
 
     @wraps(made)
-    def constructor(self: object, *args: Any, **options: Any) -> None:
-        if type(self) is kind and getattr(kind, "_is_protocol", False):
+    def of_protocol(self: object, *args: Any, **options: Any) -> None:
+        if type(self) is kind:
             raise InputError(f"{kind.__name__} is a protocol: write a class with its methods")
+        super(kind, self).__init__(*args, **options)  # type: ignore[arg-type]  # of other bases
+
+    @wraps(made)
+    def constructor(self: object, *args: Any, **options: Any) -> None:
         try:
             made(self, *args, **options)
         except TypeError as error:
@@ -84,7 +88,7 @@ def guided(kind: type) -> None:
                 raise
             raise InputError(_wrong_call(kind, args, options)) from None
 
-    kind.__init__ = constructor  # type: ignore[misc]
+    kind.__init__ = of_protocol if getattr(kind, "_is_protocol", False) else constructor  # type: ignore[misc]
 
 
 def _wrong_call(kind: type, args: tuple[Any, ...], options: dict[str, Any]) -> str:

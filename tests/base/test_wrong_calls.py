@@ -87,6 +87,19 @@ def test_an_error_within_a_constructor_stays_what_it_is():
         Ball(0.1)
 
 
+def test_a_protocol_is_not_made_but_classes_of_it_are_also_those_of_another_class():
+    class Device:
+        def __init__(self, port):
+            self.port = port
+
+    class Link(rrtik.following.RobotLink, Device):
+        pass
+
+    assert Link("usb").port == "usb"
+    with pytest.raises(rrtik.InputError, match="RobotLink is a protocol: write a class"):
+        rrtik.following.RobotLink()
+
+
 def robot():
     return rrtik.load_robot("planar3")
 
