@@ -16,12 +16,12 @@ from typer import Option
 
 import rrtik_ompl as rrtik
 from bench.replanning import scenes
+from bench.replanning.runs import plane_run
 from bench.shared.parts import Parts
 from bench.shared.run import Run
 from rrtik_bench.contact_check import check_contacts
 from rrtik_bench.report.page import Report
 from rrtik_ompl.replanning.record import ReplanRun
-from rrtik_ompl.replanning.replanner import replan
 from rrtik_ompl.replanning.tick import Tick
 from rrtik_ompl.replanning.unavoidable import ContactWarning
 from rrtik_ompl.world.arrangement import arranged
@@ -64,10 +64,7 @@ def outcome(seed: int) -> Outcome:
     begin = time.process_time()
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        run = replan(
-            problem, limits=scenes.limits(), seed=seed, clock=lambda: 0.0, seconds=40.0, speed_bound=BOUND,
-            **scenes.OPTIONS,
-        )  # fmt: skip
+        run = plane_run(problem, seed, clock=lambda: 0.0, speed_bound=BOUND)
     seconds = time.process_time() - begin
     return judged(problem, run, seconds, sum(each.category is ContactWarning for each in caught))
 

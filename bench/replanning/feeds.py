@@ -106,7 +106,6 @@ class FeedOutcome:
 
     Attributes:
         outcome: Whether it arrived, or why not.
-        seconds: Processor time of its ticks [s].
         duration: Time of the run [s].
         faults: How many of each kind there were.
         proven, moving, told, untold: Ticks with contact in which the move is called proven; and of the others those in
@@ -115,7 +114,6 @@ class FeedOutcome:
     """
 
     outcome: str
-    seconds: float
     duration: float
     faults: dict[str, int]
     proven: int
@@ -207,11 +205,7 @@ def run_with_faults(place: Place, seed: int, patience: float) -> tuple[ReplanRun
     feed = feed_of(scenes_of(actors, problem.robot, place, loops, rng), patience)
     loop = Loop(problem, feed, settings, None, time.process_time, patience)
     loops.append(loop)
-    loop.run.outcome = "out of time"
-    for number in range(int(place.longest * place.rate) + 1):
-        if not loop.tick(number):
-            break
-    return loop.run, actors
+    return loop.run_ticks(), actors
 
 
 def feed_outcome(name: str, seed: int, patience: float) -> FeedOutcome:
@@ -240,7 +234,7 @@ def feed_outcome(name: str, seed: int, patience: float) -> FeedOutcome:
 
     faults: Counter[str] = Counter(fault.kind for fault in run.faults)
     return FeedOutcome(
-        run.outcome, run.seconds, run.ticks[-1].time, dict(faults), kinds["proven"], kinds["moving"], kinds["told"],
+        run.outcome, run.ticks[-1].time, dict(faults), kinds["proven"], kinds["moving"], kinds["told"],
         kinds["untold"],
     )  # fmt: skip
 

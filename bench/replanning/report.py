@@ -5,9 +5,8 @@ Times are of the processor, so that runs beside each other are fair. An interrup
 
 from __future__ import annotations
 
-import time
 from itertools import groupby
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 from typer import Option
@@ -15,7 +14,7 @@ from typer import Option
 import rrtik_ompl as rrtik
 from bench.replanning import runs, scenes
 from bench.replanning.arms import HEAD, arm_rows, contacts, figures, repair_rows
-from bench.replanning.runs import outcome
+from bench.replanning.runs import outcome, plane_run
 from bench.shared.parts import Parts
 from bench.shared.problems import goal_joints
 from bench.shared.run import Run
@@ -29,16 +28,6 @@ from rrtik_ompl.replanning.replanner import replan
 from rrtik_ompl.world.moving_world import MovingWorld
 
 PLANNERS = ("drrt-con", "rrt-connect", "drrt")
-
-
-def plane_run(problem: rrtik.Problem, seed: int, **changes: Any) -> ReplanRun:
-    return replan(
-        problem,
-        limits=scenes.limits(),
-        seed=seed,
-        clock=time.process_time,
-        **{"seconds": 40.0, **scenes.OPTIONS, **changes},
-    )
 
 
 def static_rows(report: Report, count: int) -> None:

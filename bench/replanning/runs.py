@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 import rrtik_ompl as rrtik
+from bench.replanning import scenes
 from rrtik_bench.contact_check import ContactReport, check_contacts
 from rrtik_bench.moving_scenes import moving_problem
 from rrtik_ompl.model.scene import Scene
@@ -82,6 +83,12 @@ def arm_outcome(name: str, seed: int, planner: str, slot: float, seconds: float)
     return outcome(run, check_contacts(problem.robot, run, problem.world.scene, samples_per_tick=5))
 
 
+def plane_run(problem: rrtik.Problem, seed: int, **changes: Any) -> ReplanRun:
+    """A run of the point in the plane."""
+    options = {"clock": time.process_time, "seconds": 40.0, **scenes.OPTIONS, **changes}
+    return replan(problem, limits=scenes.limits(), seed=seed, **options)
+
+
 def executed_valid(problem: rrtik.Problem, run: ReplanRun) -> bool:
     """Whether every step along a path was free, by the exact world of its moment."""
     scene = problem.world.scene
@@ -129,9 +136,7 @@ def paired(name: str, seeds: range, slow_every: int = 8) -> tuple[Moments, Momen
     for seed in seeds:
         loop = _loop(name, seed)
         with_pairs(loop, quick, slow, slow_every)
-        for number in range(int(LONGEST * RATE)):
-            if not loop.tick(number):
-                break
+        loop.run_ticks()
     return quick, slow
 
 

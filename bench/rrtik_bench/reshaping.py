@@ -166,15 +166,10 @@ def reshaped(name: str, reshaper: Reshaper, seed: int, speed_bound: float) -> Re
     scenario = Scenario.load(name)
     settings = replace(scenario.settings, seed=seed, repair_budget=REPAIR_SECONDS, speed_bound=speed_bound)
     loop = ReshapedLoop(scenario, settings, reshaper)
-    for number in range(int(settings.seconds * settings.rate) + 1):
-        if not loop.tick(number):
-            loop.run.outcome = "arrived"
-            break
-    else:
-        loop.run.outcome = "out of time"
+    run = loop.run_ticks()
     problem = scenario.problem
-    untouched = not check_contacts(problem.robot, loop.run, problem.world.scene).contacts
-    return Reshaped(loop.run, tuple(loop.acts), untouched)
+    untouched = not check_contacts(problem.robot, run, problem.world.scene).contacts
+    return Reshaped(run, tuple(loop.acts), untouched)
 
 
 BRAKE, PATIENCE = 6.0, 20  # ticks

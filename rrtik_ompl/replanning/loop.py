@@ -41,7 +41,7 @@ REACTION_TICKS = 6  # The arm evades a cloud that would be too near within so ma
 
 
 class Loop:
-    """The state of one run of replanning; :meth:`tick` advances it by one tick.
+    """The state of one run of replanning; :meth:`tick` advances it by one tick, :meth:`run_ticks` to its end.
 
     Attributes:
         q: The robot's configuration, shape (n,).
@@ -135,6 +135,15 @@ class Loop:
         if self._settings.speed_bound is not None:
             keep = self._settings.margin + self._proven_clearance
             self._guard = Guard(first_world, self._world_of_arm, self._settings, keep, self._max_change, self._rng)
+
+    def run_ticks(self) -> ReplanRun:
+        """Do ticks until the goal is reached, the feed ends the run or the time is up, and return the record."""
+        for number in range(int(self._settings.seconds * self._settings.rate) + 1):
+            if not self.tick(number):
+                return self.run
+        self.run.outcome = "out of time"
+        self.run.reason = self.run.ticks[-1].reason or "still on its way"
+        return self.run
 
     def tick(self, number: int) -> bool:
         """Do one tick, add it to the record and return whether the run goes on.

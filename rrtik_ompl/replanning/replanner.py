@@ -143,18 +143,9 @@ def replan_with(
             watch = open_feeds.enter_context(PatientFeed(make_feed, answer_seconds, "scene feed"))
         if (given_goal_feed := goal_feed) is not None:
             goal_feed = open_feeds.enter_context(PatientFeed(lambda: given_goal_feed, answer_seconds, "goal feed"))
-        return _run(Loop(problem, watch, settings, goal_feed, clock, silence_seconds), settings, record)
-
-
-def _run(loop: Loop, settings: ReplanSettings, record: str | os.PathLike[str] | None) -> ReplanRun:
-    """Run ticks until the goal is reached or the time is up, and write the record even if an error ends the run."""
-    try:
-        for number in range(int(settings.seconds * settings.rate) + 1):
-            if not loop.tick(number):
-                return loop.run
-        loop.run.outcome = "out of time"
-        loop.run.reason = loop.run.ticks[-1].reason or "still on its way"
-        return loop.run
-    finally:
-        if record is not None and loop.run.ticks:
-            loop.run.save(record)
+        loop = Loop(problem, watch, settings, goal_feed, clock, silence_seconds)
+        try:
+            return loop.run_ticks()
+        finally:  # The record is written even if an error ends the run.
+            if record is not None and loop.run.ticks:
+                loop.run.save(record)
