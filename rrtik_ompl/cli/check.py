@@ -104,6 +104,9 @@ def _say_ends(problem: Problem, kept: str) -> None:
     goal = problem.goal.q
     ends = {"start": problem.start} | ({} if goal is None else {"goal": goal})
     for end, q in ends.items():
+        if not problem.world.valid(q):
+            say(f"{problem.name}: {end} is covered at first: {problem.world.explain(q)}")
+            continue
         say(f"{problem.name}: {end} is free, clearance {_millimetres(problem.world.clearance(q))}{kept}")
 
 

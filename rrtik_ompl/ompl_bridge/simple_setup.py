@@ -21,7 +21,7 @@ from rrtik_ompl.ompl_bridge.planner_traits import OMPL_TRAITS, PlannerTraits
 from rrtik_ompl.ompl_bridge.region_constraint import projected_space
 from rrtik_ompl.ompl_bridge.setup import CheckedMotions, bounded_space, circular_space
 from rrtik_ompl.ompl_bridge.states import Coordinates, StateIO, coordinates_of
-from rrtik_ompl.world.problem import Problem, fixed_ends, planning_bounds
+from rrtik_ompl.world.problem import Problem, fixed_ends, planning_bounds, refuse_covered_goal
 from rrtik_ompl.world.proven_edges import ProvenEdges
 from rrtik_ompl.world.route_check import motion_taken
 from rrtik_ompl.world.world import World
@@ -228,6 +228,7 @@ def simple_setup(problem: Problem, *, seed: int | None = 0, so2: bool = False, p
 
     Raises:
         InputError: If it is no problem, or SO(2) is wanted along path constraints.
+        ProblemError: If an obstacle that moves covers the goal now.
 
     Example:
         >>> import rrtik_ompl as rrtik
@@ -237,6 +238,7 @@ def simple_setup(problem: Problem, *, seed: int | None = 0, so2: bool = False, p
     """
     if not isinstance(problem, Problem):
         raise InputError(f"simple_setup: expected a Problem, got {type(problem).__name__}")
+    refuse_covered_goal(problem)
 
     si = space_information(problem, so2=so2, proven=proven)
     if proven:

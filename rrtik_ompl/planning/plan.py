@@ -13,7 +13,7 @@ from rrtik_ompl.description.catalog import AUTO, is_auto
 from rrtik_ompl.planning.outcome import RESTARTS, Improvement, Plan, Request
 from rrtik_ompl.planning.short_path import short_path
 from rrtik_ompl.world.clearances import check_clearance
-from rrtik_ompl.world.problem import Problem, fixed_ends
+from rrtik_ompl.world.problem import Problem, fixed_ends, refuse_covered_goal
 
 if TYPE_CHECKING:
     from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory
@@ -98,6 +98,7 @@ def plan(
         UnknownNameError: If there is no planner, accuracy, objective, strategy or method of shortening of that name.
         InputError: If a number or a parameter makes no sense, start or goal cannot keep the clearance, or the objective
             is "time" and the robot has no velocity limits.
+        ProblemError: If an obstacle that moves covers the goal now.
         PlannerError: If the planner broke.
 
     Example:
@@ -160,8 +161,10 @@ def planned_and_finished(
     Raises:
         UnknownNameError: If there is no planner of that name.
         InputError: If the planner does not take a parameter.
+        ProblemError: If the goal is not free now, see :func:`refuse_covered_goal`.
         PlannerError: If the planner broke.
     """
+    refuse_covered_goal(problem)
     short = short_path(problem, request, pull=method == "auto") if _is_auto(planner) else None
     if short is not None and method in ("auto", None):
         return short
@@ -186,8 +189,10 @@ def planned(problem: Problem, planner: str | PlannerFactory, request: Request) -
     Raises:
         UnknownNameError: If there is no planner of that name.
         InputError: If the planner does not take a parameter.
+        ProblemError: If the goal is not free now, see :func:`refuse_covered_goal`.
         PlannerError: If the planner broke.
     """
+    refuse_covered_goal(problem)
     short = short_path(problem, request, pull=True) if _is_auto(planner) else None
     if short is not None:
         return short

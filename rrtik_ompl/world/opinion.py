@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.world.clearance_curve import clearance_along
-from rrtik_ompl.world.problem import Problem
+from rrtik_ompl.world.problem import Problem, refuse_covered_goal
 from rrtik_ompl.world.route_check import how_checked, violations_of
 from rrtik_ompl.world.world import World
 
@@ -42,7 +42,7 @@ def opinion_on(world: World, start: ArrayLike, goal: ArrayLike, waypoints: Array
         InputError: If rows do not have one value per joint, or contain other things than numbers.
         ProblemError: If an end is in collision or outside the limits.
     """
-    Problem(world, start, goal)
+    refuse_covered_goal(Problem(world, start, goal))
     path = JointPath.of(world.robot, waypoints)
 
     proof = world.prove(path.waypoints)

@@ -24,6 +24,7 @@ from rrtik_ompl.files.kinds import found, read, write
 from rrtik_ompl.model.goal import Goal, GoalLike, JointGoal, PoseGoal
 from rrtik_ompl.model.goal_kind import TaskRegion
 from rrtik_ompl.model.robot import Robot
+from rrtik_ompl.model.scene import Scene
 from rrtik_ompl.model.world_settings import WorldSettings
 from rrtik_ompl.world.route_check import verification_resolution
 from rrtik_ompl.world.world import World, form_of, like
@@ -36,12 +37,15 @@ class Problem:
     Joint values up to 1e-5 outside a limit are moved onto it. The goal values of continuous joints are shifted by whole
     turns to be nearest to the start, so that the straight motion goes the short way round.
 
+    A goal that only obstacles with a stated motion cover is taken, since they may go away: :func:`rrtik_ompl.replan`
+    and :func:`rrtik_ompl.replanning.plan_in_time` wait for it, and planners among obstacles at rest refuse it.
+
     A problem is plain data: it is copied, pickled and changed by its fields.
 
     Attributes:
         settings: The settings of its world: robot, scene, and how motions are checked.
         start: Start configuration, shape (dof,), read-only.
-        goal: The goal; a :class:`JointGoal` has been checked to be free.
+        goal: The goal; a :class:`JointGoal` has been checked to be free, but for obstacles that state their motion.
         name: Name used in messages and files.
         planner: Name of the planner that :func:`rrtik_ompl.plan` uses where none is named, or None.
 
@@ -90,7 +94,7 @@ class Problem:
         goal = world.robot.posture(goal) if isinstance(goal, str) else goal
         checked_goal = _goal_of(goal)
         joints = {} if checked_goal.q is None else {"goal": checked_goal.q}
-        ends = usable_configurations(world, {"start": start, **joints})
+        ends = _usable_ends(world, {"start": start, **joints})
         checked_start = frozen(ends["start"])
 
         # Place the path constraints at the start, and add them to the world.
@@ -249,6 +253,40 @@ def densely_checked(problem: Problem) -> Problem:
 def problem_in(problem: Problem, world: World) -> Problem:
     """Return the problem in another form of its world, as :meth:`Problem.with_world` but without a type check."""
     return changed(problem, settings=world.settings, world=world)
+
+
+def refuse_covered_goal(problem: Problem) -> None:
+    """Refuse a problem whose goal is not free at time 0, for planners that take moving obstacles to be at rest.
+
+    Raises:
+        ProblemError: If the goal is in collision or within an obstacle's margin; the message names the pair.
+    """
+    q = problem.goal.q
+    if q is None or not _moving(problem.settings.scene):
+        return
+    try:
+        usable_configuration(problem.world, q, "goal")
+    except ProblemError as error:
+        hint = "plan_in_time() and replan() wait until it is free"
+        raise ProblemError(f"{error}; {hint}", error.contacts, part="goal") from None
+
+
+def _usable_ends(world: World, ends: Mapping[str, ArrayLike]) -> dict[str, Vector]:
+    """Validate start and goal as :func:`usable_configurations` does; moving obstacles may cover the goal."""
+    try:
+        return usable_configurations(world, ends)
+    except ProblemError as error:
+        moving = _moving(world.scene)
+        if error.part != "goal" or not moving:
+            raise
+    world_at_rest = world.unheld.with_scene(world.scene.without(*moving))
+    goal = usable_configuration(world_at_rest, ends["goal"], "goal")
+    return usable_configurations(world, {"start": ends["start"]}) | {"goal": goal}
+
+
+def _moving(scene: Scene) -> list[str]:
+    """Return the names of the obstacles that state a motion."""
+    return [o.name for o in scene.obstacles if o.motion is not None]
 
 
 def usable_configuration(world: World, values: ArrayLike, what: str) -> Vector:

@@ -18,6 +18,7 @@ from rrtik_ompl.replanning.in_time import plan_in_time
 from rrtik_ompl.replanning.in_time.foreseen import travel
 from rrtik_ompl.replanning.in_time.pace import Pace, stretch
 from rrtik_ompl.replanning.in_time.search import TimeTree
+from rrtik_ompl.world.opinion import opinion_on
 from rrtik_ompl.world.world import World
 from rrtik_tests.moving_plane import FAST, box, crossing, place, plane
 
@@ -99,6 +100,8 @@ def test_a_goal_that_stays_blocked_is_named():
 def test_nothing_in_the_way_arrives_as_soon_as_speed_allows():
     plan = plan_in_time(plane(box("far", 10.0, 18.0, 1.0, 1.0)), seed=1, **PLANE)
     assert plan.arrival == pytest.approx(plan.least_seconds) == pytest.approx(3.7)  # 3.6 s at full speed
+    aside = plan_in_time(plane(), goal=[1.0, 12.0], seed=1, **PLANE)
+    assert aside.path.end.tolist() == [1.0, 12.0]
 
 
 @pytest.mark.kernels
@@ -192,12 +195,38 @@ def test_no_motion_is_faster_than_the_bound_and_straight_ones_may_be_slower():
 
 def test_a_goal_that_is_free_only_later_is_waited_for():
     lid = TimedPoses([0.0, 6.0, 6.5], [place(19.0, 10.0), place(19.0, 10.0), place(19.0, -30.0)])
-    problem = plane(box("lid", 19.0, 10.0, 2.0, 2.0, lid), goal=(1.0, 10.0))
-    plan = plan_in_time(problem, goal=[19.0, 10.0], seed=1, iterations=50, **PLANE)
+    problem = plane(box("lid", 19.0, 10.0, 2.0, 2.0, lid))
+    plan = plan_in_time(problem, seed=1, iterations=50, **PLANE)
     assert plan.found, plan.reason
     assert 6.0 < plan.arrival < 7.5
     assert faults_of(problem, plan.motion, 1e3, 5.0) == ([], ())
     keeps_accelerations(plan, FAST)
+
+
+def test_a_goal_under_what_moves_is_refused_where_nothing_is_waited_for(tmp_path, capsys):
+    lid = box("lid", 19.0, 10.0, 2.0, 2.0, ConstantVelocity([0.0, 1.0, 0.0]))
+    problem = plane(lid)
+    straight = [problem.start, problem.goal.q]
+    for refuses in (
+        lambda: rrtik.plan(problem),
+        lambda: rrtik.plan(problem, "rrtconnect", shorten=False),
+        lambda: rrtik.ompl.simple_setup(problem),
+        lambda: opinion_on(problem.world, *straight, straight),
+    ):
+        with pytest.raises(rrtik.ProblemError, match=r"'lid' overlap.*plan_in_time") as caught:
+            refuses()
+        assert caught.value.part == "goal"
+        assert caught.value.contacts == (("disc", "lid"),)
+    assert all("plan_in_time" in each.reason for each in rrtik.plan_many([problem, problem]))
+
+    problem.save(tmp_path / "lid.yaml")
+    assert run_command(["check", str(tmp_path / "lid.yaml")]) == 0
+    assert "goal is covered at first: 'disc' and 'lid' overlap" in capsys.readouterr().out
+
+    rest = box("rest", 19.0, 10.0, 2.0, 2.0)
+    for obstacles, ends in (((lid, rest), {}), ((lid,), {"goal": (30.0, 10.0)}), ((lid,), {"start": (19.0, 10.0)})):
+        with pytest.raises(rrtik.ProblemError, match=r"'rest'|'x' is at 30 m|start is in"):
+            plane(*obstacles, **ends)
 
 
 def test_bad_input_names_what_is_wrong():

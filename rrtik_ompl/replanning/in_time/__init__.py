@@ -138,8 +138,8 @@ def plan_in_time(
     Args:
         problem: Robot, scene whose obstacles state their motions, start and goal. If the goal is a pose, position or
             region, all configurations that reach it are goals.
-        goal: A configuration to reach in place of the problem's goal, shape (n,). Obstacles may stand there at first,
-            which a problem does not allow of its own goal; the arm waits until it is free.
+        goal: A configuration to reach in place of the problem's goal, shape (n,). Obstacles that move may stand at
+            either at first; the arm waits until it is free.
         rate: Number of slots per second [Hz]. With more slots the arm can pass nearer to fast obstacles, and searches
             take longer.
         horizon: The latest arrival [s].
