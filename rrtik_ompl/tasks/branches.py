@@ -21,7 +21,7 @@ from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import Touching
 from rrtik_ompl.planning.tip_motion import DEVIATION, TURN_DEVIATION
-from rrtik_ompl.planning.tip_motion.attempts import Attempt, Way, attempt, farthest, path_of
+from rrtik_ompl.planning.tip_motion.attempts import Attempt, Way, attempt, complete, leanings, path_of
 from rrtik_ompl.planning.tip_motion.following import Tolerance, centred, follow
 from rrtik_ompl.planning.tip_motion.rails import straight_rail
 from rrtik_ompl.tasks.contact_life import MotionContact, follow_contacts, parted
@@ -38,7 +38,6 @@ Reason: TypeAlias = str | Callable[[], str]  # why a step has failed; a function
 TOLERANCE = Tolerance(DEVIATION, TURN_DEVIATION, arrived=1e-6)
 NEAREST = 6  # configurations at a goal that are tried first, where kernels find them
 THOROUGH = 1  # first round of the search in which straight lines are tried in all ways that a redundant arm has
-WHOLE = 1.0  # share of a line that is followed completely
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -284,7 +283,7 @@ class Expander:
             return
 
         setting, arriving, attempted, reason = self._follow_line(branch, line)
-        if attempted.fraction < WHOLE:
+        if attempted is None:
             self.failures.append((branch, step, reason))
             return
 
@@ -301,48 +300,48 @@ class Expander:
             branch, step, setting, path.end, followed.path, setting_left=setting_left, contacts=contacts
         )
 
-    def _follow_line(self, branch: Branch, line: Way) -> tuple[Setting, tuple[Touching, ...], Attempt, Reason]:
+    def _follow_line(self, branch: Branch, line: Way) -> tuple[Setting, tuple[Touching, ...], Attempt | None, Reason]:
         """Follow a straight line, with contacts at its end only if it cannot be followed without them.
 
         To find these contacts, the line is first followed without collision checks.
 
         Returns:
-            The setting during the motion, the contacts of things that are taken or set down at the end, the attempt,
-            and why it did not come farther.
+            The setting during the motion, the contacts of things that are taken or set down at the end, the attempt if
+            it has come to the end, and why not.
         """
         setting = branch.after
         steps = branch.rest[1:]
         world = setting.world
         attempted: Attempt | None = None
         if not handled(steps, world.robot):
-            attempted = self._attempt(branch, line, world)
-            return setting, (), attempted, partial(_ended, attempted)
+            return setting, (), self._attempt(branch, line, world), partial(_ended, world, branch, line)
 
         unchecked = follow(world.robot, line.rails[0], branch.q, line.tolerance, centred(world.robot))
         end = unchecked.rows[-1]
         free_at_end = not unchecked.complete or world.motion_proven(end, end)
-        if free_at_end or branch.effort >= THOROUGH:
+        looked_at = free_at_end or branch.effort >= THOROUGH
+        if looked_at:
             attempted = self._attempt(branch, line, world)
-            if attempted.fraction == WHOLE:
+            if attempted is not None:
                 arriving = self._arriving(branch, attempted.rows[-1]) if setting.scene.contacts else ()
                 return setting.arriving(arriving), arriving, attempted, ""
             if not unchecked.complete:
-                return setting, (), attempted, partial(_ended, attempted)
+                return setting, (), None, partial(_ended, world, branch, line)
 
         reached = arrival(world, steps, end)
         if reached.contacts and not reached.fault:
             setting = setting.arriving(reached.contacts)
             attempted = self._attempt(branch, line, setting.world)
-        elif attempted is None:
+        elif not looked_at:
             attempted = self._attempt(branch, line, world)
         arriving = () if reached.fault else reached.contacts
-        return setting, arriving, attempted, partial(_ended, attempted, reached.fault)
+        return setting, arriving, attempted, partial(_ended, setting.world, branch, line, reached.fault)
 
-    def _attempt(self, branch: Branch, line: Way, world: World) -> Attempt:
-        """Follow a line in a world: thoroughly, in all ways of a redundant arm, in later rounds of the search."""
-        if branch.effort >= THOROUGH:
-            return farthest(world, line, branch.q[None])
-        return attempt(world, line, branch.q, centred(world.robot))
+    def _attempt(self, branch: Branch, line: Way, world: World) -> Attempt | None:
+        """Follow a line to its end in a world: in later rounds of the search in all ways that a redundant arm has."""
+        usual = [centred(world.robot)]
+        ways_to_lean = leanings(world, line, branch.q) if branch.effort >= THOROUGH else usual
+        return complete(world, line, branch.q, ways_to_lean)
 
 
 def _without_parted(setting: Setting, q: Vector) -> Setting:
@@ -355,8 +354,9 @@ def _without_parted(setting: Setting, q: Vector) -> Setting:
     return setting.with_contacts_only(lasting)
 
 
-def _ended(attempted: Attempt, fault: str = "") -> str:
-    """Return where and why a straight line ended."""
+def _ended(world: World, branch: Branch, line: Way, fault: str = "") -> str:
+    """Return where and why a straight line ends in a world."""
+    attempted = attempt(world, line, branch.q, centred(world.robot))
     return f"ends at {100.0 * attempted.fraction:.3g} %: {fault or attempted.reason}"
 
 

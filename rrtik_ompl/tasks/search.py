@@ -35,6 +35,7 @@ FIRST_ITERATIONS = 4_000
 GROWTH = 4
 LEAST_SECONDS = 1e-3  # [s] least time for such a motion
 ROUNDS = 8
+MOST_FAILURES = 24  # failed steps after which the first round ends: more effort in some of them may do
 NAMED = 6  # most stages whose failures a reason names
 MOST_WORDS = 300  # most letters of one failure
 
@@ -72,6 +73,9 @@ class TaskSearch:
         self._motions_not_found: set[int] = set()
         self._waiting: list[Branch] = []
 
+        # Number of failures after which branches have been tried again.
+        self._retried = 0
+
         # Counts: rounds, branches that were expanded, motions between configurations for which a path was looked for.
         self._rounds = 0
         self._expanded = 0
@@ -90,8 +94,8 @@ class TaskSearch:
     def run(self, start: Branch) -> Done | None:
         """Search for choices with which the whole task works; None if there are none.
 
-        Each round allows more effort than the one before: it retries the branches whose motions were not found, and
-        continues with further configurations of the goals.
+        Each round allows more effort than the one before: it retries the branches whose motions were not found, or
+        that have failed, and continues with further configurations of the goals.
         """
         self._push(start)
         for effort in range(ROUNDS):
@@ -103,8 +107,7 @@ class TaskSearch:
             waiting = self._waiting
             self._waiting = []
             self._motions_not_found.clear()
-            failed = [branch for branch, _, _ in self._expander.failures] if effort == 0 else []
-            for branch in (*waiting, *failed):
+            for branch in (*waiting, *self._failed_at_first()):
                 self._push(replace(branch, effort=effort + 1))
             for branch in self._expander.more():
                 self._push(branch)
@@ -137,13 +140,15 @@ class TaskSearch:
         return "; ".join([*time_note, *sentences]) or "no choice of alternatives and configurations works"
 
     def _run_round(self, effort: int) -> Done | None:
-        """Expand branches until one has done the whole task; None if none is left or the time is up."""
+        """Expand branches until one has done the whole task; None if none is left, the time is up, or too many fail."""
         while self._queue or self._expander.put_off:
             if not self._queue:
                 for branch in self._expander.take_up():
                     self._push(branch)
             if self._budget.over():
                 self._out_of_time = True
+                return None
+            if effort == 0 and len(self._expander.failures) >= MOST_FAILURES:
                 return None
             branch = heapq.heappop(self._queue)[-1]
             self._expanded += 1
@@ -158,6 +163,12 @@ class TaskSearch:
                     contacts = tuple(self._contacts.get(id(link), link.contacts) for link, _ in motions)
                     return Done(branch, tuple(motions), contacts)
         return None
+
+    def _failed_at_first(self) -> list[Branch]:
+        """Return the branches that have failed since the last round, in their order, and had not failed before."""
+        failures = self._expander.failures[self._retried :]
+        self._retried = len(self._expander.failures)
+        return [branch for branch, _, _ in failures if branch.effort == 0]
 
     def _push(self, branch: Branch) -> None:
         heapq.heappush(self._queue, (-branch.done, branch.cost, next(self._numbers), branch))

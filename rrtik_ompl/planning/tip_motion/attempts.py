@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -153,8 +153,57 @@ def leanings(world: World, way: Way, q: Vector) -> Iterator[Leaning]:
 
 def attempt(world: World, way: Way, q: Vector, leaning: Leaning) -> Attempt:
     """Follow the rails from a configuration, shape (dof,), and return the part that is proven free."""
-    robot = world.robot
-    why: Callable[[], str] = str
+    traced = _traced(world.robot, way, q, leaning)
+    proof = _proof_of(world, way, traced.rows)
+    if proof is not None and not proof.proven:
+        return _proven_part(world, way, traced, proof)
+    return Attempt(traced.rows, proof, traced.fraction, traced.why)
+
+
+def complete(world: World, way: Way, q: Vector, ways_to_lean: Iterable[Leaning]) -> Attempt | None:
+    """Follow the rails to their end in the first way that is proven free; None if there is none.
+
+    This takes less time than :func:`attempt`, which also finds how far the arm comes.
+
+    Args:
+        world: Robot and scene.
+        way: Rails and conditions.
+        q: Configuration at the beginning, shape (dof,).
+        ways_to_lean: What is tried, in this order.
+    """
+    for leaning in ways_to_lean:
+        traced = _traced(world.robot, way, q, leaning)
+        if traced.fraction < 1.0:
+            continue
+        proof = _proof_of(world, way, traced.rows)
+        if proof is None or proof.proven:
+            return Attempt(traced.rows, proof, traced.fraction, traced.why)
+    return None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Traced:
+    """Configurations along rails, which nobody has checked.
+
+    Attributes:
+        rows: Configurations, shape (k, dof).
+        shares: Share of the way at each of them, shape (k,).
+        why: Tells why they end there; "" if they cover the whole way.
+    """
+
+    rows: Matrix
+    shares: Vector
+    why: Callable[[], str]
+
+    @property
+    def fraction(self) -> float:
+        """Share of the way that they cover, from 0 to 1."""
+        fraction = float(self.shares[-1])
+        return 1.0 if self.why is str and fraction >= 1.0 - SMALLEST_STEP else fraction
+
+
+def _traced(robot: Robot, way: Way, q: Vector, leaning: Leaning) -> _Traced:
+    """Follow the rails from a configuration, shape (dof,), as far as the joints can, through obstacles too."""
     parts = [robot.clamp(q)[None]]
     places = [np.zeros(1)]
     lengths = way.measures(robot)
@@ -165,31 +214,26 @@ def attempt(world: World, way: Way, q: Vector, leaning: Leaning) -> Attempt:
         places.append((lengths[:number].sum() + lengths[number] * followed.shares[1:]) / total)
         if not followed.complete:
             why = partial(why_stopped, robot, rail, followed)
-            break
-
-    # Prove the motions, and cut the path off at the first one that is not proven.
-    rows = np.concatenate(parts)
-    shares = np.concatenate(places)
-    proof = world.prover.route(rows, clearance=way.clearance_in(world)) if len(rows) > 1 else None
-    if proof is not None and not proof.proven:
-        return _proven_part(world, way, rows, shares, proof)
-
-    fraction = float(shares[-1])
-    if why is str and fraction >= 1.0 - SMALLEST_STEP:
-        fraction = 1.0
-    return Attempt(rows, proof, fraction, why)
+            return _Traced(np.concatenate(parts), np.concatenate(places), why)
+    return _Traced(np.concatenate(parts), np.concatenate(places), str)
 
 
-def _proven_part(world: World, way: Way, rows: Matrix, shares: Vector, proof: Proof) -> Attempt:
+def _proof_of(world: World, way: Way, rows: Matrix) -> Proof | None:
+    """Return the proof of configurations along the rails, which may be incomplete; None if there is one alone."""
+    return world.prover.route(rows, clearance=way.clearance_in(world)) if len(rows) > 1 else None
+
+
+def _proven_part(world: World, way: Way, traced: _Traced, proof: Proof) -> Attempt:
     """Return the part before the first place that is not proven, which is found by bisection of that motion.
 
     Args:
         world: Proves motions.
         way: Rails and conditions.
-        rows: All configurations, shape (k, dof).
-        shares: Share of the way at each of them, shape (k,).
+        traced: All configurations.
         proof: Their proof, which is incomplete.
     """
+    rows = traced.rows
+    shares = traced.shares
     gap = proof.unproven[0]
     a = rows[gap.motion]
     b = rows[gap.motion + 1]
