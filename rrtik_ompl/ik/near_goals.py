@@ -2,7 +2,7 @@
 
 This is the usual goal of the tip in a few calls of kernels: they walk there, or take all branches of a closed form, and
 sort what they find; then configurations are checked, the nearest first, until enough of them are free. The answer
-depends on the problem alone.
+depends on the problem alone. A pose may leave its turn about one axis free, which need not go through the tip.
 """
 
 from __future__ import annotations
@@ -16,24 +16,27 @@ from rrtik_ompl.base.arrays import TAU, Mask, Matrix, Vector
 from rrtik_ompl.base.kept import kept_with
 from rrtik_ompl.description.joint_weights import weights_of
 from rrtik_ompl.ik.analytic.closed_form import has_closed_form
-from rrtik_ompl.ik.kernel_tables import call_table, seeded_limb_of
+from rrtik_ompl.ik.kernel_tables import call_table, pose_numbers, seeded_limb_of, seeds_of
 from rrtik_ompl.ik.method_interface import SAME_POSTURE
 from rrtik_ompl.ik.numeric.descent import PATIENCE, STEPS
 from rrtik_ompl.ik.one_pose import solve_one_pose
 from rrtik_ompl.ik.residual import error_of_one
 from rrtik_ompl.ik.solve import SECONDS, solve_in_any_way
 from rrtik_ompl.ik.targets import goal_rows
-from rrtik_ompl.kernels.ik.ik_layout import LimbTable
+from rrtik_ompl.kernels.ik.ik_layout import FREE_TURN, POSE_NUMBERS, LimbTable
 from rrtik_ompl.kernels.ik.near_layout import CAPACITY, KERNELS, SLIDES, STARTS, NearTable
 from rrtik_ompl.kernels.simd.library import Library, library
-from rrtik_ompl.kernels.tables.memory import packed
-from rrtik_ompl.model.goal import PoseGoal, PositionGoal, Target
+from rrtik_ompl.kernels.tables.memory import packed, with_own_arrays
+from rrtik_ompl.model.goal import Goal, GoalSet, PoseGoal, PositionGoal, Target
+from rrtik_ompl.model.goal_kind import TaskRegion
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.world.problem import Problem
 
 SAME_PLACE = 0.01  # [rad] or [m] of a joint: of nearer ones that slide the nearest to the start is kept
 APART = 0.02  # [rad] or [m] of a joint by which those that slide are apart: each is searched to
 AT_ONCE = 16  # configurations that are checked together
+TURNS = 3  # coordinates of a region from which on they are angles
+HERE = np.eye(4)
 
 
 def near_goals(problem: Problem, most: int) -> Matrix | None:
@@ -50,13 +53,13 @@ def near_goals(problem: Problem, most: int) -> Matrix | None:
         know, so that it has to be searched.
     """
     robot = problem.robot
-    goal = problem.goal
-    arm = _arm_of(robot) if looked_for(problem) else None
-    if arm is None or not isinstance(goal, (PoseGoal, PositionGoal)):
+    aim = None if problem.constraints else _aim_of(problem.goal)
+    arm = _arm_of(robot)
+    if arm is None or aim is None:
         return None
 
     branches: Matrix | None = None
-    if goal.oriented and has_closed_form(robot):
+    if isinstance(problem.goal, PoseGoal) and has_closed_form(robot):
         branches = _free_branches(problem)
         if branches is None:
             return None
@@ -65,7 +68,7 @@ def near_goals(problem: Problem, most: int) -> Matrix | None:
     except IndexError:  # none was made yet, or all are in use
         search = _Search(arm)
     if branches is None:
-        found = search.walked(goal, problem.start, most, problem.world.checks.free)
+        found = search.walked(aim, problem.start, most, problem.world.checks.free)
     else:
         found = search.turned(branches, problem.start, most)
     arm.spare.append(search)
@@ -74,8 +77,7 @@ def near_goals(problem: Problem, most: int) -> Matrix | None:
 
 def looked_for(problem: Problem) -> bool:
     """Check whether :func:`near_goals` looks for configurations at the goal of a problem."""
-    of_the_tip = isinstance(problem.goal, (PoseGoal, PositionGoal)) and not problem.constraints
-    return of_the_tip and _arm_of(problem.robot) is not None
+    return not problem.constraints and _aim_of(problem.goal) is not None and _arm_of(problem.robot) is not None
 
 
 def starts_at_goal(problem: Problem) -> bool:
@@ -85,6 +87,41 @@ def starts_at_goal(problem: Problem) -> bool:
         return problem.reached(problem.start)
     distance, angle = error_of_one(problem.robot, goal, problem.start)
     return distance <= goal.tolerances[0] and angle <= goal.tolerances[1]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Aim:
+    """A goal as kernels know it.
+
+    Attributes:
+        row: The goal of a frame that is rigidly joined to the tip, shape (18,), see `rrtik_ompl.ik.targets`.
+        frame: T_tip_frame, shape (4, 4); None for the tip itself.
+        counts: How many of the six coordinates of the frame take a joint. A turn that is free saves two, as five joints
+            that point a tool straight down can turn about it.
+    """
+
+    row: Vector
+    frame: Matrix | None
+    counts: int
+
+
+def _aim_of(goal: Goal) -> _Aim | None:
+    """Return a goal as kernels know it; None for one of another kind, such as a region with ranges."""
+    if isinstance(goal, (PoseGoal, PositionGoal)):
+        return _Aim(goal_rows(goal)[0], None, 6 if goal.oriented else 3)
+    if isinstance(goal, GoalSet) and len(goal.members) == 1 and isinstance(goal.members[0], PoseGoal):
+        turns = goal.free_rotation_axis is not None
+        return _Aim(goal_rows(goal)[0], None, 6 - 2 * turns - int(np.count_nonzero(goal.box)))
+    if not isinstance(goal, TaskRegion):
+        return None
+
+    # The frame is that of the region, displaced: what is left free is a whole turn about one of its axes.
+    (places,) = np.nonzero(goal.bounds.any(axis=1))
+    if len(places) != 1 or places[0] < TURNS or np.ptp(goal.bounds[places[0]]) < TAU:
+        return None
+    row = goal_rows(PoseGoal(goal.T_world_w, *goal.tolerances))[0]
+    row[FREE_TURN] = places[0] - TURNS
+    return _Aim(row, goal.T_w_tip.inverse().homogeneous, 4)
 
 
 def _free_branches(problem: Problem) -> Matrix | None:
@@ -128,10 +165,13 @@ class _Search:
         robot = arm.robot
         turning = robot.chain.whole_turns() & ~robot.continuous & (robot.upper - robot.lower >= TAU)
         self._kernels = arm.kernels
+        self._arm = arm
         self._dof = robot.dof
+        self._frame = HERE  # T_tip_frame: what is brought to the goal
+        self._limb = with_own_arrays(arm.limb, fixed=arm.limb.fixed, seed_tips=arm.limb.seed_tips)
         self._table = table = packed(
             NearTable,
-            limb=arm.limb,
+            limb=self._limb,
             walk=call_table(arm.limb, STEPS, PATIENCE, STARTS),
             posture=np.zeros(robot.dof),
             weights=np.array(weights_of(robot) if robot.joint_weights else np.ones(robot.dof)),
@@ -144,21 +184,20 @@ class _Search:
         )
         self._rows: Matrix = table.rows.reshape(CAPACITY, robot.dof)
 
-    def walked(
-        self, goal: PoseGoal | PositionGoal, posture: Vector, most: int, free: Callable[[Matrix], Mask]
-    ) -> Matrix:
+    def walked(self, aim: _Aim, posture: Vector, most: int, free: Callable[[Matrix], Mask]) -> Matrix:
         """Return free configurations at a goal, the nearest to a posture first, at most so many, shape (k, dof).
 
         Args:
-            goal: The goal.
+            aim: The goal.
             posture: Shape (dof,).
             most: How many.
             free: Tells which rows, shape (m, dof), are free.
         """
         table = self._table
         table.posture[:] = posture
-        table.walk.aims[:] = goal_rows(goal)[0]
-        slides = self._dof > (6 if goal.oriented else 3)
+        table.walk.aims[:] = aim.row
+        self._bring(HERE if aim.frame is None else aim.frame)
+        slides = self._dof > aim.counts
         table.put(slides=SLIDES * slides, least=SAME_PLACE if slides else SAME_POSTURE)
         table.apart = APART if slides else SAME_POSTURE
 
@@ -171,6 +210,18 @@ class _Search:
             if chosen == most:
                 break
         return self._chosen(chosen)
+
+    def _bring(self, frame: Matrix) -> None:
+        """Have a frame brought to the goal; T_tip_frame, shape (4, 4)."""
+        if (frame == self._frame).all():
+            return
+        self._frame = frame
+        last = self._arm.limb.fixed[-POSE_NUMBERS:]
+        tip = np.eye(4)
+        tip[:3, :3] = last[:9].reshape(3, 3)
+        tip[:3, 3] = last[9:]
+        self._limb.fixed[-POSE_NUMBERS:] = pose_numbers((tip @ frame)[None])[0]
+        self._limb.seed_tips[:] = pose_numbers(seeds_of(self._arm.robot).tips @ frame).ravel()
 
     def turned(self, rows: Matrix, posture: Vector, most: int) -> Matrix:
         """Return the nearest to a posture of some free configurations and of those a full turn of a joint away.

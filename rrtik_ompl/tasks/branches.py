@@ -16,7 +16,7 @@ from rrtik_ompl.description.joint_weights import weighted_difference
 from rrtik_ompl.ik.goal_configurations import GoalSearch
 from rrtik_ompl.ik.method_interface import SAME_POSTURE
 from rrtik_ompl.ik.near_goals import looked_for, near_goals
-from rrtik_ompl.model.goal import PoseGoal, Target
+from rrtik_ompl.model.goal import PoseGoal, TipGoal
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import Touching
@@ -250,7 +250,7 @@ class Expander:
     def _known_problem(self, q: Vector, setting: Setting, stage: MoveTo) -> Problem | None:
         """Return the problem of a goal of the tip without constraints, if its start is proven free."""
         world = setting.world
-        if not isinstance(stage.goal, Target) or stage.constraints or world.constraints is not None:
+        if not isinstance(stage.goal, TipGoal) or stage.constraints or world.constraints is not None:
             return None
         return known_problem(world, q, stage.goal) if world.motion_proven(q, q) else None
 

@@ -91,10 +91,36 @@ def test_configurations_that_collide_are_passed_over():
     assert distances(blocked, rows)[0] > distances(problem, nearest[None])[0]
 
 
+@pytest.mark.parametrize("arm", ["so101", "panda", "ur5"])
+@pytest.mark.parametrize("line", [True, False])
+def test_a_turn_may_be_free_about_the_tip_or_about_a_line_beside_it(arm, line):
+    robot = rrtik.load_robot(arm)
+    start = np.clip(0.3, robot.lower, robot.upper)
+    world = rrtik.World(robot)
+    tip = rrtik.pose([0.2 if arm == "so101" else 0.4, 0.1, 0.06], rpy=[np.pi, 0.0, -0.5])
+    beside = tip.translation - np.array([0.02, 0.0, 0.0])
+    free = rrtik.TaskRegion.about_axis(tip, [0.0, 0.0, 1.0], through=beside) if line else rrtik.GoalSet([tip], "z")
+
+    problem = rrtik.Problem(world, start, free)
+    full = rrtik.Problem(world, start, rrtik.PoseGoal(tip))
+    at_tip = near_goals(full, MOST)
+    rows = near_goals(problem, MOST)
+    assert free.satisfied(robot, rows).all()
+    assert world.certify(rows).all()
+    away = distances(problem, rows)
+    assert (np.diff(away) >= -1e-9).all()
+    assert away[0] <= 1.02 * distances(problem, GoalSearch(problem, 1).first()).min()
+    assert away[0] <= distances(full, at_tip)[0] + 1e-6
+    np.testing.assert_array_equal(near_goals(full, MOST), at_tip)  # no goal leaves anything to the next one
+    np.testing.assert_array_equal(near_goals(problem, MOST), rows)
+
+
 def test_what_the_kernels_do_not_know_is_left_to_the_search():
     problem = to_pose("panda_shelf")
-    free_turn = rrtik.TaskRegion.about_axis(problem.goal.pose, [0, 0, 1])
-    assert near_goals(rrtik.Problem(problem.world, problem.start, free_turn), MOST) is None
+    half_turn = rrtik.TaskRegion.about_axis(problem.goal.pose, [0, 0, 1], turn=[-1.5, 1.5])
+    assert near_goals(rrtik.Problem(problem.world, problem.start, half_turn), MOST) is None
+    sliding = rrtik.TaskRegion.about_axis(problem.goal.pose, [0, 0, 1], slide=[-0.1, 0.1])
+    assert near_goals(rrtik.Problem(problem.world, problem.start, sliding), MOST) is None
     out_of_reach = rrtik.Problem(problem.world, problem.start, rrtik.PoseGoal(rrtik.pose([9.0, 0.0, 0.0])))
     assert near_goals(out_of_reach, MOST) is None
 
