@@ -94,18 +94,21 @@ def holds(problem: rrtik.Problem, tick: Tick, step: float) -> bool:
     inside = (in_reach[:, None] >= proof.lower) & (in_reach[:, None] <= proof.upper)
     covered = bool(inside.all(axis=2).any(axis=1).all())
 
+    # Where the arm is at the time of each box, on its motion to the centre.
+    shares = proof.seconds * scenes.RATE
+    on_the_way = tick.q + shares[:, None] * (0.5 * (proof.lower + proof.upper) - tick.q)
+    elsewhere = shares * (0.5 * (proof.upper - proof.lower) @ problem.world.weights)
+
     scene = problem.world.scene.at(tick.time)
     bodies = arranged(problem.robot, scene, 0.0).bodies.as_tuple
-    centres = 0.5 * (proof.lower + proof.upper)
-    frames = problem.robot.joint_frames(centres)
-    half_ways = 0.5 * (proof.upper - proof.lower) @ problem.world.weights
+    frames = problem.robot.joint_frames(on_the_way)
     for number, (link, obstacle) in enumerate(proof.pairs):
         own, other = (next(body for body in bodies if body.name == name) for name in (link, obstacle))
         poses = frames[number, own.joint] @ own.placement.homogeneous, other.placement.homogeneous
         places = [coal.Transform3s(pose[:3, :3], pose[:3, 3]) for pose in poses]
         solids = own.geometry, places[0], other.geometry, places[1]
         distance = coal.distance(*solids, coal.DistanceRequest(), coal.DistanceResult())
-        if distance + half_ways[number] > BOUND * proof.seconds + ROUNDING:
+        if distance + elsewhere[number] > BOUND * proof.seconds[number] + ROUNDING:
             return False
     return covered
 
@@ -121,11 +124,11 @@ def main(
     found: list[Outcome] = parts(outcome, [(seed,) for seed in range(runs)])
 
     touched = [each for each in found if each.contacts]
-    unannounced = sum(not any(k <= each.contacts[0] for k in each.lost) for each in touched)
+    unannounced = sum(not set(each.contacts) <= set(each.lost) for each in touched)
     in_safe_ticks = sum(len(set(each.contacts) - set(each.unsafe)) for each in found)
     enough = "" if runs >= 3000 else " (fewer than 3,000 runs)"
     report.bar(
-        "runs with contact that was not proven unavoidable beforehand", "0 of 3,000",
+        "runs with contact in a tick that did not begin with its proof", "0 of 3,000",
         f"{unannounced} of {runs}{enough}", unannounced == 0 and not enough,
     )  # fmt: skip
     report.bar("ticks with contact among those called safe", "0",

@@ -19,14 +19,20 @@ from rrtik_ompl.model.scene import Scene, pairs_that_may_touch
 from rrtik_ompl.model.shapes.shape import same_but_for_points
 from rrtik_ompl.replanning.evading import evasion
 from rrtik_ompl.replanning.faults import UNFORESEEN, Fault, FaultKind, FeedWarning, SceneMemory
-from rrtik_ompl.replanning.feed import SILENCE_SECONDS, Snapshot, Watch
+from rrtik_ompl.replanning.feed import SILENCE_SECONDS, TIME_RESOLUTION, Snapshot, Watch
 from rrtik_ompl.replanning.record import ReplanRun, joints_of
-from rrtik_ompl.replanning.refuge import SPARE, Guard, ticks_of
+from rrtik_ompl.replanning.refuge import SPARE, Guard, Refuge, ticks_of
 from rrtik_ompl.replanning.settings import PREDICTED_PLACES, ReplanSettings, make_planner
 from rrtik_ompl.replanning.start_and_goals import GoalFeed, check_start, every_goal, goal_now, held_pairs, sampling_box
 from rrtik_ompl.replanning.tick import Tick
-from rrtik_ompl.replanning.travels import MotionTracker, Travels, refuse_endless_turns, required_distances
-from rrtik_ompl.replanning.unavoidable import ContactWarning, Unavoidable, unavoidable
+from rrtik_ompl.replanning.travels import (
+    SPEED_WARNING_RATIO,
+    MotionTracker,
+    Travels,
+    refuse_endless_turns,
+    required_distances,
+)
+from rrtik_ompl.replanning.unavoidable import ROUNDING, ContactWarning, Reach, Unavoidable, way_out
 from rrtik_ompl.world.clearances import CLEARANCE
 from rrtik_ompl.world.moving_world import MovingWorld, check_held
 from rrtik_ompl.world.problem import Problem
@@ -34,8 +40,8 @@ from rrtik_ompl.world.world import World
 
 Clock = Callable[[], float]
 
+TOO_NEAR = "an obstacle is too near"
 NO_WAY_OUT = "no motion was found that nothing can reach in time"
-PROOF_SHARES = (1.0, 0.5, 0.25, 0.125)  # of a tick, by whose end a contact may be proven unavoidable
 PROOF_TRIES = 3  # searches for a path that is proven
 REACTION_TICKS = 6  # The arm evades a cloud that would be too near within so many ticks at its present speed.
 
@@ -191,10 +197,10 @@ class Loop:
             event, reason, q_after = self._early_evasion() or (self._go(event) if free else self._wait_or_evade())
             self._distance_left_before = self._distance_left(q_after)
         else:
-            event, reason, q_after, safe_seconds = self._guarded(self._guard, event, free)
-            if safe_seconds < self._settings.tick - SPARE:
-                lost = self._unavoidable(now)
-                reason = NO_WAY_OUT if lost is None else lost.sentence
+            event, reason, q_after, safe_seconds, lost = self._guarded(self._guard, event, free)
+            if lost is not None and not self._has_warned:
+                self._has_warned = True
+                warnings.warn(ContactWarning(f"at {now:.3g} s {lost.sentence}"), stacklevel=4)
 
         path = self._planner.path
         moves = (q_after != q_before).any()
@@ -471,7 +477,9 @@ class Loop:
             return np.nan
         return float(self._world_ahead(0).clearance(q[None])[0]) - self._required
 
-    def _guarded(self, guard: Guard, event: TickEvent, free: bool) -> tuple[TickEvent, str, Vector, float]:
+    def _guarded(
+        self, guard: Guard, event: TickEvent, free: bool
+    ) -> tuple[TickEvent, str, Vector, float, Unavoidable | None]:
         """Go along the path if a way out is left then, or else where nothing can reach the arm for the longest time.
 
         While the scene is old, only proven steps are made along the path.
@@ -482,45 +490,54 @@ class Loop:
             free: Whether the path is free.
 
         Returns:
-            Event, reason, next configuration, shape (n,), and how long the arm is safe [s].
+            Event, reason, next configuration, shape (n,), how long the arm is safe [s], and the proof that no motion
+            rules out a contact, or None.
         """
-        if self._world.blocked:
-            return "wait", self._world.blocked, self.q, 0.0
-        base_is_safe = self._world.base_apart(self._possible_travels or {})
-
+        base_is_safe = not self._world.blocked and self._world.base_apart(self._possible_travels or {})
         path = self._planner.path
-        if free:
+        if free and not self._world.blocked:
             q, passed = self._next_on_path()
             leaves_way_out = q is not self.q and guard.seconds_after(self.q, q, path) >= guard.needed
             if leaves_way_out and not (self._scene_is_old and not self._proven_whatever_moves(self.q, q)):
                 self._planner.advance(q, passed, self._world)
-                return event, "", q, guard.needed * base_is_safe
+                return event, "", q, guard.needed * base_is_safe, None
 
-        refuge = guard.refuge(self.q, path, self._world_ahead)
+        if self._world.blocked:
+            refuge = Refuge(self.q, 0.0, moves=False)
+            reason = self._world.blocked
+        else:
+            refuge = guard.refuge(self.q, path, self._world_ahead)
+            reason = TOO_NEAR if refuge.moves else self._why_stay(free)
+
+        lost: Unavoidable | None = None
+        if refuge.seconds * base_is_safe < self._settings.tick - SPARE:
+            found = self._way_out()
+            reason = NO_WAY_OUT
+            if isinstance(found, Unavoidable):
+                lost = found
+                reason = lost.sentence
+            elif found is not None:
+                refuge = Refuge(found, self._settings.tick, moves=bool((found != self.q).any()))
+                reason = TOO_NEAR
+
         if refuge.moves:
             self._planner.rejoin(refuge.q)
-            return "evade", "an obstacle is too near", refuge.q, refuge.seconds * base_is_safe
-        return "wait", self._why_stay(free), self.q, refuge.seconds * base_is_safe
+        return "evade" if refuge.moves else "wait", reason, refuge.q, refuge.seconds * base_is_safe, lost
 
-    def _unavoidable(self, now: float) -> Unavoidable | None:
-        """Return a proof that no motion of the arm rules out a contact in this tick, or None; warn of the first one."""
+    def _way_out(self) -> Vector | Unavoidable | None:
+        """Return the end of a motion on which nothing can touch the arm in this tick, or a proof that there is none."""
         settings = self._settings
+        after = self._possible_travels or {}
+        way = settings.tick * (settings.speed_bound or 0.0)  # of an obstacle in a tick [m]
+        before = {name: max(travel - way, 0.0) for name, travel in after.items()}
         world = self._problem.world.with_accuracy("exact").with_scene(self._world.scene)
-        travels = self._possible_travels or {}
-        lost: Unavoidable | None = None
-        for share in PROOF_SHARES:
-            later = (1.0 - share) * settings.tick * (settings.speed_bound or 0.0)  # what obstacles do after it [m]
-            growths = {name: max(travel - later, 0.0) for name, travel in travels.items()}
-            lost = unavoidable(
-                world, self.q, growths, share * settings.tick, step=share * settings.step,
-                max_change=share * self._max_change,
-            )  # fmt: skip
-            if lost is not None:
-                break
-        if lost is not None and not self._has_warned:
-            self._has_warned = True
-            warnings.warn(ContactWarning(f"at {now:.3g} s {lost.sentence}"), stacklevel=6)
-        return lost
+        reach = Reach(world, self.q, settings.step, self._max_change, settings.tick, before, after)
+
+        # What is no faster than the bound but for rounding is not called faster.
+        spare = ROUNDING + (SPEED_WARNING_RATIO - 1.0) * max(after.values(), default=0.0)
+        spare += SPEED_WARNING_RATIO * TIME_RESOLUTION * (settings.speed_bound or 0.0)
+        alone = self._world_of_arm
+        return way_out(reach, lambda q: alone.motion_valid(self.q, q), spare)
 
     def _why_stay(self, free: bool) -> str:
         """Return why the robot does not go along a path."""
@@ -546,8 +563,8 @@ class Loop:
 
         q = self._evasion()
         if q is None:
-            return "wait", "an obstacle is too near, and every escape is blocked", self.q
-        return "evade", "an obstacle is too near", q
+            return "wait", f"{TOO_NEAR}, and every escape is blocked", self.q
+        return "evade", TOO_NEAR, q
 
     def _why_no_path(self) -> str:
         """Return why the last search has found no path."""

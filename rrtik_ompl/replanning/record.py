@@ -475,16 +475,18 @@ def _tick_data(tick: Tick) -> dict[str, Any]:
 
 def _unavoidable_data(lost: Unavoidable) -> dict[str, Any]:
     boxes = {"lower": lost.lower.tolist(), "upper": lost.upper.tolist()}
-    return {"seconds": lost.seconds, **boxes, "pairs": lost.pairs, "distances": lost.distances.tolist()}
+    numbers = {"seconds": lost.seconds.tolist(), "distances": lost.distances.tolist()}
+    return {**boxes, "pairs": lost.pairs, **numbers}
 
 
 def _unavoidable(entry: Mapping[str, Any], joints: int) -> Unavoidable:
     distances = finite_array(entry["distances"], (None,), "distances of a contact that cannot be avoided")
     lower, upper = (finite_array(entry[side], (len(distances), joints), f"{side} corners") for side in _SIDES)
+    seconds = finite_array(entry["seconds"], (len(distances),), "seconds of a contact that cannot be avoided")
     pairs = tuple((str(link), str(obstacle)) for link, obstacle in entry["pairs"])
     if len(pairs) != len(distances):
         raise InputError(f"pairs: expected {len(distances)}, one for each box, got {len(pairs)}")
-    return Unavoidable(positive(entry["seconds"], "seconds"), lower, upper, pairs, distances)
+    return Unavoidable(lower, upper, seconds, pairs, distances)
 
 
 def _tick(entry: Mapping[str, Any], joints: int) -> Tick:

@@ -20,6 +20,7 @@ from rrtik_ompl.replanning.evading import directions
 from rrtik_ompl.replanning.feed import TIME_RESOLUTION
 from rrtik_ompl.replanning.settings import ReplanSettings
 from rrtik_ompl.replanning.travels import SPEED_WARNING_RATIO
+from rrtik_ompl.replanning.unavoidable import kept
 from rrtik_ompl.world.moving_world import MovingWorld
 from rrtik_ompl.world.world import World
 
@@ -194,7 +195,7 @@ class Guard:
                 room = world.clearance(ways.reshape(-1, joints)).reshape(count, -1)
                 growth = self._speed * self._tick * looks if moving else np.zeros_like(looks)
                 for k, keep in enumerate((self._keep, 0.0)):
-                    safe[:, :-1, k] &= _kept(room, travels, keep + growth)
+                    safe[:, :-1, k] &= kept(room, travels, keep + growth)
         return np.asarray(self._tick * looks[safe.argmin(axis=1)])
 
     def _out_of_reach(self, q: Vector, ends: Matrix) -> Mask:
@@ -249,26 +250,6 @@ def ticks_of(edges: Matrix, step: float, max_change: Vector) -> Vector:
     with np.errstate(divide="ignore", invalid="ignore"):
         rates = np.where(edges == 0.0, 0.0, np.abs(edges) / max_change)
     return np.asarray(np.maximum(np.linalg.norm(edges, axis=1) / step, rates.max(axis=1)))
-
-
-def _kept(room: Matrix, travels: Matrix, growth: Vector) -> Mask:
-    """Return in which pieces of motions there is always more room than obstacles have grown, shape (m, k - 1).
-
-    From one end of a piece to the other no point of the arm goes farther than ``travels``. So the room in between is at
-    least the larger of two lines that fall from the ends inwards; beside the growth it is least where they meet, or at
-    the end.
-
-    Args:
-        room: Lower bounds of the distance to obstacles at the ends of the pieces [m], shape (m, k).
-        travels: Bounds of the motion in each piece [m], shape (m, k - 1).
-        growth: How much obstacles have grown at the ends [m], increasing, shape (k,).
-    """
-    first, last = room[:, :-1], room[:, 1:]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        meeting = np.clip(np.where(travels > 0.0, 0.5 + 0.5 * (first - last) / travels, 1.0), 0.0, 1.0)
-        least = np.where(travels > 0.0, 0.5 * (first + last - travels), last)
-    grown = growth[:-1] + meeting * np.diff(growth)
-    return np.asarray((first > growth[:-1]) & (last > growth[1:]) & (least > grown))
 
 
 def _part_of(scene: Scene, names: frozenset[str]) -> Scene:

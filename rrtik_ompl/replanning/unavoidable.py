@@ -1,27 +1,32 @@
-"""Proof that no motion of the arm rules out a contact: whatever it does, some obstacle can touch it in time.
+"""A way out of a tick, or a proof that there is none: whatever the arm does, some obstacle can touch it in the tick.
 
-The configurations that the arm can reach by a time are covered by boxes. In each box one obstacle, grown by what the
-bound on its speed allows until then, touches one link in all configurations: at the centre of the box it is nearer than
-its growth, by more than any point of the arm moves within the box. A link that never moves is one such link everywhere.
-docs/science/evasion.md has the theorem.
+In a tick the arm goes straight, at one speed. So a motion is the configuration where it ends, and boxes cover all of
+these. In each box one obstacle, grown by what the bound on its speed allows until some time of the tick, touches one
+link on all motions that end there: at this time of the motion to the box's centre it is nearer than its growth, by more
+than any point of the arm is elsewhere then on another of these motions. Boxes of which this cannot be said are halved,
+until the motion to the centre of one of them keeps apart from all obstacles, which is a way out, or until none is left.
+A link that never moves is touched on all motions. docs/science/evasion.md has the theorem.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.base.arrays import Mask, Matrix, Vector
 from rrtik_ompl.base.copies import as_value
 from rrtik_ompl.geometry.collision.distances import measured
 from rrtik_ompl.model.judgement import Contact
 from rrtik_ompl.world.world import World
 
-MOST_BOXES = 4096  # after which a proof is given up, for an arm of few joints
+MOST_BOXES = 4096  # after which the search is given up, for an arm of few joints
 MANY_JOINTS = 4
 FEW_BOXES = 64  # the same for an arm of so many joints or more, whose boxes are too many to be cut small
+FIRST_LOOKS = 4  # parts of a motion at whose ends it is looked at; twice as many where boxes are half as wide
+MOST_HALVINGS = 9  # of parts of a motion that is to be proven
 ROUNDING = 1e-6  # [m] of distances
 
 
@@ -34,16 +39,16 @@ class Unavoidable:
     """A proof that contact cannot be ruled out in a tick, for each motion that the arm could make.
 
     Attributes:
-        seconds: Time from the begin of the tick by which an obstacle can touch the arm [s].
-        lower, upper: Corners of boxes that cover all configurations which the arm can reach by then, shape (k, n).
-        pairs: For each box a link and an obstacle that can touch it by then, wherever in the box the arm is.
-        distances: For each box the distance of this obstacle, where it was seen, from the link at the centre [m], shape
-            (k,).
+        lower, upper: Corners of boxes that cover all configurations that the arm can reach in the tick, shape (k, n).
+        seconds: For each box a time of the tick, from its begin [s], shape (k,).
+        pairs: For each box a link and an obstacle that can touch it by then, wherever in the box the motion ends.
+        distances: For each box the distance of this obstacle, where it was seen, from the link at that time of the
+            motion to the centre [m], shape (k,).
     """
 
-    seconds: float
     lower: Matrix
     upper: Matrix
+    seconds: Vector
     pairs: tuple[tuple[str, str], ...]
     distances: Vector
 
@@ -53,86 +58,177 @@ class Unavoidable:
     def sentence(self) -> str:
         """What is proven, in one line."""
         names = ", ".join(f"'{name}'" for name in dict.fromkeys(obstacle for _, obstacle in self.pairs))
-        return f"no motion of the arm rules out a contact with {names} within {self.seconds:.3g} s, which is proven"
+        seconds = self.seconds.max()
+        return f"no motion of the arm rules out a contact with {names} within {seconds:.3g} s, which is proven"
 
 
-def unavoidable(
-    world: World, q: Vector, growths: Mapping[str, float], seconds: float, *, step: float, max_change: Vector
-) -> Unavoidable | None:
-    """Return a proof that the arm cannot rule out a contact by a time, or None if none was found.
+@dataclass(frozen=True, eq=False)
+class Reach:
+    """What the arm and the obstacles can reach in a tick.
+
+    Attributes:
+        world: The robot and the obstacles where they were seen.
+        q: The robot's configuration at the begin of the tick, shape (n,).
+        step: How far the arm can go in the tick [unit of the space].
+        max_change: How far each joint can move in it [rad or m], shape (n,).
+        seconds: Length of the tick [s].
+        before, after: How far each obstacle may be from where it was seen at the begin of the tick and at its end [m],
+            by name.
+    """
+
+    world: World
+    q: Vector
+    step: float
+    max_change: Vector
+    seconds: float
+    before: Mapping[str, float]
+    after: Mapping[str, float]
+
+    @cached_property
+    def ends(self) -> tuple[Vector, Vector]:
+        """The corners of a box around all configurations that the arm can reach, shapes (n,)."""
+        change = np.minimum(self.max_change, self.step)
+        robot = self.world.robot
+        return np.maximum(self.q - change, robot.lower), np.minimum(self.q + change, robot.upper)
+
+    @cached_property
+    def pairs(self) -> tuple[tuple[str, str], ...]:
+        """The links that move, each with an obstacle that it must not touch."""
+        named = (_link_first(*pair, self.after) for pair in self.world.distances(self.q).names)
+        return tuple(pair for pair in named if pair[1] in self.after)
+
+    def distances(self, rows: Matrix) -> Matrix:
+        """Return the distances of the pairs at configurations, shape (m, n), or lower bounds of them [m], (m, p)."""
+        lower, upper = self.ends
+        of_interest = max(self.after.values()) + float((upper - lower) @ self.world.weights)
+        return self.world.distances(rows, self.pairs, within=of_interest).values
+
+    def growths(self, shares: Vector) -> Matrix:
+        """Return how far the obstacles of the pairs may have gone at shares of the tick, shape (k,) [m], (k, p)."""
+        before, after = (np.array([way[obstacle] for _, obstacle in self.pairs]) for way in (self.before, self.after))
+        return np.asarray(before + shares[:, None] * (after - before))
+
+    def keeps_apart(self, end: Vector, spare: float) -> bool:
+        """Check whether nothing can reach the arm on its motion to ``end``, shape (n,), with ``spare`` left [m]."""
+        shares = np.linspace(0.0, 1.0, FIRST_LOOKS + 1)
+        way = float(np.abs(end - self.q) @ self.world.weights)
+        for _ in range(MOST_HALVINGS):
+            room = self.distances(self.q + shares[:, None] * (end - self.q)).T
+            growth = self.growths(shares).T + spare
+            if (room <= growth).any():
+                return False
+            doubtful = ~kept(room, way * np.diff(shares), growth).all(axis=0)
+            if not doubtful.any():
+                return True
+            middles = 0.5 * (shares[1:] + shares[:-1])
+            shares = np.sort(np.append(shares, middles[doubtful]))
+        return False
+
+
+def way_out(reach: Reach, may_go: Callable[[Vector], bool], spare: float) -> Vector | Unavoidable | None:
+    """Return the end of a motion of a tick on which nothing can touch the arm, or a proof that there is none.
 
     Args:
-        world: The robot and the obstacles where they were seen.
-        q: The robot's configuration, shape (n,).
-        growths: How far each obstacle may be from there by that time [m], by name.
-        seconds: The time, from now [s].
-        step: How far the arm can go until then [unit of the space].
-        max_change: How far each joint can move until then [rad or m], shape (n,).
-    """
-    robot = world.robot
-    change = np.minimum(max_change, step)
-    lower = np.maximum(q - change, robot.lower)[None]
-    upper = np.minimum(q + change, robot.upper)[None]
-    if (base := _base_touched(world, q, growths)) is not None:
-        return Unavoidable(seconds, lower, upper, (base[0],), np.array([base[1]]))
+        reach: What arm and obstacles can reach.
+        may_go: Says of a configuration, shape (n,), whether the motion to it is free but for what may move.
+        spare: Room that the motion has to leave [m], which accounts for rounding.
 
-    proven: list[tuple[Vector, Vector, tuple[str, str], float]] = []
+    Returns:
+        Where the motion ends, shape (n,); the proof; or None if neither was found.
+    """
+    q = reach.q
+    weights = reach.world.weights
+    lower, upper = (corner[None] for corner in reach.ends)
+    if (base := _base_touched(reach)) is not None:
+        return Unavoidable(lower, upper, np.array([reach.seconds]), (base[0],), np.array([base[1]]))
+    if not reach.pairs:
+        return None
+
+    proven: list[tuple[Vector, Vector, float, tuple[str, str], float]] = []
     asked = 0
+    widest = float((upper - lower)[0] @ weights)
     while len(lower) > 0:
         asked += len(lower)
-        if asked > (MOST_BOXES if robot.dof < MANY_JOINTS else FEW_BOXES):
+        if asked > (MOST_BOXES if len(q) < MANY_JOINTS else FEW_BOXES):
             return None
-        centres = 0.5 * (lower + upper)
-        pairs, distances, beside = _nearest(world, centres, growths)
-        touched = beside + 0.5 * (upper - lower) @ world.weights < -ROUNDING
-        proven += [(lower[k], upper[k], pairs[k], float(distances[k])) for k in np.flatnonzero(touched).tolist()]
 
-        # A centre that the arm can reach and no obstacle can ends the search: there is no proof.
-        if ((np.linalg.norm(centres - q, axis=1) <= step) & (beside > 0.0)).any():
-            return None
-        lower, upper = _halves(lower[~touched], upper[~touched], world.weights)
-        within = np.linalg.norm(np.clip(q, lower, upper) - q, axis=1) <= step
+        wide = float((upper - lower)[0] @ weights)
+        shares = np.linspace(0.0, 1.0, FIRST_LOOKS * round(widest / wide) + 1)
+        centres = 0.5 * (lower + upper)
+        rows = q + shares[:, None] * (centres - q)[:, None, :]
+        distances = reach.distances(rows.reshape(-1, len(q))).reshape(len(centres), len(shares), -1)
+        beside = distances - reach.growths(shares)
+        least = beside.min(axis=2)
+
+        room = np.where(_in_reach(reach, centres), least.min(axis=1), -np.inf)
+        best = int(room.argmax())
+        if room[best] > 0.0 and reach.keeps_apart(centres[best], spare) and may_go(centres[best]):
+            return np.asarray(centres[best])
+
+        elsewhere = shares * (0.5 * (upper - lower) @ weights)[:, None]
+        looked = (least + elsewhere).argmin(axis=1)
+        at = np.arange(len(centres)), looked
+        touched = (least + elsewhere)[at] < -ROUNDING
+        pair = beside[at].argmin(axis=1)
+        for k in np.flatnonzero(touched).tolist():
+            distance = float(distances[k, looked[k], pair[k]])
+            proven.append((lower[k], upper[k], reach.seconds * shares[looked[k]], reach.pairs[pair[k]], distance))
+
+        lower, upper = _halves(lower[~touched], upper[~touched], weights)
+        within = _in_reach(reach, np.clip(q, lower, upper))
         lower, upper = lower[within], upper[within]
 
-    lows, highs, touching, near = zip(*proven, strict=True)
-    return Unavoidable(seconds, np.array(lows), np.array(highs), tuple(touching), np.array(near))
+    lows, highs, seconds, pairs, near = zip(*proven, strict=True)
+    return Unavoidable(np.array(lows), np.array(highs), np.array(seconds), pairs, np.array(near))
 
 
-def _base_touched(world: World, q: Vector, growths: Mapping[str, float]) -> tuple[tuple[str, str], float] | None:
+def kept(room: Matrix, travels: Matrix, growth: Matrix) -> Mask:
+    """Return in which pieces of motions there is always more room than obstacles have grown, shape (m, k - 1).
+
+    From one end of a piece to the other no point of the arm goes farther than ``travels``. So the room in between is at
+    least the larger of two lines that fall from the ends inwards; beside the growth it is least where they meet, or at
+    the end.
+
+    Args:
+        room: Lower bounds of the distance to obstacles at the ends of the pieces [m], shape (m, k).
+        travels: Bounds of the motion in each piece [m], shape (m, k - 1) or (k - 1,).
+        growth: How much obstacles have grown at the ends [m], increasing, shape (m, k) or (k,).
+    """
+    first, last = room[:, :-1], room[:, 1:]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        meeting = np.clip(np.where(travels > 0.0, 0.5 + 0.5 * (first - last) / travels, 1.0), 0.0, 1.0)
+        least = np.where(travels > 0.0, 0.5 * (first + last - travels), last)
+    grown = growth[..., :-1] + meeting * np.diff(growth)
+    return np.asarray((first > growth[..., :-1]) & (last > growth[..., 1:]) & (least > grown))
+
+
+def _in_reach(reach: Reach, rows: Matrix) -> Mask:
+    """Return which configurations, shape (m, n), are within a step, shape (m,)."""
+    return np.asarray(np.linalg.norm(rows - reach.q, axis=1) <= reach.step)
+
+
+def _base_touched(reach: Reach) -> tuple[tuple[str, str], float] | None:
     """Return a link that never moves and an obstacle that can touch it, with their distance [m]; None without any.
 
     Coal measures these few pairs: to pack a new scene for kernels would take far longer.
     """
+    world = reach.world
     bodies = world.bodies
     pairs_at_rest = [pair for pair in world.pairs if all(bodies[k].joint == 0 for k in pair)]
-    frames = world.robot.chain.joint_frames(q[None])[0]
+    frames = world.robot.chain.joint_frames(reach.q[None])[0]
 
     def beside(contact: Contact) -> float:
-        return contact.distance - growths[_link_first(contact.first, contact.second, growths)[1]]
+        return contact.distance - reach.after[_link_first(contact.first, contact.second, reach.after)[1]]
 
     nearest = min(measured(bodies, pairs_at_rest, frames, near_only=False), key=beside, default=None)
     if nearest is None or beside(nearest) >= -ROUNDING:
         return None
-    return _link_first(nearest.first, nearest.second, growths), nearest.distance
+    return _link_first(nearest.first, nearest.second, reach.after), nearest.distance
 
 
-def _link_first(first: str, second: str, growths: Mapping[str, float]) -> tuple[str, str]:
+def _link_first(first: str, second: str, obstacles: Mapping[str, float]) -> tuple[str, str]:
     """Return the names of a pair, that of the obstacle last."""
-    return (first, second) if second in growths else (second, first)
-
-
-def _nearest(world: World, rows: Matrix, growths: Mapping[str, float]) -> tuple[list[tuple[str, str]], Vector, Vector]:
-    """Return for configurations, shape (m, n), the link and the obstacle that is nearest beside its growth.
-
-    Returns:
-        The pairs, their distances, and their distances less the growth [m], shape (m,).
-    """
-    found = world.distances(rows)
-    pairs = [_link_first(*pair, growths) for pair in found.names]
-    beside = found.values - [growths.get(obstacle, -np.inf) for _, obstacle in pairs]
-    nearest = np.argmin(beside, axis=1)
-    at = np.arange(len(rows)), nearest
-    return [pairs[k] for k in nearest.tolist()], found.values[at], beside[at]
+    return (first, second) if second in obstacles else (second, first)
 
 
 def _halves(lower: Matrix, upper: Matrix, weights: Vector) -> tuple[Matrix, Matrix]:

@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 
 from rrtik_ompl.description.catalog import load_robot
-from rrtik_ompl.model.scene import Obstacle, Scene, TimedPoses
-from rrtik_ompl.model.shapes import Box
+from rrtik_ompl.model.scene import Scene, TimedPoses
 from rrtik_ompl.replanning.record import ReplanRun
-from rrtik_ompl.replanning.refuge import Guard, _kept
+from rrtik_ompl.replanning.refuge import Guard
 from rrtik_ompl.replanning.replanner import replan
 from rrtik_ompl.replanning.settings import ReplanSettings
-from rrtik_ompl.replanning.unavoidable import ContactWarning, unavoidable
+from rrtik_ompl.replanning.unavoidable import ContactWarning, Reach, Unavoidable, kept, way_out
 from rrtik_ompl.world.moving_world import MovingWorld
 from rrtik_ompl.world.world import World
 from rrtik_tests.moving_plane import OPTIONS, box, place, plane
@@ -50,15 +49,15 @@ def box_distance(points, obstacle):
 def test_a_piece_is_kept_only_if_its_least_room_is_larger_than_the_growth():
     rng = np.random.default_rng(1)
     shares = np.linspace(0.0, 1.0, 401)
-    kept = 0
+    count = 0
     for _ in range(300):
         room, travel, growth = rng.uniform(0.0, 1.0, 2), rng.uniform(0.01, 1.0), np.sort(rng.uniform(0.0, 0.6, 2))
         least = np.maximum(room[0] - travel * shares, room[1] - travel * (1.0 - shares))
         truly = (least > growth[0] + shares * (growth[1] - growth[0])).all() and (room > growth).all()
-        found = _kept(room[None], np.array([[travel]]), growth)[0, 0]
+        found = kept(room[None], np.array([[travel]]), growth)[0, 0]
         assert not (found and not truly)
-        kept += found
-    assert kept > 20
+        count += found
+    assert count > 20
 
 
 def test_a_refuge_is_out_of_reach_for_as_long_as_it_says():
@@ -108,21 +107,62 @@ def test_a_robot_that_is_pressed_is_told_so_before_it_is_touched_and_the_proof_h
         assert inside.any(axis=1).all()
         for number, (_, name) in enumerate(proof.pairs):
             corners = np.array([[x, y] for x in (0, 1) for y in (0, 1)])
-            corners = proof.lower[number] + corners * (proof.upper[number] - proof.lower[number])
-            assert (box_distance(corners, scene.obstacle(name)) <= SPEED * proof.seconds).all()
+            ends = proof.lower[number] + corners * (proof.upper[number] - proof.lower[number])
+            on_the_way = tick.q + proof.seconds[number] / TICK * (ends - tick.q)
+            assert (box_distance(on_the_way, scene.obstacle(name)) <= SPEED * proof.seconds[number]).all()
 
 
-@pytest.mark.parametrize("room", [0.0, 0.3])
-def test_no_contact_is_called_unavoidable_where_there_is_a_way_out(room):
+def gaps(ends, shares, q, boxes):
+    """How far a point keeps from all that boxes can reach, on motions to ends, (m, 2), at shares, (m, k) or (k,)."""
+    shares = np.broadcast_to(shares, (len(ends), np.shape(shares)[-1]))
+    points = (q + shares[:, :, None] * (ends - q)[:, None]).reshape(-1, 2)
+    near = np.min([box_distance(points, each) for each in boxes], axis=0)
+    return near.reshape(shares.shape) - SPEED * TICK * shares
+
+
+def hemmed_in(rng):
+    """A point with two to four boxes around it, most of which it cannot wait for."""
+    q = rng.uniform(1.0, 19.0, 2)
+    boxes = []
+    for k in range(int(rng.integers(2, 5))):
+        wide, high = rng.uniform(0.4, 4.0, 2)
+        angle = rng.uniform(0.0, 2.0 * np.pi)
+        way = np.array([np.cos(angle), np.sin(angle)])
+        out = way / np.abs(way / [0.5 * wide, 0.5 * high]).max()  # from the middle of the box to its edge
+        boxes.append(box(f"box{k}", *(q + out + rng.uniform(0.02, 0.45) * way), wide, high))
+    return q, boxes
+
+
+def test_every_tick_has_a_way_out_or_a_proof_that_there_is_none():
     robot = load_robot("point2d", parameters={"radius": 0.0, "bounds": [[0, 20], [0, 20]]})
-    walls = [Obstacle(f"wall{y:g}", Box([20.0, 1.0, 1.0]), place(10.0, y)) for y in (9.2, 10.8)]
-    if not room:
-        walls += [Obstacle("end", Box([1.0, 20.0, 1.0]), place(x, 10.0)) for x in (9.2,)]
-        walls += [Obstacle("far", Box([1.0, 20.0, 1.0]), place(x, 10.0)) for x in (10.9,)]
-    world = World(robot, Scene(walls))
-    growths = dict.fromkeys((o.name for o in walls), SPEED * TICK - room)
-    found = unavoidable(world, np.array([10.0, 10.0]), growths, TICK, step=0.5, max_change=np.full(2, 0.5))
-    assert (found is None) == bool(room)
+    rng = np.random.default_rng(5)
+    grid = np.stack(np.meshgrid(*(2 * [np.linspace(-0.5, 0.5, 41)])), axis=-1).reshape(-1, 2)
+    grid = grid[np.linalg.norm(grid, axis=1) <= 0.5]
+    narrow = dict.fromkeys(("way out", "proof"), 0)
+    for _ in range(50):
+        q, boxes = hemmed_in(rng)
+        best = gaps(q + grid, np.linspace(0.0, 1.0, 11), q, boxes).min(axis=1).max()
+        names = [each.name for each in boxes]
+        before, after = dict.fromkeys(names, 0.0), dict.fromkeys(names, SPEED * TICK)
+        reach = Reach(World(robot, Scene(boxes)), q, 0.5, np.full(2, 0.5), TICK, before, after)
+        found = way_out(reach, lambda q: True, 1e-5)
+
+        if isinstance(found, Unavoidable):
+            assert best < 0.0
+            narrow["proof"] += best > -0.05
+            ends = q + rng.uniform(-1.0, 1.0, (500, 2)) * 0.5
+            ends = ends[np.linalg.norm(ends - q, axis=1) <= 0.5]
+            inside = ((ends[:, None] >= found.lower) & (ends[:, None] <= found.upper)).all(axis=2)
+            assert inside.any(axis=1).all()
+            shares = found.seconds[inside.argmax(axis=1)] / TICK
+            assert (gaps(ends, shares[:, None], q, boxes) <= 0.0).all()
+        else:
+            assert found is not None
+            assert best > -0.03  # The grid is coarse.
+            narrow["way out"] += best < 0.05
+            assert np.linalg.norm(found - q) <= 0.5 + 1e-9
+            assert (gaps(found[None], np.linspace(0.0, 1.0, 2001), q, boxes) > 0.0).all()
+    assert min(narrow.values()) >= 3
 
 
 def test_moves_of_a_run_with_a_bound_are_safe_for_the_tick_they_are_made_in():
