@@ -17,7 +17,7 @@ from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.copies import in_one_line, set_fields
 from rrtik_ompl.base.errors import InputError, ProblemError, listed, require
 from rrtik_ompl.files.kinds import read, write
-from rrtik_ompl.geometry.collision.distances import measured
+from rrtik_ompl.geometry.collision.distances import beyond, measured
 from rrtik_ompl.kernels.threads import in_threads
 from rrtik_ompl.model.certificate import TaskCertificate
 from rrtik_ompl.model.goal_kind import TaskRegion
@@ -631,19 +631,22 @@ def _notes_of(done: Done) -> tuple[str, ...]:
         notes += [f"{branch.step} stands on a contact: {each}" for each in stood_on.get(id(branch), ())]
         if branch.before is not None and branch.step is not None and isinstance(branch.step.stage, Attach):
             stage = branch.step.stage
-            distance = _gap(branch.before.after.world, branch.q, stage.object, stage.link)
+            distance = _far_gap(branch.before.after.world, branch.q, stage.object, stage.link)
             if distance > FAR:
                 text = f"'{stage.object}' is {1e3 * distance:.0f} mm away from '{stage.link}' when it is attached"
                 notes.append(f"{branch.step}: {text}")
     return tuple(notes)
 
 
-def _gap(world: World, q: Vector, name: str, link: str) -> float:
-    """Return an obstacle's distance from a link and the links rigidly joined to it at q [m]; 0 without solids."""
+def _far_gap(world: World, q: Vector, name: str, link: str) -> float:
+    """Return an obstacle's distance from a link and the links rigidly joined to it at q [m]; 0 if not above ``FAR``."""
     robot = world.robot
     bodies = world.bodies
     joint = robot.model.frames[robot.model.getFrameId(link)].parentJoint
     links_joined = [k for k, body in enumerate(bodies) if body.joint == joint and body.name in robot.link_names]
     parts = [k for k, body in enumerate(bodies) if body.name == name]
-    pairs = measured(bodies, list(product(links_joined, parts)), robot.joint_frames(q[None])[0], near_only=False)
-    return min((pair.distance for pair in pairs), default=0.0)
+    frames = robot.joint_frames(q[None])[0]
+    pairs = list(product(links_joined, parts))
+    if any(not beyond(bodies[i], bodies[j], frames, FAR) for i, j in pairs):
+        return 0.0  # which takes less time than to measure it
+    return min((pair.distance for pair in measured(bodies, pairs, frames, near_only=False)), default=0.0)

@@ -21,7 +21,7 @@ from rrtik_ompl.description.catalog import robot_from_entry
 from rrtik_ompl.geometry.collision.bodies import DISTANCE_TOLERANCE, Body, kept_apart
 from rrtik_ompl.geometry.collision.body_arrays import body_arrays
 from rrtik_ompl.geometry.collision.containment import Containment
-from rrtik_ompl.geometry.collision.distances import measured
+from rrtik_ompl.geometry.collision.distances import beyond, measured
 from rrtik_ompl.geometry.collision.solids import around
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.tasks.contact_life import CONTACT_GAP, EXTRA_DEPTH, signed_distance
@@ -133,8 +133,8 @@ class PairMotion:
         self._speed = sum(_speed(body, twist) for body, twist in zip(first, self._twists, strict=True))
         self._required_distance = kept_apart(*first)
         # A thing that the fingers release may continue to touch them, but hardly deeper.
-        if self._distance(0.0, hulls=False) <= CONTACT_GAP:
-            overlap_now = min(self._distance(0.0, hulls=True), 0.0)
+        if not self._beyond(0.0, CONTACT_GAP):
+            overlap_now = min(self._depth_apart(0.0), 0.0)
             self._required_distance = min(self._required_distance, overlap_now - EXTRA_DEPTH)
 
     def apart(self) -> bool:
@@ -144,15 +144,15 @@ class PairMotion:
 
     def _apart_on_intervals(self) -> bool:
         """Check whether the two bodies keep their distance, by bisection with a bound on how fast they move [16]."""
+        least = self._required_distance + DISTANCE_TOLERANCE
         undecided = [(0, 0)]  # level and number of intervals
         while undecided:
             level, number = undecided.pop()
             width = 0.5**level
-            distance = self._distance((number + 0.5) * width, hulls=self._required_distance < 0.0)
-            spare = distance - self._required_distance - DISTANCE_TOLERANCE
-            if spare > 0.5 * width * self._speed:
+            middle = (number + 0.5) * width
+            if self._beyond(middle, least + 0.5 * width * self._speed):
                 continue
-            if spare <= 0.0 or level == MAX_LEVEL:
+            if level == MAX_LEVEL or not self._beyond(middle, least):
                 return False
             undecided += [(level + 1, 2 * number + 1), (level + 1, 2 * number)]
         return True
@@ -165,16 +165,19 @@ class PairMotion:
         )
         return first, second
 
-    def _distance(self, share: float, *, hulls: bool) -> float:
-        """Return the signed distance of the bodies at a share of the motion [m].
+    def _beyond(self, share: float, distance: float) -> bool:
+        """Check whether the bodies are farther apart than a distance [m] at a share of the motion.
 
-        With ``hulls`` it is that of their convex hulls, for which coal has a penetration depth.
+        A negative distance is compared with that of their convex hulls.
         """
-        bodies = self._bodies_at(share)
-        if hulls:
-            first, second = (replace(body, geometry=around(body.geometry)) for body in bodies)
-            bodies = first, second
-        return next(measured(bodies, [(0, 1)], self._frames, near_only=False)).distance
+        if distance < 0.0:
+            return self._depth_apart(share) > distance
+        return beyond(*self._bodies_at(share), self._frames, distance)
+
+    def _depth_apart(self, share: float) -> float:
+        """Return the signed distance of the convex hulls at a share of the motion [m]; coal knows their depth."""
+        first, second = (replace(body, geometry=around(body.geometry)) for body in self._bodies_at(share))
+        return next(measured((first, second), [(0, 1)], self._frames, near_only=False)).distance
 
 
 def _not_far_apart(

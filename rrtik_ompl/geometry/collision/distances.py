@@ -71,6 +71,15 @@ def gap_beyond(ends: Ends, margin: float) -> float | None:
     return float(result.distance_lower_bound)
 
 
+def beyond(first: Body, second: Body, frames: NDArray[np.float64], distance: float) -> bool:
+    """Check whether two bodies are farther apart than a distance [m], from 0; ``frames`` as of :func:`measured`.
+
+    Where one is a mesh, to measure how far takes several times as long.
+    """
+    ends = (first.geometry, transform_of(first, frames), second.geometry, transform_of(second, frames))
+    return gap_beyond(ends, distance) is not None
+
+
 def _distance(ends: Ends, *, with_depth: bool) -> tuple[float, Vector, Vector]:
     """Return the signed distance of two placed geometries and their nearest points.
 
