@@ -10,7 +10,7 @@ work as they do for margins.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -20,7 +20,7 @@ import pinocchio as pin
 
 from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.geometry.collision.bodies import DISTANCE_TOLERANCE, Body, deepest_contact, usually_apart
-from rrtik_ompl.geometry.collision.distances import measured
+from rrtik_ompl.geometry.collision.distances import signed_gap
 from rrtik_ompl.geometry.collision.motion_bound import approach_weights
 from rrtik_ompl.geometry.collision.solids import is_mesh
 from rrtik_ompl.model.path import JointPath, path_through
@@ -169,12 +169,12 @@ def signed_distance(robot: Robot, pair: tuple[Body, Body], q: Vector, frames: Ma
     if distance(pair[0].geometry, poses[0], pair[1].geometry, poses[1], CONTACT_GAP) is not None:
         return np.inf
 
-    (contact,) = measured(pair, [(0, 1)], frames, near_only=False)
-    if contact.distance > CONTACT_GAP:
+    gap = signed_gap((pair[0].geometry, poses[0], pair[1].geometry, poses[1]))
+    if gap > CONTACT_GAP:
         return np.inf
     if any(is_mesh(body.geometry) for body in pair):
-        return min(contact.distance, -_depth_of_pieces(robot, pair, q))
-    return contact.distance
+        return min(gap, -_depth_of_pieces(robot, pair, q))
+    return gap
 
 
 def _depth_of_pieces(robot: Robot, pair: tuple[Body, Body], q: Vector) -> float:
@@ -328,29 +328,33 @@ def place_of_parting(rows: Matrix, world: World, contact: Touching) -> tuple[int
     if not pairs:
         return 0, 0.0
 
-    weights = approach_weights(world.robot, bodies, pairs).max(axis=0)
-    for number, share, frames in _places_along(rows, world.robot, weights):
+    for number, share, frames in _places_along(rows, world, pairs):
         if all(_keep_apart((bodies[i], bodies[j]), frames) for i, j in pairs):
             return number, share
     return None
 
 
-def _places_along(rows: Matrix, robot: Robot, weights: Vector) -> Iterator[tuple[int, float, Matrix]]:
+def _places_along(rows: Matrix, world: World, pairs: Sequence[tuple[int, int]]) -> Iterator[tuple[int, float, Matrix]]:
     """Yield places of a route between which bodies approach each other by at most ``PARTING_STEP``.
 
     Args:
         rows: Waypoints of the route, shape (k, dof).
-        robot: The robot.
-        weights: Bound of the approach per change of each joint, shape (dof,) [m per rad or m].
+        world: The world.
+        pairs: Pairs of numbers of its bodies.
 
     Yields:
         Index of the motion between two waypoints, the share of it, and the joint frames there,
         shape (joints + 1, 4, 4).
     """
-    ends = [(rows[0], rows[0])] if len(rows) == 1 else pairwise(rows)
-    for number, (a, b) in enumerate(ends):
+    robot = world.robot
+    yield 0, 0.0, robot.joint_frames(rows[:1])[0]
+    if len(rows) == 1:
+        return
+
+    weights = approach_weights(robot, world.bodies, pairs).max(axis=0)
+    for number, (a, b) in enumerate(pairwise(rows)):
         steps = max(1, int(np.ceil(float(weights @ np.abs(b - a)) / PARTING_STEP)))
-        shares = np.arange(steps + 1) / steps
+        shares = np.arange(int(number == 0), steps + 1) / steps
         for part in np.array_split(shares, 1 + len(shares) // PLACES_AT_ONCE):
             frames = robot.joint_frames(a + part[:, None] * (b - a))
             for share, frame in zip(part.tolist(), frames, strict=True):

@@ -9,19 +9,20 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 
+import coal
 import numpy as np
 import pinocchio as pin
 
-from rrtik_ompl.base.arrays import Vector
+from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.base.kept import kept_with
 from rrtik_ompl.description.catalog import robot_from_entry
 from rrtik_ompl.geometry.collision.bodies import DISTANCE_TOLERANCE, Body, kept_apart
 from rrtik_ompl.geometry.collision.body_arrays import body_arrays
 from rrtik_ompl.geometry.collision.containment import Containment
-from rrtik_ompl.geometry.collision.distances import beyond, measured
+from rrtik_ompl.geometry.collision.distances import gap_beyond, signed_gap
 from rrtik_ompl.geometry.collision.solids import around
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.tasks.contact_life import CONTACT_GAP, EXTRA_DEPTH, signed_distance
@@ -65,20 +66,21 @@ def finger_motion(before: Setting, after: Setting, q: Vector, things_taken: Sequ
 
     note = _pressed_in(before, after, q, moving, things_taken)
     frames = before.robot.joint_frames(q[None])[0]
+    things = set(before.scene.names)
     pairs = []
     for i, j in before.world.pairs:
-        names = {bodies_before[i].name, bodies_before[j].name}
-        if {i, j} & moving and names & set(before.scene.names) and not names & set(things_taken):
-            pairs.append((i, j))
+        if i in moving or j in moving:
+            names = {bodies_before[i].name, bodies_before[j].name}
+            if names & things and not names & set(things_taken):
+                pairs.append((i, j))
 
-    speeds = dict.fromkeys(range(len(bodies_before)), 0.0)
-    speeds |= {k: _speed(bodies_before[k], _twist(bodies_before[k], bodies_after[k])) for k in moving}
-    for i, j in _not_far_apart(bodies_before, pairs, frames, speeds):
-        motion = PairMotion((bodies_before[i], bodies_before[j]), (bodies_after[i], bodies_after[j]), frames)
-        if not motion.apart():
-            names_in_order = " and ".join(f"'{body.name}'" for body in (bodies_before[i], bodies_before[j]))
-            return FingerMotion(fault=f"contact of the fingers on their way: {names_in_order}; {REMEDY}")
-
+    numbers = sorted({k for pair in pairs for k in pair})
+    parts = {k: _Part.of(bodies_before[k], bodies_after[k], frames) for k in numbers}
+    near = _not_far_apart(bodies_before, pairs, frames, parts)
+    fault = _meeting(parts, near, frames)
+    if fault is not None:
+        first, second = (bodies_before[k].name for k in fault)
+        return FingerMotion(fault=f"contact of the fingers on their way: '{first}' and '{second}'; {REMEDY}")
     return FingerMotion(note=note)
 
 
@@ -117,71 +119,106 @@ def _pressed_in(before: Setting, after: Setting, q: Vector, moving: set[int], th
     return f"{note}; give a width that only touches it" if note else ""
 
 
-class PairMotion:
-    """A motion of two bodies, at least one of which moves, each along a screw.
+@dataclass(frozen=True, slots=True, eq=False)
+class _Part:
+    """A body that stands still or moves along a screw.
 
-    Args:
-        first: Both bodies at the beginning.
-        last: Both bodies at the end, on the same joints.
-        frames: Poses of all joint frames, shape (joints + 1, 4, 4).
+    Attributes:
+        body: The body at the beginning.
+        joint: Pose of its joint frame.
+        twist: The screw from its beginning to its end, in its own frame, shape (6,).
+        speed: How far any of its points moves at most from beginning to end [m].
     """
 
-    def __init__(self, first: tuple[Body, Body], last: tuple[Body, Body], frames: Vector) -> None:
-        self._first = first
-        self._frames = frames
-        self._twists = [_twist(a, b) for a, b in zip(first, last, strict=True)]
-        self._speed = sum(_speed(body, twist) for body, twist in zip(first, self._twists, strict=True))
-        self._required_distance = kept_apart(*first)
-        # A thing that the fingers release may continue to touch them, but hardly deeper.
-        if not self._beyond(0.0, CONTACT_GAP):
-            overlap_now = min(self._depth_apart(0.0), 0.0)
-            self._required_distance = min(self._required_distance, overlap_now - EXTRA_DEPTH)
+    body: Body
+    joint: pin.SE3
+    twist: Vector
+    speed: float
 
-    def apart(self) -> bool:
-        """Check whether the two bodies keep the required distance during the whole motion."""
-        places = Containment(self._bodies_at(0.0), ((0, 1),))
-        return not places.holds((0, 1), self._frames) and self._apart_on_intervals()
+    @classmethod
+    def of(cls, first: Body, last: Body, frames: Matrix) -> _Part:
+        """Return the part that moves from one place to another.
 
-    def _apart_on_intervals(self) -> bool:
-        """Check whether the two bodies keep their distance, by bisection with a bound on how fast they move [16]."""
-        least = self._required_distance + DISTANCE_TOLERANCE
-        undecided = [(0, 0)]  # level and number of intervals
-        while undecided:
-            level, number = undecided.pop()
-            width = 0.5**level
-            middle = (number + 0.5) * width
-            if self._beyond(middle, least + 0.5 * width * self._speed):
-                continue
-            if level == MAX_LEVEL or not self._beyond(middle, least):
-                return False
-            undecided += [(level + 1, 2 * number + 1), (level + 1, 2 * number)]
-        return True
-
-    def _bodies_at(self, share: float) -> tuple[Body, Body]:
-        """Return both bodies at a share of the motion, from 0 to 1."""
-        first, second = (
-            replace(body, placement=body.placement * pin.exp6(share * twist))
-            for body, twist in zip(self._first, self._twists, strict=True)
-        )
-        return first, second
-
-    def _beyond(self, share: float, distance: float) -> bool:
-        """Check whether the bodies are farther apart than a distance [m] at a share of the motion.
-
-        A negative distance is compared with that of their convex hulls.
+        Args:
+            first: The body at the beginning.
+            last: The body at the end, on the same joint.
+            frames: Poses of all joint frames, shape (joints + 1, 4, 4).
         """
-        if distance < 0.0:
-            return self._depth_apart(share) > distance
-        return beyond(*self._bodies_at(share), self._frames, distance)
+        twist = _twist(first, last)
+        return cls(first, pin.SE3(frames[first.joint]), twist, _speed(first, twist))
 
-    def _depth_apart(self, share: float) -> float:
-        """Return the signed distance of the convex hulls at a share of the motion [m]; coal knows their depth."""
-        first, second = (replace(body, geometry=around(body.geometry)) for body in self._bodies_at(share))
-        return next(measured((first, second), [(0, 1)], self._frames, near_only=False)).distance
+    def at(self, share: float) -> coal.Transform3s:
+        """Return the pose in the world at a share of the motion, from 0 to 1."""
+        placement = self.body.placement
+        if self.speed > 0.0 and share > 0.0:
+            placement = placement * pin.exp6(share * self.twist)
+        pose = self.joint * placement
+        return coal.Transform3s(pose.rotation, pose.translation)
+
+
+def _meeting(parts: Mapping[int, _Part], pairs: Sequence[tuple[int, int]], frames: Matrix) -> tuple[int, int] | None:
+    """Return the first pair of bodies that do not keep their required distance on the whole motion; None if all do.
+
+    Args:
+        parts: The bodies by their numbers.
+        pairs: Pairs of these numbers.
+        frames: Poses of all joint frames, shape (joints + 1, 4, 4).
+    """
+    if not pairs:
+        return None
+    numbers = sorted({k for pair in pairs for k in pair})
+    place = {k: row for row, k in enumerate(numbers)}
+    rows = [(place[i], place[j]) for i, j in pairs]
+    inside = Containment(tuple(parts[k].body for k in numbers), tuple(rows))
+    for (i, j), both in zip(pairs, rows, strict=True):
+        if inside.holds(both, frames) or not _apart(parts[i], parts[j]):
+            return i, j
+    return None
+
+
+def _apart(first: _Part, second: _Part) -> bool:
+    """Check whether two parts keep their distance, by bisection with a bound on how fast they move [16]."""
+    required = kept_apart(first.body, second.body)
+    # A thing that the fingers release may continue to touch them, but hardly deeper.
+    if not _beyond(first, second, 0.0, CONTACT_GAP):
+        overlap_now = min(_depth_apart(first, second, 0.0), 0.0)
+        required = min(required, overlap_now - EXTRA_DEPTH)
+
+    least = required + DISTANCE_TOLERANCE
+    speed = first.speed + second.speed
+    undecided = [(0, 0)]  # level and number of intervals
+    while undecided:
+        level, number = undecided.pop()
+        width = 0.5**level
+        middle = (number + 0.5) * width
+        if _beyond(first, second, middle, least + 0.5 * width * speed):
+            continue
+        if level == MAX_LEVEL or not _beyond(first, second, middle, least):
+            return False
+        undecided += [(level + 1, 2 * number + 1), (level + 1, 2 * number)]
+    return True
+
+
+def _beyond(first: _Part, second: _Part, share: float, distance: float) -> bool:
+    """Check whether two parts are farther apart than a distance [m] at a share of their motion.
+
+    A negative distance is compared with that of their convex hulls. Where one is a mesh, to measure how far they are
+    apart takes several times as long.
+    """
+    if distance < 0.0:
+        return _depth_apart(first, second, share) > distance
+    ends = (first.body.geometry, first.at(share), second.body.geometry, second.at(share))
+    return gap_beyond(ends, distance) is not None
+
+
+def _depth_apart(first: _Part, second: _Part, share: float) -> float:
+    """Return the signed distance of two parts' convex hulls at a share of their motion [m]; coal knows their depth."""
+    one, other = (around(part.body.geometry) for part in (first, second))
+    return signed_gap((one, first.at(share), other, second.at(share)))
 
 
 def _not_far_apart(
-    bodies: Sequence[Body], pairs: Sequence[tuple[int, int]], frames: Vector, speeds: Mapping[int, float]
+    bodies: Sequence[Body], pairs: Sequence[tuple[int, int]], frames: Matrix, parts: Mapping[int, _Part]
 ) -> list[tuple[int, int]]:
     """Return the pairs of bodies that a motion may bring together, by the boxes around them.
 
@@ -189,19 +226,18 @@ def _not_far_apart(
         bodies: All bodies, where they are before the motion.
         pairs: Pairs of their numbers.
         frames: Poses of all joint frames, shape (joints + 1, 4, 4).
-        speeds: How far each body moves at most [m].
+        parts: The bodies of these pairs, by their numbers.
     """
     if not pairs:
         return []
-    near = sorted({k for pair in pairs for k in pair})
-    place = {k: number for number, k in enumerate(near)}
-    arrays = body_arrays(tuple(bodies[k] for k in near))
+    place = {k: number for number, k in enumerate(parts)}
+    arrays = body_arrays(tuple(bodies[k] for k in parts))
     poses = frames[arrays.joints] @ arrays.placements
     turns = poses[:, :3, :3]
     centres = np.einsum("nij,nj->ni", turns, arrays.centres) + poses[:, :3, 3]
     radii = np.linalg.norm(arrays.halves, axis=1)
     numbers = np.array([(place[i], place[j]) for i, j in pairs])
-    moved = np.array([speeds[k] for k in near])
+    moved = np.array([part.speed for part in parts.values()])
 
     # The ball around one body is apart from the box around the other.
     gaps = []

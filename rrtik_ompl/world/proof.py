@@ -26,7 +26,7 @@ from rrtik_ompl.files import notice
 from rrtik_ompl.geometry.collision.bodies import Body
 from rrtik_ompl.geometry.collision.digests import world_digest
 from rrtik_ompl.geometry.collision.solids import of_each
-from rrtik_ompl.kernels.proof.layout import ProofTable
+from rrtik_ompl.kernels.proof.layout import SUGGESTED, ProofTable
 from rrtik_ompl.kernels.proof.packing import ProofPairs, proof_pairs
 from rrtik_ompl.kernels.proof.rows import PROOF_KERNELS, proof_of_rows
 from rrtik_ompl.kernels.proof.taken_proof import TakenProof
@@ -276,14 +276,18 @@ class Prover:
         prove = proof_of_rows(packed, tails, heads, pairs, places)
 
         # Let the kernels prove all motions in batches, as long as there is time. They begin with the planes that have
-        # proven the motion before, and in contact with the normals at the first motion.
+        # proven the motion before, and in contact with the normals at the first motion for which there were none.
+        left = count
         at_once = MOTIONS_AT_ONCE if seconds is None or library(PROOF_KERNELS) is not None else FEW_AT_ONCE
         for first in range(0, count, at_once):
             if first > 0 and seconds is not None and time.monotonic() - begin > seconds:
                 break
-            if packed.touching and first == 0:
+            if first == 0 and packed.touching and not _with_planes(packed):
                 suggest_planes(self.robot, self.bodies, packed, np.stack([rows[0][0], rows[1][0]]))
-            prove(first, min(at_once, count - first))
+            number = min(at_once, count - first)
+            left -= number - prove(first, number)
+        if left == 0 and sound is None:
+            return []
 
         # Where bodies in contact turn about each other, the normals of each motion are tried.
         for k in np.flatnonzero(np.isin(pairs, packed.touching)).tolist() if packed.touching else ():
@@ -343,6 +347,13 @@ class Prover:
         if pair < 0:
             return Gap(motion, float("nan"), "", "")
         return Gap(motion, place, *(self.bodies[k].name for k in packed.bodies[pair].tolist()))
+
+
+def _with_planes(packed: ProofPairs) -> bool:
+    """Check whether there is a plane to begin with for each pair that is in contact."""
+    planes = packed.table.ways.reshape(-1, 3)[packed.touching]
+    suggested = packed.table.way_stamps[packed.touching] == SUGGESTED
+    return bool((suggested & planes.any(axis=1)).all())
 
 
 def _part_proven(packed: ProofPairs, tail: Vector, head: Vector, begin: float, end: float) -> bool:

@@ -159,7 +159,8 @@ class RowChecks:
         """Return which rows, shape (m, dof), the second check calls free, shape (m,): proofs first, then coal."""
         mask = inside_limits(self.settings.robot, rows)
         unproven = mask & ~self.prover.still_proven(rows, clearance=self.settings.clearance)
-        mask[unproven] = self.certificate.free(rows[unproven])
+        if unproven.any():
+            mask[unproven] = self.certificate.free(rows[unproven])
         return mask if self.constraints is None else mask & self.constraints.held(rows)
 
     def contacts(self, q: Vector) -> tuple[Contact, ...]:
