@@ -104,6 +104,12 @@ def frozen(values: ArrayLike, dtype: DTypeLike = np.float64) -> NDArray[Any]:
     return array
 
 
+def sealed(array: NDArray[Any]) -> NDArray[Any]:
+    """Return an array that nobody else has, read-only from now on."""
+    array.setflags(write=False)
+    return array
+
+
 def distinct(values: ArrayLike) -> NDArray[Any]:
     """Return the distinct numbers in ascending order, as ``numpy.unique`` does, but faster for few numbers.
 

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.base.arrays import Mask, Matrix, Vector, frozen
+from rrtik_ompl.base.arrays import Mask, Matrix, Vector, frozen, sealed
 from rrtik_ompl.base.errors import InputError, UnknownNameError
 from rrtik_ompl.geometry.collision.bodies import Body, Pairs, keeps_clearance, kept_apart
 from rrtik_ompl.geometry.collision.cloud_solid import CloudSolid
@@ -45,6 +45,24 @@ class Choice(NamedTuple):
     within: float = float("inf")
 
 
+class Asked(NamedTuple):
+    """Pairs of objects that are measured.
+
+    Attributes:
+        names: Their names, p pairs.
+        numbers: The numbers of the objects, shape (p, 2).
+        columns: The same for kernels.
+        margins: The distance that each pair has to keep [m], without the clearance of the world, shape (p,).
+        beside_obstacles: Which have to keep that, too, shape (p,).
+    """
+
+    names: tuple[tuple[str, str], ...]
+    numbers: NDArray[np.int64]
+    columns: NDArray[np.int32]
+    margins: Vector
+    beside_obstacles: Mask
+
+
 @dataclass(eq=False)
 class Ruler:
     """Measures the objects of a world: all bodies of one name are one object.
@@ -59,6 +77,7 @@ class Ruler:
     bodies: Sequence[Body]
     pairs: Pairs
     _containments: dict[tuple[Body, Body], Containment] = field(default_factory=dict)
+    _last: tuple[Names | None, Asked] | None = None  # what was asked about
 
     def for_thread(self) -> Ruler:
         """Return the same ruler for another thread."""
@@ -76,29 +95,48 @@ class Ruler:
             UnknownNameError: If there is no object of a name.
             InputError: If a pair is an object and itself.
         """
-        names = self._checked_names if choice.pairs is None else tuple(choice.pairs)
-        numbers = self._numbers(names)
-        hollow = np.asarray(self._hollow[numbers].any(axis=1))
+        asked = self._asked(choice.pairs)
         values = np.ascontiguousarray(self.robot.chain.joint_values(rows))
-        keep = 0 if choice.nearest is None else min(choice.nearest, len(names))
-        found = self.rows.measured(values, numbers, hollow, within=choice.within, keep=keep)
-        self._look_again(rows, numbers, found, choice.within)
+        keep = 0 if choice.nearest is None else min(choice.nearest, len(asked.names))
+        found = self.rows.measured(values, asked.columns, within=choice.within, keep=keep)
+        self._look_again(rows, asked.numbers, found, choice.within)
 
-        unseen = found.told == BEYOND
-        found.points[unseen | ~np.isfinite(found.points).all(axis=(2, 3))] = np.nan
-        which = np.broadcast_to(np.arange(len(names)), found.told.shape)
-        margins = np.array([self._margin(pair, clearance) for pair in numbers.tolist()])
-        if choice.nearest is not None:
-            which = np.argsort(np.where(unseen, np.inf, found.values), axis=1, kind="stable")[:, :keep]
+        margins = asked.margins + np.where(asked.beside_obstacles, clearance, 0.0)
+        shape = found.told.shape
+        if choice.nearest is None:
+            which = np.broadcast_to(np.arange(len(asked.names)), shape)
+            return Distances(
+                asked.names,
+                which,
+                sealed(found.values),
+                sealed(found.points),
+                sealed(found.gradients),
+                np.broadcast_to(margins, shape),
+            )
+        which = np.argsort(np.where(found.told == BEYOND, np.inf, found.values), axis=1, kind="stable")[:, :keep]
         at = np.arange(len(rows))[:, None], which
         return Distances(
-            names,
+            asked.names,
             frozen(which, np.int64),
-            frozen(found.values[at]),
-            frozen(found.points[at]),
-            frozen(found.gradients[at]),
-            frozen(margins.reshape(-1)[which]),
+            sealed(found.values[at]),
+            sealed(found.points[at]),
+            sealed(found.gradients[at]),
+            sealed(margins[which]),
         )
+
+    def _asked(self, names: Names | None) -> Asked:
+        """Return what is known of pairs of names; who asks many times asks about the same ones."""
+        if self._last is None or self._last[0] != names:
+            pairs = self._checked_names if names is None else tuple(names)
+            numbers = self._numbers(pairs)
+            hollow = np.asarray(self._hollow[numbers].any(axis=1))
+            both = [sorted(self._members[k][0] for k in pair) for pair in numbers.tolist()]
+            bodies = [(self.bodies[i], self.bodies[j]) for i, j in both]
+            beside = [keeps_clearance(one, other) and bool(one.joint or other.joint) for one, other in bodies]
+            margins = np.array([kept_apart(*pair) for pair in bodies])
+            columns = self.rows.columns(numbers, hollow)
+            self._last = names, Asked(pairs, numbers, columns, margins, np.array(beside, dtype=bool))
+        return self._last[1]
 
     @cached_property
     def _objects(self) -> dict[str, list[int]]:
@@ -141,17 +179,8 @@ class Ruler:
                 raise InputError(f"pairs: '{pair[0]}' and itself have no distance; name two objects")
         return np.array([[number_of[name] for name in pair] for pair in names], dtype=np.int64).reshape(-1, 2)
 
-    def _margin(self, pair: Sequence[int], clearance: float) -> float:
-        """Return the distance that two objects have to keep [m]."""
-        first, second = sorted(self._members[k][0] for k in pair)
-        one = self.bodies[first]
-        other = self.bodies[second]
-        beside_obstacle = keeps_clearance(one, other) and (one.joint or other.joint)
-        return kept_apart(one, other) + (clearance if beside_obstacle else 0.0)
-
     def _look_again(self, rows: Matrix, numbers: NDArray[np.int64], found: Measured, within: float) -> None:
         """Measure what kernels have left open, and look for what is inside something else."""
-        found.gradients[found.told == CROSSING] = 0.0
         open_rows, open_columns = np.nonzero(found.told > CROSSING)
         for row in np.unique(open_rows).tolist():
             frames = self.robot.chain.joint_frames(rows[row : row + 1])[0]
@@ -169,20 +198,20 @@ class Ruler:
             nearest = min(contacts, key=lambda contact: contact.distance)
             points = np.array([nearest.point_first, nearest.point_second])
             way = points[0] - points[1]
-            unit = way / nearest.distance if abs(nearest.distance) > SHORTEST else np.zeros(3)
             near = nearest.distance < within
             found.told[place] = MEASURED if near else BEYOND
             found.values[place] = nearest.distance if near else within
-            found.points[place] = points
-            found.normals[place] = unit if near else 0.0
-            joints = [bodies[0].joint for bodies in own]
-            found.gradients[place] = gradient_at(self.robot.chain, frames, joints, points, found.normals[place])
+            found.points[place] = points if near and np.isfinite(points).all() else np.nan
+            found.gradients[place] = 0.0
+            if abs(nearest.distance) > SHORTEST and np.isfinite(found.points[place]).all():
+                joints = [bodies[0].joint for bodies in own]
+                unit = way / nearest.distance
+                found.gradients[place] = gradient_at(self.robot.chain, frames, joints, points, unit)
 
         if found.values[place] > 0.0 and any(self._holds(both, frames) for both in product(own[0], own[1])):
             found.told[place] = CROSSING
             found.values[place] = 0.0
             found.points[place] = np.nan
-            found.normals[place] = 0.0
             found.gradients[place] = 0.0
 
     def _holds(self, pair: tuple[Body, Body], frames: NDArray[np.float64]) -> bool:

@@ -11,6 +11,8 @@ import pytest
 import rrtik_ompl as rrtik
 from rrtik_ompl import AttachedObject, Obstacle, Scene, World, pose
 from rrtik_ompl.geometry.collision.cloud_solid import CloudSolid
+from rrtik_ompl.kernels.distances.layout import NODE_CENTRES
+from rrtik_ompl.kernels.distances.trees import _blocks_of
 from rrtik_ompl.model.shapes import SHAPES
 from rrtik_ompl.model.shapes.octree import FEW_CELLS
 
@@ -81,10 +83,12 @@ def arm(tmp_path_factory):
     return rrtik.load_robot(str(file), tip="hand")
 
 
+HELD = AttachedObject("held", "hand", notched(0.05), [0.1, 0.0, 0.12], margin=0.004)
+
+
 def world_with(arm, shape, **options):
-    held = AttachedObject("held", "hand", notched(0.05), [0.1, 0.0, 0.12], margin=0.004)
     obstacle = Obstacle("obstacle", shape, pose([0.75, 0.3, 0.1], rpy=[0.1, 0.2, 0.3]), margin=0.01)
-    return World(arm, Scene([obstacle], attached=[held]), **options)
+    return World(arm, Scene([obstacle], attached=[HELD]), **options)
 
 
 def parts_of(body, place):
@@ -204,6 +208,42 @@ def test_what_lies_inside_a_mesh_is_at_zero_without_a_gradient(arm):
     assert found.values == [0.0]
     assert not found.gradients.any()
     assert np.isnan(found.points).all()
+
+
+@pytest.mark.kernels
+def test_two_surfaces_that_cross_are_at_zero_and_have_no_nearest_points(arm):
+    world = World(arm, Scene([Obstacle("obstacle", notched(0.15), [0.8, 0.0, 0.0])], attached=[HELD]))
+    found = world.distances(postures(arm, 200), [("held", "obstacle")])
+    crossing = found.values[:, 0] == 0.0
+    assert crossing.any()
+    assert np.array_equal(np.isnan(found.points).all(axis=(1, 2, 3)), crossing)
+    assert not found.gradients[crossing].any()
+
+
+@pytest.mark.kernels
+def test_what_was_asked_before_does_not_matter(arm):
+    world = world_with(arm, rrtik.Box([0.3, 0.2, 0.1]), clearance=0.02, self_margin=0.005)
+    q = postures(arm, 1)[0]
+    every = world.distances(q)
+    pairs = [every.names[3], every.names[0]]
+    for _ in range(2):
+        some = world.distances(q, pairs)
+        assert some.names == tuple(pairs)
+        assert np.array_equal(some.clearances, every.clearances[[3, 0]])
+        assert np.array_equal(some.points, every.points[[3, 0]])
+        assert np.array_equal(world.distances(q).values, every.values)
+
+
+def test_no_leaf_of_a_cloud_reaches_across_a_room():
+    """Morton's curve jumps from wall to wall; what is between them would be compared with each point of such a leaf."""
+    rng = np.random.default_rng(1)
+    walls = rng.uniform([-1.0, -1.0, -1.0], 1.0, (6000, 3))
+    walls[:, 0] = np.where(walls[:, 0] < 0.0, -1.0, 1.0)
+    cloud = rrtik.PointCloud(walls, radius=0.01)
+    trees = _blocks_of(cloud)
+    leaves = [tree.solids[tree.nodes[0, NODE_CENTRES]].corners for tree in trees]
+    assert max(np.ptp(points, axis=0).max() for points in leaves) < 0.6
+    assert np.array_equal(np.unique(np.concatenate(leaves), axis=0), np.unique(cloud.points, axis=0))
 
 
 @pytest.mark.parametrize("shape", [rrtik.Box([0.3, 0.2, 0.1]), notched(0.15)])

@@ -8,7 +8,7 @@ leaves so far is left out.
 
 from __future__ import annotations
 
-from math import sqrt
+from math import nan, sqrt
 from typing import Any
 
 from rrtik_ompl.kernels.checks.gjk import cross, depth_inside, dot, minus, scaled
@@ -24,7 +24,16 @@ from rrtik_ompl.kernels.distances.layout import (
     NodeRows,
 )
 from rrtik_ompl.kernels.layout import JointValues
-from rrtik_ompl.kernels.proof.frames import carried, frame_at, node_frames, origin_of, place_frames, turned, vector_at
+from rrtik_ompl.kernels.proof.frames import (
+    carried,
+    frame_at,
+    node_frames,
+    origin_of,
+    place_frames,
+    turned,
+    turned_back,
+    vector_at,
+)
 from rrtik_ompl.kernels.proof.layout import (
     BALL_CENTRE,
     BALL_RADIUS,
@@ -40,10 +49,20 @@ from rrtik_ompl.kernels.proof.layout import (
     SOLID_KIND,
     Frame,
 )
-from rrtik_ompl.kernels.proof.planes import ANY_WAY, LOWEST, ahead, corner_at, farthest, put_vector, sizes_at, solid_at
+from rrtik_ompl.kernels.proof.planes import (
+    ANY_WAY,
+    LOWEST,
+    ahead,
+    corner_at,
+    farthest,
+    heights,
+    put_vector,
+    sizes_at,
+    solid_at,
+)
 from rrtik_ompl.kernels.record import Doubles, Ints
-from rrtik_ompl.kernels.simd.compiled import WIDTH, entry, inlined, kernel
-from rrtik_ompl.kernels.simd.lanes import set_wide_lanes, spread_wide, wide_lanes_at
+from rrtik_ompl.kernels.simd.compiled import entry, inlined, kernel
+from rrtik_ompl.kernels.simd.lanes import bits, first_bit, larger, set_wide_lanes, spread_wide, wide_lanes_at
 from rrtik_ompl.kernels.simd.records import row_at
 
 MOST_STEPS = 100
@@ -57,6 +76,7 @@ SAME = 1e-10  # [m] depths that are not told apart
 FLAT = 1e-12  # [m] height of a polytope without an inside
 THIN = 1e-14  # [m^2] twice the area of a face without a normal
 NO_WEIGHT = 1e-12
+NOWHERE = (nan, nan, nan)
 APART, OVERLAPPING, FAR, LOST = range(4)
 
 
@@ -69,7 +89,6 @@ def measure(
     column_count: int,
     values: Doubles,
     points: Doubles,
-    normals: Doubles,
     gradients: Doubles,
     told: Ints,
 ) -> int:
@@ -82,8 +101,7 @@ def measure(
         columns: The pairs.
         column_count: How many.
         values: Gets the signed distances, shape (count, columns).
-        points: Gets the nearest point of each object in the world, shape (count, columns, 2, 3).
-        normals: Gets unit vectors from the second point to the first one, or away from it, shape (count, columns, 3).
+        points: Gets the nearest points in the world, NaN where there are none, shape (count, columns, 2, 3).
         gradients: Gets the derivatives by the coordinates, shape (count, columns, dof).
         told: Gets what is told of each, shape (count, columns).
     """
@@ -92,6 +110,7 @@ def measure(
         row = row_at(rows, table.joint_count, k)
         place_frames(table, row, row, 0.0, 0)
         frames = node_frames(table, 0)
+        put_twists(table, frames)
         for j in range(table.keep):
             table.smallest[j] = table.within
         for j in range(column_count):
@@ -101,11 +120,10 @@ def measure(
             answer, value, way, p, q = distance(table, column, frames, limit)
             told[place] = answer
             values[place] = value
-            put_vector(normals, 3 * place, way)
-            put_vector(points, 6 * place, p)
-            put_vector(points, 6 * place + 3, q)
-            gradient = row_at(gradients, table.dof, place)
-            put_gradient(table, column, frames, way, p, q, gradient)
+            seen = dot(way, way) > 0.0
+            put_vector(points, 6 * place, p if seen else NOWHERE)
+            put_vector(points, 6 * place + 3, q if seen else NOWHERE)
+            put_gradient(table, column, way, p, q, row_at(gradients, table.dof, place))
             if answer >= SURROUNDED:
                 left += 1
             elif answer != BEYOND and table.keep > 0:
@@ -175,7 +193,7 @@ def distance(table: DistanceTable, column: ColumnRows, frames: Frame, limit: flo
         way = vector_at(bounds, layout.BOUND_WAY)
         parent = bounds[layout.PARENT_BOUND]
         at_leaf = is_leaf(one) and is_leaf(other)
-        if at_leaf or bounds[layout.BOUND] > parent + NEARER or bounds[layout.BOUND] == LOWEST:
+        if at_leaf or pays(table, one, other, bounds, best):
             state, low, value, way, a, b, exact = compared(table, one, other, one_frame, other_frame, way, best)
             if state == FAR or low >= best:
                 continue
@@ -206,6 +224,19 @@ def distance(table: DistanceTable, column: ColumnRows, frames: Frame, limit: flo
     return answer, best, best_way, p, q
 
 
+@inlined
+def pays(table: DistanceTable, one: NodeRows, other: NodeRows, bounds: Doubles, best: float) -> bool:
+    """Whether a pair of nodes, not both leaves, is compared before it is split.
+
+    A mesh is, if its part is known to be farther away than the whole: else the part has the whole's nearest point. A
+    box always is, unless its branches are leaves and there is nothing yet that these could be farther away than.
+    """
+    if one[layout.NODE_KIND] == layout.BOX_AROUND or other[layout.NODE_KIND] == layout.BOX_AROUND:
+        box = one if one[layout.NODE_KIND] == layout.BOX_AROUND else other
+        return bool(best < -LOWEST or not is_leaf(node_at(table, box[layout.NODE_FIRST])))
+    return bool(bounds[layout.BOUND] > bounds[layout.PARENT_BOUND] + NEARER or bounds[layout.BOUND] == LOWEST)
+
+
 @kernel
 def of_leaves(
     table: DistanceTable, one: NodeRows, other: NodeRows, one_frame: Frame, other_frame: Frame, way: Any, limit: float
@@ -233,7 +264,10 @@ def of_leaves(
     best = limit
     best_way = p = q = nothing
     for block in range(centres[FIRST_BLOCK], centres[END_BLOCK]):
-        for lane in range(WIDTH):
+        bounds = element_gaps(table, cloud, block, first, second, one_frame, other_frame, way)
+        left = bits(bounds < best - NEARER)
+        while left != 0:
+            lane = first_bit(left)
             put_element(table, cloud[layout.NODE_PART], corner_at(table.corners, block, lane))
             found, value, toward, a, b = of_solids(table, first, second, one_frame, other_frame, way, best)
             if found == UNKNOWN:
@@ -245,7 +279,32 @@ def of_leaves(
                 p = a
                 q = b
                 way = toward
+                bounds = larger(bounds, element_gaps(table, cloud, block, first, second, one_frame, other_frame, way))
+            left = left & (left - 1) & bits(bounds < best - NEARER)
     return answer, best, best_way, p, q
+
+
+@kernel
+def element_gaps(
+    table: DistanceTable,
+    cloud: NodeRows,
+    block: int,
+    first: int,
+    second: int,
+    one_frame: Frame,
+    other_frame: Frame,
+    way: Any,
+) -> Any:
+    """As ``gap_along``, of each element of a block of a cloud, a lane each; ``table.element`` is one of the two solids.
+
+    All elements are alike, so that their gaps differ as their centres do.
+    """
+    is_one = first == table.element
+    outward = turned_back(one_frame, way) if is_one else turned_back(other_frame, scaled(way, -1.0))
+    centre = corner_at(table.corners, block, 0)
+    put_element(table, cloud[layout.NODE_PART], centre)
+    gap = solids_gap(table, first, second, one_frame, other_frame, way)
+    return heights(table.corners, block, outward) + (gap - dot(outward, centre))
 
 
 @kernel
@@ -384,10 +443,16 @@ def size_of(table: DistanceTable, node: NodeRows) -> float:
 
 
 @inlined
-def gap_along(table: DistanceTable, first: int, second: int, one_frame: Frame, other_frame: Frame, way: Any) -> float:
+def gap_along(table: DistanceTable, first: int, second: int, one_frame: Frame, other_frame: Frame, way: Any) -> Any:
     """The gap of two nodes along a unit vector: a lower bound of their signed distance."""
     one = node_at(table, first)[layout.NODE_SOLID]
     other = node_at(table, second)[layout.NODE_SOLID]
+    return solids_gap(table, one, other, one_frame, other_frame, way)
+
+
+@inlined
+def solids_gap(table: DistanceTable, one: int, other: int, one_frame: Frame, other_frame: Frame, way: Any) -> float:
+    """As ``gap_along``, of two solids."""
     if solid_at(table, one)[SOLID_KIND] == HALF_SPACE or solid_at(table, other)[SOLID_KIND] == HALF_SPACE:
         return LOWEST
     p = farthest(table, one, one_frame, scaled(way, -1.0))
@@ -492,33 +557,20 @@ def between(
             if height <= 0.0 and depth_inside(a, b, c, p) >= 0.0:
                 inside = True
                 break
-            of_c = weights_on_triangle(a, b, p)
-            of_a = weights_on_triangle(p, b, c)
-            of_b = weights_on_triangle(a, p, c)
-            in_c = mean(of_c, a, b, p)
-            in_a = mean(of_a, p, b, c)
-            in_b = mean(of_b, a, p, c)
-            square_c = dot(in_c, in_c)
-            square_a = dot(in_a, in_a)
-            square_b = dot(in_b, in_b)
-            smallest = min(square_a, square_b, square_c)
-            if smallest >= length * length:  # rounding lets nothing better be found
+            place, share, point, square = with_corner(a, b, c, weights, p)
+            if square >= length * length:  # rounding lets nothing better be found
                 break
-            if square_c == smallest:
-                c = p
-                w = x
-                nearest = in_c
-                weights = of_c
-            elif square_a == smallest:
+            weights = share
+            nearest = point
+            if place == 0:
                 a = p
                 u = x
-                nearest = in_a
-                weights = of_a
-            else:
+            elif place == 1:
                 b = p
                 v = x
-                nearest = in_b
-                weights = of_b
+            else:
+                c = p
+                w = x
         length = sqrt(dot(nearest, nearest))
         if length < SHORTEST:
             inside = True
@@ -538,6 +590,39 @@ def between(
     on_one = minus(on_one, scaled(way, sizes_at(table, one)[ROUND]))
     on_other = ahead(on_other, scaled(way, sizes_at(table, other)[ROUND]))
     return state, low - around, length - around, way, on_one, on_other, single, other_single
+
+
+@inlined
+def with_corner(a: Any, b: Any, c: Any, weights: Any, p: Any) -> Any:
+    """Let a point take the place of a corner of a triangle: of one without weight, or else where that is best.
+
+    Returns:
+        The number of the corner, the new weights, the point of the new triangle that is nearest to the origin, and the
+        square of its distance.
+    """
+    if weights[2] == 0.0:
+        share = weights_on_triangle(a, b, p)
+        nearest = mean(share, a, b, p)
+        return 2, share, nearest, dot(nearest, nearest)
+    if weights[1] == 0.0:
+        share = weights_on_triangle(a, p, c)
+        nearest = mean(share, a, p, c)
+        return 1, share, nearest, dot(nearest, nearest)
+    share = weights_on_triangle(p, b, c)
+    nearest = mean(share, p, b, c)
+    square = dot(nearest, nearest)
+    if weights[0] == 0.0:
+        return 0, share, nearest, square
+    place = 0
+    for turn in range(1, 3):
+        own = weights_on_triangle(a, p, c) if turn == 1 else weights_on_triangle(a, b, p)
+        point = mean(own, a, p, c) if turn == 1 else mean(own, a, b, p)
+        if dot(point, point) < square:
+            place = turn
+            share = own
+            nearest = point
+            square = dot(point, point)
+    return place, share, nearest, square
 
 
 @inlined
@@ -799,27 +884,41 @@ def toggled(table: DistanceTable, edges: int, begin: int, end: int) -> int:
     return edges + 1
 
 
+@inlined
+def put_twists(table: DistanceTable, frames: Frame) -> None:
+    """Write how each joint moves what it carries, for a rate of 1: turning, and moving at the world's origin."""
+    for joint in range(table.joint_count):
+        own = frame_at(frames, joint + 1)
+        axis = turned(own, vector_at(row_at(table.joints, JOINT_SIZE, joint), JOINT_AXIS))
+        twist = row_at(table.twists, layout.TWIST_SIZE, joint)
+        slides = table.sliding[joint] != 0
+        put_vector(twist, 0, (0.0, 0.0, 0.0) if slides else axis)
+        put_vector(twist, 3, axis if slides else cross(origin_of(own), axis))
+
+
 @kernel
-def put_gradient(
-    table: DistanceTable, column: ColumnRows, frames: Frame, way: Any, p: Any, q: Any, gradient: Doubles
-) -> None:
-    """Write the derivatives of a distance: those of the gap along its direction, at points that bodies carry along."""
+def put_gradient(table: DistanceTable, column: ColumnRows, way: Any, p: Any, q: Any, gradient: Doubles) -> None:
+    """Write the derivatives of a distance: those of the gap along its direction, at points that bodies carry along.
+
+    A joint that carries both changes nothing. Parents have smaller numbers.
+    """
     for k in range(table.dof):
         gradient[k] = 0.0
     if dot(way, way) == 0.0:
         return
-    for side in range(2):
-        root = column[layout.COLUMN_ONE] if side == 0 else column[layout.COLUMN_OTHER]
-        frame = solid_at(table, node_at(table, root)[layout.NODE_SOLID])[SOLID_FRAME]
-        point = p if side == 0 else q
-        sign = 1.0 if side == 0 else -1.0
-        while frame > 0:
-            joint = frame - 1
-            coordinate = table.coordinates[joint]
-            if coordinate >= 0:
-                own = frame_at(frames, frame)
-                axis = turned(own, vector_at(row_at(table.joints, JOINT_SIZE, joint), JOINT_AXIS))
-                if table.sliding[joint] == 0:
-                    axis = cross(axis, minus(point, origin_of(own)))
-                gradient[coordinate] += sign * table.gains[joint] * dot(axis, way)
+    frame = solid_at(table, node_at(table, column[layout.COLUMN_ONE])[layout.NODE_SOLID])[SOLID_FRAME]
+    other = solid_at(table, node_at(table, column[layout.COLUMN_OTHER])[layout.NODE_SOLID])[SOLID_FRAME]
+    moment = cross(p, way)
+    other_moment = cross(q, way)
+    while frame != other:
+        of_first = frame > other
+        joint = (frame if of_first else other) - 1
+        coordinate = table.coordinates[joint]
+        if coordinate >= 0:
+            twist = row_at(table.twists, layout.TWIST_SIZE, joint)
+            rate = dot(vector_at(twist, 0), moment if of_first else other_moment) + dot(vector_at(twist, 3), way)
+            gradient[coordinate] += (table.gains[joint] if of_first else -table.gains[joint]) * rate
+        if of_first:
             frame = table.parents[joint]
+        else:
+            other = table.parents[joint]

@@ -43,6 +43,7 @@ class DistanceTable(CarriedSolids):
     keep: int  # so many of the smallest distances of a configuration are of interest
 
     # What a kernel computes in.
+    twists: Doubles  # how each joint moves what it carries
     smallest: Doubles  # the ``keep`` smallest distances of a configuration, in order
     stack: Ints  # pairs of nodes
     bounds: Doubles  # of each of them a lower bound of its distance, the same of its parent, and a direction
@@ -61,6 +62,8 @@ SOLID, TRIANGLE, HULL, AROUND, BOX_AROUND, POINTS = range(6)
 
 COLUMN_SIZE = 3
 COLUMN_ONE, COLUMN_OTHER, COLUMN_HOLLOW = range(3)
+
+TWIST_SIZE = 6
 
 STACKED = 512  # pairs of nodes that may wait: trees are at most a quarter as deep
 STACK_SIZE = 2

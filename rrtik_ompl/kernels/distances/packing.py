@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.base.arrays import Matrix
+from rrtik_ompl.base.arrays import Matrix, allocated
 from rrtik_ompl.base.collector import collector_waits
 from rrtik_ompl.geometry.collision.bodies import Body
 from rrtik_ompl.kernels.distances import layout
@@ -33,25 +33,22 @@ class Measured:
 
     Attributes:
         values: Signed distances [m], shape (m, p).
-        points: Nearest points in the world [m], shape (m, p, 2, 3).
-        normals: Unit vectors from the second point towards the first, the other way round where objects overlap, shape
-            (m, p, 3).
+        points: Nearest points in the world [m], NaN where none are measured, shape (m, p, 2, 3).
         gradients: Derivatives of the distances by the coordinates, shape (m, p, dof).
         told: What is told of each, see :mod:`rrtik_ompl.kernels.distances.layout`, shape (m, p).
     """
 
     values: Matrix
     points: NDArray[np.float64]
-    normals: NDArray[np.float64]
     gradients: NDArray[np.float64]
     told: NDArray[np.int32]
 
     @classmethod
     def unknown(cls, rows: int, columns: int, dof: int) -> Measured:
         """Room for distances of which nothing is known yet."""
-        told = np.full((rows, columns), layout.UNKNOWN, dtype=np.int32)
         shape = rows, columns
-        return cls(np.zeros(shape), np.zeros((*shape, 2, 3)), np.zeros((*shape, 3)), np.zeros((*shape, dof)), told)
+        told = np.full(shape, layout.UNKNOWN, dtype=np.int32)
+        return cls(allocated(shape), allocated((*shape, 2, 3)), allocated((*shape, dof)), told)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,29 +63,34 @@ class DistanceRows:
     table: DistanceTable
     roots: NDArray[np.int64]
 
-    def measured(
-        self, values: Matrix, pairs: NDArray[np.int64], hollow: NDArray[np.bool_], *, within: float, keep: int
-    ) -> Measured:
+    def columns(self, pairs: NDArray[np.int64], hollow: NDArray[np.bool_]) -> NDArray[np.int32]:
+        """Return pairs of objects as the kernels read them, shape (p, COLUMN_SIZE).
+
+        Args:
+            pairs: Numbers of two objects each, shape (p, 2).
+            hollow: Of which pairs one may be wholly inside the other, which is a mesh, shape (p,).
+        """
+        return np.ascontiguousarray(np.column_stack([self.roots[pairs], hollow]), dtype=np.int32)
+
+    def measured(self, values: Matrix, columns: NDArray[np.int32], *, within: float, keep: int) -> Measured:
         """Measure pairs of objects; what kernels cannot tell is UNKNOWN.
 
         Args:
             values: Rows of joint values in C order, shape (m, joints).
-            pairs: Numbers of two objects each, shape (p, 2).
-            hollow: Of which pairs one may be wholly inside the other, which is a mesh, shape (p,).
+            columns: Which pairs, as :meth:`columns` gives them, shape (p, COLUMN_SIZE).
             within: Larger distances are not measured [m].
             keep: So many of the smallest distances of a row are wanted; 0 for all.
         """
-        found = Measured.unknown(len(values), len(pairs), self.table.dof)
+        found = Measured.unknown(len(values), len(columns), self.table.dof)
         kernels = library(KERNELS)
         if kernels is None or found.told.size == 0:
             return found
 
-        columns = np.ascontiguousarray(np.column_stack([self.roots[pairs], hollow]), dtype=np.int32)
         if keep > len(self.table.smallest):
             self.table.put(smallest=np.zeros(keep))
         self.table.within = within
         self.table.keep = keep
-        sinks = found.values, found.points, found.normals, found.gradients, found.told
+        sinks = found.values, found.points, found.gradients, found.told
         # Between calls Ctrl-C is seen.
         for first in range(0, len(values), ROWS_AT_ONCE):
             block = slice(first, first + ROWS_AT_ONCE)
@@ -143,6 +145,7 @@ def distance_rows(chain: Chain, objects: Sequence[Sequence[Body]]) -> DistanceRo
         gains=chain.gain.sum(axis=1),
         within=0.0,
         keep=0,
+        twists=np.zeros(layout.TWIST_SIZE * len(chain.parent)),
         smallest=np.zeros(1),
         stack=np.zeros(layout.STACKED * layout.STACK_SIZE, dtype=np.int32),
         bounds=np.zeros(layout.STACKED * layout.BOUND_SIZE),

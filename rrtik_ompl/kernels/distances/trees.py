@@ -120,17 +120,33 @@ def _hull_of(corners: Matrix) -> Matrix:
 
 
 def _blocks_of(cloud: Cloud) -> list[Tree]:
-    """Return a leaf for every block of points of a cloud: what is around them, they, and what stands at each."""
+    """Return a leaf for every few points of a cloud: what is around them, they, and what stands at each."""
     cubes = cloud.half > 0.0
     part = ConvexSolid(cloud.half * BOX_CORNERS) if cubes else ConvexSolid(np.zeros((1, 3)), radius=cloud.radius)
     node = np.array([(0, *LEAF, POINTS, 1, 2)])
     made = []
-    for points in cloud.tree.blocks.transpose(0, 2, 1).astype(np.float64):
+    for points in _gathered(cloud.tree.blocks.transpose(0, 2, 1).astype(np.float64)):
         centres = ConvexSolid(points, radius=part.radius)
         low = points.min(axis=0) - cloud.half
         high = points.max(axis=0) + cloud.half
         made.append(Tree([_box_solid(low, high) if cubes else centres, centres, part], node))
     return made
+
+
+def _gathered(blocks: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return blocks of points, shape (n, size, 3), cut where the curve along which they are sorted jumps.
+
+    A block across a jump is as wide as the room, and all that is in the room would be compared with each of its points.
+    """
+    size = blocks.shape[1]
+    points = blocks.reshape(-1, 3)
+    jumps = np.abs(np.diff(points, axis=0, append=points[-1:])).max(axis=1)
+    usual = np.median(np.ptp(blocks, axis=1).max(axis=1))
+    last = jumps > usual
+    last[size - 1 :: size] = True
+    ends = np.flatnonzero(last)
+    starts = np.concatenate([[0], ends[:-1] + 1])
+    return points[np.minimum(starts[:, None] + np.arange(size), ends[:, None])]
 
 
 def _joined(trees: Sequence[Tree]) -> Tree:
