@@ -86,6 +86,8 @@ if TYPE_CHECKING:
     from rrtik_ompl.tasks import Task as Task
     from rrtik_ompl.tasks import TaskPlan as TaskPlan
     from rrtik_ompl.tasks import Variation as Variation
+    from rrtik_ompl.tasks.grasps import Grasp as Grasp
+    from rrtik_ompl.tasks.grasps import grasps as grasps
     from rrtik_ompl.tasks.task_file import list_tasks as list_tasks
     from rrtik_ompl.viewer import view as view
     from rrtik_ompl.viewer.plots.joints import plot_joints as plot_joints
@@ -178,6 +180,10 @@ else:
             "Task",
             "TaskPlan",
             "Variation",
+        ),
+        "tasks.grasps": (
+            "Grasp",
+            "grasps",
         ),
         "tasks.task_file": ("list_tasks",),
         "viewer": ("view",),

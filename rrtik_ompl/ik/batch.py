@@ -15,7 +15,7 @@ from rrtik_ompl.base.copies import as_value, in_one_line
 from rrtik_ompl.base.errors import NotFoundError, require
 from rrtik_ompl.description.joint_weights import weighted_difference
 from rrtik_ompl.ik.analytic.branches import tip_residuals
-from rrtik_ompl.ik.analytic.closed_form import branches_of, check_poses, form_of
+from rrtik_ompl.ik.analytic.closed_form import branches_of, check_poses, form_of, has_closed_form
 from rrtik_ompl.ik.method_interface import mid_range_configuration
 from rrtik_ompl.ik.methods import load_kernels
 from rrtik_ompl.ik.numeric.descent import Search
@@ -134,6 +134,29 @@ def solve_ik_many(
     return IkBatch(frozen(q), found, frozen(residuals), reasons, details, budget.elapsed)
 
 
+def free_configurations(robot: Robot, poses: NDArray[np.float64], near: Vector, world: World, rounds: int) -> Matrix:
+    """Return a configuration for each of many poses, in a few rounds that take all of them at once.
+
+    Args:
+        robot: The arm.
+        poses: T_world_tip, shape (m, 4, 4).
+        near: Configuration near which they are wanted, shape (dof,).
+        world: The world in which they are free.
+        rounds: How many configurations are tried for each pose, where there is no closed form.
+
+    Returns:
+        Configurations inside the limits, shape (m, dof); NaN where there is none among those that were tried.
+    """
+    load_kernels(robot)
+    q = np.full((len(poses), robot.dof), np.nan)
+    residuals = np.full((len(poses), 2), np.nan)
+    if has_closed_form(robot) and form_of(robot).kind == "pose":
+        _by_closed_form(robot, poses, near, world, q, residuals)
+    else:
+        _by_search(robot, poses, near, world, Budget(), q, residuals, rounds)
+    return q
+
+
 def _solved(
     robot: Robot,
     poses: NDArray[np.float64],
@@ -215,15 +238,18 @@ def _by_search(
     budget: Budget,
     q: Matrix,
     residuals: Matrix,
+    rounds: float = np.inf,
 ) -> None:
     """Write numeric solutions into q, shape (m, dof), and residuals, shape (m, 2), in place.
 
-    Targets whose solution is in collision are tried again, until a solution is free, the starts or the time run out.
+    Targets whose solution is in collision are tried again, until a solution is free, or the starts, the time or the
+    rounds run out.
     """
     search = Search(robot, pose_rows(targets), near)
     going = np.arange(len(targets))
 
-    while len(going) and not budget.over():
+    while len(going) and rounds > 0 and not budget.over():
+        rounds -= 1
         going = going[search.advance(going)]
         free = free_of_collision(world, search.q[going])
         done = going[free]

@@ -38,7 +38,7 @@ from rrtik_ompl.problem_files.robot import ROBOT, robot_data
 from rrtik_ompl.problem_files.scene import ContactEntry, SceneEntry, scene_data
 from rrtik_ompl.tasks import TaskPlan
 from rrtik_ompl.tasks.contact_life import MotionContact
-from rrtik_ompl.tasks.task_file import STAGE, stage_data
+from rrtik_ompl.tasks.task_file import MOVING_STAGE, stage_data
 from rrtik_ompl.world.world import World
 
 KIND: Literal["task_plan"] = "task_plan"
@@ -66,7 +66,7 @@ class StoodOnEntry(ContactEntry):
 class MotionEntry(WorldEntry):
     """One motion: what it does, where it leads, the world that it is in, and the contacts that it stood on."""
 
-    stage = key(STAGE)
+    stage = key(MOVING_STAGE)
     waypoints = key(Listed(NUMBERS, 1))
     contacts = key(Listed(StoodOnEntry), "that the motion stood on", default=[])
 
@@ -150,7 +150,7 @@ def _task_plan(file: str | os.PathLike[str]) -> TaskPlan:
         worlds.append(world)
         paths.append(path)
 
-    stages = tuple(motion.stage.build(world.robot) for motion, world in zip(entry.motions, worlds, strict=True))
+    stages = tuple(motion.stage.build(world) for motion, world in zip(entry.motions, worlds, strict=True))
     end = worlds[-1] if entry.end is None else _world(document, entry, entry.end, ("end",))
     contacts = tuple(tuple(each.stood_on() for each in motion.contacts) for motion in entry.motions)
     notes = tuple(entry.notes)

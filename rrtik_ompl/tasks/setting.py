@@ -20,7 +20,7 @@ from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import Scene, Touching
 from rrtik_ompl.tasks.contact_life import EXTRA_DEPTH, SMALL_OVERLAP, allowed, left_inside, touching_at, with_contacts
-from rrtik_ompl.tasks.stages import Attach, Detach, Gripper, GripperState, MoveTo, Stage
+from rrtik_ompl.tasks.stages import Attach, Detach, Gripper, MoveTo, Stage
 from rrtik_ompl.tasks.worlds import Worlds
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
@@ -168,22 +168,20 @@ def with_gripper(robot: Robot, stage: Gripper) -> Robot:
     Raises:
         InputError: If the robot has no gripper joints, or does not open so far.
     """
-    return _with_fingers(robot, stage.state, stage.width, stage.opening)
-
-
-@kept_with
-def _with_fingers(robot: Robot, state: GripperState, width: float | None, opening: float | None) -> Robot:
-    """Return the robot with its fingers in a state, a width [m] apart, or open by a share.
-
-    Robots keep no stages of tasks alive.
-    """
     joints = robot.gripper
     if joints is None:
         raise InputError(f"robot '{robot.name}' has no gripper joints: leave the stage Gripper out")
-    if opening is not None:
-        values = joints.at(opening)
+    if stage.opening is not None:
+        values = joints.at(stage.opening)
     else:
-        values = joints.posture(state) if width is None else joints.close_on(width)
+        values = joints.posture(stage.state) if stage.width is None else joints.close_on(stage.width)
+    locked = robot.source.get("locked", {})
+    return robot if values.items() <= locked.items() else _with_fingers(robot, tuple(values.items()))
+
+
+@kept_with
+def _with_fingers(robot: Robot, values: tuple[tuple[str, float], ...]) -> Robot:
+    """Return the robot with some joints of its gripper elsewhere: pairs of name and value [rad or m]."""
     source: dict[str, Any] = dict(robot.source)
-    source["locked"] = {**source.get("locked", {}), **values}
+    source["locked"] = {**source.get("locked", {}), **dict(values)}
     return robot_from_entry(source)

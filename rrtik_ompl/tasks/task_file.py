@@ -23,6 +23,7 @@ from rrtik_ompl.files.sections import (
     VECTOR2,
     VECTOR3,
     VERSION,
+    WHOLE,
     Choice,
     Kind,
     Later,
@@ -53,6 +54,7 @@ from rrtik_ompl.problem_files.problem_values import WorldKeys, world_data
 from rrtik_ompl.problem_files.robot import ROBOT, robot_data
 from rrtik_ompl.problem_files.scene import SceneEntry, scene_data
 from rrtik_ompl.tasks import Task
+from rrtik_ompl.tasks.grasps import grasps
 from rrtik_ompl.tasks.program import check_program, steps_of
 from rrtik_ompl.tasks.randomness import Displacement, Randomness, check_random
 from rrtik_ompl.tasks.setting import Setting, placed_constraints
@@ -68,7 +70,7 @@ OF_TASKS = ("task", "goals")  # A task file has exactly one of these keys.
 class StageEntry(Section):
     """A stage."""
 
-    def build(self, robot: Robot) -> Stage:
+    def build(self, world: World) -> Stage:
         """Build the stage."""
         raise NotImplementedError
 
@@ -79,9 +81,9 @@ class MoveToEntry(StageEntry):
     move_to = key(GOAL)
     path_constraints = key(Listed(CONSTRAINT), "regions that a frame must not leave on the way", default=[])
 
-    def build(self, robot: Robot) -> MoveTo:
+    def build(self, world: World) -> MoveTo:
         """Build the stage."""
-        return _move_to(self.move_to, robot, [section.build(robot) for section in self.path_constraints])
+        return _move_to(self.move_to, world.robot, [section.build(world.robot) for section in self.path_constraints])
 
 
 def _move_to(section: JointValues | TipTarget, robot: Robot, constraints: Iterable[TaskRegion]) -> MoveTo:
@@ -107,9 +109,9 @@ class StraightEntry(StageEntry):
 
     straight = key(LineEntry)
 
-    def build(self, robot: Robot) -> Straight:
+    def build(self, world: World) -> Straight:
         """Build the stage."""
-        del robot
+        del world
         line = self.straight
         return Straight(line.by, None if line.to is None else line.to.build(), line.frame)
 
@@ -130,9 +132,9 @@ class AttachEntry(StageEntry):
 
     attach = key(HoldEntry)
 
-    def build(self, robot: Robot) -> Attach:
+    def build(self, world: World) -> Attach:
         """Build the stage."""
-        del robot
+        del world
         return Attach(self.attach.object, self.attach.link, tuple(self.attach.allow), self.attach.padding)
 
 
@@ -141,9 +143,9 @@ class DetachEntry(StageEntry):
 
     detach = key(NAME)
 
-    def build(self, robot: Robot) -> Detach:
+    def build(self, world: World) -> Detach:
         """Build the stage."""
-        del robot
+        del world
         return Detach(self.detach)
 
 
@@ -154,10 +156,43 @@ class GripperEntry(StageEntry):
     width = key(NOT_NEGATIVE, "how far apart the fingers are afterwards [m]", default=None)
     opening = key(NOT_NEGATIVE, "or how far its joints are open, 0 to 1", default=None)
 
-    def build(self, robot: Robot) -> Gripper:
+    def build(self, world: World) -> Gripper:
         """Build the stage."""
-        del robot
+        del world
         return Gripper(self.gripper, self.width, self.opening)
+
+
+class GraspEntry(Section):
+    """An obstacle that two fingers take, and how grasps of it are sampled; see rrtik_ompl.grasps."""
+
+    object = key(NAME)
+    count = key(WHOLE, "how many grasps the task may choose from", default=8)
+    friction = key(POSITIVE, "coefficient of friction between fingers and object", default=0.5)
+    clearance = key(NOT_NEGATIVE, "what arm and open hand keep from obstacles [m]", default=0.002)
+    approach = key(NOT_NEGATIVE, "length of the straight way to the grasp [m]", default=0.1)
+    seed = key(WHOLE, "the same seed gives the same grasps", default=0)
+
+
+class GraspsEntry(StageEntry):
+    """Take an obstacle, where the scene has it, by any of several grasps that are sampled."""
+
+    grasp = key(GraspEntry)
+
+    def build(self, world: World) -> Alternatives:
+        """Build the stage."""
+        how = self.grasp
+        found = grasps(
+            world,
+            how.object,
+            count=how.count,
+            friction=how.friction,
+            clearance=how.clearance,
+            approach=how.approach,
+            seed=how.seed,
+        )
+        if not found:
+            raise InputError(f"grasp: no grasp of '{how.object}' is found that the arm reaches; say how it is taken")
+        return Alternatives([grasp.stages() for grasp in found])
 
 
 class AlternativesEntry(StageEntry):
@@ -165,19 +200,21 @@ class AlternativesEntry(StageEntry):
 
     alternatives = key(Listed(Listed(Later(lambda: STAGE), 1), 1))
 
-    def build(self, robot: Robot) -> Alternatives:
+    def build(self, world: World) -> Alternatives:
         """Build the stage."""
-        return Alternatives([[stage.build(robot) for stage in row] for row in self.alternatives])
+        return Alternatives([[stage.build(world) for stage in row] for row in self.alternatives])
 
 
+OF_MOTIONS: dict[str, type[StageEntry]] = {"move_to": MoveToEntry, "straight": StraightEntry}
+MOVING_STAGE: Kind[StageEntry] = ToldApart("the stage of a motion", OF_MOTIONS)
 STAGE: Kind[StageEntry] = ToldApart(
     "a stage",
     {
-        "move_to": MoveToEntry,
-        "straight": StraightEntry,
+        **OF_MOTIONS,
         "attach": AttachEntry,
         "detach": DetachEntry,
         "gripper": GripperEntry,
+        "grasp": GraspsEntry,
         "alternatives": AlternativesEntry,
     },
 )
@@ -404,8 +441,7 @@ def _check(document: YamlDocument, key: str, task: Task, world: World) -> None:
 def _stages(document: YamlDocument, entry: TaskFile, world: World, start: Vector) -> list[Stage]:
     """Return the stages that a file lists, or one stage for each of its goals."""
     if entry.task is not None:
-        with document.at(("task",)):
-            return [stage.build(world.robot) for stage in entry.task]
+        return [_stage(document, entry.task, number, world) for number in range(len(entry.task))]
 
     constraints = build_constraints(document, entry.path_constraints, world.robot)
     with document.at(("path_constraints",)):
@@ -416,6 +452,17 @@ def _stages(document: YamlDocument, entry: TaskFile, world: World, start: Vector
         with document.at(("goals", number)):
             stages.append(_move_to(goal, world.robot, placed_regions))
     return stages
+
+
+def _stage(document: YamlDocument, entries: list[StageEntry], number: int, world: World) -> Stage:
+    """Return one of the stages that a file lists; grasps are of obstacles that no stage before it has taken."""
+    with document.at(("task", number)):
+        entry = entries[number]
+        taken = {each.attach.object for each in entries[:number] if isinstance(each, AttachEntry)}
+        taken |= {each.grasp.object for each in entries[:number] if isinstance(each, GraspsEntry)}
+        if isinstance(entry, GraspsEntry) and entry.grasp.object in taken:
+            raise InputError(f"grasp: '{entry.grasp.object}' was taken before; say how it is taken where it is then")
+        return entry.build(world)
 
 
 def stage_data(stage: Stage) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from rrtik_ompl.base.lazy import public_values
 from rrtik_ompl.model.world_settings import WorldSettings
 
 # Made by the library, not by users, as are results, which have a reason or reasons.
-MADE = {"Certificate", "Robot", "TaskCertificate", "ik.ReachMap"}
+MADE = {"Certificate", "Grasp", "Robot", "TaskCertificate", "ik.ReachMap"}
 NARROW = ("tuple[", "list[", "Vector", "Matrix", "pin.SE3", "NDArray", "ndarray", "Any")
 # What widens a pose is written beside it.
 WIDE = ("ArrayLike | pin.SE3", "Sequence[", "Iterable[", "Mapping[")

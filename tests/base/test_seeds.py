@@ -29,6 +29,9 @@ TIP = ARM.robot.fk(POSTURE)
 TURNED = rrtik.pose([0.0, 0.0, 0.0], rpy=[0.0, 0.0, 0.1]) * TIP
 NEAR, NEARER, ABOVE = (TIP.translation + np.array(by) for by in ([0.1, 0.0, 0.0], [0.05, 0.02, 0.0], [0.0, 0.0, 0.05]))
 
+BALL = rrtik.Obstacle("ball", rrtik.Sphere(0.02), [0.5, 0.0, 0.4])
+GRASPING = rrtik.World(rrtik.load_robot("panda_primitives"), rrtik.Scene([BALL]))
+
 TASK = rrtik.Task([rrtik.MoveTo(END)], WORLD, START)
 RANDOM = rrtik.Task([rrtik.MoveTo(END)], WORLD, START, random=rrtik.demos.Randomness(start=np.zeros((3, 2))))
 
@@ -42,6 +45,7 @@ CALLS = {
     "Roadmap": lambda seed: rrtik.Roadmap(WORLD, vertices=3, seed=seed),
     "Task.plan_many": lambda seed: TASK.plan_many([rrtik.Variation()], seed=seed),
     "Task.plan": lambda seed: rrtik.Task([rrtik.MoveTo(END)]).plan(WORLD, START, seed=seed),
+    "grasps": lambda seed: rrtik.grasps(GRASPING, "ball", count=1, seed=seed),
     "ik.reach_map": lambda seed: rrtik.ik.reach_map(ROBOT, samples=50, seed=seed),
     "ik.solve_trajectory": lambda seed: rrtik.ik.solve_trajectory(ARM.robot, [TIP.homogeneous] * 2, seed=seed),
     "ompl.GoalSampler": lambda seed: rrtik.ompl.GoalSampler(MARK, seed=seed),

@@ -111,6 +111,11 @@ def run_certificate_fault(problem, _):
     return certificate is None or run.verify(certificate, problem.world)
 
 
+def grasping():
+    ball = rrtik.Obstacle("ball", rrtik.Sphere(0.02), [0.5, 0.0, 0.4])
+    return rrtik.World(rrtik.load_robot("panda_primitives"), rrtik.Scene([ball]))
+
+
 ENGINES = {"World", "Roadmap", "Task"}  # of which all methods are tried
 MERE_VALUES = {"Plan", "TaskPlan", "World"}
 CALLS = {
@@ -167,6 +172,7 @@ CALLS = {
     "World.explain": lambda p, _: [p.world.explain(row) for row in ROWS],
     "World.certify": lambda p, _: p.world.certify(ROWS),
     "following.Servo": lambda p, _: first_rates(p),
+    "grasps": lambda p, _: [round(grasp.width, 4) for grasp in rrtik.grasps(grasping(), "ball", count=1)],
     "ik.reach_map": lambda p, _: rrtik.ik.reach_map(p.robot, world=p.world, cell=0.5, samples=2000).reached.sum(),
     "ik.solve_trajectory": lambda p, _: rrtik.ik.solve_trajectory(p.robot, p.robot.fk_batch(LINE), world=p.world).found,
     "ompl.GoalSampler": lambda p, _: len(rrtik.ompl.GoalSampler(p).rows),
