@@ -319,7 +319,16 @@ class Robot(Keeper):
 
     def joint_frames(self, Q: ArrayLike) -> NDArray[np.float64]:
         """Compute the poses of all Pinocchio joint frames in the world, world first, shape (m, joints + 1, 4, 4)."""
-        return self.chain.joint_frames(self._rows(Q))
+        rows = self._rows(Q)
+        if self.model.nv > MOST_MOVING or not 0 < len(rows) <= FEW:
+            return self.chain.joint_frames(rows)
+
+        data = _data_of(self, get_ident())
+        frames = np.empty((len(rows), len(data.oMi), 4, 4))
+        for k, full in enumerate(pinocchio_rows(self, rows)):
+            pin.forwardKinematics(self.model, data, full)
+            frames[k] = [pose.homogeneous for pose in data.oMi]
+        return frames
 
     def fk_batch(self, Q: ArrayLike, frame: str | None = None) -> NDArray[np.float64]:
         """Compute T_world_tip, or the pose of another frame or link, for Q: (m, dof) -> (m, 4, 4)."""

@@ -178,6 +178,10 @@ def _between(
     Fingers that move between the two worlds carry along what they hold, so the place of the link in either world is
     accepted, and the smallest difference counts.
     """
+    both_stand = isinstance(old, Obstacle) and isinstance(new, Obstacle)
+    if both_stand and np.array_equal(old.pose.homogeneous, new.pose.homogeneous):
+        return 0.0, 0.0
+
     differences = []
     if isinstance(old, AttachedObject) and isinstance(new, AttachedObject) and old.link == new.link:
         differences.append(old.pose.actInv(new.pose))

@@ -237,7 +237,7 @@ def suggest_planes(robot: Robot, bodies: Sequence[Body], packed: ProofPairs, end
         packed: The table. The normals are written into ``packed.table.ways``, in the frame of each pair.
         ends: Start and end configuration, shape (2, dof).
     """
-    frames = robot.chain.joint_frames(ends)
+    frames = robot.joint_frames(ends)
     normals_of_rows = packed.table.ways.reshape(-1, 3)
     bases = packed.table.pairs.reshape(-1, layout.PAIR_SIZE)[:, layout.PAIR_BASE]
     normal_of_solids: dict[tuple[int, int], tuple[int, Vector]] = {}

@@ -13,7 +13,7 @@ from rrtik_ompl.motion.trajectory.checks import bad_moments, proof_of_pieces
 from rrtik_ompl.motion.trajectory.corners import MERGED_SHARE, first_radii, spaced, vertices
 from rrtik_ompl.motion.trajectory.cubics import Cubics
 from rrtik_ompl.motion.trajectory.dynamics import DynamicLimits
-from rrtik_ompl.motion.trajectory.limits import RateLimits
+from rrtik_ompl.motion.trajectory.limits import RateLimits, slowing_of
 from rrtik_ompl.motion.trajectory.motion import Trajectory, motion_along
 from rrtik_ompl.motion.trajectory.runs import Run, runs, seconds_of_lines
 from rrtik_ompl.world.clearances import provable_clearances
@@ -116,7 +116,7 @@ def joined(parts: Sequence[Run], path: JointPath, limits: RateLimits) -> Traject
 def _within(motion: Cubics, limits: RateLimits, rounds: int = 10) -> Cubics:
     """Slow a motion down if rounding errors let it exceed a limit."""
     for _ in range(rounds):
-        factor = limits.slowing(*motion.peaks())
+        factor = slowing_of(limits, *motion.peaks())
         if factor == 1.0:
             break
         motion = motion.slowed(factor)

@@ -167,6 +167,8 @@ def _not_proven_together(
     clock = np.unique(np.concatenate([begin_times, motion.times[pieces[ends] + 1]]))
 
     proof = world.prover.route(motion.states(clock).positions, clearance=clearance, slack=SLACKS[0])
+    if proof.proven:
+        return np.empty(0, dtype=np.int64)
     is_open = np.isin(np.searchsorted(clock, begin_times), [gap.motion for gap in proof.unproven])
     return np.flatnonzero(is_open[np.cumsum(begins) - 1])
 

@@ -151,7 +151,7 @@ class Curve:
         """
         corner_places = self.along[1:-1]
         radii = self.radii[1:-1]
-        knots = np.unique(
+        knots = np.sort(
             np.concatenate([corner_places - radii, corner_places, corner_places + radii, self.along[[0, -1]]])
         )
         knots = knots[np.concatenate([[True], knots[1:] - knots[:-1] > SAME_PLACE * self.length])]

@@ -128,9 +128,12 @@ class RateLimits:
         Raises:
             InputError: If they are for another number of joints.
         """
-        self._fits(whole_number(count, "number of joints", 1))
+        joints = whole_number(count, "number of joints", 1)
+        if joints == len(self.velocity) == len(self.acceleration) == len(self.jerk):
+            return self
+        self._fits(joints)
         rows = {"velocity": self.velocity, "acceleration": self.acceleration, "jerk": self.jerk}
-        return changed(self, **{name: frozen(np.broadcast_to(row, (count,))) for name, row in rows.items()})
+        return changed(self, **{name: frozen(np.broadcast_to(row, (joints,))) for name, row in rows.items()})
 
     def slowing(self, velocity: Vector, acceleration: Vector, jerk: Vector | None = None) -> float:
         """Return the factor, 1 or more, by which a motion with these peaks must be slowed to keep the limits.
@@ -143,17 +146,33 @@ class RateLimits:
         Raises:
             InputError: If these are not one number per joint.
         """
-        shares = []
+        rows: list[Vector | None] = []
         peaks = {"velocity": velocity, "acceleration": acceleration, "jerk": jerk}
         for (name, peak), limit in zip(peaks.items(), (self.velocity, self.acceleration, self.jerk), strict=True):
-            if peak is not None or name != "jerk":
-                row = number_rows(np.nan if peak is None else peak, f"peaks of {name}").reshape(-1)
-                self._fits(len(row))
-                limited_peaks = finite_array(np.where(np.isfinite(limit), row, 0.0), (None,), f"peaks of {name}")
-                shares.append((limited_peaks / limit).max(initial=0.0))
+            if peak is None and name == "jerk":
+                rows.append(None)
+                continue
+            row = number_rows(np.nan if peak is None else peak, f"peaks of {name}").reshape(-1)
+            self._fits(len(row))
+            finite_array(np.where(np.isfinite(limit), row, 0.0), (None,), f"peaks of {name}")
+            rows.append(row)
+        return slowing_of(self, *rows)
 
-        factors = [float(share) ** (1.0 / power) for power, share in enumerate(shares, start=1)]
-        return 1.0 if max(shares) <= 1.0 else max(factors) * ROUNDING_MARGIN
+
+def slowing_of(limits: RateLimits, *peaks: Vector | None) -> float:
+    """Return :meth:`RateLimits.slowing` for largest velocities, accelerations and jerks that are known to be finite.
+
+    Jerks may be infinite where they are not limited.
+    """
+    shares = []
+    for row, limit in zip(peaks, (limits.velocity, limits.acceleration, limits.jerk), strict=True):
+        if row is not None:
+            limited = np.where(np.isfinite(limit), row, 0.0)
+            shares.append(float((limited / limit).max(initial=0.0)))
+    if max(shares) <= 1.0:
+        return 1.0
+    factors: list[float] = [share ** (1.0 / power) for power, share in enumerate(shares, start=1)]
+    return ROUNDING_MARGIN * max(factors)
 
 
 def default_words(robot: Robot, given: Collection[str] = ()) -> str:
