@@ -41,7 +41,12 @@ from rrtik_ompl.world.world import World
 Clock = Callable[[], float]
 
 TOO_NEAR = "an obstacle is too near"
+NO_WAY_LEFT = "a step would leave no way out"
 NO_WAY_OUT = "no motion was found that nothing can reach in time"
+BERTH_PAUSE = 1.0  # between tries to give obstacles a wide berth [s]
+NEAR_STEPS = 3.0  # as far apart two places are one
+REFUSED_SECONDS = 1.0  # after which steps that are refused at one place
+STAY_SECONDS = 5.0  # are made for so long only to where the arm could stay
 PROOF_TRIES = 3  # searches for a path that is proven
 REACTION_TICKS = 6  # The arm evades a cloud that would be too near within so many ticks at its present speed.
 
@@ -106,6 +111,11 @@ class Loop:
         self._cut_short = False  # whether the last search for a path has ended with its time
         self._distance_left_before = np.nan  # distance left at the end of the previous tick [m]
         self._required_distances: dict[str, float] = {}  # distance to keep from each obstacle now [m]
+        self._berth: dict[str, float] = {}  # what paths keep from some obstacles beyond that [m]
+        self._berth_after = 0.0  # when a wide berth may be tried (again) [s]
+        self._refused: tuple[float, Vector] | None = None  # since when steps along a path are refused, and where
+        self._last_refused = -np.inf  # [s]
+        self._stays_until = 0.0  # until when the arm steps only to where it could stay [s]
 
         self.run = ReplanRun(
             problem.name, robot.name, robot.joint_names, settings.planner, settings.seed, settings.step, settings.rate,
@@ -148,7 +158,8 @@ class Loop:
             if not self.tick(number):
                 return self.run
         self.run.outcome = "out of time"
-        self.run.reason = self.run.ticks[-1].reason or "still on its way"
+        refused = "" if self._guard is None else self._why_refused(self._guard)
+        self.run.reason = refused or self.run.ticks[-1].reason or "still on its way"
         return self.run
 
     def tick(self, number: int) -> bool:
@@ -161,6 +172,7 @@ class Loop:
             number: Number of the tick, from 0; it begins at this number times the length of a tick.
         """
         now = number * self._settings.tick
+        self._now = now
         begin = self._clock()
 
         if self._arrived():
@@ -265,6 +277,9 @@ class Loop:
         travels_in_tick = self._travels.in_tick(scene)
         travels = {name: travel + self._travels_since_seen[name] for name, travel in travels_in_tick.items()}
         distances = required_distances(scene, self._required, travels)
+        self._required_in_tick = distances
+        berths = {name: distances[name] + berth for name, berth in self._berth.items() if name in distances}
+        distances = distances | berths
 
         # and in proofs of moves for every motion that nothing rules out; None where no bound is known.
         self._possible_travels = self._travels.possible(snapshot, ages)
@@ -347,12 +362,15 @@ class Loop:
     def _repair(self) -> bool:
         """Look for a free path and return whether one was found.
 
-        If there is none that avoids the predicted places of obstacles too, only their present places are avoided.
+        If there is none that avoids the predicted places of obstacles too, or gives them a wide berth, only their
+        present places are avoided.
         """
         if self._new_proven_path():
             return True
-        if not self._settings.lookahead_ticks:
+        if not self._settings.lookahead_ticks and not self._berth:
             return False
+        self._berth = {}
+        self._required_distances = self._required_in_tick
         self._world.move(self._world.scene, inflation=self._required_distances)
         return self._planner.check_path(self._world) or self._new_proven_path()
 
@@ -497,10 +515,15 @@ class Loop:
         path = self._planner.path
         if free and not self._world.blocked:
             q, passed = self._next_on_path()
-            leaves_way_out = q is not self.q and guard.seconds_after(self.q, q, path) >= guard.needed
+            seconds, leaves_way_out = 0.0, False
+            if q is not self.q and path is not None:
+                rest = np.vstack([q, path[passed + 1 :]])
+                seconds, leaves_way_out = guard.seconds_after(self.q, rest, stays=self._now < self._stays_until)
             if leaves_way_out and not (self._scene_is_old and not self._proven_whatever_moves(self.q, q)):
                 self._planner.advance(q, passed, self._world)
-                return event, "", q, guard.needed * base_is_safe, None
+                return event, "", q, seconds * base_is_safe, None
+            self._note_refusal()
+            self._give_wide_berth(guard)
 
         if self._world.blocked:
             refuge = Refuge(self.q, 0.0, moves=False)
@@ -524,20 +547,70 @@ class Loop:
             self._planner.rejoin(refuge.q)
         return "evade" if refuge.moves else "wait", reason, refuge.q, refuge.seconds * base_is_safe, lost
 
+    def _give_wide_berth(self, guard: Guard) -> None:
+        """Make further paths keep out of reach of obstacles, for as long as the guard asks for, where that is possible.
+
+        It is beside obstacles that can reach neither the arm where it is nor the goal in that time.
+        """
+        path = self._planner.path
+        if self._now < self._berth_after or path is None:
+            return
+        self._berth_after = self._now + BERTH_PAUSE
+        berth = (guard.needed - self._settings.tick) * (self._settings.speed_bound or 0.0)
+        rooms = self._rooms(np.vstack([self.q, path[-1]])).items()
+        self._berth = {name: berth for name, room in rooms if min(room) > self._required_in_tick[name] + berth}
+
+    def _rooms(self, rows: Matrix) -> dict[str, Vector]:
+        """Return the distances from each obstacle that may move at configurations, shape (m, n) [m], shape (m,)."""
+        found = self._exact_world().distances(rows)
+        may_move = [name for name, travel in (self._possible_travels or {}).items() if travel > 0.0]
+        columns = {name: [name in pair for pair in found.names] for name in may_move}
+        return {name: found.values[:, own].min(axis=1) for name, own in columns.items() if any(own)}
+
+    def _note_refusal(self) -> None:
+        """Let the arm step only to where it could stay, for a while, if its steps were refused for long at one place.
+
+        Else it would go to and fro.
+        """
+        self._last_refused = self._now
+        near = NEAR_STEPS * self._settings.step
+        if self._refused is None or float(np.linalg.norm(self.q - self._refused[1])) > near:
+            self._refused = self._now, self.q
+        elif self._now - self._refused[0] >= REFUSED_SECONDS:
+            self._refused = None
+            self._stays_until = self._now + STAY_SECONDS
+
+    def _why_refused(self, guard: Guard) -> str:
+        """Return which obstacle keeps the arm from going on, and with which bound on speeds it would go."""
+        path = self._planner.path
+        if path is None or self._now - self._last_refused > REFUSED_SECONDS:
+            return ""
+        rooms = self._rooms(np.vstack([path[-1], self._next_on_path()[0]]))
+        for k, place in enumerate(("the goal", "the next step")):
+            left = {name: room[k] - self._required - self._travels_since_seen[name] for name, room in rooms.items()}
+            nearest = min(left, key=lambda name: left[name], default=None)
+            if nearest is not None and (bound := guard.bound_for(left[nearest])) < (self._settings.speed_bound or 0.0):
+                reach = f"'{nearest}' could reach the arm at {place} within {guard.needed:.3g} s"
+                return f"{reach}; with a speed_bound of {bound:.3g} m/s or less it would go there"
+        return NO_WAY_LEFT
+
     def _way_out(self) -> Vector | Unavoidable | None:
         """Return the end of a motion on which nothing can touch the arm in this tick, or a proof that there is none."""
         settings = self._settings
         after = self._possible_travels or {}
         way = settings.tick * (settings.speed_bound or 0.0)  # of an obstacle in a tick [m]
         before = {name: max(travel - way, 0.0) for name, travel in after.items()}
-        world = self._problem.world.with_accuracy("exact").with_scene(self._world.scene)
-        reach = Reach(world, self.q, settings.step, self._max_change, settings.tick, before, after)
+        reach = Reach(self._exact_world(), self.q, settings.step, self._max_change, settings.tick, before, after)
 
         # What is no faster than the bound but for rounding is not called faster.
         spare = ROUNDING + (SPEED_WARNING_RATIO - 1.0) * max(after.values(), default=0.0)
         spare += SPEED_WARNING_RATIO * TIME_RESOLUTION * (settings.speed_bound or 0.0)
         alone = self._world_of_arm
         return way_out(reach, lambda q: alone.motion_valid(self.q, q), spare)
+
+    def _exact_world(self) -> World:
+        """Return a world for exact distances, with obstacles where they were seen."""
+        return self._problem.world.with_accuracy("exact").with_scene(self._world.scene)
 
     def _why_stay(self, free: bool) -> str:
         """Return why the robot does not go along a path."""
@@ -547,7 +620,7 @@ class Loop:
             return "the goal is not free"
         if not free:
             return self._why_no_path()
-        return "what was seen is too old to go on" if self._scene_is_old else "a step would leave no way out"
+        return "what was seen is too old to go on" if self._scene_is_old else NO_WAY_LEFT
 
     def _wait_or_evade(self) -> tuple[TickEvent, str, Vector]:
         """Wait, or evade an obstacle that is too near, when there is no free path.

@@ -90,9 +90,8 @@ class Guard:
         self._keep = keep
         self._max_change = max_change
         self._rng = rng
-        fastest = float((world.weights * np.minimum(settings.step, max_change)).max())  # [m] in a tick
-        slow_ticks = int(min(UNIT_SHARE * fastest / (self._speed * self._tick), LONGEST_UNIT / self._tick))
-        self._unit = max(slow_ticks, 1)  # [ticks]
+        self._fastest = float((world.weights * np.minimum(settings.step, max_change)).max())  # [m] in a tick
+        self._unit = self._unit_for(self._speed)  # [ticks]
         self._looks = np.unique([*FIRST_LOOKS, *(self._unit * np.array(FURTHER_LOOKS))])
         self._parts: dict[bool, tuple[frozenset[str], MovingWorld | None]] = {}
 
@@ -100,6 +99,16 @@ class Guard:
     def needed(self) -> float:
         """How long motions have to be safe, the tick included, so that the arm goes on [s]."""
         return NEEDED * self._unit * self._tick
+
+    def _unit_for(self, speed: float) -> int:
+        """Return the ticks of a unit among obstacles of a speed [m/s]."""
+        return max(int(min(UNIT_SHARE * self._fastest / (speed * self._tick), LONGEST_UNIT / self._tick)), 1)
+
+    def bound_for(self, room: float) -> float:
+        """Return a bound on speeds with which nothing comes as far as ``room`` [m] in the time that is needed [m/s]."""
+        longest = max(int(LONGEST_UNIT / self._tick), 1)
+        bounds = ((unit, max(room, 0.0) / (NEEDED * unit * self._tick)) for unit in range(1, longest + 1))
+        return max(bound for unit, bound in bounds if unit == longest or bound == 0.0 or self._unit_for(bound) <= unit)
 
     def see(self, scene: Scene, ages: Mapping[str, float], may_move: frozenset[str]) -> None:
         """Take over where obstacles were seen.
@@ -121,24 +130,36 @@ class Guard:
                 seconds = {name: ages[name] + TIME_RESOLUTION if moving else 0.0 for name in names}
                 world.move(part, inflation={name: self._speed * age for name, age in seconds.items()})
 
-    def seconds_after(self, q: Vector, after: Vector, path: Matrix | None) -> float:
-        """Return how long the best motion that begins with a tick from ``q`` to ``after`` keeps its distance [s].
+    def seconds_after(self, q: Vector, path: Matrix, *, stays: bool = False) -> tuple[float, bool]:
+        """Return how long the best motion that begins with a step keeps its distance, and whether that is enough.
 
-        The answer is at most :attr:`needed`.
+        It is if the motion does so for as long as is needed, or to the end of the path, where the run ends.
 
         Args:
             q: The robot's configuration, shape (n,).
-            after: Where it would be after the tick, shape (n,).
-            path: Its path, shape (k, n), or None.
+            path: Where it would be after the tick, and its path from there to a goal, shape (k, n).
+            stays: Whether the arm must be able to stand where the step ends for as long as is needed.
+
+        Returns:
+            The time, at most :attr:`needed` [s].
         """
+        after = path[0]
         looks = self._looks[self._looks <= NEEDED * self._unit]
         step = q + np.minimum(looks, 1.0)[:, None] * (after - q)
         seconds = float(self._safe_seconds(step[None], looks)[0, 0])  # It may stand where the step ends.
         if seconds >= self.needed - SPARE or seconds < self._tick - SPARE:
-            return seconds
-        ways = self._ways(after, self._targets(after, path), np.maximum(looks - 1.0, 0.0))
+            return seconds, seconds >= self.needed - SPARE
+
+        further = np.maximum(looks - 1.0, 0.0)
+        ways = self._ways(after, self._targets(after, path), further)
+        ways = np.concatenate([ways, self._along(path, further)[None]])
         ways = np.where((looks <= 1.0)[None, :, None], step[None], ways)
-        return float(self._safe_seconds(ways, looks)[:, 0].max())
+        kept_seconds = self._safe_seconds(ways, looks)[:, 0]
+        seconds = float(kept_seconds.max())
+        ticks = 1.0 + float(ticks_of(np.diff(path, axis=0), self._step, self._max_change).sum())
+        arrival = float(np.ceil(ticks - SPARE)) * self._tick
+        arrives = float(kept_seconds[-1]) >= arrival - SPARE
+        return seconds, arrives or (seconds >= self.needed - SPARE and not stays)
 
     def refuge(self, q: Vector, path: Matrix | None, ahead: Callable[[int], MovingWorld]) -> Refuge:
         """Return the begin of the best motion from ``q``.
@@ -156,13 +177,13 @@ class Guard:
         soon = ahead(round(3 * self._unit))
         ways = self._ways(q, np.vstack([q, self._targets(q, path, soon)]), self._looks)
         if path is not None and len(path) > 1:
-            ways = np.concatenate([ways, self._along(path)[None]])
+            ways = np.concatenate([ways, self._along(path, self._looks)[None]])
         kept_seconds, seconds = self._safe_seconds(ways, self._looks).T
         if kept_seconds[0] >= self.needed - SPARE:
             return Refuge(q, float(seconds[0]), moves=False)
 
         room = np.full(len(ways), np.inf)
-        for ticks in (1, *(round(self._unit * units) for units in RATED)):
+        for ticks in dict.fromkeys((1, *(round(self._unit * units) for units in RATED))):
             room = np.minimum(room, ahead(ticks).clearance(ways[:, self._look_at(ticks)]))
         ends = ways[:, self._look_at(1)]
         if seconds.max() < self._tick - SPARE:
@@ -235,10 +256,10 @@ class Guard:
             shares = np.where(ticks[:, None] > 0.0, looks / ticks[:, None], 1.0)
         return np.asarray(q + np.minimum(shares, 1.0)[:, :, None] * edges[:, None, :])
 
-    def _along(self, path: Matrix) -> Matrix:
-        """Return where the arm is on its way along the path, shape (k, n), at the looks."""
+    def _along(self, path: Matrix, looks: Vector) -> Matrix:
+        """Return where the arm is on its way along the path, shape (k, n), at times in ticks."""
         ends = np.concatenate([[0.0], np.cumsum(ticks_of(np.diff(path, axis=0), self._step, self._max_change))])
-        return np.column_stack([np.interp(self._looks, ends, values) for values in path.T])
+        return np.column_stack([np.interp(looks, ends, values) for values in path.T])
 
     def _look_at(self, ticks: int) -> int:
         """Return the number of the look after so many ticks."""

@@ -1,5 +1,7 @@
 """What nothing can reach in time is what a bound on speeds says, and a contact that cannot be ruled out is proven."""
 
+import re
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -9,7 +11,8 @@ from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.model.scene import Scene, TimedPoses
 from rrtik_ompl.replanning.record import ReplanRun
 from rrtik_ompl.replanning.refuge import Guard
-from rrtik_ompl.replanning.replanner import replan
+from rrtik_ompl.replanning.replanner import replan, replan_with
+from rrtik_ompl.replanning.scenario import Scenario
 from rrtik_ompl.replanning.settings import ReplanSettings
 from rrtik_ompl.replanning.unavoidable import ContactWarning, Reach, Unavoidable, kept, way_out
 from rrtik_ompl.world.moving_world import MovingWorld
@@ -169,3 +172,38 @@ def test_moves_of_a_run_with_a_bound_are_safe_for_the_tick_they_are_made_in():
     run = replan(pressed(12.0), speed_bound=SPEED, **(OPTIONS | {"seconds": 1.5}))
     assert all(before.safe_seconds is not None for before, _ in pairwise(run.ticks))
     assert replan(pressed(12.0), **(OPTIONS | {"seconds": 0.3})).ticks[0].safe_seconds is None
+
+
+def beside_goal(gap):
+    """A box at rest beside the goal, which a feed shows, so that it may begin to move."""
+    return plane(box("post", 19.0, 11.0 + gap, 2.0, 2.0), start=(13.0, 10.0))
+
+
+def test_a_goal_is_entered_where_the_arm_is_safe_until_it_arrives():
+    problem = beside_goal(0.6)  # It could be there in 0.12 s, and a way out has to be left for 0.5 s elsewhere.
+    run = replan(problem, lambda t: problem.world.scene, speed_bound=SPEED, **(OPTIONS | {"seconds": 3.0}))
+    assert run.found
+    assert all(tick.safe_seconds >= TICK - 1e-9 for tick in run.ticks[:-1])
+
+
+def test_a_run_that_waits_says_which_obstacle_it_waits_for_and_with_which_bound_it_would_go():
+    problem = beside_goal(0.3)
+    options = OPTIONS | {"seconds": 3.0}
+    run = replan(problem, lambda t: problem.world.scene, speed_bound=SPEED, **options)
+    assert run.outcome == "out of time"
+    said = re.fullmatch(
+        r"'post' could reach the arm at the goal within 0.5 s; "
+        r"with a speed_bound of (\S+) m/s or less it would go there", run.reason,
+    )  # fmt: skip
+    bound = float(said[1])
+    assert 0.0 < bound < 0.3 / 0.5  # The box at the goal, the time that is needed.
+    assert replan(problem, lambda t: problem.world.scene, speed_bound=bound, **options).found
+
+
+def test_a_way_that_leads_too_near_to_what_could_move_is_led_around_it():
+    scenario = Scenario.load("replan_planar_arm")
+    settings = replace(scenario.settings, speed_bound=3.8, repair_budget=30.0, seed=1, seconds=15.0)
+    run = replan_with(settings, scenario.problem)
+    assert run.found
+    assert all(tick.safe_seconds >= settings.tick - 1e-9 for tick in run.ticks[:-1])
+    assert not run.violations(scenario.problem)

@@ -269,7 +269,7 @@ def fixed_contact(robot: Robot, bodies: tuple[Body, ...], pairs: tuple[tuple[int
         bodies: All bodies of the world.
         pairs: Numbers of the bodies that never move and must not touch.
     """
-    meeting = _boxes_meet(bodies, pairs)
+    meeting = _boxes_meet(bodies, pairs) if pairs else ()
     return Certificate(robot, bodies, meeting).first_pairs(np.zeros((1, robot.dof)))[0] if meeting else None
 
 

@@ -240,8 +240,10 @@ class PlacedPrimitives:
             covers = [outer[k] for k in moved]
             grown = [inflation[k] for k in moved]
             made = outer_primitives([bodies[k] for k in moved], covers, grown)
-            kept = self._made.only(~np.isin(self._made.bodies, places))
-            self._made = joined([kept, replace(made, bodies=np.array(places)[made.bodies])])
+            made = replace(made, bodies=np.array(places)[made.bodies])
+            if len(places) < len(now):
+                made = joined([self._made.only(~np.isin(self._made.bodies, places)), made])
+            self._made = made
             self._known.update((place, now[place]) for place in places)
 
         return self._made

@@ -275,12 +275,17 @@ def _half_space(body: Body, place: int, grow: float, inflation: float) -> Primit
     return _single(HALF_SPACE, place, numbers, -everywhere, everywhere, None)
 
 
+@once_per_geometry
+def _corners(solid: coal.ConvexBase) -> Matrix:
+    return np.array(solid.points()).reshape(-1, 3)
+
+
 def _convex(body: Body, place: int, grow: float, inflation: float) -> Primitives:
     """A convex solid by its planes; a ball meets the inner primitive if its centre lies behind all of them."""
     planes = cast(Matrix, outward_planes(body.geometry))
     rotation = np.array(body.placement.rotation)
     origin = np.array(body.placement.translation)
-    corners = np.array(body.geometry.points()).reshape(-1, 3) @ rotation.T + origin
+    corners = _corners(body.geometry) @ rotation.T + origin
     low = corners.min(axis=0)
     high = corners.max(axis=0)
     inflation += float(_slack(0.5 * (low + high)[None], (high - low).max(keepdims=True))[0])
