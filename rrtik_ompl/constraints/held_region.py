@@ -55,6 +55,7 @@ class HeldRegion:
         label: Name of the region in messages.
         link: Frame of the robot that carries the region's frame.
         joint: Index of the joint that carries it, 0 for the world.
+        T_joint_frame: Pose of the constrained frame in the joint's frame, shape (4, 4).
         T_joint_d: Pose of the displacement's frame d in the joint's frame, shape (4, 4). For AXIS it is turned so that
             the constrained axis is its z axis; for BALL so that d coincides with w at the right orientation.
         T_w_world: Pose of the world in w, shape (4, 4).
@@ -72,6 +73,7 @@ class HeldRegion:
     label: str
     link: str
     joint: int
+    T_joint_frame: NDArray[np.float64]
     T_joint_d: NDArray[np.float64]
     T_w_world: NDArray[np.float64]
     turning: Turning
@@ -255,8 +257,8 @@ def held_region(robot: Robot, scene: Scene, region: TaskRegion, label: str) -> H
     turns[rows] = ~robot.chain.prismatic[rows]
 
     T_w_world = region.T_world_w.inverse().homogeneous
-    none = np.zeros(2)
-    return HeldRegion(robot, region, label, link, joint, T_joint_d, T_w_world, turning, before, levers, turns, none)
+    placed = link, joint, T_joint_frame.homogeneous, T_joint_d, T_w_world
+    return HeldRegion(robot, region, label, *placed, turning, before, levers, turns, np.zeros(2))
 
 
 def frame_place(robot: Robot, scene: Scene, frame: str | None, label: str) -> tuple[str, int, Any]:

@@ -27,7 +27,7 @@ TASK_KIND = "task_certificate"
 MOST_PARTS = 10_000  # of a task
 IN_PATHS = "certificate"  # key of the certificate in the file of a path
 TIMED = ("times", "rates")  # fields of timed motions alone
-FURTHER = (*TIMED, "tracks", "held", "base")  # fields that may be absent
+FURTHER = (*TIMED, "tracks", "constraints", "held", "base")  # fields that may be absent
 ORDERS = 5  # largest degree of the polynomials of timed motions
 FIELDS = (
     *("version", "kind", "robot", "joints", "bodies", "unchecked"),
@@ -37,6 +37,7 @@ DEEPEST = 10  # largest level of an interval
 LARGEST_NUMBER = (1 << 30) - 1  # of a body, a node or an interval
 MOST_CUTS = 100_000  # of a body
 MOST_BODIES = 100_000
+MOST_CONSTRAINTS = 1000
 POSE = 12  # numbers of a pose, the first three rows of its matrix
 # An entry has six integers: body, node, body, node, level, number. The three numbers of a plane's normal may follow.
 WHOLE = 6
@@ -118,6 +119,29 @@ class ModelBody:
     cuts: tuple[tuple[int, int, float], ...] = ()
 
 
+@dataclass(frozen=True, slots=True)
+class ModelConstraint:
+    """A path constraint, as a certificate lists it: a region that a frame does not leave.
+
+    Attributes:
+        frame: Name of the link or the attached object.
+        joint: Number of the joint that carries it, 0 for the world.
+        pose: Pose of the frame in the joint's frame, 12 numbers.
+        within: Pose of what is bounded in the frame, 12 numbers.
+        region: Pose of the region in the world, 12 numbers.
+        bounds: Lowest and highest x, y, z [m], roll, pitch and yaw [rad] of what is bounded, as seen from the region.
+        tolerances: By how much position and orientation may be outside of these [m; rad].
+    """
+
+    frame: str
+    joint: int
+    pose: list[float]
+    within: list[float]
+    region: list[float]
+    bounds: list[list[float]]
+    tolerances: list[float]
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class MotionEntries:
     """The entries that show parts of bodies apart in one motion.
@@ -158,6 +182,7 @@ class Certificate:
         held: Values of joints that stand still where they are held, such as fingers, by name [rad or m].
         base: Pose of the robot's root link in the world, 12 numbers; None if it is that of its description. Like
             ``held`` it is for readers of the description: joints and bodies have it in their poses.
+        constraints: Path constraints that the whole motion keeps.
         version: Version of the format.
 
     Example:
@@ -183,6 +208,7 @@ class Certificate:
     tracks: NDArray[np.float64] | None = field(default=None, repr=False)
     held: tuple[tuple[str, float], ...] = ()
     base: tuple[float, ...] | None = field(default=None, repr=False)
+    constraints: tuple[ModelConstraint, ...] = ()
     version: int = VERSION
 
     __reduce__ = as_value
@@ -202,15 +228,17 @@ class Certificate:
             ways = [way if any(way) else [] for way in (motion.normals + 0.0).tolist()]
             motions.append([row + way for row, way in zip(rows, ways, strict=True)])
 
-        timed: dict[str, Any] = {}
+        further: dict[str, Any] = {}
         if self.times is not None and self.rates is not None:
-            timed = {"times": self.times.tolist(), "rates": self.rates.tolist()}
+            further = {"times": self.times.tolist(), "rates": self.rates.tolist()}
         if self.tracks is not None:
-            timed["tracks"] = self.tracks.tolist()
+            further["tracks"] = self.tracks.tolist()
+        if self.constraints:
+            further["constraints"] = [asdict(each) for each in self.constraints]
         if self.held:
-            timed["held"] = dict(self.held)
+            further["held"] = dict(self.held)
         if self.base is not None:
-            timed["base"] = list(self.base)
+            further["base"] = list(self.base)
         return {
             "version": self.version,
             "kind": KIND,
@@ -221,7 +249,7 @@ class Certificate:
             "clearance": self.clearance,
             "self_margin": self.self_margin,
             "waypoints": self.waypoints.tolist(),
-            **timed,
+            **further,
             "motions": motions,
         }
 
@@ -428,7 +456,23 @@ def from_document(document: Mapping[str, Any]) -> Certificate:
         tracks,
         _held(document.get("held", {})),
         tuple(_numbers(document["base"], (POSE,), "base").tolist()) if "base" in document else None,
+        _constraints(document["constraints"]) if "constraints" in document else (),
     )
+
+
+def _constraints(given: object) -> tuple[ModelConstraint, ...]:
+    found = []
+    for k, each in enumerate(_list(given, "constraints", MOST_CONSTRAINTS)):
+        where = f"constraints[{k}]"
+        made = ModelConstraint(**_checked(each, where, ModelConstraint, _CONSTRAINT))
+        if any(low > high for low, high in made.bounds):
+            raise InputError(f"{where}.bounds: expected the lowest and the highest value of each")
+        if any(value < 0.0 for value in made.tolerances):
+            raise InputError(f"{where}.tolerances: expected two numbers that are not negative")
+        found.append(made)
+    if not found:
+        raise InputError("constraints: expected at least one; without any the field is left out")
+    return tuple(found)
 
 
 def _held(given: object) -> tuple[tuple[str, float], ...]:
@@ -446,7 +490,7 @@ def _body(given: object, where: str) -> ModelBody:
 
 
 def _checked(given: object, where: str, of: type, kinds: Mapping[str, Callable[[Any, str], Any]]) -> dict[str, Any]:
-    """Return the checked fields of a joint or a body; ``cuts`` may be absent."""
+    """Return the checked fields of a joint, a body or a constraint; ``cuts`` may be absent."""
     if not isinstance(given, dict):
         raise InputError(f"{where}: expected an object")
     names = [field.name for field in fields(of)]
@@ -563,6 +607,15 @@ _BODY: dict[str, Callable[[Any, str], Any]] = {
     "padding": _distance,
     "contacts": _contacts,
     "cuts": _cuts,
+}
+_CONSTRAINT: dict[str, Callable[[Any, str], Any]] = {
+    "frame": _text,
+    "joint": _whole,
+    "pose": _fixed_list(POSE),
+    "within": _fixed_list(POSE),
+    "region": _fixed_list(POSE),
+    "bounds": lambda value, where: _numbers(value, (6, 2), where).tolist(),
+    "tolerances": _fixed_list(2),
 }
 
 

@@ -173,7 +173,7 @@ class TaskPlan:
     def certificate(self, clearance: float = 0.0) -> TaskCertificate | None:
         """Certify all motions, each with what is held and what is in contact then; None if one is not proven.
 
-        Motions of fingers between them, and path constraints, are not part of it.
+        Path constraints of stages are part of it, motions of fingers between them are not.
 
         Args:
             clearance: Distance kept from every obstacle on top of its margin [m].

@@ -15,6 +15,7 @@ import numpy as np
 from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.model.certificate import TaskCertificate
 from rrtik_ompl.tasks.contact_life import world_from
+from rrtik_ompl.tasks.setting import world_of_motion
 from rrtik_ompl.world.world import World
 
 if TYPE_CHECKING:
@@ -39,12 +40,13 @@ class Part(NamedTuple):
 def parts_of(plan: TaskPlan) -> Iterator[Part]:
     """Yield the parts of a plan's motions, divided where contacts end."""
     contacts = plan.contacts or ((),) * len(plan.paths)
-    for path, world, stood_on in zip(plan.paths, plan.worlds, contacts, strict=True):
+    for path, world, stage, stood_on in zip(plan.paths, plan.worlds, plan.stages, contacts, strict=True):
+        held = world_of_motion(path, world, stage)
         last = len(path.waypoints) - 1
         partings = {each.until for each in stood_on if each.until is not None and 0 < each.until < last}
         cuts = [0, *sorted(partings), last]
         for first, end in pairwise(cuts) if last else [(0, 0)]:
-            yield Part(world_from(world, stood_on, first), path.waypoints[first : end + 1])
+            yield Part(world_from(held, stood_on, first), path.waypoints[first : end + 1])
 
 
 def certificate_of_task(plan: TaskPlan, clearance: float) -> TaskCertificate | None:

@@ -38,6 +38,7 @@ from rrtik_ompl.model.certificate import DEEPEST, VERSION, Certificate, ModelBod
 from rrtik_ompl.model.robot import Chain, Robot
 from rrtik_ompl.model.scene import Scene
 from rrtik_ompl.world.certificate_course import LARGEST_VALUE, SAME, Course, Stack, powers_of
+from rrtik_ompl.world.certificate_held import fault_of_constraints, model_constraints
 from rrtik_ompl.world.certificate_intervals import Known, Numbers, Open, Rows, intervals_of, joined
 from rrtik_ompl.world.certificate_parts import Parts, enclosed, inside_mesh
 
@@ -71,13 +72,19 @@ def certificate_fault(
     try:
         named, tracks = bodies_of_route(world.robot, world.bodies, world.scene, asked)
         pairs = compared_pairs(named, world.pairs)
-        fault = _fault_of_model(certificate, world, named, pairs) or _fault_of_tracks(certificate, tracks)
+        fault = (
+            _fault_of_model(certificate, world, named, pairs)
+            or _fault_of_tracks(certificate, tracks)
+            or _fault_of_listed(certificate, world)
+        )
         if fault:
             return fault
         trees = [Parts(each.elements, body.cuts) for each, body in zip(named, certificate.bodies, strict=True)]
     except InputError as error:
         return str(error)
     course = Course(world.robot.chain, asked, tracks)
+    if fault := course.fault or fault_of_constraints(certificate.constraints, course):
+        return fault
     return Motions(world.robot.chain, named, trees, pairs, course, certificate.clearance).fault(certificate.motions)
 
 
@@ -164,6 +171,20 @@ def _fault_of_tracks(certificate: Certificate, tracks: Stack | None) -> str:
         certificate.tracks, tracks[:, :, :3].reshape(*tracks.shape[:2], -1)
     )
     return "" if same else "it is for another scene: obstacles move otherwise"
+
+
+def _fault_of_listed(certificate: Certificate, world: World) -> str:
+    """Return whether a certificate lists other path constraints than those of a world; "" if it does not."""
+    own = model_constraints(world.constraints)
+    theirs = certificate.constraints
+    for k, (first, second) in enumerate(zip(own, theirs, strict=False), 1):
+        numbers = ("pose", "within", "region", "bounds", "tolerances")
+        same = (first.frame, first.joint) == (second.frame, second.joint)
+        if not same or not all(_near(getattr(first, name), getattr(second, name)) for name in numbers):
+            return f"it is for other path constraints: number {k}, of '{second.frame}', differs"
+    if len(own) != len(theirs):
+        return f"it is for other path constraints: it lists {len(theirs)} of them, not {len(own)}"
+    return ""
 
 
 def _fault_of_model(
@@ -327,44 +348,16 @@ class Motions:
             For each joint that carries the body, 0 for the world: bounds of speed and acceleration in each motion,
                 which takes time 1, and what joints' accelerations add to the latter, shape (3, motions) [m].
         """
-        chain = self.chain
-        course = self._course
         body = self.named[number].body
-        velocity, acceleration, pushed = np.zeros((3, course.count))
         joint = body.joint
-        bounds = {joint: np.array([velocity, acceleration, pushed])}
         if joint == 0:
-            return bounds
-        if joint > len(chain.parent):
+            return {0: np.zeros((3, self._course.count))}
+        if joint > self._course.joints:
             reach, _ = self._reaches(number, body.placement.homogeneous, np.zeros(3))
-            return {**bounds, 0: course.bounds_on_track(joint, reach)}
-
-        reach, off_axis = self._reaches(number, body.placement.homogeneous, chain.axis[joint - 1])
-
-        # A revolute joint adds centripetal and Coriolis terms, a prismatic joint none; both add their own acceleration.
-        while joint != 0:
-            k = joint - 1
-            rate = course.rates[:, k]
-            push = course.pushes[:, k]
-            slides = bool(chain.prismatic[k])
-            if slides:
-                acceleration = acceleration + push
-                velocity = velocity + rate
-                pushed = pushed + push
-            else:
-                acceleration = acceleration + rate * (2.0 * velocity + rate * off_axis) + push * off_axis
-                velocity = velocity + rate * off_axis
-                pushed = pushed + push * off_axis
-            joint = int(chain.parent[k]) + 1
-            bounds[joint] = np.array([velocity, acceleration, pushed])
-
-            # Bound the distances of the body's points from the axis and the origin of the next joint inwards.
-            origin = chain.placement[k][:3, 3]
-            stroke = course.strokes[:, k] if slides else 0.0
-            off_axis = float(np.linalg.norm(np.cross(origin, chain.axis[joint - 1]))) + stroke + reach
-            reach = reach + float(np.linalg.norm(origin)) + stroke
-
-        return bounds
+            at_rest = np.zeros((3, self._course.count))
+            return {joint: at_rest, 0: self._course.bounds_on_track(joint, reach)}
+        reaches = self._reaches(number, body.placement.homogeneous, self.chain.axis[joint - 1])
+        return self._course.bounds_on_joint(joint, *reaches)
 
     def _reaches(self, number: int, pose: Matrix, axis: Vector) -> tuple[Vector | float, Vector | float]:
         """Return how far points of a body are at most from the origin and from an axis of its joint's frame [m]."""

@@ -94,6 +94,69 @@ class Course:
         shift = np.linalg.norm(self._shifts[k], axis=1)
         return np.array([shift + turn * around, turn**2 * around, np.zeros_like(turn)])
 
+    def bounds_on_joint(self, joint: int, reach: Vector | float, off_axis: Vector | float) -> dict[int, Matrix]:
+        """Bound speed and acceleration of points that a joint carries, as seen from each frame inwards (point 5.4).
+
+        Args:
+            joint: The number of the joint.
+            reach: Largest distance of the points from the origin of the joint's frame [m].
+            off_axis: Their largest distance from the joint's axis [m].
+
+        Returns:
+            For the joint and each one inwards, 0 for the world: bounds of speed and acceleration in each motion, which
+            takes time 1, and what joints' accelerations add to the latter, shape (3, motions) [m].
+        """
+        chain = self._chain
+        velocity, acceleration, pushed = np.zeros((3, self.count))
+        bounds = {joint: np.array([velocity, acceleration, pushed])}
+
+        # A revolute joint adds centripetal and Coriolis terms, a prismatic joint none; both add their own acceleration.
+        while joint != 0:
+            k = joint - 1
+            rate = self.rates[:, k]
+            push = self.pushes[:, k]
+            slides = bool(chain.prismatic[k])
+            if slides:
+                acceleration = acceleration + push
+                velocity = velocity + rate
+                pushed = pushed + push
+            else:
+                acceleration = acceleration + rate * (2.0 * velocity + rate * off_axis) + push * off_axis
+                velocity = velocity + rate * off_axis
+                pushed = pushed + push * off_axis
+            joint = int(chain.parent[k]) + 1
+            bounds[joint] = np.array([velocity, acceleration, pushed])
+
+            # Bound the distances of the points from the axis and the origin of the next joint inwards.
+            origin = chain.placement[k][:3, 3]
+            stroke = self.strokes[:, k] if slides else 0.0
+            off_axis = float(np.linalg.norm(np.cross(origin, chain.axis[joint - 1]))) + stroke + reach
+            reach = reach + float(np.linalg.norm(origin)) + stroke
+
+        return bounds
+
+    def bends_of_point(self, joint: int, point: Vector) -> Vector:
+        """Bound the acceleration of a point that a joint carries, as seen from the world, shape (motions,) [m].
+
+        Args:
+            joint: The number of the joint, 0 for the world.
+            point: The point in the joint's frame [m], shape (3,).
+        """
+        axis = self._chain.axis[joint - 1] if joint else np.zeros(3)
+        off_axis = float(np.linalg.norm(np.cross(point, axis)))
+        return np.asarray(self.bounds_on_joint(joint, float(np.linalg.norm(point)), off_axis)[0][1])
+
+    def turns_of_joint(self, joint: int) -> Matrix:
+        """Bound how fast a joint's frame turns, and what joints' accelerations add to it, shape (2, motions) [rad]."""
+        turn, push = np.zeros((2, self.count))
+        while joint != 0:
+            k = joint - 1
+            if not self._chain.prismatic[k]:
+                turn = turn + self.rates[:, k]
+                push = push + self.pushes[:, k]
+            joint = int(self._chain.parent[k]) + 1
+        return np.array([turn, push])
+
     @property
     def joints(self) -> int:
         """Number of joints; tracks have greater numbers."""

@@ -41,6 +41,7 @@ from rrtik_ompl.model.robot import Chain, Robot
 from rrtik_ompl.world.arm_cache import strokes
 from rrtik_ompl.world.certificate_check import Motions, bodies_of_route
 from rrtik_ompl.world.certificate_course import Course
+from rrtik_ompl.world.certificate_held import MAKING, fault_of_constraints, model_constraints
 from rrtik_ompl.world.certificate_parts import Parts
 from rrtik_ompl.world.coal_proof import PROVEN, CoalProof, suggest_planes
 
@@ -201,7 +202,8 @@ def certificate_of(prover: Prover, route: Route, clearance: float, world: World 
     if any(not named[k].elements.known for pair in compared for k in pair):
         return None
     course = Course(robot.chain, route, tracks)
-    if course.fault:
+    constraints = model_constraints(prover.constraints)
+    if course.fault or fault_of_constraints(constraints, course, rounding=MAKING):
         return None
 
     slacks = np.zeros(course.count)
@@ -273,7 +275,7 @@ def _model(
     moved = None if tracks is None else frozen(tracks[:, :, :3].reshape(*tracks.shape[:2], -1))
     return Certificate(
         *model, clearance, prover.self_margin, frozen(route.waypoints), (), route.times, route.rates, moved,
-        *_description(robot),
+        *_description(robot), model_constraints(prover.constraints),
     )  # fmt: skip
 
 

@@ -18,7 +18,15 @@ import pytest
 import rrtik_ompl as rrtik
 import rrtik_ompl.model
 from rrtik_ompl.base.copies import changed
-from rrtik_ompl.model.certificate import Certificate, ModelBody, ModelJoint, MotionEntries, Route, TaskCertificate
+from rrtik_ompl.model.certificate import (
+    Certificate,
+    ModelBody,
+    ModelConstraint,
+    ModelJoint,
+    MotionEntries,
+    Route,
+    TaskCertificate,
+)
 from rrtik_ompl.model.gripper import GripperEvent, GripperJoints
 from rrtik_ompl.model.judgement import (
     ClearanceCurve,
@@ -46,6 +54,7 @@ CURVE = ClearanceCurve(np.array([0, 0]), np.array([0.0, 1.0]), np.array([0.1, 0.
 ENTRIES = MotionEntries(np.zeros((1, 4), np.int64), np.zeros((1, 2), np.int64), np.zeros((1, 3)))
 FOUND = Finding("touching", 1.1, 1.3, 1.2, 0.5, POINTS[0], "link1", "ball", -0.01, "they overlap")
 HINGE = ModelJoint("hinge", 0, [0.0] * 12, [0.0, 0.0, 1.0], False, [1.0], 0.0)
+UPRIGHT = ModelConstraint("arm", 1, [0.0] * 12, [0.0] * 12, [0.0] * 12, [[-1.0, 1.0]] * 6, [0.001, 0.1])
 LINK = ModelBody("arm", 0, "link", 1, [0.0] * 12, {"sphere": 0.1}, cuts=((0, 2, 0.5),))
 VERDICT = Verdict(True, "every move is proven free")
 
@@ -85,6 +94,7 @@ SAMPLES = {
     "Measure": lambda: Measure("length"),
     "Mesh": lambda: rrtik.Mesh(POINTS, [[0, 1, 2]]),
     "ModelBody": lambda: LINK,
+    "ModelConstraint": lambda: UPRIGHT,
     "ModelJoint": lambda: HINGE,
     "MotionEntries": lambda: ENTRIES,
     "MotionVerdict": lambda: MotionVerdict(3, 0.001, touching=(1,), findings=(FOUND,)),

@@ -121,6 +121,8 @@ CHANGES = {
     "waypoints": [[], [[0, 1], [0]], [[1e4], [0]]], "motions": [[], [[], []], [[[0, 0, 1, 0, 0]]]],
     "joints": [[], None], "bodies": [None, [{}]], "times": [[0, 1]], "trust": [1],
     "unchecked": [[[0, 1]], [[1, 0, "a"]], [[0, 7, "a"]]],
+    "constraints": [[], {}, [{}], [{"frame": "arm", "joint": 1, "pose": STILL, "within": STILL, "region": STILL,
+                                    "bounds": [[0, 1]] * 5, "tolerances": [0, 0]}]],
 }  # fmt: skip
 
 

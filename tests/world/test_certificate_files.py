@@ -10,7 +10,16 @@ import pytest
 import rrtik_ompl as rrtik
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.files.text import MAX_BYTES
-from rrtik_ompl.model.certificate import MOST_CUTS, Certificate, ModelBody, ModelJoint, MotionEntries, from_document
+from rrtik_ompl.model.certificate import (
+    MOST_CONSTRAINTS,
+    MOST_CUTS,
+    Certificate,
+    ModelBody,
+    ModelConstraint,
+    ModelJoint,
+    MotionEntries,
+    from_document,
+)
 from rrtik_ompl.model.proof import Proof
 from rrtik_ompl.model.scene import Obstacle, Scene
 from rrtik_ompl.model.shapes import Box
@@ -28,7 +37,9 @@ def certificate():
     cups = (ModelBody("cup", 0, "obstacle", 0, pose, {"box": [1.0, 2.0, 3.0]}, 0.01, 0.0, (("arm", -0.001),)),)
     arm = ModelBody("arm", 0, "link", 1, pose, {"mesh": 12, "extents": [1.0] * 14}, cuts=((0, 2, 0.25),))
     model = "arm", joints, (arm, *cups), ((0, 1, "allowed by the scene"),)
-    return Certificate(*model, 0.001, 0.002, rows, (entries, none))
+    bounds = [[-0.1, 0.1], [0.0, 0.0], [-1e3, 1e3], [0.0, 0.0], [-0.2, 0.1], [-np.pi, np.pi]]
+    held = ModelConstraint("arm", 1, pose, pose, pose, bounds, [0.001, 0.01])
+    return Certificate(*model, 0.001, 0.002, rows, (entries, none), constraints=(held,))
 
 
 def test_a_certificate_is_read_as_it_was_written(tmp_path):
@@ -92,6 +103,15 @@ BROKEN = {
     "nan for a cut": (_in("bodies", 0, "cuts", [[0, 1, NAN]]), "bodies[0].cuts"),
     "too many cuts": (_in("bodies", 0, "cuts", [0] * (MOST_CUTS + 1)), "bodies[0].cuts"),
     "pair without a reason": (_with("unchecked", [[0, 1]]), "unchecked[0]"),
+    "constraints of none": (_with("constraints", []), "constraints"),
+    "too many constraints": (_with("constraints", [0] * (MOST_CONSTRAINTS + 1)), "constraints"),
+    "constraint of a name alone": (_in("constraints", 0, "name", ...), "constraints[0].frame"),
+    "constraint by turns": (_in("constraints", 0, "turns", [1.0]), "constraints[0].turns"),
+    "nan in a region": (_in("constraints", 0, "region", [NAN] * 12), "constraints[0].region"),
+    "five bounds": (_in("constraints", 0, "bounds", [[0.0, 1.0]] * 5), "constraints[0].bounds"),
+    "bounds turned over": (_in("constraints", 0, "bounds", [[1.0, 0.0]] * 6), "constraints[0].bounds"),
+    "negative tolerance": (_in("constraints", 0, "tolerances", [-1.0, 0.0]), "constraints[0].tolerances"),
+    "fraction of a joint": (_in("constraints", 0, "joint", 0.5), "constraints[0].joint"),
     "times without rates": (_with("times", [0.0, 1.0, 2.0]), "rates"),
     "text for a clearance": (_with("clearance", "0.001"), "clearance"),
     "true for a clearance": (_with("clearance", True), "clearance"),

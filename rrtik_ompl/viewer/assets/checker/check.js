@@ -8,9 +8,9 @@ const VERSION = 2;
 const ROUNDING = 1e-8; // [m] added to every required gap
 const MEASURED = 1e-5; // [m] further gap where a distance of surfaces is measured
 const DEEPEST = 10; // level of an interval
-const MOST = { numbers: 1e6, bodies: 1e5, cuts: 1e5, entries: 1e6, parts: 1e4 };
+const MOST = { numbers: 1e6, bodies: 1e5, cuts: 1e5, entries: 1e6, parts: 1e4, constraints: 1e3 };
 const FIELDS = ["kind", "version", "robot", "joints", "bodies", "unchecked", "clearance", "self_margin", "waypoints", "motions"];
-const FURTHER_FIELDS = ["times", "rates", "tracks", "held", "base"];
+const FURTHER_FIELDS = ["times", "rates", "tracks", "constraints", "held", "base"];
 const ORDERS = 5; // derivatives of a timed motion
 const JOINT_FIELDS = ["name", "parent", "pose", "axis", "slides", "gain", "offset"];
 const BODY_FIELDS = ["name", "number", "kind", "joint", "pose", "shape", "margin", "padding", "contacts"];
@@ -38,6 +38,7 @@ function checkCertificate(certificate, own) {
     proof.checkEntries(); // 8.5
     proof.checkPairs(); // 8.6
     proof.checkInsides(); // 8.7
+    checkHeld(certificate.constraints ?? [], world.joints, proof.motions); // 8.8
     return { holds: true, fault: "", facts: world.facts };
   } catch (error) {
     if (error instanceof Fault) return { holds: false, fault: error.message, facts: null };
@@ -108,6 +109,7 @@ function checkForm(file) {
     demand(links.length === 0, `contacts: '${name}' and '${links[0]?.[0]}' are links`);
   }
 
+  checkConstraintForm(file.constraints, file.joints);
   demand(file.held === undefined || (isObject(file.held) && Object.values(file.held).every(isNumber)), "held: expected values of joints by name");
   demand(file.base === undefined || (areNumbers(file.base, 12) && isRigid(poseOf(file.base))), "base: expected a pose");
   demand(Array.isArray(file.unchecked), "unchecked: expected a list");
@@ -196,7 +198,7 @@ function readingOf(file, own) {
     if (list !== null && number < list.length) refuse(`it is for another ${ownerOf(list[number])}: '${list[number].name}' is not in the certificate`);
   }
   const tracks = (file.tracks ?? []).map((track) => track.map(poseOf));
-  return { joints: arm.joints, bodies, tracks, readRobot: robot !== null, readScene: scene !== null };
+  return { joints: arm.joints, carriers: arm.carriers, bodies, tracks, readRobot: robot !== null, readScene: scene !== null };
 }
 
 /** The robot stands, and holds its joints, where the asker says: at the origin and at rest if nothing is said. */
@@ -213,7 +215,7 @@ const ownerOf = (body) => (body.kind === "link" ? "robot" : "scene");
 
 /** Joints, bodies and the pairs that must be apart, after comparison with what the file says of them: section 3. */
 function worldOf(file, own) {
-  const { joints, bodies, tracks, readRobot, readScene } = readingOf(file, own);
+  const { joints, carriers, bodies, tracks, readRobot, readScene } = readingOf(file, own);
   const difference = readRobot ? jointsDifference(file.joints, joints) : "";
   demand(difference === "", `it is for another robot: ${difference}`);
   file.bodies.forEach((body, k) => {
@@ -222,6 +224,7 @@ function worldOf(file, own) {
   });
   const elsewhere = readScene ? tracksDifference(file, own.scene, tracks) : "";
   demand(elsewhere === "", `it is for another scene: ${elsewhere}`);
+  const tips = checkListed(file, own, joints, carriers);
   const selfMargin = readScene ? own.scene.selfMargin : file.self_margin;
   demand(Math.abs(file.self_margin - selfMargin) <= SAME, `it is for a self margin of ${file.self_margin} m, not ${selfMargin} m`);
 
@@ -240,7 +243,7 @@ function worldOf(file, own) {
       if (isCompared(bodies[i], bodies[j]) && !unchecked.has(`${i} ${j}`)) pairs.push(pairOf(i, j, file, joints, bodies));
     }
   }
-  return { joints, bodies, tracks, pairs, facts: { readRobot, readScene, pairs: pairs.length, unchecked: [...unchecked.values()] } };
+  return { joints, bodies, tracks, pairs, facts: { readRobot, readScene, tips, pairs: pairs.length, unchecked: [...unchecked.values()] } };
 }
 
 /** Names of the joints that the numbers of a waypoint are of: those with a gain of 1 that follow no other. */

@@ -64,8 +64,11 @@ function factsInWords(file, facts) {
   const entries = listed.reduce((sum, motion) => sum + motion.length, 0);
   const clearance = Math.min(...parts.map((part) => part.clearance));
   const believed = [facts.readRobot ? null : "the robot", facts.readScene ? null : "the scene"].filter((word) => word !== null);
+  const kept = parts.reduce((sum, part) => sum + (part.constraints?.length ?? 0), 0);
+  const constraints = kept > 0 ? `, ${kept} path constraint${kept === 1 ? "" : "s"} kept` : "";
+  const tips = facts.tips.length > 0 ? `; ${facts.tips.join(", ")} taken for the tip` : "";
   const taken = believed.length > 0 ? `; of ${believed.join(" and ")} that the certificate describes` : "";
-  return `${motions} motion${motions === 1 ? "" : "s"} proven free, ${(1000 * clearance).toPrecision(3)} mm kept from obstacles, ${facts.pairs} pairs, ${entries} entries${taken}`;
+  return `${motions} motion${motions === 1 ? "" : "s"} proven free, ${(1000 * clearance).toPrecision(3)} mm kept from obstacles, ${facts.pairs} pairs, ${entries} entries${constraints}${tips}${taken}`;
 }
 
 function make(tag, text) {

@@ -26,7 +26,7 @@ function checkTask(file, own) {
     file.parts.slice(1).forEach((part, k) => checkJunction(file.parts[k], part, `from part ${k + 1} to the next`));
     const unchecked = facts.flatMap((each) => each.unchecked);
     const different = [...new Map(unchecked.map((pair) => [pair.join(" "), pair])).values()];
-    return { holds: true, fault: "", facts: { ...facts[0], pairs: facts.reduce((sum, each) => sum + each.pairs, 0), unchecked: different } };
+    return { holds: true, fault: "", facts: { ...facts[0], tips: [...new Set(facts.flatMap((each) => each.tips))], pairs: facts.reduce((sum, each) => sum + each.pairs, 0), unchecked: different } };
   } catch (error) {
     if (error instanceof Fault) return { holds: false, fault: error.message, facts: null };
     throw error;

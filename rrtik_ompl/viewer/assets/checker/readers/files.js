@@ -66,10 +66,10 @@ function fileOf(name, from, lookup) {
   return buffer;
 }
 
-/** Where a robot stands and which joints it holds, by a problem or a plan: {held, base}. */
+/** Where a robot stands, which joints it holds, and its tip if that is named, by a problem or a plan: {held, base, tip}. */
 function stanceOf(robot, where) {
-  if (robot === null || typeof robot !== "object") return { held: {}, base: IDENTITY };
-  return { held: robot.locked ?? {}, base: posedBy(robot.base_pose ?? null, `${where}: base_pose`) };
+  if (robot === null || typeof robot !== "object") return { held: {}, base: IDENTITY, tip: null };
+  return { held: robot.locked ?? {}, base: posedBy(robot.base_pose ?? null, `${where}: base_pose`), tip: robot.tip ?? null };
 }
 
 /** The thickness that a problem file gives links: a number for all, or numbers by name. */

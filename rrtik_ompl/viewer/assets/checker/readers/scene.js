@@ -9,7 +9,7 @@ const PROBLEM_KEYS = ["version", "scene", "robot", "start", "goal", "planner", "
 /** A scene of YAML text; see `sceneOf`. */
 const readScene = (text, file) => sceneOf(readYaml(text, file), file);
 
-/** A scene {obstacles, attached, allowed, contacts, selfMargin, robot} of data; `robot` is what a problem file says of it. */
+/** A scene {obstacles, attached, allowed, contacts, constraints, selfMargin, robot} of data; `robot` is what a problem file says of it. */
 function sceneOf(data, file) {
   only(data, PROBLEM_KEYS, file);
   if (data.version !== 1) throw new Error(`${file}: version: expected 1`);
@@ -44,6 +44,7 @@ function sceneOf(data, file) {
       only(each, ["pair", "distance"], `${file}: contact`);
       return { pair: namePair(each.pair, file), distance: finite(each.distance, `${file}: distance`) };
     }),
+    constraints: readConstraints(data.path_constraints, file),
     selfMargin: notNegative(data.self_margin ?? 0, `${file}: self_margin`),
     robot: data.robot ?? null,
   };
