@@ -12,178 +12,42 @@ import subprocess
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from copy import deepcopy
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import lru_cache
 from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-import pinocchio as pin
 from typer import Option
 
-from bench.proofs.cases import DENTED, FACES, random_path
+from bench.proofs.checked_cases import CLEARANCE, Arm, arm_of, cases_of
 from bench.proofs.forgeries import FORGERS, Case, Forgery
-from bench.proofs.forgery_judge import Judge
 from bench.proofs.task_forgeries import TASK_FORGERS
 from bench.shared.parts import Parts
 from bench.shared.run import Run
 from rrtik_bench.report.machine import processes
 from rrtik_bench.report.page import Report
-from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.base.errors import InputError, RrtikError
-from rrtik_ompl.description.urdf import robot_from_urdf
 from rrtik_ompl.files.tables import json_value
-from rrtik_ompl.model.certificate import Route, from_document, task_from_document
-from rrtik_ompl.model.robot import Robot
-from rrtik_ompl.model.scene import ConstantVelocity, Obstacle, Scene, TimedPoses
-from rrtik_ompl.model.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, PointCloud, Prism, Sphere
-from rrtik_ompl.motion.trajectory.splines import Splines
+from rrtik_ompl.model.certificate import from_document, task_from_document
+from rrtik_ompl.model.scene import Scene
+from rrtik_ompl.problem_files.path_constraints import constraint_data
 from rrtik_ompl.tasks import Task
 from rrtik_ompl.world.certificate_check import certificate_fault
-from rrtik_ompl.world.world import World
-from rrtik_robots.example_arms import data_folder
 
 ARMS = {"planar": 10, "titan4": 10, "ur5": 6, "panda": 5, "so101": 1}  # how often each is taken
-# Arms whose certificates are of other kinds: of timed motions, of motions among obstacles that move.
-KINDS = {"planar timed": 2, "ur5 timed": 1, "planar moving": 2, "ur5 moving": 1}
+# Arms whose certificates are of other kinds: of timed motions, of motions among obstacles that move, beside an octree
+# and a height field, with things in the hand, and with path constraints.
+KINDS = {
+    "planar timed": 2, "ur5 timed": 1, "planar moving": 2, "ur5 moving": 1, "titan4 piles": 2, "panda piles holding": 1,
+    "planar holding": 1, "ur5 holding": 1, "planar held": 1, "titan4 held": 2, "ur5 held timed": 1,
+    "panda holding held": 1,
+}  # fmt: skip
 ROUND = 8  # true certificates of a part
-CLEARANCE = 0.001  # [m]
-PLANAR = 4  # links of the planar arm
-FEWEST_PLANES = 3  # of a certificate, as those of paths far from everything offer little to forge
-PLANE = 9  # numbers of an entry with a plane
-
-
-def planar_urdf(links: int = PLANAR) -> str:
-    """Return the URDF of an arm that turns about z alone, of boxes and capsules."""
-    parts = ['<robot name="planar"><link name="base"/>']
-    for k in range(links):
-        shape = '<box size="0.5 0.06 0.06"/>' if k % 2 else '<capsule radius="0.03" length="0.5"/>'
-        turned = "0 0 0" if k % 2 else "0 1.5707963267948966 0"
-        parts.append(
-            f'<link name="link{k}"><collision><origin xyz="0.3 0 0" rpy="{turned}"/>'
-            f"<geometry>{shape}</geometry></collision></link>"
-            f'<joint name="joint{k}" type="revolute"><parent link="{f"link{k - 1}" if k else "base"}"/>'
-            f'<child link="link{k}"/><origin xyz="{0.65 if k else 0} 0 0"/><axis xyz="0 0 1"/>'
-            '<limit lower="-2.8" upper="2.8" velocity="1" effort="1"/></joint>'
-        )
-    return "\n".join([*parts, "</robot>\n"])
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Arm:
-    """A robot, and the files that describe it."""
-
-    robot: Robot
-    files: tuple[str, ...]
-
-
-def arm_of(name: str, folder: Path) -> Arm:
-    """Return an arm by its name in `ARMS` or `KINDS`."""
-    name = name.split()[0]
-    example = data_folder()
-    known: dict[str, list[Any]] = {
-        "titan4": [str(files("rrtik_robots.titan4").joinpath(f"titan4.{kind}")) for kind in ("urdf", "srdf")],
-        "ur5": [
-            example / "ur_description/urdf/ur5_robot.urdf",
-            example / "ur_description/srdf/ur5_joint_limited_robot.srdf",
-        ],
-        "panda": [example / "panda_description/urdf/panda.urdf", example / "panda_description/srdf/panda.srdf"],
-        "so101": [example / "so_arm_description/urdf/so101.urdf"],
-    }
-    if name in known:
-        from rrtik_ompl import load_robot
-
-        return Arm(load_robot(name), tuple(map(str, known[name])))
-    urdf = folder / "planar.urdf"
-    urdf.write_text(planar_urdf())
-    return Arm(robot_from_urdf(urdf), (str(urdf),))
-
-
-def random_scene(arm: str, folder: Path, rng: np.random.Generator) -> Scene:
-    """Return obstacles of every kind around an arm; those that come from files are written to a folder."""
-    arm, *kind = arm.split()
-    reach = {"planar": 2.4, "titan4": 1.6, "so101": 0.4}.get(arm, 0.9)
-    size = reach / 0.9
-    mesh = _dented(folder, size)
-    points = 0.1 * size * rng.normal(size=(40, 3))
-    cloud = PointCloud(points, radius=0.02 * size).save(folder / f"cloud{rng.integers(1 << 30)}.ply")
-    corner = size * np.array([[0.0, 0.0], [0.3, 0.0], [0.3, 0.1], [0.1, 0.1], [0.1, 0.3], [0.0, 0.3]])
-    solids = [
-        Box(size * np.array([0.2, 0.1, 0.3])), Sphere(0.1 * size), Cylinder(0.05 * size, 0.4 * size),
-        Capsule(0.04 * size, 0.3 * size), Box(size * np.array([0.3, 0.3, 0.02])), Prism(corner, 0.2 * size),
-        mesh, cloud,
-    ]  # fmt: skip
-    chosen = rng.permutation(len(solids))[:6]
-    places = [pin.SE3(pin.exp3(rng.normal(size=3)), rng.uniform(-reach, reach, 3)) for _ in chosen]
-    obstacles = [
-        Obstacle(f"solid {k}", solids[k], place, margin=float(rng.choice([0.0, 0.002])))
-        for k, place in zip(chosen, places, strict=True)
-    ]
-    if kind == ["moving"]:
-        obstacles = [replace(each, motion=_random_motion(each.pose, rng)) for each in obstacles[:3]] + obstacles[3:]
-    floor = Obstacle("floor", HalfSpace([0.1, 0.0, 1.0], -1.2 * reach), pin.SE3.Identity())
-    return Scene((*obstacles, floor))
-
-
-def _random_motion(pose: pin.SE3, rng: np.random.Generator) -> ConstantVelocity | TimedPoses:
-    """Return a motion of an obstacle that is at a pose at first."""
-    if rng.integers(2):
-        return ConstantVelocity(0.05 * rng.normal(size=3))
-    steps = [pin.SE3(pin.exp3(0.2 * rng.normal(size=3)), 0.1 * rng.normal(size=3)) for _ in range(3)]
-    return TimedPoses([0.0, 1.5, 4.0, 5.2], [pose, *(pose * step for step in steps)])
-
-
-def _dented(folder: Path, size: float) -> Mesh:
-    """Return a mesh that is not convex, from a file of text."""
-    corners = size * np.array(DENTED)
-    lines = ["solid dented"]
-    for face in FACES:
-        rows = "\n".join("vertex " + " ".join(map(repr, corners[k].tolist())) for k in face)
-        lines.append(f"facet normal 0 0 0\nouter loop\n{rows}\nendloop\nendfacet")
-    file = folder / f"dented{size:.3f}.stl"
-    file.write_text("\n".join([*lines, "endsolid dented\n"]))
-    return Mesh.load(file)
-
-
-def cases_of(arm: str, robot: Robot, folder: Path, seed: int) -> Iterator[Case]:
-    """Yield true certificates of an arm in ever new scenes, each with some planes."""
-    rng = np.random.default_rng(seed)
-    while True:
-        world = World(robot, random_scene(arm, folder, rng))
-        for _ in range(3):
-            path = random_path(world, rng, CLEARANCE)
-            if path is None:
-                continue
-            route = _route(arm, path.waypoints, world.scene, rng)
-            certificate = world.certificate(route, CLEARANCE)
-            if certificate is None:
-                continue
-            document = json.loads(json.dumps(certificate.document()))
-            if sum(len(row) == PLANE for rows in document["motions"] for row in rows) >= FEWEST_PLANES:
-                yield Case(world, route, document, Judge(world, route))
-
-
-def _route(arm: str, rows: Matrix, scene: Scene, rng: np.random.Generator) -> Route:
-    """Return a motion through waypoints, shape (k, dof): as the kind of an arm has it."""
-    kind = arm.split()[1:]
-    if not kind:
-        return Route(rows)
-    if kind == ["moving"]:
-        turns = [each.motion.times for each in scene.obstacles if isinstance(each.motion, TimedPoses)]
-        clock = np.linspace(0.0, 5.0, len(rows))
-        times = np.unique(np.concatenate([clock, *turns]))
-        times = times[times <= clock[-1]]
-        rows = np.column_stack([np.interp(times, clock, column) for column in rows.T])
-        return Route(rows, times, (np.diff(rows, axis=0) / np.diff(times)[:, None])[:, None], moving=True)
-    times = np.cumsum([0.0, *rng.uniform(0.5, 2.0, len(rows) - 1)])
-    rest = np.zeros_like(rows)
-    speeds = rest.copy()
-    speeds[1:-1] = 0.2 * (rows[2:] - rows[:-2]) / (times[2:] - times[:-2])[:, None]
-    return Splines.through(times, rows, speeds, rest if rng.integers(2) else None).route
 
 
 @lru_cache(maxsize=8)
@@ -191,6 +55,12 @@ def _written(scene: Scene, file: Path) -> str:
     """Return the text of a scene's file; the scene of a case is asked for again and again."""
     scene.save(file)
     return file.read_text()
+
+
+def _constraints(forgery: Forgery) -> str:
+    """Return the line of a problem file that has the path constraints of the asker."""
+    found = [constraint_data(region) for region in forgery.world.settings.constraints]
+    return f"path_constraints: {json.dumps(found)}\n" if found else ""
 
 
 class Script:
@@ -216,7 +86,7 @@ class Script:
         texts = {
             "certificate.json": forgery.text,
             "path.json": json.dumps(path),
-            str(scene): _written(forgery.world.scene, scene),
+            str(scene): _written(forgery.world.scene, scene) + _constraints(forgery),
         }
         return self.fault_of(arm, texts, forgery.clearance)
 
@@ -277,8 +147,8 @@ class Count:
     seconds: list[tuple[float, float]] = field(default_factory=list)
 
 
-def compared(name: str, seed: int, true: int, forged: int) -> Count:
-    """Count what both checkers say of some certificates of an arm, and of so many forgeries of each."""
+def compared(name: str, seed: int, true: int, forged: int, kinds: Sequence[str] = tuple(FORGERS)) -> Count:
+    """Count what both checkers say of some certificates of an arm, and of so many forgeries of each, of some kinds."""
     count = Count()
     rng = np.random.default_rng(seed)
     with tempfile.TemporaryDirectory() as place, script() as page:
@@ -296,7 +166,8 @@ def compared(name: str, seed: int, true: int, forged: int) -> Count:
             count.accepted += not ours and not theirs
             if ours or theirs:
                 count.wrong.append(f"{name} {seed}: true, refused: {ours!r} {theirs!r}")
-            forge(count, case, arm, page, folder, forged, rng)
+            drawn = rng.permutation([*kinds] * (2 + forged // len(kinds))).tolist()
+            forge(count, case, arm, page, folder, drawn, forged, rng)
     return count
 
 
@@ -345,12 +216,12 @@ def tasks_compared(name: str, seed: int, forged: int) -> Count:
 
 
 def forge(
-    count: Count, case: Case, arm: Arm, page: Script, folder: Path, forged: int, rng: np.random.Generator
-) -> None:
-    """Count what both checkers say of forgeries of one certificate, of each kind that there is something for."""
-    names = list(FORGERS)
+    count: Count, case: Case, arm: Arm, page: Script, folder: Path, kinds: Sequence[str], forged: int,
+    rng: np.random.Generator,
+) -> None:  # fmt: skip
+    """Count what both checkers say of forgeries of one certificate, of the first kinds that there is something for."""
     done = 0
-    for name in rng.permutation(names * (2 + forged // len(names))):
+    for name in kinds:
         if done == forged:
             return
         try:

@@ -15,15 +15,18 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 
-from bench.proofs.forgery_judge import Document, Judge, entries_of
+from bench.proofs.forgery_judge import Document, Judge, between, entries_of, outside
 from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.model.certificate import Route
-from rrtik_ompl.model.scene import ConstantVelocity, Obstacle, Scene, TimedPoses
+from rrtik_ompl.model.scene import ConstantVelocity, Obstacle, TimedPoses
 from rrtik_ompl.model.shapes import Box
 from rrtik_ompl.world.certificates import certificate_for
 from rrtik_ompl.world.world import World
 
+PLACES = 20  # of each motion at which frames are looked at
+LEAST_EXCESS = 2e-3  # [m] or [rad] that a frame has to be outside of bounds, for a tolerance that it exceeds
 SLIGHT = 1e-5  # [rad] or [m] by which numbers are changed that have to be the same
 ODD_VALUES: tuple[Any, ...] = (None, True, "0", "NaN", [], {}, -1, 1.5, 2**40, 10**400, 1e308, [[0.0]])
 RAW_VALUES = ("NaN", "1e999", "-1e999", "Infinity", "01", "0x1", '"\\ud800"', "1e-999e5")
@@ -348,7 +351,9 @@ def raised_clearance(case: Case, rng: np.random.Generator) -> Forgery | None:
     """More is said to be kept than coal finds along the path."""
     clearance = case.document["clearance"] + float(rng.uniform(0.05, 0.4))
     grown = tuple(replace(each, margin=each.margin + clearance) for each in case.world.scene.obstacles)
-    if not Judge(World(case.world.robot, Scene(grown)), case.route).touches(case.route):
+    if not Judge(case.world.unheld.with_scene(replace(case.world.scene, obstacles=grown)), case.route).touches(
+        case.route
+    ):
         return None
     return _given(case, {**case.document, "clearance": clearance})
 
@@ -434,7 +439,7 @@ def missing_body(case: Case, rng: np.random.Generator) -> Forgery:
 
 
 def _in_scene(case: Case, obstacles: tuple[Obstacle, ...]) -> World:
-    return World(case.world.robot, Scene(obstacles))
+    return case.world.with_scene(replace(case.world.scene, obstacles=obstacles))
 
 
 def moved_obstacle(case: Case, rng: np.random.Generator) -> Forgery | None:
@@ -477,7 +482,7 @@ def honest_model(case: Case, rng: np.random.Generator) -> Forgery | None:
     if not Judge(world, case.route).touches(case.route):
         return None
     still = np.array([row for row in case.waypoints if world.valid(row)][:1])
-    model = certificate_for(world, still, 0.0) if len(still) and not case.route.moving else None
+    model = certificate_for(world.unheld, still, 0.0) if len(still) and not case.route.moving else None
     if model is None:
         return None
     bodies = json.loads(json.dumps(model.document()))["bodies"]
@@ -488,6 +493,94 @@ def honest_model(case: Case, rng: np.random.Generator) -> Forgery | None:
     for new, body in zip(bodies, document["bodies"], strict=True):
         body["pose"] = new["pose"]
     return _given(case, document, world=world)
+
+
+def other_hold(case: Case, rng: np.random.Generator) -> Forgery | None:
+    """A thing in the hand of the asker is held otherwise, missing, renamed, or another one."""
+    held = list(case.world.scene.attached)
+    if not held:
+        return None
+    k = int(rng.integers(len(held)))
+    way = int(rng.integers(4))
+    if way == 0:
+        held.pop(k)
+    elif way == 1:
+        held[k] = replace(held[k], name="another")
+    elif way == 2:
+        held[k] = replace(held[k], margin=held[k].margin + SLIGHT)
+    else:
+        pose = held[k].pose.copy()
+        pose.translation = pose.translation + np.array([SLIGHT, -SLIGHT, SLIGHT]) * 10 ** rng.uniform(0.0, 2.0)
+        held[k] = replace(held[k], pose=pose)
+    return _given(case, case.document, world=case.world.with_scene(replace(case.world.scene, attached=tuple(held))))
+
+
+# --- path constraints ---
+
+
+def other_constraint(case: Case, rng: np.random.Generator) -> Forgery:
+    """A path constraint has other numbers than the asker's, is missing or is there twice."""
+    document = deepcopy(case.document)
+    listed = document.setdefault("constraints", [])
+    if not listed:
+        listed.append(_loose_constraint(document))
+        return _given(case, document)
+    each = _pick(rng, listed)
+    key = _pick(rng, ("frame", "joint", "pose", "within", "region", "bounds", "tolerances", "missing", "twice"))
+    if key == "missing":
+        listed.remove(each)
+    elif key == "twice":
+        listed.append(each)
+    elif key == "frame":
+        each[key] = "another"
+    elif key == "joint":
+        each[key] = (each[key] + 1) % (1 + len(document["joints"]))
+    elif key == "bounds":
+        _pick(rng, each[key])[int(rng.integers(2))] += float(_pick(rng, (-SLIGHT, SLIGHT)))
+    else:
+        each[key][int(rng.integers(len(each[key])))] += SLIGHT
+    return _given(case, document)
+
+
+def _loose_constraint(document: Document) -> dict[str, Any]:
+    """Return a constraint of the base that every motion keeps, and that nobody has asked for."""
+    still = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0]
+    bounds = [[-1.0, 1.0]] * 3 + [[-np.pi, np.pi]] * 3
+    poses = {"pose": still, "within": still, "region": still}
+    return {"frame": document["bodies"][0]["name"], "joint": 0, **poses, "bounds": bounds, "tolerances": [0.01, 0.01]}
+
+
+def left_region(case: Case, rng: np.random.Generator) -> Forgery | None:
+    """Asker and certificate have a path constraint with a tolerance that the motion exceeds."""
+    regions = list(case.world.settings.constraints)
+    if not regions:
+        return None
+    k = int(rng.integers(len(regions)))
+    largest = outside(regions[k], frame_poses(case.world, regions[k].frame, case.route))
+    bounded = [np.abs(regions[k].bounds[:3]).min() < 1000.0, True]
+    places = [j for j in (0, 1) if bounded[j] and largest[j] > LEAST_EXCESS]
+    if not places:
+        return None
+    j = int(_pick(rng, places))
+    tolerance = float(largest[j] * rng.uniform(0.3, 0.95))
+    if j == 0:
+        regions[k] = replace(regions[k], position_tolerance=tolerance, position_allowance=0.0)
+    else:
+        regions[k] = replace(regions[k], orientation_tolerance=tolerance, orientation_allowance=0.0)
+    document = deepcopy(case.document)
+    document["constraints"][k]["tolerances"][j] = tolerance
+    world = World.of(replace(case.world.settings, constraints=tuple(regions)))
+    return _given(case, document, world=world)
+
+
+def frame_poses(world: World, frame: str | None, route: Route) -> list[pin.SE3]:
+    """Return poses of a link or a thing in the hand at many places of a motion."""
+    held = next((each for each in world.scene.attached if each.name == frame), None)
+    link = frame if held is None else held.link
+    count = max(1, len(route.waypoints) - 1)
+    rows = np.concatenate([between(route, m, np.linspace(0.0, 1.0, PLACES)) for m in range(count)])
+    poses = map(pin.SE3, world.robot.fk_batch(rows, link))
+    return [pose if held is None else pose * held.pose for pose in poses]
 
 
 # --- motions in time ---
@@ -598,6 +691,15 @@ def odd_value(case: Case, rng: np.random.Generator) -> Forgery | None:
     ]  # fmt: skip
     holders += [(document["times"], 0), (document["rates"][0][0], 0)] if "times" in document else []
     holders += [(document["tracks"][0][0], 3)] if "tracks" in document else []
+    if "constraints" in document:
+        each = _pick(rng, document["constraints"])
+        holders += [
+            (each, "joint"),
+            (each["region"], 3),
+            (each["bounds"], 4),
+            (each["tolerances"], 1),
+            (each, "within"),
+        ]
     if place is not None:
         holders += [(document["motions"][place[0]][place[1]], k) for k in (0, 3)]
     holder, key = _pick(rng, holders)
@@ -656,6 +758,7 @@ FORGERS: dict[str, Forger] = {
         other_part, no_such_part, swapped_bodies, other_count, other_cut,
         left_out_pair, raised_clearance, lowered_clearance, other_self_margin, other_margin,
         other_joint, other_body, moved_base, missing_body, moved_obstacle, other_obstacles, honest_model,
+        other_hold, other_constraint, left_region,
         untimed, other_times, other_rates, bulging_motion, other_track, other_motion,
         odd_value, raw_value, twice, other_field, cut_off,
     )

@@ -6,7 +6,7 @@ two parts that no entry, ball or box shows apart, or a configuration of the path
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cache, cached_property
 from itertools import product
@@ -15,12 +15,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
+from scipy.spatial.transform import Rotation
 
 from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.geometry.collision.bodies import Body
 from rrtik_ompl.geometry.collision.certificate import Certificate as ByCoal
 from rrtik_ompl.geometry.collision.elements import NamedBody, named_bodies
 from rrtik_ompl.model.certificate import Route
+from rrtik_ompl.model.goal_kind import TaskRegion
 from rrtik_ompl.model.scene import pose_at
 from rrtik_ompl.world.world import World
 
@@ -28,6 +30,7 @@ CERTAIN = 1e-7  # [m] by which a witness has to be wrong
 SAMPLES = 60  # configurations of a motion that coal looks at
 SHORTEST_LEVEL = 10  # down to which intervals are tried
 MOVING_STEP = 6  # of these samples one in so many where obstacles move
+FREE_ANGLES = 721  # values of a free angle that are tried
 TRIES = 4  # places and pairs of parts that are looked at for a witness
 Document = dict[str, Any]
 
@@ -87,7 +90,7 @@ class Place(NamedTuple):
     time: float
 
 
-def _between(route: Route, m: int, shares: Vector) -> Matrix:
+def between(route: Route, m: int, shares: Vector) -> Matrix:
     """Return configurations of a motion at shares of it, shape (n,): shape (n, dof)."""
     rows = route.waypoints
     if route.times is None or route.rates is None:
@@ -120,13 +123,13 @@ class Judge:
         count = max(1, len(route.waypoints) - 1)
         shares = np.linspace(0.0, 1.0, SAMPLES)
         if not self._moving:
-            return not self._coal.free(np.concatenate([_between(route, m, shares) for m in range(count)])).all()
+            return not self._coal.free(np.concatenate([between(route, m, shares) for m in range(count)])).all()
         return any(self._touches_at(route, m, share) for m in range(count) for share in shares[::MOVING_STEP])
 
     def _touches_at(self, route: Route, m: int, share: float) -> bool:
         time = self._time(m, share)
         bodies = tuple(self._carried(body, time) for body in self.world.bodies)
-        return not ByCoal(self.world.robot, bodies, self.world.pairs).free(_between(route, m, np.array([share]))).all()
+        return not ByCoal(self.world.robot, bodies, self.world.pairs).free(between(route, m, np.array([share]))).all()
 
     def _carried(self, body: Body, time: float) -> Body:
         """Return a body where it is at a time, if it is of an obstacle that moves."""
@@ -179,7 +182,7 @@ class Judge:
     def _at(self, document: Document, m: int, share: float) -> Place:
         times, rates = (np.array(document[name]) if name in document else None for name in ("times", "rates"))
         route = Route(np.array(document["waypoints"]), times, rates)
-        return Place(_between(route, m, np.array([share]))[0], self._time(m, share))
+        return Place(between(route, m, np.array([share]))[0], self._time(m, share))
 
     @staticmethod
     def _reach(tree: Tree, node: int, pose: pin.SE3, direction: Vector) -> float:
@@ -241,6 +244,38 @@ class Judge:
         start = places[0].act(p)
         by_ball = float(np.linalg.norm(start + share * chord - c)) - other_radius
         return max(by_ball, float(np.linalg.norm(beyond))) > radius
+
+
+def outside(region: TaskRegion, poses: Sequence[pin.SE3]) -> tuple[float, float]:
+    """Return how far a frame is outside of the bounds of a region at most, without its tolerances [m; rad].
+
+    Args:
+        region: The region, placed in the world.
+        poses: Poses of the frame in the world.
+    """
+    seen = [region.T_world_w.actInv(pose) * region.T_w_tip.inverse() for pose in poses]
+    points = np.array([pose.translation for pose in seen])
+    low, high = region.bounds[:3].T
+    metres = float(np.linalg.norm(points - np.clip(points, low, high), axis=1).max())
+
+    ranges = region.bounds[3:]
+    full = ranges[:, 1] - ranges[:, 0] >= 2.0 * np.pi - 1e-9
+    turns = Rotation.from_matrix(np.array([pose.rotation for pose in seen]))
+    if full.all():
+        return metres, 0.0
+    wanted = Rotation.from_euler("xyz", np.where(full, 0.0, ranges[:, 0]))
+    if (ranges[:, 0] == ranges[:, 1]).all():
+        return metres, float((wanted.inv() * turns).magnitude().max())
+    if full.sum() == 1 and ((ranges[:, 0] == ranges[:, 1]) | full).all():
+        # The nearest of the orientations that the free angle gives, of many.
+        free = np.linspace(-np.pi, np.pi, FREE_ANGLES)
+        angles = np.where(full, free[:, None], ranges[:, 0])
+        way = [(Rotation.from_euler("xyz", angles).inv() * turn).magnitude().min() for turn in turns]
+        return metres, float(max(way))
+    angles = turns.as_euler("xyz")
+    middle = ranges.mean(axis=1)
+    away = np.abs((angles - middle + np.pi) % (2.0 * np.pi) - np.pi) - 0.5 * (ranges[:, 1] - ranges[:, 0])
+    return metres, float(np.maximum(away, 0.0).sum(axis=1).max())
 
 
 def entries_of(document: Document) -> Iterator[tuple[int, int]]:
