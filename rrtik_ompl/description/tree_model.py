@@ -16,7 +16,7 @@ import pinocchio as pin
 from rrtik_ompl.base.copies import Once
 from rrtik_ompl.base.errors import EmptyMeshError, InputError, MeshWarning, few
 from rrtik_ompl.description.shapes.materials import Colour, parts_by_colour
-from rrtik_ompl.description.shapes.mesh import load_surface
+from rrtik_ompl.description.shapes.mesh import shared_surface
 from rrtik_ompl.description.tree import Joint, Link, MeshFile, Solid, Tree
 from rrtik_ompl.geometry.collision.shape_table import pieces
 from rrtik_ompl.model.shapes import Shape
@@ -229,7 +229,7 @@ def _loaded(shape: Shape | MeshFile, meshes: dict[MeshFile, Any], where: str) ->
         return meshes[mesh]
 
     try:
-        meshes[mesh] = load_surface(mesh.path, np.array(mesh.scale))
+        meshes[mesh] = shared_surface(mesh.path, mesh.scale)
     except InputError as error:
         raise type(error)(f"{where}: {error}") from error
     return meshes[mesh]

@@ -68,7 +68,7 @@ def near_goals(problem: Problem, most: int) -> Matrix | None:
     except IndexError:  # none was made yet, or all are in use
         search = _Search(arm)
     if branches is None:
-        found = search.walked(aim, problem.start, most, problem.world.checks.free)
+        found = search.walked(aim, problem.start, most, problem.world.checks.certified)
     else:
         found = search.turned(branches, problem.start, most)
     arm.spare.append(search)

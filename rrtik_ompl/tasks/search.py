@@ -27,7 +27,7 @@ from rrtik_ompl.tasks.program import Step
 from rrtik_ompl.tasks.setting import world_of_motion
 from rrtik_ompl.tasks.stages import MoveTo
 from rrtik_ompl.world.clearances import CLEARANCE, proved, proved_as_clear
-from rrtik_ompl.world.problem import Problem
+from rrtik_ompl.world.problem import Problem, known_problem
 from rrtik_ompl.world.world import World
 
 # Iterations of each planner for a motion between configurations; GROWTH times as many in each further round.
@@ -203,11 +203,15 @@ class TaskSearch:
         assert link.step is not None, "it has done one"
         constraints = link.step.stage.constraints if isinstance(link.step.stage, MoveTo) else ()
 
-        try:
-            problem = Problem(world, before.q, link.q, name=f"stage {link.step.number}", constraints=constraints)
-        except ProblemError as error:
-            self._note_failure(link, str(error))
-            return False
+        name = f"stage {link.step.number}"
+        if not constraints and world.motion_proven(before.q, link.q):  # and so are its ends
+            problem = known_problem(world, before.q, link.q, name=name)
+        else:
+            try:
+                problem = Problem(world, before.q, link.q, name=name, constraints=constraints)
+            except ProblemError as error:
+                self._note_failure(link, str(error))
+                return False
 
         if problem.world.motion_proven(before.q, link.q):
             straight = JointPath.of(world.robot, np.stack([before.q, link.q]))

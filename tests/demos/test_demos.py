@@ -43,6 +43,21 @@ def content(folder):
     return {str(file.relative_to(folder)): file.read_bytes() for file in folder.rglob("*") if file.is_file()}
 
 
+def test_an_so101_takes_its_block_in_each_draw_and_puts_it_down_on_the_other_side():
+    made = record("so101_pick_place", 8, "blocks", jobs=1)
+    assert made.attempts == made.count
+    for file in sorted(made.dataset.iterdir()):
+        arrays = np.load(file)
+        poses = arrays["object_pose"][:, 0]
+        still = np.abs(poses - poses[0]).max(axis=1) < 1e-6
+        closed = arrays["gripper"] < 0.2
+        assert closed[~still].any()
+        assert still[: closed.argmax()].all()  # it is not moved before the jaw has closed
+        assert arrays["gripper"][-1] == pytest.approx(0.7, abs=1e-3)
+        assert np.abs(poses[-1, :3] - [0.19, -0.095, 0.02]).max() < 0.0401
+        assert np.abs(poses[-1, 3:5]).max() < 1e-3  # it stands upright, turned anyhow
+
+
 def test_the_same_data_come_out_by_processes_after_interruptions_and_in_parts(tmp_path):
     made = record("reach.yaml", 5, "whole", seed=3, jobs=1)
     whole = content(tmp_path / "whole")

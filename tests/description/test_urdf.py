@@ -144,6 +144,18 @@ def test_materials_may_be_defined_after_use_and_twice():
     assert robot.visual.geometryObjects[0].meshColor.tolist() == [1, 0, 0, 1]
 
 
+def test_robots_of_one_file_share_its_surface_until_it_is_written_anew(tmp_path):
+    path = tmp_path / "arm.urdf"
+    path.write_text(solid("<mesh filename='a.obj'/>"))
+    (tmp_path / "a.obj").write_bytes(TRIANGLE)
+    one, other = (robot_from_urdf(path) for _ in range(2))
+    (tmp_path / "a.obj").write_bytes(TRIANGLE.replace(b"1", b"2.5", 1))
+    later = robot_from_urdf(path)
+    surfaces = [robot.collision.geometryObjects[0].geometry for robot in (one, other, later)]
+    assert surfaces[0] is surfaces[1]
+    assert [surface.vertices().max() for surface in surfaces] == [1.0, 1.0, 2.5]
+
+
 def test_a_mesh_that_is_only_drawn_is_read_when_somebody_looks(tmp_path, capfd):
     (tmp_path / "broken.obj").write_bytes(b"v 0 0 nan\n")
     text = solid("<mesh filename='broken.obj'/>", "visual")

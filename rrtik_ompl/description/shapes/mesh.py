@@ -8,8 +8,10 @@ from __future__ import annotations
 import os
 import re
 import warnings
+from collections.abc import Hashable
 from io import BytesIO
 from pathlib import Path
+from weakref import WeakValueDictionary
 from xml.etree import ElementTree
 
 import coal
@@ -44,6 +46,8 @@ _NOT_FINITE = re.compile(
     re.IGNORECASE,
 )
 
+_surfaces: WeakValueDictionary[Hashable, coal.BVHModelBase] = WeakValueDictionary()  # those that somebody has
+
 
 def read_mesh(file: str | os.PathLike[str], scale: float = 1.0) -> Mesh:
     """Read a triangle mesh; see :meth:`Mesh.load`.
@@ -63,6 +67,22 @@ def read_mesh(file: str | os.PathLike[str], scale: float = 1.0) -> Mesh:
     elif _volume(mesh) < 0.0:
         mesh = Mesh(mesh.vertices, mesh.triangles[:, ::-1], source=mesh.source, scale=factor)
     return mesh
+
+
+def shared_surface(path: Path, scale: tuple[float, float, float]) -> coal.BVHModelBase:
+    """Read a mesh file as :func:`load_surface` does; as long as anybody has the surface of it, that is returned.
+
+    A robot with its fingers elsewhere is another robot of the same meshes, whose hulls and covers are kept with them.
+    """
+    try:
+        state = os.stat(path)
+    except OSError:
+        return load_surface(path, np.array(scale))  # which says what is wrong
+    key = (os.path.abspath(path), state.st_mtime_ns, state.st_size, scale)
+    surface = _surfaces.get(key)
+    if surface is None:
+        _surfaces[key] = surface = load_surface(path, np.array(scale))
+    return surface
 
 
 def load_surface(path: Path, scale: Vector) -> coal.BVHModelBase:
