@@ -158,7 +158,7 @@ class Ruler:
     @cached_property
     def rows(self) -> DistanceRows:
         """The objects as kernels have them."""
-        return distance_rows(self.robot.chain, [[self.bodies[k] for k in own] for own in self._members])
+        return distance_rows(self.robot, [[self.bodies[k] for k in own] for own in self._members])
 
     @cached_property
     def _checked_names(self) -> tuple[tuple[str, str], ...]:

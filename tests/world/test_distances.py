@@ -11,8 +11,9 @@ import pytest
 import rrtik_ompl as rrtik
 from rrtik_ompl import AttachedObject, Obstacle, Scene, World, pose
 from rrtik_ompl.geometry.collision.cloud_solid import CloudSolid
+from rrtik_ompl.kernels.distances import packing
 from rrtik_ompl.kernels.distances.layout import NODE_CENTRES
-from rrtik_ompl.kernels.distances.trees import _blocks_of
+from rrtik_ompl.kernels.distances.trees import _blocks_of, tree_of
 from rrtik_ompl.model.shapes import SHAPES
 from rrtik_ompl.model.shapes.octree import FEW_CELLS
 
@@ -232,6 +233,20 @@ def test_what_was_asked_before_does_not_matter(arm):
         assert np.array_equal(some.clearances, every.clearances[[3, 0]])
         assert np.array_equal(some.points, every.points[[3, 0]])
         assert np.array_equal(world.distances(q).values, every.values)
+
+
+def test_links_are_packed_once_for_all_scenes_of_an_arm(arm, monkeypatch):
+    boxes = [Obstacle(f"box{k}", rrtik.Box([0.2, 0.2, 0.2]), pose([1.5, 0.2 * k, 0.0])) for k in range(2)]
+    World(arm, Scene([boxes[0]])).distances(np.zeros(3))
+    packed = []
+
+    def tree_and_note(bodies):
+        packed.append(bodies[0].name)
+        return tree_of(bodies)
+
+    monkeypatch.setattr(packing, "tree_of", tree_and_note)
+    World(arm, Scene([boxes[1]])).distances(np.zeros(3))
+    assert packed == ["box1"]
 
 
 def test_no_leaf_of_a_cloud_reaches_across_a_room():

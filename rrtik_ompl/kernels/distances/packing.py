@@ -10,17 +10,18 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Matrix, allocated
 from rrtik_ompl.base.collector import collector_waits
+from rrtik_ompl.base.kept import kept_with
 from rrtik_ompl.geometry.collision.bodies import Body
 from rrtik_ompl.kernels.distances import layout
 from rrtik_ompl.kernels.distances.layout import DistanceTable
-from rrtik_ompl.kernels.distances.trees import tree_of
+from rrtik_ompl.kernels.distances.trees import Tree, tree_of
 from rrtik_ompl.kernels.proof.layout import FRAME_SIZE
 from rrtik_ompl.kernels.proof.packing import angle_lanes, joint_rows
 from rrtik_ompl.kernels.proof.placed import KINDS, block_count, corner_blocks, size_rows
 from rrtik_ompl.kernels.simd.library import library
 from rrtik_ompl.kernels.tables.memory import packed
 from rrtik_ompl.kernels.tables.solid_tables import ConvexSolid
-from rrtik_ompl.model.robot import Chain
+from rrtik_ompl.model.robot import Robot
 
 KERNELS = "distances.kernels"
 
@@ -105,27 +106,77 @@ class DistanceRows:
         return found
 
 
-@collector_waits()
-def distance_rows(chain: Chain, objects: Sequence[Sequence[Body]]) -> DistanceRows:
-    """Pack objects, each of bodies that one joint carries."""
-    roots: list[int] = []
-    nodes: list[NDArray[np.int64]] = []
-    solids: list[ConvexSolid] = []
-    joints: list[int] = []
-    for bodies in objects:
-        tree = tree_of(bodies)
-        if tree is None:
-            roots.append(-1)
-            continue
-        roots.append(sum(map(len, nodes)))
-        nodes.append(tree.behind(len(solids), roots[-1]))
-        solids += tree.solids
-        joints += [bodies[0].joint] * len(tree.solids)
+@dataclass(frozen=True, slots=True, eq=False)
+class _Packed:
+    """An object as the table has it, with numbers of its own.
 
-    solids.append(ConvexSolid(np.zeros((8, 3))))  # what stands at a point of a cloud, while that is compared
-    joints.append(0)
-    ends = np.cumsum([block_count(solid.corners) for solid in solids])
-    records = np.column_stack([joints, [0, *ends[:-1]], ends, [KINDS[solid.kind] for solid in solids]])
+    Attributes:
+        joint: The number of the joint that carries it.
+        tree: Its nodes, without the solids.
+        kinds, counts: Of each solid its kind and how many blocks of corners it has, shape (k,).
+        sizes: Shape (k, SIZE_COUNT).
+        blocks: Shape (blocks, 3, WIDTH).
+    """
+
+    joint: int
+    tree: Tree
+    kinds: NDArray[np.int64]
+    counts: NDArray[np.int64]
+    sizes: Matrix
+    blocks: NDArray[np.float64]
+
+
+def _packed_tree(tree: Tree, joint: int) -> _Packed:
+    """Pack a tree that a joint carries."""
+    solids = tree.solids
+    return _Packed(
+        joint,
+        Tree((), tree.nodes),
+        np.array([KINDS[solid.kind] for solid in solids], dtype=np.int64),
+        np.array([block_count(solid.corners) for solid in solids], dtype=np.int64),
+        size_rows([(solid,) for solid in solids], np.tile(np.eye(3), (len(solids), 1, 1))),
+        corner_blocks([solid.corners for solid in solids]),
+    )
+
+
+def _packed_bodies(bodies: Sequence[Body]) -> _Packed | None:
+    """Pack the bodies of an object; None if the kernels do not know all of them."""
+    tree = tree_of(bodies)
+    return None if tree is None else _packed_tree(tree, bodies[0].joint)
+
+
+@kept_with
+def _packed_link(robot: Robot, bodies: tuple[Body, ...]) -> _Packed | None:
+    """Pack a link once for all worlds of its robot: meshes take long."""
+    del robot  # it keeps the answer
+    return _packed_bodies(bodies)
+
+
+@collector_waits()
+def distance_rows(robot: Robot, objects: Sequence[Sequence[Body]]) -> DistanceRows:
+    """Pack objects, each of bodies that one joint carries."""
+    chain = robot.chain
+    found = [
+        _packed_link(robot, tuple(bodies)) if bodies[0].kind == "link" else _packed_bodies(bodies) for bodies in objects
+    ]
+    # Behind them is what stands at a point of a cloud, while that is compared.
+    element = _packed_tree(Tree([ConvexSolid(np.zeros((8, 3)))], np.zeros((0, layout.NODE_SIZE), dtype=np.int64)), 0)
+    all_packed = [*(each for each in found if each is not None), element]
+    roots: list[int] = []
+    nodes = [element.tree.nodes]
+    first_node = 0
+    first_solid = 0
+    for each in found:
+        roots.append(-1 if each is None else first_node)
+        if each is not None:
+            nodes.append(each.tree.behind(first_solid, first_node))
+            first_node += len(each.tree.nodes)
+            first_solid += len(each.kinds)
+
+    ends = np.cumsum(np.concatenate([each.counts for each in all_packed]))
+    kinds = np.concatenate([each.kinds for each in all_packed])
+    joints = np.repeat([each.joint for each in all_packed], [len(each.kinds) for each in all_packed])
+    records = np.column_stack([joints, [0, *ends[:-1]], ends, kinds])
 
     made = packed(
         DistanceTable,
@@ -134,12 +185,12 @@ def distance_rows(chain: Chain, objects: Sequence[Sequence[Body]]) -> DistanceRo
         sliding=chain.prismatic.astype(np.int32),
         joints=joint_rows(chain),
         solids=records.astype(np.int32),
-        sizes=size_rows([(solid,) for solid in solids], np.tile(np.eye(3), (len(solids), 1, 1))),
-        corners=corner_blocks([solid.corners for solid in solids]),
+        sizes=np.concatenate([each.sizes for each in all_packed]),
+        corners=np.concatenate([each.blocks for each in all_packed]),
         frames=np.zeros((len(chain.parent) + 1) * FRAME_SIZE),
         angles=angle_lanes(len(chain.parent)),
-        nodes=np.concatenate([np.zeros((0, layout.NODE_SIZE)), *nodes]).astype(np.int32),
-        element=len(solids) - 1,
+        nodes=np.concatenate(nodes).astype(np.int32),
+        element=len(records) - 1,
         dof=chain.gain.shape[1],
         coordinates=_coordinates(chain.gain),
         gains=chain.gain.sum(axis=1),
