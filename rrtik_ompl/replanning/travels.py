@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping
-from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 import pinocchio as pin
 
 from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.base.copies import changed
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.base.poses import ROTATION_NOISE, travel_bound
 from rrtik_ompl.geometry.collision.shape_table import farthest
@@ -104,7 +104,7 @@ class MotionTracker:
             The scene with obstacles at their predicted poses; those with neither motion nor velocity stay.
         """
         age_of_obstacle = ages or {}
-        return replace(
+        return changed(
             scene,
             obstacles=tuple(self._predicted(o, seconds + age_of_obstacle.get(o.name, 0.0)) for o in scene.obstacles),
         )
@@ -113,10 +113,10 @@ class MotionTracker:
         """Return an obstacle at its predicted pose, ``seconds`` after it was seen [s]."""
         if obstacle.motion is not None:
             pose = obstacle.motion.pose_at(obstacle.pose, seconds)
-            return replace(obstacle, pose=pose, motion=obstacle.motion.seen_from(seconds))
+            return changed(obstacle, pose=pose, motion=obstacle.motion.seen_from(seconds))
         if obstacle.name not in self._velocities:
             return obstacle
-        return replace(obstacle, pose=pin.SE3(*_extrapolated(obstacle.pose, self._velocities[obstacle.name], seconds)))
+        return changed(obstacle, pose=pin.SE3(*_extrapolated(obstacle.pose, self._velocities[obstacle.name], seconds)))
 
     def unforeseen(self, seconds: float) -> dict[str, float]:
         """Return how far clouds whose points have changed, which cannot be predicted, may go in a time [s] [m]."""
