@@ -20,7 +20,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError, cKDTree
 
-from rrtik_ompl.base.arrays import Matrix, Vector, distinct, frozen
+from rrtik_ompl.base.arrays import Mask, Matrix, Vector, distinct, frozen
 from rrtik_ompl.base.poses import pose_from_xyzw
 from rrtik_ompl.geometry.collision.bodies import Body
 from rrtik_ompl.geometry.collision.elements import (
@@ -352,6 +352,11 @@ class _Table:
                 self._divide_clouds(route, scale)
         return None
 
+    @cached_property
+    def _endless(self) -> Mask:
+        """Which bodies are half-spaces, shape (bodies,)."""
+        return np.array([cover.elements.key == "half_space" for cover in self.covers], dtype=bool)
+
     @property
     def _hulls(self) -> set[int]:
         """Bodies that may overlap others, and therefore count as their hulls."""
@@ -413,6 +418,7 @@ class _Table:
         pair = np.zeros(1, dtype=np.int32)
         place = np.zeros(1)
         first = chords[0].bodies
+        numbers = _Numbers(nodes)
         moves = any(each.body is not body for each, body in zip(self.named, first, strict=True))
         moved = MovedObstacles(packed, self._plain(first)) if moves else None
         coal_proof = CoalProof(self.robot, first, packed)
@@ -432,7 +438,7 @@ class _Table:
                 log, measured = coal_proof.logged(chord.ends, pair, place, run)
                 if pair[0] != PROVEN:
                     return self._parts_of(packed, int(pair[0]), nodes)
-            entries.append(self._entries(log, measured, nodes, whole_log=chord.level > 0))
+            entries.append(self._entries(log, measured, numbers, whole_log=chord.level > 0))
         return None
 
     def _parts_of(self, packed: ProofPairs, pair: int, nodes: Sequence[Sequence[int]]) -> list[tuple[int, int]]:
@@ -446,7 +452,7 @@ class _Table:
         return number not in self._hulls and len(cover.leaves) < min(most, len(cover.elements.points))
 
     def _entries(
-        self, log: MotionEntries, measured: NDArray[np.int64], nodes: Sequence[Sequence[int]], *, whole_log: bool
+        self, log: MotionEntries, measured: NDArray[np.int64], numbers: _Numbers, *, whole_log: bool
     ) -> MotionEntries:
         """Return the entries of a chord.
 
@@ -455,12 +461,11 @@ class _Table:
         Args:
             log: The kernels' log of the motion.
             measured: Numbers of two bodies, and level and number of an interval, shape (n, 4).
-            nodes: For each body the nodes of its parts.
+            numbers: The nodes of parts.
             whole_log: Whether entries without a plane are kept. A verifier finds those of a whole motion by balls and
                 boxes.
         """
-        over = np.array([cover.elements.key == "half_space" for cover in self.covers], dtype=bool)
-        normals = np.where(over[log.solids[:, 2]][:, None], 0.0, np.round(log.normals, self.digits))
+        normals = np.where(self._endless[log.solids[:, 2]][:, None], 0.0, np.round(log.normals, self.digits))
         intervals = log.intervals.copy()
         # A motion that stands still is logged as one interval, and covers all of it.
         if len(intervals) and (intervals == intervals[0]).all():
@@ -470,8 +475,7 @@ class _Table:
         needed = (normals.any(axis=1) | whole_log) & ~settled
         solids = log.solids[needed]
         for side in (0, 2):
-            parts = zip(solids[:, side].tolist(), solids[:, side + 1].tolist(), strict=True)
-            solids[:, side + 1] = [nodes[body][part] if part >= 0 else 0 for body, part in parts]
+            solids[:, side + 1] = numbers.of(solids[:, side], solids[:, side + 1])
 
         whole = np.insert(measured[:, :2], [1, 2], -1, axis=1)
         return MotionEntries(
@@ -525,6 +529,22 @@ class _Table:
                 for leaf in chosen:
                     if cover.divide(leaf):
                         candidates += [2 * len(cover.cuts) - 1, 2 * len(cover.cuts)]
+
+
+class _Numbers:
+    """The nodes of parts, by the numbers of bodies and parts in a table of the kernels.
+
+    Args:
+        nodes: For each body the nodes of its parts.
+    """
+
+    def __init__(self, nodes: Sequence[Sequence[int]]) -> None:
+        self._firsts = np.cumsum([0, *map(len, nodes)])
+        self._nodes = np.array([node for own in nodes for node in own], dtype=np.int64)
+
+    def of(self, bodies: NDArray[np.int64], parts: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Return the nodes of parts, 0 for the whole body where the part is -1; all of shape (n,)."""
+        return np.where(parts < 0, 0, self._nodes[self._firsts[bodies] + np.maximum(parts, 0)])
 
 
 def _joined(chords: Sequence[Chord], entries: Sequence[MotionEntries]) -> list[MotionEntries]:
