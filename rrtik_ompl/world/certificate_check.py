@@ -40,7 +40,7 @@ from rrtik_ompl.model.scene import Scene
 from rrtik_ompl.world.certificate_course import LARGEST_VALUE, SAME, Course, Stack, powers_of
 from rrtik_ompl.world.certificate_held import fault_of_constraints, model_constraints
 from rrtik_ompl.world.certificate_intervals import Known, Numbers, Open, Rows, intervals_of, joined
-from rrtik_ompl.world.certificate_parts import Parts, enclosed, inside_mesh
+from rrtik_ompl.world.certificate_parts import Parts, enclosed, inside_mesh, parts_of
 
 if TYPE_CHECKING:
     from rrtik_ompl.world.world import World
@@ -79,7 +79,7 @@ def certificate_fault(
         )
         if fault:
             return fault
-        trees = [Parts(each.elements, body.cuts) for each, body in zip(named, certificate.bodies, strict=True)]
+        trees = [parts_of(each.elements, body.cuts) for each, body in zip(named, certificate.bodies, strict=True)]
     except InputError as error:
         return str(error)
     course = Course(world.robot.chain, asked, tracks)
@@ -316,11 +316,10 @@ class Motions:
         self.pushes = bounds[:, 2]
 
         # Frames of joints in the frames of pairs, each combination once.
-        views = [
-            (joints[k], base) for both, base in zip(self.pairs, self.base_of_pair.tolist(), strict=True) for k in both
-        ]
-        self._views = {view: k for k, view in enumerate(dict.fromkeys(views))}
-        self._view_of_pair = np.array([self._views[view] for view in views], dtype=np.int64).reshape(-1, 2)
+        both = np.array(joints, dtype=np.int64)[self._bodies_of_pair]
+        views = np.stack([both, np.repeat(self.base_of_pair[:, None], 2, axis=1)], axis=2).reshape(-1, 2)
+        self._views, view_of_body = np.unique(views, axis=0, return_inverse=True)
+        self._view_of_pair = view_of_body.reshape(-1, 2)
         self._placements = np.array([each.body.placement.homogeneous for each in named]).reshape(-1, 4, 4)
 
         # Balls and boxes of all nodes of all bodies, one after the other.
@@ -329,6 +328,7 @@ class Motions:
         self._children = np.concatenate([tree.children for tree in trees])
         self._low = np.concatenate([tree.low for tree in trees])
         self._high = np.concatenate([tree.high for tree in trees])
+        self._centres = np.concatenate([tree.centres for tree in trees])
         self._carried_centres = np.concatenate(
             [tree.centres @ place[:3, :3].T + place[:3, 3] for tree, place in zip(trees, self._placements, strict=True)]
         )
@@ -361,24 +361,18 @@ class Motions:
 
     def _reaches(self, number: int, pose: Matrix, axis: Vector) -> tuple[Vector | float, Vector | float]:
         """Return how far points of a body are at most from the origin and from an axis of its joint's frame [m]."""
-
-        def placed(points: Matrix) -> Matrix:
-            return np.asarray(points @ pose[:3, :3].T + pose[:3, 3])
-
-        tree = self.trees[number]
-        return tree.largest_length(placed), tree.largest_length(lambda points: np.cross(placed(points), axis))
+        return self.trees[number].reaches(pose, axis)
 
     # --- tests (point 7) ---
 
     def _frames(self, motion: Numbers, share: Vector) -> NDArray[np.float64]:
         """Compute the frames of joints in the frames of pairs at places of motions, shape (places, views, 4, 4)."""
         frames = self._course.frames(motion, share)
-        seen = np.zeros((len(frames), len(self._views), 4, 4))
-        for (joint, base), k in self._views.items():
-            turn = frames[:, base, :3, :3].transpose(0, 2, 1)
-            seen[:, k, :3, :3] = turn @ frames[:, joint, :3, :3]
-            seen[:, k, :3, 3] = np.einsum("nij,nj->ni", turn, frames[:, joint, :3, 3] - frames[:, base, :3, 3])
-            seen[:, k, 3, 3] = 1.0
+        joint, base = self._views.T
+        outer = frames[:, base]
+        seen = frames[:, joint]
+        seen[:, :, :3, 3] -= outer[:, :, :3, 3]
+        seen[:, :, :3] = outer[:, :, :3, :3].swapaxes(2, 3) @ seen[:, :, :3]
         return seen
 
     def _not_apart(self, rows: Rows, normals: Matrix | None = None) -> Numbers:
@@ -737,28 +731,32 @@ class Motions:
     def needed(self, motions: Sequence[MotionEntries]) -> Mask | None:
         """Return which entries, one motion after the other, a certificate cannot do without; None if some lack."""
         entries = self._entries(motions)
-        known = self._known(entries)
-        everything = self.everything
-        if known.too_many or next(self._stuck(everything, known), None) is not None:
+        if self._known(entries).too_many:
             return None
-        used = known.used | (entries.first < 0)
 
-        # What balls show at the ends and in the middle of an interval, they may show on its parts.
-        doubtful = np.flatnonzero(known.used & (entries.first >= 0))
+        # What balls show at the ends and in the middle of an interval, they may show on its parts: try without that.
+        doubtful = np.flatnonzero(entries.first >= 0)
         for share in (0.0, 0.5, 1.0):
             some = entries.of(doubtful)
             still = some._replace(begin=some.begin + share * some.width, width=np.zeros(len(doubtful)))
             doubtful = np.delete(doubtful, self._not_apart(still))
-        needed = used.copy()
-        needed[doubtful] = False
+        tried = np.delete(np.arange(len(entries.pair)), doubtful)
+        known = self._known(entries.of(tried))
+        everything = self.everything
+        stuck = [each.motion * len(self.pairs) + each.pair for each in self._stuck(everything, known)]
+        needed = entries.first < 0
+        needed[tried[known.used]] = True
+        if not stuck:
+            return needed
 
-        # Try without them, and take back what is about a pair and motion that is not shown apart then.
-        claims = everything.motion * len(self.pairs) + everything.pair
-        about = entries.motion * len(self.pairs) + entries.pair
-        tried = everything.of(np.isin(claims, about[doubtful]))
-        left = self._known(entries.of(needed))
-        stuck = [each.motion * len(self.pairs) + each.pair for each in self._stuck(tried, left)]
-        needed |= used & np.isin(about, np.concatenate([*stuck, about[:0]]))
+        # Take back what is about a pair and motion that is not shown apart then.
+        open_claims = np.concatenate(stuck)
+        about = np.flatnonzero(np.isin(entries.motion * len(self.pairs) + entries.pair, open_claims))
+        known = self._known(entries.of(about))
+        left = everything.of(np.isin(everything.motion * len(self.pairs) + everything.pair, open_claims))
+        if next(self._stuck(left, known), None) is not None:
+            return None
+        needed[about] = known.used | (entries.first[about] < 0)
         return needed
 
     def _known(self, entries: Rows) -> Known:
@@ -772,16 +770,24 @@ class Motions:
     def _fault_of_insides(self) -> str:
         """Return a body that is inside a mesh at the first waypoint; "" if there is none (point 7.3)."""
         frames = self._frames(np.zeros(1, dtype=np.int64), np.zeros(1))[0]
-        for number, (i, j) in enumerate(self.pairs):
-            for outer, inner in ((i, j), (j, i)):
-                if not self._mesh[outer] or self._by_hulls[number] or not self.trees[inner].bounded:
-                    continue
-                poses = dict(zip((i, j), frames[self._view_of_pair[number]], strict=True))
-                one, other = (poses[k] @ self._placements[k] for k in (outer, inner))
-                turn = one[:3, :3].T @ other[:3, :3]
-                shift = one[:3, :3].T @ (other[:3, 3] - one[:3, 3])
-                if self._holds(outer, inner, turn, shift):
-                    names = [self.named[k].body.name for k in (inner, outer)]
+        placed = frames[self._view_of_pair] @ self._placements[self._bodies_of_pair]
+        bounded = np.array([tree.bounded for tree in self.trees], dtype=bool)
+        for outer in (0, 1):
+            meshes, others = self._bodies_of_pair[:, [outer, 1 - outer]].T
+            rows = np.flatnonzero(self._mesh[meshes] & ~self._by_hulls & bounded[others])
+            one = placed[rows, outer]
+            other = placed[rows, 1 - outer]
+            turn = one[:, :3, :3].swapaxes(1, 2) @ other[:, :3, :3]
+            shift = np.einsum("nji,nj->ni", one[:, :3, :3], other[:, :3, 3] - one[:, :3, 3])
+
+            # Only a body whose ball comes near the mesh's box may be inside.
+            mesh = self._firsts[meshes[rows]]
+            inner = self._firsts[others[rows]]
+            centre = np.einsum("nij,nj->ni", turn, self._centres[inner]) + shift
+            gap = np.maximum(0.0, np.maximum(self._low[mesh] - centre, centre - self._high[mesh]))
+            for k in np.flatnonzero(~(np.linalg.norm(gap, axis=1) > self._radii[inner])).tolist():
+                if self._holds(int(meshes[rows[k]]), int(others[rows[k]]), turn[k], shift[k]):
+                    names = [self.named[each[rows[k]]].body.name for each in (others, meshes)]
                     return f"'{names[0]}' is inside '{names[1]}' at the first waypoint, or a part of it is"
         return ""
 
@@ -789,15 +795,8 @@ class Motions:
         """Check whether a mesh contains a connected part of another body, whose pose in its frame is given."""
         mesh = self.trees[outer]
         other = self.trees[inner]
-        low = mesh.low[0]
-        high = mesh.high[0]
-        centre = turn @ other.centres[0] + shift
-        gap = np.maximum(0.0, np.maximum(low - centre, centre - high))
-        if np.linalg.norm(gap) > other.radii[0]:
-            return False
-
         points = other.elements.points @ turn.T + shift
-        inside = ((points >= low) & (points <= high)).all(axis=(1, 2))
+        inside = ((points >= mesh.low[0]) & (points <= mesh.high[0])).all(axis=(1, 2))
         corners = mesh.elements.points
         if other.elements.key == "mesh":
             return any(inside_mesh(corners, point) for point in enclosed(other.elements.points, points, inside))

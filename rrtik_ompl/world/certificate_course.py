@@ -6,7 +6,6 @@ Points 5.1, 5.2 and 5.5 of ``docs/science/certificate.md``.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
 from itertools import pairwise
 from math import comb, factorial
 
@@ -53,6 +52,11 @@ class Course:
         rows = np.repeat(rows, 2, axis=0) if len(rows) == 1 else rows
         self.count = len(rows) - 1
         self._starts = rows[:-1]
+
+        # How far the origin of each joint is from that of the next one inwards, and from its axis.
+        origins = chain.placement[:, :3, 3]
+        self._offsets = np.linalg.norm(origins, axis=1)
+        self._off_axes = np.linalg.norm(np.cross(origins, chain.axis[chain.parent]), axis=1)
         values = np.abs(chain.joint_values(rows))
         self.fault = ""
         self._powers = powers_of(route)
@@ -128,10 +132,9 @@ class Course:
             bounds[joint] = np.array([velocity, acceleration, pushed])
 
             # Bound the distances of the points from the axis and the origin of the next joint inwards.
-            origin = chain.placement[k][:3, 3]
             stroke = self.strokes[:, k] if slides else 0.0
-            off_axis = float(np.linalg.norm(np.cross(origin, chain.axis[joint - 1]))) + stroke + reach
-            reach = reach + float(np.linalg.norm(origin)) + stroke
+            off_axis = self._off_axes[k] + stroke + reach
+            reach = reach + self._offsets[k] + stroke
 
         return bounds
 
@@ -167,7 +170,7 @@ class Course:
         found = np.zeros((len(named), self.count))
         for k, (each, tree) in enumerate(zip(named, trees, strict=True)):
             if each.body.joint > self.joints:
-                reach = tree.largest_length(partial(_placed, each.body.placement.homogeneous))
+                reach, _ = tree.reaches(each.body.placement.homogeneous, np.zeros(3))
                 found[k] = self.bounds_on_track(each.body.joint, reach)[0]
         return found
 
@@ -196,10 +199,6 @@ class Course:
             pose[:, :3, 3] += self._shifts[k][motion] * share[:, None]
             frames[:, 1 + len(chain.parent) + k] = pose
         return frames
-
-
-def _placed(pose: Matrix, points: Matrix) -> Matrix:
-    return np.asarray(points @ pose[:3, :3].T + pose[:3, 3])
 
 
 def powers_of(route: Route) -> list[Matrix]:

@@ -138,7 +138,10 @@ class Known:
     def _entry_with(self, keys: Numbers, open_: Open) -> Numbers:
         """Return the number of an entry with each key whose interval contains each interval; -1 if there is none."""
         found = np.full(len(keys), -1)
-        rows = np.flatnonzero(np.isin(keys, self._keys)) if len(self._keys) else np.zeros(0, dtype=np.int64)
+        if len(self._keys) == 0:
+            return found
+        nearest = np.minimum(np.searchsorted(self._keys, keys), len(self._keys) - 1)
+        rows = np.flatnonzero(self._keys[nearest] == keys)
         for level, places, numbers in self._places:
             own = rows[open_.level[rows] >= level]
             wanted = (keys[own] << level) + (open_.number[own] >> (open_.level[own] - level))

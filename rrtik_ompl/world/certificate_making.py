@@ -10,9 +10,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
+from copy import copy
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property, lru_cache, partial
 from typing import TYPE_CHECKING, NamedTuple
+from weakref import WeakKeyDictionary
 
 import coal
 import numpy as np
@@ -42,7 +44,7 @@ from rrtik_ompl.world.arm_cache import strokes
 from rrtik_ompl.world.certificate_check import Motions, bodies_of_route
 from rrtik_ompl.world.certificate_course import Course
 from rrtik_ompl.world.certificate_held import MAKING, fault_of_constraints, model_constraints
-from rrtik_ompl.world.certificate_parts import Parts
+from rrtik_ompl.world.certificate_parts import FEW_POINTS, MOST_KNOWN, parts_of
 from rrtik_ompl.world.coal_proof import PROVEN, CoalProof, suggest_planes
 
 # [m] Certificates keep this distance beyond the rounding that proofs allow for: verifiers round elsewhere, and the
@@ -71,6 +73,9 @@ if TYPE_CHECKING:
     from rrtik_ompl.world.proof import Prover
     from rrtik_ompl.world.world import World
 
+# Of each prover, which is one thread's alone, the pairs and the table of its bodies as they are divided at first.
+_first_tables: WeakKeyDictionary[Prover, tuple[list[tuple[int, int]], ProofPairs]] = WeakKeyDictionary()
+
 
 class Cover:
     """The parts of a body, and the cuts that divide it into them.
@@ -79,18 +84,30 @@ class Cover:
         elements: The elements of the body's shape.
         cuts: See :attr:`rrtik_ompl.model.certificate.ModelBody.cuts`.
         leaves: Nodes that are not divided, and the numbers of their elements.
+        solids: Convex solids around parts that were asked for.
+        is_first: Whether it is divided as bodies are at first.
     """
 
     def __init__(self, elements: Elements) -> None:
         self.elements = elements
         self.cuts: list[tuple[int, int, float]] = []
         self.leaves: dict[int, NDArray[np.int64]] = {0: np.arange(len(elements.points))}
+        self.solids: dict[int, ConvexSolid] = {}
+        self.is_first = True
         self._low = elements.points.min(axis=1)
         self._high = elements.points.max(axis=1)
         self._middles = 0.5 * (self._low + self._high)
         if elements.half is not None:
             self._low = self._low - elements.half
             self._high = self._high + elements.half
+
+    def copy(self) -> Cover:
+        """Return another one with the same parts."""
+        other = copy(self)
+        other.cuts = list(self.cuts)
+        other.leaves = dict(self.leaves)
+        other.solids = dict(self.solids)
+        return other
 
     def box(self, leaf: int) -> tuple[Vector, Vector]:
         """Return the lowest and highest coordinates of a part's elements, without its radius [m]."""
@@ -131,6 +148,7 @@ class Cover:
             below = middles[:, axis] < cut
 
         number = len(self.cuts)
+        self.is_first = False
         self.cuts.append((leaf, axis, cut))
         del self.leaves[leaf]
         self.leaves[2 * number + 1] = own[below]
@@ -152,6 +170,11 @@ class Cover:
 
     def solid(self, leaf: int) -> ConvexSolid:
         """Return a convex solid around a part, for the kernels."""
+        if leaf not in self.solids:
+            self.solids[leaf] = self._solid(leaf)
+        return self.solids[leaf]
+
+    def _solid(self, leaf: int) -> ConvexSolid:
         elements = self.elements
         if elements.half is not None or elements.key == "balls":
             low, high = self.box(leaf)
@@ -163,6 +186,35 @@ class Cover:
             with suppress(QhullError, ValueError):  # flat ones have no hull
                 points = points[ConvexHull(points).vertices]
         return ConvexSolid(points, radius=elements.radius, disc=elements.disc)
+
+
+def _first_covers(named: Sequence[NamedBody], pairs: Sequence[tuple[int, int]]) -> list[Cover]:
+    """Return the parts of all bodies that are tried first: meshes that are compared have several."""
+    compared = {k for pair in pairs for k in pair}
+    covers = []
+    for k, each in enumerate(named):
+        parted = k in compared and each.elements.key == "mesh" and not _may_overlap(each)
+        find = _known_cover if len(each.elements.points) < FEW_POINTS else _divided_cover
+        covers.append(find(each.elements, FIRST_PARTS if parted else 1).copy())
+    return covers
+
+
+def _divided_cover(elements: Elements, count: int) -> Cover:
+    """Return a body divided into a number of parts."""
+    cover = Cover(elements)
+    cover.divide_into(count)
+    cover.is_first = True
+    for leaf in cover.leaves if count > 1 else ():
+        cover.solid(leaf)
+    return cover
+
+
+_known_cover = lru_cache(maxsize=MOST_KNOWN)(_divided_cover)
+
+
+def _may_overlap(named: NamedBody) -> bool:
+    """Check whether a body may overlap others, and therefore counts as its hull."""
+    return any(distance < 0.0 for _, distance in named.body.contacts)
 
 
 class Chord(NamedTuple):
@@ -209,16 +261,16 @@ def certificate_of(prover: Prover, route: Route, clearance: float, world: World 
     slacks = np.zeros(course.count)
     travels = np.zeros((len(named), course.count))
     if route.times is not None:
-        whole = [Parts(each.elements, ()) for each in named]
+        whole = [parts_of(each.elements, ()) for each in named]
         slacks = Motions(robot.chain, named, whole, compared, course, clearance).pushes.max(axis=0, initial=0.0) / 8.0
         travels = course.travels(named, whole)
     levels = _levels(slacks, travels)
     finest = FINER_CHORDS if levels.any() else 1
     for spare, digits, finer in [(SPARE, DIGITS, k) for k in range(finest)] + [(CLOSE_SPARE, CLOSE_DIGITS, finest - 1)]:
         chords = list(_chords(named, course, levels + finer, travels))
-        covers = [Cover(each.elements) for each in named]
+        covers = _first_covers(named, compared)
         spare += float((slacks * 0.25 ** (levels + finer)).max())
-        motions = _Table(robot, named, covers, compared, clearance, spare, digits).proven(chords)
+        motions = _Table(prover, named, covers, compared, clearance, spare, digits).proven(chords)
         if motions is not None:
             made = _model(prover, route, named, compared, covers, clearance, tracks)
             held = _holding(made, motions, robot.chain, named, compared, course)
@@ -298,7 +350,7 @@ def _holding(
     course: Course,
 ) -> Certificate | None:
     """Return a certificate with entries, without those that balls and boxes make needless; None if it does not hold."""
-    trees = [Parts(each.elements, body.cuts) for each, body in zip(named, certificate.bodies, strict=True)]
+    trees = [parts_of(each.elements, body.cuts) for each, body in zip(named, certificate.bodies, strict=True)]
     verifier = Motions(chain, named, trees, pairs, course, certificate.clearance)
     ordered = [verifier.with_passing(verifier.in_order(motion)) for motion in motions]
     fitting = ordered if certificate.times is None else verifier.fitted(ordered)
@@ -319,7 +371,7 @@ def _holding(
 class _Table:
     """Bodies and their parts as the kernels compare them; the parts become finer as far as that is needed."""
 
-    robot: Robot
+    prover: Prover
     named: Sequence[NamedBody]
     covers: Sequence[Cover]
     pairs: Sequence[tuple[int, int]]
@@ -327,14 +379,14 @@ class _Table:
     spare: float
     digits: int
 
+    @property
+    def robot(self) -> Robot:
+        """The robot."""
+        return self.prover.robot
+
     def proven(self, chords: Sequence[Chord]) -> list[MotionEntries] | None:
         """Return the entries of each motion, from the chords of all of them; None if one is not proven."""
         route = np.stack([chord.ends for chord in chords])
-        compared = {k for pair in self.pairs for k in pair}
-        for number in sorted(compared):
-            cover = self.covers[number]
-            if cover.elements.key == "mesh" and number not in self._hulls:
-                cover.divide_into(FIRST_PARTS)
         scale = 1.0
         self._divide_clouds(route, scale)
 
@@ -357,11 +409,6 @@ class _Table:
         """Which bodies are half-spaces, shape (bodies,)."""
         return np.array([cover.elements.key == "half_space" for cover in self.covers], dtype=bool)
 
-    @property
-    def _hulls(self) -> set[int]:
-        """Bodies that may overlap others, and therefore count as their hulls."""
-        return {k for k, each in enumerate(self.named) if any(distance < 0.0 for _, distance in each.body.contacts)}
-
     def _divide(self, body: int, node: int) -> bool:
         """Divide a body further of which a part is not proven apart from another; return whether that is possible."""
         if not self._can_be_finer(body):
@@ -374,6 +421,18 @@ class _Table:
     def _packed(self, bodies: Sequence[Body]) -> tuple[ProofPairs, list[list[int]]]:
         """Return the table of the kernels, and for each body the nodes of its parts."""
         nodes = [list(cover.leaves) for cover in self.covers]
+        moving = [each for each, body in zip(self.named, bodies, strict=True) if each.body is not body]
+        is_first = not moving and all(cover.is_first for cover in self.covers)
+        pairs, packed = _first_tables.get(self.prover, (None, None)) if is_first else (None, None)
+        if packed is None or pairs != self._arm_pairs:
+            packed = self._new_table(bodies, fixed=not moving)
+            if is_first:
+                _first_tables[self.prover] = self._arm_pairs, packed
+        packed.table.ways[:] = 0.0  # the same whatever was proven before
+        packed.keep(self.clearance, self.spare)
+        return packed, nodes
+
+    def _new_table(self, bodies: Sequence[Body], *, fixed: bool) -> ProofPairs:
         solids = []
         for each, cover in zip(self.named, self.covers, strict=True):
             geometry = each.body.geometry
@@ -381,11 +440,8 @@ class _Table:
                 solids.append(Solids(tuple(map(cover.solid, cover.leaves))))
             else:
                 solids.append(convex_solids(geometry))
-        moving = [each for each, body in zip(self.named, bodies, strict=True) if each.body is not body]
         plain = self._plain(bodies)
-        packed = proof_pairs(self.robot.chain, plain, self._arm_pairs, solids, strokes(self.robot), fixed=not moving)
-        packed.keep(self.clearance, self.spare)
-        return packed, nodes
+        return proof_pairs(self.robot.chain, plain, self._arm_pairs, solids, strokes(self.robot), fixed=fixed)
 
     @cached_property
     def _arm_pairs(self) -> list[tuple[int, int]]:
@@ -449,7 +505,7 @@ class _Table:
     def _can_be_finer(self, number: int) -> bool:
         cover = self.covers[number]
         most = {"mesh": MOST_PARTS, "balls": MOST_LEAVES, "boxes": MOST_LEAVES}.get(cover.elements.key, 1)
-        return number not in self._hulls and len(cover.leaves) < min(most, len(cover.elements.points))
+        return not _may_overlap(self.named[number]) and len(cover.leaves) < min(most, len(cover.elements.points))
 
     def _entries(
         self, log: MotionEntries, measured: NDArray[np.int64], numbers: _Numbers, *, whole_log: bool

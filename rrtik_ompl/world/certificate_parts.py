@@ -5,8 +5,8 @@ Points 3.3, 3.4, 7.1 and 7.3 of ``docs/science/certificate.md``.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from functools import cached_property
+from collections.abc import Iterator, Sequence
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,8 @@ from rrtik_ompl.base.arrays import Mask, Matrix, Vector
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.geometry.collision.elements import Elements
 
+FEW_POINTS = 20_000  # elements of a body whose parts are remembered
+MOST_KNOWN = 256  # bodies whose parts are
 PRODUCTS_AT_ONCE = 2_000_000  # points times directions that are computed together
 
 
@@ -57,6 +59,7 @@ class Parts:
             self.children[node] = 2 * k + 1, 2 * k + 2
             self.spans[2 * k + 1 : 2 * k + 3] = [[begin, middle], [middle, end]]
 
+        self._reaches: dict[bytes, tuple[float, float]] = {}
         self._points = points[self.order]
         self._half = None if elements.half is None else elements.half[self.order]
         self._bound((least - half)[self.order], (greatest + half)[self.order])
@@ -118,17 +121,44 @@ class Parts:
         sines = np.hypot(directions[:, 0], directions[:, 1])
         return np.asarray(highest + self.elements.disc * sines + self.elements.radius)
 
-    def largest_length(self, mapping: Callable[[Matrix], Matrix]) -> float:
-        """Return the largest norm [m] that a non-expansive mapping, (n, 3) -> (n, 3), takes on the points of the body.
+    def reaches(self, pose: Matrix, axis: Vector) -> tuple[float, float]:
+        """Return how far points of the body are at most from the origin and from an axis of its joint's frame [m].
 
-        It is evaluated at the points of the elements; the disc and the radius around them are added.
+        The points of the elements are looked at; the disc and the radius around them are added.
+
+        Args:
+            pose: Pose of the shape in the joint's frame, shape (4, 4).
+            axis: Unit vector, shape (3,).
         """
+        key = pose.tobytes() + axis.tobytes()
+        if key not in self._reaches:
+            self._reaches[key] = self._largest_lengths(pose, axis)
+        return self._reaches[key]
+
+    def _largest_lengths(self, pose: Matrix, axis: Vector) -> tuple[float, float]:
         if not self.bounded:
-            return np.inf
-        lengths = np.linalg.norm(mapping(self._points.reshape(-1, 3)), axis=1)
-        if self._half is not None:
-            lengths = lengths + np.linalg.norm(self._half, axis=1)
-        return float(lengths.max()) + self.elements.disc + self.elements.radius
+            return np.inf, np.inf
+        x, y, z = placed = pose[:3, :3] @ self._points.reshape(-1, 3).T + pose[:3, 3:]
+        a, b, c = axis
+        around = np.stack([b * z - c * y, c * x - a * z, a * y - b * x])
+        thickness = self.elements.disc + self.elements.radius
+        half = 0.0 if self._half is None else np.linalg.norm(self._half, axis=1)
+        far, off = (float((np.sqrt((ways * ways).sum(axis=0)) + half).max()) for ways in (placed, around))
+        return far + thickness, off + thickness
+
+
+def parts_of(elements: Elements, cuts: Sequence[tuple[int, int, float]]) -> Parts:
+    """Return the parts of a body; those of small ones, such as links, are remembered.
+
+    Raises:
+        InputError: If a cut divides no leaf.
+    """
+    return _known_parts(elements, tuple(cuts)) if len(elements.points) < FEW_POINTS else Parts(elements, cuts)
+
+
+@lru_cache(maxsize=MOST_KNOWN)
+def _known_parts(elements: Elements, cuts: tuple[tuple[int, int, float], ...]) -> Parts:
+    return Parts(elements, cuts)
 
 
 def enclosed(own: NDArray[np.float64], placed: NDArray[np.float64], inside: Mask) -> Iterator[Vector]:
