@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import partial
-from itertools import pairwise
 from typing import TypeAlias
 
 import numpy as np
@@ -375,9 +374,9 @@ def _at_pose(branch: Branch) -> Branch:
     return replace(branch, q=followed.rows[-1]) if followed.complete else branch
 
 
-def weighted_length(robot: Robot, a: Vector, b: Vector) -> float:
-    """Return the weighted length of a straight motion between two configurations [rad; metres count the same]."""
-    return float(np.linalg.norm(weighted_difference(robot, b, a)))
+def weighted_length(robot: Robot, rows: Matrix) -> float:
+    """Return the weighted length of the way through configurations, shape (k, dof) [rad; metres count the same]."""
+    return float(np.linalg.norm(weighted_difference(robot, rows[1:], rows[:-1]), axis=1).sum())
 
 
 def _line_of(branch: Branch, stage: Straight, seed: int) -> Way:
@@ -402,8 +401,8 @@ def _following_branch(
     It takes over the rest of the steps, the choices and the effort, and adds the length of the path (or of the
     straight motion to ``q``) to the cost.
     """
-    rows = [branch.q, q] if path is None else path.waypoints
-    cost = branch.cost + sum(weighted_length(setting.robot, a, b) for a, b in pairwise(rows))
+    rows = np.stack([branch.q, q]) if path is None else path.waypoints
+    cost = branch.cost + weighted_length(setting.robot, rows)
 
     return Branch(
         setting,

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import compress, pairwise
 
 import coal
 import numpy as np
@@ -20,6 +20,7 @@ import pinocchio as pin
 
 from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.geometry.collision.bodies import DISTANCE_TOLERANCE, Body, deepest_contact, usually_apart
+from rrtik_ompl.geometry.collision.body_arrays import body_arrays
 from rrtik_ompl.geometry.collision.distances import signed_gap
 from rrtik_ompl.geometry.collision.motion_bound import approach_weights
 from rrtik_ompl.geometry.collision.solids import is_mesh
@@ -139,17 +140,20 @@ def touching_at(world: World, q: Vector, name: str) -> list[Nearness]:
     """
     bodies = world.bodies
     frames = world.robot.joint_frames(q[None])[0]
+    pairs = [(i, j) for i, j in world.pairs if name in (bodies[i].name, bodies[j].name)]
+    if not pairs:
+        return []
+    near = body_arrays(tuple(bodies)).least_gaps(np.array(pairs), frames) <= CONTACT_GAP
     nearest_of_pair: dict[tuple[str, str], Nearness] = {}
 
-    for i, j in world.pairs:
+    for i, j in compress(pairs, near.tolist()):
         first = bodies[i]
         second = bodies[j]
-        if name in (first.name, second.name):
-            gap = signed_distance(world.robot, (first, second), q, frames)
-            other = second.name if first.name == name else first.name
-            is_nearest = (name, other) not in nearest_of_pair or gap < nearest_of_pair[name, other].distance
-            if gap <= CONTACT_GAP and is_nearest:
-                nearest_of_pair[name, other] = Nearness(name, other, gap, deepest_contact(bodies, name, other))
+        gap = signed_distance(world.robot, (first, second), q, frames)
+        other = second.name if first.name == name else first.name
+        is_nearest = (name, other) not in nearest_of_pair or gap < nearest_of_pair[name, other].distance
+        if gap <= CONTACT_GAP and is_nearest:
+            nearest_of_pair[name, other] = Nearness(name, other, gap, deepest_contact(bodies, name, other))
 
     return sorted(nearest_of_pair.values(), key=lambda near: near.distance)
 

@@ -8,6 +8,7 @@ interval if their distance at its middle exceeds what they can approach each oth
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -232,20 +233,11 @@ def _not_far_apart(
         return []
     place = {k: number for number, k in enumerate(parts)}
     arrays = body_arrays(tuple(bodies[k] for k in parts))
-    poses = frames[arrays.joints] @ arrays.placements
-    turns = poses[:, :3, :3]
-    centres = np.einsum("nij,nj->ni", turns, arrays.centres) + poses[:, :3, 3]
-    radii = np.linalg.norm(arrays.halves, axis=1)
     numbers = np.array([(place[i], place[j]) for i, j in pairs])
     moved = np.array([part.speed for part in parts.values()])
-
-    # The ball around one body is apart from the box around the other.
-    gaps = []
-    for one, other in (numbers.T, numbers.T[::-1]):
-        inside = np.einsum("nji,nj->ni", turns[other], centres[one] - centres[other])
-        gaps.append(np.linalg.norm(np.maximum(np.abs(inside) - arrays.halves[other], 0.0), axis=1) - radii[one])
     required = np.maximum(arrays.kept_apart(numbers), CONTACT_GAP) + moved[numbers].sum(axis=1) + DISTANCE_TOLERANCE
-    return [pair for pair, near in zip(pairs, np.max(gaps, axis=0) <= required, strict=True) if near]
+    near = arrays.least_gaps(numbers, frames) <= required
+    return [pair for pair, is_near in zip(pairs, near.tolist(), strict=True) if is_near]
 
 
 def _twist(first: Body, last: Body) -> Vector:
@@ -259,8 +251,9 @@ def _speed(body: Body, twist: Vector) -> float:
     """Return an upper bound on how far any point of a body moves along a screw from beginning to end [m]."""
     if not twist.any():
         return 0.0  # also of a half-space, which has no reach
-    reach = float(np.linalg.norm(body.geometry.aabb_center)) + float(body.geometry.aabb_radius)
-    return float(np.linalg.norm(twist[:3]) + np.linalg.norm(twist[3:]) * reach)
+    x, y, z, *turn = twist.tolist()
+    reach = math.hypot(*body.geometry.aabb_center) + float(body.geometry.aabb_radius)
+    return math.hypot(x, y, z) + math.hypot(*turn) * reach
 
 
 def _same_pose(first: pin.SE3, second: pin.SE3) -> bool:

@@ -24,8 +24,12 @@ MOST_MOVED = 4  # obstacles that are moved in a world; if there are more, it is 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Known:
-    """A world without contacts, and the worlds of the same scene with contacts, by these."""
+    """A world without contacts, and the worlds of the same scene with contacts, by these.
 
+    The kind is what is equal for worlds that differ in the poses of obstacles alone.
+    """
+
+    kind: Hashable
     world: World
     in_contact: dict[tuple[Touching, ...], World] = field(default_factory=dict)
 
@@ -55,17 +59,18 @@ class Worlds:
         self._left = [] if left is None else left
         self._made: dict[Hashable, Known] = {}
         if not first.scene.contacts and (not self._left or _used(first)):
-            self._made[_key(first.robot, first.scene), _places(first.scene)] = Known(first)
+            kind = _kind(first.robot, first.scene)
+            self._made[kind, _places(first.scene)] = Known(kind, first)
 
     def of(self, robot: Robot, scene: Scene) -> World:
         """Return the world of a robot in a scene."""
-        kind = _key(robot, scene)
+        kind = _kind(robot, scene)
         places = _places(scene)
         if (kind, places) not in self._made:
             bare = changed(scene, contacts=())
             known = self._taken_over(kind, places, bare)
             if known is None:
-                known = Known(form_of(self._first, robot=robot, scene=scene if not scene.contacts else bare))
+                known = Known(kind, form_of(self._first, robot=robot, scene=scene if not scene.contacts else bare))
             self._made[kind, places] = known
         return self._made[kind, places].with_contacts(scene.contacts)
 
@@ -75,7 +80,7 @@ class Worlds:
 
     def _taken_over(self, kind: Hashable, places: tuple[bytes, ...], scene: Scene) -> Known | None:
         """Return a world that an earlier task has left, with obstacles where they are now; None if there is none."""
-        alike = [known for known in self._left if _key(known.world.robot, known.world.scene) == kind]
+        alike = [known for known in self._left if known.kind == kind]
         if not alike:
             return None
         same = [known for known in alike if _places(known.world.scene) == places]
@@ -89,7 +94,7 @@ class Worlds:
         world = known.world
         for obstacle in moved:
             world = world.moved(obstacle.name, obstacle.pose)
-        known = Known(world) if moved else known
+        known = Known(kind, world) if moved else known
         known.forget()
         return known
 
@@ -114,7 +119,7 @@ def _used(world: World) -> bool:
     return world.prover.tables.packed is not None or "checker" in vars(world.checks)
 
 
-def _key(robot: Robot, scene: Scene) -> Hashable:
+def _kind(robot: Robot, scene: Scene) -> Hashable:
     """Return what is equal for scenes that differ in the poses of obstacles alone."""
     obstacles = tuple((each.name, id(each.shape), each.margin, id(each.motion)) for each in scene.obstacles)
     held = tuple(

@@ -24,7 +24,7 @@ from rrtik_ompl.geometry.collision.bodies import (
     scene_bodies,
 )
 from rrtik_ompl.geometry.collision.bodies import in_contact as bodies_in_contact
-from rrtik_ompl.geometry.collision.body_arrays import BodyArrays, body_arrays
+from rrtik_ompl.geometry.collision.body_arrays import BodyArrays, arrays_in_contact, body_arrays
 from rrtik_ompl.geometry.collision.certificate import fixed_contact
 from rrtik_ompl.geometry.collision.containment import Containment
 from rrtik_ompl.geometry.collision.motion_bound import approach_weights, displacement_weights
@@ -180,7 +180,7 @@ def with_contacts(bare: Arrangement, scene: Scene) -> Arrangement:
     """
     robot = bare.robot
     bodies = Items(bodies_in_contact(robot, scene, bare.bodies.as_tuple))
-    arrays = body_arrays(bodies.as_tuple)
+    arrays = arrays_in_contact(bare.arrays, bodies.as_tuple)
     checked = tuple(pair for pair in bare.checked if pair not in arrays.contacts)
     always_colliding = bare.always_colliding
     if any(pair in arrays.contacts for pair in bare.standing):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 from weakref import WeakValueDictionary
 
@@ -56,6 +56,27 @@ class BodyArrays:
             separation[row] = min(separation[row], self.contacts[_ordered(pairs[row])])
         return separation
 
+    def least_gaps(self, pairs: NDArray[np.int64], frames: NDArray[np.float64]) -> Vector:
+        """Return lower bounds of the distances of bodies [m], shape (k,), by the boxes around them.
+
+        Args:
+            pairs: Numbers of the bodies, shape (k, 2).
+            frames: Pose of every joint frame in the world, the world's own first, shape (joints + 1, 4, 4).
+        """
+        poses = frames[self.joints] @ self.placements
+        turns = poses[:, :3, :3]
+        centres = np.einsum("nij,nj->ni", turns, self.centres) + poses[:, :3, 3]
+        radii = np.sqrt(np.einsum("ni,ni->n", self.halves, self.halves))
+
+        # The ball around one body is apart from the box around the other.
+        gaps = []
+        for one, other in (pairs.T, pairs.T[::-1]):
+            inside = np.einsum("nji,nj->ni", turns[other], centres[one] - centres[other])
+            beyond = np.maximum(np.abs(inside) - self.halves[other], 0.0)
+            gaps.append(np.sqrt(np.einsum("ni,ni->n", beyond, beyond)) - radii[one])
+        least: Vector = np.maximum(*gaps)
+        return least
+
     def in_contact(self, pairs: NDArray[np.int64]) -> Mask:
         """Return a mask, shape (k,), of the pairs, shape (k, 2), whose bodies are in contact."""
         in_contact: Mask = np.asarray(self.touching[pairs].all(axis=1))
@@ -91,6 +112,15 @@ def body_arrays(bodies: Sequence[Body]) -> BodyArrays:
     if arrays is None:
         _KNOWN[key] = arrays = _body_arrays(key)
     return arrays
+
+
+def arrays_in_contact(arrays: BodyArrays, bodies: tuple[Body, ...]) -> BodyArrays:
+    """Return the data of bodies from that of the same bodies with other contacts."""
+    known = _KNOWN.get(bodies)
+    if known is None:
+        touching = np.array([bool(body.contacts) for body in bodies], dtype=bool)
+        _KNOWN[bodies] = known = replace(arrays, touching=touching, contacts=_contacts(bodies))
+    return known
 
 
 def _body_arrays(bodies: tuple[Body, ...]) -> BodyArrays:
