@@ -11,6 +11,7 @@ import pytest
 import rrtik_ompl as rrtik
 from rrtik_ompl import AttachedObject, Obstacle, Scene, World, pose
 from rrtik_ompl.geometry.collision.cloud_solid import CloudSolid
+from rrtik_ompl.geometry.collision.solids import bvh
 from rrtik_ompl.kernels.distances import packing
 from rrtik_ompl.kernels.distances.layout import NODE_CENTRES
 from rrtik_ompl.kernels.distances.trees import _blocks_of, tree_of
@@ -200,6 +201,57 @@ def test_depths_of_convex_solids_are_those_of_coal(arm):
         for k in deep:
             assert np.allclose(found.gradients[k], differences(world, Q[k], pairs=pairs), rtol=0.0, atol=GRADIENT)
     assert overlapping > 20
+
+
+def by_triangles(world, q, pair, mesh):
+    """The least of coal's distances between the bodies of a pair, one triangle of a mesh at a time."""
+    one = [body for body in world.bodies if body.name == pair[0]]
+    robot = world.robot
+    data = robot.model.createData()
+    pin.forwardKinematics(robot.model, data, robot.chain.joint_values(q[None])[0])
+    where = data.oMi[one[0].joint] * one[0].placement
+    other = next(body.placement for body in world.bodies if body.name == pair[1])
+    ends = [coal.Transform3s(place.rotation, place.translation) for place in (where, other)]
+    parts = [bvh(mesh.vertices[corners], np.array([[0, 1, 2]])) for corners in mesh.triangles]
+    request = coal.DistanceRequest()
+    return min(coal.distance(one[0].geometry, ends[0], part, ends[1], request, coal.DistanceResult()) for part in parts)
+
+
+@pytest.mark.kernels
+@pytest.mark.parametrize("kernels", ["0", "1"])
+def test_a_mesh_is_overlapped_by_the_depth_of_its_deepest_triangle(arm, kernels, request):
+    if kernels == "0":
+        request.getfixturevalue("without_kernels")
+    shape = notched(0.15)
+    pair = ("slider", "obstacle")
+    overlapping = 0
+    world = world_with(arm, shape)
+    Q = postures(arm, 600) * [0.3, 1.0, 0.3] + [0.3, 0.0, 0.0]
+    rows = Q[~world.valid_batch(Q)][:80]
+    for q, value in zip(rows, world.distances(rows, [pair]).values[:, 0], strict=True):
+        expected = by_triangles(world, q, pair, shape)
+        if expected < -1e-4:
+            overlapping += 1
+            assert value == pytest.approx(expected, abs=ACCURATE)
+            assert world.closest(q).distance <= value + ACCURATE
+    assert overlapping > 10
+
+
+@pytest.mark.kernels
+def test_a_ball_whose_middle_is_in_a_cylinder_is_as_deep_as_a_formula_says(arm):
+    """Coal is off by centimetres there."""
+    radius, half, ball = 0.3, 0.4, 0.06
+    world = World(arm, Scene([Obstacle("can", rrtik.Cylinder(radius, 2.0 * half), [0.9, 0.0, 0.0])]))
+    Q = postures(arm, 300)
+    wrist = next(body for body in world.bodies if body.name == "wrist")
+    frames = arm.chain.joint_frames(Q)[:, wrist.joint]
+    x, y, z = (frames @ np.append(wrist.placement.translation, 1.0))[:, :3].T - np.array([[0.9], [0.0], [0.0]])
+    beside = np.hypot(x, y) - radius
+    above = np.abs(z) - half
+    inside = np.maximum(beside, above) < 0.0
+    assert inside.sum() > 10
+    found = world.distances(Q[inside], [("wrist", "can")])
+    assert np.allclose(found.values[:, 0], np.maximum(beside, above)[inside] - ball, rtol=0.0, atol=1e-8)
 
 
 @pytest.mark.kernels

@@ -23,6 +23,7 @@ from rrtik_ompl.geometry.collision.solids import is_mesh, solids_of
 from rrtik_ompl.model.judgement import Contact
 
 Segment: TypeAlias = tuple[Vector, Vector]
+MOST_CONTACTS = 1_000_000  # triangles of a mesh that may overlap a solid
 
 
 def measured(
@@ -95,21 +96,24 @@ def _distance(ends: Ends, *, with_depth: bool) -> tuple[float, Vector, Vector]:
         with_depth: Whether to compute the penetration depth of two overlapping meshes, which takes longer.
 
     Returns:
-        The distance [m], negative for a penetration depth, and the nearest (or deepest) point on each geometry in the
-        world [m], shape (3,) each.
+        The distance [m], negative for a penetration depth (of a mesh, that of its deepest triangle), and the nearest
+        (or deepest) point on each geometry in the world [m], shape (3,) each.
     """
     if is_ours(ends):
         return own_nearest(ends)
 
-    collision = coal.CollisionResult()
     result = coal.DistanceResult()
     distance = float(coal.distance(*ends, coal.DistanceRequest(), result))
 
-    # Coal has no signed distance for two overlapping meshes, but collide() gives their penetration depth.
-    meshes_overlap = distance <= 0.0 and is_mesh(ends[0]) and is_mesh(ends[2])
-    if with_depth and meshes_overlap and coal.collide(*ends, request(0.0), collision):
-        result = collision.getContact(0)
-        distance = float(result.penetration_depth)
+    # Of two meshes that overlap coal.distance tells no depth, of one the depth of any triangle.
+    meshes = is_mesh(ends[0]) + is_mesh(ends[2])
+    if distance <= 0.0 and (meshes == 1 or (meshes == 2 and with_depth)):
+        wanted = request(0.0)
+        wanted.num_max_contacts = MOST_CONTACTS if meshes == 1 else 1
+        collision = coal.CollisionResult()
+        if coal.collide(*ends, wanted, collision):
+            result = min(collision.getContacts(), key=lambda contact: float(contact.penetration_depth))
+            distance = float(result.penetration_depth)
     return distance, np.array(result.getNearestPoint1()), np.array(result.getNearestPoint2())
 
 

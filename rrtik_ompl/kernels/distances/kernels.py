@@ -52,17 +52,18 @@ from rrtik_ompl.kernels.proof.layout import (
 from rrtik_ompl.kernels.proof.planes import (
     ANY_WAY,
     LOWEST,
+    UPRIGHT,
     ahead,
     corner_at,
-    farthest,
     heights,
+    highest_corner,
     put_vector,
     sizes_at,
     solid_at,
 )
 from rrtik_ompl.kernels.record import Doubles, Ints
 from rrtik_ompl.kernels.simd.compiled import entry, inlined, kernel
-from rrtik_ompl.kernels.simd.lanes import bits, first_bit, larger, set_wide_lanes, spread_wide, wide_lanes_at
+from rrtik_ompl.kernels.simd.lanes import bits, first_bit, larger
 from rrtik_ompl.kernels.simd.records import row_at
 
 MOST_STEPS = 100
@@ -74,7 +75,9 @@ SHORTEST = 1e-10  # [m] of a vector that has a direction
 NEARER = 1e-14
 SAME = 1e-10  # [m] depths that are not told apart
 FLAT = 1e-12  # [m] height of a polytope without an inside
-THIN = 1e-14  # [m^2] twice the area of a face without a normal
+# [m^2] twice the area of a face without a normal. On the rim of a disc, corners so near each other that the depth is
+# known to SAME span some 1e-16 m^2.
+THIN = 1e-20
 NO_WEIGHT = 1e-12
 NOWHERE = (nan, nan, nan)
 APART, OVERLAPPING, FAR, LOST = range(4)
@@ -313,7 +316,9 @@ def of_solids(
 ) -> Any:
     """Measure two convex solids; returns as :func:`of_leaves`."""
     nothing = (0.0, 0.0, 0.0)
-    state, low, value, way, a, b, _, _ = solids_compared(table, first, second, one_frame, other_frame, way, limit)
+    state, low, value, way, a, b, _, _ = solids_compared(
+        table, first, second, one_frame, other_frame, way, limit, False
+    )
     if state == FAR or low >= limit:
         return BEYOND, limit, nothing, nothing, nothing
     if state == APART:
@@ -329,16 +334,11 @@ def of_solids(
 @kernel
 def put_element(table: DistanceTable, part: int, centre: Any) -> None:
     """Let what is around a point be the solid that is compared."""
-    template = solid_at(table, part)
-    element = solid_at(table, table.element)
-    begin = element[FIRST_BLOCK]
-    count = template[END_BLOCK] - template[FIRST_BLOCK]
-    shift = minus(centre, vector_at(sizes_at(table, part), BALL_CENTRE))
-    element[END_BLOCK] = begin + count
-    for block in range(count):
-        for axis in range(3):
-            own = wide_lanes_at(table.corners, 3 * (template[FIRST_BLOCK] + block) + axis)
-            set_wide_lanes(table.corners, 3 * (begin + block) + axis, own + spread_wide(shift[axis]))
+    element = row_at(table.spans, layout.SPAN_SIZE, table.element)
+    template = row_at(table.spans, layout.SPAN_SIZE, part)
+    for place in range(layout.SPAN_EDGES, layout.SPAN_SIZE):
+        element[place] = template[place]
+    put_vector(element, layout.SPAN_MIDDLE, centre)
     sizes_at(table, table.element)[ROUND] = sizes_at(table, part)[ROUND]
 
 
@@ -381,8 +381,8 @@ def is_nested(table: DistanceTable, one: int, other: int, one_frame: Frame, othe
     for axis in range(3):
         way = (1.0 if axis == 0 else 0.0, 1.0 if axis == 1 else 0.0, 1.0 if axis == 2 else 0.0)
         back = scaled(way, -1.0)
-        above = dot(minus(farthest(table, one, one_frame, way), farthest(table, other, other_frame, way)), way)
-        below = dot(minus(farthest(table, one, one_frame, back), farthest(table, other, other_frame, back)), back)
+        above = dot(minus(support(table, one, one_frame, way), support(table, other, other_frame, way)), way)
+        below = dot(minus(support(table, one, one_frame, back), support(table, other, other_frame, back)), back)
         around = sizes_at(table, one)[ROUND] - sizes_at(table, other)[ROUND]
         one_in_other = one_in_other and above + around <= 0.0 and below + around <= 0.0
         other_in_one = other_in_one and above + around >= 0.0 and below + around >= 0.0
@@ -443,6 +443,33 @@ def size_of(table: DistanceTable, node: NodeRows) -> float:
 
 
 @inlined
+def support(table: DistanceTable, number: int, frame: Frame, way: Any) -> Any:
+    """The point of a solid's core, in its frame, that is farthest along a vector of the surroundings, of any length.
+
+    Of a box, a segment or a point it is a sum; else it is one of the corners.
+    """
+    own = turned_back(frame, way)
+    span = row_at(table.spans, layout.SPAN_SIZE, number)
+    if span[layout.IS_SPAN] > 0.0:
+        p = vector_at(span, layout.SPAN_MIDDLE)
+        for axis in range(3):
+            half = vector_at(span, layout.SPAN_EDGES + 3 * axis)
+            p = ahead(p, scaled(half, 1.0 if dot(half, own) > 0.0 else -1.0))
+    else:
+        solid = solid_at(table, number)
+        p = highest_corner(table.corners, solid[FIRST_BLOCK], solid[END_BLOCK], own)
+    sizes = sizes_at(table, number)
+    radius = sizes[DISC]
+    if radius > 0.0:
+        pole = vector_at(sizes, DISC_AXIS)
+        across = minus(own, scaled(pole, dot(pole, own)))
+        length = sqrt(dot(across, across))
+        if length > UPRIGHT * sqrt(dot(own, own)):
+            p = minus(p, scaled(across, -radius / length))
+    return carried(frame, p)
+
+
+@inlined
 def gap_along(table: DistanceTable, first: int, second: int, one_frame: Frame, other_frame: Frame, way: Any) -> Any:
     """The gap of two nodes along a unit vector: a lower bound of their signed distance."""
     one = node_at(table, first)[layout.NODE_SOLID]
@@ -455,8 +482,8 @@ def solids_gap(table: DistanceTable, one: int, other: int, one_frame: Frame, oth
     """As ``gap_along``, of two solids."""
     if solid_at(table, one)[SOLID_KIND] == HALF_SPACE or solid_at(table, other)[SOLID_KIND] == HALF_SPACE:
         return LOWEST
-    p = farthest(table, one, one_frame, scaled(way, -1.0))
-    q = farthest(table, other, other_frame, way)
+    p = support(table, one, one_frame, scaled(way, -1.0))
+    q = support(table, other, other_frame, way)
     gap: float = dot(minus(p, q), way) - sizes_at(table, one)[ROUND] - sizes_at(table, other)[ROUND]
     return gap
 
@@ -479,8 +506,9 @@ def compared(
     """
     first = one[layout.NODE_SOLID]
     second = other[layout.NODE_SOLID]
+    asks = one[layout.NODE_KIND] > layout.TRIANGLE or other[layout.NODE_KIND] > layout.TRIANGLE
     state, low, value, way, a, b, single, other_single = solids_compared(
-        table, first, second, one_frame, other_frame, way, limit
+        table, first, second, one_frame, other_frame, way, limit, asks
     )
     exact = is_of_object(one, single) and is_of_object(other, other_single)
     return state, low, value, way, a, b, exact
@@ -488,7 +516,14 @@ def compared(
 
 @inlined
 def solids_compared(
-    table: DistanceTable, first: int, second: int, one_frame: Frame, other_frame: Frame, way: Any, limit: float
+    table: DistanceTable,
+    first: int,
+    second: int,
+    one_frame: Frame,
+    other_frame: Frame,
+    way: Any,
+    limit: float,
+    asks: bool,
 ) -> Any:
     """Compare two convex solids, or one and a half-space; returns as :func:`between`."""
     if solid_at(table, first)[SOLID_KIND] == HALF_SPACE:
@@ -497,7 +532,7 @@ def solids_compared(
     if solid_at(table, second)[SOLID_KIND] == HALF_SPACE:
         value, way, a, b = over_half_space(table, first, second, one_frame, other_frame)
         return APART, value, value, way, a, b, True, True
-    return between(table, first, second, one_frame, other_frame, way, limit)
+    return between(table, first, second, one_frame, other_frame, way, limit, asks)
 
 
 @inlined
@@ -512,7 +547,7 @@ def over_half_space(table: DistanceTable, one: int, plane: int, frame: Frame, pl
     """The height of a solid over a half-space, the direction, and the lowest point with its foot."""
     sizes = sizes_at(table, plane)
     normal = turned(plane_frame, vector_at(sizes, DISC_AXIS))
-    low = farthest(table, one, frame, scaled(normal, -1.0))
+    low = support(table, one, frame, scaled(normal, -1.0))
     low = minus(low, scaled(normal, sizes_at(table, one)[ROUND]))
     height = dot(normal, minus(low, origin_of(plane_frame))) - sizes[DISC]
     return height, normal, low, minus(low, scaled(normal, height))
@@ -520,7 +555,7 @@ def over_half_space(table: DistanceTable, one: int, plane: int, frame: Frame, pl
 
 @kernel
 def between(
-    table: DistanceTable, one: int, other: int, one_frame: Frame, other_frame: Frame, way: Any, limit: float
+    table: DistanceTable, one: int, other: int, one_frame: Frame, other_frame: Frame, way: Any, limit: float, asks: bool
 ) -> Any:
     """GJK on two convex solids, from a first direction on.
 
@@ -534,15 +569,16 @@ def between(
     a = b = c = way  # corners of a triangle in the difference of the solids
     u = v = w = way  # the points of the first solid that made them
     weights = (1.0, 0.0, 0.0)
-    nearest = way
+    nearest = heading = way
+    inverse = 1.0  # of the length of ``heading``; nothing waits for it
     inside = False
     for step in range(MOST_STEPS):
-        x = farthest(table, one, one_frame, scaled(way, -1.0))
-        p = minus(x, farthest(table, other, other_frame, way))
-        height = dot(p, way)
+        x = support(table, one, one_frame, scaled(heading, -1.0))
+        p = minus(x, support(table, other, other_frame, heading))
+        height = dot(p, heading) * inverse
         low = max(low, height)
         if low - around >= limit:
-            return FAR, low - around, limit, way, x, x, False, False
+            return FAR, low - around, limit, scaled(heading, inverse), x, x, False, False
         if length - low <= CONVERGED:
             break
         if step == 0:
@@ -575,13 +611,15 @@ def between(
         if length < SHORTEST:
             inside = True
             break
-        way = scaled(nearest, 1.0 / length)
+        heading = nearest
+        inverse = 1.0 / length
 
+    way = scaled(heading, inverse)
     on_one = mean(weights, u, v, w)
     nearest = mean(weights, a, b, c)
     on_other = minus(on_one, nearest)
-    single = same_points(weights, u, v, w)
-    other_single = same_points(weights, minus(u, a), minus(v, b), minus(w, c))
+    single = asks and same_points(weights, u, v, w)
+    other_single = asks and same_points(weights, minus(u, a), minus(v, b), minus(w, c))
     state = APART
     if inside or (length - low > ACCURATE and low <= 0.0):
         state = OVERLAPPING
@@ -775,9 +813,9 @@ def put_support(
     """Write the point of the difference that is farthest along a vector as a corner of the polytope."""
     length = sqrt(dot(way, way))
     unit = scaled(way, 1.0 / length)
-    x = farthest(table, first, one_frame, unit)
+    x = support(table, first, one_frame, unit)
     row = row_at(table.points, layout.POINT_SIZE, number)
-    put_vector(row, 0, minus(x, farthest(table, second, other_frame, scaled(unit, -1.0))))
+    put_vector(row, 0, minus(x, support(table, second, other_frame, scaled(unit, -1.0))))
     put_vector(row, 3, x)
 
 

@@ -34,6 +34,7 @@ class DistanceTable(CarriedSolids):
     """
 
     nodes: NodeRows
+    spans: Doubles  # of each solid
     element: int  # the solid that stands for what is around a point, while that is compared
     dof: int
     coordinates: Ints  # coordinate of a configuration that moves each joint, -1 for none
@@ -59,6 +60,10 @@ NODE_SOLID, NODE_FIRST, NODE_SECOND, NODE_KIND, NODE_CENTRES, NODE_PART = range(
 # SOLID: a convex leaf. TRIANGLE: of a mesh. HULL: of a whole mesh. AROUND: hull of a part of a mesh. BOX_AROUND: none
 # of its corners need be of the object. POINTS: a leaf of points, with a solid around each.
 SOLID, TRIANGLE, HULL, AROUND, BOX_AROUND, POINTS = range(6)
+
+# Span: whether the core of a solid is a box (or a segment, or a point: edges are 0), its middle, three half edges.
+SPAN_SIZE = 13
+IS_SPAN, SPAN_MIDDLE, SPAN_EDGES = 0, 1, 4
 
 COLUMN_SIZE = 3
 COLUMN_ONE, COLUMN_OTHER, COLUMN_HOLLOW = range(3)

@@ -12,6 +12,7 @@ from rrtik_ompl.base.arrays import Matrix, allocated
 from rrtik_ompl.base.collector import collector_waits
 from rrtik_ompl.base.kept import kept_with
 from rrtik_ompl.geometry.collision.bodies import Body
+from rrtik_ompl.geometry.collision.shape_table import BOX_CORNERS
 from rrtik_ompl.kernels.distances import layout
 from rrtik_ompl.kernels.distances.layout import DistanceTable
 from rrtik_ompl.kernels.distances.trees import Tree, tree_of
@@ -25,6 +26,7 @@ from rrtik_ompl.model.robot import Robot
 
 KERNELS = "distances.kernels"
 
+ROUNDING = 1e-14  # of coordinates
 ROWS_AT_ONCE = 64  # configurations per kernel call, some hundredths of a second
 
 
@@ -115,6 +117,7 @@ class _Packed:
         tree: Its nodes, without the solids.
         kinds, counts: Of each solid its kind and how many blocks of corners it has, shape (k,).
         sizes: Shape (k, SIZE_COUNT).
+        spans: Shape (k, SPAN_SIZE).
         blocks: Shape (blocks, 3, WIDTH).
     """
 
@@ -123,6 +126,7 @@ class _Packed:
     kinds: NDArray[np.int64]
     counts: NDArray[np.int64]
     sizes: Matrix
+    spans: Matrix
     blocks: NDArray[np.float64]
 
 
@@ -135,6 +139,7 @@ def _packed_tree(tree: Tree, joint: int) -> _Packed:
         np.array([KINDS[solid.kind] for solid in solids], dtype=np.int64),
         np.array([block_count(solid.corners) for solid in solids], dtype=np.int64),
         size_rows([(solid,) for solid in solids], np.tile(np.eye(3), (len(solids), 1, 1))),
+        _spans(solids),
         corner_blocks([solid.corners for solid in solids]),
     )
 
@@ -160,7 +165,7 @@ def distance_rows(robot: Robot, objects: Sequence[Sequence[Body]]) -> DistanceRo
         _packed_link(robot, tuple(bodies)) if bodies[0].kind == "link" else _packed_bodies(bodies) for bodies in objects
     ]
     # Behind them is what stands at a point of a cloud, while that is compared.
-    element = _packed_tree(Tree([ConvexSolid(np.zeros((8, 3)))], np.zeros((0, layout.NODE_SIZE), dtype=np.int64)), 0)
+    element = _packed_tree(Tree([ConvexSolid(np.zeros((1, 3)))], np.zeros((0, layout.NODE_SIZE), dtype=np.int64)), 0)
     all_packed = [*(each for each in found if each is not None), element]
     roots: list[int] = []
     nodes = [element.tree.nodes]
@@ -190,6 +195,7 @@ def distance_rows(robot: Robot, objects: Sequence[Sequence[Body]]) -> DistanceRo
         frames=np.zeros((len(chain.parent) + 1) * FRAME_SIZE),
         angles=angle_lanes(len(chain.parent)),
         nodes=np.concatenate(nodes).astype(np.int32),
+        spans=np.concatenate([each.spans for each in all_packed]),
         element=len(records) - 1,
         dof=chain.gain.shape[1],
         coordinates=_coordinates(chain.gain),
@@ -212,3 +218,23 @@ def _coordinates(gain: Matrix) -> NDArray[np.int32]:
     """Return the coordinate that moves each joint, -1 if none does; a joint mimics at most one other."""
     moved = gain != 0.0
     return np.where(moved.any(axis=1), moved.argmax(axis=1), -1).astype(np.int32)
+
+
+def _spans(solids: Sequence[ConvexSolid]) -> Matrix:
+    """Return which solids have a core that is a box, with its middle and half edges, shape (n, SPAN_SIZE)."""
+    spans = np.zeros((len(solids), layout.SPAN_SIZE))
+    counts = np.array([len(solid.corners) for solid in solids])
+    for count, signs in ((1, np.zeros((1, 0))), (2, BOX_CORNERS[:2, 2:]), (8, BOX_CORNERS)):
+        numbers = np.flatnonzero(counts == count)
+        if not len(numbers):
+            continue
+        corners = np.array([solids[k].corners for k in numbers.tolist()])
+        middles = corners.mean(axis=1)
+        halves = np.einsum("ck,ncx->nkx", signs, corners) / count
+        off = np.abs(middles[:, None] + np.einsum("ck,nkx->ncx", signs, halves) - corners).max(axis=(1, 2))
+        own = spans[numbers]
+        own[:, layout.IS_SPAN] = off <= ROUNDING * np.abs(corners).max(axis=(1, 2), initial=1.0)
+        own[:, layout.SPAN_MIDDLE : layout.SPAN_EDGES] = middles
+        own[:, layout.SPAN_EDGES : layout.SPAN_EDGES + halves[0].size] = halves.reshape(len(numbers), -1)
+        spans[numbers] = own
+    return spans
