@@ -20,6 +20,7 @@ from rrtik_ompl.geometry.collision.cloud_solid import cloud_solid
 from rrtik_ompl.kernels import FREE, FastWorld
 from rrtik_ompl.kernels.proof.moving import MovedObstacles
 from rrtik_ompl.kernels.proof.packing import ProofPairs
+from rrtik_ompl.kernels.proof.taken_proof import TakenProof
 from rrtik_ompl.kernels.search.motions.motion_table import FastMotions, motions_of, step_counts
 from rrtik_ompl.model.robot import Robot, inside_limits
 from rrtik_ompl.model.scene import AttachedObject, Obstacle, Scene, pairs_that_may_touch
@@ -247,11 +248,15 @@ class MovingWorld:
 
 
 class MovingProver(Prover):
-    """Prover among obstacles that are moved, at their current poses. Its table is packed once and updated in place."""
+    """Prover among obstacles that are moved, at their current poses. Its table is packed once and updated in place.
+
+    Attributes:
+        obstacles: Those of the table; None as long as there is no table.
+    """
 
     _fixed = False
     _new_inflations: Sequence[float] | None = None
-    _moved: MovedObstacles | None = None
+    obstacles: MovedObstacles | None = None
 
     def place(self, bodies: Sequence[Body], inflations: Sequence[float], *, always_colliding: bool) -> None:
         """Set the poses of the obstacles. The table is updated when the next motion is to be proven, not before.
@@ -265,11 +270,23 @@ class MovingProver(Prover):
         self._new_inflations = inflations
         self.always_colliding = always_colliding
 
+    def elsewhere(self) -> MovingProver:
+        """Return a prover of the same bodies, whose obstacles may be placed independently of those of this one."""
+        packed = super()._packed_for(0.0, 0.0).for_thread(placing=True)
+        other = replace(self, tables=TakenProof(packed), kin=object(), _coal=None)
+        other.obstacles = self._table_obstacles().within(packed)
+        return other
+
+    def _table_obstacles(self) -> MovedObstacles:
+        """Return the obstacles of the table, which is made if there is none."""
+        if self.obstacles is None:
+            self.obstacles = MovedObstacles(super()._packed_for(0.0, 0.0), self.bodies)
+        return self.obstacles
+
     def _packed_for(self, clearance: float, slack: float) -> ProofPairs:
-        if self._moved is None:
-            self._moved = MovedObstacles(super()._packed_for(clearance, slack), self.bodies)
+        obstacles = self._table_obstacles()
         if self._new_inflations is not None:
-            self._moved.put(self.bodies, self._new_inflations)
+            obstacles.put(self.bodies, self._new_inflations)
             self._new_inflations = None
         return super()._packed_for(clearance, slack)
 

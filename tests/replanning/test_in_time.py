@@ -7,16 +7,18 @@ import json
 import numpy as np
 import pinocchio as pin
 import pytest
+from scipy.interpolate import CubicHermiteSpline
 
 import rrtik_ompl as rrtik
 from rrtik_bench.contact_check import check_contacts
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.cli.app import run as run_command
+from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.scene import ConstantVelocity, Obstacle, Scene, TimedPoses
 from rrtik_ompl.model.shapes import Box, HalfSpace, Sphere
 from rrtik_ompl.replanning.in_time import plan_in_time
 from rrtik_ompl.replanning.in_time.foreseen import travel
-from rrtik_ompl.replanning.in_time.pace import Pace, stretch
+from rrtik_ompl.replanning.in_time.pace import Pace, Timing, stretch
 from rrtik_ompl.replanning.in_time.search import TimeTree
 from rrtik_ompl.world.opinion import opinion_on
 from rrtik_ompl.world.world import World
@@ -182,6 +184,19 @@ def test_a_stretch_keeps_its_limits_and_ends_where_it_should(slots):
     steps = np.abs(np.diff(rows, axis=0))
     assert (steps <= pace.change + 1e-9).all()
     assert (np.abs(np.diff(steps, axis=0)) <= pace.rise + 1e-9).all()
+
+
+@pytest.mark.parametrize("short", [0.0, 2e-16, 1e-14, 1e-12, 1e-9, 1e-5, 1e-2])
+def test_knots_are_far_enough_apart_to_have_an_acceleration(short):
+    """A stretch whose acceleration needs all of its slots but a few parts of them has a very short cruise."""
+    pace = Pace(np.array([9.0, 9.0]), np.array([0.5, 0.3]), np.inf)
+    rows = np.array([[0.7, -0.2], [0.7, -0.2] + (1.0 - short) * np.array([4.5, 0.3])])  # 36 square slots
+    timing = Timing(rows, np.array([0, 6]))
+    motion = timing.trajectory(pace, 0.1, JointPath(rows, ("a", "b"), np.zeros(2, dtype=bool), "two"))
+    spline = CubicHermiteSpline(motion.times, motion.positions, motion.velocities)
+    ends = [spline(motion.times[:-1], 2), spline(np.nextafter(motion.times[1:], 0.0), 2)]
+    assert (np.abs(ends) <= np.array([0.5, 0.3]) / 0.1**2 * (1.0 + 1e-6)).all()
+    assert np.abs(motion(0.1 * np.arange(7)).positions - timing.each_slot(pace)).max() < 1e-9
 
 
 def test_no_motion_is_faster_than_the_bound_and_straight_ones_may_be_slower():

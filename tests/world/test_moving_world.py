@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -12,8 +14,8 @@ from rrtik_ompl.geometry.collision.distances import measured
 from rrtik_ompl.kernels import FREE
 from rrtik_ompl.kernels.search.motions.motion_table import step_counts
 from rrtik_ompl.model.scene import Obstacle, Scene
-from rrtik_ompl.model.shapes import Box, HalfSpace, Prism, Sphere
-from rrtik_ompl.world.moving_world import MovingWorld
+from rrtik_ompl.model.shapes import Box, HalfSpace, HeightField, Octree, PointCloud, Prism, Sphere
+from rrtik_ompl.world.moving_world import MovingProver, MovingWorld
 from rrtik_ompl.world.world import World
 from rrtik_tests.moving_plane import box, plane
 
@@ -47,6 +49,46 @@ def test_a_moved_world_answers_as_a_new_one():
         assert (moving.motion_valid_batch(rows, ends) == way).all()
         assert not (here & ~fresh.with_accuracy("conservative").valid_batch(rows)).any()
         assert 0.0 < moving.valid_batch(rows).mean() < 1.0
+
+
+@pytest.mark.kernels
+def test_provers_from_one_table_place_their_obstacles_independently():
+    robot = load_robot("titan4")
+    rng = np.random.default_rng(3)
+    shapes = [*arm_scenes()[1][0].obstacles, *(Obstacle(name, shape) for name, shape in odd_shapes().items())]
+    world = World(robot, Scene([o if isinstance(o.shape, HalfSpace) else replace(o, pose=far(rng)) for o in shapes]))
+    pairs = tuple(pair for pair in world.pairs if any(world.bodies[k].joint for k in pair))
+    first = MovingProver(robot, tuple(world.bodies), pairs)
+    rows = rng.uniform(*robot.finite_range(), (60, robot.dof))
+    ends = np.clip(rows + 0.1 * rng.normal(size=rows.shape), robot.lower, robot.upper)
+
+    placed = []
+    for _ in range(3):
+        poses = {o.name: far(rng) for o in world.scene.obstacles if o.shape.bounded}
+        bodies = [
+            replace(body, placement=poses[body.name] * body.within) if body.name in poses else body
+            for body in world.bodies
+        ]
+        prover, fresh = first.elsewhere(), MovingProver(robot, tuple(world.bodies), pairs)
+        for each in (prover, fresh):
+            each.place(bodies, [0.05] * len(bodies), always_colliding=False)
+        placed.append((prover, fresh.proven(rows, ends)))
+    for prover, answer in placed:
+        assert (prover.proven(rows, ends) == answer).all()
+    assert 0.1 < np.mean([answer for _, answer in placed]) < 0.95
+
+
+def far(rng):
+    return pin.SE3(pin.exp3(rng.normal(size=3)), rng.uniform(-1.3, 1.3, 3))
+
+
+def odd_shapes():
+    rng = np.random.default_rng(5)
+    return {
+        "cloud": PointCloud(rng.uniform(-0.1, 0.1, (40, 3)), 0.02),
+        "octree": Octree(rng.integers(-2, 3, (6, 3)) * 0.1, np.full(6, 0.1)),
+        "field": HeightField(rng.uniform(0.1, 0.3, (3, 3)), cell=0.1, floor=0.0),
+    }
 
 
 def test_free_with_room_means_that_far_away():

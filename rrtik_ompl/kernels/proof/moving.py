@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from itertools import product
 
 import numpy as np
@@ -55,6 +56,12 @@ class MovedObstacles:
         self._pairs: NDArray[np.int64] = np.array(sides, dtype=np.int64).reshape(-1, 2)
         obstacles = np.array([bodies[k].margin for k in self._numbers])
         self._paddings = packed.margins[self._pairs[:, 0]] - obstacles[self._pairs[:, 1]]  # of what moves
+
+    def within(self, packed: ProofPairs) -> MovedObstacles:
+        """Return the same obstacles in a copy of the table, wherever they are there."""
+        other = copy(self)
+        other._packed = packed
+        return other
 
     def put(self, bodies: Sequence[Body], room: Sequence[float]) -> None:
         """Put the obstacles where they are now.

@@ -34,6 +34,7 @@ COMPUTED = (
     *("margins", "frames", "angles", "stamps", "bends", "ways", "way_stamps", "lists", "counts"),
     *("stack", "chords", "chord_stamps", "seen", "log", "log_ways"),
 )
+PLACED = ("sizes", "corners", "still", "clouds", "cloud_poses")  # where solids stand
 
 
 @dataclass(slots=True, eq=False)
@@ -84,14 +85,20 @@ class ProofPairs:
         sizes = self.table.sizes.reshape(-1, layout.SIZE_COUNT)[self.still[blocks], : layout.STILL_SIZE]
         self.table.still.reshape(-1, layout.STILL_SIZE, WIDTH)[blocks] = sizes.transpose(0, 2, 1)
 
-    def for_thread(self) -> ProofPairs:
-        """The same pairs in a table with memory of its own to compute in."""
+    def for_thread(self, *, placing: bool = False) -> ProofPairs:
+        """The same pairs in a table with memory of its own to compute in.
+
+        Args:
+            placing: Whether its obstacles may be put elsewhere than those of this table.
+        """
         own = {name: np.zeros_like(getattr(self.table, name)) for name in COMPUTED}
         if self.clouds:  # points that are compared stand among the solids
             own |= {name: getattr(self.table, name) for name in ("solids", "corners")}
+        if placing:
+            own |= {name: getattr(self.table, name) for name in PLACED}
         table = with_own_arrays(self.table, **own)
         table.log_room = 0  # which the thread of this one may just have given to a log of its own
-        return replace(self, table=table, kept=(float("nan"), ROOM))
+        return replace(self, table=table, margins=self.margins.copy(), kept=(float("nan"), ROOM))
 
     def with_contacts(self, bodies: Sequence[Body]) -> ProofPairs:
         """The same pairs of bodies that are in contact, in the memory of this object.

@@ -17,8 +17,8 @@ class TakenProof:
         packed: The table, None if there is none.
     """
 
-    def __init__(self) -> None:
-        self.packed: ProofPairs | None = None
+    def __init__(self, packed: ProofPairs | None = None) -> None:
+        self.packed = packed
         self._rows: MovedSolids | None = None
         self._moved: tuple[int, ...] = ()  # bodies that stand elsewhere than in the table
         self._lent = False

