@@ -183,11 +183,40 @@ class HeldRegion:
     def curvature(self) -> float:
         """Bound of the second derivative of the orientation's measure for joint speeds whose sum is 1 rad."""
         if self.turning == Turning.RANGES:
-            tolerance = float(self.limits(between=True)[1])
-            pitch = float(np.abs(self.region.bounds[4]).max()) + tolerance
-            # A motion within the bound turns by at most sqrt(8 tolerance / curvature), its pitch by half of that.
-            return _curvature(pitch + np.sqrt(2.0 * tolerance / _curvature(pitch)))
+            return _curvature(self._largest_pitch)
         return {Turning.FREE: 0.0, Turning.AXIS: 1.0, Turning.BALL: 0.25}[self.turning]
+
+    @property
+    def _largest_pitch(self) -> float:
+        """Largest pitch on motions within the bound [rad], for RANGES."""
+        tolerance = float(self.limits(between=True)[1])
+        pitch = float(np.abs(self.region.bounds[4]).max()) + tolerance
+        # A motion within the bound turns by at most sqrt(8 tolerance / curvature), its pitch by half of that.
+        return pitch + float(np.sqrt(2.0 * tolerance / _curvature(pitch)))
+
+    @property
+    def passage(self) -> float:
+        """How far roll or yaw have to turn at least to pass what their ranges leave out of a turn [rad]; for RANGES."""
+        widths = np.diff(self.region.bounds[[3, 5]], axis=1)
+        left_out = TAU - widths[widths < TAU - 1e-9]
+        return float(left_out.min(initial=TAU) - 2.0 * self.limits(between=True)[1])
+
+    def least_parts(self, A: Matrix, B: Matrix) -> Vector:
+        """Return into how many equal parts motions are divided at least, so that none passes a range from end to end.
+
+        As angles on a circle both ends may be in a range, and what is between them out of it.
+
+        Args:
+            A: Start configurations, shape (m, dof).
+            B: End configurations, shape (m, dof).
+
+        Returns:
+            Numbers, more than which are needed, shape (m,).
+        """
+        if self.turning != Turning.RANGES:
+            return np.zeros(len(A))
+        turned = (np.abs((B - A) @ self.robot.chain.gain.T) * self.turns).sum(axis=1)
+        return np.asarray(turned / np.cos(min(self._largest_pitch, STEEPEST_PITCH)) / self.passage)
 
     def outside(self, q: Vector) -> tuple[float, float]:
         """Return by how much a configuration, shape (dof,), exceeds the tolerances: position [m], orientation [rad]."""

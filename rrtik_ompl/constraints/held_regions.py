@@ -131,6 +131,12 @@ def _placed(robot: Robot, scene: Scene, region: TaskRegion, label: str, start: V
             "take less, or leave the angles free"
         )
 
+    if held.turning == Turning.RANGES and held.passage <= 0.0:
+        raise InputError(
+            f"{label}: roll or yaw may be anywhere but in a part of a turn that is no larger than twice the tolerance; "
+            "leave the angle free, or take a narrower range"
+        )
+
     inset = np.minimum(INSET, INSET_SHARE * held.tolerances)
     held = replace(held, inset=np.maximum(inset - held.allowances, 0.0))
     _refuse_too_narrow(held)
@@ -175,7 +181,8 @@ def _keeps(region: HeldRegion, A: Matrix, B: Matrix, ends: NDArray[np.float64]) 
     most = region.limits(between=True) + ROUNDING
     stored: Mask = np.logical_and.reduce(ends <= region.limits() + ROUNDING, axis=(0, 2))
     near: Mask = np.logical_and.reduce(_highest(ends[0], ends[1], deviations) <= most, axis=1)
-    kept = stored & near
+    least_parts = region.least_parts(A, B)
+    kept = stored & near & (least_parts < 1.0)
     open_ = np.flatnonzero(stored & ~kept)
 
     for level in range(1, HALVINGS + 1):
@@ -187,7 +194,7 @@ def _keeps(region: HeldRegion, A: Matrix, B: Matrix, ends: NDArray[np.float64]) 
         measures = region.measures(rows.reshape(-1, A.shape[1])).reshape(len(open_), parts + 1, 2)
         highest = _highest(measures[:, :-1], measures[:, 1:], deviations[open_, None] / parts**2)
         # A motion is kept if all its parts are, and is given up if a node is outside.
-        done = (highest <= most).all(axis=(1, 2))
+        done = (highest <= most).all(axis=(1, 2)) & (least_parts[open_] < parts)
         kept[open_[done]] = True
         open_ = open_[~done & (measures <= most).all(axis=(1, 2))]
 

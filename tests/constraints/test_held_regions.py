@@ -334,3 +334,19 @@ def test_generated_paths_keep_small_tolerances_on_whole_motions_by_pinocchio(nam
     assert seen.proven == seen.found
     assert seen.metres <= 1e-9
     assert seen.degrees <= 1e-9
+
+
+def test_a_motion_does_not_pass_what_a_range_leaves_out_of_a_turn():
+    """Both ends are in the range of yaw, on both sides of what it leaves out at half a turn."""
+    robot = rrtik.load_robot("planar3")
+    bounds = np.outer([1000.0] * 3 + [np.pi, 0.1, np.pi - 0.04], [-1.0, 1.0])
+    held = held_regions(robot, rrtik.Scene(), [rrtik.TaskRegion(np.zeros(3), bounds, orientation_tolerance=0.01)], None)
+    step = np.array([[0.014, 0.014, 0.014]])
+    across = np.full((1, 3), np.pi / 3.0)
+    assert held.held(np.concatenate([across - step, across + step])).all()
+    assert not held.held(across).any()
+    assert not held.motions_held(across - step, across + step).any()
+    assert held.motions_held(across - step, across - 40.0 * step).all()
+    narrow = rrtik.TaskRegion(np.zeros(3), bounds, orientation_tolerance=0.041)
+    with pytest.raises(InputError, match="leave the angle free"):
+        held_regions(robot, rrtik.Scene(), [narrow], None)

@@ -139,7 +139,7 @@ def test_a_timed_motion_that_swings_out_between_its_ends_keeps_nothing(robot):
 
 def test_ranges_are_left_through_a_gap_that_is_narrower_than_a_motion(robot):
     """Both ends are in the range of yaw, on both sides of what it leaves out at half a turn."""
-    world = world_with(robot, ranges((-np.pi + 0.04, np.pi - 0.04), 0.005))
+    world = world_with(robot, ranges((-np.pi + 0.04, np.pi - 0.04), 0.01))
     across = np.array([[np.pi - 0.042], [np.pi + 0.042]])
     along = np.array([[-np.pi + 0.042], [np.pi - 0.042]])
     certificate = world.certificate(along)
