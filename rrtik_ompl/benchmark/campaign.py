@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.errors import InputError, require
 from rrtik_ompl.benchmark import records, run
 from rrtik_ompl.benchmark.suite import Suite
 from rrtik_ompl.many import spread
@@ -66,6 +66,7 @@ def run_campaign(
         >>> rrtik.benchmark.run_campaign(rrtik.benchmark.load_suite("suite.yaml"), Path("runs")).name
         'runs.jsonl'
     """
+    require(suite, Suite, "suite of a campaign", "use load_suite(file)")
     file = folder / records.NAME
     about = machine(jobs, scheduler)
     done = _held(file, suite, about, resume)

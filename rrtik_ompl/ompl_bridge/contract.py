@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable
+from contextlib import suppress
+from inspect import signature
 from itertools import pairwise
 from typing import Any
 
@@ -58,6 +60,11 @@ def check_planner(factory: Factory, *, single_joint_moves: bool = False) -> None
     """
     if not callable(factory):
         raise InputError(f"planner to check: expected a function or class that makes it, got {factory!r}")
+    with suppress(ValueError):  # OMPL's own classes state no signature
+        try:
+            signature(factory).bind(None, seed=7)
+        except TypeError as error:
+            raise InputError(f"planner to check: it is called as factory(si, seed=7): {error}") from None
 
     clauses = (*CONTRACT, moves_one_joint_at_a_time) if single_joint_moves else CONTRACT
     for clause in clauses:
