@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from rrtik_ompl import constraints as constraints
     from rrtik_ompl import demos as demos
     from rrtik_ompl import following as following
+    from rrtik_ompl import gym as gym
     from rrtik_ompl import ik as ik
     from rrtik_ompl import ompl as ompl
     from rrtik_ompl import replanning as replanning
@@ -198,6 +199,7 @@ else:
             "constraints",
             "demos",
             "following",
+            "gym",
             "ik",
             "ompl",
             "replanning",

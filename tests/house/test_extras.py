@@ -2,12 +2,14 @@
 
 import re
 import sys
+from importlib import import_module
+from unittest.mock import patch
 
 import pytest
 
 from rrtik_ompl import load_motions, load_robot
 from rrtik_ompl.base.errors import InputError
-from rrtik_ompl.base.floors import FLOORS
+from rrtik_ompl.base.floors import FLOORS, DependencyError
 from rrtik_ompl.demos.formats import check_format
 from rrtik_ompl.many.spread import cluster
 from rrtik_ompl.motion.trajectory.text import write_mcap
@@ -37,9 +39,17 @@ def xacro(folder):
     load_robot(folder / "arm.urdf.xacro")
 
 
+def gym(folder):
+    with patch.dict(sys.modules):
+        for name in [name for name in sys.modules if name.startswith("rrtik_ompl.gym")]:
+            del sys.modules[name]
+        import_module("rrtik_ompl.gym")
+
+
 NEEDED_BY = {
     "mcap": lambda folder: write_mcap(folder / "a.mcap", "robot", ["a"], []),
     "distributed": lambda folder: next(cluster([], "tcp://nowhere:1")),
+    "gymnasium": gym,
     "h5py": lambda folder: check_format("hdf5", 30.0),
     "mujoco": mjcf,
     "pyarrow": lambda folder: check_format("lerobot", 30.0),
@@ -66,10 +76,16 @@ def test_an_extra_that_is_missing_is_named_with_its_command(package, tmp_path, m
     for known in [name for name in sys.modules if name.startswith(f"{package}.")]:
         monkeypatch.delitem(sys.modules, known)  # or a part that another test has imported is found
     monkeypatch.setitem(sys.modules, package, None)
-    with pytest.raises(InputError, match=r"^[^\n]*pip install [^\n]*$") as caught:
+    with pytest.raises((InputError, DependencyError), match=r"^[^\n]*pip install [^\n]*$") as caught:
         NEEDED_BY[package](tmp_path)
     named = re.findall(r"pip install '?([\w\[\]-]+)", str(caught.value))
-    assert named in ([package], [f"rrtik-ompl[{package}]"], ["rrtik-ompl[cluster]"], ["rrtik-ompl[data]"])
+    assert named in (
+        [package],
+        [f"rrtik-ompl[{package}]"],
+        ["rrtik-ompl[cluster]"],
+        ["rrtik-ompl[data]"],
+        ["rrtik-ompl[gym]"],
+    )
 
 
 @pytest.mark.parametrize("folder", ["rrtik_ompl", "planners", "robots", "bench", "docs", "examples"])
