@@ -164,15 +164,17 @@ def _boxes_of_points(points: Matrix) -> NDArray[np.float64]:
 
 def convexified(geometry: coal.CollisionGeometry) -> coal.CollisionGeometry:
     """Return the convex hull of a mesh that is convex (see ``DEEPEST_DENT``), and any other geometry unchanged."""
-    if not fills_its_hull(geometry):
-        return geometry
+    return around(geometry) if fills_its_hull(geometry) and _is_convex(geometry) else geometry
 
+
+@once_per_geometry
+def _is_convex(geometry: coal.CollisionGeometry) -> bool:
+    """Check whether a mesh that nearly fills its convex hull has no dent either."""
     vertices, triangles = mesh_arrays(geometry)
     hull_solid = around(geometry)
-
     if len(triangles) * hull_solid.num_polygons > MOST_COMPARED:
-        return geometry
-    return geometry if _has_dent(vertices, triangles, hull_solid) else hull_solid
+        return False
+    return not _has_dent(vertices, triangles, hull_solid)
 
 
 def fills_its_hull(geometry: coal.CollisionGeometry) -> bool:
