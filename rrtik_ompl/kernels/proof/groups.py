@@ -12,8 +12,6 @@ from typing import TypeAlias
 
 import numpy as np
 
-from rrtik_ompl.geometry.collision.bodies import Body
-from rrtik_ompl.kernels.layout import CONVEX_SOLID
 from rrtik_ompl.kernels.tables.solid_tables import ConvexSolid
 from rrtik_ompl.kernels.tables.z_order import z_order
 
@@ -26,12 +24,12 @@ Parts: TypeAlias = Sequence[Sequence[ConvexSolid]]
 
 
 def compared_as_one(
-    bodies: Sequence[Body],
-    parts: Parts,
+    joints: Sequence[int],
+    paddings: Sequence[float],
+    convex: Sequence[bool],
     pairs: Sequence[tuple[int, int]],
     common: Callable[[int, int], int],
-    *,
-    fixed: bool,
+    blocks: Callable[[Sequence[int]], Levels] | None,
 ) -> list[tuple[Members, Levels]]:
     """Bodies of one joint with one padding, each with blocks of bodies that none of them may touch.
 
@@ -39,26 +37,26 @@ def compared_as_one(
     beside many obstacles only.
 
     Args:
-        bodies: All bodies.
-        parts: The solids of each.
+        joints: The joint that carries each body.
+        paddings: The padding of each.
+        convex: Whether all solids of each are convex.
         pairs: Those that must not touch.
         common: The last joint that carries both of two.
-        fixed: Whether obstacles stay where they are; of many, neighbours are blocks then, otherwise each is one.
+        blocks: Makes blocks of neighbours among many obstacles (``MANY``); None where each is one.
     """
     movers: dict[tuple[int, float, int], list[int]] = {}
-    convex = [all(solid.kind == CONVEX_SOLID for solid in own) for own in parts]
     for i, j in pairs:
-        base = common(bodies[i].joint, bodies[j].joint)
-        mover, still = (i, j) if base == bodies[j].joint else (j, i)
-        if base == bodies[still].joint != bodies[mover].joint and convex[mover] and convex[still]:
-            movers.setdefault((bodies[mover].joint, bodies[mover].padding, still), []).append(mover)
+        base = common(joints[i], joints[j])
+        mover, still = (i, j) if base == joints[j] else (j, i)
+        if base == joints[still] != joints[mover] and convex[mover] and convex[still]:
+            movers.setdefault((joints[mover], paddings[mover], still), []).append(mover)
     beside: dict[tuple[Members, int], list[int]] = {}
     for (_, _, still), members in movers.items():
-        beside.setdefault((tuple(members), bodies[still].joint), []).append(still)
+        beside.setdefault((tuple(members), joints[still]), []).append(still)
     made = list[tuple[Members, Levels]]()
     for (together, base), stills in beside.items():
-        if fixed and base == 0 and len(stills) >= MANY:
-            made.append((together, _blocks(parts, stills)))
+        if blocks is not None and base == 0 and len(stills) >= MANY:
+            made.append((together, blocks(stills)))
         elif len(together) > 1:
             made.append((together, [[(still,) for still in stills]]))
     return made
@@ -107,7 +105,7 @@ def group_rows(
     return rows, together, top
 
 
-def _blocks(parts: Parts, stills: Sequence[int]) -> Levels:
+def neighbours(parts: Parts, stills: Sequence[int]) -> Levels:
     """Neighbours in space, up to BLOCK of them at a time, and neighbours among these blocks."""
     order = z_order(np.array([parts[k][0].corners.mean(axis=0) for k in stills])).tolist()
     levels = [_joined([(stills[k],) for k in order])]

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, partial
+from functools import cache, lru_cache, partial
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -16,8 +16,9 @@ from rrtik_ompl.base.collector import collector_waits
 from rrtik_ompl.geometry.collision.bodies import Body
 from rrtik_ompl.geometry.collision.body_arrays import body_arrays
 from rrtik_ompl.geometry.collision.cloud_solid import CloudSolid
+from rrtik_ompl.kernels.layout import CONVEX_SOLID
 from rrtik_ompl.kernels.proof import layout
-from rrtik_ompl.kernels.proof.groups import Members, compared_as_one, group_rows
+from rrtik_ompl.kernels.proof.groups import MANY, Levels, Members, compared_as_one, group_rows, neighbours
 from rrtik_ompl.kernels.proof.layout import CLOUD, HALF_SPACE, NODES, UNKNOWN, WHOLE_BODY, ProofTable
 from rrtik_ompl.kernels.proof.placed import PlacedBodies, bodies_in_place
 from rrtik_ompl.kernels.simd.processor import WIDTH
@@ -28,6 +29,7 @@ from rrtik_ompl.kernels.tables.neighbour_tables import Cells, neighbour_table
 from rrtik_ompl.kernels.tables.solid_tables import Solids
 from rrtik_ompl.model.robot import Chain
 
+LISTED = 64  # lists of pairs that are kept: numbers of a robot, and of what it holds and what stands around it
 SHORTEST_RUN = 4  # pairs that are compared in lanes
 ROOM = 1e-8  # [m] for rounding: float64 misplaces points of an arm of 30 joints and 100 m by less than a tenth of it
 COMPUTED = (
@@ -292,14 +294,49 @@ def _listed_pairs(
     fixed: bool,
 ) -> _ListedPairs:
     """The pairs of bodies, of their parts, and of groups of bodies; arguments as of :func:`proof_pairs`."""
-    joints = [body.joint for body in bodies]
+    joints = tuple(body.joint for body in bodies)
     parts = placed.parts
-    firsts = placed.firsts
-    common = cache(partial(common_frame, chain))
-    moving = [(i, j) for i, j in pairs if joints[i] or joints[j]]
+    what = _Listing(
+        tuple(chain.parent.tolist()),
+        joints,
+        tuple(body.padding for body in bodies),
+        tuple(all(solid.kind == CONVEX_SOLID for solid in own) for own in parts),
+        tuple(map(len, parts)),
+        tuple(placed.firsts),
+        tuple((i, j) for i, j in pairs if joints[i] or joints[j]),
+    )
+    blocks = partial(neighbours, parts) if fixed and joints.count(0) >= MANY else None
+    return _listed(what) if blocks is None else _list(what, blocks)
+
+
+class _Listing(NamedTuple):
+    """What pairs are listed from, mere numbers, one for each body; ``parents`` of the joints."""
+
+    parents: tuple[int, ...]
+    joints: tuple[int, ...]
+    paddings: tuple[float, ...]
+    convex: tuple[bool, ...]
+    counts: tuple[int, ...]
+    firsts: tuple[int, ...]
+    moving: tuple[tuple[int, int], ...]
+
+
+@lru_cache(maxsize=LISTED)
+def _listed(what: _Listing) -> _ListedPairs:
+    """The pairs of a scene with few obstacles: the same wherever these are, and whatever they measure."""
+    return _list(what, None)
+
+
+def _list(what: _Listing, blocks: Callable[[Sequence[int]], Levels] | None) -> _ListedPairs:
+    """The pairs; ``blocks`` as of :func:`compared_as_one`."""
+    joints = what.joints
+    counts_of = what.counts
+    firsts = what.firsts
+    moving = what.moving
+    common = cache(partial(_common, what.parents))
 
     # those that groups are made of come first
-    groups = compared_as_one(bodies, parts, moving, common, fixed=fixed)
+    groups = compared_as_one(joints, what.paddings, what.convex, moving, common, blocks)
     grouped = {(k, s): None for members, (blocks, *_) in groups for block in blocks for k in members for s in block}
     others = [pair for pair in moving if pair not in grouped and pair[::-1] not in grouped]
     others = [(i, j) if common(joints[i], joints[j]) == joints[j] else (j, i) for i, j in others]
@@ -311,11 +348,11 @@ def _listed_pairs(
     for one, other in [*grouped, *sorted(others)]:  # what stands still, seen from there, is below
         base = common(joints[one], joints[other])
         own = [sweeps.setdefault(((k,), base), len(sweeps)) if joints[k] != base else -1 for k in (one, other)]
-        counts = [len(parts[k]) for k in (one, other)]
+        counts = [counts_of[k] for k in (one, other)]
         end = begin
         if max(counts) > 1:
             end += counts[0] * counts[1]
-            several.append((*(firsts[k + 1] - len(parts[k]) for k in (one, other)), base, *own, one, other, *counts))
+            several.append((*(firsts[k + 1] - counts_of[k] for k in (one, other)), base, *own, one, other, *counts))
         numbers = [-1 if count > 1 else 0 for count in counts]
         whole.append((firsts[one], firsts[other], base, *own, begin, end, one, numbers[0], other, numbers[1]))
         begin = end
@@ -440,8 +477,13 @@ def _runs(
 
 def common_frame(chain: Chain, first: int, second: int) -> int:
     """The last frame that carries both of two frames."""
+    return _common(chain.parent, first, second)
+
+
+def _common(parents: Sequence[int] | NDArray[np.int64], first: int, second: int) -> int:
+    """The last frame that carries both of two frames, by the parents of the joints."""
     while first != second:  # parents have smaller numbers
-        first, second = min(first, second), int(chain.parent[max(first, second) - 1]) + 1
+        first, second = min(first, second), int(parents[max(first, second) - 1]) + 1
     return first
 
 

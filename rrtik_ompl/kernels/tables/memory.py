@@ -51,10 +51,14 @@ def _placed(array: NDArray[Any]) -> tuple[NDArray[Any], int]:
 
 
 def is_intact(array: NDArray[Any]) -> bool:
-    """Whether the guard words around an array that :func:`aligned` has made are as they were."""
+    """Whether the guard words around an array that :func:`aligned` or :func:`table` has made are as they were."""
     memory: Any = array.base
     start = int(array.ctypes.data) - int(memory.ctypes.data)
-    return bool((memory[:start] == GUARD).all() and (memory[start + array.nbytes :] == GUARD).all())
+    end = start + array.nbytes
+    is_alone = memory.nbytes == array.nbytes + 3 * ALIGNMENT
+    first = 0 if is_alone else start - ALIGNMENT
+    following = memory.nbytes if is_alone else end + ALIGNMENT + -array.nbytes % ALIGNMENT
+    return bool((memory[first:start] == GUARD).all() and (memory[end:following] == GUARD).all())
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -81,10 +85,29 @@ def table(fields: Mapping[int, int | NDArray[Any]]) -> Table:
 
     Arrays are copied, flat, begin on a multiple of ``ALIGNMENT`` bytes and stay where they are as long as it lives.
     """
-    placed = {place: _placed(value) for place, value in fields.items() if isinstance(value, np.ndarray)}
-    header = [placed[place][1] if place in placed else fields[place] for place in range(len(fields))]
-    arrays = {place: array for place, (array, _) in placed.items()}
-    return Table(aligned(np.array(header, dtype=np.int64)), arrays)
+    given = {place: value for place, value in fields.items() if isinstance(value, np.ndarray)}
+    header = np.array([0 if place in given else fields[place] for place in range(len(fields))], dtype=np.int64)
+    values = [*given.values(), header]
+
+    # All of them lie in one piece, with guard words around each.
+    memory = np.empty(sum(value.nbytes + 2 * ALIGNMENT for value in values) + 2 * ALIGNMENT, dtype=np.uint8)
+    begin = int(memory.ctypes.data)
+    start = ALIGNMENT + -begin % ALIGNMENT
+    memory[:start] = GUARD
+    copies: list[NDArray[Any]] = []
+    addresses = []
+    for value in values:
+        end = start + value.nbytes
+        following = end + ALIGNMENT + -value.nbytes % ALIGNMENT
+        memory[end:following] = GUARD
+        copy: NDArray[Any] = np.ndarray(value.size, value.dtype, memory, start)
+        copy[:] = value.ravel()
+        copies.append(copy)
+        addresses.append(begin + start)
+        start = following
+
+    copies[-1][list(given)] = addresses[:-1]
+    return Table(copies[-1], dict(zip(given, copies[:-1], strict=True)))
 
 
 def packed(kind: type[R], **fields: Any) -> R:

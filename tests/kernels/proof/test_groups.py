@@ -11,6 +11,34 @@ from rrtik_ompl.world.world import World
 pytestmark = pytest.mark.kernels
 
 
+@pytest.fixture(autouse=True)
+def forgotten():
+    yield
+    packing._listed.cache_clear()
+
+
+def without_groups(monkeypatch):
+    monkeypatch.setattr(packing, "compared_as_one", lambda *_: [])
+    packing._listed.cache_clear()
+
+
+def test_pairs_that_are_listed_once_are_those_of_another_scene_with_as_many_things():
+    robot = load_robot("panda")
+    scenes = [
+        rrtik.Scene([rrtik.Obstacle("thing", rrtik.Box(size, 0.1, 0.1), [0.6, 0.3, height])])
+        for size, height in ((0.1, 0.2), (0.3, 0.5))
+    ]
+    World(robot, scenes[0]).prover._packed_for(0.0, 0.0)
+    hits = packing._listed.cache_info().hits
+    known = World(robot, scenes[1]).prover._packed_for(0.0, 0.0)
+    assert packing._listed.cache_info().hits > hits
+    packing._listed.cache_clear()
+    anew = World(robot, rrtik.Scene(scenes[1].obstacles)).prover._packed_for(0.0, 0.0)
+    assert known is not anew
+    for name in ("pairs", "sizes", "solids", "sweeps", "reaches", "top_pairs"):
+        np.testing.assert_array_equal(getattr(known.table, name), getattr(anew.table, name))
+
+
 @pytest.mark.parametrize("name", ["panda", "ur5_gripper"])
 def test_a_gripper_that_is_compared_as_one_is_apart_from_links_where_its_parts_are(name, monkeypatch):
     robot = load_robot(name)
@@ -23,7 +51,7 @@ def test_a_gripper_that_is_compared_as_one_is_apart_from_links_where_its_parts_a
     several = pairs[:, layout.PAIR_ONE] >= table.firsts[-1]  # their solids come last
     assert (pairs[several, layout.PAIR_BASE] > 0).any()
     proven = together.motions_proven(starts, ends)
-    monkeypatch.setattr(packing, "compared_as_one", lambda *_, **__: [])
+    without_groups(monkeypatch)
     alone = World(robot)
     assert not alone.prover._packed_for(0.0, 0.0).groups
     np.testing.assert_array_equal(proven, alone.motions_proven(starts, ends))
@@ -54,7 +82,7 @@ def test_a_block_of_which_one_body_needs_no_clearance_keeps_that_of_the_others(s
     rows = np.random.default_rng(1).uniform(*robot.finite_range(), (3000, robot.dof))
     together = World(robot, scene())
     proven = together.motions_proven(rows, rows, clearance=0.08)
-    monkeypatch.setattr(packing, "compared_as_one", lambda *_, **__: [])
+    without_groups(monkeypatch)
     alone = World(robot, scene())
     assert not alone.prover._packed_for(0.0, 0.0).groups
     np.testing.assert_array_equal(proven, alone.motions_proven(rows, rows, clearance=0.08))
