@@ -148,6 +148,23 @@ def test_the_calls_of_maniskill_move_the_tip_along_screws(planner):
         q = np.concatenate([result["position"][-1], START[7:]]).astype(np.float32)
 
 
+def test_a_screw_to_a_goal_a_little_out_of_reach_ends_where_it_is_nearest_and_says_so(planner):
+    goal = np.array([0.7924, -0.1346, 0.1234, *DOWN])  # where ManiSkill's PullCubeTool-v1 sends the hand, seed 6
+    start = np.array([-0.1388, 0.5532, 0.06, -1.3128, -0.0322, 1.8556, 0.7066, 0.0231, 0.0231])
+    with pytest.warns(
+        PoseWarning, match=r"plan_screw: the goal is out of reach: the motion ends 3\.5 mm and 0\.14 deg"
+    ):
+        result = planner.plan_screw(goal, start, time_step=0.05)
+    assert_timed(result, planner, 0.05)
+    assert result["proven"]
+    off = placement(goal, "").actInv(hand_at(result["position"][-1])[0])
+    assert np.linalg.norm(off.translation) == pytest.approx(3.5e-3, abs=5e-5)
+    assert np.linalg.norm(pin.log3(off.rotation)) == pytest.approx(np.radians(0.14), abs=1e-4)
+    assert planner.IK(goal, start)[0] == "IK Failed! Cannot find valid solution."
+    goal[0] += 0.02
+    assert planner.plan_screw(goal, start)["status"] == "screw plan failed"
+
+
 def test_the_names_of_arguments_of_both_versions_are_taken(planner):
     first = planner.plan_screw(target_pose=GOAL, qpos=START)
     second = planner.plan_screw(goal_pose=mplib.Pose(GOAL), current_qpos=START[:7])

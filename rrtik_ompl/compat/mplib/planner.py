@@ -16,7 +16,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from rrtik_ompl.base.arrays import Matrix, Vector, number_rows, positive
-from rrtik_ompl.base.errors import CloudWarning, InputError, ProblemError, few
+from rrtik_ompl.base.errors import CloudWarning, InputError, PoseWarning, ProblemError, few
 from rrtik_ompl.compat.joints import Joints, joints_of
 from rrtik_ompl.compat.mplib.fcl import parts_of
 from rrtik_ompl.compat.mplib.pose import Pose, placement, swapped
@@ -30,6 +30,7 @@ from rrtik_ompl.compat.mplib.views import (
 )
 from rrtik_ompl.files.kinds import FilePath
 from rrtik_ompl.files.text import file_name
+from rrtik_ompl.ik.numeric.descent import descend
 from rrtik_ompl.ik.solve import solve_ik
 from rrtik_ompl.model.goal import PoseGoal
 from rrtik_ompl.model.path import JointPath
@@ -53,6 +54,9 @@ SCREW_DEVIATION = 5e-4  # [m] of the tip from the screw
 SCREW_TURN = 5e-3  # [rad]
 BLEND = 0.1  # [rad or m] how far before a corner of a path its rounding may begin
 SCREW_BLEND = 0.1  # [rad or m]
+SHORT = 0.015  # [m] of a goal out of reach, at which a screw may end where it is nearest; MPlib's end as far from goals
+SHORT_TURN = 0.05  # [rad]
+LAST = 0.25  # [rad or m] that a joint moves at most to get there
 NEAR = 0.1  # [rad or m] two solutions of inverse kinematics that are nearer count as one
 FIRST_SECONDS = 0.05  # [s] after which it is asked whether a goal pose can be reached at all
 MOST_WORLDS = 8  # worlds of one scene that are kept: one for each posture of the fingers
@@ -726,6 +730,9 @@ class Planner:
             wrt_world: Whether the goal is in the world.
             qpos_step, verbose: Without effect; the move group leaves the screw by at most 0.5 mm and 5 mrad, before
                 corners of the path are rounded.
+
+        A goal that is out of reach by 15 mm and 0.05 rad at most is approached as far as the arm comes, beside the end
+        of the screw: "reason" says how near that is, and a `PoseWarning` does.
         """
         del qpos_step, verbose
         start = self._start(qpos if current_qpos is None else current_qpos, True)
@@ -743,7 +750,12 @@ class Planner:
             found = farthest(world, way, begin[None])
         path = path_of(world, found)
         if path is None or found.fraction < 1.0:
-            return _failed(NO_SCREW, f"after {100.0 * found.fraction:.3g} % of the way: {found.reason}")
+            nearest = None if path is None else _to_nearest(path, world, goal)
+            if nearest is None:
+                return _failed(NO_SCREW, f"after {100.0 * found.fraction:.3g} % of the way: {found.reason}")
+            path, reason = nearest
+            warnings.warn(f"plan_screw: {reason}", PoseWarning, stacklevel=2)
+            return {**self._timed(path, world, time_step, SCREW_BLEND, True), "reason": reason}
         return self._timed(path, world, time_step, SCREW_BLEND, True)
 
     def TOPP(self, path: ArrayLike, step: float = 0.1, verbose: bool = False) -> tuple[Any, ...]:
@@ -907,6 +919,24 @@ def _success(
         "duration": duration,
         "proven": proven is True,
     }
+
+
+def _to_nearest(path: JointPath, world: World, goal: pin.SE3) -> tuple[JointPath, str] | None:
+    """Lead a path whose goal is out of reach on to where the tip is nearest to it; None if that is far, or not free.
+
+    Returns:
+        The path, and in words how near it ends.
+    """
+    arm = world.robot
+    end = descend(arm, PoseGoal(goal), path.end[None])[0][0]
+    error = arm.fk(end).actInv(goal)
+    shift = float(np.linalg.norm(error.translation))
+    turn = float(np.linalg.norm(pin.log3(error.rotation)))
+    step = float(np.abs(end - path.end).max())
+    if shift > SHORT or turn > SHORT_TURN or step > LAST or not world.motion_proven(path.end, end):
+        return None
+    told = f"the goal is out of reach: the motion ends {1e3 * shift:.2g} mm and {np.degrees(turn):.2g} deg from it"
+    return JointPath.of(arm, np.vstack([path.waypoints, end])), told
 
 
 def _failed(status: str, reason: str) -> Result:
