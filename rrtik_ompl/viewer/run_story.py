@@ -7,17 +7,16 @@ from itertools import groupby
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from rrtik_ompl.base.arrays import Matrix, Vector
-from rrtik_ompl.base.poses import pose_row
 from rrtik_ompl.model.robot import Robot
-from rrtik_ompl.model.scene import Obstacle, Scene
+from rrtik_ompl.model.scene import Scene
 from rrtik_ompl.replanning.record import ReplanRun
 from rrtik_ompl.replanning.tick import Tick
 from rrtik_ompl.viewer.drawing.framing import Frame
 from rrtik_ompl.viewer.drawing.robot_picture import node_name
 from rrtik_ompl.viewer.drawing.scene_picture import obstacle_look
+from rrtik_ompl.viewer.run_actors import Actor, actors_of
 from rrtik_ompl.viewer.task_story import TASK
 
 MAX_POINTS = 40  # points of the trail of a path
@@ -28,11 +27,11 @@ DIGITS = 5
 def run_story(run: ReplanRun, robot: Robot, scene: Scene, frame: Frame) -> dict[str, Any]:
     """Return the part of the page's data that describes a run."""
     lines, numbers = _lines(run, robot)
-    moved = sorted({name for tick in run.ticks for name in tick.poses})
+    actors = [each for each in actors_of(run, scene) if each.acts]
     return {
         "groups": _motions(run.ticks) if run.planner == TASK else _groups(run.ticks),
         "outcome": run.outcome + (f": {run.reason}" if run.reason else ""),
-        "moving": {node_name(name): _places(scene.obstacle(name), run, frame) for name in moved},
+        "moving": {node_name(each.drawn.name): _places(each, frame) for each in actors},
         "lines": lines,
         "line": numbers,
         "replaced": _replaced(run, numbers),
@@ -62,23 +61,14 @@ def _groups(ticks: Iterable[Tick]) -> list[dict[str, Any]]:
     return found
 
 
-def _places(obstacle: Obstacle, run: ReplanRun, frame: Frame) -> dict[str, Any]:
-    """Return the placement of an obstacle's geometry in its own frame, and the pose of that frame in each tick."""
-    _, own = obstacle_look(obstacle, frame)
-    poses = [pose_row(place) for place in _stated(obstacle.name, run)] or [
-        tick.poses.get(obstacle.name, pose_row(obstacle.pose)) for tick in run.ticks
-    ]
-    return {"placement": own.ravel().tolist(), "poses": np.round(poses, DIGITS).tolist()}
-
-
-def _stated(name: str, run: ReplanRun) -> list[pin.SE3]:
-    """Return the pose of an obstacle in each tick by its own motion; an empty list if the run's scene states none."""
-    if not run.scenes or not run.scenes[0].stated:
-        return []
-    obstacle = run.scenes[0].scene.obstacle(name)
-    if obstacle.motion is None:
-        return []
-    return [obstacle.motion.pose_at(obstacle.pose, tick.time) for tick in run.ticks]
+def _places(actor: Actor, frame: Frame) -> dict[str, Any]:
+    """Return the placement of an obstacle's geometry in its own frame, the pose of that frame, and if it is there."""
+    _, own = obstacle_look(actor.drawn, frame)
+    return {
+        "placement": own.ravel().tolist(),
+        "poses": np.round(actor.poses, DIGITS).tolist(),
+        "shown": None if actor.shown.all() else actor.shown.tolist(),
+    }
 
 
 def _lines(run: ReplanRun, robot: Robot) -> tuple[list[list[list[float]]], list[int]]:

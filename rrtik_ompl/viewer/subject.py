@@ -20,6 +20,7 @@ from rrtik_ompl.model.scene import Scene
 from rrtik_ompl.motion.trajectory import Trajectory
 from rrtik_ompl.replanning.record import ReplanRun
 from rrtik_ompl.viewer.drawing.marks import Mark
+from rrtik_ompl.viewer.run_actors import actors_of
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
 
@@ -266,18 +267,17 @@ def _path(robot: Robot, path: ShownPath) -> JointPath:
 
 
 def subject_of_run(problem: Showable, run: ReplanRun) -> Subject:
-    """Return the subject of a run: the robot in every tick, and the obstacles where they are in the first one.
+    """Return the subject of a run: the robot in every tick, and every obstacle where it was first.
 
     Raises:
         InputError: If it is no run, or not one of that problem's robot.
     """
     subject = replayed(problem, run)
-    scene = run.scenes[0].scene if run.scenes else subject.scene  # a feed may begin with another scene than the problem
-
-    still = tuple(replace(o, motion=None) for o in scene.at(0.0).obstacles)
-    for name in {obstacle.name for obstacle in still}.union(*(tick.poses for tick in run.ticks)):
-        subject.scene.obstacle(name)  # raises if the run belongs to another problem
-    scene = replace(subject.scene, obstacles=still)
+    drawn = Scene([each.drawn for each in actors_of(run, subject.scene)])
+    for name in set[str]().union(*(tick.poses for tick in run.ticks)):
+        drawn.obstacle(name)  # raises if the run belongs to another problem
+    still = tuple(replace(o, motion=None) for o in drawn.at(0.0).obstacles)
+    scene = Scene(still, subject.scene.attached)
 
     judged = run.judged(problem if isinstance(problem, Problem) else None)
     return replace(subject, scene=scene, verdict=judged.verdict, contacts=judged.contacts)

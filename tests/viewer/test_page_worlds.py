@@ -114,7 +114,7 @@ class Page:
             moving = (self.story["run"] or {"moving": {}})["moving"].get(node_name(name))
             if moving is None:
                 found.append(recorded[at])
-            else:
+            elif moving["shown"] is None or moving["shown"][tick]:
                 found.append(_matrix(moving["poses"][tick]) @ np.reshape(moving["placement"], (4, 4)))
         for node, frame in zip(self.story["robot"]["nodes"], self.frames[tick], strict=True):
             path = f"/meshcat/robot/{node}/held{node_name(name)}"
@@ -234,6 +234,37 @@ def test_a_run_shows_obstacles_where_they_were_seen(arm: rrtik.Robot, source: st
         for item in problem.world.scene.attached:
             (drawn,) = page.drawn(item.name, number)
             np.testing.assert_allclose(drawn, (arm.fk(tick.q, item.link) * item.pose).homogeneous, atol=1e-5)
+
+
+def faulty(time: float) -> rrtik.Scene:
+    """The ball of a feed goes away for good, a box comes, another one changes its shape and its name."""
+    here, there = rrtik.pose([0.0, -1.5 - time, 0.5]), rrtik.pose([0.0, 1.5, 0.5])
+    seen = [rrtik.Obstacle("ball", rrtik.Sphere(0.05), here)] if time < 0.3 else []
+    seen += [rrtik.Obstacle("late", rrtik.Box([0.2, 0.2, 0.2]), here)] if time > 0.4 else []
+    shape = rrtik.Sphere(0.1) if time < 0.6 else rrtik.Box([0.1, 0.2, 0.3])
+    return rrtik.Scene([*seen, rrtik.Obstacle("thing" if time < 0.8 else "renamed", shape, there)])
+
+
+def test_a_run_shows_what_comes_goes_and_changes_as_its_record_has_it(arm: rrtik.Robot) -> None:
+    problem = rrtik.Problem(rrtik.World(arm, faulty(0.0)), [0.0, 0.0], A)
+    run = rrtik.replan(
+        problem, ((0.05 * k, faulty(0.05 * k)) for k in range(40)), step=0.02, rate=20.0, seconds=1.5, seed=1,
+        feed_patience=0.5,
+    )  # fmt: skip
+    page = Page.of(subject_of_run(problem, run))
+    drawn_names = {entry["name"] for entry in page.story["obstacles"]}
+    assert drawn_names == {"ball", "late", "thing", "thing (2)", "thing (before)", "renamed"}
+    kinds = set()
+    for number, tick in enumerate(run.ticks):
+        known = next(seen.scene for seen in reversed(run.scenes) if seen.time <= tick.time + 1e-9)
+        kinds.add(tuple(o.name for o in known.obstacles))
+        places = {name: page.drawn(name, number) for name in drawn_names}
+        assert sum(map(len, places.values())) == len(known.obstacles)
+        for o in known.obstacles:
+            name = "thing (2)" if o.name == "thing" and isinstance(o.shape, rrtik.Box) else o.name
+            (drawn,) = places[name]
+            np.testing.assert_allclose(drawn, o.pose.homogeneous, atol=2e-5)
+    assert len(kinds) > 2, "something came, and something went"
 
 
 def test_a_run_in_time_shows_obstacles_where_they_are_then(arm: rrtik.Robot) -> None:

@@ -41,8 +41,9 @@ function showFingers(tick, share) {
 }
 
 function showRun(time, tick, share) {
-  for (const [name, { placement, poses }] of Object.entries(run.moving)) {
+  for (const [name, { placement, poses, shown }] of Object.entries(run.moving)) {
     const group = node("obstacles", name);
+    if (shown) group.visible = shown[tick];
     const pose = poseBetween(poses, tick + share).multiply(rowMajor(placement));
     pose.decompose(group.position, group.quaternion, group.scale);
   }
