@@ -27,6 +27,7 @@ VERSION = "v3.0"
 FOLDER = "lerobot"
 CHUNK = 1000  # files of a folder, at most
 FILE_MB = 100  # size of a file, about
+TOGETHER = 1000  # rows of episodes that are written at once
 MEGABYTE = 2**20
 FILE = "chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
 STATE = "observation.state"
@@ -153,11 +154,14 @@ class _Writer:
     def _write_episodes(self, rows: list[dict[str, Any]], statistics: list[Statistics]) -> None:
         """Write what is said of each demonstration, and its statistics."""
         files = _Files(self.root / "meta" / "episodes")
+        whole = []
+        for row, found in zip(rows, statistics, strict=True):
+            own = {f"stats/{name}/{what}": value.tolist() for name, each in found.items()
+                   for what, value in each.items()}  # fmt: skip
+            whole.append({**row, **own})
         try:
-            for row, found in zip(rows, statistics, strict=True):
-                own = {f"stats/{name}/{what}": value.tolist() for name, each in found.items()
-                       for what, value in each.items()}  # fmt: skip
-                files.write_row({**row, **own})
+            for first in range(0, len(whole), TOGETHER):
+                files.write_rows(whole[first : first + TOGETHER])
         finally:
             files.close()
 
@@ -212,24 +216,31 @@ class _Files:
 
     def write(self, table: pa.Table) -> tuple[int, int]:
         """Append rows, in a new file if the present one is full, and return their place."""
-        if self._writer is not None and self._bytes + table.nbytes > FILE_MB * MEGABYTE:
-            self.close()
-            self._number += 1
+        chunk, file = self._place_for(table)
         if self._writer is None:
-            chunk, file = self.place
             path = self._root / FILE.format(chunk_index=chunk, file_index=file)
             path.parent.mkdir(parents=True, exist_ok=True)
             self._writer = pq.ParquetWriter(path, table.schema)
             self._bytes = 0
         self._writer.write_table(table)
         self._bytes += table.nbytes
-        return self.place
+        return chunk, file
 
-    def write_row(self, row: dict[str, Any]) -> None:
-        """Append a row that names its own place."""
-        chunk, file = self.place
-        own = {"meta/episodes/chunk_index": chunk, "meta/episodes/file_index": file}
-        self.write(pa.Table.from_pylist([{**row, **own}]))
+    def write_rows(self, rows: list[dict[str, Any]]) -> None:
+        """Append rows that name their own place."""
+        names = ("meta/episodes/chunk_index", "meta/episodes/file_index")
+        table = pa.Table.from_pylist([{**row, **dict.fromkeys(names, 0)} for row in rows])
+        for name, number in zip(names, self._place_for(table), strict=True):
+            column = pa.array(np.full(len(rows), number))
+            table = table.set_column(table.schema.get_field_index(name), name, column)
+        self.write(table)
+
+    def _place_for(self, table: pa.Table) -> tuple[int, int]:
+        """Return the place of rows that are to be appended; if the present file is full, that of the next one."""
+        if self._writer is not None and self._bytes + table.nbytes > FILE_MB * MEGABYTE:
+            self.close()
+            self._number += 1
+        return self.place
 
     def close(self) -> None:
         """Complete the present file."""
