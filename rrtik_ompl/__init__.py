@@ -67,6 +67,7 @@ if TYPE_CHECKING:
     from rrtik_ompl.motion.trajectory import RateLimits as RateLimits
     from rrtik_ompl.motion.trajectory import Trajectory as Trajectory
     from rrtik_ompl.motion.trajectory import time_parameterize as time_parameterize
+    from rrtik_ompl.motion.trajectory import time_parameterize_many as time_parameterize_many
     from rrtik_ompl.ompl_bridge.planner_names import list_planners as list_planners
     from rrtik_ompl.planning.moves.staircase import one_joint_moves as one_joint_moves
     from rrtik_ompl.planning.outcome import Plan as Plan
@@ -168,6 +169,7 @@ else:
             "RateLimits",
             "Trajectory",
             "time_parameterize",
+            "time_parameterize_many",
         ),
         "replanning.replanner": ("replan",),
         "tasks": (

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
+
 from numpy.typing import ArrayLike
 
 from rrtik_ompl.base.arrays import Matrix, bounded_array, not_negative
-from rrtik_ompl.base.errors import InputError, require
+from rrtik_ompl.base.errors import InputError, listed, require
+from rrtik_ompl.kernels.threads import in_threads
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.robot import Robot, require_joints
 from rrtik_ompl.motion.trajectory.blending import blended, fault_finder, joined, seconds_with_stops, stops_at_corners
@@ -25,6 +28,7 @@ __all__ = [
     "State",
     "Trajectory",
     "time_parameterize",
+    "time_parameterize_many",
 ]
 
 
@@ -116,6 +120,65 @@ def time_parameterize(
 
     rounded = _rounded(path, corners, bounds, reach, world, clearance, more) if reach > 0.0 else None
     return joined(stops_at_corners(corners, bounds, more), path, bounds) if rounded is None else rounded
+
+
+def time_parameterize_many(
+    paths: Iterable[JointPath],
+    limits: RateLimits | Robot,
+    *,
+    blend: float = 0.0,
+    world: World | Sequence[World] | None = None,
+    clearance: float | None = None,
+    tip_speed: float | None = None,
+    tip_acceleration: float | None = None,
+    torque: ArrayLike | bool | None = None,
+    payload: float = 0.0,
+    threads: int | None = None,
+) -> list[Trajectory]:
+    """Compute the trajectories along many paths, each as :func:`time_parameterize` computes it, to the bit.
+
+    Kernels of several threads run side by side; what is computed in Python takes turns.
+
+    Args:
+        paths: The paths.
+        limits: As there, for all of them.
+        blend: As there.
+        world: As there, for all of them, or one for each path.
+        clearance: As there.
+        tip_speed: As there.
+        tip_acceleration: As there.
+        torque: As there.
+        payload: As there.
+        threads: Number of paths at a time; None for the number of cores.
+
+    Returns:
+        One trajectory for each path, in their order.
+
+    Raises:
+        InputError: As there, with the number of the path; if there is not one world for each path.
+
+    Example:
+        >>> world = rrtik.load_problem("planar3_boxes").world
+        >>> plans = rrtik.plan_many(world, np.zeros(3), [[0.3, 0.0, 0.2], [0.0, 0.2, 0.1]])
+        >>> motions = rrtik.time_parameterize_many([plan.path for plan in plans], rrtik.RateLimits(1.0, 2.0, 20.0))
+        >>> [round(motion.duration, 2) for motion in motions]
+        [0.88, 0.74]
+    """
+    listed_paths = listed(paths, "paths to time")
+    worlds = [world] * len(listed_paths) if isinstance(world, World | None) else listed(world, "worlds of paths")
+    if len(worlds) != len(listed_paths):
+        raise InputError(f"worlds of paths: expected one for each of {len(listed_paths)}, or one, got {len(worlds)}")
+
+    def timed(number: int) -> Trajectory:
+        try:
+            return time_parameterize(
+                listed_paths[number], limits, blend=blend, world=worlds[number], clearance=clearance,
+                tip_speed=tip_speed, tip_acceleration=tip_acceleration, torque=torque, payload=payload,
+            )  # fmt: skip
+        except InputError as error:
+            raise InputError(f"paths[{number}]: {error}") from None
+
+    return in_threads(timed, range(len(listed_paths)), threads)
 
 
 def _rounded(

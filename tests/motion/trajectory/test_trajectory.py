@@ -8,6 +8,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+import rrtik_ompl as rrtik
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.model.path import JointPath
@@ -337,3 +338,32 @@ def test_the_limits_of_a_robot_are_taken_and_the_rest_is_a_documented_default():
             RateLimits.of(planar, share=share)
     with pytest.raises(InputError, match="planar3"):
         RateLimits.of(planar, velocity=[1.0, 1.0])
+
+
+@pytest.mark.kernels
+@pytest.mark.parametrize("blend", [0.0, 0.2])
+def test_many_paths_are_timed_to_the_bit_as_each_alone(blend):
+    world = rrtik.load_problem("planar3_boxes").world
+    starts = np.random.default_rng(0).uniform(-1.0, 1.0, (40, 3))
+    starts = starts[world.valid_batch(starts)]
+    paths = [plan.path for plan in rrtik.plan_many(world, starts[:-1], starts[1:]) if plan.found][:8]
+    limits = rrtik.RateLimits(1.0, 2.0, 20.0)
+    alone = [rrtik.time_parameterize(path, limits, blend=blend, world=world) for path in paths]
+    for threads in (1, 3):
+        many = rrtik.time_parameterize_many(paths, limits, blend=blend, world=world, threads=threads)
+        for one, other in zip(alone, many, strict=True):
+            for name in ("times", "positions", "velocities", "accelerations"):
+                np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
+
+
+def test_many_paths_name_the_one_that_cannot_be_timed():
+    path = rrtik.JointPath([[0.0, 0.0], [1.0, 0.0]])
+    still = rrtik.JointPath([[0.0, 0.0]])
+    limits = rrtik.RateLimits(1.0, 2.0, 20.0)
+    assert rrtik.time_parameterize_many([], limits) == []
+    with pytest.raises(InputError, match=r"^paths\[1\]: path to time: it has one waypoint"):
+        rrtik.time_parameterize_many([path, still], limits)
+    with pytest.raises(InputError, match="expected one for each of 2, or one, got 1"):
+        rrtik.time_parameterize_many([path, path], limits, blend=0.1, world=[None])
+    with pytest.raises(InputError, match="threads"):
+        rrtik.time_parameterize_many([path, path], limits, threads=0)
