@@ -109,9 +109,14 @@ def test_a_browser_finds_each_obstacle_where_it_stands(crane: rrtik.Robot, tmp_p
     })"""
     with planning_page(text, tmp_path, "document.documentElement.dataset.ready") as browser:
         found = browser.ask(f"JSON.stringify({look})")
+        browser.ask('(setLabels("obstacle", true), node("obstacles", story.obstacles[1].node).visible = false, 1)')
+        hidden = """(placeLabels(), JSON.stringify(labels.filter((each) => each.kind === "obstacle").map(
+          (each) => each.element.hidden)))"""
+        without_name = json.loads(browser.ask(hidden))
         hand = browser.ask('node("robot", robot.nodes.at(-1)).children.filter((c) => c.name.startsWith("held")).length')
     expected = [[o.name, 1, *o.pose.translation[:2].round(9)] for o in scene.obstacles]
     for one, other in zip(json.loads(found), expected, strict=True):
         assert one[:2] == other[:2]
         assert one[2:] == pytest.approx(other[2:], abs=1e-6)
+    assert without_name == [k == 1 for k in range(len(expected))], "what is not shown has no name"
     assert hand == 2

@@ -206,8 +206,9 @@ function buildLegend() {
 
 function labelObstacles() {
   for (const obstacle of story.obstacles) {
-    const box = new THREE.Box3().setFromObject(node("obstacles", obstacle.node)).getCenter(new THREE.Vector3());
-    addLabel(obstacle.name, "obstacle", { x: box.x, y: -box.z, z: box.y });
+    const thing = node("obstacles", obstacle.node);
+    const box = new THREE.Box3().setFromObject(thing).getCenter(new THREE.Vector3());
+    addLabel(obstacle.name, "obstacle", { x: box.x, y: -box.z, z: box.y }, thing);
   }
 }
 

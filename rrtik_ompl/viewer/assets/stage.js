@@ -141,12 +141,15 @@ function highlightPiece(piece) {
 // Labels: HTML over the picture, moved along whenever it is drawn ----------------------------------------------------
 const labels = [];
 
-function addLabel(text, kind, position) {
+const worldPlace = (thing) => thing.getWorldPosition(new THREE.Vector3());
+
+/** A label at a place, which goes with a thing if one is given, and is hidden with it. */
+function addLabel(text, kind, position, thing = null) {
   const element = document.createElement("span");
   element.textContent = text;
   element.className = kind;
   document.getElementById("labels").append(element);
-  labels.push({ element, kind, position: new THREE.Vector3(position.x, position.z, -position.y), on: true });
+  labels.push({ element, kind, position: new THREE.Vector3(position.x, position.z, -position.y), on: true, thing, from: thing && worldPlace(thing) });
 }
 
 function dropLabels(...kinds) {
@@ -164,8 +167,10 @@ function setLabels(kind, on) {
 function placeLabels() {
   const taken = [];
   for (const label of labels) {
-    const place = label.position.clone().project(viewer.camera);
-    label.element.hidden = !label.on || Math.abs(place.z) > 1;
+    const { thing } = label;
+    const way = thing ? worldPlace(thing).sub(label.from) : new THREE.Vector3();
+    const place = label.position.clone().add(way).project(viewer.camera);
+    label.element.hidden = !label.on || Math.abs(place.z) > 1 || thing?.visible === false;
     if (label.element.hidden) continue;
     label.wide ??= label.element.offsetWidth;
     label.tall ??= label.element.offsetHeight;
