@@ -795,7 +795,12 @@ class Motions:
         """Check whether a mesh contains a connected part of another body, whose pose in its frame is given."""
         mesh = self.trees[outer]
         other = self.trees[inner]
-        points = other.elements.points @ turn.T + shift
+        points = other.elements.points
+        if other.elements.key != "mesh":  # of clouds, those in parts whose balls come near the mesh's box
+            centres = other.centres @ turn.T + shift
+            gap = np.maximum(0.0, np.maximum(mesh.low[0] - centres, centres - mesh.high[0]))
+            points = points[other.elements_of_leaves(np.linalg.norm(gap, axis=1) <= other.radii)]
+        points = points @ turn.T + shift
         inside = ((points >= mesh.low[0]) & (points <= mesh.high[0])).all(axis=(1, 2))
         corners = mesh.elements.points
         if other.elements.key == "mesh":

@@ -106,6 +106,11 @@ class Parts:
         """Which nodes have no element, shape (nodes,)."""
         return np.asarray(self.spans[:, 0] == self.spans[:, 1])
 
+    def elements_of_leaves(self, chosen: Mask) -> NDArray[np.int64]:
+        """Return the numbers of the elements of the leaves among some nodes, shape (nodes,)."""
+        leaves = self.spans[chosen & (self.children[:, 0] < 0)].tolist()
+        return np.concatenate([self.order[:0], *(self.order[begin:end] for begin, end in leaves)])
+
     def support(self, node: int, directions: Matrix) -> Vector:
         """Return the support function [m] of a node at unit vectors in the shape's frame, (n, 3) -> (n,)."""
         begin, end = self.spans[node].tolist()
