@@ -14,7 +14,7 @@ from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.geometry.collision.bodies import Body
 from rrtik_ompl.geometry.collision.cloud_solid import cloud_gap, has_cloud, nearest_of_cloud
 from rrtik_ompl.model.robot import Robot
-from rrtik_ompl.model.scene import Scene, pose_at
+from rrtik_ompl.model.scene import Obstacle, Scene, TimedPoses, pose_at
 from rrtik_ompl.model.shapes import same_shape
 from rrtik_ompl.replanning.feed import Feed
 from rrtik_ompl.replanning.record import ReplanRun
@@ -78,7 +78,7 @@ def check_contacts(
 def _poses(source: Scene | Feed, times: list[float]) -> dict[str, NDArray[np.float64]]:
     """Where each obstacle is at the times, shape (m, 4, 4)."""
     if isinstance(source, Scene):
-        return {o.name: np.array([pose_at(o, time).homogeneous for time in times]) for o in source.obstacles}
+        return {o.name: _course(o, np.array(times)) for o in source.obstacles}
 
     scenes = [source(time) for time in times]
     names = [o.name for o in scenes[0].obstacles]
@@ -87,6 +87,24 @@ def _poses(source: Scene | Feed, times: list[float]) -> dict[str, NDArray[np.flo
         if any(not same_shape(scene.obstacle(name).shape, shape) for scene in scenes):
             raise InputError(f"check of contacts: '{name}' has other points later; check such a run tick by tick")
     return {name: np.array([scene.obstacle(name).pose.homogeneous for scene in scenes]) for name in names}
+
+
+def _course(obstacle: Obstacle, times: Vector) -> NDArray[np.float64]:
+    """Where an obstacle is at times, shape (m,), by its motion, shape (m, 4, 4)."""
+    motion = obstacle.motion
+    if not isinstance(motion, TimedPoses) or len(motion.times) < 2:
+        return np.array([pose_at(obstacle, time).homogeneous for time in times.tolist()])
+    stations = np.array([pose.homogeneous for pose in motion.poses])
+    if (stations[:, :3, :3] != stations[0, :3, :3]).any():
+        return np.array([pose_at(obstacle, time).homogeneous for time in times.tolist()])
+
+    # One that does not turn is moved at once.
+    after = np.clip(np.searchsorted(motion.times, times, side="right"), 1, len(stations) - 1)
+    shares = (times - motion.times[after - 1]) / (motion.times[after] - motion.times[after - 1])
+    shares = np.clip(shares, 0.0, 1.0)[:, None]
+    poses = np.repeat(stations[:1], len(times), axis=0)
+    poses[:, :3, 3] = (1.0 - shares) * stations[after - 1, :3, 3] + shares * stations[after, :3, 3]
+    return poses
 
 
 def _gaps(

@@ -83,6 +83,7 @@ class Loop:
         robot = problem.robot
         self._memory = SceneMemory(patience, settings.speed_bound)
         self._warned_faults = set[FaultKind]()
+        self._now = 0.0  # begin of the tick [s]
         self._snapshot = self._read_feed(0.0)
         scene = self._snapshot.scene
         refuse_endless_turns(scene)
@@ -144,6 +145,7 @@ class Loop:
         copies = PREDICTED_PLACES if self._settings.lookahead_ticks else 1
         self._world = MovingWorld(first_world, copies=copies)
         self._world_of_obstacles = MovingWorld(first_world, self_collision=False)
+        self._moved_ahead = np.nan, 0  # the time [s] and the ticks ahead that this world was moved for
         empty_scene = Scene((), scene.attached, held_pairs(scene))
         self._world_of_arm = first_world.with_accuracy("conservative").with_scene(empty_scene)
         # With a bound on the speed of obstacles, motions are chosen that nothing can reach in time.
@@ -659,6 +661,9 @@ class Loop:
 
         Obstacles whose motion cannot be predicted are inflated by the distance that they may travel until then.
         """
+        if self._moved_ahead == (self._now, ticks):
+            return self._world_of_obstacles
+        self._moved_ahead = self._now, ticks
         seconds = ticks * self._settings.tick
         scene_now = self._world.scene
         scene = self._tracker.later(scene_now, seconds) if ticks else scene_now

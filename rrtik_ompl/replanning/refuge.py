@@ -34,6 +34,7 @@ UNIT_SHARE = 0.3
 LONGEST_UNIT = 0.1  # [s]
 NEEDED = 5.0  # A step along the path is made if with it there is a motion that is safe for so many units.
 RATED = (1.0, 2.0, 3.0, 4.0, 6.0)  # when ways out are rated by where obstacles are predicted to be [units]
+SOON = 3.0  # Refuges have most room then [units]; it is one of the times above, whose world is there already.
 ENOUGH = 1.0  # Of ways out that are safe for so many units the prediction decides.
 DIRECTIONS = 64  # random directions in which refuges are looked for
 LENGTHS = (0.25, 1.0, 2.0, 4.0)  # how far away, in units at full speed
@@ -174,7 +175,8 @@ class Guard:
             ahead: Returns the world predicted so many ticks ahead, without self-collision. It may move and return the
                 same object each time.
         """
-        soon = ahead(round(3 * self._unit))
+        soon_ticks = round(SOON * self._unit)
+        soon = ahead(soon_ticks)
         ways = self._ways(q, np.vstack([q, self._targets(q, path, soon)]), self._looks)
         if path is not None and len(path) > 1:
             ways = np.concatenate([ways, self._along(path, self._looks)[None]])
@@ -183,7 +185,7 @@ class Guard:
             return Refuge(q, float(seconds[0]), moves=False)
 
         room = np.full(len(ways), np.inf)
-        for ticks in dict.fromkeys((1, *(round(self._unit * units) for units in RATED))):
+        for ticks in dict.fromkeys((soon_ticks, 1, *(round(self._unit * units) for units in RATED))):
             room = np.minimum(room, ahead(ticks).clearance(ways[:, self._look_at(ticks)]))
         ends = ways[:, self._look_at(1)]
         if seconds.max() < self._tick - SPARE:
