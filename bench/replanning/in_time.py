@@ -335,6 +335,7 @@ def main(
     parts: Parts,
     *,
     plans: Annotated[int, Option(help="Plans that are judged.", min=1)] = PLANS,
+    seeded: Annotated[int, Option(help="Problems that are planned with several seeds.")] = MANY_SEEDS,
 ) -> Report:
     """Measure."""
     report = run.report("Plans in time among what moves")
@@ -367,14 +368,8 @@ def main(
     report.table("Arrivals", ["robot", *head], [*rows, _row("all", drawn)])
     report.table("Where the straight way at full speed", *_straight(found))
 
-    times = np.array(parts(arrivals, [(number,) for number in range(MANY_SEEDS)]))
-    times = times[np.isfinite(times).all(axis=1)]
-    spread = times.max(axis=1) - times.min(axis=1)
-    same, worst = int((spread < ROUNDING).sum()), float(spread.max(initial=0.0))
-    text = (
-        f"{same} of {len(times)} problems: all {SEEDS} seeds arrive at the same time; worst difference {worst:.1f} s."
-    )
-    report.note("Seeds", text)
+    if seeded:
+        report.note("Seeds", _spread(np.array(parts(arrivals, [(number,) for number in range(seeded)]))))
 
     ends = [o.ends_near for o in found if o.ends_near is not None]
     kinds = Counter(kind for o in found for kind in o.kinds)
@@ -413,6 +408,16 @@ def _straight(found: list[Outcome]) -> tuple[list[str], list[list[str]]]:
         rows.append([what, str(len(some)), f"{np.mean(some < ROUNDING):.0%}", f"{np.median(some):.1f}",
                      f"{np.percentile(some, 95):.1f}"])  # fmt: skip
     return ["the judge says", "plans", "at the bound", "over the bound: median", "95 % [s]"], rows
+
+
+def _spread(times: Matrix) -> str:
+    """How much the arrivals of the seeds of problems differ, shape (problems, seeds)."""
+    times = times[np.isfinite(times).all(axis=1)]
+    spread = times.max(axis=1) - times.min(axis=1)
+    same, worst = int((spread < ROUNDING).sum()), float(spread.max(initial=0.0))
+    return (
+        f"{same} of {len(times)} problems: all {SEEDS} seeds arrive at the same time; worst difference {worst:.1f} s."
+    )
 
 
 def _short(reason: str) -> str:
