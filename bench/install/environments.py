@@ -2,11 +2,13 @@
 
 The table goes to docs/install.md. Packages without wheels, such as those that LeRobot needs, are built for their
 metadata, so that a run takes some ten minutes the first time. ``--real FOLDER`` also makes an environment of some GB,
-with LeRobot and ManiSkill, and plans in it.
+with LeRobot and ManiSkill, and plans in it. There, or by ``--lerobot PYTHON`` in an environment that has it, LeRobot
+reads demonstrations that were written for it; ``--no-resolve`` leaves the rest out.
 """
 
 from __future__ import annotations
 
+import json
 import re
 import subprocess
 import sys
@@ -25,6 +27,7 @@ from bench.shared.run import Run
 from rrtik_bench.report.machine import package_version
 from rrtik_bench.report.page import Report
 from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.demos import record
 
 PYTHONS = ("3.10", "3.11", "3.12", "3.13", "3.14")
 PLATFORM = "x86_64-manylinux_2_39"
@@ -51,6 +54,11 @@ BEGIN, END = "<!-- python -m bench environments -->\n", "<!-- end -->\n"
 # OpenCV comes under two names with the same files, of which an environment must hold the same version.
 REAL = ("lerobot", "mani_skill", "opencv-python<4.14", "opencv-python-headless<4.14")
 REAL_PYTHON = "3.12"
+
+DEMOS = ("panda_pick_place", "so101_pick_place")
+COUNT = 10  # demonstrations of each
+EQUAL = 1e-5  # share of a column's range to which statistics are equal, in single precision
+BINS = 2 / 5000  # the same of quantiles: two of the bins in which LeRobot counts
 
 
 def beside(toolkit: str, python: str, wheel: Path) -> tuple[str, Answer | None]:
@@ -113,20 +121,47 @@ def plan_beside(wheel: Path, folder: Path) -> str:
     return subprocess.run(plan, cwd=folder, check=True, capture_output=True, text=True).stdout
 
 
+def read_by_lerobot(page: Report, python: str, folder: Path) -> None:
+    """Write demonstrations of both tasks as datasets, and have LeRobot read them and compute their statistics anew."""
+    rows = []
+    equal = True
+    for task in DEMOS:
+        made = record(task, COUNT, folder / task, format="lerobot", jobs=1)
+        script = [python, str(Path(__file__).with_name("read_lerobot.py")), str(made.dataset)]
+        answer = subprocess.run(script, cwd=folder, check=True, capture_output=True, text=True).stdout
+        said = json.loads(answer.splitlines()[-1])
+        quantiles = max(share for word, share in said["differences"].items() if word.startswith("q"))
+        others = max(share for word, share in said["differences"].items() if not word.startswith("q"))
+        equal &= said["episodes"] == COUNT and others <= EQUAL and quantiles <= BINS
+        shapes = ", ".join(f"{name} {shape}" for name, shape in said["batch"].items())
+        rows.append([f"`{task}`", said["version"], str(said["episodes"]), str(said["frames"]), shapes,
+                     f"{others:.1e}", f"{quantiles:.1e}"])  # fmt: skip
+    page.bar("datasets read by LeRobot's loader, statistics as its writer computes them", "equal", str(equal), equal)
+    header = ("task", "LeRobot", "episodes", "frames", "a batch", "statistics", "quantiles")
+    text = "The last two: largest difference, as a share of a column's range. LeRobot counts quantiles in 5,000 bins."
+    page.table("Read by LeRobot", header, rows, text=text)
+
+
 def main(
     run: Run,
     *,
     wheel: Annotated[Path | None, Option(help="One that was built already.")] = None,
     real: Annotated[Path | None, Option(help="Make an environment here, and plan in it.")] = None,
+    lerobot: Annotated[str | None, Option(help="Python that has LeRobot, which reads demonstrations.")] = None,
+    resolve: Annotated[bool, Option(help="Ask uv for all toolkits.")] = True,
 ) -> Report:
     """Ask, and with ``--real`` install."""
     if find_spec("uv") is None:
         raise InputError("environments: uv is not installed here; pip install uv")
     report = run.report("The wheel beside other toolkits", "resolved")
     with tempfile.TemporaryDirectory() as folder:
-        made = (wheel or built_wheel(Path(folder))).resolve()
+        made = (wheel or built_wheel(Path(folder))).resolve() if resolve or real is not None else Path()
         if real is not None:
             said = plan_beside(made, real.resolve())
             report.note("LeRobot and ManiSkill installed", f"`rrtik plan panda_shelf --seed 1`:\n\n```\n{said}```")
-        fill(report, made)
+            lerobot = lerobot or str(real.resolve() / "bin" / "python")
+        if lerobot is not None:
+            read_by_lerobot(report, lerobot, Path(folder))
+        if resolve:
+            fill(report, made)
     return report

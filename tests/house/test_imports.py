@@ -28,6 +28,7 @@ PEERS = {
     "pydrake",
     "genesis",
     "torch",
+    "lerobot",
     "pyroboplan",
     "roboticstoolbox",
 }  # measured where they are installed
