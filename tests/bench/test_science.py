@@ -118,6 +118,22 @@ def test_the_paper_counts_the_verdicts_of_the_round_that_is_stored():
     assert told[0] == sum(told[1:])
 
 
+def test_the_paper_tells_of_plans_in_time_what_the_stored_round_has():
+    stored = (ROOT / "bench" / "reports" / "reproduce_full.md").read_text(encoding="utf-8")
+    paper = (ROOT / "docs" / "science" / "paper.md").read_text(encoding="utf-8").partition("### 5.4")[2]
+    told = " ".join(paper.partition("### 5.5")[0].split())
+    scenes = {"at 0.5 m/s": "{} of the time among 20 fast obstacles", "up to 0.2 m/s": "{} among slow ones",
+              "six triangles": "{} among the triangles", "two pockets": "{} between the pockets"}  # fmt: skip
+    for scene, words in scenes.items():
+        ours, theirs = re.search(rf"{scene}: time of arrival .*\| ([\d.]+) s beside ([\d.]+) s \|", stored).groups()
+        assert words.format(f"{float(ours) / float(theirs):.2f}") in told
+    counts = re.findall(r"planned in time, proven \| not in the print \| (\d+) of (\d+), every move proven", stored)
+    found, asked = np.array(counts, dtype=int).sum(axis=0)
+    assert f"{'all of ' if found == asked else f'{found} of '}{asked} plans found" in told
+    judged_plans = (ROOT / "bench" / "reports" / "in_time.md").read_text(encoding="utf-8")
+    assert f"{re.search(r'times of ([0-9,]+) plans', judged_plans)[1]} further plans" in told
+
+
 def test_a_table_that_says_who_set_its_bars_says_so_on_its_page():
     table = next(each for each in COLLECTION.tables if each.name == "ikurt-limits")
     row = judged("a", "b", "c", 0.0, exactly(0, 1))
