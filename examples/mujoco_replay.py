@@ -1,5 +1,6 @@
 """Play a proven pick and place in MuJoCo by position servos, and see what touches: pip install mujoco."""
 
+# pyright: reportAttributeAccessIssue=false
 import mujoco
 import numpy as np
 
@@ -19,9 +20,8 @@ option = f'<option timestep="{STEP}" integrator="implicitfast" cone="elliptic" i
 urdf = (panda / "urdf/panda.urdf").read_text().replace("</robot>", f"<mujoco>{compiler}{option}</mujoco></robot>")
 spec = mujoco.MjSpec.from_string(urdf)
 for joint in spec.joints:
-    stiffness = 20000.0 if "finger" in joint.name else 8000.0
-    servo = spec.add_actuator(target=joint.name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
-    servo.set_to_position(kp=stiffness, kv=DAMPING * stiffness)
+    kp = 20000.0 if "finger" in joint.name else 8000.0
+    spec.add_actuator(target=joint.name, trntype=mujoco.mjtTrn.mjTRN_JOINT).set_to_position(kp=kp, kv=DAMPING * kp)
 for link in spec.bodies:
     link.gravcomp = 1.0  # as an arm's own controller does
 for thing in plan.worlds[0].scene.obstacles:

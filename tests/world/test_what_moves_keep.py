@@ -110,7 +110,7 @@ STILL = {  # take a world or a problem, and make no motion
     "prove",
     *("view", "plot_joints"),
     *("GoalSampler", "simple_setup", "space_information", "solve_ik", "solve_ik_many", "solve_trajectory"),
-    "grasps",
+    *("grasps", "Reach", "time_parameterize_many"),
     *(
         "Problem",
         "World",
