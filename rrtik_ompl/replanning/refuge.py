@@ -148,14 +148,20 @@ class Guard:
         looks = self._looks[self._looks <= NEEDED * self._unit]
         step = q + np.minimum(looks, 1.0)[:, None] * (after - q)
         seconds = float(self._safe_seconds(step[None], looks)[0, 0])  # It may stand where the step ends.
-        if seconds >= self.needed - SPARE or seconds < self._tick - SPARE:
-            return seconds, seconds >= self.needed - SPARE
+        if seconds >= self.needed - SPARE:
+            return seconds, True
+        proven = 0.0
+        if seconds < self._tick - SPARE:
+            # The bounds between looks are coarse: beside an obstacle that stays, planes may still prove the step.
+            if not self._out_of_reach(q, after[None], self._keep)[0]:
+                return seconds, False
+            proven = 1.0
 
         further = np.maximum(looks - 1.0, 0.0)
         ways = self._ways(after, self._targets(after, path), further)
         ways = np.concatenate([ways, self._along(path, further)[None]])
         ways = np.where((looks <= 1.0)[None, :, None], step[None], ways)
-        kept_seconds = self._safe_seconds(ways, looks)[:, 0]
+        kept_seconds = self._safe_seconds(ways, looks, proven)[:, 0]
         seconds = float(kept_seconds.max())
         ticks = 1.0 + float(ticks_of(np.diff(path, axis=0), self._step, self._max_change).sum())
         arrival = float(np.ceil(ticks - SPARE)) * self._tick
@@ -200,7 +206,7 @@ class Guard:
                 return Refuge(ends[k], float(seconds[k]), moves=True)
         return Refuge(q, float(seconds[0]), moves=False)
 
-    def _safe_seconds(self, ways: Ways, looks: Vector) -> Matrix:
+    def _safe_seconds(self, ways: Ways, looks: Vector, proven: float = 0.0) -> Matrix:
         """Return how long motions keep the distance ``keep``, and how long they touch nothing [s], shape (m, 2).
 
         Both are at most the time of the last look.
@@ -208,6 +214,7 @@ class Guard:
         Args:
             ways: Configurations at the looks, between which the joints go straight, shape (m, k, n).
             looks: Times in ticks, increasing from 0, shape (k,).
+            proven: Until then the motions are known to keep ``keep`` [ticks].
         """
         count, _, joints = ways.shape
         travels = np.abs(np.diff(ways, axis=1)) @ self._world.weights
@@ -218,13 +225,14 @@ class Guard:
                 room = world.clearance(ways.reshape(-1, joints)).reshape(count, -1)
                 growth = self._speed * self._tick * looks if moving else np.zeros_like(looks)
                 for k, keep in enumerate((self._keep, 0.0)):
-                    safe[:, :-1, k] &= kept(room, travels, keep + growth)
+                    safe[:, :-1, k] &= kept(room, travels, keep + growth) | (looks[1:] <= proven)
         return np.asarray(self._tick * looks[safe.argmin(axis=1)])
 
-    def _out_of_reach(self, q: Vector, ends: Matrix) -> Mask:
+    def _out_of_reach(self, q: Vector, ends: Matrix, keep: float = 0.0) -> Mask:
         """Return which motions of one tick from ``q`` to ends, shape (m, n), are proven safe by planes, shape (m,).
 
-        It is exact where :meth:`_safe_seconds` has only bounds of distances, and takes longer.
+        They keep the distance ``keep`` [m] from what obstacles can reach. It is exact where :meth:`_safe_seconds` has
+        only bounds of distances, and takes longer.
         """
         free = np.ones(len(ends), dtype=bool)
         for before, after in pairwise(np.linspace(0.0, 1.0, PIECES + 1).tolist()):
@@ -232,7 +240,7 @@ class Guard:
                 if world is not None and free.any():
                     growth = self._speed * self._tick * after if moving else 0.0
                     edges = ends[free] - q
-                    proven = world.motions_proven(q + before * edges, q + after * edges, less=-growth)
+                    proven = world.motions_proven(q + before * edges, q + after * edges, less=-growth - keep)
                     free[free] = proven
         return free
 

@@ -207,3 +207,11 @@ def test_a_way_that_leads_too_near_to_what_could_move_is_led_around_it():
     assert run.found
     assert all(tick.safe_seconds >= settings.tick - 1e-9 for tick in run.ticks[:-1])
     assert not run.violations(scenario.problem)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_path_close_to_what_stands_still_is_gone_along_beside_what_moves(seed):
+    scenario = Scenario.load("replan_pockets")  # its path grazes the corner of an obstacle at rest
+    run = scenario.run(seed=seed, repair_budget=1.0, speed_bound=1.0)
+    assert run.found
+    assert all(tick.safe_seconds > 0.0 for tick in run.ticks[:-1])
