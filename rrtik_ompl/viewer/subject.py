@@ -270,9 +270,11 @@ def subject_of_run(problem: Showable, run: ReplanRun) -> Subject:
     """Return the subject of a run: the robot in every tick, and every obstacle where it was first.
 
     Raises:
-        InputError: If it is no run, or not one of that problem's robot.
+        InputError: If it is no run, or not one of that problem.
     """
     subject = replayed(problem, run)
+    if isinstance(problem, Problem) and not np.allclose(run.configurations[0], problem.start):
+        raise InputError(f"run to show: one of '{run.problem}', which has another start; give the problem that was run")
     drawn = Scene([each.drawn for each in actors_of(run, subject.scene)])
     for name in set[str]().union(*(tick.poses for tick in run.ticks)):
         drawn.obstacle(name)  # raises if the run belongs to another problem

@@ -155,7 +155,7 @@ def test_a_run_is_not_shown_with_another_robot(crossing):
 
 def test_a_record_of_another_problem_is_refused(crossing):
     run = Scenario.load(crossing).run(repair_budget=30.0)
-    with pytest.raises(InputError, match="lift"):
+    with pytest.raises(InputError, match="one of 'crossing', which has another start"):
         page(load_problem("env_e"), run=run)
 
 
