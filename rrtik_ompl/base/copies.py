@@ -204,9 +204,11 @@ def _short(value: object) -> str:
         return np.array2string(value, precision=6, separator=", ", max_line_width=1000).replace("\n", "")
 
     if isinstance(value, (tuple, list)):
-        if len(value) > MOST_SHOWN:
-            return f"<{len(value)} of {type(value[0]).__name__}>"
-        inside = ", ".join(map(_short, value))
+        kind = type(value[0]).__name__ if value else ""
+        parts = [_short(each) for each in value[:MOST_SHOWN]]
+        if len(value) > MOST_SHOWN or (len(value) > 1 and set(parts) == {f"<{kind}>"}):
+            return f"<{len(value)} of {kind}>"
+        inside = ", ".join(parts)
         return f"({inside}{',' * (len(value) == 1)})" if isinstance(value, tuple) else f"[{inside}]"
 
     text = repr(value)

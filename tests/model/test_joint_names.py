@@ -51,6 +51,7 @@ TAKERS = {  # what takes a motion and a robot: how it is called
     "shorten": lambda names, task, file: rrtik.shorten(path(names), task),
     "time_parameterize": lambda names, task, file: rrtik.time_parameterize(path(names), task.robot),
     "view": lambda names, task, file: subject_of(task, path(names)),
+    "time_parameterize_many": lambda names, task, file: rrtik.time_parameterize_many([path(names)], task.robot),
     "time_parameterize in a world": lambda names, task, file: rrtik.time_parameterize(
         path(names), LIMITS, blend=0.05, world=task.world
     ),

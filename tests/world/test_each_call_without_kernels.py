@@ -172,6 +172,7 @@ CALLS = {
     "World.explain": lambda p, _: [p.world.explain(row) for row in ROWS],
     "World.certify": lambda p, _: p.world.certify(ROWS),
     "following.Servo": lambda p, _: first_rates(p),
+    "gym.Reach": lambda p, _: rrtik.gym.Reach(p.world).reset(seed=1)[0].round(6),
     "grasps": lambda p, _: [round(grasp.width, 4) for grasp in rrtik.grasps(grasping(), "ball", count=1)],
     "ik.reach_map": lambda p, _: rrtik.ik.reach_map(p.robot, world=p.world, cell=0.5, samples=2000).reached.sum(),
     "ik.solve_trajectory": lambda p, _: rrtik.ik.solve_trajectory(p.robot, p.robot.fk_batch(LINE), world=p.world).found,
@@ -201,6 +202,9 @@ CALLS = {
     "solve_ik_many": lambda p, _: rrtik.solve_ik_many(p.robot, p.robot.fk_batch(LINE), world=p.world).found,
     "time_parameterize": lambda p, _: round(
         rrtik.time_parameterize(path_of(p), p.robot, blend=0.01, world=p.world).duration, 6
+    ),
+    "time_parameterize_many": lambda p, _: round(
+        rrtik.time_parameterize_many([path_of(p)], p.robot, blend=0.01, world=p.world)[0].duration, 6
     ),
     "tip.arc": lambda p, _: motion_of(
         rrtik.tip.arc(p.world, START, tip_of(p, by=[-0.1, 0.1, 0.0]), tip_of(p, by=[-0.02, 0.08, 0.0]))
