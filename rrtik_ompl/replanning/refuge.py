@@ -262,18 +262,38 @@ class Guard:
         """Return where the arm is on its straight ways at full speed from ``q`` to targets, shape (m, n), and stays."""
         edges = targets - q
         ticks = ticks_of(edges, self._step, self._max_change)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            shares = np.where(ticks[:, None] > 0.0, looks / ticks[:, None], 1.0)
-        return np.asarray(q + np.minimum(shares, 1.0)[:, :, None] * edges[:, None, :])
+
+        def at(times: Vector) -> Ways:
+            with np.errstate(divide="ignore", invalid="ignore"):
+                shares = np.where(ticks[:, None] > 0.0, times / ticks[:, None], 1.0)
+            return np.asarray(q + np.minimum(shares, 1.0)[:, :, None] * edges[:, None, :])
+
+        return _straight_in_ticks(at, looks)
 
     def _along(self, path: Matrix, looks: Vector) -> Matrix:
         """Return where the arm is on its way along the path, shape (k, n), at times in ticks."""
         ends = np.concatenate([[0.0], np.cumsum(ticks_of(np.diff(path, axis=0), self._step, self._max_change))])
-        return np.column_stack([np.interp(looks, ends, values) for values in path.T])
+
+        def at(times: Vector) -> Matrix:
+            return np.column_stack([np.interp(times, ends, values) for values in path.T])
+
+        return _straight_in_ticks(at, looks)
 
     def _look_at(self, ticks: int) -> int:
         """Return the number of the look after so many ticks."""
         return int(np.searchsorted(self._looks, ticks))
+
+
+def _straight_in_ticks(at: Callable[[Vector], Ways], looks: Vector) -> Ways:
+    """Return where the arm is at times in ticks, shape (k,), if it goes straight, at one speed, within each tick.
+
+    Args:
+        at: Returns where it is when ticks begin and end, shape (..., k, n).
+        looks: The times.
+    """
+    begins = at(np.floor(looks))
+    shares = looks % 1.0
+    return np.asarray(begins + shares[:, None] * (at(np.ceil(looks)) - begins))
 
 
 def ticks_of(edges: Matrix, step: float, max_change: Vector) -> Vector:

@@ -33,13 +33,13 @@ def pressed(seconds=3.0):
     return plane(*walls, start=(10.3, 10.2))
 
 
-def guard_of(problem):
-    settings = ReplanSettings(step=0.5, rate=1.0 / TICK, speed_bound=SPEED)
+def guard_of(problem, speed=SPEED, may_move=None):
+    settings = ReplanSettings(step=0.5, rate=1.0 / TICK, speed_bound=speed)
     alone = problem.world.with_scene(Scene())
     guard = Guard(problem.world, alone, settings, 0.0, np.full(2, 0.5), np.random.default_rng(0))
     scene = problem.world.scene
     names = frozenset(o.name for o in scene.obstacles)
-    guard.see(scene, dict.fromkeys(names, 0.0), names)
+    guard.see(scene, dict.fromkeys(names, 0.0), names if may_move is None else frozenset(may_move))
     return guard
 
 
@@ -75,6 +75,21 @@ def test_a_refuge_is_out_of_reach_for_as_long_as_it_says():
     assert np.linalg.norm(refuge.q - problem.start) <= 0.5 + 1e-9
     for obstacle in problem.world.scene.obstacles:
         assert (box_distance(points, obstacle) > SPEED * TICK * shares).all()
+
+
+def test_a_refuge_behind_a_corner_of_the_path_is_out_of_reach_on_the_straight_way_to_it():
+    corner, end = [10.177, 10.177], [10.354, 10.0]  # The arm would be at the end after a tick, around the post.
+    post, lid = box("post", 10.177, 9.53, 0.02, 1.0), box("lid", 10.0, 11.3, 8.0, 2.0)
+    problem = plane(post, lid, box("chaser", 8.6, 10.0, 2.0, 8.0), start=(10.0, 10.0))
+    nearer = problem.world.with_scene(Scene([post, lid, box("chaser", 9.0, 10.0, 2.0, 8.0)]))
+    predicted = MovingWorld(nearer, self_collision=False)
+    guard = guard_of(problem, speed=2.0, may_move={"chaser"})
+    path = np.array([problem.start, corner, end, [13.0, 9.5]])
+    refuge = guard.refuge(problem.start, path, lambda ticks: predicted)
+    assert refuge.seconds >= TICK - 1e-9
+    points = problem.start + np.linspace(0.0, 1.0, 500)[:, None] * (refuge.q - problem.start)
+    for obstacle in (post, lid):
+        assert (box_distance(points, obstacle) > 0.0).all()
 
 
 def test_planes_prove_what_bounds_of_distances_do_not():
