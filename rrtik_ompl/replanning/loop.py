@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 import warnings
+from bisect import bisect_left
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from typing import Any
@@ -513,7 +514,6 @@ class Loop:
             Event, reason, next configuration, shape (n,), how long the arm is safe [s], and the proof that no motion
             rules out a contact, or None.
         """
-        base_is_safe = not self._world.blocked and self._world.base_apart(self._possible_travels or {})
         path = self._planner.path
         if free and not self._world.blocked:
             q, passed = self._next_on_path()
@@ -523,7 +523,7 @@ class Loop:
                 seconds, leaves_way_out = guard.seconds_after(self.q, rest, stays=self._now < self._stays_until)
             if leaves_way_out and not (self._scene_is_old and not self._proven_whatever_moves(self.q, q)):
                 self._planner.advance(q, passed, self._world)
-                return event, "", q, seconds * base_is_safe, None
+                return event, "", q, self._with_base(seconds), None
             self._note_refusal()
             self._give_wide_berth(guard)
 
@@ -535,7 +535,7 @@ class Loop:
             reason = TOO_NEAR if refuge.moves else self._why_stay(free)
 
         lost: Unavoidable | None = None
-        if refuge.seconds * base_is_safe < self._settings.tick - SPARE:
+        if self._with_base(refuge.seconds) < self._settings.tick - SPARE:
             found = self._way_out()
             reason = NO_WAY_OUT
             if isinstance(found, Unavoidable):
@@ -547,7 +547,22 @@ class Loop:
 
         if refuge.moves:
             self._planner.rejoin(refuge.q)
-        return "evade" if refuge.moves else "wait", reason, refuge.q, refuge.seconds * base_is_safe, lost
+        return "evade" if refuge.moves else "wait", reason, refuge.q, self._with_base(refuge.seconds), lost
+
+    def _with_base(self, seconds: float) -> float:
+        """Return until when nothing can touch the base either, which cannot give way: at most ``seconds`` [s]."""
+        settings = self._settings
+        speed = SPEED_WARNING_RATIO * (settings.speed_bound or 0.0)
+        travels = {name: travel for name, travel in (self._possible_travels or {}).items() if travel > 0.0}
+
+        def can_be_touched(ticks: int) -> bool:
+            further = (ticks - 1) * settings.tick * speed
+            return not self._world.base_apart({name: travel + further for name, travel in travels.items()})
+
+        most = int(np.ceil(seconds / settings.tick - SPARE))
+        if not can_be_touched(most):
+            return seconds
+        return settings.tick * bisect_left(range(1, most + 1), True, key=can_be_touched)
 
     def _give_wide_berth(self, guard: Guard) -> None:
         """Make further paths keep out of reach of obstacles, for as long as the guard asks for, where that is possible.

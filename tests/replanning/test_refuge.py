@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from rrtik_ompl.description.catalog import load_robot
-from rrtik_ompl.model.scene import Scene, TimedPoses
+from rrtik_ompl.model.scene import Obstacle, Scene, TimedPoses
+from rrtik_ompl.model.shapes import Box
 from rrtik_ompl.replanning.record import ReplanRun
 from rrtik_ompl.replanning.refuge import Guard
 from rrtik_ompl.replanning.replanner import replan, replan_with
@@ -16,6 +17,7 @@ from rrtik_ompl.replanning.scenario import Scenario
 from rrtik_ompl.replanning.settings import ReplanSettings
 from rrtik_ompl.replanning.unavoidable import ContactWarning, Reach, Unavoidable, kept, way_out
 from rrtik_ompl.world.moving_world import MovingWorld
+from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
 from rrtik_tests.moving_plane import OPTIONS, box, place, plane
 
@@ -230,3 +232,13 @@ def test_a_path_close_to_what_stands_still_is_gone_along_beside_what_moves(seed)
     run = scenario.run(seed=seed, repair_budget=1.0, speed_bound=1.0)
     assert run.found
     assert all(tick.safe_seconds > 0.0 for tick in run.ticks[:-1])
+
+
+def test_the_base_too_is_safe_for_as_long_as_a_run_says():
+    post = Obstacle("post", Box([0.05, 0.05, 0.05]), [0.12, 0.0, -0.12])
+    problem = Problem(World(load_robot("ur5"), Scene([post])), [0.0, -1.57, *4 * [0.0]], [1.0, -1.57, *4 * [0.0]])
+    distance = float(problem.world.distances(problem.start, [("base_link", "post")]).values[0])
+    speed = 0.5
+    run = replan(problem, lambda t: problem.world.scene, speed_bound=speed, step=0.05, rate=20.0, seconds=0.1)
+    for tick in run.ticks:
+        assert 0.05 <= tick.safe_seconds < distance / speed
