@@ -34,7 +34,16 @@ from rrtik_ompl.geometry.collision.elements import (
     tracked_bodies,
     unchecked_pairs,
 )
-from rrtik_ompl.model.certificate import DEEPEST, VERSION, Certificate, ModelBody, ModelJoint, MotionEntries, Route
+from rrtik_ompl.model.certificate import (
+    DEEPEST,
+    VERSION,
+    Certificate,
+    ModelBody,
+    ModelConstraint,
+    ModelJoint,
+    MotionEntries,
+    Route,
+)
 from rrtik_ompl.model.robot import Chain, Robot
 from rrtik_ompl.model.scene import Scene
 from rrtik_ompl.world.certificate_course import LARGEST_VALUE, SAME, Course, Stack, powers_of
@@ -72,10 +81,11 @@ def certificate_fault(
     try:
         named, tracks = bodies_of_route(world.robot, world.bodies, world.scene, asked)
         pairs = compared_pairs(named, world.pairs)
+        constraints = model_constraints(world.constraints)
         fault = (
             _fault_of_model(certificate, world, named, pairs)
             or _fault_of_tracks(certificate, tracks)
-            or _fault_of_listed(certificate, world)
+            or _fault_of_listed(certificate.constraints, constraints)
         )
         if fault:
             return fault
@@ -83,7 +93,7 @@ def certificate_fault(
     except InputError as error:
         return str(error)
     course = Course(world.robot.chain, asked, tracks)
-    if fault := course.fault or fault_of_constraints(certificate.constraints, course):
+    if fault := course.fault or fault_of_constraints(constraints, course):
         return fault
     return Motions(world.robot.chain, named, trees, pairs, course, certificate.clearance).fault(certificate.motions)
 
@@ -173,10 +183,8 @@ def _fault_of_tracks(certificate: Certificate, tracks: Stack | None) -> str:
     return "" if same else "it is for another scene: obstacles move otherwise"
 
 
-def _fault_of_listed(certificate: Certificate, world: World) -> str:
+def _fault_of_listed(theirs: Sequence[ModelConstraint], own: Sequence[ModelConstraint]) -> str:
     """Return whether a certificate lists other path constraints than those of a world; "" if it does not."""
-    own = model_constraints(world.constraints)
-    theirs = certificate.constraints
     for k, (first, second) in enumerate(zip(own, theirs, strict=False), 1):
         numbers = ("pose", "within", "region", "bounds", "tolerances")
         same = (first.frame, first.joint) == (second.frame, second.joint)

@@ -12,6 +12,7 @@ from rrtik_ompl.constraints import inside, on_line, on_plane, orientation_of, up
 from rrtik_ompl.description.urdf import robot_from_urdf
 from rrtik_ompl.model.certificate import Route, from_document, task_from_document
 from rrtik_ompl.model.goal_kind import TaskRegion
+from rrtik_ompl.problem_files.path_constraints import constraint_data
 from rrtik_ompl.world.certificate_held import model_constraints
 from rrtik_ompl.world.world import World
 from rrtik_tests.checker_script import in_script
@@ -159,6 +160,31 @@ def test_a_certificate_lists_all_constraints_that_are_asked_for_and_no_others(ro
     assert both.verify(both.unheld.certificate(ROWS), ROWS) == (
         "it is for other path constraints: it lists 0 of them, not 2"
     )
+
+
+def test_constraints_are_those_of_the_asker_where_the_list_differs_by_less_than_a_billionth(robot, tmp_path):
+    """Ranges of a billionth add up what roll and yaw are off, single values do not."""
+    single = ANYWHERE.copy()
+    single[3:] = [[0.2], [0.0], [0.0]]
+    wider = single.copy()
+    wider[3:, 1] += 8e-10
+    other, world = (
+        world_with(robot, TaskRegion([0.0, 0.0, 0.0], bounds, orientation_tolerance=0.45)) for bounds in (single, wider)
+    )
+    certificate = other.certificate(ROWS)
+    assert other.verify(certificate, ROWS) == ""
+    assert world.certificate(ROWS) is None
+    assert world.verify(certificate, ROWS).startswith(NOT_KEPT)
+
+    scenes = []
+    for each in (other, world):
+        file = tmp_path / "scene.yaml"
+        each.scene.save(file)
+        constraints = [constraint_data(region) for region in each.settings.constraints]
+        scenes.append(f"{file.read_text()}\npath_constraints: {json.dumps(constraints)}\n")
+    scene = "{ scene: readScene(text, 'scene'), tip: 'tip' }"
+    says = f"data.scenes.map((text) => checkCertificate(data.file, {scene}).fault)"
+    assert in_script(says, {"scenes": scenes, "file": plain(certificate)}) == ["", NOT_KEPT]
 
 
 def test_stages_of_a_task_have_their_constraints(robot):

@@ -38,7 +38,7 @@ function checkCertificate(certificate, own) {
     proof.checkEntries(); // 8.5
     proof.checkPairs(); // 8.6
     proof.checkInsides(); // 8.7
-    checkHeld(certificate.constraints ?? [], world.joints, proof.motions); // 8.8
+    checkHeld(world.constraints, world.joints, proof.motions); // 8.8
     return { holds: true, fault: "", facts: world.facts };
   } catch (error) {
     if (error instanceof Fault) return { holds: false, fault: error.message, facts: null };
@@ -213,7 +213,7 @@ const sameValues = (one, other) => Object.keys(one).length === Object.keys(other
 
 const ownerOf = (body) => (body.kind === "link" ? "robot" : "scene");
 
-/** Joints, bodies and the pairs that must be apart, after comparison with what the file says of them: section 3. */
+/** Joints, bodies, the pairs that must be apart and path constraints, after comparison with what the file says of them: section 3. */
 function worldOf(file, own) {
   const { joints, carriers, bodies, tracks, readRobot, readScene } = readingOf(file, own);
   const difference = readRobot ? jointsDifference(file.joints, joints) : "";
@@ -224,7 +224,7 @@ function worldOf(file, own) {
   });
   const elsewhere = readScene ? tracksDifference(file, own.scene, tracks) : "";
   demand(elsewhere === "", `it is for another scene: ${elsewhere}`);
-  const tips = checkListed(file, own, joints, carriers);
+  const { constraints, tips } = checkListed(file, own, joints, carriers);
   const selfMargin = readScene ? own.scene.selfMargin : file.self_margin;
   demand(Math.abs(file.self_margin - selfMargin) <= SAME, `it is for a self margin of ${file.self_margin} m, not ${selfMargin} m`);
 
@@ -243,7 +243,7 @@ function worldOf(file, own) {
       if (isCompared(bodies[i], bodies[j]) && !unchecked.has(`${i} ${j}`)) pairs.push(pairOf(i, j, file, joints, bodies));
     }
   }
-  return { joints, bodies, tracks, pairs, facts: { readRobot, readScene, tips, pairs: pairs.length, unchecked: [...unchecked.values()] } };
+  return { joints, bodies, tracks, pairs, constraints, facts: { readRobot, readScene, tips, pairs: pairs.length, unchecked: [...unchecked.values()] } };
 }
 
 /** Names of the joints that the numbers of a waypoint are of: those with a gain of 1 that follow no other. */

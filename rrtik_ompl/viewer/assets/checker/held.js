@@ -21,7 +21,8 @@ function checkConstraintForm(constraints, joints) {
 /**
  * Section 3.5: refuse constraints other than those that are asked for, and frames that are elsewhere here.
  *
- * Returns the names of frames that are believed to be the robot's tip, as nothing that was given names it.
+ * Returns the constraints {frame, joint, ...} as they are asked for, or as the file has them where nothing was given,
+ * and the names of frames that are believed to be the robot's tip, as nothing that was given names it.
  */
 function checkListed(file, own, joints, carriers) {
   const listed = file.constraints ?? [];
@@ -29,7 +30,7 @@ function checkListed(file, own, joints, carriers) {
   demand(asked === null || asked.length === listed.length, `it is for other path constraints: it lists ${listed.length} of them, and ${asked?.length} are asked for`);
   const frames = jointFrames(joints, jointValues(joints, own.begin ?? file.waypoints[0]));
   const tips = new Set();
-  listed.forEach((stated, k) => {
+  const constraints = listed.map((stated, k) => {
     const differs = (what) => refuse(`it is for other path constraints: ${what} of number ${k + 1}, of '${stated.frame}'`);
     const held = own.scene?.attached.find(({ name }) => name === stated.frame);
     const carrier = carriers.get(held === undefined ? stated.frame : held.link);
@@ -38,18 +39,20 @@ function checkListed(file, own, joints, carriers) {
     const isTold = (own.scene ?? null) === null && file.bodies.some(({ name, kind }) => kind === "attached" && name === stated.frame);
     if (place === undefined && (own.robot ?? null) !== null && !isTold) differs("no such frame here");
     if (place !== undefined && (place.joint !== stated.joint || !near(stated.pose, poseNumbers(place.pose)))) differs("the frame is elsewhere here");
-    if (asked === null) return;
+    const pose = place === undefined ? poseOf(stated.pose) : place.pose;
+    if (asked === null) return { ...stated, pose: poseNumbers(pose) };
 
     const { frame, fromStart, region, within, bounds, tolerances } = asked[k];
     const name = frame ?? own.tip ?? null;
     if (name === null) tips.add(stated.frame);
     else if (name !== stated.frame) differs("another frame");
-    const placed = fromStart ? chained(chained(frames[stated.joint], poseOf(stated.pose)), region) : region;
+    const placed = fromStart ? chained(chained(frames[stated.joint], pose), region) : region;
     if (!near(stated.region, poseNumbers(placed)) || !near(stated.within, poseNumbers(within))) differs("another pose");
     if (!near(stated.bounds.flat(), bounds.flat())) differs("other bounds");
     if (!near(stated.tolerances, tolerances)) differs("other tolerances");
+    return { ...stated, pose: poseNumbers(pose), within: poseNumbers(within), region: poseNumbers(placed), bounds, tolerances };
   });
-  return [...tips];
+  return { constraints, tips: [...tips] };
 }
 
 /** Section 8.8: each constraint is kept in each motion; intervals are halved until that shows. */
