@@ -39,11 +39,6 @@ class Known:
             self.in_contact[contacts] = form_of(self.world, scene=changed(self.world.scene, contacts=contacts))
         return self.in_contact[contacts] if contacts else self.world
 
-    def forget(self) -> None:
-        """Forget the planes of earlier proofs."""
-        for world in (self.world, *self.in_contact.values()):
-            world.prover.forget()
-
 
 class Worlds:
     """The worlds of one task, by robot and scene.
@@ -94,9 +89,7 @@ class Worlds:
         world = known.world
         for obstacle in moved:
             world = world.moved(obstacle.name, obstacle.pose)
-        known = Known(kind, world) if moved else known
-        known.forget()
-        return known
+        return Known(kind, world) if moved else known
 
 
 class Left(threading.local):

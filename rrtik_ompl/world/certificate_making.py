@@ -428,7 +428,7 @@ class _Table:
             packed = self._new_table(bodies, fixed=not moving)
             if is_first:
                 _first_tables[self.prover] = self._arm_pairs, packed
-        packed.table.ways[:] = 0.0  # the same whatever was proven before
+        packed.forget_planes()  # the same whatever was proven before
         packed.keep(self.clearance, self.spare)
         return packed, nodes
 

@@ -26,7 +26,7 @@ from rrtik_ompl.files import notice
 from rrtik_ompl.geometry.collision.bodies import Body
 from rrtik_ompl.geometry.collision.digests import world_digest
 from rrtik_ompl.geometry.collision.solids import of_each
-from rrtik_ompl.kernels.proof.layout import SUGGESTED, ProofTable
+from rrtik_ompl.kernels.proof.layout import ProofTable
 from rrtik_ompl.kernels.proof.packing import ProofPairs, proof_pairs
 from rrtik_ompl.kernels.proof.rows import PROOF_KERNELS, proof_of_rows
 from rrtik_ompl.kernels.proof.taken_proof import TakenProof
@@ -182,7 +182,7 @@ class Prover:
         earlier proofs stored in it are cleared.
         """
         packed = self._packed_for(clearance, SPARE)
-        packed.table.ways[:] = 0.0
+        packed.forget_planes()
         return packed.table
 
     def made(self, proof: Proof) -> bool:
@@ -198,11 +198,6 @@ class Prover:
         """Make the tables, for a caller that has few configurations now and motions to prove later."""
         if not self.always_colliding:
             self.tables.get(self.bodies, self._new_table)
-
-    def forget(self) -> None:
-        """Forget the planes of earlier proofs, with which the next ones would begin."""
-        if self.tables.packed is not None:
-            self.tables.packed.table.ways[:] = 0.0
 
     def lent_table(self) -> ProofPairs | None:
         """Return the table with memory of its own to compute in; None if another prover has taken it."""
@@ -275,24 +270,18 @@ class Prover:
         places = np.full(count, np.nan)
         prove = proof_of_rows(packed, tails, heads, pairs, places)
 
-        # Let the kernels prove all motions in batches, as long as there is time. They begin with the planes that have
-        # proven the motion before, and in contact with the normals at the first motion for which there were none.
+        # Let the kernels prove all motions in batches, as long as there is time.
+        if packed.touching:
+            packed.forget_planes()
         left = count
         at_once = MOTIONS_AT_ONCE if seconds is None or library(PROOF_KERNELS) is not None else FEW_AT_ONCE
         for first in range(0, count, at_once):
             if first > 0 and seconds is not None and time.monotonic() - begin > seconds:
                 break
-            if first == 0 and packed.touching and not _with_planes(packed):
-                suggest_planes(self.robot, self.bodies, packed, np.stack([rows[0][0], rows[1][0]]))
             number = min(at_once, count - first)
             left -= number - prove(first, number)
         if left == 0 and sound is None:
             return []
-
-        # Where bodies in contact turn about each other, the normals of each motion are tried.
-        for k in np.flatnonzero(np.isin(pairs, packed.touching)).tolist() if packed.touching else ():
-            suggest_planes(self.robot, self.bodies, packed, np.stack([rows[0][k], rows[1][k]]))
-            prove(k, 1)
 
         # A proof outside the bound on rounding errors does not count.
         if sound is not None:
@@ -301,12 +290,20 @@ class Prover:
         elif (pairs == PROVEN).all():
             return []
 
-        # Try the motions that failed at a pair of links again with coal's distances.
+        # Try the motions that failed again: at bodies in contact with the normals there, at a pair of links with coal's
+        # distances. No motion begins with planes of another one, so that its proof does not depend on these.
         by_coal = self._coal_proof(packed)
-        for k in (k for k in np.flatnonzero(pairs >= 0).tolist() if by_coal.links[pairs[k]]):
+        again = by_coal.links.copy()
+        again[packed.touching] = True
+        for k in (k for k in np.flatnonzero(pairs >= 0).tolist() if again[pairs[k]]):
             motion = np.stack([rows[0][k], rows[1][k]])
-            part_proven = partial(_part_proven, packed, tails[k], heads[k])
-            by_coal.settle(motion, pairs[k : k + 1], places[k : k + 1], partial(prove, k, 1), part_proven)
+            packed.forget_planes()
+            if pairs[k] in packed.touching:
+                suggest_planes(self.robot, self.bodies, packed, motion)
+                prove(k, 1)
+            if pairs[k] >= 0 and by_coal.links[pairs[k]]:
+                part_proven = partial(_part_proven, packed, tails[k], heads[k])
+                by_coal.settle(motion, pairs[k : k + 1], places[k : k + 1], partial(prove, k, 1), part_proven)
         return [self._gap(packed, k, int(pairs[k]), float(places[k])) for k in np.flatnonzero(pairs != PROVEN).tolist()]
 
     def _packed_for(self, clearance: float, slack: float) -> ProofPairs:
@@ -347,13 +344,6 @@ class Prover:
         if pair < 0:
             return Gap(motion, float("nan"), "", "")
         return Gap(motion, place, *(self.bodies[k].name for k in packed.bodies[pair].tolist()))
-
-
-def _with_planes(packed: ProofPairs) -> bool:
-    """Check whether there is a plane to begin with for each pair that is in contact."""
-    planes = packed.table.ways.reshape(-1, 3)[packed.touching]
-    suggested = packed.table.way_stamps[packed.touching] == SUGGESTED
-    return bool((suggested & planes.any(axis=1)).all())
 
 
 def _part_proven(packed: ProofPairs, tail: Vector, head: Vector, begin: float, end: float) -> bool:

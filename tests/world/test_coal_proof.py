@@ -152,3 +152,44 @@ def small_mesh(half):
     mesh.endModel()
     mesh.computeLocalAABB()
     return mesh
+
+
+def resting_on_a_post(rng, robot, q):
+    """A world in which a held box just touches a turned post at a configuration."""
+    held = rrtik.AttachedObject("thing", robot.tip, rrtik.Box(rng.uniform(0.03, 0.1, 3)), [0.0, 0.0, 0.08])
+    shape = rrtik.Box(rng.uniform(0.05, 0.2, 3))
+    turn = pin.Quaternion(*unit(rng.normal(size=4))).matrix()
+    way = unit(rng.normal(size=3))
+    middle = robot.fk(q).act(np.array([0.0, 0.0, 0.08]))
+
+    def at(distance, contacts=()):
+        post = rrtik.Obstacle("post", shape, pin.SE3(turn, middle + distance * way))
+        return rrtik.World(robot, rrtik.Scene([post], attached=[held], contacts=contacts))
+
+    near, far = 0.0, 0.4
+    for _ in range(12):
+        place = 0.5 * (near + far)
+        touch = any({c.first, c.second} == {"thing", "post"} for c in at(place).contacts(q))
+        near, far = (place, far) if touch else (near, place)
+    return at(near, [rrtik.Touching("thing", "post", -0.001)])
+
+
+def unit(vector):
+    return vector / np.linalg.norm(vector)
+
+
+def test_proofs_of_bodies_in_contact_do_not_depend_on_what_was_proven_before():
+    rng = np.random.default_rng(1)
+    robot = rrtik.load_robot("panda")
+    q = np.array(robot.posture("ready"))
+    shares = []
+    for _ in range(8):
+        world = resting_on_a_post(rng, robot, q)
+        starts = q + rng.normal(0.0, 10.0 ** rng.uniform(-4.0, -2.3, (60, 1)), (60, 7))
+        ends = starts + rng.normal(0.0, 10.0 ** rng.uniform(-3.5, -1.0, (60, 1)), (60, 7))
+        one_by_one = [world.motion_proven(a, b) for a, b in zip(starts, ends, strict=True)]
+        in_reverse = [world.motion_proven(a, b) for a, b in zip(starts[::-1], ends[::-1], strict=True)]
+        np.testing.assert_array_equal(one_by_one, in_reverse[::-1])
+        np.testing.assert_array_equal(one_by_one, world.prover.proven(starts, ends))
+        shares.append(np.mean(one_by_one))
+    assert 0.2 < np.mean(shares) < 0.8

@@ -117,6 +117,11 @@ class ProofPairs:
             kept=(float("nan"), ROOM),
         )
 
+    def forget_planes(self) -> None:
+        """Forget the planes of earlier proofs, with which the next ones would begin."""
+        self.table.ways[:] = 0.0
+        self.table.way_stamps[:] = 0
+
     def intact(self) -> bool:
         """Whether no kernel has written beyond an array."""
         return self.table.intact() and all(cloud.intact() for cloud in self.clouds)
