@@ -1,8 +1,8 @@
 """Proofs by coal's distances, for pairs of bodies that kernels leave unproven, and planes for bodies in contact.
 
-Bodies in contact overlap, so no plane separates them, and a search for their distance may find none. Their proof needs a
-plane beyond which neither body reaches deeper than it may. The contact normal that coal reports gives such a plane, and
-:func:`suggest_planes` lets the kernels try it where they have found none.
+Bodies in contact overlap, so no plane separates them, and a search for their distance may find none. Their proof needs
+a plane beyond which neither body reaches deeper than it may. The contact normal that coal reports gives such a plane,
+and :func:`suggest_planes` lets the kernels begin with it where their own search has failed.
 
 The kernels represent a link by convex pieces around its mesh. Where the pieces of two links are too close to be proven
 apart, coal's distances between the meshes are used instead (:class:`CoalProof`), after Schwarzer, Saha and Latombe
