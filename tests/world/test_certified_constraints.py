@@ -76,6 +76,14 @@ def world_with(robot, *constraints):
     return World(robot, rrtik.Scene([BALL]), constraints=constraints)
 
 
+def problem_text(world, folder):
+    """What a problem file says of a scene and its path constraints."""
+    file = folder / "scene.yaml"
+    world.scene.save(file)
+    constraints = [constraint_data(region) for region in world.settings.constraints]
+    return f"{file.read_text()}\npath_constraints: {json.dumps(constraints)}\n"
+
+
 def listed(world):
     return model_constraints(world.constraints)
 
@@ -176,15 +184,20 @@ def test_constraints_are_those_of_the_asker_where_the_list_differs_by_less_than_
     assert world.certificate(ROWS) is None
     assert world.verify(certificate, ROWS).startswith(NOT_KEPT)
 
-    scenes = []
-    for each in (other, world):
-        file = tmp_path / "scene.yaml"
-        each.scene.save(file)
-        constraints = [constraint_data(region) for region in each.settings.constraints]
-        scenes.append(f"{file.read_text()}\npath_constraints: {json.dumps(constraints)}\n")
-    scene = "{ scene: readScene(text, 'scene'), tip: 'tip' }"
-    says = f"data.scenes.map((text) => checkCertificate(data.file, {scene}).fault)"
-    assert in_script(says, {"scenes": scenes, "file": plain(certificate)}) == ["", NOT_KEPT]
+    own = "{ scene: readScene(text, 'scene'), tip: 'tip' }"
+    says = f"data.texts.map((text) => checkCertificate(data.file, {own}).fault)"
+    texts = [problem_text(each, tmp_path) for each in (other, world)]
+    assert in_script(says, {"texts": texts, "file": plain(certificate)}) == ["", NOT_KEPT]
+
+
+def test_the_script_takes_one_frame_alone_for_the_tip_that_nobody_names(robot, tmp_path):
+    world = world_with(robot, on_plane([0.0, 0.0, 0.0], [0.0, 0.0, 1.0]), about_z(0.0, 1.0))
+    certificate = world.certificate(ROWS)
+    first, second = certificate.constraints
+    forged = replace(certificate, constraints=(first, replace(second, frame="arm")))
+    says = "data.files.map((file) => checkCertificate(file, { scene: readScene(data.text, 'scene') }).fault)"
+    found = in_script(says, {"text": problem_text(world, tmp_path), "files": [plain(certificate), plain(forged)]})
+    assert found == ["", "it is for other path constraints: tip and arm cannot all be the robot's tip"]
 
 
 def test_stages_of_a_task_have_their_constraints(robot):

@@ -52,6 +52,7 @@ function checkListed(file, own, joints, carriers) {
     if (!near(stated.tolerances, tolerances)) differs("other tolerances");
     return { ...stated, pose: poseNumbers(pose), within: poseNumbers(within), region: poseNumbers(placed), bounds, tolerances };
   });
+  demand(tips.size <= 1, `it is for other path constraints: ${[...tips].join(" and ")} cannot all be the robot's tip`);
   return { constraints, tips: [...tips] };
 }
 
