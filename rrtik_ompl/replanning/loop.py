@@ -608,7 +608,7 @@ class Loop:
             nearest = min(left, key=lambda name: left[name], default=None)
             if nearest is not None and (bound := guard.bound_for(left[nearest])) < (self._settings.speed_bound or 0.0):
                 reach = f"'{nearest}' could reach the arm at {place} within {guard.needed:.3g} s"
-                return f"{reach}; with a speed_bound of {bound:.3g} m/s or less it would go there"
+                return f"{reach}; with a speed_bound of {bound:.3g} m/s it would go there"
         return NO_WAY_LEFT
 
     def _way_out(self) -> Vector | Unavoidable | None:

@@ -210,7 +210,7 @@ def test_a_run_that_waits_says_which_obstacle_it_waits_for_and_with_which_bound_
     assert run.outcome == "out of time"
     said = re.fullmatch(
         r"'post' could reach the arm at the goal within 0.5 s; "
-        r"with a speed_bound of (\S+) m/s or less it would go there", run.reason,
+        r"with a speed_bound of (\S+) m/s it would go there", run.reason,
     )  # fmt: skip
     bound = float(said[1])
     assert 0.0 < bound < 0.3 / 0.5  # The box at the goal, the time that is needed.
