@@ -7,9 +7,9 @@ from typing import Any, ClassVar
 
 import gymnasium
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.base.arrays import Matrix, Vector, bounded_array
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.world.world import World
@@ -36,6 +36,7 @@ class Arm(gymnasium.Env):
         self.robot = robot
         self.increment = increment
         self._q: Vector = np.zeros(robot.dof)
+        self._begun = False
         self._ended = False
 
     @property
@@ -57,9 +58,29 @@ class Arm(gymnasium.Env):
         """Return the space of shares of the largest increment, and of so many other numbers, all from -1 to 1."""
         return gymnasium.spaces.Box(-1.0, 1.0, (self.robot.dof + more,), dtype=np.float32)
 
-    def _move(self, shares: Row) -> bool:
+    def _begin(self, q: Vector) -> None:
+        """Begin an episode at a configuration, shape (dof,)."""
+        self._q = q
+        self._begun = True
+        self._ended = False
+
+    def _require_begun(self) -> None:
+        """Refuse what needs an episode before the first one."""
+        if not self._begun:
+            raise InputError("environment: no episode has begun; call reset() first")
+
+    def _told(self, action: ArrayLike) -> Vector:
+        """Return an action as numbers, in the shape of the space.
+
+        Raises:
+            InputError: If it is none, or no episode has begun.
+        """
+        self._require_begun()
+        return bounded_array(action, self.action_space.shape or (), "action")
+
+    def _move(self, shares: Vector) -> bool:
         """Move the joints by shares of the largest increment, shape (dof,), if that is free; return whether it was."""
-        wanted = self.robot.clamp(self._q + self.increment * np.clip(shares.astype(np.float64), -1.0, 1.0))
+        wanted = self.robot.clamp(self._q + self.increment * np.clip(shares, -1.0, 1.0))
         free = bool(self.world.motion_valid(self._q, wanted))
         if free:
             self._q = wanted

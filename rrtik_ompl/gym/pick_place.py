@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import ArrayLike
 
 from rrtik_ompl.base.arrays import positive
 from rrtik_ompl.base.errors import InputError, NotFoundError, ProblemError, require
@@ -92,10 +93,9 @@ class PickPlace(Arm):
             NotFoundError: If none of 20 instances can be done.
         """
         super().reset(seed=seed, options=options)
-        self._ended = False
         self._plan = self._drawn()
         first = self._plan.worlds[0]
-        self._q = np.array(self._plan.paths[0].start)
+        self._begin(np.array(self._plan.paths[0].start))
         self._enter(Setting.beginning(first, self._q))
         held = next(world.scene.attached[0] for world in self._plan.worlds if world.scene.attached)
         assert self._plan.end is not None, "it was found"
@@ -103,11 +103,18 @@ class PickPlace(Arm):
         self._place = np.array(self._plan.end.scene.obstacle(self._attach.object).pose.translation)
         return self._observation(), self._info(collision=False)
 
-    def step(self, action: Row) -> tuple[Row, float, bool, bool, dict[str, Any]]:
-        """Move the joints, then the gripper; see the class."""
-        free = self._move(action[:-1])
-        if abs(action[-1]) > TOLD:
-            free &= self._grip("close" if action[-1] < 0.0 else "open")
+    def step(self, action: ArrayLike) -> tuple[Row, float, bool, bool, dict[str, Any]]:
+        """Move the joints, then the gripper; see the class.
+
+        Raises:
+            InputError: If the action is not one finite number for each joint and one for the gripper, or before the
+                first `reset`.
+        """
+        told = self._told(action)
+        gripper = told[-1]
+        free = self._move(told[:-1])
+        if abs(gripper) > TOLD:
+            free &= self._grip("close" if gripper < 0.0 else "open")
         info = self._info(collision=not free)
         self._ended = info["is_success"]
         away = 0.0 if info["held"] else self._away()
@@ -116,6 +123,7 @@ class PickPlace(Arm):
 
     def expert(self) -> Iterator[Row]:
         """Yield the actions of the plan of this episode; see :func:`rrtik_ompl.gym.expert`."""
+        self._require_begun()
         if self._held or not np.array_equal(self._q, self._plan.paths[0].start):
             raise InputError("expert: it begins where the episode does; call reset() first")
         still = np.zeros(self.robot.dof)

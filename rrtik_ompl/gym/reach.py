@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from rrtik_ompl.base.arrays import Vector, positive
 from rrtik_ompl.base.errors import InputError, require
@@ -60,15 +61,18 @@ class Reach(Arm):
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Row, dict[str, Any]]:
         """Begin an episode; see the class."""
         super().reset(seed=seed, options=options)
-        self._ended = False
-        self._q = self._free_configuration()
+        self._begin(self._free_configuration())
         self._goal_q = self._free_configuration()
         self._goal = np.array(self.robot.fk(self._goal_q).translation)
         return self._observation(), self._info(collision=False)
 
-    def step(self, action: Row) -> tuple[Row, float, bool, bool, dict[str, Any]]:
-        """Move the joints; see the class."""
-        free = self._move(action)
+    def step(self, action: ArrayLike) -> tuple[Row, float, bool, bool, dict[str, Any]]:
+        """Move the joints; see the class.
+
+        Raises:
+            InputError: If the action is not one finite number for each joint, or before the first `reset`.
+        """
+        free = self._move(self._told(action))
         info = self._info(collision=not free)
         self._ended = info["is_success"]
         reward = -info["distance"] - COLLISION * info["collision"]
@@ -76,6 +80,7 @@ class Reach(Arm):
 
     def expert(self) -> Iterator[Row]:
         """Yield the actions from where the arm is; see :func:`rrtik_ompl.gym.expert`."""
+        self._require_begun()
         path = plan(Problem(self.world, self._q, self._goal_q), seed=0).require()
         for shares in self._along(path.waypoints):
             yield shares.astype(np.float32)

@@ -72,6 +72,33 @@ def test_whatever_it_is_told_the_arm_is_free_by_coal(env):
     assert stopped
 
 
+@pytest.mark.parametrize(
+    ("action", "said"),
+    [
+        (lambda n: np.zeros(n - 1), "action: expected an array of shape"),
+        (lambda n: np.zeros((n, 1)), "action: expected an array of shape"),
+        (lambda n: [np.nan] * n, "action: every number must be finite"),
+        (lambda _: "left", "action: expected numbers"),
+        (lambda _: None, "action: "),
+    ],
+)
+def test_an_action_that_is_none_is_refused_in_a_line_and_moves_nothing(env, action, said):
+    env.reset(seed=1)
+    arm = env.unwrapped
+    before = arm.q
+    with pytest.raises(InputError, match=said):
+        arm.step(action(env.action_space.shape[0]))
+    assert np.array_equal(arm.q, before)
+
+
+@pytest.mark.parametrize("environment", [Reach, PickPlace])
+def test_before_the_first_episode_it_says_what_to_call(environment):
+    env = environment()
+    for called in (lambda: env.step(env.action_space.sample()), lambda: next(expert(env))):
+        with pytest.raises(InputError, match=r"no episode has begun; call reset\(\) first"):
+            called()
+
+
 def test_a_thing_is_taken_only_where_it_is_grasped_and_stays_where_it_is_let_go():
     env = PickPlace()
     first, _ = env.reset(seed=0)
