@@ -44,7 +44,7 @@ from rrtik_ompl.world.arm_cache import strokes
 from rrtik_ompl.world.certificate_check import Motions, bodies_of_route
 from rrtik_ompl.world.certificate_course import Course
 from rrtik_ompl.world.certificate_held import MAKING, fault_of_constraints, model_constraints
-from rrtik_ompl.world.certificate_parts import FEW_POINTS, MOST_KNOWN, parts_of
+from rrtik_ompl.world.certificate_parts import MOST_KNOWN, is_remembered, parts_of
 from rrtik_ompl.world.coal_proof import PROVEN, CoalProof, suggest_planes
 
 # [m] Certificates keep this distance beyond the rounding that proofs allow for: verifiers round elsewhere, and the
@@ -194,7 +194,7 @@ def _first_covers(named: Sequence[NamedBody], pairs: Sequence[tuple[int, int]]) 
     covers = []
     for k, each in enumerate(named):
         parted = k in compared and each.elements.key == "mesh" and not _may_overlap(each)
-        find = _known_cover if len(each.elements.points) < FEW_POINTS else _divided_cover
+        find = _known_cover if is_remembered(each.elements) else _divided_cover
         covers.append(find(each.elements, FIRST_PARTS if parted else 1).copy())
     return covers
 

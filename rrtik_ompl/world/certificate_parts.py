@@ -152,13 +152,21 @@ class Parts:
         return far + thickness, off + thickness
 
 
+def is_remembered(elements: Elements) -> bool:
+    """Whether what is made of a body is remembered: it is small, and its geometry has the same elements each time.
+
+    Those of a pile of boxes are made anew each time.
+    """
+    return elements.half is None and len(elements.points) < FEW_POINTS
+
+
 def parts_of(elements: Elements, cuts: Sequence[tuple[int, int, float]]) -> Parts:
     """Return the parts of a body; those of small ones, such as links, are remembered.
 
     Raises:
         InputError: If a cut divides no leaf.
     """
-    return _known_parts(elements, tuple(cuts)) if len(elements.points) < FEW_POINTS else Parts(elements, cuts)
+    return _known_parts(elements, tuple(cuts)) if is_remembered(elements) else Parts(elements, cuts)
 
 
 @lru_cache(maxsize=MOST_KNOWN)

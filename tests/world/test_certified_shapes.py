@@ -12,7 +12,8 @@ from rrtik_ompl.geometry.collision.elements import compared_pairs, elements_of, 
 from rrtik_ompl.model.certificate import from_document
 from rrtik_ompl.model.scene import Obstacle, Scene
 from rrtik_ompl.world.certificate_intervals import Known, Open, Rows
-from rrtik_ompl.world.certificate_parts import Parts, enclosed, inside_mesh
+from rrtik_ompl.world.certificate_making import _known_cover
+from rrtik_ompl.world.certificate_parts import Parts, _known_parts, enclosed, inside_mesh
 from rrtik_ompl.world.world import World
 
 pytestmark = pytest.mark.kernels
@@ -72,6 +73,16 @@ def test_a_path_beside_any_shape_has_a_certificate_that_holds_there_and_not_wher
     assert not nearer.prove(rows).proven
     assert nearer.verify(certificate, rows) == "it is for another scene: 'thing' differs"
     assert "not shown apart" in nearer.verify(with_model_of(certificate, nearer), rows)
+
+
+@pytest.mark.parametrize("name", ["octree of few cells", "height field"])
+def test_a_second_certificate_leaves_nothing_behind_that_the_first_has_not_left(arm, name):
+    world, rows = beside(arm, name)
+    remembered = []
+    for _ in range(2):
+        assert world.verify(world.certificate(rows), rows) == ""
+        remembered.append([known.cache_info().misses for known in (_known_parts, _known_cover)])
+    assert remembered[0] == remembered[1]
 
 
 def test_a_point_more_in_a_cloud_is_found_whatever_the_model_says(arm, cloudy):
