@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterable
+from functools import reduce
 from pathlib import Path
 from typing import Any
 
@@ -441,7 +442,13 @@ def _check(document: YamlDocument, key: str, task: Task, world: World) -> None:
 def _stages(document: YamlDocument, entry: TaskFile, world: World, start: Vector) -> list[Stage]:
     """Return the stages that a file lists, or one stage for each of its goals."""
     if entry.task is not None:
-        return [_stage(document, entry.task, number, world) for number in range(len(entry.task))]
+        listed_stages: list[Stage] = []
+        taken: frozenset[str] = frozenset()
+        for number, stage in enumerate(entry.task):
+            with document.at(("task", number)):
+                taken = _taken_after(taken, stage)
+                listed_stages.append(stage.build(world))
+        return listed_stages
 
     constraints = build_constraints(document, entry.path_constraints, world.robot)
     with document.at(("path_constraints",)):
@@ -454,15 +461,22 @@ def _stages(document: YamlDocument, entry: TaskFile, world: World, start: Vector
     return stages
 
 
-def _stage(document: YamlDocument, entries: list[StageEntry], number: int, world: World) -> Stage:
-    """Return one of the stages that a file lists; grasps are of obstacles that no stage before it has taken."""
-    with document.at(("task", number)):
-        entry = entries[number]
-        taken = {each.attach.object for each in entries[:number] if isinstance(each, AttachEntry)}
-        taken |= {each.grasp.object for each in entries[:number] if isinstance(each, GraspsEntry)}
-        if isinstance(entry, GraspsEntry) and entry.grasp.object in taken:
-            raise InputError(f"grasp: '{entry.grasp.object}' was taken before; say how it is taken where it is then")
-        return entry.build(world)
+def _taken_after(taken: frozenset[str], entry: StageEntry) -> frozenset[str]:
+    """Return the obstacles that may have been taken after a stage, from those before it.
+
+    Raises:
+        InputError: If it is grasps of one of these, which need not be where the scene has it.
+    """
+    if isinstance(entry, AlternativesEntry):
+        return taken.union(*(reduce(_taken_after, row, taken) for row in entry.alternatives))
+    if isinstance(entry, AttachEntry):
+        return taken | {entry.attach.object}
+    if isinstance(entry, GraspsEntry):
+        name = entry.grasp.object
+        if name in taken:
+            raise InputError(f"grasp: '{name}' was taken before; say how it is taken where it is then")
+        return taken | {name}
+    return taken
 
 
 def stage_data(stage: Stage) -> dict[str, Any]:

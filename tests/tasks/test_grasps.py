@@ -255,6 +255,16 @@ def test_a_task_file_asks_for_grasps_and_is_written_with_them(tmp_path):
         ("object: can", "object: cup", "yaml:9: .*cup"),
         ("radius: 0.03", "radius: 0.05", "yaml:9: .*no grasp of 'can' is found"),
         ("  - straight", "  - grasp: {object: can}\n  - straight", "yaml:10: .*'can' was taken before"),
+        (
+            "  - straight",
+            "  - alternatives: [[{detach: can}, {grasp: {object: can}}]]\n  - straight",
+            "yaml:10: .*'can' was taken before",
+        ),
+        (
+            "  - grasp",
+            "  - alternatives: [[{attach: {object: can, link: panda_hand}}]]\n  - grasp",
+            "yaml:10: .*'can' was taken before",
+        ),
     ],
 )
 def test_grasps_of_a_file_that_there_are_not_are_said_with_their_line(old, new, words, tmp_path):
