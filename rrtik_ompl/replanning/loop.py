@@ -517,7 +517,8 @@ class Loop:
         path = self._planner.path
         if free and not self._world.blocked:
             q, passed = self._next_on_path()
-            seconds, leaves_way_out = 0.0, False
+            seconds = 0.0
+            leaves_way_out = False
             if q is not self.q and path is not None:
                 rest = np.vstack([q, path[passed + 1 :]])
                 seconds, leaves_way_out = guard.seconds_after(self.q, rest, stays=self._now < self._stays_until)

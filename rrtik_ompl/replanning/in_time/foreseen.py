@@ -74,7 +74,8 @@ class ForeseenWorlds:
             onward: 1 if each motion is one slot later than the one before it, -1 if it is one slot earlier.
             stop: Ends the check when it returns True; motions that were not checked count as blocked.
         """
-        done, count = 0, len(rows) - 1
+        count = len(rows) - 1
+        done = 0
         level = LEVELS - 1
         while done < count and not stop():
             # The largest block that begins here and ends before the last motion does.
@@ -207,7 +208,7 @@ class ForeseenWorlds:
             return self._provers[key]
 
         begin = self._slot * (block << level)
-        end = self._slot * (block + 1 << level)
+        end = self._slot * ((block + 1) << level)
         poses = {o.name: pose_at(o, 0.5 * (begin + end)) for o in self._world.scene.obstacles}
         room = {
             o.name: self._clearance + travel(o, begin, end, self._radii[o.name]) for o in self._world.scene.obstacles
