@@ -357,19 +357,15 @@ class Motions:
                 which takes time 1, and what joints' accelerations add to the latter, shape (3, motions) [m].
         """
         body = self.named[number].body
+        pose = body.placement.homogeneous
         joint = body.joint
+        at_rest = np.zeros((3, self._course.count))
         if joint == 0:
-            return {0: np.zeros((3, self._course.count))}
+            return {0: at_rest}
         if joint > self._course.joints:
-            reach, _ = self._reaches(number, body.placement.homogeneous, np.zeros(3))
-            at_rest = np.zeros((3, self._course.count))
+            reach, _ = self.trees[number].reaches(pose, np.zeros(3))
             return {joint: at_rest, 0: self._course.bounds_on_track(joint, reach)}
-        reaches = self._reaches(number, body.placement.homogeneous, self.chain.axis[joint - 1])
-        return self._course.bounds_on_joint(joint, *reaches)
-
-    def _reaches(self, number: int, pose: Matrix, axis: Vector) -> tuple[Vector | float, Vector | float]:
-        """Return how far points of a body are at most from the origin and from an axis of its joint's frame [m]."""
-        return self.trees[number].reaches(pose, axis)
+        return self._course.bounds_on_joint(joint, *self.trees[number].reaches(pose, self.chain.axis[joint - 1]))
 
     # --- tests (point 7) ---
 
