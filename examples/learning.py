@@ -11,7 +11,8 @@ world = rrtik.World(rrtik.load_robot("ur5"), rrtik.Scene(posts))
 for env in (gymnasium.make("rrtik/Reach-v0", world=world, increment=0.2), gymnasium.make("rrtik/PickPlace-v0")):
     for seed in range(2):
         observation, info = env.reset(seed=seed)
-        shown, total = [], 0.0
+        shown = []
+        total = 0.0
         for action in rrtik_ompl.gym.expert(env):
             shown.append((observation, action))
             observation, reward, ended, cut, info = env.step(action)

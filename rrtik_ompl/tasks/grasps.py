@@ -165,8 +165,18 @@ def grasps(
             width = hand.closed_on(parts, pose, float(np.linalg.norm(points[k, 1] - points[k, 0])))
             if width is None or (length and straight(free, Q[k], pose * before).fraction < 1.0):
                 continue
-            at_grasp = (obstacle, robot.tip, pose, frozen(points[k]), width, hand.opening(width), shift)
-            found.append(Grasp(*at_grasp, frozen(Q[k]), others.clearance(Q[k])))
+            grasp = Grasp(
+                object=obstacle,
+                link=robot.tip,
+                pose=pose,
+                points=frozen(points[k]),
+                width=width,
+                opening=hand.opening(width),
+                approach=shift,
+                q=frozen(Q[k]),
+                clearance=others.clearance(Q[k]),
+            )
+            found.append(grasp)
             if len(found) == CHOICE * wanted:
                 break
         if len(found) >= wanted:
@@ -233,13 +243,16 @@ def _pairs_of_triangles(
     normals = np.cross(sides[:, 0], sides[:, 1])
     areas = np.linalg.norm(normals, axis=1)
     solid = areas > 0.0
-    first, sides, areas = corners[solid, 0], sides[solid], areas[solid]
+    first = corners[solid, 0]
+    sides = sides[solid]
+    areas = areas[solid]
     normals = normals[solid] / areas[:, None]
 
     for face in rng.choice(len(normals), tries, p=areas / areas.sum()):
-        u, v = rng.random(2)
-        u, v = (u, v) if u + v < 1.0 else (1.0 - u, 1.0 - v)
-        point = first[face] + u * sides[face, 0] + v * sides[face, 1]
+        shares = rng.random(2)
+        if shares.sum() >= 1.0:
+            shares = 1.0 - shares  # the other half of a parallelogram
+        point = first[face] + shares @ sides[face]
         inward = -normals[face]
 
         # Where the line meets the triangles, after Moeller and Trumbore.
