@@ -103,7 +103,8 @@ def problem_of(number: int) -> rrtik.Problem:
         rows = _free_rows(robot, Scene(obstacles), rng)
         if len(rows) < 2:
             continue
-        start, goal = rows[0], rows[int(np.argmax(np.linalg.norm(rows - rows[0], axis=1)))]
+        start = rows[0]
+        goal = rows[int(np.argmax(np.linalg.norm(rows - start, axis=1)))]
         if with_lid:
             obstacles[-1] = _lid(rng, obstacles[-1], robot.fk(goal).translation)
         try:
@@ -249,7 +250,9 @@ def _closer(
 
 def peaks(spline: CubicHermiteSpline) -> tuple[Vector, Vector]:
     """The largest speeds and accelerations of the joints, exact, as each piece is a cubic; shape (n,) each."""
-    constant, linear = 2.0 * spline.c[1], 6.0 * spline.c[0]  # of the second derivative in a piece
+    # The second derivative in a piece.
+    constant = 2.0 * spline.c[1]
+    linear = 6.0 * spline.c[0]
     seconds = np.diff(spline.x)[:, None]
     accelerations = np.abs([constant, constant + linear * seconds]).max(axis=(0, 1))
 
@@ -280,7 +283,9 @@ def outcome(number: int) -> Outcome:
 
 def judged(problem: rrtik.Problem, plan: TimedPlan, kinds: list[str], covered: bool, seconds: float) -> Outcome:
     """What the judge says of a plan."""
-    robot, run, motion = problem.robot, plan.require(), plan.trajectory
+    robot = problem.robot
+    run = plan.require()
+    motion = plan.trajectory
     assert motion is not None
     judge = Judge(problem)
     spline = CubicHermiteSpline(motion.times, motion.positions, motion.velocities)

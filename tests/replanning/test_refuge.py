@@ -80,8 +80,10 @@ def test_a_refuge_is_out_of_reach_for_as_long_as_it_says():
 
 
 def test_a_refuge_behind_a_corner_of_the_path_is_out_of_reach_on_the_straight_way_to_it():
-    corner, end = [10.177, 10.177], [10.354, 10.0]  # The arm would be at the end after a tick, around the post.
-    post, lid = box("post", 10.177, 9.53, 0.02, 1.0), box("lid", 10.0, 11.3, 8.0, 2.0)
+    corner = [10.177, 10.177]
+    end = [10.354, 10.0]  # The arm would be there after a tick, around the post.
+    post = box("post", 10.177, 9.53, 0.02, 1.0)
+    lid = box("lid", 10.0, 11.3, 8.0, 2.0)
     problem = plane(post, lid, box("chaser", 8.6, 10.0, 2.0, 8.0), start=(10.0, 10.0))
     nearer = problem.world.with_scene(Scene([post, lid, box("chaser", 9.0, 10.0, 2.0, 8.0)]))
     predicted = MovingWorld(nearer, self_collision=False)

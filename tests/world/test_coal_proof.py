@@ -166,7 +166,8 @@ def resting_on_a_post(rng, robot, q):
         post = rrtik.Obstacle("post", shape, pin.SE3(turn, middle + distance * way))
         return rrtik.World(robot, rrtik.Scene([post], attached=[held], contacts=contacts))
 
-    near, far = 0.0, 0.4
+    near = 0.0
+    far = 0.4
     for _ in range(12):
         place = 0.5 * (near + far)
         touch = any({c.first, c.second} == {"thing", "post"} for c in at(place).contacts(q))

@@ -240,7 +240,9 @@ def test_a_mesh_is_overlapped_by_the_depth_of_its_deepest_triangle(arm, kernels,
 @pytest.mark.kernels
 def test_a_ball_whose_middle_is_in_a_cylinder_is_as_deep_as_a_formula_says(arm):
     """Coal is off by centimetres there."""
-    radius, half, ball = 0.3, 0.4, 0.06
+    radius = 0.3
+    half = 0.4
+    ball = 0.06
     world = World(arm, Scene([Obstacle("can", rrtik.Cylinder(radius, 2.0 * half), [0.9, 0.0, 0.0])]))
     Q = postures(arm, 300)
     wrist = next(body for body in world.bodies if body.name == "wrist")
