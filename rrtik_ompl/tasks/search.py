@@ -204,7 +204,9 @@ class TaskSearch:
         constraints = link.step.stage.constraints if isinstance(link.step.stage, MoveTo) else ()
 
         name = f"stage {link.step.number}"
-        if not constraints and world.motion_proven(before.q, link.q):  # and so are its ends
+        is_constrained = bool(constraints) or world.constraints is not None
+        proven = not is_constrained and world.motion_proven(before.q, link.q)
+        if proven:  # and so are its ends
             problem = known_problem(world, before.q, link.q, name=name)
         else:
             try:
@@ -212,8 +214,10 @@ class TaskSearch:
             except ProblemError as error:
                 self._note_failure(link, str(error))
                 return False
+            # Its world has the constraints, placed as seen from the start.
+            proven = is_constrained and problem.world.motion_proven(before.q, link.q)
 
-        if problem.world.motion_proven(before.q, link.q):
+        if proven:
             straight = JointPath.of(world.robot, np.stack([before.q, link.q]))
             if self._accept_path(link, proved_as_clear(straight, problem.world, CLEARANCE), effort):
                 return True
