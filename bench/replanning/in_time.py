@@ -15,7 +15,8 @@ import coal
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
-from scipy.interpolate import CubicHermiteSpline
+from scipy.interpolate import CubicHermiteSpline, interp1d
+from scipy.spatial.transform import Rotation, Slerp
 from typer import Option
 
 import rrtik_ompl as rrtik
@@ -25,7 +26,7 @@ from bench.shared.run import Run
 from bench.shared.solids import coal_solids, one_of_each, reach_of
 from rrtik_bench.report.page import Report
 from rrtik_ompl.base.arrays import Matrix, Vector
-from rrtik_ompl.model.scene import Obstacle, Scene, TimedPoses, pose_at
+from rrtik_ompl.model.scene import Obstacle, Scene, TimedPoses
 from rrtik_ompl.model.shapes import Shape
 from rrtik_ompl.replanning.in_time import TimedPlan, plan_in_time
 from rrtik_ompl.world.problem import fixed_ends
@@ -181,42 +182,95 @@ def planned(problem: rrtik.Problem, seed: int) -> TimedPlan:
 # The judge.
 
 
+@dataclass(frozen=True)
+class Solid:
+    """A solid of coal, fixed in a frame, and a ball around it there; an infinite one around a half-space.
+
+    Attributes:
+        geometry: The solid.
+        within: Its pose in the frame.
+        middle: Of the ball, in the frame [m].
+        radius: Of the ball [m].
+    """
+
+    geometry: coal.CollisionGeometry
+    within: pin.SE3
+    middle: Vector
+    radius: float
+
+    @classmethod
+    def of(cls, geometry: coal.CollisionGeometry, within: pin.SE3) -> Solid:
+        """The solid with the ball that coal puts around it."""
+        geometry.computeLocalAABB()
+        if isinstance(geometry, coal.Halfspace):
+            return cls(geometry, within, np.zeros(3), np.inf)
+        return cls(geometry, within, within.act(np.asarray(geometry.aabb_center)), float(geometry.aabb_radius))
+
+    def near(self, places: Matrix, points: Matrix, distance: float) -> NDArray[np.bool_]:
+        """Which points are nearer than a distance [m] to the ball, or to the half-space.
+
+        Args:
+            places: Poses of the frame, shape (k, 4, 4).
+            points: A point for each, shape (k, 3).
+            distance: See above.
+        """
+        if isinstance(self.geometry, coal.Halfspace):
+            normals = places[:, :3, :3] @ self.within.rotation @ self.geometry.n
+            on_plane = self.within.act(self.geometry.d * np.asarray(self.geometry.n))
+            heights = ((points - _moved(places, on_plane)) * normals).sum(axis=1)
+            return np.asarray(heights < distance)
+        return np.asarray(np.linalg.norm(points - _moved(places, self.middle), axis=1) < self.radius + distance)
+
+
 class Judge:
-    """Looks at an arm among obstacles at many times: pinocchio places the links, coal compares the solids."""
+    """Looks at an arm among obstacles at many times: pinocchio places the links, coal compares the solids.
+
+    Coal is asked where balls around a link, around an obstacle and around its solid are too near to tell.
+    """
 
     def __init__(self, problem: rrtik.Problem) -> None:
         robot = problem.robot
-        self._robot, self._links = robot, robot.collision
-        self._data, self._frames = robot.model.createData(), robot.collision.createData()
-        self._obstacles = problem.settings.scene.obstacles
-        self._solids = {o.name: coal_solids(o.shape) for o in self._obstacles}
-        for geometry in self._links.geometryObjects:
-            geometry.geometry.computeLocalAABB()
-        for solid, _ in (each for some in self._solids.values() for each in some):
-            solid.computeLocalAABB()
+        self._robot = robot
+        self._links = robot.collision.geometryObjects
+        self._data = robot.model.createData()
+        self._frames = robot.collision.createData()
+        self._own = [Solid.of(link.geometry, pin.SE3.Identity()) for link in self._links]
+        self._obstacles = [
+            (o, [Solid.of(*each) for each in coal_solids(o.shape)]) for o in problem.settings.scene.obstacles
+        ]
 
     def gaps(self, rows: Matrix, times: Vector, distance: float) -> NDArray[np.int64]:
         """Per look 0 if nothing is nearer than the distance [m], 1 if something is, and 2 for a contact, shape (k,).
 
         What no joint moves keeps no margin.
-        """
-        found = np.zeros(len(rows), dtype=np.int64)
-        links = range(len(self._links.geometryObjects))
-        poses = np.empty((len(rows), len(links), 4, 4))
-        for k, q in enumerate(self._robot.pinocchio_configuration(rows)):
-            pin.updateGeometryPlacements(self._robot.model, self._data, self._links, self._frames, q)
-            poses[k] = [self._frames.oMg[link].homogeneous for link in links]
 
-        for obstacle in self._obstacles:
-            places = np.array([pose_at(obstacle, float(now)).homogeneous for now in times])
-            for number, link in enumerate(links):
-                own = self._links.geometryObjects[link].geometry
-                room = distance if self._links.geometryObjects[link].parentJoint else max(distance - KEPT, 0.0)
-                for solid, within in self._solids[obstacle.name]:
-                    there = places @ within.homogeneous
-                    close = _balls_closer(own, poses[:, number], solid, there, room)
-                    for k in np.flatnonzero(close & (found < 2)).tolist():
-                        ends = own, pin.SE3(poses[k, number]), solid, pin.SE3(there[k])
+        Args:
+            rows: The configuration at each time, or a single one for all, shape (k, n) or (1, n).
+            times: The times [s], shape (k,).
+            distance: See above.
+        """
+        found = np.zeros(len(times), dtype=np.int64)
+        poses = np.empty((len(self._links), len(rows), 4, 4))
+        for k, q in enumerate(self._robot.pinocchio_configuration(rows)):
+            pin.updateGeometryPlacements(self._robot.model, self._data, self._robot.collision, self._frames, q)
+            poses[:, k] = [frame.homogeneous for frame in self._frames.oMg]
+        poses = np.broadcast_to(poses, (len(self._links), len(times), 4, 4))
+
+        for obstacle, solids in self._obstacles:
+            places = places_of(obstacle, times)
+            middle = np.mean([solid.middle for solid in solids], axis=0)
+            radius = max(float(np.linalg.norm(solid.middle - middle)) + solid.radius for solid in solids)
+
+            for link, own, there in zip(self._links, self._own, poses, strict=True):
+                room = distance if link.parentJoint else max(distance - KEPT, 0.0)
+                own_middles = _moved(there, own.middle)
+                apart = np.linalg.norm(own_middles - _moved(places, middle), axis=1)
+                near = apart < own.radius + radius + room
+                for solid in solids if near.any() else ():
+                    close = near & (found < 2)
+                    close[close] = solid.near(places[close], own_middles[close], own.radius + room)
+                    for k in np.flatnonzero(close).tolist():
+                        ends = own.geometry, pin.SE3(there[k]), solid.geometry, pin.SE3(places[k]) * solid.within
                         if found[k] == 0 and _closer(*ends, room):
                             found[k] = 1
                         if found[k] and _closer(*ends, 0.0):
@@ -224,20 +278,25 @@ class Judge:
         return found
 
 
-def _balls_closer(
-    first: coal.CollisionGeometry, poses: Matrix, second: coal.CollisionGeometry, places: Matrix, distance: float
-) -> NDArray[np.bool_]:
-    """Whether the balls around two solids are nearer than a distance, for many poses, shape (k, 4, 4)."""
-    if isinstance(second, coal.Halfspace):
-        return np.ones(len(poses), dtype=bool)
-    middles = [
-        each[:, :3, :3] @ np.asarray(solid.aabb_center) + each[:, :3, 3]
-        for solid, each in ((first, poses), (second, places))
-    ]
-    near: NDArray[np.bool_] = (
-        np.linalg.norm(middles[0] - middles[1], axis=1) < first.aabb_radius + second.aabb_radius + distance
-    )
-    return near
+def places_of(obstacle: Obstacle, times: Vector) -> Matrix:
+    """Where an obstacle is at many times by scipy, from the poses that its motion states, shape (k, 4, 4)."""
+    places = np.tile(obstacle.pose.homogeneous, (len(times), 1, 1))
+    motion = obstacle.motion
+    if motion is None:
+        return places
+
+    assert isinstance(motion, TimedPoses)
+    stated = np.array([pose.homogeneous for pose in motion.poses])
+    now = np.clip(times, motion.times[0], motion.times[-1])
+    places[:, :3, :3] = Slerp(motion.times, Rotation.from_matrix(stated[:, :3, :3]))(now).as_matrix()
+    places[:, :3, 3] = interp1d(motion.times, stated[:, :3, 3], axis=0)(now)
+    return places
+
+
+def _moved(poses: Matrix, point: Vector) -> Matrix:
+    """A point of a frame in many poses of the frame, shape (k, 3)."""
+    moved: Matrix = poses[:, :3, :3] @ point + poses[:, :3, 3]
+    return moved
 
 
 def _closer(
@@ -301,7 +360,7 @@ def judged(problem: rrtik.Problem, plan: TimedPlan, kinds: list[str], covered: b
     # Until when the arm may stay, and what comes then.
     goal = rows[-1]
     stay = _looks(plan.arrival, min(plan.free_until, HORIZON))
-    stay_gaps = judge.gaps(np.broadcast_to(goal, (len(stay), robot.dof)), stay, KEPT)
+    stay_gaps = judge.gaps(goal[None], stay, KEPT)
     ends_near = None
     if plan.free_until < HORIZON:
         reached = judge.gaps(goal[None], np.array([plan.free_until]), MARGIN + (run.clearance or 0.0) + 2e-4)
@@ -309,7 +368,7 @@ def judged(problem: rrtik.Problem, plan: TimedPlan, kinds: list[str], covered: b
 
     # The first slot in which the goal is free at all.
     slots = np.arange(round(plan.least_seconds * RATE), round(plan.arrival * RATE) + 1) / RATE
-    at_goal = judge.gaps(np.broadcast_to(goal, (len(slots), robot.dof)), slots, KEPT)
+    at_goal = judge.gaps(goal[None], slots, KEPT)
     bound = float(slots[np.flatnonzero(at_goal == 0)[0]]) if (at_goal == 0).any() else np.nan
 
     shares = np.linspace(0.0, 1.0, 101)
@@ -439,7 +498,7 @@ READING = (
     f"plan keeps {1e3 * MARGIN:g} mm, has {RATE:g} slots a second, and arrives by {HORIZON:g} s. The judge takes the "
     f"exported motion as scipy's cubic through its knots, looks every {1e3 * EVERY:g} ms (for the arm's own contacts, "
     "tenfold), places links by pinocchio and solids, made from the numbers of each shape, where the obstacles' "
-    "motions say, and compares them by coal; speeds and accelerations are the exact peaks of the pieces. The bound is "
-    "the first slot, after the time that the limits of the joints need, in which coal finds the goal free: no plan "
-    "arrives earlier."
+    "motions say, as scipy interpolates these, and compares by coal those that balls around them do not tell apart; "
+    "speeds and accelerations are the exact peaks of the pieces. The bound is the first slot, after the time that the "
+    "limits of the joints need, in which coal finds the goal free: no plan arrives earlier."
 )

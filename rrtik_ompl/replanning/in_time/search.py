@@ -11,6 +11,7 @@ for earlier arrivals, in the next round for any.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from heapq import heappop, heappush
 from itertools import pairwise
 from typing import TypeAlias
@@ -426,6 +427,16 @@ def timed(
     least = _least_slots_left(places, end_of_piece, pace)
     previous: dict[Place, Place] = {}
     blocked_steps: BlockedSteps = {}
+
+    # The same stretches are looked at from slot to slot.
+    @cache
+    def slots_of(begin: int, end: int) -> list[int]:
+        return _slots_of(places[end] - places[begin], pace)
+
+    @cache
+    def rows_of(begin: int, end: int, slots: int) -> Matrix:
+        return stretch(places[begin], places[end], slots, pace)
+
     queue: list[tuple[int, int, int, Place]] = [(int(least[0]), 0, 0, (0, 0))]  # arrival, -place, slot, from where
 
     checked = 0
@@ -435,14 +446,17 @@ def timed(
         if (slot, number) in previous:
             continue
         checked += slot > 0
-        if slot and not _stretch_free(places, before, (slot, number), pace, worlds, blocked_steps, stop):
-            continue
+        if slot:
+            begin_slot, begin = before
+            stretch_rows = rows_of(begin, number, slot - begin_slot)
+            if not _stretch_free(stretch_rows, before, number, worlds, blocked_steps, stop):
+                continue
         previous[slot, number] = before
         if number == goal and slot:
             return _timing(places, previous, (slot, number))
 
         for after in range(number, int(end_of_piece[number]) + 1):
-            for slots in _slots_of(places[after] - places[number], pace):
+            for slots in slots_of(number, after):
                 arrival = slot + slots + int(least[after])
                 if arrival <= last:
                     heappush(queue, (arrival, -after, slot + slots, (slot, number)))
@@ -483,28 +497,29 @@ def _least_slots_left(places: Matrix, end_of_piece: NDArray[np.int64], pace: Pac
 
 
 def _stretch_free(
-    places: Matrix,
-    begin: Place,
-    end: Place,
-    pace: Pace,
-    worlds: ForeseenWorlds,
-    blocked_steps: BlockedSteps,
-    stop: Stop,
+    rows: Matrix, begin: Place, end: int, worlds: ForeseenWorlds, blocked_steps: BlockedSteps, stop: Stop
 ) -> bool:
     """Check whether the stretch from place to place, or the wait at one, is free in each of its slots.
 
     The step at which the same stretch was blocked last, in other slots, is checked first.
-    """
-    (slot, a), (end_slot, b) = begin, end
-    count = end_slot - slot
-    rows = stretch(places[a], places[b], count, pace)
 
-    suspect = blocked_steps.get((a, b, count))
+    Args:
+        rows: The configurations at the begin of each slot and at the end, shape (k, n).
+        begin: Where and when it begins.
+        end: The place where it ends.
+        worlds: Checks which motions are free in which slot.
+        blocked_steps: Gets the step that was found blocked.
+        stop: Ends the check when it returns True; the stretch then counts as blocked.
+    """
+    slot, place = begin
+    count = len(rows) - 1
+
+    suspect = blocked_steps.get((place, end, count))
     if suspect is not None and not worlds.free(slot + suspect, rows[suspect], rows[suspect + 1]):
         return False
     free = worlds.steps_free(slot, rows, 1, stop)
     if free < count:
-        blocked_steps[a, b, count] = free
+        blocked_steps[place, end, count] = free
     return free == count
 
 
