@@ -271,7 +271,10 @@ class MovingProver(Prover):
         self.always_colliding = always_colliding
 
     def elsewhere(self) -> MovingProver:
-        """Return a prover of the same bodies, whose obstacles may be placed independently of those of this one."""
+        """Return a prover of the same bodies, whose obstacles may be placed independently of those of this one.
+
+        Both are for the same thread.
+        """
         packed = super()._packed_for(0.0, 0.0).for_thread(placing=True)
         other = replace(self, tables=TakenProof(packed), kin=object(), _coal=None)
         other.obstacles = self._table_obstacles().within(packed)

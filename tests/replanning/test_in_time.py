@@ -17,7 +17,7 @@ from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.scene import ConstantVelocity, Obstacle, Scene, TimedPoses
 from rrtik_ompl.model.shapes import Box, HalfSpace, Sphere
 from rrtik_ompl.replanning.in_time import plan_in_time
-from rrtik_ompl.replanning.in_time.foreseen import travel
+from rrtik_ompl.replanning.in_time.foreseen import Travel
 from rrtik_ompl.replanning.in_time.pace import Pace, Timing, stretch
 from rrtik_ompl.replanning.in_time.search import TimeTree
 from rrtik_ompl.world.opinion import opinion_on
@@ -151,14 +151,14 @@ def test_the_way_of_an_obstacle_bounds_every_point_of_it():
     points = rng.normal(size=(50, 3))
     points *= 0.3 / np.linalg.norm(points, axis=1, keepdims=True)
     for begin in np.linspace(0.0, 1.4, 15):
-        bound = travel(solid, begin, begin + 0.2, 0.3)
+        bound = Travel(solid, 0.3).from_middle(begin, begin + 0.2)
         middle = solid.motion.pose_at(solid.pose, begin + 0.1)
         for now in np.linspace(begin, begin + 0.2, 21):
             there = solid.motion.pose_at(solid.pose, now)
             moved = [np.linalg.norm(there.act(p) - middle.act(p)) for p in points]
             assert max(moved) <= bound
     steady = Obstacle("steady", Sphere(0.3), motion=ConstantVelocity([0.0, 3.0, 4.0]))
-    assert travel(steady, 1.0, 1.2, 0.3) == pytest.approx(0.5)
+    assert Travel(steady, 0.3).from_middle(1.0, 1.2) == pytest.approx(0.5)
 
 
 def test_a_vertex_is_reached_only_onwards_in_time_and_at_a_speed_that_is_allowed():

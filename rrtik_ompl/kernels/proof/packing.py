@@ -91,9 +91,11 @@ class ProofPairs:
         """The same pairs in a table with memory of its own to compute in.
 
         Args:
-            placing: Whether its obstacles may be put elsewhere than those of this table.
+            placing: Whether its obstacles may be put elsewhere than those of this table. It is then for the same
+                thread, and computes frames, which take most of the memory, where this one does: each proof begins with
+                none of them.
         """
-        own = {name: np.zeros_like(getattr(self.table, name)) for name in COMPUTED}
+        own = {name: np.zeros_like(getattr(self.table, name)) for name in COMPUTED if name != "frames" or not placing}
         if self.clouds:  # points that are compared stand among the solids
             own |= {name: getattr(self.table, name) for name in ("solids", "corners")}
         if placing:

@@ -50,7 +50,7 @@ class ForeseenWorlds:
         self._world = world.with_accuracy("exact")
         self._slot = slot
         self._clearance = clearance
-        self._radii = {o.name: farthest(o.shape, pin.SE3.Identity()) for o in world.scene.obstacles}
+        self._travels = {o.name: Travel(o, farthest(o.shape, pin.SE3.Identity())) for o in world.scene.obstacles}
 
         room = world.settings.clearance
         self._bodies = [replace(b, margin=b.margin + room) if b.kind == "obstacle" else b for b in world.bodies]
@@ -183,7 +183,7 @@ class ForeseenWorlds:
             The time [s], or None if the two are proven apart in the whole interval.
         """
         middle = 0.5 * (begin + end)
-        reach = travel(obstacle, begin, end, self._radii[obstacle.name])
+        reach = self._travels[obstacle.name].from_middle(begin, end)
         pose = pose_at(obstacle, middle) * obstacle_body.within
         part, rest, kept = body
         if distance(part.geometry, rest, obstacle_body.geometry, pose.homogeneous, kept + reach) is not None:
@@ -210,9 +210,7 @@ class ForeseenWorlds:
         begin = self._slot * (block << level)
         end = self._slot * ((block + 1) << level)
         poses = {o.name: pose_at(o, 0.5 * (begin + end)) for o in self._world.scene.obstacles}
-        room = {
-            o.name: self._clearance + travel(o, begin, end, self._radii[o.name]) for o in self._world.scene.obstacles
-        }
+        room = {name: self._clearance + travel.from_middle(begin, end) for name, travel in self._travels.items()}
         places = np.array([[*poses[name].homogeneous.ravel(), room[name]] for name in poses])
 
         key = self._keys[level, block] = blake2b(places.tobytes(), digest_size=16).digest()
@@ -236,30 +234,46 @@ class ForeseenWorlds:
         return self._provers.pop(list(self._provers)[int(self._rng.integers(len(self._provers)))])
 
 
-def travel(obstacle: Obstacle, begin: float, end: float, radius: float) -> float:
-    """Return an upper bound on the way of any point of an obstacle from the middle of a slot to either end [m].
+class Travel:
+    """Upper bounds on how far the points of an obstacle go by its stated motion.
 
     Args:
-        obstacle: The obstacle with its stated motion.
-        begin: Begin of the slot [s].
-        end: End of the slot [s].
-        radius: Distance of the obstacle's farthest point from its origin [m].
-
-    Raises:
-        InputError: If the obstacle turns and is unbounded.
+        obstacle: The obstacle.
+        radius: Distance of its farthest point from its origin [m]; inf if it is unbounded.
     """
-    motion = obstacle.motion
-    if motion is None:
-        return 0.0
-    if isinstance(motion, ConstantVelocity):
-        return 0.5 * (end - begin) * float(np.linalg.norm(motion.velocity)) + ROUNDING
 
-    middle = 0.5 * (begin + end)
-    travels = []
-    for first, last in ((begin, middle), (middle, end)):
-        stations = motion.times[(motion.times > first) & (motion.times < last)]
-        poses = [motion.pose_at(obstacle.pose, float(time)) for time in (first, *stations, last)]
-        travels.append(sum(travel_bound(a, b, radius) for a, b in pairwise(poses)))
-    if not np.isfinite(max(travels)):
-        raise turns_without_end(obstacle.name)
-    return max(travels) + (ROUNDING if max(travels) > 0.0 else 0.0)
+    def __init__(self, obstacle: Obstacle, radius: float) -> None:
+        self._name = obstacle.name
+        self._speed = 0.0
+        self._times = np.zeros(1)
+        self._ways = np.zeros(0)  # from each pose that is stated to the next one [m]
+        match obstacle.motion:
+            case ConstantVelocity(velocity=velocity):
+                self._speed = float(np.linalg.norm(velocity))
+            case TimedPoses(times=times, poses=poses):
+                self._times = times
+                self._ways = np.array([travel_bound(a, b, radius) for a, b in pairwise(poses)])
+
+    def from_middle(self, begin: float, end: float) -> float:
+        """Return an upper bound on the way of any point from the middle of an interval to either end [m].
+
+        Args:
+            begin: Begin of the interval [s].
+            end: End of the interval [s].
+
+        Raises:
+            InputError: If the obstacle turns and is unbounded.
+        """
+        middle = 0.5 * (begin + end)
+        longest = max(self._way(begin, middle), self._way(middle, end))
+        return longest + (ROUNDING if longest > 0.0 else 0.0)
+
+    def _way(self, begin: float, end: float) -> float:
+        """Return how far a point goes between two times at most [m]; between two poses its speed is even."""
+        first, last = self._times[:-1], self._times[1:]
+        shares = (np.minimum(last, end) - np.maximum(first, begin)) / (last - first)
+        meant = shares > 0.0
+        way = self._speed * (end - begin) + float(shares[meant] @ self._ways[meant])
+        if not np.isfinite(way):
+            raise turns_without_end(self._name)
+        return way
