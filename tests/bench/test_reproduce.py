@@ -25,6 +25,7 @@ from rrtik_ompl.description import catalog
 HELD, BETTER, DIFFERS, REFUTED, MISSED = Verdict
 TABLES = {table.name: table for table in COLLECTION.tables}
 FAST = ("titan4", "sensing-arithmetic", "sensing-noise", "sensing-sequences", "errata-kinematics", "errata-grim",
+        "errata-statistics",
         "crdt-routes", "mb-rrt-example", "mb-rrt-10", "mb-rrt-sliding", "mb-rrt-obstacles",
         "ikurt-solutions",
         "drrt-con-arm", "drrt-con-unannounced")  # fmt: skip

@@ -4,9 +4,13 @@ import re
 
 import numpy as np
 import pytest
+from scipy.stats import t as student_t
 
+from rrtik_bench.crdt.published import CRDT_TABLE, RRT_TABLE
 from rrtik_bench.errata.grim import consistent, off
 from rrtik_bench.errata.prints import level_link_4, listed_routes, printed_routes, undefined
+from rrtik_bench.errata.statistics import left_out, points_of, welch
+from rrtik_bench.errata.tables import statistics
 from rrtik_bench.figures import ikurt as ikurt_figures
 from rrtik_bench.figures.mb_rrt import FIGURES, first_directions
 from rrtik_bench.ikurt_limits import WRIST, approach, outward_share
@@ -29,6 +33,56 @@ def test_a_mean_over_whole_numbers_is_a_fraction_of_their_number():
     assert consistent(5.4286, 4, 35) == [7, 14, 21, 28, 35]
     assert consistent(6.7844, 4, 35) == []
     assert 71 in consistent(1333.0282, 4, 100)
+
+
+def test_welch_of_printed_numbers_is_that_of_samples_which_have_them():
+    rng, count = np.random.default_rng(0), 1000
+    samples = []
+    for table in (RRT_TABLE, CRDT_TABLE):
+        values = rng.exponential(size=count)
+        samples.append(table[0][0] + table[3][0] * (values - values.mean()) / values.std(ddof=1))
+    first, second = ((sample.mean(), sample.std(ddof=1)) for sample in samples)
+    t, p = welch(first, second, count)
+    squares = [sample.var(ddof=1) / count for sample in samples]
+    by_hand = (samples[0].mean() - samples[1].mean()) / np.sqrt(sum(squares))
+    freedom = sum(squares) ** 2 / (sum(square**2 for square in squares) / (count - 1))
+    assert t == pytest.approx(by_hand, rel=1e-12)
+    assert p == pytest.approx(2.0 * student_t.sf(t, freedom), rel=1e-6)
+    assert t == pytest.approx(30.7, abs=0.05)
+
+
+def test_equal_means_do_not_differ_more_often_than_by_chance():
+    rng, tests = np.random.default_rng(0), 2000
+    samples = rng.normal(0.0, [[[1.0]], [[3.0]]], (2, tests, 50))
+    means, deviations = samples.mean(axis=2), samples.std(axis=2, ddof=1)
+    p = [welch((means[0, k], deviations[0, k]), (means[1, k], deviations[1, k]), 50)[1] for k in range(tests)]
+    assert 0.035 < np.mean(np.array(p) < 0.05) < 0.065
+
+
+@pytest.mark.parametrize("reached", [1, 39, 47, 250])
+@pytest.mark.parametrize("counted", [9_800, 10_000, 10_100])
+def test_generations_left_out_are_those_that_make_a_quotient_right(reached, counted):
+    least, most = left_out(10_000, reached, counted // reached)
+    assert least <= 10_000 - counted <= most
+    for missing in (least, most):
+        assert (10_000 - missing) // reached == counted // reached
+    assert (10_000 - least + 1) // reached != counted // reached != (10_000 - most - 1) // reached
+
+
+def test_a_share_gives_the_points_that_were_reached():
+    for number in range(252):
+        assert number in points_of(round(100.0 * number / 251, 1), 251)
+        assert number in points_of(int(1000.0 * number / 251) / 10, 251)
+
+
+def test_printed_statistics_are_judged_against_each_other():
+    rows = {row.name: row for row in statistics(True)}
+    means = [row for name, row in rows.items() if name.startswith("tables 6.2")]
+    counts = [row for name, row in rows.items() if name.startswith("[2, table 4]")]
+    assert [row.verdict.value for row in means] == ["refuted"] * 4
+    assert [row.verdict.value for row in counts] == ["differs"] * 4
+    assert [row.value for row in counts] == [84, 120, 51, 17]
+    assert rows["test 2, 2000 mm: standard deviation"].verdict.value == "refuted"
 
 
 def test_gamma_of_the_print_is_right_where_the_first_joint_is_at_zero_and_only_there():

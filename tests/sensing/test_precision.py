@@ -1,9 +1,12 @@
 """Statistics of repeated measurements reproduce the published ones."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from rrtik_bench.sensing.precision import Series, series_of
+from rrtik_bench.sensing.tables import GRIPPER
 from rrtik_ompl.base.errors import InputError
 
 
@@ -17,18 +20,31 @@ def test_statistics_reproduce_the_published_ones():
 
 
 @pytest.mark.parametrize(
-    ("largest", "smallest", "mean", "printed", "bound", "possible"),
-    [
-        (1963.3162, 1962.3938, 1962.9328, 0.5261, 0.464, False),
-        (2134.1887, 2131.7919, 2132.7625, 1.2301, 1.204, False),
-        (2407.2225, 2398.0351, 2402.7820, 5.3397, 4.617, False),
-        (2791.8982, 2777.4443, 2784.6694, 5.5185, 7.263, True),
-    ],
+    ("distance", "by_range", "by_mean", "by_quartiles"),
+    [(500, 0.464, 0.457, 0.351), (1000, 1.204, 1.182, 0.898), (1500, 4.617, 4.614, 3.607), (2000, 7.263, 7.263, 5.362)],
 )
-def test_an_impossible_deviation_is_flagged(largest, smallest, mean, printed, bound, possible):
-    series = Series(100, largest, smallest, mean, printed)
-    assert series.largest_possible_deviation == pytest.approx(bound, abs=2e-3)
-    assert series.possible is possible
+def test_an_impossible_deviation_is_flagged(distance, by_range, by_mean, by_quartiles):
+    series = GRIPPER[distance]
+    assert series.possible_deviations == pytest.approx(
+        {"range": by_range, "mean": by_mean, "quartiles": by_quartiles}, abs=1e-3
+    )
+    assert not series.possible
+    assert replace(series, quartiles=None).possible is (distance == 2000)
+
+
+@pytest.mark.parametrize("method", ["inverted_cdf", "hazen", "weibull", "linear", "median_unbiased", "higher", "lower"])
+def test_no_sample_deviates_by_more_than_its_statistics_allow(method):
+    rng, nearest = np.random.default_rng(0), {"range": 0.0, "mean": 0.0, "quartiles": 0.0}
+    for _ in range(2000):
+        count = 4 * int(rng.integers(1, 30))
+        values = rng.beta(*rng.uniform(0.02, 2.0, 2), count) + rng.integers(-1, 2, count) * rng.integers(0, 2)
+        quartiles = tuple(np.quantile(values, [0.25, 0.5, 0.75], method=method))
+        mean, deviation = values.mean(), values.std(ddof=1)
+        series = Series(count, values.max(), values.min(), mean, deviation, quartiles)
+        for known, bound in series.possible_deviations.items():
+            assert deviation <= bound + 1e-12
+            nearest[known] = max(nearest[known], deviation / max(bound, 1e-12))
+    assert min(nearest.values()) > 0.95  # and some come near each bound
 
 
 @pytest.mark.parametrize(

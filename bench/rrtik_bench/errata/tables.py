@@ -1,4 +1,4 @@
-"""Errors of [1] and [2], and the GRIM test [54] of the means of [3]."""
+"""Errors of [1] and [2], what their printed statistics say of each other, and the GRIM test [54] of means of [3]."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ import numpy as np
 
 import rrtik_ompl as rrtik
 from rrtik_bench import drrt_con, ikurt, titan4
-from rrtik_bench.crdt.published import RRT_TABLE, SDU_LIST
+from rrtik_bench.crdt.published import CRDT_TABLE, RRT_TABLE, SDU_LIST
+from rrtik_bench.crdt.tables import COLUMNS
 from rrtik_bench.errata.grim import consistent, off
 from rrtik_bench.errata.prints import (
     by_arc_tangent,
@@ -19,10 +20,12 @@ from rrtik_bench.errata.prints import (
     printed_routes,
     undefined,
 )
+from rrtik_bench.errata.statistics import left_out, points_of, welch
+from rrtik_bench.genetic.published import POINTS, TABLE_4, TABLE_5
 from rrtik_bench.genetic.runs import arm, run
 from rrtik_bench.mb_rrt.runs import GOALS, NAMES, PRECISION, PUBLISHED
 from rrtik_bench.report.rows import INFINITE, Bar, Row, Verdict, judged
-from rrtik_bench.sensing.tables import arithmetic
+from rrtik_bench.sensing.tables import deviations
 from rrtik_bench.tables import Table
 from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.ik.analytic.analytic_solver import wrapped
@@ -30,6 +33,8 @@ from rrtik_ompl.ik.analytic.closed_form import solutions
 from rrtik_ompl.ik.genetic.options import STANDARD
 from rrtik_ompl.model.robot import Robot
 
+RUNS_OF_E = 1000  # of each planner in environment E, as printed
+GA_LIMIT = 10_000  # generations, as printed
 RIGHT_TO = 1e-9  # a formula that is right is so to this
 DEVIATION = Bar((0.0, INFINITE), held=(0.0, RIGHT_TO), refuted=(1e-3, 1e6))
 SHARE = Bar((0.0, 1.0), held=(1.0, 1.0), refuted=(0.0, 0.99))
@@ -114,7 +119,7 @@ def _refuted(rows: Iterable[Row], *names: str) -> list[Row]:
 
 
 def planning(quick: bool) -> list[Row]:
-    """Statements of chapters 4 to 6, and one of [2]."""
+    """Statements of chapters 5 and 6, and one of [2]."""
     wrong = [edges for edges in (1, 2, 3) if printed_routes(3, 1, edges) != listed_routes(3, 1, edges)]
     texts = [f"m = {m}: {printed_routes(3, 1, m)} printed, {listed_routes(3, 1, m)} listed" for m in (1, 2, 3)]
     moves = undefined(np.deg2rad(SDU_LIST))
@@ -129,7 +134,6 @@ def planning(quick: bool) -> list[Row]:
                f"so round by chance: {chance:.1%}", chance, Bar((0.0, 1.0), held=(0.05, 1.0), differs=(1e-4, 0.05)),
                "points to a cap on the iterations, with which 100 % would not be known"),
         *_refuted(drrt_con.triangles(quick), "ticks with"),
-        *_refuted(arithmetic(quick), "test 2"),
         *_refuted(ikurt.solutions(quick), "solutions"),
         *([] if quick else [_gain()]),
     ]  # fmt: skip
@@ -141,6 +145,52 @@ def _gain() -> Row:
     return judged("[2]: points reached by five joints with the printed extrapolation", "100 %", f"{printed:.0f} %",
                   0.01 * printed if damped == 100.0 else np.nan, SHARE,
                   f"gain 1: nothing brakes what leaves the tip at rest; with gain 0 {damped:.0f} %")  # fmt: skip
+
+
+def statistics(quick: bool) -> list[Row]:
+    """What printed means, deviations and counts say of each other."""
+    del quick
+    return [*_differences(), *_refuted(deviations(), "test 2"), *_per_point()]
+
+
+def _differences() -> list[Row]:
+    """Tables 6.2 and 6.3, of which [1] says that nothing in them differs significantly."""
+    rows = []
+    for k, column in enumerate(COLUMNS):
+        first, second = ((table[0][k], table[3][k]) for table in (RRT_TABLE, CRDT_TABLE))
+        t, p = welch(first, second, RUNS_OF_E)
+        together = min(len(COLUMNS) * p, 1.0)
+        rows.append(
+            judged(f"tables 6.2 and 6.3, {column}: means of RRT and C-RDT", "no significant difference",
+                   f"{first[0]:g} and {second[0]:g}: t = {t:.1f}, p = {p:.1g}", together,
+                   Bar((0.0, 1.0), held=(0.05, 1.0), refuted=(0.0, 0.05)),
+                   f"Welch's test [82] of the printed means and deviations, {RUNS_OF_E} runs each; "
+                   f"judged by {len(COLUMNS)} p, as there are so many columns")
+        )  # fmt: skip
+    return rows
+
+
+def _per_point() -> list[Row]:
+    """Generations a point of tables 4 and 5 of [2], which are generations over points if a trajectory is complete."""
+    whole = [each[1] for each in TABLE_4.values()] + list(TABLE_5.values())
+    cut_off = sum(generations // POINTS == per_point for generations, per_point in whole)
+    rows = [
+        judged("[2, tables 4, 5]: generations a point, trajectories that are complete", f"{len(whole)} quotients",
+               f"{cut_off} of {len(whole)} are generations / {POINTS}, decimals cut off", cut_off,
+               Bar((0.0, len(whole)), held=(len(whole), len(whole))))
+    ]  # fmt: skip
+    for number, ((share, per_point), _) in TABLE_4.items():
+        (reached,) = points_of(share, POINTS)
+        least, most = left_out(GA_LIMIT, reached, per_point)
+        missing = least if least > 0 else min(most, 0)
+        rows.append(
+            judged(f"[2, table 4], trajectory {number} without reduction: generations a point", str(per_point),
+                   f"{GA_LIMIT / reached:.1f} by {reached} points in {GA_LIMIT:,} generations", missing,
+                   Bar((-1e4, 1e4), held=(0.0, 0.0), refuted=(-1e4, -1.0), differs=(1.0, 3.0 * per_point)),
+                   f"no number of points gives {per_point}, rounded or cut off; it is right if {least} to {most} "
+                   "generations for the point that was not reached are left out, which is not said")
+        )  # fmt: skip
+    return rows
 
 
 def grim(quick: bool) -> list[Row]:
@@ -173,6 +223,7 @@ def _listed(numbers: Sequence[int], most: int = 6) -> str:
 
 TABLES = (
     Table("errata-kinematics", "Errors of the sources: kinematics", "[1, ch. 3, app. B, C]", kinematics, 2, 1),
-    Table("errata-planning", "Errors of the sources: sensing, planning", "[1, ch. 4 to 6], [2]", planning, 12, 5),
+    Table("errata-planning", "Errors of the sources: planning", "[1, ch. 5, 6], [2]", planning, 12, 5),
+    Table("errata-statistics", "Printed statistics beside each other", "[1, ch. 4, 6], [2]", statistics, 1, 1),
     Table("errata-grim", "GRIM test of printed means", "[3, tables 6 to 11], by [54]", grim, 1, 1),
 )

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from rrtik_bench.report.rows import Bar, Row, about, judged, within
-from rrtik_bench.sensing.precision import NORMAL_QUARTILES, series_of
+from rrtik_bench.sensing.precision import series_of
 from rrtik_bench.sensing.tables import ACCURACY, GRIPPER, SERIES, SOURCE
 from rrtik_bench.tables import Table
 
@@ -39,7 +39,7 @@ def gripper(quick: bool) -> list[Row]:
     from rrtik_bench.sensing.runs import PLAIN, gripper_distances, gripper_poses, seen_poses
 
     poses, count, rows = (3, 20, []) if quick else (5, 100, [])
-    for distance, _, _, _, first, third in GRIPPER:
+    for distance, published in GRIPPER.items():
         spread = {}
         for align in (False, True):
             places = gripper_poses(1e-3 * distance, poses)
@@ -48,7 +48,7 @@ def gripper(quick: bool) -> list[Row]:
                 np.median([series_of(gripper_distances(each)).robust_deviation for each in seen])
             )
         rows += _rows(f"gripper, l = {distance} mm: spread by the quartiles",
-                      (third - first) / NORMAL_QUARTILES, spread, 1.0)  # fmt: skip
+                      published.robust_deviation, spread, 1.0)  # fmt: skip
     return rows
 
 

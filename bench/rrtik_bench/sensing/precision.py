@@ -52,13 +52,33 @@ class Series:
 
     @property
     def possible(self) -> bool:
-        """No sample in [smallest, largest] deviates by more than half the range times sqrt(N / (N - 1)) (like [54])."""
+        """Whether any sample has these statistics, as far as `possible_deviations` tell (like [54])."""
         return self.deviation <= self.largest_possible_deviation
 
     @property
     def largest_possible_deviation(self) -> float:
-        """What a sample of this range and size can deviate at most."""
-        return 0.5 * (self.largest - self.smallest) * float(np.sqrt(self.count / (self.count - 1)))
+        """The least of `possible_deviations`."""
+        return min(self.possible_deviations.values())
+
+    @property
+    def possible_deviations(self) -> dict[str, float]:
+        """What a sample can deviate at most, by what is known of it.
+
+        With its range alone: half of the values lie at each end. With its mean, too: all at the ends, as many at each
+        as the mean asks for [81]. With its quartiles: a quarter of the values lies between each two neighbours of
+        smallest, quartiles and largest, each value at the end that is farther from the mean. That holds for every
+        quartile between the values of rank N / 4 and N / 4 + 1, so for all usual ones if N is a multiple of 4.
+        """
+        above, below = self.largest - self.mean, self.mean - self.smallest
+        variances = {"range": 0.25 * (self.largest - self.smallest) ** 2, "mean": above * below}
+
+        if self.quartiles is not None and self.count % 4 == 0:
+            marks = np.array([self.smallest, *self.quartiles, self.largest])
+            away = (marks - self.mean) ** 2
+            variances["quartiles"] = float(np.maximum(away[1:], away[:-1]).mean())
+
+        scale = self.count / (self.count - 1)
+        return {known: float(np.sqrt(scale * variance)) for known, variance in variances.items()}
 
     def error_percent(self, truth: float) -> float:
         """Of the mean, in percent of the true value: ``(mean - truth) / truth * 100``."""

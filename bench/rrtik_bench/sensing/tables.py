@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 
 from rrtik_bench.report.rows import Bar, Row, about, judged, within
-from rrtik_bench.sensing.precision import NORMAL_QUARTILES
+from rrtik_bench.sensing.precision import Series
 from rrtik_bench.tables import Table
 from rrtik_ompl.base.arrays import Matrix, Vector
 
@@ -16,23 +16,38 @@ CAMERA = np.array([[877.6915, 0.2272, 320.6451], [0.0, 869.8953, 242.8119], [0.0
 MARKER = 80.0  # [mm]
 NOISE = 0.03  # [px] of each corner coordinate
 STEP = 1e-6  # of the differences
-# Marker before the camera: mean x, y, z and standard deviation of z, per series [mm]
-SERIES = (
-    (1.0280, 0.7641, 505.7898, 0.0671),
-    (1.0885, 3.8133, 996.4844, 0.3676),
-    (3.3554, 14.3850, 1296.7787, 0.5402),
-    (8.9229, 18.9287, 1536.6946, 0.7901),
-    (114.1568, 26.7594, 1727.4685, 1.8604),
-    (58.5330, 3.8215, 2035.0656, 2.1142),
-)
 FAR = 1600.0  # [mm]; beyond, detection itself becomes worse, which the simulated camera does not know
-# Virtual gripper: distance to the marker, largest, smallest, printed standard deviation, quartiles [mm]
-GRIPPER = (
-    (500, 1963.3162, 1962.3938, 0.5261, 1962.7860, 1963.1051),
-    (1000, 2134.1887, 2131.7919, 1.2301, 2132.3903, 2133.0369),
-    (1500, 2407.2225, 2398.0351, 5.3397, 2400.3763, 2404.6499),
-    (2000, 2791.8982, 2777.4443, 5.5185, 2782.7907, 2787.0907),
+# Table 4.1, coordinates x, y and z of each series: largest, smallest, mean, standard deviation [mm]
+COORDINATES = (
+    ((1.0442, 1.0038, 1.0280, 0.0071), (0.7767, 0.7487, 0.7641, 0.0065), (505.9640, 505.6400, 505.7898, 0.0671)),
+    ((1.1374, 1.0531, 1.0885, 0.0160), (3.8323, 3.7894, 3.8133, 0.0113), (997.2500, 995.7280, 996.4844, 0.3676)),
+    ((3.3963, 3.3017, 3.3554, 0.0201), (14.4725, 14.3246, 14.3850, 0.0252), (1298.9100, 1295.5000, 1296.7787, 0.5402)),
+    ((9.0354, 8.8338, 8.9229, 0.0377), (18.9694, 18.8956, 18.9287, 0.0133), (1539.0600, 1534.8000, 1536.6946, 0.7901)),
+    (
+        (114.5460, 113.9340, 114.1568, 0.1240),
+        (26.8476, 26.6144, 26.7594, 0.0486),
+        (1733.2800, 1724.1400, 1727.4685, 1.8604),
+    ),
+    ((58.6802, 58.3940, 58.5330, 0.0497), (4.0331, 3.5828, 3.8215, 0.0775), (2041.1300, 2029.8200, 2035.0656, 2.1142)),
 )
+# Table 4.2, z of each series: quartiles with the median between them [mm]
+QUARTILES = (
+    (505.7473, 505.7885, 505.8320),
+    (996.1815, 996.4480, 996.7228),
+    (1296.5000, 1296.6100, 1297.0500),
+    (1535.9500, 1536.9250, 1536.9825),
+    (1725.9425, 1727.2550, 1728.5025),
+    (2033.8500, 2035.1500, 2035.9125),
+)
+# Table 4.3, virtual gripper by its distance to the marker [mm]
+GRIPPER = {
+    500: Series(COUNT, 1963.3162, 1962.3938, 1962.9328, 0.5261, (1962.7860, 1962.9616, 1963.1051)),
+    1000: Series(COUNT, 2134.1887, 2131.7919, 2132.7625, 1.2301, (2132.3903, 2132.7536, 2133.0369)),
+    1500: Series(COUNT, 2407.2225, 2398.0351, 2402.7820, 5.3397, (2400.3763, 2403.4463, 2404.6499)),
+    2000: Series(COUNT, 2791.8982, 2777.4443, 2784.6694, 5.5185, (2782.7907, 2784.4271, 2787.0907)),
+}
+# Marker before the camera: mean x, y, z and standard deviation of z, per series [mm]
+SERIES = tuple((x[2], y[2], z[2], z[3]) for x, y, z in COORDINATES)
 # Two markers 300 mm apart: distance to the camera, mean and standard deviation of what was measured [mm], error [%]
 ACCURACY = (
     (600, 299.1255, 0.0432, -0.2915),
@@ -50,21 +65,34 @@ def arithmetic(quick: bool) -> list[Row]:
         ours = spread / np.sqrt(COUNT)
         rows.append(judged(f"test 1, series {number}: precision of the mean", f"{printed} mm", f"{ours:.4f} mm", ours,
                            Bar((0.0, 10.0), held=about(printed, 1e-4))))  # fmt: skip
-    for distance, most, least, printed, first, third in GRIPPER:
-        largest = 0.5 * (most - least) * np.sqrt(COUNT / (COUNT - 1))
-        likely = (third - first) / NORMAL_QUARTILES
-        excess = printed / largest
-        rows.append(
-            judged(f"test 2, {distance} mm: standard deviation", f"{printed} mm",
-                   f"at most {largest:.3f} mm with that range; by the quartiles {likely:.2f} mm", excess,
-                   Bar((0.0, 10.0), held=(0.0, 1.0), refuted=(1.0, 10.0)),
-                   f"printed {100.0 * (excess - 1.0):.0f} % above what that range allows; use the quartiles"
-                   if excess > 1.0 else "")
-        )  # fmt: skip
+    rows += deviations()
     for distance, mean, _, printed in ACCURACY:
         ours = (mean - 300.0) / 3.0
         rows.append(judged(f"accuracy, x = 300 mm at {distance} mm: error", f"{printed} %", f"{ours:.4f} %", ours,
                            Bar((-100.0, 100.0), held=about(printed, 2e-3))))  # fmt: skip
+    return rows
+
+
+def deviations() -> list[Row]:
+    """Whether printed standard deviations are possible with what is printed beside them."""
+    columns = [Series(COUNT, *column) for series in COORDINATES for column in series[:2]]
+    columns += [Series(COUNT, *series[2], quartiles) for series, quartiles in zip(COORDINATES, QUARTILES, strict=True)]
+    possible = sum(each.possible for each in columns)
+    rows = [
+        judged("test 1, x, y and z of six series: standard deviations", "18 of them",
+               f"{possible} of {len(columns)} are possible with their range, mean and quartiles", possible,
+               Bar((0.0, 18.0), held=(18.0, 18.0), refuted=(0.0, 17.0)))
+    ]  # fmt: skip
+    for distance, series in GRIPPER.items():
+        printed, largest = series.deviation, series.possible_deviations
+        bounds = ", ".join(f"{bound:.3f} by its {known}" for known, bound in largest.items())
+        excess = printed / series.largest_possible_deviation
+        rows.append(
+            judged(f"test 2, {distance} mm: standard deviation", f"{printed} mm",
+                   f"at most [mm] {bounds}; normal by the quartiles {series.robust_deviation:.2f}", excess,
+                   Bar((0.0, 10.0), held=(0.0, 1.0), refuted=(1.0, 10.0)),
+                   f"printed {100.0 * (excess - 1.0):.0f} % above what any sample can have; use the quartiles")
+        )  # fmt: skip
     return rows
 
 
