@@ -15,6 +15,8 @@ from math import isinf, isnan
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, Protocol, TypeVar, overload
 
 from rrtik_ompl.base.arrays import LARGEST
+from rrtik_ompl.base.colors import PATTERN, color_of
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.files.strict_yaml import Location, YamlDocument, describe
 from rrtik_ompl.files.text import is_number
 
@@ -179,6 +181,23 @@ class Choice(_Plain):
         raise _not_a(f"{', '.join(others)} or {last}" if others else last, value)
 
 
+class Color(_Plain):
+    """A colour: '#rrggbb', or red, green and blue from 0 to 1."""
+
+    def __init__(self) -> None:
+        super().__init__({"anyOf": [{"type": "string", "pattern": PATTERN}, SHARES3.schema({})]})
+
+    def read(self, value: object) -> str:
+        """Return the colour as '#rrggbb'."""
+        remedy = "'#rrggbb' in quotes, or [red, green, blue] from 0 to 1"
+        try:
+            color = color_of(value if isinstance(value, str) else SHARES3.read(value), "color")
+        except (InputError, Refused):
+            raise _not_a(f"a colour, {remedy}", value) from None
+        assert color is not None, "there is a value"
+        return color
+
+
 class Anything(_Plain):
     """Whatever stands there."""
 
@@ -333,6 +352,8 @@ LENGTHS3 = Listed(LENGTH, 3, 3)
 VECTOR2 = Listed(NUMBER, 2, 2)
 VECTOR3 = Listed(NUMBER, 3, 3)
 VECTOR4 = Listed(NUMBER, 4, 4)
+SHARES3 = Listed(Number(0.0, 1.0), 3, 3)
+COLOR = Color()
 
 
 # --- sections --------------------------------------------------------------------------------------------------------
@@ -445,7 +466,8 @@ class Section:
                 hint = f"did you mean '{near[0]}'? " if near else ""
                 raise Refused(f"unknown key '{name}'; {hint}allowed keys: {', '.join(cls.keys)}", name)
             if value is None:
-                raise Refused("nothing stands after the colon; give a value or delete the key", name)
+                quotes = " (a colour in quotes, as # begins a comment)" if name == "color" else ""
+                raise Refused(f"nothing stands after the colon; give a value{quotes} or delete the key", name)
         return data
 
     def check_together(self) -> None:

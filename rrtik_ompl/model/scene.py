@@ -14,6 +14,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from rrtik_ompl.base.arrays import LARGEST, Vector, bounded_array, finite_array, finite_number, frozen
+from rrtik_ompl.base.colors import color_of
 from rrtik_ompl.base.copies import as_value, changed, set_fields
 from rrtik_ompl.base.errors import InputError, UnknownNameError, at_most, listed, name_of, require
 from rrtik_ompl.base.poses import PoseLike, rigid
@@ -132,9 +133,10 @@ class Obstacle:
         pose: T_world_obstacle.
         motion: Its motion over time; None if it is at rest.
         margin: Distance that the moving parts of the arm must keep from it [m]; the fixed parts must only not touch it.
+        color: '#rrggbb' in which it is drawn, also given as red, green and blue from 0 to 1; None: pages choose one.
 
     Example:
-        >>> post = rrtik.Obstacle("post", rrtik.Cylinder(0.05, 1.0), [0.4, 0.0, 0.5], margin=0.02)
+        >>> post = rrtik.Obstacle("post", rrtik.Cylinder(0.05, 1.0), [0.4, 0.0, 0.5], margin=0.02, color="#c0392b")
         >>> post.pose.translation
         array([0.4, 0. , 0.5])
     """
@@ -144,6 +146,7 @@ class Obstacle:
     pose: pin.SE3
     motion: Motion | None
     margin: float
+    color: str | None
 
     def __init__(
         self,
@@ -152,11 +155,13 @@ class Obstacle:
         pose: PoseLike = (0.0, 0.0, 0.0),
         motion: Motion | None = None,
         margin: float = 0.0,
+        color: str | ArrayLike | None = None,
     ) -> None:
         placement = _checked_solid(name, shape, pose)
         require(motion, Motion | None, f"motion of '{name}'")
         room = _room(margin, f"margin of '{name}'")
         set_fields(self, name=name, shape=shape, pose=placement, motion=motion, margin=room)
+        set_fields(self, color=color_of(color, f"color of '{name}'"))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -172,6 +177,7 @@ class AttachedObject:
         padding: Distance of the grasp [m]: kept from everything that it must not touch, in addition to margins. That of
             the holding link (``padding`` of :func:`rrtik_ompl.load_robot`) if None.
         margin: Its own margin [m], kept likewise; it becomes the margin of the obstacle again when it is detached.
+        color: '#rrggbb' in which it is drawn, also given as red, green and blue from 0 to 1; None: pages choose one.
 
     Example:
         >>> rod = rrtik.AttachedObject("rod", "panda_hand", rrtik.Cylinder(0.01, 0.2), [0.0, 0.0, 0.15])
@@ -186,6 +192,7 @@ class AttachedObject:
     allow: tuple[str, ...]
     padding: float | None
     margin: float
+    color: str | None
 
     def __init__(
         self,
@@ -196,6 +203,7 @@ class AttachedObject:
         allow: Iterable[str] = (),
         padding: float | None = None,
         margin: float = 0.0,
+        color: str | ArrayLike | None = None,
     ) -> None:
         name_of(link, f"the link of '{name}'")
         placement = _checked_solid(name, shape, pose)
@@ -209,6 +217,7 @@ class AttachedObject:
 
         set_fields(self, name=name, link=link, shape=shape, pose=placement)
         set_fields(self, allow=touchable, padding=own_padding, margin=room)
+        set_fields(self, color=color_of(color, f"color of '{name}'"))
 
 
 def _checked_solid(name: object, shape: object, pose: object) -> pin.SE3:
@@ -431,9 +440,9 @@ class Scene:
     ) -> Scene:
         """Return the scene in which an obstacle has become an attached object; allowed pairs stay allowed.
 
-        The object keeps its margin and loses its motion. It may touch the things named in ``allow`` until it is
-        detached, to any depth, because a scene does not know the posture of the arm. :class:`rrtik_ompl.Task` limits
-        the depth.
+        The object keeps its margin and colour, and loses its motion. It may touch the things named in ``allow`` until
+        it is detached, to any depth, because a scene does not know the posture of the arm. :class:`rrtik_ompl.Task`
+        limits the depth.
 
         Args:
             name: Name of the obstacle.
@@ -450,7 +459,7 @@ class Scene:
         taken = self.obstacle(name)
         rest = self.without(name)
         place = pin.SE3.Identity() if pose is None else pose
-        held = AttachedObject(name, link, taken.shape, place, padding=padding, margin=taken.margin)
+        held = AttachedObject(name, link, taken.shape, place, padding=padding, margin=taken.margin, color=taken.color)
 
         names = listed(allow, f"allow of '{name}'")
         for other in names:
@@ -462,7 +471,8 @@ class Scene:
     def detaching(self, name: str, pose: ArrayLike | pin.SE3) -> Scene:
         """Return the scene in which an attached object has become an obstacle at T_world_object.
 
-        It keeps its margin. The settings of the grasp end: its padding, what it was allowed to touch, and its contacts.
+        It keeps its margin and colour. The settings of the grasp end: its padding, what it was allowed to touch, and
+        its contacts.
 
         Raises:
             UnknownNameError: If there is no attached object of that name.
@@ -474,7 +484,7 @@ class Scene:
             raise UnknownNameError("attached object", name, held)
 
         item = held.pop(name)
-        free = Obstacle(name, item.shape, pose, margin=item.margin)
+        free = Obstacle(name, item.shape, pose, margin=item.margin, color=item.color)
         contacts = tuple(contact for contact in self.contacts if name not in contact.pair)
         return Scene((*self.obstacles, free), tuple(held.values()), self.allowed_collisions, contacts)
 

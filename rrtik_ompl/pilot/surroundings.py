@@ -349,6 +349,7 @@ class Surroundings:
                 held.T_tip_object * solid.pose,
                 gripper,
                 margin=solid.margin + held.seen.margin(solid),
+                color=solid.color,
             )
             for name, solid in zip(marked_object.solid_names, marked_object.solids, strict=True)
         ]

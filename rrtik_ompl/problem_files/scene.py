@@ -17,6 +17,7 @@ from rrtik_ompl.files.point_files import is_ply_mesh
 from rrtik_ompl.files.pose_entry import PoseEntry, pose_data
 from rrtik_ompl.files.sections import (
     ANYTHING,
+    COLOR,
     NAME,
     NOT_NEGATIVE,
     NUMBER,
@@ -65,6 +66,7 @@ class SolidEntry(ShapeEntry):
     """A named solid: exactly one shape and a pose."""
 
     pose = key(PoseEntry, default=None)
+    color = key(COLOR, "in which pages draw it: '#rrggbb', or red, green and blue from 0 to 1", default=None)
 
     def build_pose(self) -> pin.SE3:
         """Return the pose; the identity if none is given."""
@@ -91,7 +93,7 @@ class ObstacleEntry(SolidEntry):
         if self.pose is None and motion is not None:
             place = motion.pose_at(place, 0.0)
         own = margin if self.margin is None else self.margin
-        return Obstacle(self.name, self.build_shape(folder), place, motion, own)
+        return Obstacle(self.name, self.build_shape(folder), place, motion, own, self.color)
 
 
 class AttachedEntry(SolidEntry):
@@ -106,7 +108,9 @@ class AttachedEntry(SolidEntry):
         """Return the attached object."""
         shape = self.build_shape(folder)
         pose = self.build_pose()
-        return AttachedObject(self.name, self.link, shape, pose, tuple(self.allow), self.padding, self.margin)
+        return AttachedObject(
+            self.name, self.link, shape, pose, tuple(self.allow), self.padding, self.margin, self.color
+        )
 
 
 class ContactEntry(Section):
@@ -258,7 +262,8 @@ def _obstacle_data(obstacle: Obstacle, folder: Path) -> dict[str, Any]:
     elif obstacle.motion is not None:
         stations = zip(obstacle.motion.times.tolist(), obstacle.motion.poses, strict=True)
         data["motion"] = {"waypoints": [{"time": time, "pose": pose_data(T)} for time, T in stations]}
-    return data | ({"margin": obstacle.margin} if obstacle.margin else {})
+    data |= {"margin": obstacle.margin} if obstacle.margin else {}
+    return data | ({"color": obstacle.color} if obstacle.color else {})
 
 
 def _attached_data(held: AttachedObject, folder: Path) -> dict[str, Any]:
@@ -266,4 +271,5 @@ def _attached_data(held: AttachedObject, folder: Path) -> dict[str, Any]:
     data["pose"] = pose_data(held.pose)
     data |= {"allow": list(held.allow)} if held.allow else {}
     data |= {} if held.padding is None else {"padding": held.padding}
-    return data | ({"margin": held.margin} if held.margin else {})
+    data |= {"margin": held.margin} if held.margin else {}
+    return data | ({"color": held.color} if held.color else {})

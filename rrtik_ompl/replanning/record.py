@@ -641,6 +641,7 @@ def _shape(entry: Mapping[str, Any]) -> Shape:
 def _obstacle_data(obstacle: Obstacle, shape: int) -> Json:
     data: Json = {"name": obstacle.name, "shape": shape, "pose": pose_row(obstacle.pose).tolist()}
     data |= {"margin": obstacle.margin} if obstacle.margin else {}
+    data |= {"color": obstacle.color} if obstacle.color else {}
     if isinstance(obstacle.motion, ConstantVelocity):
         data["velocity"] = obstacle.motion.velocity.tolist()
     elif isinstance(obstacle.motion, TimedPoses):
@@ -656,18 +657,20 @@ def _obstacle(row: Mapping[str, Any], shapes: Sequence[Shape]) -> Obstacle:
         motion = ConstantVelocity(row["velocity"])
     elif "times" in row:
         motion = TimedPoses(row["times"], [_pose(there, name) for there in row["poses"]])
-    return Obstacle(name, _numbered(row, shapes), _pose(row["pose"], name), motion, row.get("margin", 0.0))
+    beside = motion, row.get("margin", 0.0), row.get("color")
+    return Obstacle(name, _numbered(row, shapes), _pose(row["pose"], name), *beside)
 
 
 def _held_data(item: AttachedObject, shape: int) -> Json:
     data: Json = {"name": item.name, "link": item.link, "shape": shape, "pose": pose_row(item.pose).tolist()}
+    data |= {"color": item.color} if item.color else {}
     return data | {"allow": list(item.allow), "padding": item.padding, "margin": item.margin}
 
 
 def _held(row: Mapping[str, Any], shapes: Sequence[Shape]) -> AttachedObject:
     name = row["name"]
     place = _pose(row["pose"], name)
-    beside = tuple(row["allow"]), row["padding"], row["margin"]
+    beside = tuple(row["allow"]), row["padding"], row["margin"], row.get("color")
     return AttachedObject(name, row["link"], _numbered(row, shapes), place, *beside)
 
 

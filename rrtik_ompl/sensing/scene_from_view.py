@@ -79,7 +79,7 @@ class SeenObject:
     def solids(self) -> tuple[Obstacle, ...]:
         """Return its solids as obstacles in the base frame, named after it, with its uncertainty in their margins."""
         return tuple(
-            Obstacle(name, each.shape, self.T_base_object * each.pose, margin=each.margin + self.margin(each))
+            replace(each, name=name, pose=self.T_base_object * each.pose, margin=each.margin + self.margin(each))
             for name, each in zip(self.object.solid_names, self.object.solids, strict=True)
         )
 

@@ -16,7 +16,6 @@ from rrtik_ompl.viewer.drawing.marks import draw_marks
 from rrtik_ompl.viewer.drawing.meshes import thickened
 from rrtik_ompl.viewer.drawing.nodes import Node, Recording
 from rrtik_ompl.viewer.drawing.robot_picture import (
-    GHOST_TRIANGLES,
     Part,
     attached_parts,
     draw_parts,
@@ -85,8 +84,6 @@ def _draw_robot(vis: Node, robot: Robot, subject: Subject) -> Frame:
 
     frame = frame_around(points, subject.scene, places, whole=robot.planar)
     _draw_parts(vis["robot"], robot, parts, frames[0], frame)
-    if subject.start is not None or subject.ghosts is not None:
-        _draw_parts(vis["ghost"], robot, link_parts(robot, GHOST_TRIANGLES) + held, frames[0], frame)
 
     tip = robot.model.frames[robot.model.getFrameId(robot.tip)]
     draw_triad(vis["robot"][joint_nodes(robot)[tip.parentJoint]]["tip frame"], tip.placement, 0.07 * frame.arm)

@@ -21,6 +21,7 @@ from rrtik_ompl.viewer.drawing import palette
 from rrtik_ompl.viewer.drawing.framing import Frame, overview
 from rrtik_ompl.viewer.drawing.marks import Mark
 from rrtik_ompl.viewer.drawing.meshes import look_of_margin
+from rrtik_ompl.viewer.drawing.painting import obstacle_colors
 from rrtik_ompl.viewer.drawing.robot_picture import joint_nodes, node_name, nodes_of
 from rrtik_ompl.viewer.drawing.trail import pieces
 from rrtik_ompl.viewer.run_story import run_story
@@ -95,10 +96,12 @@ def _limit(value: float) -> float | None:
 
 
 def _obstacles(scene: Scene) -> list[dict[str, Any]]:
+    colors = obstacle_colors(scene.obstacles)
     return [
         {
             "name": o.name,
             "node": node_name(o.name),
+            "color": colors[o.name],
             "plate": not o.shape.bounded,
             "moving": o.motion is not None,
             "margin": o.margin,

@@ -41,7 +41,9 @@ def subject_of_task(shown: Showable, played: PlayedTask) -> Subject:
     loose = [item for item in first.scene.attached if item.name not in kept]
     things: list[Obstacle | AttachedObject] = [*first.scene.obstacles, *loose]
     scene = Scene(
-        tuple(Obstacle(each.name, each.shape, places[each.name], margin=each.margin) for each in things),
+        tuple(
+            Obstacle(each.name, each.shape, places[each.name], margin=each.margin, color=each.color) for each in things
+        ),
         tuple(item for item in first.scene.attached if item.name in kept),
     )
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from rrtik_ompl.base.colors import hexadecimal
 from rrtik_ompl.base.errors import DescriptionWarning, InputError
 from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.description.mjcf.elements import field_mesh
@@ -130,6 +131,32 @@ def test_a_height_field_in_a_file_needs_mujoco(file, monkeypatch):
         load_scene(file)
     with pytest.warns(DescriptionWarning, match="height field .h. is in a file"):
         load_robot(file)
+
+
+@pytest.mark.parametrize("extra", ["", FRAME], ids=["plain", "compiled"])
+def test_obstacles_and_links_have_the_colours_that_mujoco_draws(tmp_path, extra):
+    mujoco = pytest.importorskip("mujoco")
+    red, own = 'material="red"', 'material="red" rgba="0 0 1 1"'
+    text = SCENE.format(extra=extra).replace("<asset>", '<asset><material name="red" rgba="1 0.2 0 1"/>')
+    text = text.replace('<geom type="box"', f'<geom {red} type="box"').replace(
+        'name="post" type', f'{own} name="post" type'
+    )
+    text = text.replace('<geom name="hand"', f'<geom {red} name="hand"')
+    path = tmp_path / "room.xml"
+    path.write_text(text)
+
+    model = mujoco.MjModel.from_xml_path(str(path))
+    drawn = {"post": model.geom("post").rgba[:3]}
+    drawn["table"] = drawn["hand"] = model.mat_rgba[model.geom("hand").matid[0]][:3]
+
+    scene = load_scene(path)
+    for name in ("table", "post"):
+        assert scene.obstacle(name).color == hexadecimal(drawn[name])
+    assert scene.obstacle("lid").color is None  # MuJoCo's grey of what states none
+    with pytest.warns(DescriptionWarning):
+        robot = load_robot(path)
+    painted = [body for body in robot.visual.geometryObjects if body.overrideMaterial]
+    assert [body.meshColor[:3] for body in painted] == [pytest.approx(drawn["hand"])]
 
 
 def test_a_scene_without_a_robot_is_read(tmp_path):

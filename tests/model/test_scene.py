@@ -12,6 +12,19 @@ BOX = rrtik.Obstacle("box", rrtik.Box([0.1, 0.1, 0.1]), [0.5, 0.5, 0.5])
 SCENE = rrtik.Scene([BALL, BOX], allowed_collisions=[("ball", "wrist")])
 
 
+def test_a_colour_goes_with_an_obstacle_that_is_taken_and_set_down():
+    cup = rrtik.Obstacle("cup", rrtik.Sphere(0.1), color=[1.0, 0.0, 0.0])
+    held = rrtik.Scene([cup]).attaching("cup", "hand")
+    down = held.detaching("cup", rrtik.pose([1.0, 0.0, 0.0]))
+    assert [cup.color, held.attached[0].color, down.obstacles[0].color] == ["#ff0000"] * 3
+
+
+@pytest.mark.parametrize("color", ["red", "#12345", "#12345g", [0.0, 1.0], [0.0, 0.0, 1.1], [0.0, 0.0, np.nan], 7])
+def test_what_is_no_colour_is_refused(color):
+    with pytest.raises(rrtik.InputError, match="color of 'a'"):
+        rrtik.Obstacle("a", rrtik.Sphere(0.1), color=color)
+
+
 def test_obstacles_come_and_go_and_the_scene_stays_as_it_was():
     more = SCENE.with_(rrtik.Obstacle("post", rrtik.Sphere(0.2)))
     assert more.names == ("ball", "box", "post")

@@ -131,6 +131,31 @@ def test_numbers_survive_bit_for_bit(tmp_path):
         assert motion_numbers(one.motion) == motion_numbers(two.motion)
 
 
+def test_colours_are_read_in_both_forms_and_survive(tmp_path):
+    text = """version: 1
+scene:
+  obstacles:
+    - {name: a, sphere: 1, color: "#C0392B"}
+    - {name: b, sphere: 1, color: [1, 0.5, 0]}
+    - {name: c, sphere: 1}
+  attached: [{name: d, link: hand, sphere: 1, color: [0, 0, 1]}]
+"""
+    (tmp_path / "scene.yaml").write_text(text)
+    load_scene(tmp_path / "scene.yaml").save(tmp_path / "again.yaml")
+    for name in ("scene.yaml", "again.yaml"):
+        scene = load_scene(tmp_path / name)
+        colors = [each.color for each in (*scene.obstacles, *scene.attached)]
+        assert colors == ["#c0392b", "#ff8000", None, "#0000ff"]
+
+
+def test_a_colour_that_begins_a_comment_is_told(tmp_path):
+    (tmp_path / "scene.yaml").write_text(
+        "version: 1\nscene:\n  obstacles:\n    - name: a\n      sphere: 1\n      color: #c0392b\n"
+    )
+    with pytest.raises(InputError, match=r"scene\.yaml:6: .*color: nothing stands after the colon.* in quotes"):
+        load_scene(tmp_path / "scene.yaml")
+
+
 def test_an_empty_scene_survives(tmp_path):
     Scene().save(tmp_path / "scene.yaml")
     assert load_scene(tmp_path / "scene.yaml").names == ()
@@ -172,6 +197,10 @@ BAD = {
     "overflow": ("{name: a, sphere: 1e999}", "must be a finite number"),
     "kilometres": ("{name: a, box: [1, 1, 1e7]}", r"box\[2\]: must be 1e\+06 or less"),
     "true": ("{name: a, sphere: true}", "must be a number, found true"),
+    "colour of another kind": ("{name: a, sphere: 1, color: brown}", "color: must be a colour, '#rrggbb' in quotes"),
+    "short colour": ("{name: a, sphere: 1, color: '#fff'}", "color: must be a colour.* found text '#fff'"),
+    "colour of two": ("{name: a, sphere: 1, color: [0, 1]}", "color: must be a colour.* found a list of 2"),
+    "colour in 255ths": ("{name: a, sphere: 1, color: [255, 0, 0]}", r"\[red, green, blue\] from 0 to 1"),
     "nothing": ("{name: a, sphere: }", "nothing stands after the colon"),
     "cylinder without length": ("{name: a, cylinder: {radius: 1}}", "cylinder.length: missing"),
     "cylinder as list": ("{name: a, cylinder: [1, 2]}", "cylinder: must be a group of keys, found a list of 2"),

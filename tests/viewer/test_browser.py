@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import rrtik_ompl
+from rrtik_ompl.base.colors import fractions
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.viewer.drawing import palette
 from rrtik_ompl.viewer.page import page
@@ -18,7 +19,7 @@ from rrtik_tests.page_pictures import document_of, screenshot
 
 def share_of(color: str, picture: np.ndarray, likeness: float) -> float:
     """Share of pixels of a hue, whatever their lightness."""
-    wanted = np.array(palette.fractions(color))
+    wanted = np.array(fractions(color))
     wanted = (wanted - wanted.mean()) / np.linalg.norm(wanted - wanted.mean())
     tint = picture - picture.mean(axis=2, keepdims=True)
     strength = np.linalg.norm(tint, axis=2)

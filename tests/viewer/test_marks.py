@@ -13,8 +13,6 @@ from rrtik_ompl.ik.mb_rrt.links import Links
 from rrtik_ompl.ik.mb_rrt.published import grow
 from rrtik_ompl.viewer.drawing.marks import balls, tubes
 from rrtik_ompl.viewer.page import page
-from rrtik_ompl.viewer.picture import draw
-from rrtik_ompl.viewer.subject import subject_of
 from rrtik_tests.page_pictures import document_of
 
 
@@ -39,9 +37,6 @@ def test_ghosts_take_the_place_of_start_and_goal_and_are_taken_into_the_picture(
     assert story["ghosts"][0]["color"] != story["ghosts"][1]["color"]
     assert story["start_ghost"] is None
     assert story["goal_ghost"] is None
-    window, _ = draw(subject_of(robot, None, None, rows))
-    assert any("/ghost/" in path for path in window.paths)
-    assert not any("/ghost/" in path for path in draw(subject_of(robot))[0].paths)
     assert view(robot, ghosts=rows, html=tmp_path / "ghosts.html") == tmp_path / "ghosts.html"
 
 

@@ -22,6 +22,7 @@ from rrtik_ompl.model.shapes import Mesh
 JOINTS = ("free", "ball", "slide", "hinge")  # in the order of MuJoCo's numbers
 GEOMS = ("plane", "hfield", "sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh", "sdf")
 EQUALITIES = ("connect", "weld", "joint", "tendon", "flex", "flexvert", "flexstrain")
+UNPAINTED = (0.5, 0.5, 0.5, 1.0)  # colour of a geom that states none
 PATCHES = 500  # flat faces around an ellipsoid, about: it gets some 1 % larger
 
 
@@ -121,7 +122,9 @@ class _Writer:
         place(geom, model.geom_pos[number], model.geom_quat[number])
         geom.set("contype", str(model.geom_contype[number]))
         geom.set("conaffinity", str(model.geom_conaffinity[number]))
-        geom.set("rgba", text(model.geom_rgba[number]))
+        colour = self.colour(number)
+        if colour is not None:
+            geom.set("rgba", text(colour))
 
         if kind == "ellipsoid":
             geom.set("mesh", self.kept(ellipsoid(size)))
@@ -132,6 +135,15 @@ class _Writer:
         else:
             geom.set("size", text(size[: {"sphere": 1, "capsule": 2, "cylinder": 2}.get(kind, 3)]))
         geom.set("type", "mesh" if geom.get("mesh") else kind)
+
+    def colour(self, number: int) -> Vector | None:
+        """Return the colour of a geom: its own, or that of its material; None if it has none of its own."""
+        own: Vector = self.model.geom_rgba[number]
+        if not np.allclose(own, UNPAINTED):
+            return own
+        material = self.model.geom_matid[number]
+        painted: Vector | None = None if material < 0 else self.model.mat_rgba[material]
+        return painted
 
     def mesh(self, number: int) -> Mesh:
         """Return a mesh as MuJoCo has centred and turned it."""

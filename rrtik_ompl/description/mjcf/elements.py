@@ -27,6 +27,7 @@ OF_THE_SCENE = ("plane", "hfield")
 KINDS = ("box", "capsule", "cylinder", "mesh", "sphere")
 _COUNTS = {"sphere": 1, "capsule": 2, "cylinder": 2, "box": 3}  # how many numbers a size has
 Attributes = Mapping[str, str]
+Rgba = tuple[float, float, float, float]
 Meshes = Mapping[str, tuple[MeshFile | Mesh, Any]]  # by name, each with its pose in its geom (pinocchio.SE3)
 COMPILER = "with the package mujoco installed, its compiler reads the file (pip install mujoco)"
 _UNITS = dict(zip("xyz", np.eye(3), strict=True))
@@ -43,6 +44,7 @@ class Settings:
         limited: Whether a joint with a range has limits.
         meshes: Folder of meshes, as the file names it.
         classes: Default attributes by class and tag.
+        colours: Red, green, blue and opacity of materials, by name.
     """
 
     degrees: bool = True
@@ -50,9 +52,10 @@ class Settings:
     limited: bool = True
     meshes: str = ""
     classes: dict[str, dict[str, Attributes]] = field(default_factory=lambda: {MAIN: {}})
+    colours: dict[str, Rgba] = field(default_factory=dict)
 
     def read(self, root: Element, where: str) -> None:
-        """Take over the settings of ``<compiler>`` and ``<default>``, in place.
+        """Take over the settings of ``<compiler>`` and ``<default>``, and the colours of materials, in place.
 
         Raises:
             InputError: If a value is not valid.
@@ -76,6 +79,11 @@ class Settings:
             }
             self.classes[name] = {**inherited, **defaults}
             stack += [(item, name) for item in element.findall("default")]
+
+        for material in root.findall("asset/material"):
+            rgba = _rgba(self.filled(material, MAIN, where), where)
+            if rgba is not None:
+                self.colours[material.get("name", "")] = rgba
 
     def filled(self, element: Element, parent_class: str, where: str) -> Element:
         """Return the element with the defaults of its class, or of the class of the body that it is in.
@@ -152,6 +160,14 @@ def masks(geom: Element, where: str) -> tuple[int, int]:
     return kind, affinity
 
 
+def _rgba(element: Element, where: str) -> Rgba | None:
+    """Return the colour that an element states, from 0 to 1, or None."""
+    if element.get("rgba") is None:
+        return None
+    red, green, blue, opacity = (min(max(part, 0.0), 1.0) for part in numbers(element, "rgba", 4, None, where))
+    return red, green, blue, opacity
+
+
 def solid_of(geom: Element, settings: Settings, meshes: Meshes, where: str) -> Solid:
     """Return the solid of a geom that is neither a plane nor a height field (see :func:`ground_of`).
 
@@ -165,8 +181,7 @@ def solid_of(geom: Element, settings: Settings, meshes: Meshes, where: str) -> S
         InputError: If its kind cannot be read, or its numbers are not valid.
     """
     kind = geom.get("type", "sphere")
-    colour = numbers(geom, "rgba", 4, None, where) if geom.get("rgba") is not None else None
-    rgba = None if colour is None else (colour[0], colour[1], colour[2], colour[3])
+    rgba = _rgba(geom, where) or settings.colours.get(geom.get("material", ""))
     if kind not in KINDS:
         raise InputError(f"{where}: geom of type '{kind}' cannot be read; {COMPILER}")
     place = settings.placement(geom, where)

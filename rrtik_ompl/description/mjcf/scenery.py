@@ -10,7 +10,7 @@ import numpy as np
 from rrtik_ompl.base.errors import InputError, in_file
 from rrtik_ompl.description.mjcf.read import read_mjcf
 from rrtik_ompl.description.shapes.mesh import read_mesh
-from rrtik_ompl.description.tree import MeshFile
+from rrtik_ompl.description.tree import MeshFile, Solid
 from rrtik_ompl.model.scene import Obstacle, Scene
 from rrtik_ompl.model.shapes import Mesh, Shape
 
@@ -28,10 +28,15 @@ def scene_from_mjcf(path: str | os.PathLike[str]) -> Scene:
     """
     things = read_mjcf(Path(path), scene=True).things
     try:
-        obstacles = [Obstacle(thing.name, _shape(thing.solid.shape), thing.solid.T_link_solid) for thing in things]
+        obstacles = [_obstacle(thing.name, thing.solid) for thing in things]
         return Scene(obstacles, allowed_collisions=[(thing.name, link) for thing in things for link in thing.apart])
     except InputError as error:
         raise in_file(path, error) from None
+
+
+def _obstacle(name: str, solid: Solid) -> Obstacle:
+    color = None if solid.colour is None else solid.colour[:3]
+    return Obstacle(name, _shape(solid.shape), solid.T_link_solid, color=color)
 
 
 def _shape(shape: Shape | MeshFile) -> Shape:

@@ -15,6 +15,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Matrix, Vector, finite_array
+from rrtik_ompl.base.colors import fractions
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.base.poses import rigid
 from rrtik_ompl.model.robot import Robot
@@ -264,7 +265,7 @@ class Augmenter:
             canvas.clear()
             if arm is not None and q is not None:
                 shown = placed(arm, T @ (self._all_at(q) if q.ndim == 2 else self._joint_frames(q)))
-                canvas.draw(shown if color is None else tinted(shown, palette.fractions(color)))
+                canvas.draw(shown if color is None else tinted(shown, fractions(color)))
             if solids is not None:
                 canvas.draw(placed(solids, T[None]))
 
@@ -336,5 +337,5 @@ class Augmenter:
 
 
 def _bgr(color: str) -> tuple[int, int, int]:
-    red, green, blue = (round(255 * part) for part in palette.fractions(color))
+    red, green, blue = (round(255 * part) for part in fractions(color))
     return blue, green, red

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.base.arrays import Matrix
+from rrtik_ompl.base.colors import fractions, hexadecimal
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.geometry.collision.shape_table import shape_of
 from rrtik_ompl.geometry.collision.solids import is_mesh
@@ -66,7 +67,7 @@ def surface_of_shape(shape: Shape, color: str, frame: int = 0, triangles: int = 
         InputError: For a half-space, which has no boundary.
     """
     vertices, faces = split_creases(*_triangles(shape, triangles))
-    return Surface(vertices, _normals(vertices, faces), faces, np.array(palette.fractions(color)), frame)
+    return Surface(vertices, _normals(vertices, faces), faces, np.array(fractions(color)), frame)
 
 
 def robot_surfaces(robot: Robot, triangles: int = ROBOT_TRIANGLES) -> tuple[Surface, ...]:
@@ -136,7 +137,7 @@ def _link_surface(body: object, limit: int) -> Surface | None:
 
     color = palette.ROBOT_ALTERNATE if joint % 2 else palette.ROBOT
     if body.overrideMaterial:  # type: ignore[attr-defined]
-        color = palette.hexadecimal(body.meshColor[:3])  # type: ignore[attr-defined]
+        color = hexadecimal(body.meshColor[:3])  # type: ignore[attr-defined]
 
     try:
         shape = shape_of(geometry)

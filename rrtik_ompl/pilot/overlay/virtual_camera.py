@@ -6,6 +6,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
+from rrtik_ompl.base.colors import fractions
 from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.viewer.drawing import palette
 
@@ -35,7 +36,7 @@ def orbit_pose(centre: ArrayLike, distance: float, azimuth: float, elevation: fl
 
 def background(camera: Camera) -> NDArray[np.uint8]:
     """Return a pale background with a vertical gradient, shape (height, width, 3), blue, green, red."""
-    ends = np.array([palette.fractions(c)[::-1] for c in (palette.BACKGROUND_TOP, palette.BACKGROUND_BOTTOM)])
+    ends = np.array([fractions(c)[::-1] for c in (palette.BACKGROUND_TOP, palette.BACKGROUND_BOTTOM)])
 
     share = np.linspace(0.0, 1.0, camera.height)[:, None]
     rows = np.rint(255.0 * ((1.0 - share) * ends[0] + share * ends[1])).astype(np.uint8)

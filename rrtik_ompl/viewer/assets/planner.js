@@ -51,12 +51,17 @@ function moveDrawing(k) {
   group.visible = shown;
 }
 
+/** The colour of an obstacle; of one that the page has added that of the first. */
+function drawnColor({ name }) {
+  return story.obstacles.find((each) => each.name === name)?.color ?? story.colors.obstacle;
+}
+
 function drawShape(obstacle, sizes) {
   const group = new THREE.Group();
-  group.add(new THREE.Mesh(shapeGeometry(obstacle.shape, sizes), new THREE.MeshPhongMaterial({ color: story.colors.obstacle })));
+  group.add(new THREE.Mesh(shapeGeometry(obstacle.shape, sizes), new THREE.MeshPhongMaterial({ color: drawnColor(obstacle) })));
   viewer.delete_path([...ROOT, "obstacles", obstacle.node]);
   viewer.set_object([...ROOT, "obstacles", obstacle.node], group);
-  outline(group, 0x7a5a1e);
+  outline(group);
   Object.assign(obstacle, { drawnSizes: sizes.slice(), drawn: new THREE.Matrix4() });
 }
 

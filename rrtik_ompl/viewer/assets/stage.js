@@ -47,24 +47,36 @@ for (const light of ["SpotLight", "PointLightNegativeX", "PointLightPositiveX", 
 }
 viewer.set_property(["Grid"], "visible", false);
 viewer.set_property(["Axes"], "visible", false);
-const key = new THREE.DirectionalLight(0xffffff, 0.5);
-key.position.set(0.4, -0.8, 1);
-const fill = new THREE.DirectionalLight(0xffffff, 0.25);
+const key = new THREE.DirectionalLight(0xffffff, 0.48);
+key.position.set(0.5, -0.7, 1.2);
+const fill = new THREE.DirectionalLight(0xffffff, 0.14);
 fill.position.set(-1, 0.6, 0.3);
-const sky = new THREE.HemisphereLight(0xffffff, 0xb9c0c8, 0.55);
+const sky = new THREE.HemisphereLight(0xffffff, 0xa4aeba, 0.6);
 sky.position.set(0, 0, 1);
 key.position.multiplyScalar(2 * size).add(centre);
 key.target.position.copy(centre);
 [key, fill, sky, key.target].forEach((light, k) => viewer.set_object(["Lights", `page ${k}`], light));
 
-// The arm and the obstacles cast shadows on the ground alone: on each other they would hide what one looks for.
+// Soft shadows on the ground and on what stands there show what touches what.
+const SHADOW_PIXELS = 2048;
 function castShadows() {
   if (story.planar) return;
+  const reach = 0.65 * size;
+  viewer.renderer.shadowMap.type = THREE.PCFShadowMap;  // the kind whose edges can be made softer
   key.castShadow = true;
-  key.shadow.mapSize.set(1024, 1024);
-  Object.assign(key.shadow.camera, { left: -size, right: size, bottom: -size, top: size, near: 0.1 * size, far: 6 * size });
+  key.shadow.mapSize.set(SHADOW_PIXELS, SHADOW_PIXELS);
+  key.shadow.radius = 3;
+  key.shadow.normalBias = (3 * 2 * reach) / SHADOW_PIXELS;  // of a few pixels: surfaces cast none on themselves
+  Object.assign(key.shadow.camera, { left: -reach, right: reach, bottom: -reach, top: reach, near: 0.1 * size, far: 6 * size });
   node().traverse((item) => { item.castShadow = item.receiveShadow = false; });
-  node("robot").traverse((item) => { item.castShadow = item.isMesh === true; });
+  shade(node("robot"));
+}
+
+/** Let the solids of a group cast and receive shadows; what is seen through casts none. */
+function shade(group) {
+  group.traverse((item) => {
+    if (item.isMesh) item.castShadow = item.receiveShadow = !item.material.transparent;
+  });
 }
 castShadows();
 
@@ -83,18 +95,19 @@ function addGrid() {
 showGround();
 dark.addEventListener("change", showGround);
 
-// Dark edges make flat-sided obstacles readable from every side.
-function outline(group, color) {
+// Dark edges, in a darker tone of the surface, make flat-sided obstacles readable from every side.
+function outline(group) {
   const meshes = [];
+  if (!story.planar) shade(group);
   group.traverse((item) => { if (item.isMesh) meshes.push(item); });
   for (const mesh of meshes) {
-    mesh.castShadow = true;
+    const color = mesh.material.color.clone().multiplyScalar(0.6);
     const index = mesh.geometry.index;
     if ((index && index.count > 60000) || mesh.material.transparent) continue;
     mesh.add(new THREE.LineSegments(new THREE.EdgesGeometry(mesh.geometry, 30), new THREE.LineBasicMaterial({ color })));
   }
 }
-outline(node("obstacles"), 0x7a5a1e);
+outline(node("obstacles"));
 
 // Postures ---------------------------------------------------------------------------------------------------------
 function setPosture(group, q) {
@@ -106,24 +119,28 @@ function setPosture(group, q) {
   viewer.set_dirty();
 }
 
-// Ghosts share the triangles of one coarser arm. The first copy of each only fills the depth buffer, so that the second one shows the
-// nearest surface alone and looks like tinted glass, not like a heap of overlapping shells.
+// Ghosts share the triangles of the arm. The first copy of each only fills the depth buffer, so that the second one shows the nearest
+// surface alone and looks like tinted glass, not like a heap of overlapping shells. Each is a little farther away than the one before,
+// so that the arm, or else the first of them, is seen where they coincide.
+const GHOST_UNITS = 16;  // steps of the depth buffer from each ghost to the next one
+let ghostCount = 0;
 function addGhost(name, color, q) {
   const depth = new THREE.MeshBasicMaterial({ colorWrite: false, transparent: true });
   const glass = new THREE.MeshLambertMaterial({ color, transparent: true, opacity: 0.42, depthWrite: false });
   glass.emissive = new THREE.Color(color).multiplyScalar(0.4);
   const ghost = new THREE.Group();
+  ghostCount += 1;
   [depth, glass].forEach((material, pass) => {
-    Object.assign(material, { side: THREE.DoubleSide, polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 4 });
-    const copy = node("ghost").clone(true);
-    copy.visible = true;
-    copy.traverse((item) => { if (item.isMesh) { item.material = material; item.renderOrder = pass + 1; } });
+    Object.assign(material, { side: THREE.DoubleSide, polygonOffset: true, polygonOffsetFactor: ghostCount, polygonOffsetUnits: GHOST_UNITS * ghostCount });
+    const copy = node("robot").clone(true);
+    const tipFrame = copy.getObjectByName("tip frame");
+    if (tipFrame) tipFrame.parent.remove(tipFrame);
+    copy.traverse((item) => { if (item.isMesh) Object.assign(item, { material, renderOrder: pass + 1, castShadow: false }); });
     setPosture(copy, q);
     ghost.add(copy);
   });
   viewer.set_object([...ROOT, name], ghost);
 }
-setVisible(["ghost"], false);
 if (robot && story.start_ghost) addGhost("start ghost", story.colors.start, story.start_ghost);
 if (robot && story.goal_ghost) addGhost("goal ghost", story.colors.goal, story.goal_ghost);
 story.ghosts.forEach(({ name, color, q }) => addGhost(name, color, q));

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 ROBOT = "#5b6b7c"
 ROBOT_ALTERNATE = "#8494a5"  # every second link, so that the joints can be seen
 START = "#0072b2"
 GOAL = "#009e73"
-OBSTACLE = "#e6b35a"
+OBSTACLE = "#e3bd84"
+# Of obstacles that state no colour, the largest kind first; away from the hues of ghosts, trails and contacts.
+OBSTACLES = (OBSTACLE, "#a8b8c8", "#c9826b", "#9d92c7", "#cfc48a", "#83a6ab", "#d3a3b4", "#a08b77")
+GROUND = "#c9bfa8"
 ATTACHED = "#cc79a7"
 INK = "#1d2733"
 TRAIL = "#d55e00"
@@ -27,13 +28,3 @@ GRID_MIDDLE_DARK, GRID_DARK = "#4d5965", "#38434f"
 def number(color: str) -> int:
     """Convert the colour '#rrggbb' to a number for three.js."""
     return int(color.removeprefix("#"), 16)
-
-
-def hexadecimal(fractions: Iterable[float]) -> str:
-    """Convert red, green and blue between 0 and 1 to the colour '#rrggbb'."""
-    return "#" + "".join(f"{round(255 * min(max(float(part), 0.0), 1.0)):02x}" for part in fractions)
-
-
-def fractions(color: str) -> list[float]:
-    """Convert the colour '#rrggbb' to red, green and blue between 0 and 1."""
-    return [int(color[k : k + 2], 16) / 255.0 for k in (1, 3, 5)]

@@ -10,6 +10,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Matrix
+from rrtik_ompl.base.colors import hexadecimal
 from rrtik_ompl.base.errors import UnknownNameError
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import AttachedObject, Scene
@@ -18,7 +19,6 @@ from rrtik_ompl.viewer.drawing.meshes import Look, look_of_coal, look_of_shape, 
 from rrtik_ompl.viewer.drawing.nodes import Material, Node
 
 ROBOT_TRIANGLES = 40_000  # largest number for the whole arm; meshes are simplified beyond that
-GHOST_TRIANGLES = 15_000  # largest number for each ghost
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,7 +82,7 @@ def _link_parts(bodies: Sequence[pin.GeometryObject], triangles: int) -> list[Pa
 def _link_color(body: pin.GeometryObject) -> str:
     """Return the colour in the robot's description, or one of two alternating greys, which make joints visible."""
     if body.overrideMaterial:
-        return palette.hexadecimal(body.meshColor[:3])
+        return hexadecimal(body.meshColor[:3])
     return palette.ROBOT_ALTERNATE if body.parentJoint % 2 else palette.ROBOT
 
 
@@ -102,7 +102,9 @@ def attached_parts(robot: Robot, attached: Sequence[AttachedObject]) -> list[Par
         frame = robot.model.frames[robot.model.getFrameId(item.link, pin.FrameType.BODY)]
         placement = (frame.placement * item.pose).homogeneous
         name = held_node_name(item.name)
-        parts.append(Part(name, frame.parentJoint, placement, look_of_shape(item.shape), palette.ATTACHED))
+        parts.append(
+            Part(name, frame.parentJoint, placement, look_of_shape(item.shape), item.color or palette.ATTACHED)
+        )
     return parts
 
 

@@ -19,6 +19,7 @@ from rrtik_ompl.viewer.drawing import palette
 from rrtik_ompl.viewer.drawing.framing import Frame
 from rrtik_ompl.viewer.drawing.meshes import Look, half_space_plate, look_of_margin, look_of_shape, look_of_triangles
 from rrtik_ompl.viewer.drawing.nodes import Material, Node
+from rrtik_ompl.viewer.drawing.painting import obstacle_colors
 from rrtik_ompl.viewer.drawing.robot_picture import node_name
 from rrtik_ompl.viewer.drawing.triangles import tube
 
@@ -30,15 +31,18 @@ SIDES = 24  # sides of a cone
 CONE = 0.3  # length of a cone, as a share of the arm's diagonal
 THINNEST = 0.004  # thickness of a plane or a line, as a share of the arm's diagonal
 OPACITY = 0.2
+PLATE_OPACITY = 0.4  # of a half-space
 
 
 def draw_scene(vis: Node, scene: Scene, frame: Frame) -> None:
     """Draw obstacles and their margins under ``obstacles``, the later poses of moving ones under ``later``."""
+    colors = obstacle_colors(scene.obstacles)
     for obstacle in scene.at(0.0).obstacles:
-        _draw_obstacle(vis["obstacles"][node_name(obstacle.name)], obstacle, frame)
+        _draw_obstacle(vis["obstacles"][node_name(obstacle.name)], obstacle, colors[obstacle.name], frame)
     for obstacle in scene.obstacles:
         if obstacle.motion is not None and obstacle.shape.bounded:
-            _draw_motion(vis["later"][node_name(obstacle.name)], obstacle, obstacle.motion, frame)
+            node = vis["later"][node_name(obstacle.name)]
+            _draw_motion(node, obstacle, obstacle.motion, colors[obstacle.name], frame)
 
 
 def obstacle_look(obstacle: Obstacle, frame: Frame) -> tuple[Look, Matrix]:
@@ -50,32 +54,32 @@ def obstacle_look(obstacle: Obstacle, frame: Frame) -> tuple[Look, Matrix]:
     return look, look.placement
 
 
-def _draw_obstacle(node: Node, obstacle: Obstacle, frame: Frame) -> None:
+def _draw_obstacle(node: Node, obstacle: Obstacle, color: str, frame: Frame) -> None:
     look, placement = obstacle_look(obstacle, frame)
-    opacity = 1.0 if obstacle.shape.bounded else 0.2
-    node.set_object(look.geometry, look_material(palette.OBSTACLE, opacity))
+    opacity = 1.0 if obstacle.shape.bounded else PLATE_OPACITY
+    node.set_object(look.geometry, look_material(color, opacity))
     node.set_transform(obstacle.pose.homogeneous @ placement)
-    _draw_margin(node["margin"], obstacle, placement)
+    _draw_margin(node["margin"], obstacle, color, placement)
 
 
-def _draw_margin(node: Node, obstacle: Obstacle, placement: Matrix) -> None:
+def _draw_margin(node: Node, obstacle: Obstacle, color: str, placement: Matrix) -> None:
     """Draw the margin of an obstacle below its node, which has ``placement`` in the obstacle's frame."""
     look = look_of_margin(obstacle.shape, obstacle.margin) if obstacle.margin else None
     if look is not None:
-        node.set_object(look.geometry, look_material(palette.OBSTACLE, opacity=0.2))
+        node.set_object(look.geometry, look_material(color, opacity=0.2))
         node.set_transform(np.linalg.solve(placement, look.placement))
 
 
-def _draw_motion(node: Node, obstacle: Obstacle, motion: Motion, frame: Frame) -> None:
+def _draw_motion(node: Node, obstacle: Obstacle, motion: Motion, color: str, frame: Frame) -> None:
     times = LATER_SECONDS if isinstance(motion, ConstantVelocity) else tuple(motion.times[motion.times > 0.0])
     look = look_of_shape(obstacle.shape)
 
     for k, time in enumerate(times):
-        node[f"at {k}"].set_object(look.geometry, look_material(palette.OBSTACLE, opacity=0.2))
+        node[f"at {k}"].set_object(look.geometry, look_material(color, opacity=0.2))
         node[f"at {k}"].set_transform(motion.pose_at(obstacle.pose, time).homogeneous @ look.placement)
 
     stations = np.array([motion.pose_at(obstacle.pose, time).translation for time in np.linspace(0.0, times[-1], 40)])
-    draw_tube(node["way"], stations, 0.003 * frame.arm, palette.OBSTACLE)
+    draw_tube(node["way"], stations, 0.003 * frame.arm, color)
 
 
 def draw_goal(vis: Node, goal: Goal | None, frame: Frame) -> None:
