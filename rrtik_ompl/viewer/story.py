@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -11,14 +12,16 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.base.poses import pose_from_xyzw
 from rrtik_ompl.base.units import shown_unit
 from rrtik_ompl.model.goal import Goal
 from rrtik_ompl.model.judgement import FARTHEST, ClearanceCurve, PathContact, Verdict
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import Scene
 from rrtik_ompl.model.transitions import moved, route_length, transitions
+from rrtik_ompl.replanning.record import ReplanRun
 from rrtik_ompl.viewer.drawing import palette
-from rrtik_ompl.viewer.drawing.framing import Frame, overview
+from rrtik_ompl.viewer.drawing.framing import Frame, obstacle_corners, overview
 from rrtik_ompl.viewer.drawing.marks import Mark
 from rrtik_ompl.viewer.drawing.meshes import look_of_margin
 from rrtik_ompl.viewer.drawing.painting import obstacle_colors
@@ -26,6 +29,7 @@ from rrtik_ompl.viewer.drawing.robot_picture import joint_nodes, node_name, node
 from rrtik_ompl.viewer.drawing.trail import pieces
 from rrtik_ompl.viewer.run_story import run_story
 from rrtik_ompl.viewer.subject import Subject
+from rrtik_ompl.viewer.task_story import TASK
 
 PLAY_SPEED = np.deg2rad(30.0)  # [rad/s]; speed of the joint that travels farthest in a move
 PLAY_SECONDS = (3.0, 60.0)  # shortest and longest playing time of a whole path
@@ -60,8 +64,8 @@ def story_of(subject: Subject, frame: Frame, title: str) -> dict[str, Any]:
         "contacts": [] if robot is None else [_contact(contact, robot, subject.scene) for contact in subject.contacts],
         "run": None if subject.run is None or robot is None else run_story(subject.run, robot, subject.scene, frame),
         "fingers": None if subject.fingers is None else subject.fingers.story(),
-        "frame": {"low": _numbers(frame.low), "high": _numbers(frame.high)},
-        "overview": _numbers(overview(_places(subject), subject.scene)),
+        "frame": {"low": _numbers(frame.low), "high": _numbers(frame.high), "points": _numbers(frame.points)},
+        "overview": _numbers(overview(_groups_to_see(subject), subject.scene)),
         "planar": robot is not None and robot.planar,
         "grid": grid_cell(frame.size),
         "colors": _colors(),
@@ -217,12 +221,36 @@ def _contact(contact: PathContact, robot: Robot, scene: Scene) -> dict[str, Any]
     }
 
 
-def _places(subject: Subject) -> Matrix:
-    """Return the positions of joints and tip at each waypoint, shape (m, 3)."""
+def _groups_to_see(subject: Subject) -> list[Matrix]:
+    """Return what the first view should not hide, arrays of shape (m, 3).
+
+    These are the positions of joints and tip at each waypoint, the tip at the end, and first and last places of what a
+    task moves.
+    """
     if subject.robot is None:
-        return np.empty((0, 3))
+        return []
     frames = subject.robot.joint_frames(subject.waypoints)[:, 1:, :3, 3].reshape(-1, 3)
-    return np.concatenate([frames, subject.robot.fk_batch(subject.waypoints)[:, :3, 3]])
+    tips = subject.robot.fk_batch(subject.waypoints)[:, :3, 3]
+    groups = [np.concatenate([frames, tips])]
+
+    if subject.end is not None:
+        groups.append(subject.robot.fk_batch(subject.end[None])[:, :3, 3])
+    if subject.run is not None and subject.run.planner == TASK:
+        groups += _moved_things(subject.run, subject.scene)
+    return groups
+
+
+def _moved_things(run: ReplanRun, scene: Scene) -> list[Matrix]:
+    """Return the corners of boxes around each thing that moves in a run, where it is first and last, shape (16, 3)."""
+    ends = run.ticks[0].poses, run.ticks[-1].poses
+    moved_names = [name for name in ends[0] if not np.array_equal(ends[0][name], ends[1][name])]
+    groups = []
+
+    for name in moved_names:
+        thing = scene.obstacle(name)
+        places = [pose_from_xyzw(poses[name][:3], poses[name][3:]) for poses in ends]
+        groups.append(np.concatenate([obstacle_corners(replace(thing, pose=place)) for place in places]))
+    return groups
 
 
 def grid_cell(size: float) -> float:

@@ -131,9 +131,9 @@ def test_the_camera_takes_in_arm_and_obstacles_but_not_all_of_a_huge_floor() -> 
 
 def test_the_camera_looks_from_where_no_obstacle_stands_in_the_way() -> None:
     points = np.array([[0.0, 0.0, 0.5]])
-    free = overview(points, Scene())
+    free = overview([points], Scene())
     wall = Obstacle("wall", Box([0.1, 4.0, 4.0]), pose([0.5 * np.sign(free[0]), 0.0, 0.5]))
-    around = overview(points, Scene((wall,)))
+    around = overview([points], Scene((wall,)))
     assert behind(points, free, wall).all()
     assert not behind(points, around, wall).any()
     assert around[2] > 0.0

@@ -215,7 +215,7 @@ const VIEWPOINTS = { Overview: story.overview, Front: [1, 0, 0.0], Side: [0, -1,
 let viewpoint = story.planar ? "Top" : "Overview";
 let turnedByHand = false;
 
-/** Place the camera in a direction so that the whole box fills the picture; meshcat's camera has y up: (x, z, -y). */
+/** Place the camera in a direction so that what must be seen fills the picture; meshcat's camera has y up: (x, z, -y). */
 function lookFrom(name) {
   viewpoint = name;
   turnedByHand = false;
@@ -231,7 +231,7 @@ function lookFrom(name) {
   viewer.set_dirty();
 }
 
-/** Where the eye and its target must be to see the box from a direction, as large and as central as it goes. */
+/** Where the eye and its target must be to see all that must be seen from a direction, as large and as central as it goes. */
 function fit(away, tangent) {
   const right = new THREE.Vector3(0, 0, 1).cross(away).normalize();
   const up = away.clone().cross(right);
@@ -240,8 +240,8 @@ function fit(away, tangent) {
   const target = centre.clone();
   let distance = 2 * size;
   for (let round = 0; round < 12; round += 1) {
-    const spots = corners().map((corner) => {
-      const arm = corner.sub(target);
+    const spots = outermost().map((spot) => {
+      const arm = spot.sub(target);
       const depth = Math.max(distance - arm.dot(away), 1e-6 * size);
       return [arm.dot(right) / depth / wide, arm.dot(up) / depth / tall];
     });
@@ -253,10 +253,8 @@ function fit(away, tangent) {
   return { eye: target.clone().addScaledVector(away, distance), target };
 }
 
-function corners() {
-  return [...Array(8).keys()].map(
-    (k) => new THREE.Vector3(k & 1 ? high.x : low.x, k & 2 ? high.y : low.y, k & 4 ? high.z : low.z),
-  );
+function outermost() {
+  return story.frame.points.map(([x, y, z]) => new THREE.Vector3(x, y, story.planar ? 0 : z));
 }
 
 viewer.controls.addEventListener("start", () => { turnedByHand = true; });

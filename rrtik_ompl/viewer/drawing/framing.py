@@ -14,10 +14,14 @@ from rrtik_ompl.base.arrays import Mask, Matrix, Vector
 from rrtik_ompl.model.scene import Obstacle, Scene
 from rrtik_ompl.viewer.drawing.meshes import look_of_shape
 
-# Ratio of an obstacle's size to that of the arm's box above which only a part of the obstacle is shown.
+# Ratios of an obstacle's size to that of the arm's box above which only the part near the arm has to be in the picture:
+# of a table only sideways, so that the ground stays below its legs.
+TABLE_RATIO = 0.75
 SURROUNDINGS_RATIO = 3.0
 EMPTY_BOX = np.array([[-0.5] * 3, [0.5] * 3])  # [m]; shown if there is nothing else
-SURROUNDINGS_MARGIN = 0.5  # how far around the arm's box such an obstacle is shown, as a share of the box
+TABLE_MARGIN = 0.15  # how far around the arm's box such an obstacle is shown, as a share of the box
+SURROUNDINGS_MARGIN = 0.5
+DIRECTIONS = np.array([[x, y, z] for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1) if x or y or z])
 
 DEFAULT_AZIMUTH = np.deg2rad(-50.0)  # the viewer stands in front of the arm (x), on its right
 ELEVATIONS = np.deg2rad([27.0, 42.0])
@@ -34,11 +38,13 @@ class Frame:
         low, high: Corners, shape (3,) [m].
         arm: Diagonal of the box around the arm, at least a tenth of the whole box's [m]; that of the whole box if there
             is no arm.
+        points: Outermost points of what must be in the picture, shape (k, 3) [m].
     """
 
     low: Vector
     high: Vector
     arm: float
+    points: Matrix
 
     @property
     def centre(self) -> Vector:
@@ -67,22 +73,36 @@ def frame_around(
         everything = np.concatenate([*boxes, *extra, *([] if boxes or extra else [EMPTY_BOX])])
         low = everything.min(axis=0)
         high = everything.max(axis=0)
-        return Frame(low, high, max(float(np.linalg.norm(high - low)), 1e-3))
+        return Frame(low, high, max(float(np.linalg.norm(high - low)), 1e-3), _outermost(everything))
 
     points = np.concatenate([arm_points, *extra])
     low = points.min(axis=0)
     high = points.max(axis=0)
     arm = max(float(np.linalg.norm(high - low)), 1e-3)
 
-    near_low = low - SURROUNDINGS_MARGIN * arm
-    near_high = high + SURROUNDINGS_MARGIN * arm
-    for corners in boxes:
-        if not whole and float(np.ptp(corners, axis=0).max()) > SURROUNDINGS_RATIO * arm:
-            corners = np.clip(corners, near_low, near_high)
-        low = np.minimum(low, corners.min(axis=0))
-        high = np.maximum(high, corners.max(axis=0))
+    shown = boxes if whole else [_near_part(corners, low, high, arm) for corners in boxes]
+    everything = np.concatenate([points, *shown])
+    low = everything.min(axis=0)
+    high = everything.max(axis=0)
+    return Frame(low, high, max(arm, 0.1 * float(np.linalg.norm(high - low))), _outermost(everything))
 
-    return Frame(low, high, max(arm, 0.1 * float(np.linalg.norm(high - low))))
+
+def _near_part(corners: Matrix, low: Vector, high: Vector, arm: float) -> Matrix:
+    """Return the corners of the part of an obstacle's box that must be in the picture, near the arm's, shape (8, 3)."""
+    extent = float(np.ptp(corners, axis=0).max())
+    if extent <= TABLE_RATIO * arm:
+        return corners
+    if extent <= SURROUNDINGS_RATIO * arm:
+        sideways = np.clip(corners[:, :2], low[:2] - TABLE_MARGIN * arm, high[:2] + TABLE_MARGIN * arm)
+        return np.column_stack([sideways, corners[:, 2]])
+    near: Matrix = np.clip(corners, low - SURROUNDINGS_MARGIN * arm, high + SURROUNDINGS_MARGIN * arm)
+    return near
+
+
+def _outermost(points: Matrix) -> Matrix:
+    """Return the points that are farthest in any of `DIRECTIONS`, shape (k, 3)."""
+    farthest: Matrix = points[np.unique(np.argmax(points @ DIRECTIONS.T, axis=0))]
+    return farthest
 
 
 def obstacle_corners(obstacle: Obstacle) -> Matrix:
@@ -92,17 +112,19 @@ def obstacle_corners(obstacle: Obstacle) -> Matrix:
     return placed
 
 
-def overview(points: Matrix, scene: Scene) -> Vector:
+def overview(groups: Sequence[Matrix], scene: Scene) -> Vector:
     """Return the best first viewpoint: a unit vector from the scene towards the viewer, shape (3,).
 
     Several directions are compared by the share of points that obstacles hide, plus a cost for turning away from the
-    default direction.
+    default direction. Each group of points counts as much as the others.
 
     Args:
-        points: Points that should be visible, shape (m, 3) [m].
+        groups: Points that should be visible, arrays of shape (m, 3) [m].
         scene: Each obstacle hides what lies behind the box around it.
     """
     obstacles = [o for o in scene.obstacles if o.shape.bounded]
+    points = np.concatenate([np.empty((0, 3)), *groups])
+    weights = np.concatenate([np.empty(0), *(np.full(len(group), 1.0 / len(group)) for group in groups if len(group))])
     best = direction(0.0, float(ELEVATIONS[0]))
     least = np.inf
 
@@ -114,7 +136,7 @@ def overview(points: Matrix, scene: Scene) -> Vector:
                 hidden |= behind(points, away, obstacle)
 
             extra = TURN_COST * (abs(turn) / (0.5 * np.pi) + (elevation > ELEVATIONS[0]))
-            cost = (float(hidden.mean()) if len(points) else 0.0) + float(extra)
+            cost = float(weights @ hidden) / max(len(groups), 1) + float(extra)
 
             if cost < least - 1e-9:
                 best = away
