@@ -12,7 +12,7 @@ from typer import Option
 
 import rrtik_ompl as rrtik
 from bench.shared.run import REPORTS
-from rrtik_ompl.viewer.film import film
+from rrtik_ompl.viewer.film import film, picture
 
 SEED = 1
 ARMS = ("panda_shelf", "ur5_table", "ur10_bin", "xarm7_cage", "kinova_table", "so101_bin")
@@ -33,10 +33,10 @@ def sheet(file: Path) -> None:
     shots = []
     with tempfile.TemporaryDirectory() as folder:
         for name in ARMS:
-            shot = film(*planned(name), Path(folder, f"{name}.png"), size=(2 * WIDTH, 5 * WIDTH // 4))
-            picture = cv2.imread(str(shot))
-            assert picture is not None
-            shots.append(cv2.resize(picture, (WIDTH, 5 * WIDTH // 8), interpolation=cv2.INTER_AREA))
+            shot = picture(*planned(name), Path(folder, f"{name}.png"), size=(2 * WIDTH, 5 * WIDTH // 4))
+            pixels = cv2.imread(str(shot))
+            assert pixels is not None
+            shots.append(cv2.resize(pixels, (WIDTH, 5 * WIDTH // 8), interpolation=cv2.INTER_AREA))
     rows = [np.hstack(shots[k : k + COLUMNS]) for k in range(0, len(shots), COLUMNS)]
     cv2.imwrite(str(file), np.vstack(rows), [cv2.IMWRITE_PNG_COMPRESSION, 9])
 

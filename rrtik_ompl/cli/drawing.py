@@ -12,6 +12,7 @@ import typer
 
 from rrtik_ompl.base.errors import InputError, ProblemError
 from rrtik_ompl.cli import FOUND
+from rrtik_ompl.cli.filming import Camera, FilmFile, Filming, Hide, PictureFile, Rate, Size
 from rrtik_ompl.cli.terminal import PAGE_FORMATS, ProblemName, note, plural, progress, say, shown_names, suggest
 from rrtik_ompl.files.text import check_target, write_text
 
@@ -30,8 +31,6 @@ WITH_PROBLEM = {  # what cannot be shown alone, and what to do, by the kind of t
     "Trajectory": "give its problem too: rrtik show PROBLEM {}",
     "ReplanRun": "give its scenario too: rrtik replan SCENARIO --replay {} --html page.html",
 }
-FILM_SECONDS = 4.0  # duration of the film of a path
-LONGEST_FILM = 48.0  # [s] of a task; longer ones play faster
 ENDINGS = (".mp4", ".avi", ".png", ".jpg")
 
 
@@ -49,12 +48,16 @@ def show(
     scene: Annotated[Path | None, typer.Option(help="Obstacles around a robot: a YAML file.")] = None,
     before: Annotated[Path | None, typer.Option(help="Another path file, to compare with.")] = None,
     html: Annotated[Path | None, typer.Option(help="Write a self-contained 3-D page to this file.")] = None,
-    film: Annotated[
-        Path | None, typer.Option(help="Write the path as a film: .gif, .mp4; or the start: .png. Needs a browser.")
-    ] = None,
+    film: FilmFile = None,
+    picture: PictureFile = None,
     seconds: Annotated[
-        float | None, typer.Option(help="Duration of the film [s]; if left out 4, or what a task takes, at most 48.")
+        float | None,
+        typer.Option(help="Duration of the film [s]; if left out 4, or what a timed motion takes, at most 48."),
     ] = None,
+    rate: Rate = None,
+    size: Size = None,
+    camera: Camera = "overview",
+    hide: Hide = "",
     port: Annotated[int, typer.Option(help="Port on 127.0.0.1; 0 takes a free one.", min=0, max=65535)] = 0,
     still: Annotated[bool, typer.Option("--still", help="A page that does not plan by itself: smaller.")] = False,
 ) -> int:
@@ -66,7 +69,8 @@ def show(
     start is in collision, the bodies are red, and the exit code is 1.
     """
     check_target(html, PAGE_FORMATS)
-    check_target(film, (".gif", ".mp4", ".png"))
+    filming = Filming(film, picture, rate, size, camera, hide)
+    filming.check()
 
     from rrtik_ompl.files.kinds import KINDS, kind_of
     from rrtik_ompl.viewer import view
@@ -78,17 +82,12 @@ def show(
         raise InputError(f"{path}: {KINDS['ReplanRun'].what}; {WITH_PROBLEM['ReplanRun'].format(path)}")
 
     drawn = _of_task if kind == "TaskPlan" else _of_problem
-    question, route, earlier, fault, title, duration = drawn(problem, path, scene, before)
+    question, route, earlier, fault, title = drawn(problem, path, scene, before)
 
-    if film is not None:
-        from rrtik_ompl.viewer.film import film as write_film
-
-        with progress("drawing"):
-            write_film(question, route, film, seconds=duration if seconds is None else seconds)
+    written = filming.write(question, route, seconds=seconds)
     if html is not None:
         view(question, route, html=html, before=earlier, still=still, title=title)
-
-    written = [file for file in (film, html) if file is not None]
+        written.append(html)
     if written:
         say(*(f"wrote {file}" for file in written))
         suggest(*(f"open {file}" for file in written))
@@ -110,7 +109,6 @@ class Drawn(NamedTuple):
         before: A path to compare with; None without one.
         fault: Why the start is invalid; "" if it is valid.
         title: Heading; None derives it from the name.
-        seconds: Duration of a film [s].
     """
 
     question: Any
@@ -118,7 +116,6 @@ class Drawn(NamedTuple):
     before: JointPath | None
     fault: str
     title: str | None
-    seconds: float
 
 
 def _of_problem(name: str, path: Path | None, scene: Path | None, before: Path | None) -> Drawn:
@@ -129,7 +126,7 @@ def _of_problem(name: str, path: Path | None, scene: Path | None, before: Path |
     question, robot, fault = _subject(name, scene)
     route = None if path is None else load_motion_or_path(path, robot)
     earlier = None if before is None else JointPath.load(before, robot)
-    return Drawn(question, route, earlier, fault, fault or None, FILM_SECONDS)
+    return Drawn(question, route, earlier, fault, fault or None)
 
 
 def _of_task(name: str, path: Path | None, scene: Path | None, before: Path | None) -> Drawn:
@@ -142,9 +139,7 @@ def _of_task(name: str, path: Path | None, scene: Path | None, before: Path | No
         raise InputError(f"{name}: the plan of a task, which holds its paths and scenes: leave {wrong[0]} out")
 
     plan = TaskPlan.load(name)
-    played = plan.played()
-    seconds = min(len(played.waypoints) / played.rate, LONGEST_FILM)
-    return Drawn(plan.worlds[0], played, None, "", f"{Path(name).stem}: {plural(len(plan.paths), 'motion')}", seconds)
+    return Drawn(plan.worlds[0], plan.played(), None, "", f"{Path(name).stem}: {plural(len(plan.paths), 'motion')}")
 
 
 def _subject(name: str, scene: Path | None) -> tuple[Any, Robot, str]:

@@ -12,6 +12,7 @@ import typer
 
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.cli import FOUND, NOT_FOUND
+from rrtik_ompl.cli.filming import Camera, FilmFile, Filming, Hide, PictureFile, Rate, Size
 from rrtik_ompl.cli.terminal import PAGE_FORMATS, Seed, note, progress, say
 from rrtik_ompl.files.text import check_target
 
@@ -49,6 +50,12 @@ def replan_scenario(
     record: Annotated[Path | None, typer.Option(help="Write the record of the run, on Ctrl-C too: .json.")] = None,
     replay: Annotated[Path | None, typer.Option(help="Show this record instead of a new run.")] = None,
     html: Annotated[Path | None, typer.Option(help="Write a self-contained page that replays the run.")] = None,
+    film: FilmFile = None,
+    picture: PictureFile = None,
+    rate: Rate = None,
+    size: Size = None,
+    camera: Camera = "overview",
+    hide: Hide = "",
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")] = False,
 ) -> int:
     """Move a robot to its goal while obstacles move.
@@ -57,6 +64,8 @@ def replan_scenario(
     """
     check_target(html, PAGE_FORMATS)
     check_target(record, (".json",))
+    filming = Filming(film, picture, rate, size, camera, hide)
+    filming.check()
 
     options: dict[str, Any] = {
         "planner": planner,
@@ -99,12 +108,13 @@ def replan_scenario(
 
         with progress("drawing"):
             view(chosen.problem, run=run, html=html)
+    filmed = filming.write(chosen.problem, None, run=run)
 
     if as_json:
         print(json.dumps(_document(run)))
     else:
         say(run.summary())
-        say(*(f"wrote {file}" for file in (record, html) if file is not None))
+        say(*(f"wrote {file}" for file in (record, html, *filmed) if file is not None))
     return FOUND if run.found else NOT_FOUND
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rrtik_ompl.cli import FOUND, NOT_FOUND
+from rrtik_ompl.cli.filming import Camera, FilmFile, Filming, Hide, PictureFile, Rate, Size
 from rrtik_ompl.cli.terminal import (
     PAGE_FORMATS,
     TRAJECTORY_FORMATS,
@@ -117,6 +118,12 @@ def task(
         float, typer.Option(help="Rest where a gripper moves or an object is taken or put down [s].")
     ] = 1.0,
     html: Annotated[Path | None, typer.Option(help="Write a page that plays the whole task.")] = None,
+    film: FilmFile = None,
+    picture: PictureFile = None,
+    rate: Rate = None,
+    size: Size = None,
+    camera: Camera = "overview",
+    hide: Hide = "",
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")] = False,
 ) -> int:
     """Plan a task: pick and place and other sequences of stages.
@@ -126,6 +133,8 @@ def task(
     check_target(out, (".json",))
     check_target(trajectory, TRAJECTORY_FORMATS)
     check_target(html, PAGE_FORMATS)
+    filming = Filming(film, picture, rate, size, camera, hide)
+    filming.check()
 
     from rrtik_ompl.tasks import Task
 
@@ -145,13 +154,14 @@ def task(
 
         with progress("drawing"):
             view(loaded.world, plan.played(), html=html, title=f"{loaded.name}: {plural(len(plan.paths), 'motion')}")
+    filmed = filming.write(loaded.world, plan) if plan.found else []
 
     if as_json:
         print(json.dumps({**_document(plan), "seed": seed, "duration": duration}))
     elif plan.found:
         say(*plan_lines(loaded.name, plan))
         say(*([] if duration is None else [f"  in {duration:.2f} s, each rest of {pause:g} s"]))
-        say(*(f"wrote {file}" for file in (out, trajectory, commands, html) if file is not None))
+        say(*(f"wrote {file}" for file in (out, trajectory, commands, html, *filmed) if file is not None))
         seen = f"see it: {command('task', task, '--html', 'task.html')}" if html is None else f"open {html}"
         suggest(seen, *(["time it: --trajectory task.json"] if trajectory is None else []))
     else:

@@ -178,14 +178,14 @@ def progress(message: str) -> Iterator[None]:
 
 
 @contextmanager
-def counter(message: str, total: int) -> Iterator[Callable[[int], object]]:
+def counter(message: str, total: int) -> Iterator[Callable[..., object]]:
     """Show a bar on standard error with the progress up to ``total``; nothing unless that is a terminal.
 
     Yields:
-        A function that is called with the number of completed steps.
+        A function that is called with the number of completed steps, and with that of all if it was not known before.
     """
     if not sys.stderr.isatty():
-        yield lambda _: None
+        yield lambda *_: None
         return
 
     from rich.console import Console
@@ -194,7 +194,7 @@ def counter(message: str, total: int) -> Iterator[Callable[[int], object]]:
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with Progress(*columns, console=Console(stderr=True)) as bar:
         task = bar.add_task(message, total=total)
-        yield lambda done: bar.update(task, completed=done)
+        yield lambda done, all_steps=total: bar.update(task, completed=done, total=all_steps)
 
 
 def problem_names(incomplete: str) -> list[str]:

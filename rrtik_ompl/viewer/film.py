@@ -1,162 +1,237 @@
-"""Convert the page to a film: a headless browser draws the pictures, which are saved as GIF, MP4 or PNG."""
+"""Films and still pictures of a page, drawn by a headless browser: MP4, WebM, GIF and PNG."""
 
 from __future__ import annotations
 
-import base64
-import html
-import json
 import os
-import shutil
-import subprocess
-import tempfile
-import threading
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import closing
 from io import BytesIO
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 from PIL import Image
 
-from rrtik_ompl.base.errors import InputError
-from rrtik_ompl.files.text import check_target
+from rrtik_ompl.base.errors import InputError, called, listed, require
+from rrtik_ompl.files.text import check_target, file_name, write_bytes
+from rrtik_ompl.motion.trajectory import Trajectory
+from rrtik_ompl.replanning.record import ReplanRun
+from rrtik_ompl.tasks import TaskPlan
 from rrtik_ompl.tasks.played import PlayedTask
-from rrtik_ompl.viewer.page import ASKING_POLICY, POLICY, asset, page
-from rrtik_ompl.viewer.serve import PageServer
+from rrtik_ompl.viewer.browser import posts
+from rrtik_ompl.viewer.film_file import webm, whole_film
+from rrtik_ompl.viewer.film_view import camera_of, sides_of
+from rrtik_ompl.viewer.page import page
 from rrtik_ompl.viewer.subject import Showable, ShownPath, subject_of
 
-FILMS = (".gif", ".mp4", ".png")
-BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome", "microsoft-edge")
-OPTIONS = (
-    "--headless=new", "--no-sandbox", "--no-first-run", "--hide-scrollbars", "--mute-audio",
-    "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
-)  # fmt: skip
-PATIENCE = 120.0  # [s]; longest time without a new picture
-COLORS = 255  # colours of a GIF
+FILMS = (".mp4", ".webm", ".gif")
+PICTURES = (".png",)
+BITS_PER_PIXEL = 0.1  # of an encoded film
+LEAST_BITS = 2e6  # [bit/s]
+SIZE, GIF_SIZE = (1280, 720), (640, 400)  # [px]
+RATE, GIF_RATE = 30.0, 12.0  # pictures a second
+PATH_SECONDS = 4.0  # duration of the film of a path without times
+LONGEST = 48.0  # [s] of what has times of its own; longer motions play faster
 HOLD = 0.8  # [s]; how long the last picture is shown
-MOST_FRAMES = 600
-PICTURE_ONLY = (
-    "<style>header, aside, footer, #labels {{ display: none !important }} "
-    "body {{ display: block }} main {{ width: {}px; height: {}px }}</style>"
-)
+MOST_FRAMES = 36_000
+COLORS = 255  # colours of a GIF
 
 
 def film(
     shown: Showable,
-    path: ShownPath | PlayedTask | None,
+    path: ShownPath | TaskPlan | PlayedTask | None,
     file: str | os.PathLike[str],
     *,
-    seconds: float = 4.0,
-    rate: float = 12.0,
-    size: tuple[int, int] = (640, 400),
+    run: ReplanRun | None = None,
+    seconds: float | None = None,
+    rate: float | None = None,
+    size: str | Sequence[int] | None = None,
+    camera: str | os.PathLike[str] = "overview",
+    hide: str | Iterable[str] = "",
+    on_picture: Callable[[int, int], object] = lambda done, count: None,
 ) -> Path:
-    """Write a path as a film, or a configuration as a still picture.
+    """Write a film of a path, a timed motion, a task or a run of replanning.
+
+    A headless browser draws it, by software alone, so that it needs neither a screen nor a graphics card. The file
+    appears only when it is complete.
 
     Args:
         shown: A ``Problem``, ``World``, ``Robot`` or ``Scene``.
-        path: What is played, such as the ``played()`` of a plan of a task; may be None for a PNG.
-        file: .gif, .mp4 or .png (the first picture).
-        seconds: Duration of the whole path.
-        rate: Pictures a second.
-        size: Width and height [px].
+        path: What is played: a path, a ``Trajectory``, a ``TaskPlan``; None with a run.
+        file: .mp4 (H.264), .webm (VP9) or .gif.
+        run: A run of :func:`rrtik_ompl.replan` in place of a path.
+        seconds: Duration [s]; None for 4 s of a path, or for the time that the motion itself takes, at most 48 s.
+        rate: Pictures a second; None for 30, of a GIF 12.
+        size: Width and height [px], (1920, 1080) or "1920x1080"; None for 1280 x 720, of a GIF 640 x 400.
+        camera: "overview", "front", "side", "top"; "orbit" goes once around everything, "follow" stays beside the tip;
+            or a file of views, as the page saves it.
+        hide: What is left out: names of groups of the page's tree ("ghosts", "trails", "labels", "frames", "grid",
+            ...), of single things in it such as obstacles, or "caption".
+        on_picture: Called with the number of finished pictures and of all.
 
     Returns:
         The file.
 
     Raises:
-        InputError: If a moving picture has no path, a number is out of range, there is no browser, or the file cannot
-            be written.
+        InputError: If there is nothing that moves, a value is out of range, there is no browser or no encoder, or the
+            file cannot be written.
     """
-    target = Path(file)
+    target = file_name(file)
     check_target(target, FILMS)
-    still = target.suffix.lower() == ".png"
-    if not still and not isinstance(path, PlayedTask) and not subject_of(shown, path).is_path:
-        raise InputError(f"{target}: a film needs a path; give one (rrtik plan --out path.json), or ask for a .png")
+    ending = target.suffix.lower()
+    gif = ending == ".gif"
 
-    count = 1 if still else round(seconds * rate) + 1
-    if not (rate > 0.0 and 1 <= count <= MOST_FRAMES and min(size) >= 64 and max(size) <= 4096):
-        raise InputError(f"a film of {seconds:g} s, {rate:g} pictures a second, {size[0]} x {size[1]} px: out of range")
+    played = path.played() if isinstance(path, TaskPlan) else path
+    length = _seconds(shown, played, run, target) if seconds is None else float(seconds)
+    speed = (GIF_RATE if gif else RATE) if rate is None else float(rate)
+    width, height = sides_of((GIF_SIZE if gif else SIZE) if size is None else size, ending)
+    frames = round(length * speed) + 1 if np.isfinite(length * speed) else 0
+    if not (speed > 0.0 and 2 <= frames <= MOST_FRAMES):
+        raise InputError(
+            f"a film of {length:g} s, {speed:g} pictures a second: out of range (2 to {MOST_FRAMES} in all)"
+        )
 
-    held = 0 if still else round(HOLD * rate)
-    pictures = drawn(page(shown, path, still=True), count, size)
-    try:
-        _write(target, pictures, rate, held)
-    except OSError as error:
-        raise InputError(f"{target}: cannot be written: {error.strerror or error}") from error
-
+    wanted = {
+        **_wanted(camera, hide, (width, height)),
+        "frames": frames,
+        "held": round(HOLD * speed),
+        "rate": speed,
+        "ending": ending,
+        "bits": max(BITS_PER_PIXEL * width * height * speed, LEAST_BITS),
+    }
+    called(on_picture, "on_picture", "how many are finished", "how many there are")
+    with closing(posts(page(shown, played, run=run, still=True), wanted, (width, height))) as messages:
+        counted = _counted(messages, on_picture, frames)
+        if ending == ".mp4":
+            _write_mp4(target, counted, speed, (width, height))
+        elif ending == ".webm":
+            write_bytes(target, webm([(kind == b"K", data) for kind, data in counted], speed, (width, height)))
+        else:
+            write_bytes(target, _gif([data for _, data in counted], speed, wanted["held"]))
     return target
 
 
-def drawn(text: str, frames: int, size: tuple[int, int]) -> list[Image.Image]:
-    """Return the pictures of a page from the start of its path to the end.
+def picture(
+    shown: Showable,
+    path: ShownPath | TaskPlan | PlayedTask | None,
+    file: str | os.PathLike[str],
+    *,
+    run: ReplanRun | None = None,
+    at: float = 0.0,
+    size: str | Sequence[int] = SIZE,
+    camera: str | os.PathLike[str] = "overview",
+    hide: str | Iterable[str] = "",
+) -> Path:
+    """Write a still picture (.png) of what :func:`film` films; for its arguments see there.
 
-    A script in the page draws them and posts them to a local server, while a headless browser displays the page.
+    Args:
+        shown: A ``Problem``, ``World``, ``Robot`` or ``Scene``.
+        path: A path, or None.
+        file: .png.
+        run: A run in place of a path.
+        at: Which moment is drawn: 0 is the start, 1 the end.
+        size: Width and height [px].
+        camera: Name of a camera, or a file of views.
+        hide: What is left out.
+
+    Returns:
+        The file.
+
+    Raises:
+        InputError: If a value is out of range, there is no browser, or the file cannot be written.
+    """
+    target = file_name(file)
+    check_target(target, PICTURES)
+    if not 0.0 <= at <= 1.0:
+        raise InputError(f"moment of a picture: expected 0 (start) to 1 (end), got {at:g}")
+    sides = sides_of(size, target.suffix.lower())
+    wanted = {**_wanted(camera, hide, sides), "frames": 1, "held": 0, "at": at, "rate": 1.0, "ending": ".png"}
+
+    played = path.played() if isinstance(path, TaskPlan) else path
+    with closing(posts(page(shown, played, run=run, still=True), wanted, sides)) as messages:
+        write_bytes(target, next(data for _, data in messages))
+    return target
+
+
+def drawn(text: str, frames: int, size: tuple[int, int], **wanted: Any) -> Iterator[Image.Image]:
+    """Yield pictures of a page from the start of its path to the end.
 
     Args:
         text: The page.
-        frames: Number of pictures.
+        frames: Number of pictures; of a single one ``at`` says the moment.
         size: Width and height [px].
+        wanted: ``camera`` and ``hide`` as of :func:`film`.
 
     Raises:
         InputError: If there is no browser, or none that draws the page.
     """
-    browser = next((found for found in map(shutil.which, BROWSERS) if found), None)
-    if browser is None:
-        raise InputError(f"a film needs a browser to draw it: none of {', '.join(BROWSERS)} is on PATH")
-
-    work = json.dumps({"frames": frames})
-    script = f'<script id="film" type="application/json">{work}</script><script>{asset("film.js")}</script>'
-    added = PICTURE_ONLY.format(*size) + script
-
-    pictures: list[Image.Image] = []
-    news = threading.Event()
-    ended = threading.Event()
-
-    def take(body: bytes) -> None:
-        if body == b"end":
-            ended.set()
-        else:
-            pictures.append(Image.open(BytesIO(base64.b64decode(body.split(b",", 1)[1]))).convert("RGB"))
-        news.set()
-
-    text = text.replace(html.escape(POLICY), html.escape(ASKING_POLICY), 1).replace("</body>", f"{added}</body>")
-    with PageServer(text, 0, take) as server, tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
-        window = f"--window-size={size[0]},{size[1]}"
-        process = subprocess.Popen(
-            [browser, *OPTIONS, window, f"--user-data-dir={folder}", server.url],
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-        )
-
-        try:
-            while not ended.is_set() and news.wait(PATIENCE) and process.poll() is None:
-                news.clear()
-        finally:
-            process.terminate()
-            process.wait(timeout=30)
-
-    if len(pictures) < frames:
-        raise InputError(f"{Path(browser).name} drew {len(pictures)} of {frames} pictures; is it a browser with WebGL?")
-    return pictures
+    work = {**_wanted("overview", (), size), "frames": frames, "held": 0, "at": 0.0, "rate": 1.0, "ending": ".png"}
+    with closing(posts(text, {**work, **wanted}, size)) as messages:
+        for _, data in messages:
+            yield Image.open(BytesIO(data)).convert("RGB")
 
 
-def _write(file: Path, pictures: list[Image.Image], rate: float, held: int) -> None:
-    """Write pictures to one file; the last one is shown for the time of ``held`` pictures."""
-    kind = file.suffix.lower()
-    if kind == ".png":
-        pictures[0].save(file, optimize=True)
-    elif kind == ".gif":
-        chosen = np.hstack([np.asarray(pictures[k * (len(pictures) - 1) // 3]) for k in range(4)])
-        palette = Image.fromarray(chosen).quantize(COLORS, dither=Image.Dither.NONE)
-        few = [each.quantize(palette=palette, dither=Image.Dither.NONE) for each in pictures]
-        times = [round(1e3 / rate)] * (len(few) - 1) + [round(1e3 * max(held, 1) / rate)]
-        few[0].save(file, save_all=True, append_images=few[1:], duration=times, loop=0, optimize=True)
-    else:
-        code = cv2.VideoWriter.fourcc(*"mp4v")
-        width, height = (2 * (side // 2) for side in pictures[0].size)
-        writer = cv2.VideoWriter(str(file), code, rate, (width, height))
+def _wanted(camera: str | os.PathLike[str], hide: str | Iterable[str], size: tuple[int, int]) -> dict[str, Any]:
+    """Return what the page's script must know of a picture."""
+    names = hide.split(",") if isinstance(hide, str) else listed(hide, "hide")
+    for name in names:
+        require(name, str, "each name in hide")
+    return {"camera": camera_of(camera), "hide": [name.strip() for name in names if name.strip()], "size": list(size)}
+
+
+def _seconds(shown: Showable, path: ShownPath | PlayedTask | None, run: ReplanRun | None, target: Path) -> float:
+    """Return the duration of a film [s] if none is given."""
+    if run is not None:
+        return min(max(float(run.times[-1]), 1.0), LONGEST)
+    if isinstance(path, PlayedTask):
+        return min(len(path.waypoints) / path.rate, LONGEST)
+    if isinstance(path, Trajectory):
+        return min(path.duration, LONGEST)
+    if not subject_of(shown, path).is_path:
+        raise InputError(f"{target}: a film needs a path; give one (rrtik plan --out path.json), or ask for a picture")
+    return PATH_SECONDS
+
+
+def _counted(
+    messages: Iterator[tuple[bytes, bytes]], on_picture: Callable[[int, int], object], count: int
+) -> Iterator[tuple[bytes, bytes]]:
+    """Yield messages that have a content, and say how many pictures are finished."""
+    done = 0
+    for kind, data in messages:
+        if kind in (b"P", b"N"):
+            done += 1
+            on_picture(done, count)
+        if kind != b"N":
+            yield kind, data
+
+
+def _write_mp4(target: Path, messages: Iterable[tuple[bytes, bytes]], rate: float, size: tuple[int, int]) -> None:
+    """Write pictures that H.264 has encoded to a film, which appears when it is complete."""
+    settings = [cv2.VIDEOWRITER_PROP_RAW_VIDEO, 1, cv2.VIDEOWRITER_PROP_KEY_INTERVAL, int(np.ceil(rate))]
+    code = cv2.VideoWriter.fourcc(*"avc1")
+    with whole_film(target) as unfinished:
+        writer = cv2.VideoWriter(str(unfinished), cv2.CAP_FFMPEG, code, rate, size, settings)
         if not writer.isOpened():
-            raise OSError("is the folder there, and yours to write in?")
+            raise InputError(f"{target}: cannot be written; is the folder there, and yours to write in?")
+        try:
+            for _, data in messages:
+                writer.write(np.frombuffer(data, np.uint8)[None])
+        finally:
+            writer.release()
 
-        for each in pictures + [pictures[-1]] * max(held - 1, 0):
-            writer.write(np.asarray(each)[:height, :width, ::-1])
-        writer.release()
+
+def _gif(pictures: Sequence[bytes], rate: float, held: int) -> bytes:
+    """Return a GIF of pictures (PNG), all in the colours of four of them; the last one is shown ``held`` times."""
+    chosen = [_pixels(pictures[k * (len(pictures) - 1) // 3]) for k in range(4)]
+    palette = Image.fromarray(np.hstack(chosen)).quantize(COLORS, dither=Image.Dither.NONE)
+    few = [Image.fromarray(_pixels(each)).quantize(palette=palette, dither=Image.Dither.NONE) for each in pictures]
+    times = [round(1e3 / rate)] * (len(few) - 1) + [round(1e3 * max(held, 1) / rate)]
+    file = BytesIO()
+    few[0].save(file, "GIF", save_all=True, append_images=few[1:], duration=times, loop=0, optimize=True)
+    return file.getvalue()
+
+
+def _pixels(picture: bytes) -> NDArray[np.uint8]:
+    return np.asarray(Image.open(BytesIO(picture)).convert("RGB"))

@@ -34,7 +34,17 @@ from rrtik_ompl.world.problem import Problem
 SCRIPT_POLICY = "script-src 'unsafe-inline' 'wasm-unsafe-eval'"
 POLICY = f"default-src 'none'; {SCRIPT_POLICY}; style-src 'unsafe-inline'; img-src data: blob:"
 ASKING_POLICY = f"{POLICY}; connect-src 'self'"  # for a page that may send requests to its own server
-SCRIPTS = ("kinematics.js", "stage.js", "panel.js", "replay.js", "clearance.js", "contacts.js", "player.js")
+SCRIPTS = (
+    "kinematics.js",
+    "stage.js",
+    "tree.js",
+    "panel.js",
+    "replay.js",
+    "clearance.js",
+    "contacts.js",
+    "player.js",
+    "camera.js",
+)
 BOX_SHARE = 0.1  # side of an added box, as a share of the arm's diagonal
 STARTING = ("unpack.js", "start.js")
 KERNELS = ("kernels.js", "obstacles.js", "fixed.js")

@@ -40,14 +40,16 @@ def run_story(run: ReplanRun, robot: Robot, scene: Scene, frame: Frame) -> dict[
 
 def _motions(ticks: Iterable[Tick]) -> list[dict[str, Any]]:
     """Return the groups of ticks of a task, as :func:`_groups` does, one for each motion."""
-    return [{**group, "event": "motion", "text": group["reason"]} for group in _groups(ticks)]
+    named = [{**group, "event": "motion", "text": group["reason"]} for group in _groups(ticks)]
+    return [{**group, "caption": group["text"].partition(": ")[2]} for group in named]
 
 
 def _groups(ticks: Iterable[Tick]) -> list[dict[str, Any]]:
     """Group consecutive ticks of the same kind.
 
     Returns:
-        For each group the number of its first tick, the number of ticks, the event, its reason, and a text.
+        For each group the number of its first tick, the number of ticks, the event, its reason, a text, and a caption
+        of films, which says nothing of how long this machine took.
     """
     found: list[dict[str, Any]] = []
     for (event, reason), members in groupby(ticks, lambda tick: (tick.event, tick.reason)):
@@ -56,8 +58,11 @@ def _groups(ticks: Iterable[Tick]) -> list[dict[str, Any]]:
         # Only plans and repairs have times.
         spent = [1e3 * tick.seconds[event] for tick in rows if event in tick.seconds]
         text = event + (f" ({reason})" if reason else "")
-        text += f", {max(spent):.1f} ms" if spent else ""
-        found.append({"first": first, "count": len(rows), "event": event, "reason": reason, "text": text})
+        timed = f"{text}, {max(spent):.1f} ms" if spent else text
+        caption = "" if event == "walk" else text
+        found.append(
+            {"first": first, "count": len(rows), "event": event, "reason": reason, "text": timed, "caption": caption}
+        )
     return found
 
 

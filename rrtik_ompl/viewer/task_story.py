@@ -14,6 +14,7 @@ from rrtik_ompl.model.scene import AttachedObject, Obstacle, Scene
 from rrtik_ompl.replanning.record import ReplanRun, joints_of
 from rrtik_ompl.replanning.tick import Tick
 from rrtik_ompl.tasks import TaskPlan
+from rrtik_ompl.tasks.captions import motion_names
 from rrtik_ompl.tasks.played import PlayedTask
 from rrtik_ompl.viewer.drawing.robot_picture import joint_nodes, node_name
 from rrtik_ompl.viewer.subject import Fingers, Showable, Subject, replayed
@@ -63,12 +64,13 @@ def run_of(played: PlayedTask) -> ReplanRun:
     plan = played.plan
     robot = plan.worlds[0].robot
     kept = _kept(plan)
+    names = motion_names(plan)
 
     ticks: list[Tick] = []
     for number, q in zip(played.motions.tolist(), played.waypoints, strict=True):
         path = plan.paths[number]
         world = plan.worlds[number]
-        text = f"motion {number + 1} of {len(plan.paths)}: {plan.stages[number]}"
+        text = f"motion {number + 1} of {len(plan.paths)}: {names[number]}"
         poses = {name: pose_row(place) for name, place in _places(world, q).items() if name not in kept}
         ticks.append(Tick(len(ticks) / played.rate, q, "walk", path.waypoints, poses, {}, reason=text))
 

@@ -23,7 +23,7 @@ from rrtik_ompl.viewer.film import film
 WRAPPED = {
     "plan": [rrtik.plan],
     "straight": [rrtik.tip.straight, rrtik.tip.arc],
-    "task": [rrtik.Task.plan, rrtik.TaskPlan.time_parameterize, rrtik.RateLimits.of],
+    "task": [rrtik.Task.plan, rrtik.TaskPlan.time_parameterize, rrtik.RateLimits.of, film],
     "demos": [rrtik.demos.record],
     "check": [],
     "prove": [rrtik.prove, rrtik.load_motions],
@@ -31,8 +31,8 @@ WRAPPED = {
     "play": [rrtik.view],
     "moves": [rrtik.one_joint_moves, rrtik.shorten],
     "time": [rrtik.time_parameterize, rrtik.RateLimits.of, Trajectory.save],
-    "replan": [rrtik.replan],
-    "replan --foreseen": [rrtik.replanning.plan_in_time],
+    "replan": [rrtik.replan, film],
+    "replan --foreseen": [rrtik.replanning.plan_in_time, film],
     "ik": [rrtik.solve_ik, rrtik.PoseGoal],
     "ik --poses": [rrtik.solve_ik_many, rrtik.PoseGoal],
     "ik --trajectory": [rrtik.ik.solve_trajectory],
@@ -66,6 +66,7 @@ FILES = {
     "trust_xacro",
     "still",
     "film",
+    "picture",
 }
 
 OTHER_WORDS = {  # arguments that no option is called by, and why
@@ -78,6 +79,7 @@ OTHER_WORDS = {  # arguments that no option is called by, and why
     "on_attempt": "a function",
     "on_better": "a function",
     "on_ready": "a function",
+    "on_picture": "a function",
     "on_run": "a function",
     "stop": "a function",
     "inline": "of notebooks",
@@ -109,7 +111,6 @@ OF_COMMANDS = {  # arguments without an option, and options without an argument,
         ),
     },
     "time": {"gripper": "a path has no commands to a gripper"},
-    "show": {"rate": "of films in Python", "size": "of films in Python"},
     "play": {**dict.fromkeys(("before", "html", "still"), "rrtik show has it")},
     "moves": {
         "spoken": "a form of output",
@@ -120,12 +121,10 @@ OF_COMMANDS = {  # arguments without an option, and options without an argument,
     "replan": {
         "foreseen": "plan_in_time() in place of replan()",
         "horizon": "with --foreseen",
-        **dict.fromkeys(
-            ("step", "rate", "max_edge", "margin", "speed_bound", "repair_budget"), "keys of the scenario's file"
-        ),
+        **dict.fromkeys(("step", "max_edge", "margin", "speed_bound", "repair_budget"), "keys of the scenario's file"),
     },
     "replan --foreseen": {
-        **dict.fromkeys(("rate", "speed", "margin"), "keys of the scenario's file"),
+        **dict.fromkeys(("speed", "margin"), "keys of the scenario's file"),
         "iterations": "what --seconds limits",
         "goal": "that of the scenario's problem",
         "foreseen": "the function",
@@ -165,7 +164,8 @@ OF_COMMANDS |= {
 
 OTHER_DEFAULTS = {  # defaults that differ, and why
     ("time", "torque"): "a flag: False hands over None",
-    ("show", "seconds"): "None: 4 s, or what a task takes",
+    ("replan", "rate"): "of a film; that of the run is a key of the scenario's file",
+    ("replan --foreseen", "rate"): "of a film; that of the run is a key of the scenario's file",
     ("replan", "lookahead_ticks"): "None: the scenario's",
     ("replan", "planner"): "None: the usual one, and no word against --replay and --foreseen",
     ("replan", "seconds"): "None: the scenario's",

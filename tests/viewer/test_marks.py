@@ -64,7 +64,7 @@ def test_a_browser_lists_ghosts_and_marks_with_a_switch_each(tmp_path):
     rows = np.radians([[0.0] * 6, [90, 60, -120, 30, 40, 20]])
     marks = tree_marks(grow(Links([0.1] * 4, 3), [0.2, 0.1, 0.2], tolerance=0.01, rng=np.random.default_rng(0)))
     file = view(load_robot("puma560"), ghosts=rows, marks=marks, html=tmp_path / "page.html")
-    legend = document_of(file.as_uri()).split('id="legend"', 1)[1].split("</ul>", 1)[0]
-    entries = re.findall(r"</span>([^<]+)</label>", legend)
+    tree = document_of(file.as_uri()).split('id="tree"', 1)[1].split("</aside>", 1)[0]
+    entries = re.findall(r"</span>([^<]+)</label>", tree)
     wanted = ["solution 1", "solution 2", *(mark.name for mark in marks)]
     assert [entry for entry in entries if entry in wanted] == wanted

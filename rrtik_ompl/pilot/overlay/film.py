@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Iterator
 from itertools import chain, islice
 from pathlib import Path
@@ -19,12 +18,12 @@ from rrtik_ompl.pilot.overlay.augment import Augmenter, Ghost
 from rrtik_ompl.sensing.cameras.pictures import Picture, quiet
 from rrtik_ompl.sensing.scene_from_view import NoBaseError, SeenObject, base_from_camera
 from rrtik_ompl.sensing.sensor import Sensor
+from rrtik_ompl.viewer.film_file import whole_film
 
 FILMS = {".mp4": "mp4v", ".avi": "MJPG"}
 DEFAULT_RATE = 30.0  # pictures a second
 MAX_RATE = 240.0
 TRAIL_POINTS = 80
-ROOM_BYTES = 65536
 
 
 class ArmInPictures:
@@ -128,42 +127,22 @@ def write_film(path: Path, frames: Iterable[NDArray[np.uint8]], rate: float) -> 
     if path.suffix.lower() not in FILMS:
         raise InputError(f"{path}: a film ends in {', '.join(FILMS)}")
 
-    unfinished = path.with_name(f".{path.stem}.unfinished{path.suffix}")
-    writer = None
-    count = 0
-    try:
-        for frame in frames:
-            writer = writer or _writer(unfinished, path, rate, frame.shape)
-            writer.write(frame)
-            count += 1
+    with whole_film(path) as unfinished:
+        writer = None
+        count = 0
+        try:
+            for frame in frames:
+                writer = writer or _writer(unfinished, path, rate, frame.shape)
+                writer.write(frame)
+                count += 1
+        finally:
+            if writer is not None:
+                writer.release()
 
         if writer is None:
             raise InputError(f"{path}: there is no picture to write")
-        writer.release()
-        if not _has_room_to_grow(unfinished) or _pictures_in(unfinished) != count:
+        if _pictures_in(unfinished) != count:
             raise InputError(f"{path}: cannot be written whole; is there room on the disk?")
-        os.replace(unfinished, path)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error.strerror or error}") from None
-    finally:
-        if writer is not None:
-            writer.release()
-        unfinished.unlink(missing_ok=True)
-
-
-def _has_room_to_grow(file: Path) -> bool:
-    """Check whether a file can still grow, to detect a full disk.
-
-    OpenCV's writer reports no error on a full disk, and the film may lack nothing but its index.
-    """
-    size = file.stat().st_size
-    try:
-        with open(file, "ab", buffering=0) as film:
-            return film.write(bytes(ROOM_BYTES)) == ROOM_BYTES
-    except OSError:
-        return False
-    finally:
-        os.truncate(file, size)
 
 
 def _pictures_in(film: Path) -> int:

@@ -1,11 +1,92 @@
-// What `rrtik show --film` adds to a page: it draws one picture after the other and hands each to whoever serves it.
-(async () => {
-  const wanted = JSON.parse(document.getElementById("film").textContent);
-  while (document.documentElement.dataset.ready !== "yes") await new Promise((done) => setTimeout(done, 20));
-  const send = (body) => fetch("/opinion", { method: "POST", body });
-  for (let k = 0; k < wanted.frames; k += 1) {
-    if (total > 0) show((total * k) / Math.max(wanted.frames - 1, 1));
-    await send(viewer.capture_image());
+// What `--film` and `--picture` add to a page: it draws one picture after the other, and hands each to whoever serves it.
+const CODECS = { ".mp4": { codec: "avc1.640034", avc: { format: "annexb" } }, ".webm": { codec: "vp09.00.51.08" } };
+const WAITING = 4;  // pictures that may wait to be encoded
+
+/** Each message begins with a letter: P a picture, K and D encoded pictures, whole ones and changes, N one that is done, E an error, . the end. */
+const send = (kind, ...parts) => fetch("/opinion", { method: "POST", body: new Blob([kind, ...parts]) });
+
+/** Hands on encoded pictures in their order. */
+async function encoderOf(ending, { size: [width, height], rate, bits }) {
+  const settings = { ...CODECS[ending], width, height, framerate: rate, bitrate: bits };
+  const known = typeof VideoEncoder === "function" && (await VideoEncoder.isConfigSupported(settings)).supported;
+  if (!known) throw new Error(`this browser has no encoder for ${ending} of ${width} x ${height}; ask for ${ending === ".mp4" ? ".webm or " : ""}.gif, or use another browser`);
+  let sent = Promise.resolve();
+  let fault = null;
+  const encoder = new VideoEncoder({
+    error: (error) => { fault = error; },
+    output: (chunk) => {
+      const bytes = new Uint8Array(chunk.byteLength);
+      chunk.copyTo(bytes);
+      sent = sent.then(() => send(chunk.type === "key" ? "K" : "D", bytes));
+    },
+  });
+  encoder.configure(settings);
+  return {
+    take: async (sheet, k) => {
+      const frame = new VideoFrame(sheet, { timestamp: (k * 1e6) / rate, duration: 1e6 / rate });
+      encoder.encode(frame, { keyFrame: k % Math.ceil(rate) === 0 });
+      frame.close();
+      while (encoder.encodeQueueSize > WAITING && !fault) await new Promise((done) => setTimeout(done, 1));
+      if (fault) throw fault;
+    },
+    end: async () => {
+      await encoder.flush();
+      await sent;
+    },
+  };
+}
+
+/** Labels and the caption stand beside the 3-D picture in the page; in a film they are drawn on it. */
+function drawWords(pen, caption) {
+  for (const { element, spot } of labels) {
+    if (element.hidden || !spot) continue;
+    const { font, color, backgroundColor, borderTopColor } = getComputedStyle(element);
+    pen.font = font;
+    Object.assign(pen, { fillStyle: backgroundColor, strokeStyle: borderTopColor, textBaseline: "middle", textAlign: "center" });
+    pen.beginPath();
+    pen.roundRect(spot.x, spot.y, spot.wide, spot.tall, 8);
+    pen.fill();
+    pen.stroke();
+    pen.fillStyle = color;
+    pen.fillText(element.textContent, spot.x + spot.wide / 2, spot.y + spot.tall / 2 + 1);
   }
-  await send("end");
+  if (!caption) return;
+  const tall = Math.max(16, pen.canvas.height / 28);
+  pen.font = `600 ${tall}px system-ui, "Segoe UI", Roboto, "DejaVu Sans", sans-serif`;
+  Object.assign(pen, { fillStyle: dark.matches ? "#e6ebf0" : "#1d2733", textBaseline: "bottom", textAlign: "left" });
+  pen.fillText(caption, tall, pen.canvas.height - 0.8 * tall);
+}
+
+async function drawFilm(wanted) {
+  const { frames, held, at, size: [width, height], rate, ending, camera, hide } = wanted;
+  hide.filter((name) => name !== "caption").forEach(hideThing);
+  const sheet = make("canvas", { width, height });
+  const pen = sheet.getContext("2d", { alpha: false });
+  const encoder = ending in CODECS ? await encoderOf(ending, wanted) : null;
+  const place = cameraOf(camera, (frames - 1) / rate);
+  for (let k = 0; k < frames + (encoder ? held : 0); k += 1) {
+    if (k < frames) {
+      const share = frames > 1 ? k / (frames - 1) : at;
+      if (total > 0) show(total * share);
+      place(share);
+      viewer.render();
+      pen.drawImage(viewer.renderer.domElement, 0, 0, width, height);
+      drawWords(pen, hide.includes("caption") ? "" : captionNow());
+    }
+    if (encoder) await encoder.take(sheet, k);
+    if (encoder && k < frames) await send("N");
+    if (!encoder) await send("P", await new Promise((done) => sheet.toBlob(done, "image/png")));
+  }
+  await encoder?.end();
+}
+
+addEventListener("error", ({ message }) => send("E", message));
+(async () => {
+  try {
+    while (document.documentElement.dataset.ready !== "yes") await new Promise((done) => setTimeout(done, 20));
+    await drawFilm(JSON.parse(document.getElementById("film").textContent));
+    await send(".");
+  } catch (error) {
+    await send("E", error.message);
+  }
 })();

@@ -1,6 +1,5 @@
 // The panel beside the picture: joints with units, list of moves, legend with switches.
 const MINUS = "\u2212";
-const FEW_GHOSTS = 8;  // up to here each has a switch of its own
 const FEW_MOVES = 12;  // up to here waypoints carry their numbers from the beginning
 
 function make(tag, properties = {}, ...children) {
@@ -122,88 +121,6 @@ function showMove(k) {
   if (row.top < box.top || row.bottom > box.bottom) scroll.scrollTop += row.top - box.top - 40;
 }
 
-// Legend -----------------------------------------------------------------------------------------------------------
-function addSwitch(text, color, opacity, change, on = true, className = "") {
-  const box = make("input", { type: "checkbox", checked: on });
-  const swatch = make("span", { className: color ? "swatch" : "swatch none" });
-  if (color) Object.assign(swatch.style, { background: color, opacity });
-  box.addEventListener("change", () => change(box.checked));
-  const label = make("label", {}, box, swatch, ...[].concat(text));
-  document.getElementById("legend").append(make("li", { className }, label));
-  change(on);
-}
-
-const toggles = (...paths) => (on) => paths.forEach((path) => setVisible([path], on));
-
-function seeThrough(on) {
-  for (const group of node("obstacles").children) {
-    group.traverse((item) => {
-      if (!item.isMesh) return;
-      item.userData.opacity ??= item.material.opacity;
-      const opacity = on ? Math.min(0.3, item.userData.opacity) : item.userData.opacity;
-      Object.assign(item.material, { opacity, transparent: opacity < 1, depthWrite: opacity === 1 });
-    });
-  }
-  viewer.set_dirty();
-}
-
-/** Margins: those of polygons, meshes and half-spaces are not drawn, which the text says. */
-function addMarginSwitch() {
-  const kept = story.obstacles.filter(({ margin }) => margin > 0);
-  if (kept.length === 0) return;
-  const sizes = [Math.min, Math.max].map((pick) => Number(pick(...kept.map(({ margin }) => margin)).toPrecision(3)));
-  const drawn = kept.filter((obstacle) => obstacle.margin_drawn);
-  const missing = kept.length - drawn.length;
-  const text = `margins: ${[...new Set(sizes)].join(" to ")} m${missing ? ` (${missing} not drawn)` : ""}`;
-  const change = (on) => drawn.forEach((obstacle) => setVisible(["obstacles", obstacle.node, "margin"], on));
-  addSwitch(text, story.colors.obstacle, 0.35, change, true, "wide");
-}
-
-function buildLegend() {
-  const { colors } = story;
-  const axes = ["x", "y", "z"].map((textContent, k) => {
-    const letter = make("span", { textContent, className: "axis" });
-    letter.style.color = ["#d55e00", "#009e73", "#0072b2"][k];
-    return letter;
-  });
-  if (robot) addSwitch("robot", colors.robot, 1, toggles("robot"));
-  if (story.start_ghost) addSwitch("start (ghost)", colors.start, 0.6, toggles("start ghost"));
-  if (story.goal_ghost) addSwitch("goal (ghost)", colors.goal, 0.6, toggles("goal ghost"));
-  if (story.ghosts.length <= FEW_GHOSTS) {
-    story.ghosts.forEach(({ name, color }) => addSwitch(name, color, 0.6, toggles(name)));
-  } else {
-    const names = story.ghosts.map(({ name }) => name);
-    addSwitch(count(names.length, "solution"), story.ghosts[0].color, 0.6, toggles(...names));
-  }
-  for (const { name, color, opacity, node: leaf, shown } of story.marks) {
-    addSwitch(name, color, opacity, (on) => setVisible(["marks", leaf], on), shown, "wide");
-  }
-  if (story.goal && story.goal !== "joint values") addSwitch(`goal: ${story.goal}`, colors.goal, 1, toggles("goal"));
-  if (story.run) {
-    addSwitch("path ahead", colors.trail, 1, toggles("current path"));
-    if (story.run.replaced.some((line) => line >= 0)) addSwitch("before a repair", colors.before, 1, toggles("replaced path"));
-    addSwitch("way gone", colors.trail, 0.45, toggles("trail"), false);
-  } else if (story.moves.length) addSwitch("way of the tip", colors.trail, 1, toggles("trail", "beads"));
-  if (story.contacts.length) addSwitch("in collision", colors.touching, 1, (on) => setVisible(["contact"], on));
-  if (story.proof && story.proof.unproven.length) addSwitch("not proven free", colors.unproven, 1, () => {});
-  if (story.before) addSwitch(`before: ${story.before}`, colors.before, 1, toggles("before"), true, "wide");
-  if (story.attached.length) addSwitch(`held: ${story.attached.join(", ")}`, colors.attached, 1, () => {});
-  if (story.obstacles.length) {
-    addSwitch(count(story.obstacles.length, "obstacle"), colors.obstacle, 1, toggles("obstacles", "later"));
-    addMarginSwitch();
-    addSwitch("see-through", null, 1, seeThrough, false);
-    addSwitch("names of obstacles", null, 1, (on) => setLabels("obstacle", on), false);
-  }
-  if (labels.some((label) => label.kind === "waypoint")) {
-    addSwitch("numbers of moves", null, 1, (on) => setLabels("waypoint", on), story.moves.length <= FEW_MOVES);
-  }
-  addSwitch(["axes ", ...axes], null, 1, (on) => {
-    toggles("frames")(on);
-    if (robot) setVisible(["robot", robot.nodes[robot.tip.joint], "tip frame"], on);
-  });
-  addSwitch(`grid of ${story.grid} m`, "#d2d9e0", 1, toggles("grid"));
-}
-
 function labelObstacles() {
   for (const obstacle of story.obstacles) {
     const thing = node("obstacles", obstacle.node);
@@ -227,12 +144,13 @@ function labelPath() {
     else if (k === last || same.kind === "waypoint" || last <= FEW_MOVES) same.text += `, ${text}`;
   }
   places.forEach(({ tip, text, kind }) => addLabel(text, kind, tip));
+  applyEyes("labels");
 }
 
 viewer.scene.updateMatrixWorld(true);
 labelObstacles();
 labelPath();
-buildLegend();
+buildTree();
 for (const name of Object.keys(VIEWPOINTS)) {
   const button = make("button", { textContent: name, title: `look from: ${name.toLowerCase()}` });
   button.addEventListener("click", () => lookFrom(name));

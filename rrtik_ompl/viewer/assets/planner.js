@@ -62,6 +62,7 @@ function drawShape(obstacle, sizes) {
   viewer.delete_path([...ROOT, "obstacles", obstacle.node]);
   viewer.set_object([...ROOT, "obstacles", obstacle.node], group);
   outline(group);
+  applyEyes("obstacles");
   Object.assign(obstacle, { drawnSizes: sizes.slice(), drawn: new THREE.Matrix4() });
 }
 
@@ -93,6 +94,7 @@ function drawTrail(rows) {
   viewer.delete_path([...ROOT, "trail"]);
   viewer.delete_path([...ROOT, "beads"]);
   viewer.set_object([...ROOT, "trail"], trail);
+  applyEyes("trails");
 }
 
 /** Play other rows from now on; an empty list for none. */

@@ -60,6 +60,9 @@ function showRun(time, tick, share) {
 const groupOf = [];
 if (run) run.groups.forEach((group, k) => { for (let n = 0; n < group.count; n += 1) groupOf.push(k); });
 
+/** What happens now in a few words: the stage of a task, or what replanning does. */
+const captionNow = () => (run ? run.groups[groupOf[Math.min(moveAt(now), groupOf.length - 1)]].caption : "");
+
 function nowText(tick, arrived) {
   return `${now.toFixed(2)} s: ${arrived ? run.outcome : run.groups[groupOf[tick]].text}`;
 }

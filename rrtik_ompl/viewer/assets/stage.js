@@ -195,6 +195,7 @@ function placeLabels() {
     const spots = spotsBeside(x, y, label);
     const spot = spots.find((box) => !taken.some((other) => overlap(box, other))) ?? spots[0];
     taken.push(spot);
+    label.spot = spot;  // films draw it there
     label.element.style.transform = `translate(${spot.x}px, ${spot.y}px)`;
   }
 }
