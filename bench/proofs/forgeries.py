@@ -351,9 +351,8 @@ def raised_clearance(case: Case, rng: np.random.Generator) -> Forgery | None:
     """More is said to be kept than coal finds along the path."""
     clearance = case.document["clearance"] + float(rng.uniform(0.05, 0.4))
     grown = tuple(replace(each, margin=each.margin + clearance) for each in case.world.scene.obstacles)
-    if not Judge(case.world.unheld.with_scene(replace(case.world.scene, obstacles=grown)), case.route).touches(
-        case.route
-    ):
+    grown_world = case.world.unheld.with_scene(replace(case.world.scene, obstacles=grown))
+    if not Judge(grown_world, case.route, obstacles_alone=True).touches(case.route):
         return None
     return _given(case, {**case.document, "clearance": clearance})
 

@@ -102,10 +102,19 @@ def between(route: Route, m: int, shares: Vector) -> Matrix:
 
 
 class Judge:
-    """Looks for witnesses against documents that are about one world, and motions with the times of one."""
+    """Looks for witnesses against documents that are about one world, and motions with the times of one.
 
-    def __init__(self, world: World, route: Route) -> None:
+    Args:
+        world: The world.
+        route: A motion with these times.
+        obstacles_alone: Whether coal compares pairs with an obstacle alone.
+    """
+
+    def __init__(self, world: World, route: Route, *, obstacles_alone: bool = False) -> None:
         self.world = world
+        kinds = [body.kind for body in world.bodies]
+        chosen = [pair for pair in world.pairs if not obstacles_alone or "obstacle" in (kinds[pair[0]], kinds[pair[1]])]
+        self._pairs = tuple(chosen)
         self.named = named_bodies(world.bodies)
         moving = [each for each in world.scene.obstacles if route.moving and each.motion is not None]
         self._moving = {each.name: each for each in moving}
@@ -116,20 +125,20 @@ class Judge:
 
     @cached_property
     def _coal(self) -> ByCoal:
-        return ByCoal(self.world.robot, self.world.bodies, self.world.pairs)
+        return ByCoal(self.world.robot, self.world.bodies, self._pairs)
 
     def touches(self, route: Route) -> bool:
         """Return whether coal finds less than the required distance somewhere along a motion."""
         count = max(1, len(route.waypoints) - 1)
         shares = np.linspace(0.0, 1.0, SAMPLES)
         if not self._moving:
-            return not self._coal.free(np.concatenate([between(route, m, shares) for m in range(count)])).all()
+            return any(not self._coal.free(between(route, m, shares)).all() for m in range(count))
         return any(self._touches_at(route, m, share) for m in range(count) for share in shares[::MOVING_STEP])
 
     def _touches_at(self, route: Route, m: int, share: float) -> bool:
         time = self._time(m, share)
         bodies = tuple(self._carried(body, time) for body in self.world.bodies)
-        return not ByCoal(self.world.robot, bodies, self.world.pairs).free(between(route, m, np.array([share]))).all()
+        return not ByCoal(self.world.robot, bodies, self._pairs).free(between(route, m, np.array([share]))).all()
 
     def _carried(self, body: Body, time: float) -> Body:
         """Return a body where it is at a time, if it is of an obstacle that moves."""

@@ -24,7 +24,8 @@ from scipy.spatial import ConvexHull, QhullError, cKDTree
 
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector, distinct, frozen
 from rrtik_ompl.base.poses import pose_from_xyzw
-from rrtik_ompl.geometry.collision.bodies import Body
+from rrtik_ompl.geometry.collision.bodies import DISTANCE_TOLERANCE, Body, keeps_clearance, kept_apart
+from rrtik_ompl.geometry.collision.distances import measured
 from rrtik_ompl.geometry.collision.elements import (
     Elements,
     NamedBody,
@@ -56,6 +57,7 @@ CLOSE_SPARE = 1e-9
 CLOSE_DIGITS = 12
 FIRST_PARTS = 4  # of a mesh
 MOST_PARTS = 512  # of a mesh
+MOST_PARTS_ON_CHORDS = 64  # of a mesh, where each pair of parts has an entry for each of many chords
 FINER = 4  # factor on the number of parts of what is not proven apart
 ROUNDS = 12  # in which bodies are divided further
 FEW_CORNERS = 64  # up to which all points of a part are compared, and not those of its hull alone
@@ -270,7 +272,11 @@ def certificate_of(prover: Prover, route: Route, clearance: float, world: World 
         chords = list(_chords(named, course, levels + finer, travels))
         covers = _first_covers(named, compared)
         spare += float((slacks * 0.25 ** (levels + finer)).max())
-        motions = _Table(prover, named, covers, compared, clearance, spare, digits).proven(chords)
+        most_parts = MOST_PARTS if route.times is None else MOST_PARTS_ON_CHORDS
+        table = _Table(prover, named, covers, compared, course, clearance, spare, digits, most_parts)
+        motions = table.proven(chords)
+        if table.too_near:
+            return None
         if motions is not None:
             made = _model(prover, route, named, compared, covers, clearance, tracks)
             held = _holding(made, motions, robot.chain, named, compared, course)
@@ -369,15 +375,23 @@ def _holding(
 
 @dataclass(eq=False)
 class _Table:
-    """Bodies and their parts as the kernels compare them; the parts become finer as far as that is needed."""
+    """Bodies and their parts as the kernels compare them; the parts become finer as far as that is needed.
+
+    Attributes:
+        most_parts: Largest number of parts of a mesh.
+        too_near: Whether two bodies were found nearer to each other than they may be, so that no parts are fine enough.
+    """
 
     prover: Prover
     named: Sequence[NamedBody]
     covers: Sequence[Cover]
     pairs: Sequence[tuple[int, int]]
+    course: Course
     clearance: float
     spare: float
     digits: int
+    most_parts: int
+    too_near: bool = False
 
     @property
     def robot(self) -> Robot:
@@ -397,7 +411,7 @@ class _Table:
             if stuck is None:
                 return _joined(chords, entries)
             divided = [self._divide(body, node) for body, node in stuck]
-            if not any(divided):
+            if self.too_near or not any(divided):
                 return None
             if any(self.covers[body].elements.key in CLOUDS for body, _ in stuck):
                 scale /= FINER
@@ -416,7 +430,7 @@ class _Table:
         cover = self.covers[body]
         if cover.elements.key in CLOUDS:
             return node in cover.leaves and cover.divide(node)
-        return cover.divide_into(min(MOST_PARTS, FINER * len(cover.leaves)))
+        return cover.divide_into(min(self.most_parts, FINER * len(cover.leaves)))
 
     def _packed(self, bodies: Sequence[Body]) -> tuple[ProofPairs, list[list[int]]]:
         """Return the table of the kernels, and for each body the nodes of its parts."""
@@ -489,7 +503,8 @@ class _Table:
             measured = np.zeros((0, 4), dtype=np.int64)
             if pair[0] != PROVEN:
                 stuck = self._parts_of(packed, int(pair[0]), nodes)
-                if any(self._can_be_finer(body) for body, _ in stuck):
+                self.too_near = self._are_too_near([body for body, _ in stuck], chord, float(place[0]))
+                if self.too_near or any(self._can_be_finer(body) for body, _ in stuck):
                     return stuck
                 log, measured = coal_proof.logged(chord.ends, pair, place, run)
                 if pair[0] != PROVEN:
@@ -502,9 +517,20 @@ class _Table:
         first, one, second, other = packed.sides[pair].tolist()
         return [(body, nodes[body][max(part, 0)]) for body, part in ((first, one), (second, other))]
 
+    def _are_too_near(self, numbers: Sequence[int], chord: Chord, place: float) -> bool:
+        """Check whether coal finds less between two bodies than they have to keep, at a share of a chord."""
+        pair = [self.named[k].body for k in numbers]
+        kept = kept_apart(*pair) + (self.clearance if keeps_clearance(*pair) else 0.0)
+        if kept < 0.0:  # coal does not measure how deep meshes overlap
+            return False
+        share = (chord.number + place) * 0.5**chord.level
+        frames = self.course.frames(np.array([chord.motion]), np.array([share]))[0]
+        found = next(measured(pair, ((0, 1),), frames, near_only=False))
+        return bool(found.distance < kept - DISTANCE_TOLERANCE)
+
     def _can_be_finer(self, number: int) -> bool:
         cover = self.covers[number]
-        most = {"mesh": MOST_PARTS, "balls": MOST_LEAVES, "boxes": MOST_LEAVES}.get(cover.elements.key, 1)
+        most = {"mesh": self.most_parts, "balls": MOST_LEAVES, "boxes": MOST_LEAVES}.get(cover.elements.key, 1)
         return not _may_overlap(self.named[number]) and len(cover.leaves) < min(most, len(cover.elements.points))
 
     def _entries(

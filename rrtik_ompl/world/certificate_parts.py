@@ -15,7 +15,7 @@ from rrtik_ompl.base.arrays import Mask, Matrix, Vector
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.geometry.collision.elements import Elements
 
-FEW_POINTS = 20_000  # elements of a body whose parts are remembered
+FEW_POINTS = 60_000  # elements of a body whose parts are remembered
 MOST_KNOWN = 256  # bodies whose parts are
 PRODUCTS_AT_ONCE = 2_000_000  # points times directions that are computed together
 

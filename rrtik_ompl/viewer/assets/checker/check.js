@@ -312,27 +312,45 @@ function nodesOf(body, cuts) {
     }
     return 0.5 * (least + most);
   };
+  const lastNodeOf = new Int32Array(points.length).fill(-1); // of each point, so that no node has it twice
   const nodes = [{ elements, children: null }];
   for (const [k, [node, axis, coordinate]] of cuts.entries()) {
     demand(nodes[node].children === null, `'${body.name}': cut ${k} divides a part twice`);
-    const below = nodes[node].elements.filter((element) => centreAlong(element, axis) < coordinate);
-    const above = nodes[node].elements.filter((element) => !(centreAlong(element, axis) < coordinate));
+    const [below, above] = [[], []];
+    for (const element of nodes[node].elements) (centreAlong(element, axis) < coordinate ? below : above).push(element);
     nodes[node].children = [nodes.length, nodes.length + 1];
     nodes.push({ elements: below, children: null }, { elements: above, children: null });
   }
 
   for (const [number, node] of [...nodes.entries()].reverse()) {
-    node.points = [...new Set(node.elements.flat())].map((k) => points[k]);
+    node.points = [];
+    for (const element of node.elements) {
+      for (const k of element) {
+        if (lastNodeOf[k] !== number) node.points.push(points[k]);
+        lastNodeOf[k] = number;
+      }
+    }
     const reach = [radius + disc, radius + disc, radius];
-    node.low = [0, 1, 2].map((k) => node.points.reduce((least, point) => Math.min(least, point[k]), Infinity) - reach[k]);
-    node.high = [0, 1, 2].map((k) => node.points.reduce((most, point) => Math.max(most, point[k]), -Infinity) + reach[k]);
+    const { low, high } = boxAround(node.points);
+    node.low = subtract(low, reach);
+    node.high = add(high, reach);
     node.centre = middle(node.low, node.high);
-    node.radius = node.points.reduce((most, point) => Math.max(most, length(subtract(point, node.centre))), 0) + disc + radius;
+    node.radius = largestOver(node.points, (point) => length(subtract(point, node.centre)), 0) + disc + radius;
     const children = (node.children ?? []).map((child) => nodes[child]).filter((child) => child.points.length > 0);
     // By the larger of two parts the maker chooses which one to divide; its balls are around those of parts.
     node.size = number > 0 && children.length > 0 ? Math.max(...children.map((child) => length(subtract(child.centre, node.centre)) + child.size)) : node.radius;
   }
   return nodes;
+}
+
+const nodesOfSolid = once(() => new Map()); // by cuts
+
+/** The same; those of a solid and of cuts that were asked for before are kept. */
+function knownNodes(body, cuts) {
+  const known = nodesOfSolid(body.solid);
+  const key = JSON.stringify(cuts);
+  if (!known.has(key)) known.set(key, nodesOf(body, cuts));
+  return known.get(key);
 }
 
 // ---- sections 6 to 8: entries, and whether they are sufficient --------------------------------------------------
@@ -344,7 +362,7 @@ class Proof {
   constructor(file, { joints, bodies, tracks, pairs }) {
     Object.assign(this, { file, joints, bodies, pairs });
     this.motions = motionsOf(file, joints, tracks);
-    this.nodes = bodies.map((body, k) => nodesOf(body, file.bodies[k].cuts ?? []));
+    this.nodes = bodies.map((body, k) => knownNodes(body, file.bodies[k].cuts ?? []));
     this.pairOf = new Map(pairs.map((pair) => [`${pair.first} ${pair.second}`, pair]));
     this.kept = new Map(); // frames by motion and share, bounds by body, base and motion
     this.shown = file.motions.map(() => new Set()); // of each motion what its entries show: bodies, nodes, interval

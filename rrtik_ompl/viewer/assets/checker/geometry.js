@@ -66,16 +66,7 @@ const LEAF = 4;
 
 /** A tree of boxes around triangles, [[corner, corner, corner]]: {low, high, triangles} or {low, high, children}. */
 function boxTree(triangles) {
-  const low = [Infinity, Infinity, Infinity];
-  const high = [-Infinity, -Infinity, -Infinity];
-  for (const triangle of triangles) {
-    for (const corner of triangle) {
-      for (let k = 0; k < 3; k += 1) {
-        low[k] = Math.min(low[k], corner[k]);
-        high[k] = Math.max(high[k], corner[k]);
-      }
-    }
-  }
+  const { low, high } = boxAround(triangles.flat());
   if (triangles.length <= LEAF) return { low, high, triangles };
 
   // Halves at the middle of the longest side; where all are on one side, by number.
@@ -150,18 +141,16 @@ function isInside(triangles, closed, point) {
 
 /** The parts of a mesh that have no corner in common: the numbers of their triangles. */
 function connectedParts(triangles) {
-  const leader = new Map();
+  const count = 1 + largestOver(triangles, (each) => Math.max(...each), -1);
+  const leader = Int32Array.from({ length: count }, (_, k) => k);
   const find = (k) => {
-    while (leader.get(k) !== k) {
-      leader.set(k, leader.get(leader.get(k)));
-      k = leader.get(k);
+    while (leader[k] !== k) {
+      leader[k] = leader[leader[k]];
+      k = leader[k];
     }
     return k;
   };
-  for (const each of triangles) {
-    for (const k of each) if (!leader.has(k)) leader.set(k, k);
-    for (const k of each) leader.set(find(k), find(each[0]));
-  }
+  for (const each of triangles) for (const k of each) leader[find(k)] = find(each[0]);
   const parts = new Map();
   triangles.forEach((each, number) => {
     const key = find(each[0]);

@@ -10,6 +10,8 @@ const DIRECTIONS = [0, 1, 2].flatMap((axis) => [1, -1].map((sign) => [0, 1, 2].m
 /** What a thing or link is in contact with, by a scene: [name, distance] each. */
 const contactsOf = (scene, name) => scene.contacts.filter(({ pair }) => pair.includes(name)).map(({ pair, distance }) => [pair[0] === name ? pair[1] : pair[0], distance]);
 
+const solidOfLink = once((shape) => solidsOf(shape, true)[0]);
+
 /** The bodies of a robot's links: each solid with its link's joint; numbered within the link. */
 function linkBodies(robot, arm, padding) {
   const thickness = (link) => (typeof padding === "number" ? padding : padding[link] ?? 0);
@@ -17,8 +19,7 @@ function linkBodies(robot, arm, padding) {
     const carrier = arm.carriers.get(solid.link);
     const number = robot.solids.slice(0, k).filter((other) => other.link === solid.link).length;
     const place = { joint: carrier.joint, pose: chained(carrier.pose, solid.placement) };
-    const [own] = solidsOf(solid.shape, true);
-    return { name: solid.link, number, kind: "link", ...place, solid: own, shape: solid.shape, margin: 0, padding: thickness(solid.link) };
+    return { name: solid.link, number, kind: "link", ...place, solid: solidOfLink(solid.shape), shape: solid.shape, margin: 0, padding: thickness(solid.link) };
   });
 }
 
@@ -108,7 +109,7 @@ const isRigid = ({ turn }) => turn.every((row, i) => turn.every((other, j) => Ma
 const near = (a, b, tolerance = SAME) => a.length === b.length && a.every((value, k) => Math.abs(value - b[k]) <= tolerance);
 
 /** The support function of a solid's points in 14 directions, radius and disc left out. */
-const extentsOf = (solid) => DIRECTIONS.map((direction) => solid.points.reduce((height, point) => Math.max(height, dot(point, direction)), -Infinity));
+const extentsOf = once((solid) => DIRECTIONS.map((direction) => largestOver(solid.points, (point) => dot(point, direction), -Infinity)));
 
 /** Why a shape in the file is not this one: a few words, or "". */
 function shapeDifference(stated, body) {

@@ -106,17 +106,21 @@ function wayBetween(from, to, m) {
   return { at, shift: length(shift), turn: angle };
 }
 
+/** How far points of a body are at most from the origin and from the axis of the joint that carries it [m]. */
+const reachesOf = once(({ pose, solid }, axis) => {
+  const around = solid.disc + solid.radius;
+  const toOrigin = largestOver(solid.points, (point) => length(moved(pose, point)), 0) + around;
+  return { toOrigin, toAxis: largestOver(solid.points, (point) => length(cross(moved(pose, point), axis)), 0) + around };
+});
+
 /** Bounds {speed, bend} of all points of a body in a motion, over s, seen from a joint that carries it: section 5.4. */
 function boundsOf(body, base, joints, motion) {
-  const { points, disc, radius, plane } = body.solid;
+  const { plane } = body.solid;
   if (body.joint === base) return { speed: 0, bend: 0 };
   const way = motion.tracks[body.joint - joints.length];
   if (plane !== undefined) return way?.turn === 0 ? { speed: way.shift, bend: 0 } : { speed: Infinity, bend: Infinity };
-  const placed = points.map((point) => moved(body.pose, point));
-  const reach = (measure) => placed.reduce((most, point) => Math.max(most, measure(point)), 0) + disc + radius;
-  let toOrigin = reach(length);
+  let { toOrigin, toAxis } = reachesOf(body, way === undefined ? joints[body.joint].axis : UP);
   if (way !== undefined) return { speed: way.shift + way.turn * toOrigin, bend: way.turn * way.turn * toOrigin };
-  let toAxis = reach((point) => length(cross(point, joints[body.joint].axis)));
   let [speed, bend] = [0, 0];
 
   for (let k = body.joint; k !== base; k = joints[k].parent) {

@@ -10,6 +10,35 @@ const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a
 const length = (a) => Math.sqrt(dot(a, a));
 const middle = (a, b) => scaled(add(a, b), 0.5);
 
+/** A function of an object that computes its value once: the same robots and meshes are asked for again and again. */
+function once(make) {
+  const known = new WeakMap();
+  return (key, ...rest) => {
+    if (!known.has(key)) known.set(key, make(key, ...rest));
+    return known.get(key);
+  };
+}
+
+/** The box around points: {low, high}. */
+function boxAround(points) {
+  const low = [Infinity, Infinity, Infinity];
+  const high = [-Infinity, -Infinity, -Infinity];
+  for (const point of points) {
+    for (let k = 0; k < 3; k += 1) {
+      if (point[k] < low[k]) low[k] = point[k];
+      if (point[k] > high[k]) high[k] = point[k];
+    }
+  }
+  return { low, high };
+}
+
+/** The largest of a measure of points, or a least value if that is larger. */
+function largestOver(points, measure, least) {
+  let most = least;
+  for (const point of points) most = Math.max(most, measure(point));
+  return most;
+}
+
 /** The transpose of a rotation, which is its inverse. */
 const turnedBack = (turn) => [0, 1, 2].map((k) => [turn[0][k], turn[1][k], turn[2][k]]);
 

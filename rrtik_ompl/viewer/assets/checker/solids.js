@@ -141,9 +141,7 @@ function coreTriangles({ shape, solid }) {
 class Surface {
   constructor(body) {
     this.body = body;
-    const { points } = body.solid;
-    this.low = [0, 1, 2].map((k) => points.reduce((least, point) => Math.min(least, point[k]), Infinity));
-    this.high = [0, 1, 2].map((k) => points.reduce((most, point) => Math.max(most, point[k]), -Infinity));
+    Object.assign(this, boxAround(body.solid.points));
   }
 
   keep(name, make) {
@@ -165,12 +163,8 @@ class Surface {
   }
 }
 
-const surfaces = new WeakMap();
-
-function surfaceOf(body) {
-  if (!surfaces.has(body.solid)) surfaces.set(body.solid, new Surface(body));
-  return surfaces.get(body.solid);
-}
+const surfaces = once((solid, body) => new Surface(body));
+const surfaceOf = (body) => surfaces(body.solid, body);
 
 /** Whether a component of the inner body begins inside of the surface of the outer one, in whose frame it has a pose. */
 function pointInside(outer, inner, pose) {

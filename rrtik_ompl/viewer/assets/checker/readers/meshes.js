@@ -1,14 +1,7 @@
 // Meshes of STL, OBJ and COLLADA files: {corners: [[x, y, z]], triangles: [[a, b, c]]}, in metres where the file says so.
 
-const meshesRead = new WeakMap(); // by the bytes that they were read from: links often share files
-
-/** The mesh in the bytes of a file, an ArrayBuffer; the name tells the format. */
-function readMesh(buffer, file) {
-  if (!meshesRead.has(buffer)) meshesRead.set(buffer, readNewMesh(buffer, file));
-  return meshesRead.get(buffer);
-}
-
-function readNewMesh(buffer, file) {
+/** The mesh in the bytes of a file, an ArrayBuffer; the name tells the format. Links often share files. */
+const readMesh = once((buffer, file) => {
   const ending = file.slice(file.lastIndexOf(".") + 1).toLowerCase();
   const reader = { stl: readStl, obj: readObj, dae: readDae }[ending];
   if (reader === undefined) throw new Error(`${file}: unknown kind of mesh; have STL, OBJ, DAE`);
@@ -19,22 +12,31 @@ function readNewMesh(buffer, file) {
     throw new Error(`${file}: a triangle names a vertex that is not there`);
   }
   return mesh;
-}
+});
 
 const textOf = (buffer) => new TextDecoder().decode(buffer);
 
 /** The same mesh with each corner once, and without corners that no triangle has. */
 function welded({ corners, triangles }) {
-  const numbers = new Map();
   const kept = [];
+  // A table of their numbers at places that follow from the bits of their coordinates; -1 where none is.
+  const places = new Int32Array(2 ** Math.ceil(Math.log2(2 * corners.length + 2))).fill(-1);
+  const doubles = new Float64Array(3);
+  const bits = new Uint32Array(doubles.buffer);
   const number = (k) => {
-    if (corners[k] === undefined) return -1;
-    const key = corners[k].map((value) => value + 0).join(" ");
-    if (!numbers.has(key)) {
-      numbers.set(key, kept.length);
-      kept.push(corners[k]);
+    const corner = corners[k];
+    if (corner === undefined) return -1;
+    let place = 0;
+    for (let axis = 0; axis < 3; axis += 1) doubles[axis] = corner[axis] + 0; // -0 is 0
+    for (let word = 0; word < 6; word += 1) place = Math.imul(place ^ bits[word] ^ (place >>> 15), 0x9e3779b1);
+
+    for (place = (place ^ (place >>> 15)) & (places.length - 1); places[place] >= 0; place = (place + 1) & (places.length - 1)) {
+      const [x, y, z] = kept[places[place]];
+      if (x === corner[0] && y === corner[1] && z === corner[2]) return places[place];
     }
-    return numbers.get(key);
+    places[place] = kept.length;
+    kept.push(corner);
+    return places[place];
   };
   const renumbered = triangles.map((each) => each.map(number));
   return { corners: kept, triangles: renumbered };
@@ -60,7 +62,7 @@ function readStl(buffer, file) {
   for (let k = 0; k < count; k += 1) {
     for (let corner = 0; corner < 3; corner += 1) {
       const at = 84 + 50 * k + 12 + 12 * corner;
-      corners.push([0, 4, 8].map((step) => view.getFloat32(at + step, true)));
+      corners.push([view.getFloat32(at, true), view.getFloat32(at + 4, true), view.getFloat32(at + 8, true)]);
     }
   }
   return { corners, triangles: inThrees(corners.map((_, k) => k)) };

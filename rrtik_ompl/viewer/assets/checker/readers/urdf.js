@@ -120,13 +120,21 @@ function urdfShape(each, capped, where) {
   return { kind: each.name === "capsule" || capped ? "capsule" : "cylinder", radius: a, half: b / 2 };
 }
 
+const shapesOfMesh = once(() => new Map()); // by scale
+
+function meshShape(mesh, scale) {
+  const known = shapesOfMesh(mesh);
+  const key = scale.join(" ");
+  const corners = () => mesh.corners.map((corner) => [corner[0] * scale[0], corner[1] * scale[1], corner[2] * scale[2]]);
+  if (!known.has(key)) known.set(key, { kind: "mesh", corners: corners(), triangles: mesh.triangles });
+  return known.get(key);
+}
+
 /** The robot with each "mesh file" replaced by what `meshOf(name)` returns: {corners, triangles}. */
 function withMeshes(robot, meshOf) {
   const solids = robot.solids.map((solid) => {
     if (solid.shape.kind !== "mesh file") return solid;
-    const { corners, triangles } = meshOf(solid.shape.name);
-    const [x, y, z] = solid.shape.scale;
-    return { ...solid, shape: { kind: "mesh", corners: corners.map((corner) => [corner[0] * x, corner[1] * y, corner[2] * z]), triangles } };
+    return { ...solid, shape: meshShape(meshOf(solid.shape.name), solid.shape.scale) };
   });
   return { ...robot, solids };
 }
