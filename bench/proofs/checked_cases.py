@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cache
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -89,12 +90,18 @@ def arm_of(name: str, folder: Path) -> Arm:
         "so101": [example / "so_arm_description/urdf/so101.urdf"],
     }
     if name in known:
-        from rrtik_ompl import load_robot
-
-        return Arm(load_robot(name), tuple(map(str, known[name])))
+        return Arm(_loaded(name), tuple(map(str, known[name])))
     urdf = folder / "planar.urdf"
     urdf.write_text(planar_urdf())
     return Arm(robot_from_urdf(urdf), (str(urdf),))
+
+
+@cache
+def _loaded(name: str) -> Robot:
+    """Return a robot by its name, the same each time, as much is remembered of it."""
+    from rrtik_ompl import load_robot
+
+    return load_robot(name)
 
 
 def random_scene(arm: str, robot: Robot, folder: Path, rng: np.random.Generator) -> Scene:

@@ -6,17 +6,17 @@ URDF; each is forged in many ways (`forgeries`). The script is run by node.
 
 from __future__ import annotations
 
+import atexit
 import json
 import math
 import subprocess
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import cache, lru_cache
 from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any
@@ -106,14 +106,12 @@ class Script:
         self._process.communicate()
 
 
-@contextmanager
-def script(node: str = "node") -> Iterator[Script]:
-    """Run the script as long as it is asked."""
+@cache
+def script(node: str = "node") -> Script:
+    """Return the script, which runs as long as this process: what it has read of an arm it keeps."""
     running = Script(node)
-    try:
-        yield running
-    finally:
-        running.close()
+    atexit.register(running.close)
+    return running
 
 
 def fault_in_numpy(forgery: Forgery) -> str:
@@ -151,7 +149,8 @@ def compared(name: str, seed: int, true: int, forged: int, kinds: Sequence[str] 
     """Count what both checkers say of some certificates of an arm, and of so many forgeries of each, of some kinds."""
     count = Count()
     rng = np.random.default_rng(seed)
-    with tempfile.TemporaryDirectory() as place, script() as page:
+    page = script()
+    with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
         arm = arm_of(name, folder)
         cases = cases_of(name, arm.robot, folder, seed)
@@ -178,7 +177,8 @@ def tasks_compared(name: str, seed: int, forged: int) -> Count:
     """Count what both checkers say of the certificate of a task, and of so many forgeries of it."""
     count = Count()
     rng = np.random.default_rng(seed)
-    with tempfile.TemporaryDirectory() as place, script() as page:
+    page = script()
+    with tempfile.TemporaryDirectory() as place:
         arm = arm_of(TASKS[name], Path(place))
         plan = Task.load(name).plan(seed=seed)
         made = plan.certificate()
