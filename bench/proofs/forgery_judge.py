@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cache, cached_property
-from itertools import product
+from itertools import chain, product
 from math import factorial
 from typing import Any, NamedTuple
 
@@ -132,7 +132,9 @@ class Judge:
         count = max(1, len(route.waypoints) - 1)
         shares = np.linspace(0.0, 1.0, SAMPLES)
         if not self._moving:
-            return any(not self._coal.free(between(route, m, shares)).all() for m in range(count))
+            some = (row[None] for row in route.waypoints)  # what touches much does so at a waypoint
+            rows = chain(some, (between(route, m, shares) for m in range(count)))
+            return any(not self._coal.free(each).all() for each in rows)
         return any(self._touches_at(route, m, share) for m in range(count) for share in shares[::MOVING_STEP])
 
     def _touches_at(self, route: Route, m: int, share: float) -> bool:

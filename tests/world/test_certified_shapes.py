@@ -11,8 +11,9 @@ from bench.proofs.tampering import with_model_of
 from rrtik_ompl.geometry.collision.elements import compared_pairs, elements_of, named_bodies
 from rrtik_ompl.model.certificate import from_document
 from rrtik_ompl.model.scene import Obstacle, Scene
+from rrtik_ompl.motion.trajectory.splines import Splines
 from rrtik_ompl.world.certificate_intervals import Known, Open, Rows
-from rrtik_ompl.world.certificate_making import _known_cover
+from rrtik_ompl.world.certificate_making import _known_cover, _Table
 from rrtik_ompl.world.certificate_parts import Parts, _known_parts, enclosed, inside_mesh
 from rrtik_ompl.world.world import World
 
@@ -185,3 +186,19 @@ def rows_of(nodes, level, numbers):
     first, second = np.array(nodes, dtype=np.int64).T
     width = 0.5**level
     return Rows(zeros, zeros, first, second, width * np.array(numbers), np.full(len(nodes), width))
+
+
+def test_a_timed_motion_that_touches_has_no_certificate_before_anything_is_divided(arm, monkeypatch):
+    rounds = []
+    run = _Table._run
+    monkeypatch.setattr(_Table, "_run", lambda table, *args: rounds.append(len(table.covers)) or run(table, *args))
+    shape, place = SHAPES["prism"]
+    rest = np.zeros_like(ROWS)
+    route = Splines.through(np.array([0.0, 1.0, 2.0]), ROWS, rest, None).route
+
+    free = World(arm, Scene([Obstacle("thing", shape, rrtik.pose(place))]))
+    assert free.certificate(route) is not None
+    rounds.clear()
+    nearer = World(arm, Scene([Obstacle("thing", shape, rrtik.pose(place + INTO_THE_WAY))]))
+    assert nearer.certificate(route) is None
+    assert len(rounds) <= 2
