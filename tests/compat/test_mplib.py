@@ -1,6 +1,7 @@
 """MPlib's planner: called as its users call it, judged by Pinocchio and by the exact world of the whole robot."""
 
 import importlib
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,8 +11,10 @@ import pytest
 import rrtik_ompl as rrtik
 from rrtik_ompl.base.errors import CloudWarning, InputError, PoseWarning, UnknownNameError
 from rrtik_ompl.compat import mplib
+from rrtik_ompl.compat.mplib import planner as screws
 from rrtik_ompl.compat.mplib.collision_detection import fcl
 from rrtik_ompl.compat.mplib.pose import placement
+from rrtik_ompl.planning.tip_motion import attempts
 from rrtik_robots.example_arms import data_folder
 
 URDF = data_folder() / "panda_description/urdf/panda.urdf"
@@ -151,10 +154,9 @@ def test_the_calls_of_maniskill_move_the_tip_along_screws(planner):
 def test_a_screw_to_a_goal_a_little_out_of_reach_ends_where_it_is_nearest_and_says_so(planner):
     goal = np.array([0.7924, -0.1346, 0.1234, *DOWN])  # where ManiSkill's PullCubeTool-v1 sends the hand, seed 6
     start = np.array([-0.1388, 0.5532, 0.06, -1.3128, -0.0322, 1.8556, 0.7066, 0.0231, 0.0231])
-    with pytest.warns(
-        PoseWarning, match=r"plan_screw: the goal is out of reach: the motion ends 3\.5 mm and 0\.14 deg"
-    ):
+    with pytest.warns(PoseWarning, match=r"plan_screw: the motion ends 3\.5 mm and 0\.14 deg from the goal"):
         result = planner.plan_screw(goal, start, time_step=0.05)
+    assert "the end of the reach" in result["reason"]
     assert_timed(result, planner, 0.05)
     assert result["proven"]
     off = placement(goal, "").actInv(hand_at(result["position"][-1])[0])
@@ -163,6 +165,22 @@ def test_a_screw_to_a_goal_a_little_out_of_reach_ends_where_it_is_nearest_and_sa
     assert planner.IK(goal, start)[0] == "IK Failed! Cannot find valid solution."
     goal[0] += 0.02
     assert planner.plan_screw(goal, start)["status"] == "screw plan failed"
+
+
+def test_a_screw_that_is_stopped_by_a_contact_is_not_called_out_of_reach(planner, monkeypatch):
+    whole = attempts.attempt
+
+    def stopped(world, way, q, leaning):
+        found = whole(world, way, q, leaning)
+        return replace(found, rows=found.rows[:-1], proof=None, fraction=0.98, why=lambda: "hand touches the box")
+
+    for module, name in ((screws, "attempt"), (attempts, "attempt")):
+        monkeypatch.setattr(module, name, stopped)
+    with pytest.warns(PoseWarning, match="the screw ends after 98 % of the way: hand touches the box"):
+        result = planner.plan_screw(GOAL, START)
+    assert_timed(result, planner, 0.1)
+    assert hand_at(result["position"][-1])[0].isApprox(placement(GOAL, ""), 1e-3)
+    assert "reach" not in result["reason"]
 
 
 def test_the_names_of_arguments_of_both_versions_are_taken(planner):

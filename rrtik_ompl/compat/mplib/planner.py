@@ -54,7 +54,7 @@ SCREW_DEVIATION = 5e-4  # [m] of the tip from the screw
 SCREW_TURN = 5e-3  # [rad]
 BLEND = 0.1  # [rad or m] how far before a corner of a path its rounding may begin
 SCREW_BLEND = 0.1  # [rad or m]
-SHORT = 0.015  # [m] of a goal out of reach, at which a screw may end where it is nearest; MPlib's end as far from goals
+SHORT = 0.015  # [m] from a goal at which a screw that is stopped may end; MPlib's end as far from goals
 SHORT_TURN = 0.05  # [rad]
 LAST = 0.25  # [rad or m] that a joint moves at most to get there
 NEAR = 0.1  # [rad or m] two solutions of inverse kinematics that are nearer count as one
@@ -731,8 +731,9 @@ class Planner:
             qpos_step, verbose: Without effect; the move group leaves the screw by at most 0.5 mm and 5 mrad, before
                 corners of the path are rounded.
 
-        A goal that is out of reach by 15 mm and 0.05 rad at most is approached as far as the arm comes, beside the end
-        of the screw: "reason" says how near that is, and a `PoseWarning` does.
+        If the screw is stopped, by the arm's reach or by something in its way, and the arm comes as near to the goal as
+        15 mm and 0.05 rad beside the end of the screw, it goes there: "reason" says how near that is and what stops the
+        screw, and a `PoseWarning` does.
         """
         del qpos_step, verbose
         start = self._start(qpos if current_qpos is None else current_qpos, True)
@@ -750,10 +751,12 @@ class Planner:
             found = farthest(world, way, begin[None])
         path = path_of(world, found)
         if path is None or found.fraction < 1.0:
+            stopped = f"after {100.0 * found.fraction:.3g} % of the way: {found.reason}"
             nearest = None if path is None else _to_nearest(path, world, goal)
             if nearest is None:
-                return _failed(NO_SCREW, f"after {100.0 * found.fraction:.3g} % of the way: {found.reason}")
-            path, reason = nearest
+                return _failed(NO_SCREW, stopped)
+            path, off = nearest
+            reason = f"the motion ends {off} from the goal; the screw ends {stopped}"
             warnings.warn(f"plan_screw: {reason}", PoseWarning, stacklevel=2)
             return {**self._timed(path, world, time_step, SCREW_BLEND, True), "reason": reason}
         return self._timed(path, world, time_step, SCREW_BLEND, True)
@@ -922,10 +925,10 @@ def _success(
 
 
 def _to_nearest(path: JointPath, world: World, goal: pin.SE3) -> tuple[JointPath, str] | None:
-    """Lead a path whose goal is out of reach on to where the tip is nearest to it; None if that is far, or not free.
+    """Lead a path that ends before its goal on to where the tip is nearest to it; None if that is far, or not free.
 
     Returns:
-        The path, and in words how near it ends.
+        The path, and in words how far from the goal it ends.
     """
     arm = world.robot
     end = descend(arm, PoseGoal(goal), path.end[None])[0][0]
@@ -935,8 +938,7 @@ def _to_nearest(path: JointPath, world: World, goal: pin.SE3) -> tuple[JointPath
     step = float(np.abs(end - path.end).max())
     if shift > SHORT or turn > SHORT_TURN or step > LAST or not world.motion_proven(path.end, end):
         return None
-    told = f"the goal is out of reach: the motion ends {1e3 * shift:.2g} mm and {np.degrees(turn):.2g} deg from it"
-    return JointPath.of(arm, np.vstack([path.waypoints, end])), told
+    return JointPath.of(arm, np.vstack([path.waypoints, end])), f"{1e3 * shift:.2g} mm and {np.degrees(turn):.2g} deg"
 
 
 def _failed(status: str, reason: str) -> Result:
