@@ -388,6 +388,12 @@ def inside_limits(robot: Robot, rows: Matrix, tolerance: float = LIMIT_TOLERANCE
     return np.asarray(np.logical_and.reduce((rows >= lower) & (upper >= rows), axis=1))
 
 
+def all_inside_limits(robot: Robot, rows: Matrix) -> bool:
+    """Check whether all configurations, shape (m, dof), lie inside the limits, as :func:`inside_limits` says."""
+    lower, upper = _widened_limits(robot, LIMIT_TOLERANCE)
+    return bool(((rows >= lower) & (upper >= rows)).all())
+
+
 def pinocchio_rows(robot: Robot, rows: Matrix) -> Matrix:
     """Convert configurations to Pinocchio's vectors, (m, dof) -> (m, nq); see :meth:`Robot.pinocchio_configuration`."""
     values = robot.chain.joint_values(rows)
@@ -465,6 +471,7 @@ def _poses(
     return placed
 
 
+@kept_with
 def reach_of(robot: Robot) -> float:
     """Return the characteristic length of an arm [m]: the sum of all offsets between consecutive joints."""
     return float(np.linalg.norm(robot.chain.placement[:, :3, 3], axis=1).sum()) or 1.0

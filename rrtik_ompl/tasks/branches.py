@@ -401,8 +401,9 @@ def _following_branch(
     It takes over the rest of the steps, the choices and the effort, and adds the length of the path (or of the
     straight motion to ``q``) to the cost.
     """
-    rows = np.stack([branch.q, q]) if path is None else path.waypoints
-    cost = branch.cost + weighted_length(setting.robot, rows)
+    cost = branch.cost
+    if path is not None or q is not branch.q:
+        cost += weighted_length(setting.robot, np.array([branch.q, q]) if path is None else path.waypoints)
 
     return Branch(
         setting,

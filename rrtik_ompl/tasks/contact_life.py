@@ -328,7 +328,8 @@ def place_of_parting(rows: Matrix, world: World, contact: Touching) -> tuple[int
         Index of the motion between two waypoints, and the share of it, from 0 to 1; None if they part nowhere.
     """
     bodies = world.bodies
-    pairs = [pair for pair in world.pairs if {bodies[k].name for k in pair} == contact.pair]
+    numbers = {k for k, body in enumerate(bodies) if body.name in contact.pair}
+    pairs = [(i, j) for i, j in world.pairs if i in numbers and j in numbers and bodies[i].name != bodies[j].name]
     if not pairs:
         return 0, 0.0
 

@@ -61,12 +61,14 @@ def handled(steps: Sequence[Step], robot: Robot) -> list[Handled]:
 
 def may_touch(world: World, steps: Sequence[Step]) -> list[Touching]:
     """Return contacts that let the things that are taken or set down next touch all that they may touch."""
+    bodies = world.bodies
+    names = {(bodies[i].name, bodies[j].name) for i, j in world.pairs}
     contact_of_pair: dict[frozenset[str], Touching] = {}
     for thing in handled(steps, world.robot):
-        for pair in {frozenset(world.bodies[k].name for k in numbers) for numbers in world.pairs}:
+        for pair in map(frozenset, names):
             other = next(iter(pair - {thing.name}), None)
             if thing.name in pair and other is not None and (thing.by is None or other in thing.by):
-                contact_of_pair[pair] = allowed(world.bodies, thing.name, other)
+                contact_of_pair[pair] = allowed(bodies, thing.name, other)
     return sorted(contact_of_pair.values(), key=lambda contact: contact.names)
 
 
