@@ -20,7 +20,7 @@ from rrtik_ompl.model.scene import Obstacle, Scene
 from rrtik_ompl.model.shapes import Sphere
 from rrtik_ompl.motion.following.servo import Servo
 from rrtik_ompl.motion.trajectory import State, Trajectory
-from rrtik_ompl.motion.trajectory.corners import first_radii, vertices
+from rrtik_ompl.motion.trajectory.corners import Polyline, first_radii, vertices
 from rrtik_ompl.motion.trajectory.curve import Curve
 from rrtik_ompl.motion.trajectory.fastest import Bounds, fastest
 from rrtik_ompl.motion.trajectory.runs import along_curve, along_lines
@@ -85,10 +85,11 @@ def beside_toppra(arm: str, file: str, fine: bool) -> list[float] | None:
 
     cases = planned(arm, file)
     rows = vertices(cases[0].path.waypoints) if cases else np.empty((0, 0))
-    radii = first_radii(rows, 0.2) if len(rows) > 2 else np.zeros(1)
+    line = Polyline.of(rows)
+    radii = first_radii(line, 0.2) if len(rows) > 2 else np.zeros(1)
     if (radii == 0.0).any():
         return None
-    curve, limits = Curve.of(rows, radii), cases[0].without_jerk
+    curve, limits = Curve.of(line, radii), cases[0].without_jerk
     velocity, acceleration = (np.stack([-row, row], axis=1) for row in (limits.velocity, limits.acceleration))
     rules = [
         JointVelocityConstraint(velocity),
@@ -124,8 +125,8 @@ def beside_ruckig(profiles: int) -> float:
         task, found = InputParameter(1), Profile(1)
         task.target_position, task.max_velocity, task.max_acceleration, task.max_jerk = [length], [v], [a], [j]
         Ruckig(1).calculate(task, found)
-        (pieces,) = along_lines(np.array([[0.0], [length]]), RateLimits(v, a, j))
-        ratios.append(pieces.durations.sum() / found.duration)
+        run = along_lines(Polyline.of(np.array([[0.0], [length]])), RateLimits(v, a, j))
+        ratios.append(run.duration / found.duration)
     return float(np.max(ratios))
 
 

@@ -23,7 +23,7 @@ from rrtik_ompl import RateLimits
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.motion.trajectory import Trajectory
 from rrtik_ompl.motion.trajectory.blending import blended
-from rrtik_ompl.motion.trajectory.corners import vertices
+from rrtik_ompl.motion.trajectory.corners import Polyline, vertices
 
 ROUNDS = 25  # of a measurement of time; the least counts
 
@@ -118,5 +118,10 @@ def times(report: Report) -> None:
 
 def _timed(path: JointPath, limits: RateLimits) -> Trajectory | None:
     return blended(
-        path, vertices(path.waypoints), limits, 0.1, np.inf, lambda motion, off_path: np.zeros(0, dtype=np.int64)
+        path,
+        Polyline.of(vertices(path.waypoints)),
+        limits,
+        0.1,
+        np.inf,
+        lambda motion, off_path: np.zeros(0, dtype=np.int64),
     )

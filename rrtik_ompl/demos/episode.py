@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
+from itertools import groupby
 from typing import Any
 
 import numpy as np
@@ -13,6 +15,7 @@ from numpy.typing import NDArray
 from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.base.errors import RrtikError
 from rrtik_ompl.base.poses import pose_row
+from rrtik_ompl.model.scene import AttachedObject
 from rrtik_ompl.motion.trajectory import RateLimits
 from rrtik_ompl.tasks import Attach, Task, TaskPlan, plan_after
 from rrtik_ompl.tasks.randomness import Draws, Randomness
@@ -130,23 +133,39 @@ def _object_poses(
     rows: Matrix, motion: NDArray[np.int64], worlds: Sequence[World], names: tuple[str, ...]
 ) -> NDArray[np.float64]:
     """Return position and quaternion (x, y, z, w) of each object at each tick, shape (k, objects, 7)."""
-    poses = np.zeros((len(rows), len(names), 7))
-    for number in np.unique(motion).tolist():
-        world = worlds[number]
-        ticks = np.flatnonzero(motion == number)
-        attached = {item.name: item for item in world.scene.attached}
-        for column, name in enumerate(names):
-            if name not in attached:
-                poses[ticks, column] = pose_row(world.scene.obstacle(name).pose)
+    poses = np.empty((len(rows), len(names), 7))
+    ends = motion.searchsorted(np.arange(1, len(worlds) + 1))  # tick at which each motion is over
+    for column, name in enumerate(names):
+        begin = 0
+        for _, alike in groupby(enumerate(worlds), partial(_place, name)):
+            numbers, there = zip(*alike, strict=True)  # motions during which it is held alike
+            ticks = slice(begin, int(ends[numbers[-1]]))
+            begin = ticks.stop
+            held = _held(there[0], name)
+            if held is None:
+                poses[ticks, column] = pose_row(there[0].scene.obstacle(name).pose)
                 continue
-            held = attached[name]
-            there = world.robot.fk_batch(rows[ticks], held.link) @ held.pose.homogeneous
-            poses[ticks, column, :3] = there[:, :3, 3]
-            poses[ticks, column, 3:] = _quaternions(there[:, :3, :3])
+            frames = there[0].robot.fk_batch(rows[ticks], held.link) @ held.pose.homogeneous
+            poses[ticks, column, :3] = frames[:, :3, 3]
+            poses[ticks, column, 3:] = _quaternions(frames[:, :3, :3])
     return poses
+
+
+def _place(name: str, numbered: tuple[int, World]) -> tuple[str, bytes]:
+    """Return the link that holds an object in a world, "" if none does, and the object's pose as seen from there."""
+    _, world = numbered
+    held = _held(world, name)
+    if held is not None:
+        return held.link, held.pose.homogeneous.tobytes()
+    return "", world.scene.obstacle(name).pose.homogeneous.tobytes()
+
+
+def _held(world: World, name: str) -> AttachedObject | None:
+    """Return an object if it is attached to the arm."""
+    return next((item for item in world.scene.attached if item.name == name), None)
 
 
 def _quaternions(R: NDArray[np.float64]) -> Matrix:
     """Return rotations, shape (m, 3, 3), as quaternions (x, y, z, w) with w >= 0, shape (m, 4)."""
-    rows = np.array([pin.Quaternion(each).coeffs() for each in R])
+    rows = np.array([pin.Quaternion(each).coeffs() for each in R]).reshape(-1, 4)
     return np.where(rows[:, 3:] < 0.0, -rows, rows)

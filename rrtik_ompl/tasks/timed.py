@@ -17,6 +17,9 @@ from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.motion.trajectory import RateLimits, Trajectory, time_parameterize
 from rrtik_ompl.motion.trajectory.checks import proof_of_pieces
+from rrtik_ompl.motion.trajectory.corners import row_lengths
+from rrtik_ompl.motion.trajectory.cubics import Cubics
+from rrtik_ompl.motion.trajectory.motion import motion_along
 from rrtik_ompl.tasks import TaskPlan
 from rrtik_ompl.tasks.contact_life import MotionContact, world_from
 from rrtik_ompl.tasks.setting import world_of_motion
@@ -152,7 +155,6 @@ class _Schedule:
             add(now + part.times[:-1], part, slice(-1))
             now += part.duration
 
-        first = self.parts[0]
         end = self.parts[-1]
         rest = self.rests[-1]
         if rest > 0.0:
@@ -160,14 +162,9 @@ class _Schedule:
         add(np.array([now + rest]), end, slice(-1, None), still=rest > 0.0)
 
         clock = np.concatenate(times)
-        return Trajectory(
-            clock,
-            *(np.concatenate(rows[name]) for name in names),
-            joint_names=first.joint_names,
-            prismatic=first.prismatic,
-            robot_name=first.robot_name,
-            gripper=[replace(event, time=min(event.time, float(clock[-1]))) for event in self.events],
-        )
+        motion = Cubics(clock, *(np.concatenate(rows[name]) for name in names))
+        commands = [replace(event, time=min(event.time, float(clock[-1]))) for event in self.events]
+        return motion_along(self.parts[0], motion, commands)
 
 
 def _held(gripper: GripperJoints, robot: Robot) -> tuple[float, ...]:
@@ -205,7 +202,7 @@ def _timed(
 def _free_from(motion: Trajectory, q: Vector, world: World) -> bool:
     """Check whether a motion is proven free in a world from where it passes q, shape (dof,), to its end."""
     clock = np.linspace(0.0, motion.duration, LOOKS)
-    passed = clock[np.linalg.norm(motion(clock).positions - q, axis=1).argmin()]
+    passed = clock[row_lengths(motion.cubics.states(clock).positions - q).argmin()]
     first = min(int(np.searchsorted(motion.times, passed)), len(motion.times) - 2)
     return proof_of_pieces(motion.cubics, world, 0.0, np.arange(first, len(motion.times) - 1)).proven
 

@@ -35,6 +35,7 @@ IN_BLOCKS = {  # the number of rows, which come in blocks
     "search.constrained.kernels": ("project_rows",),
     "search.motions.edge_kernels": ("prove_edges",),
     "search.motions.proven_kernels": ("judge",),
+    "timing.run_kernels": ("sample_cubics",),
 }
 ONE_THING = {  # one pose, one query, one path, or one solid whose cover is made once
     "covers.cell_kernels": ("cut_at_planes", "merge", "winding_numbers"),
@@ -50,7 +51,7 @@ ONE_THING = {  # one pose, one query, one path, or one solid whose cover is made
     "search.repair_kernels": ("finish",),
     "search.roadmap.kernels": ("insert", "doubt", "pose", "forget_query", "begin", "answer"),
     "timing.kernels": ("sample_curve", "find_squares"),
-    "timing.run_kernels": ("time_run", "find_peaks"),
+    "timing.run_kernels": ("time_run", "time_lines", "find_peaks", "find_pushes"),
 }
 
 

@@ -5,10 +5,14 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.kernels.timing.layout import FLAT, ROUNDS
-from rrtik_ompl.kernels.timing.run_layout import JUMP_SHARE, ROUNDING
+from rrtik_ompl.kernels.timing.run_layout import JUMP_SHARE, MIN_PHASE_SECONDS, ROUNDING
+
+# Acceleration at the beginning of each of the seven phases of a straight motion, as a share of the largest one.
+PUSHES = np.array([0.0, 1.0, 1.0, 0.0, 0.0, -1.0, -1.0])
 
 
 def sample_curve(vertices: Matrix, along: Vector, directions: Matrix, radii: Vector, at: Vector) -> Matrix:
@@ -118,3 +122,73 @@ def peaks(times: Vector, velocities: Matrix, accelerations: Matrix) -> tuple[Vec
     is_smooth = (smooth | (jump_sizes <= jump)).all(axis=0) & at_rest.all(axis=0)
     jerk = np.where(is_smooth, np.abs((accelerations[1:] - a) / h).max(axis=0), np.inf)
     return velocity, acceleration, jerk
+
+
+def phases_of_lines(length: Vector, v: Vector, a: Vector, j: Vector) -> tuple[Matrix, Matrix]:
+    """Compute the seven phases of the fastest motions over lengths, from rest to rest.
+
+    Args:
+        length: Lengths of m lines [rad or m], shape (m,).
+        v: Velocity limits along the lines, shape (m,).
+        a: Acceleration limits along the lines, shape (m,).
+        j: Jerk limits along the lines, inf for none, shape (m,).
+
+    Returns:
+        Durations of the phases [s] and accelerations at their beginnings, shape (m, 7) each.
+    """
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        onset = a / j  # time until the acceleration reaches its limit
+        ramp = np.where(v >= a * onset, v / a + onset, 2.0 * np.sqrt(v / j))  # time until the speed reaches its limit
+        cruise = length / v - ramp
+        limit = a * onset
+        peak = 0.5 * (np.sqrt(limit**2 + 4.0 * a * length) - limit)  # speed if there is no cruise
+        gentle = np.cbrt(length / (2.0 * j))  # onset if neither limit is reached
+        short = length < 2.0 * limit * onset
+        fast = cruise < 0.0
+        ramp = np.where(fast, np.where(short, 2.0 * gentle, peak / a + onset), ramp)
+        onset = np.minimum(onset, 0.5 * ramp)
+
+    hold = ramp - 2.0 * onset
+    cruise = np.maximum(cruise, 0.0)
+    push = np.where(np.isinf(j), a, np.where(np.isinf(j), 0.0, j) * onset)
+    phases = np.stack([onset, hold, onset, cruise, onset, hold, onset], axis=1)
+    return phases, push[:, None] * PUSHES
+
+
+def time_lines(
+    vertices: Matrix, directions: Matrix, along: Vector, phases: Matrix, pushes: Matrix, smooth: NDArray[np.bool_]
+) -> tuple[Vector, Matrix, Matrix, Matrix, Vector]:
+    """Cut straight motions between vertices into pieces; phases without duration are left out.
+
+    Args:
+        vertices: The vertices, shape (k, n).
+        directions: Unit vectors along the edges, shape (k - 1, n).
+        along: Distance of each vertex from the first one along the path, shape (k,).
+        phases: Durations of the phases on each edge, shape (k - 1, 7) [s].
+        pushes: Accelerations along the edges at their beginnings, shape (k - 1, 7).
+        smooth: Whether the jerk along an edge is limited, shape (k - 1,).
+
+    Returns:
+        Durations, positions, velocities and accelerations of all pieces, and the places on the path where they begin.
+    """
+    jerks = np.diff(np.concatenate([pushes, np.zeros_like(pushes[:, :1])], axis=1), axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        jerks = np.where((phases > MIN_PHASE_SECONDS) & smooth[:, None], jerks / phases, 0.0)
+
+    speeds = np.zeros_like(phases)
+    travelled = np.zeros_like(phases)
+    for k in range(6):
+        h = phases[:, k]
+        v = speeds[:, k]
+        a = pushes[:, k]
+        j = jerks[:, k]
+        speeds[:, k + 1] = v + h * (a + 0.5 * h * j)
+        travelled[:, k + 1] = travelled[:, k] + h * (v + h * (0.5 * a + h * j / 6.0))
+
+    edge, phase = np.nonzero(phases > MIN_PHASE_SECONDS)
+    direction = directions[edge]
+    begin = travelled[edge, phase]
+    positions = vertices[edge] + begin[:, None] * direction
+    velocities = speeds[edge, phase][:, None] * direction
+    accelerations = pushes[edge, phase][:, None] * direction
+    return phases[edge, phase], positions, velocities, accelerations, along[edge] + begin

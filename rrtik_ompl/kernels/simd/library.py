@@ -55,6 +55,8 @@ def library(name: str) -> Library | None:
 
     Why is said in a warning, once for each reason.
     """
+    if name in _libraries:
+        return _libraries[name]
     with _lock:
         if name not in _libraries:
             _libraries[name] = _tried(name)

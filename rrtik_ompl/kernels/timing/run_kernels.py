@@ -1,7 +1,7 @@
-"""The kernel that times a run through rounded corners: several ways of smoothing it, of which the fastest is kept.
+"""The kernels that time runs: one through rounded corners, and straight ones between stops.
 
-It does in one call what :mod:`rrtik_ompl.motion.trajectory.runs` does step by step, and says why. There is no motion
-if a number is not finite.
+The first tries several ways of smoothing, of which the fastest is kept. It does in one call what
+:mod:`rrtik_ompl.motion.trajectory.runs` does step by step, and says why. There is no motion if a number is not finite.
 """
 
 from __future__ import annotations
@@ -16,16 +16,118 @@ from rrtik_ompl.kernels.timing.layout import CurveTable
 from rrtik_ompl.kernels.timing.run_layout import (
     CRUISE_PARTS,
     JUMP_SHARE,
+    KNOTS,
     LEAST_PIECES,
+    LEAST_STEPS,
+    MIN_PHASE_SECONDS,
     MOST_PARTS,
     MOST_PIECES,
     MOST_STEPS,
+    PHASES,
     ROUNDING,
+    SAME_PLACE,
+    STEPS_PER_LINE,
+    STEPS_PER_RADIUS,
+    LinesTable,
     RunTable,
 )
 
 NONE = 1e300  # more than any duration
 UNBOUNDED = 1e200  # path speed squared where there is no bound
+
+
+@kernel
+def find_knots(run: RunTable) -> int:
+    """Write the places where roundings begin, are at their corner or end, ascending and each once; how many."""
+    curve = run.curve
+    knots = run.knots
+    count = 0
+    for vertex in range(curve.vertex_count):
+        for side in range(KNOTS):
+            place = curve.along[vertex] + float(side - 1) * curve.radii[vertex]
+            k = count
+            while k > 0 and knots[k - 1] > place:  # they are almost in order
+                knots[k] = knots[k - 1]
+                k -= 1
+            knots[k] = place
+            count += 1
+
+    length = curve.along[curve.vertex_count - 1]
+    kept = 1
+    before = knots[0]
+    for k in range(1, count):
+        place = knots[k]
+        if place - before > SAME_PLACE * length:
+            knots[kept] = place
+            kept += 1
+        before = place
+    knots[kept - 1] = length
+    return kept
+
+
+@kernel
+def find_tightest(run: RunTable, stretches: int) -> None:
+    """Write for each stretch between two knots the smallest class of the corners in whose rounding it lies, or inf."""
+    curve = run.curve
+    knots = run.knots
+    for k in range(stretches):
+        run.tightest[k] = math.inf
+
+    first = 0  # stretch that begins behind the beginning of a rounding, by their middles
+    for corner in range(1, curve.vertex_count - 1):
+        begin = curve.along[corner] - curve.radii[corner]
+        end = curve.along[corner] + curve.radii[corner]
+        while first > 0 and 0.5 * (knots[first] + knots[first - 1]) > begin:
+            first -= 1
+        while first < stretches and 0.5 * (knots[first + 1] + knots[first]) <= begin:
+            first += 1
+        k = first
+        while k < stretches and 0.5 * (knots[k + 1] + knots[k]) <= end:
+            run.tightest[k] = min(run.tightest[k], run.classes[corner])
+            k += 1
+
+
+@inlined
+def steps_of(run: RunTable, stretch: int, longest: float) -> float:
+    """Into how many steps a stretch of the grid is divided."""
+    width = run.knots[stretch + 1] - run.knots[stretch]
+    tightest = run.tightest[stretch]
+    step = width / float(STEPS_PER_LINE) if math.isinf(tightest) else tightest / float(STEPS_PER_RADIUS)
+    steps: float = max(math.ceil(width / min(step, longest)), 1.0)
+    return steps
+
+
+@kernel
+def lay_grid(run: RunTable) -> int:
+    """Lay the grid along the curve, closely where it bends; how many points it has.
+
+    Writes them if there is room, and by how much smoothing may leave the curve at each.
+    """
+    stretches = find_knots(run) - 1
+    find_tightest(run, stretches)
+    longest = run.knots[stretches] / float(LEAST_STEPS)
+    total = 1.0
+    for stretch in range(stretches):
+        total += steps_of(run, stretch, longest)
+    points = int(total)
+    if points > run.room:
+        return points
+
+    search = run.search
+    point = 0
+    for stretch in range(stretches):
+        begin = run.knots[stretch]
+        width = run.knots[stretch + 1] - begin
+        steps = steps_of(run, stretch, longest)
+        most = run.share * run.tightest[stretch]
+        for part in range(int(steps)):
+            search.grid[point] = begin + float(part) / steps * width
+            run.most[point] = most
+            point += 1
+    search.grid[point] = run.knots[stretches]
+    run.most[point] = math.inf
+    search.points = points
+    return points
 
 
 @inlined
@@ -318,10 +420,18 @@ def attempt(run: RunTable, number: int) -> float:
 
 @entry
 def time_run(run: RunTable) -> int:
-    """Time the run in several ways and keep the fastest of those that stay near to the path; 0 if there is none."""
+    """Time the run in several ways and keep the fastest of those that stay near to the path.
+
+    Gives the number of its pieces, 0 if there is no motion. If the grid takes more room than there is, nothing is done,
+    and the answer is its number of points as a negative number.
+    """
     curve = run.curve
     search = run.search
     n = curve.dof
+    points = lay_grid(run)
+    if points > run.room:
+        return -points
+
     curve.place_count = search.points
     for k in range(search.points):
         curve.at[k] = search.grid[k]
@@ -355,6 +465,118 @@ def time_run(run: RunTable) -> int:
 
 
 @inlined
+def root3(x: float) -> float:
+    """The cube root of a number that is not negative."""
+    root: float = x ** (1.0 / 3.0)
+    if 0.0 < root < NONE:
+        root -= (root * root * root - x) / (3.0 * root * root)  # one step of Newton's, as a third is rounded
+    return root
+
+
+@kernel
+def set_phases(lines: LinesTable, length: float, v: float, a: float, j: float) -> float:
+    """Write the seven phases of the fastest motion over a length, from rest to rest; the duration of all of them.
+
+    Args:
+        lines: Where they are written.
+        length: The length.
+        v: Limit of the speed along the line.
+        a: Limit of the acceleration.
+        j: Limit of the jerk, may be infinite.
+    """
+    onset = a / j  # time until the acceleration reaches its limit
+    ramp = v / a + onset if v >= a * onset else 2.0 * math.sqrt(v / j)  # time until the speed reaches its limit
+    cruise = length / v - ramp
+    limit = a * onset
+    if cruise < 0.0:
+        if length < 2.0 * limit * onset:  # neither limit is reached
+            ramp = 2.0 * root3(length / (2.0 * j))
+        else:
+            peak = 0.5 * (math.sqrt(limit * limit + 4.0 * a * length) - limit)  # speed if there is no cruise
+            ramp = peak / a + onset
+    onset = min(onset, 0.5 * ramp)
+    hold = ramp - 2.0 * onset
+    push = a if math.isinf(j) else j * onset
+
+    phases = lines.phases
+    pushes = lines.pushes
+    for k in range(PHASES):
+        phases[k] = onset
+        pushes[k] = 0.0
+    phases[1] = hold
+    phases[3] = max(cruise, 0.0)
+    phases[5] = hold
+    pushes[1] = push
+    pushes[2] = push
+    pushes[5] = -push
+    pushes[6] = -push
+    duration = 0.0
+    for k in range(PHASES):
+        duration += phases[k]
+    return duration
+
+
+@kernel
+def write_phases(lines: LinesTable, edge: int, piece: int, smooth: bool) -> int:
+    """Write the pieces of a straight motion behind those that are there; how many there are then.
+
+    Args:
+        lines: The phases, and where pieces are written.
+        edge: Number of the edge.
+        piece: How many pieces there are.
+        smooth: Whether the jerk is limited.
+    """
+    n = lines.dof
+    start = row_at(lines.vertices, n, edge)
+    direction = row_at(lines.directions, n, edge)
+    speed = 0.0
+    travelled = 0.0
+    for k in range(PHASES):
+        h = lines.phases[k]
+        push = lines.pushes[k]
+        after = lines.pushes[k + 1] if k + 1 < PHASES else 0.0
+        jerk = (after - push) / h if smooth and h > MIN_PHASE_SECONDS else 0.0
+        if h > MIN_PHASE_SECONDS:
+            lines.durations[piece] = h
+            lines.begins[piece] = lines.along[edge] + travelled
+            for joint in range(n):
+                slope = direction[joint]
+                lines.positions[piece * n + joint] = start[joint] + travelled * slope
+                lines.velocities[piece * n + joint] = speed * slope
+                lines.accelerations[piece * n + joint] = push * slope
+            piece += 1
+        travelled += h * (speed + h * (0.5 * push + h * jerk / 6.0))
+        speed += h * (push + 0.5 * h * jerk)
+    return piece
+
+
+@entry
+def time_lines(lines: LinesTable) -> int:
+    """Time straight motions between vertices, all joints of each by the same profile.
+
+    Gives the number of pieces of all of them; if one cannot be calculated, the number of its edge, from 1, as a
+    negative number.
+    """
+    n = lines.dof
+    pieces = 0
+    for edge in range(lines.edges):
+        direction = row_at(lines.directions, n, edge)
+        v = math.inf
+        a = math.inf
+        j = math.inf
+        for joint in range(n):
+            steep = 1.0 / abs(direction[joint])
+            v = min(v, lines.velocity[joint] * steep)
+            a = min(a, lines.acceleration[joint] * steep)
+            j = min(j, lines.jerk[joint] * steep)
+        duration = set_phases(lines, lines.lengths[edge], v, a, j)
+        if not 2.0 * MIN_PHASE_SECONDS < duration < math.inf:
+            return -(edge + 1)
+        pieces = write_phases(lines, edge, pieces, not math.isinf(j))
+    return pieces
+
+
+@inlined
 def piece_of(times: Doubles, velocities: Doubles, accelerations: Doubles, joints: int, piece: int, joint: int) -> tuple:  # type: ignore[type-arg]
     """Of a joint on a piece: its duration, acceleration at the beginning and at the end, and the jerk."""
     h = times[piece + 1] - times[piece]
@@ -365,10 +587,72 @@ def piece_of(times: Doubles, velocities: Doubles, accelerations: Doubles, joints
 
 
 @entry
+def find_pushes(
+    times: Doubles,
+    velocities: Doubles,
+    accelerations: Doubles,
+    weights: Doubles,
+    knots: int,
+    joints: int,
+    sink: Doubles,
+) -> int:
+    """Write for each piece the weighted sum of the joints' largest accelerations."""
+    for piece in range(knots - 1):
+        total = 0.0
+        for joint in range(joints):
+            _, push, end, _ = piece_of(times, velocities, accelerations, joints, piece, joint)
+            total += weights[joint] * max(abs(push), abs(end))
+        sink[piece] = total
+    return 0
+
+
+@entry
+def sample_cubics(
+    times: Doubles,
+    positions: Doubles,
+    velocities: Doubles,
+    accelerations: Doubles,
+    knots: int,
+    joints: int,
+    clock: Doubles,
+    count: int,
+    places: Doubles,
+    speeds: Doubles,
+    pushes: Doubles,
+) -> int:
+    """Write position, velocity and acceleration at times, in rows of ``joints``; before and after it all is at rest."""
+    last = knots - 1
+    duration = times[last]
+    piece = 0
+    for k in range(count):
+        inside = min(max(clock[k], 0.0), duration)
+        if inside < times[piece]:
+            piece = 0
+        while piece < last - 1 and times[piece + 1] <= inside:
+            piece += 1
+        x = inside - times[piece]
+        moving = clock[k] == inside
+        for joint in range(joints):
+            _, push, _, jerk = piece_of(times, velocities, accelerations, joints, piece, joint)
+            q = positions[piece * joints + joint]
+            v = velocities[piece * joints + joint]
+            sink = k * joints + joint
+            places[sink] = q + x * (v + x * (push / 2.0 + x * jerk / 6.0))
+            if inside == duration:  # without the rounding of the cubic
+                places[sink] = positions[last * joints + joint]
+            speeds[sink] = v + x * (push + x * jerk / 2.0) if moving else 0.0
+            pushes[sink] = push + x * jerk if moving else 0.0
+    return 0
+
+
+@entry
 def find_peaks(
     times: Doubles, velocities: Doubles, accelerations: Doubles, knots: int, joints: int, sink: Doubles
 ) -> int:
-    """Write the largest velocity, acceleration and jerk of each joint; see `rrtik_ompl.kernels.reference.timing`."""
+    """Write the largest velocity, acceleration and jerk of each joint; see `rrtik_ompl.kernels.reference.timing`.
+
+    ``sink`` has a fourth row, to compute in.
+    """
     fastest = 0.0
     strongest = 0.0
     for k in range(knots * joints):
@@ -376,35 +660,37 @@ def find_peaks(
         strongest = max(strongest, abs(accelerations[k]))
     reach = ROUNDING * (fastest + times[knots - 1] * strongest)
 
-    largest = 0.0
+    jumps = row_at(sink, joints, 3)  # that are more than rounding
     for joint in range(joints):
-        speed = abs(velocities[(knots - 1) * joints + joint])
-        most = abs(accelerations[(knots - 1) * joints + joint])
-        jolt = 0.0
-        for piece in range(knots - 1):
+        sink[joint] = abs(velocities[(knots - 1) * joints + joint])
+        sink[joints + joint] = abs(accelerations[(knots - 1) * joints + joint])
+        sink[2 * joints + joint] = 0.0
+        jumps[joint] = 0.0
+
+    for piece in range(knots - 1):
+        for joint in range(joints):
             h, push, end, jerk = piece_of(times, velocities, accelerations, joints, piece, joint)
             before = velocities[piece * joints + joint]
             after = accelerations[(piece + 1) * joints + joint]
-            speed = max(speed, abs(before))
-            turn = -push / jerk
-            if 0.0 < turn < h:
-                speed = max(speed, abs(before + 0.5 * turn * push))
-            most = max(most, abs(push))
-            if abs(end - after) * h > reach:
-                most = max(most, abs(end))
-            jolt = max(jolt, abs(after - push) / h)
-        sink[joint] = speed
-        sink[joints + joint] = most
-        sink[2 * joints + joint] = jolt
-        largest = max(largest, most)
+            sink[joint] = max(sink[joint], abs(before))
+            sink[joints + joint] = max(sink[joints + joint], abs(push))
+            sink[2 * joints + joint] = max(sink[2 * joints + joint], abs(after - push) / h)
+            if push * jerk < 0.0:  # the acceleration may change its sign
+                turn = -push / jerk
+                if turn < h:
+                    sink[joint] = max(sink[joint], abs(before + 0.5 * turn * push))
+            size = abs(end - after)
+            if size * h > reach:
+                sink[joints + joint] = max(sink[joints + joint], abs(end))
+                jumps[joint] = max(jumps[joint], size)
 
+    largest = 0.0
+    for joint in range(joints):
+        largest = max(largest, sink[joints + joint])
     jump = JUMP_SHARE * largest
     for joint in range(joints):
-        smooth = abs(accelerations[joint]) <= jump and abs(accelerations[(knots - 1) * joints + joint]) <= jump
-        for piece in range(knots - 1):
-            h, _, end, _ = piece_of(times, velocities, accelerations, joints, piece, joint)
-            size = abs(end - accelerations[(piece + 1) * joints + joint])
-            smooth = smooth and (size <= jump or size * h <= reach)
-        if not smooth:
+        begin = abs(accelerations[joint])
+        end = abs(accelerations[(knots - 1) * joints + joint])
+        if max(jumps[joint], begin, end) > jump:
             sink[2 * joints + joint] = math.inf
     return 0

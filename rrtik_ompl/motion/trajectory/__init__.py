@@ -11,8 +11,8 @@ from rrtik_ompl.base.errors import InputError, listed, require
 from rrtik_ompl.kernels.threads import in_threads
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.robot import Robot, require_joints
-from rrtik_ompl.motion.trajectory.blending import blended, fault_finder, joined, seconds_with_stops, stops_at_corners
-from rrtik_ompl.motion.trajectory.corners import vertices
+from rrtik_ompl.motion.trajectory.blending import blended, fault_finder, joined, stops_at_corners
+from rrtik_ompl.motion.trajectory.corners import Polyline, vertices
 from rrtik_ompl.motion.trajectory.cubics import Peaks, State
 from rrtik_ompl.motion.trajectory.dynamics import DynamicLimits
 from rrtik_ompl.motion.trajectory.limits import RateLimits, limits_of
@@ -103,7 +103,7 @@ def time_parameterize(
     for each in arms:
         require_joints(each, path.joint_names, "path")
 
-    corners = _corners(path)
+    line = Polyline.of(_corners(path))
     reach = float(bounded_array(blend, (), "blend"))
     if reach < 0.0:
         raise InputError(f"blend must be 0 or greater, got {reach:g}")
@@ -118,8 +118,21 @@ def time_parameterize(
             arm, tip_speed=tip_speed, tip_acceleration=tip_acceleration, torque=torque, payload=payload
         )
 
-    rounded = _rounded(path, corners, bounds, reach, world, clearance, more) if reach > 0.0 else None
-    return joined(stops_at_corners(corners, bounds, more), path, bounds) if rounded is None else rounded
+    if reach > 0.0:
+        if world is None:
+            raise InputError(
+                "a path with rounded corners leaves the checked one: pass world=problem.world, to check it"
+            )
+        check_route_clearance(world, clearance, path)
+
+    stopping = stops_at_corners(line, bounds, more)
+    if world is not None and reach > 0.0 and len(line.vertices) > 2:
+        faults = fault_finder(path, world, clearance)
+        slowest = sum(run.duration for run in stopping)
+        rounded = blended(path, line, bounds, reach, slowest, faults, more)
+        if rounded is not None:
+            return rounded
+    return joined(stopping, path, bounds)
 
 
 def time_parameterize_many(
@@ -179,26 +192,6 @@ def time_parameterize_many(
             raise InputError(f"paths[{number}]: {error}") from None
 
     return in_threads(timed, range(len(listed_paths)), threads)
-
-
-def _rounded(
-    path: JointPath,
-    corners: Matrix,
-    limits: RateLimits,
-    blend: float,
-    world: World | None,
-    clearance: float | None,
-    more: DynamicLimits | None,
-) -> Trajectory | None:
-    """Return the motion along a path that rounds its corners; None if there are none, or stops are faster."""
-    if world is None:
-        raise InputError("a path with rounded corners leaves the checked one: pass world=problem.world, to check it")
-    check_route_clearance(world, clearance, path)
-    if len(corners) == 2:
-        return None
-    faults = fault_finder(path, world, clearance)
-    slowest = seconds_with_stops(corners, limits, more)
-    return blended(path, corners, limits, blend, slowest, faults, more)
 
 
 def _corners(path: JointPath) -> Matrix:

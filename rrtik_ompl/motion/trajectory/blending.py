@@ -7,15 +7,15 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.base.arrays import Mask, Matrix, Vector
+from rrtik_ompl.base.arrays import Mask, Vector
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.motion.trajectory.checks import bad_moments, proof_of_pieces
-from rrtik_ompl.motion.trajectory.corners import MERGED_SHARE, first_radii, spaced, vertices
+from rrtik_ompl.motion.trajectory.corners import MERGED_SHARE, Polyline, first_radii, spaced, vertices
 from rrtik_ompl.motion.trajectory.cubics import Cubics
 from rrtik_ompl.motion.trajectory.dynamics import DynamicLimits
 from rrtik_ompl.motion.trajectory.limits import RateLimits, slowing_of
 from rrtik_ompl.motion.trajectory.motion import Trajectory, motion_along
-from rrtik_ompl.motion.trajectory.runs import Run, runs, seconds_of_lines
+from rrtik_ompl.motion.trajectory.runs import Run, runs
 from rrtik_ompl.world.clearances import provable_clearances
 from rrtik_ompl.world.world import World
 
@@ -29,7 +29,7 @@ Faults = Callable[[Trajectory, Mask], NDArray[np.int64]]
 
 def blended(
     path: JointPath,
-    corners: Matrix,
+    line: Polyline,
     limits: RateLimits,
     blend: float,
     slowest: float,
@@ -43,7 +43,7 @@ def blended(
 
     Args:
         path: The path.
-        corners: Its vertices, shape (k, n).
+        line: The same, as its vertices and edges.
         limits: Limits of the joints.
         blend: Largest distance of a corner from the beginning of its rounding [rad or m].
         slowest: Duration that the motion must be below [s].
@@ -53,17 +53,18 @@ def blended(
     Returns:
         The motion; None if no such motion is faster than ``slowest``, or none is free.
     """
-    chosen = spaced(corners, MERGED_SHARE * blend)
-    merged = len(chosen) < len(corners)
-    rows = vertices(corners[chosen]) if merged else corners
-    if len(rows) < 2:  # The whole path is so short that its waypoints are merged.
-        return None
-    vertex_places = np.concatenate([np.zeros(1), np.cumsum(np.linalg.norm(np.diff(rows, axis=0), axis=1))])
-    radii = first_radii(rows, blend)
+    chosen = spaced(line.vertices, MERGED_SHARE * blend)
+    merged = len(chosen) < len(line.vertices)
+    if merged:
+        rows = vertices(line.vertices[chosen])
+        if len(rows) < 2:  # The whole path is so short that its waypoints are merged.
+            return None
+        line = Polyline.of(rows)
+    radii = first_radii(line, blend)
     max_deviation = (DEVIATION_SHARE - MERGED_SHARE) * blend
 
     for _ in range(MAX_ROUNDS):
-        parts = runs(rows, radii, limits, max_deviation=max_deviation, more=more)
+        parts = runs(line, radii, limits, max_deviation=max_deviation, more=more)
         motion = joined(parts, path, limits)
         if motion.duration >= slowest:
             return None
@@ -77,20 +78,13 @@ def blended(
 
         if len(bad_places) == 0:
             return motion
-        radii = _with_narrower_corners(radii, vertex_places[1:-1], bad_places, LEAST_RADIUS * blend)
+        radii = _with_narrower_corners(radii, line.along[1:-1], bad_places, LEAST_RADIUS * blend)
     return None
 
 
-def stops_at_corners(corners: Matrix, limits: RateLimits, more: DynamicLimits | None) -> list[Run]:
+def stops_at_corners(line: Polyline, limits: RateLimits, more: DynamicLimits | None) -> list[Run]:
     """Return the runs from each vertex to the next."""
-    return runs(corners, np.zeros(len(corners) - 2), limits, more=more)
-
-
-def seconds_with_stops(corners: Matrix, limits: RateLimits, more: DynamicLimits | None) -> float:
-    """Return how long the runs of :func:`stops_at_corners` take together [s]."""
-    if more is None:
-        return seconds_of_lines(corners, limits)
-    return sum(run.duration for run in stops_at_corners(corners, limits, more))
+    return runs(line, np.zeros(len(line.vertices) - 2), limits, more=more)
 
 
 def joined(parts: Sequence[Run], path: JointPath, limits: RateLimits) -> Trajectory:
@@ -98,17 +92,16 @@ def joined(parts: Sequence[Run], path: JointPath, limits: RateLimits) -> Traject
 
     It ends where ``path`` ends, and takes the path's joint names and units.
     """
-    durations, positions, velocities, accelerations = (
-        np.concatenate(rows) for rows in zip(*(run.pieces for run in parts), strict=True)
-    )
-    rest = np.zeros((1, positions.shape[1]))
+    pieces = [run.pieces for run in parts]
+    last = pieces[-1]
+    rest = np.zeros((1, path.waypoints.shape[1]))
     # Acceleration at the end of the last cubic, which comes to rest.
-    last = -2.0 * velocities[-1:] / durations[-1] - accelerations[-1:]
+    braking = -2.0 * last.velocities[-1:] / last.durations[-1] - last.accelerations[-1:]
     motion = Cubics(
-        np.concatenate([np.zeros(1), np.cumsum(durations)]),
-        np.concatenate([positions, path.waypoints[-1:]]),
-        np.concatenate([velocities, rest]),
-        np.concatenate([accelerations, last]),
+        np.concatenate([np.zeros(1), *(each.durations for each in pieces)]).cumsum(),
+        np.concatenate([*(each.positions for each in pieces), path.waypoints[-1:]]),
+        np.concatenate([*(each.velocities for each in pieces), rest]),
+        np.concatenate([*(each.accelerations for each in pieces), braking]),
     )
     return motion_along(path, _within(motion, limits))
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.model.proof import Gap, Proof
-from rrtik_ompl.model.robot import inside_limits
+from rrtik_ompl.model.robot import all_inside_limits
 from rrtik_ompl.motion.trajectory.cubics import State, even_parts
 from rrtik_ompl.world.route_check import VERIFICATION_DENSITY, not_proven
 from rrtik_ompl.world.world import World
@@ -48,8 +48,8 @@ class Curve(Protocol):
     def greatest_speeds(self) -> Matrix:
         """Return upper bounds of the joints' speeds on each piece, shape (m - 1, n) [rad/s or m/s]."""
 
-    def greatest_accelerations(self) -> Matrix:
-        """Return upper bounds of the joints' accelerations on each piece, shape (m - 1, n) [rad/s^2 or m/s^2]."""
+    def greatest_pushes(self, weights: Vector) -> Vector:
+        """Return upper bounds of a weighted sum of the joints' accelerations on each piece, shape (n,) -> (m - 1,)."""
 
 
 def faults_of(motion: Curve, world: World) -> list[tuple[float, str]]:
@@ -110,7 +110,7 @@ def proof_of_pieces(motion: Curve, world: World, clearance: float, pieces: NDArr
     """
     begins = motion.times[pieces]
     durations = motion.times[pieces + 1] - begins
-    pushes = motion.greatest_accelerations()[pieces] @ world.weights
+    pushes = motion.greatest_pushes(world.weights)[pieces]
     gaps: list[Gap] = []
     left = _not_proven_together(motion, world, clearance, pieces, pushes)
     if len(left) == 0:
@@ -151,25 +151,33 @@ def _not_proven_together(
         pushes: Largest acceleration of any point of the arm during each piece [m/s^2], shape (m,).
     """
     number = np.arange(len(pieces))
-    longest = float(np.diff(motion.times)[pieces].max(initial=0.0))
+    times = motion.times
+    longest = float((times[1:] - times[:-1])[pieces].max(initial=0.0))
     strongest = float(pushes.max(initial=0.0))
     together = int(min(MOST_TOGETHER, 2.0 * np.sqrt(SLACKS[0] / max(strongest, 1e-12)) / max(longest, 1e-12)))
-    # Only the ends of chords are compared with limits and constraints, so the knots between them are looked at here.
-    sound = motion.smooth and world.constraints is None and inside_limits(world.robot, motion.positions).all()
-    if together < 2 or not sound:
+    if together < 2 or not motion.smooth or world.constraints is not None:
         return number
 
-    stretch_begins = np.append(True, np.diff(pieces) > 1)
-    place = number - np.maximum.accumulate(np.where(stretch_begins, number, 0))
-    begins = place % together == 0
-    ends = np.append(begins[1:], True)
-    begin_times = motion.times[pieces[begins]]
-    clock = np.unique(np.concatenate([begin_times, motion.times[pieces[ends] + 1]]))
+    # Only the ends of chords are compared with limits and constraints, so the knots between them are looked at here.
+    knots = motion.positions
+    if not all_inside_limits(world.robot, knots):
+        return number
 
-    proof = world.prover.route(motion.states(clock).positions, clearance=clearance, slack=SLACKS[0])
+    begins_stretch = np.ones(len(pieces), dtype=bool)
+    begins_stretch[1:] = pieces[1:] - pieces[:-1] > 1
+    place = number - np.maximum.accumulate(np.where(begins_stretch, number, 0))
+    begins = place % together == 0
+    ends = np.ones(len(pieces), dtype=bool)
+    ends[:-1] = begins[1:]
+    is_end = np.zeros(len(times), dtype=bool)
+    is_end[pieces[begins]] = True
+    is_end[pieces[ends] + 1] = True
+
+    rows = np.flatnonzero(is_end)
+    proof = world.prover.route(knots[rows], clearance=clearance, slack=SLACKS[0])
     if proof.proven:
         return np.empty(0, dtype=np.int64)
-    is_open = np.isin(np.searchsorted(clock, begin_times), [gap.motion for gap in proof.unproven])
+    is_open = np.isin(rows.searchsorted(pieces[begins]), [gap.motion for gap in proof.unproven])
     return np.flatnonzero(is_open[np.cumsum(begins) - 1])
 
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.base.arrays import Matrix, Vector, finite_array
+from rrtik_ompl.base.arrays import BLOCK_ROWS, Matrix, Vector, allocated, finite_array
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.kernels.reference import timing as reference
 from rrtik_ompl.kernels.simd.library import library
@@ -108,9 +108,17 @@ class Cubics:
         speeds: Matrix = np.maximum(peak[1:], peak[:-1]) + h * np.abs(self.jerks * h) / 8.0
         return speeds
 
-    def greatest_accelerations(self) -> Matrix:
-        """Return the joints' largest accelerations on each piece, shape (m - 1, n) [rad/s^2 or m/s^2]."""
-        return np.maximum(np.abs(self.accelerations[:-1]), np.abs(self.last_accelerations))
+    def greatest_pushes(self, weights: Vector) -> Vector:
+        """Return a weighted sum of the joints' largest accelerations on each piece, shape (n,) -> (m - 1,)."""
+        kernels = library(KERNELS)
+        if kernels is None:
+            largest = np.maximum(np.abs(self.accelerations[:-1]), np.abs(self.last_accelerations))
+            return np.asarray(largest @ weights)
+        rows = [np.ascontiguousarray(each) for each in (self.times, self.velocities, self.accelerations, weights)]
+        pushes = np.empty(len(self.times) - 1)
+        addresses = [each.ctypes.data for each in rows]
+        kernels.find_pushes(*addresses, *self.velocities.shape, pushes.ctypes.data)
+        return pushes
 
     def states(self, clock: Vector) -> State:
         """Return positions, velocities and accelerations at times, shape (k, n) each.
@@ -120,6 +128,25 @@ class Cubics:
         Args:
             clock: Times [s], shape (k,).
         """
+        kernels = library(KERNELS)
+        if kernels is None:
+            return self._states(clock)
+        rows = [
+            np.ascontiguousarray(each) for each in (self.times, self.positions, self.velocities, self.accelerations)
+        ]
+        moments = np.ascontiguousarray(clock)
+        knots, n = self.positions.shape
+        found = allocated((3, len(moments), n))
+        motion = [each.ctypes.data for each in rows]
+        for first in range(0, len(moments), BLOCK_ROWS):
+            part = slice(first, first + BLOCK_ROWS)
+            block = moments[part]
+            sinks = [each[part].ctypes.data for each in found]
+            kernels.sample_cubics(*motion, knots, n, block.ctypes.data, len(block), *sinks)
+        return State(*found)
+
+    def _states(self, clock: Vector) -> State:
+        """As states, without kernels."""
         inside = np.minimum(np.maximum(clock, 0.0), self.duration)
         piece = np.minimum(self.times.searchsorted(inside, side="right") - 1, len(self.times) - 2)
         x = (inside - self.times[piece])[:, None]
@@ -153,14 +180,14 @@ class Cubics:
         A velocity can peak at a knot or where the acceleration changes sign within a piece; an acceleration peaks at an
         end of a piece. If the acceleration of a joint jumps anywhere, its jerk is inf.
         """
-        times, velocities, accelerations = map(np.ascontiguousarray, (self.times, self.velocities, self.accelerations))
+        rows = [np.ascontiguousarray(each) for each in (self.times, self.velocities, self.accelerations)]
         kernels = library(KERNELS)
         if kernels is None:
-            return Peaks(*reference.peaks(times, velocities, accelerations))
-        found = np.empty((3, velocities.shape[1]))
-        addresses = (each.ctypes.data for each in (times, velocities, accelerations))
-        kernels.find_peaks(*addresses, *velocities.shape, found.ctypes.data)
-        return Peaks(*found)
+            return Peaks(*reference.peaks(*rows))
+        found = np.empty((4, self.velocities.shape[1]))
+        addresses = [each.ctypes.data for each in rows]
+        kernels.find_peaks(*addresses, *self.velocities.shape, found.ctypes.data)
+        return Peaks(*found[:3])
 
     def set_point_peaks(self) -> Peaks:
         """Return the peaks at knots that are set points; as in a drive, jerks are differences of acceleration."""

@@ -20,12 +20,9 @@ from rrtik_ompl.kernels.reference import timing as reference
 from rrtik_ompl.kernels.simd.library import library
 from rrtik_ompl.kernels.tables.memory import PlannedTable, TablePlan, sizes_of
 from rrtik_ompl.kernels.timing.layout import KERNELS, CurveTable
+from rrtik_ompl.kernels.timing.run_layout import LEAST_STEPS, SAME_PLACE, STEPS_PER_LINE, STEPS_PER_RADIUS
+from rrtik_ompl.motion.trajectory.corners import Polyline
 from rrtik_ompl.motion.trajectory.cubics import even_parts
-
-LEAST_STEPS = 150  # fewest steps of the grid along a whole curve
-STEPS_PER_RADIUS = 12  # steps of the grid per radius of a rounded corner
-STEPS_PER_LINE = 8  # steps of the grid along a line between two rounded corners
-SAME_PLACE = 1e-9  # share of a curve's length within which two points of a grid are merged
 
 
 class Samples(NamedTuple):
@@ -59,29 +56,38 @@ class Curve:
     """A run through rounded corners, from rest to rest. A place on it is a distance along the path [rad or m].
 
     Attributes:
-        vertices: Vertices of the path, shape (k, n).
-        along: Place of each vertex, shape (k,), from 0.
-        directions: Unit vectors along the edges, shape (k - 1, n).
+        line: The path.
         radii: Radii of the corners, shape (k,); 0 at both ends.
     """
 
-    vertices: Matrix
-    along: Vector
-    directions: Matrix
+    line: Polyline
     radii: Vector
 
     @classmethod
-    def of(cls, vertices: Matrix, radii: Vector) -> Curve:
-        """Make the curve through vertices, shape (k, n), whose inner ones are rounded with radii, shape (k - 2,).
+    def of(cls, line: Polyline, radii: Vector) -> Curve:
+        """Make the curve along a path whose inner vertices are rounded with radii, shape (k - 2,).
 
         No radius exceeds the distance to an end of the path.
         """
-        edges = vertices[1:] - vertices[:-1]
-        lengths = np.linalg.norm(edges, axis=1)
-        along = np.concatenate([np.zeros(1), np.cumsum(lengths)])
+        along = line.along
         widths = np.zeros(len(along))
         widths[1:-1] = np.minimum(radii, np.minimum(along[1:-1], along[-1] - along[1:-1]))
-        return cls(vertices, along, edges / lengths[:, None], widths)
+        return cls(line, widths)
+
+    @property
+    def vertices(self) -> Matrix:
+        """Return the vertices of the path, shape (k, n)."""
+        return self.line.vertices
+
+    @property
+    def along(self) -> Vector:
+        """Return the place of each vertex, shape (k,), from 0."""
+        return self.line.along
+
+    @property
+    def directions(self) -> Matrix:
+        """Return unit vectors along the edges, shape (k - 1, n)."""
+        return self.line.directions
 
     @property
     def length(self) -> float:
@@ -95,21 +101,22 @@ class Curve:
         if kernels is None:
             values = reference.sample_curve(self.vertices, self.along, self.directions, self.radii, places)
         else:
-            task = self.table(len(places))
+            task = curve_table(len(self.along), n, len(places))
+            self.put_into(task)
             task.at[:] = places
             kernels.sample_curve(task.address)
             values = task.values.reshape(-1, 3 * n)
         return Samples(values)
 
-    def table(self, places: int) -> CurveTable:
-        """Return a table of the curve for kernels, with memory for so many places."""
-        task = CurveTable(PlannedTable(_plan(len(self.along), self.vertices.shape[1], places)))
-        task.vertices[:] = self.vertices.ravel()
-        task.along[:] = self.along
-        task.directions[:] = self.directions.ravel()
-        task.radii[:] = self.radii
-        task.widest = float(self.radii.max())
-        return task
+    def put_into(self, table: CurveTable) -> None:
+        """Write the curve into a table for kernels that has room for its vertices, or more."""
+        count, n = self.vertices.shape
+        table.vertices[: count * n] = self.vertices.ravel()
+        table.along[:count] = self.along
+        table.directions[: (count - 1) * n] = self.directions.ravel()
+        table.radii[:count] = self.radii
+        table.widest = float(self.radii.max())
+        table.vertex_count = count
 
     def edges(self, places: Vector) -> NDArray[np.int64]:
         """Return the indices of the edges on which places lie, shape (m,)."""
@@ -121,6 +128,10 @@ class Curve:
         from_vertex: Vector = (places - self.along[edge])[:, None]
         return self.vertices[edge] + from_vertex * self.directions[edge]
 
+    def classes(self) -> Vector:
+        """Return the radii rounded down to steps of a quarter of an octave, of which there are few, shape (k,)."""
+        return np.exp2(0.25 * np.floor(4.0 * np.log2(np.maximum(self.radii, 1e-300))))
+
     def tightest(self, places: Vector) -> Vector:
         """Return for each place the smallest radius of the roundings in which it lies, shape (m,); inf if in none.
 
@@ -128,13 +139,11 @@ class Curve:
         """
         corner_places = self.along[1:-1]
         radii = self.radii[1:-1]
-        # Radii are rounded to steps of a quarter of an octave, so that there are few different ones.
-        steps = np.floor(4.0 * np.log2(np.maximum(radii, 1e-300)))
+        classes = self.classes()[1:-1]
         tightest = np.full(len(places), np.inf)
 
-        for step in np.unique(steps)[::-1]:
-            in_step = steps == step
-            radius = np.exp2(0.25 * step)
+        for radius in np.unique(classes)[::-1]:
+            in_step = classes == radius
             starts = np.sort(corner_places[in_step] - radii[in_step])
             ends = np.sort(corner_places[in_step] + radii[in_step])
             tightest[np.searchsorted(starts, places) > np.searchsorted(ends, places)] = radius
@@ -167,6 +176,11 @@ class Curve:
         pieces, shares = even_parts(counts)
         places = np.append(knots[pieces] + shares * widths[pieces], self.length)
         return places, np.append(tightest[pieces], np.inf)
+
+
+def curve_table(vertices: int, n: int, places: int) -> CurveTable:
+    """Return a table for kernels with room for so many vertices of n coordinates, and for places on the curve."""
+    return CurveTable(PlannedTable(_plan(vertices, n, places)))
 
 
 @lru_cache(maxsize=64)

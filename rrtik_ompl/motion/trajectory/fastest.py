@@ -112,7 +112,10 @@ def fastest(grid: Vector, samples: Samples, limits: RateLimits, bounds: Bounds) 
         rows, cap = reference.all_rows(samples.values, limits.velocity, limits.acceleration, bounds.rows, bounds.cap)
         squares = reference.find_squares(rows, cap, grid)
     else:
-        task = search_table(grid, limits, bounds.rows.first.shape[1])
+        task = search_table(len(grid), len(limits.velocity), bounds.rows.first.shape[1])
+        task.velocity[:] = limits.velocity
+        task.acceleration[:] = limits.acceleration
+        task.grid[:] = grid
         task.shape[:] = samples.values.ravel()
         task.cap[:] = bounds.cap
         task.first[:] = bounds.rows.first.ravel()
@@ -128,19 +131,9 @@ def fastest(grid: Vector, samples: Samples, limits: RateLimits, bounds: Bounds) 
     return PathTiming(grid, squares, np.concatenate([np.zeros(1), np.cumsum(steps)]))
 
 
-def search_table(grid: Vector, limits: RateLimits, rows: int = 0) -> SearchTable:
-    """Return a table of the search at places of a curve, shape (m,), for kernels; its shape and bounds are not set.
-
-    Args:
-        grid: The places.
-        limits: Velocity and acceleration limits of the joints.
-        rows: Number of further constraints at each place.
-    """
-    task = SearchTable(PlannedTable(_plan(len(grid), len(limits.velocity), rows)))
-    task.velocity[:] = limits.velocity
-    task.acceleration[:] = limits.acceleration
-    task.grid[:] = grid
-    return task
+def search_table(points: int, joints: int, rows: int = 0) -> SearchTable:
+    """Return a table for kernels: the search at so many points of a grid, with further constraints at each."""
+    return SearchTable(PlannedTable(_plan(points, joints, rows)))
 
 
 @lru_cache(maxsize=64)

@@ -473,8 +473,8 @@ class Trajectory:
         return read(Trajectory, file, robot, gripper=gripper)
 
 
-def motion_along(path: JointPath, motion: Cubics) -> Trajectory:
-    """Return a motion that is known to be sound as one of a path's joints, without validation."""
+def motion_along(path: JointPath | Trajectory, motion: Cubics, gripper: Iterable[GripperEvent] = ()) -> Trajectory:
+    """Return a motion that is known to be sound as one of a path's joints, without validation but of the commands."""
     fields = {
         "times": frozen(motion.times),
         "positions": frozen(motion.positions),
@@ -484,6 +484,6 @@ def motion_along(path: JointPath, motion: Cubics) -> Trajectory:
         "prismatic": path.prismatic,
         "robot_name": path.robot_name,
         "set_points": None,
-        "gripper": (),
+        "gripper": checked_events(gripper, motion.duration),
     }
     return restored(Trajectory, fields)

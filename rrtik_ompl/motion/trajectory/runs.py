@@ -11,12 +11,25 @@ import numpy as np
 
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector
 from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.kernels.reference import timing as reference
 from rrtik_ompl.kernels.simd.library import library
 from rrtik_ompl.kernels.tables.memory import PlannedTable, TablePlan, sizes_of
-from rrtik_ompl.kernels.timing.run_layout import CONTROLS, KERNELS, MOST_PIECES, SPEEDS, RunTable
-from rrtik_ompl.motion.trajectory.corners import COINCIDENCE
+from rrtik_ompl.kernels.timing.run_layout import (
+    CONTROLS,
+    KERNELS,
+    KNOTS,
+    LEAST_STEPS,
+    MIN_PHASE_SECONDS,
+    MOST_PIECES,
+    PHASES,
+    SPEEDS,
+    STEPS_PER_RADIUS,
+    LinesTable,
+    RunTable,
+)
+from rrtik_ompl.motion.trajectory.corners import COINCIDENCE, Polyline
 from rrtik_ompl.motion.trajectory.cubics import Pieces
-from rrtik_ompl.motion.trajectory.curve import Curve, Samples
+from rrtik_ompl.motion.trajectory.curve import Curve, Samples, curve_table
 from rrtik_ompl.motion.trajectory.dynamics import DynamicLimits
 from rrtik_ompl.motion.trajectory.fastest import Bounds, fastest, search_table
 from rrtik_ompl.motion.trajectory.limits import ROUNDING_MARGIN, RateLimits
@@ -29,10 +42,6 @@ SHORT_WINDOW = 0.02  # [s] A smoothing window as short as this costs hardly any 
 MAX_SLOWINGS = 3  # most times a spline is slowed for limits of tip or torques; apart from rounding two would do
 # Share of a corner's radius by which smoothing over time may leave the rounded corner.
 SMOOTHED_SHARE = 0.12
-
-MIN_PHASE_SECONDS = 1e-9  # [s] Shorter phases are left out.
-# Acceleration at the beginning of each of the seven phases, as a share of the largest one.
-PUSHES = np.array([0.0, 1.0, 1.0, 0.0, 0.0, -1.0, -1.0])
 
 
 class Attempt(NamedTuple):
@@ -74,7 +83,7 @@ class Run:
 
 
 def runs(
-    corners: Matrix,
+    line: Polyline,
     radii: Vector,
     limits: RateLimits,
     *,
@@ -84,34 +93,29 @@ def runs(
     """Time the runs of a path from stop to stop, each as fast as the limits allow.
 
     Args:
-        corners: The vertices of the path, shape (k, n).
+        line: The path.
         radii: Distance from each inner vertex at which its rounding begins, shape (k - 2,) [rad or m]; 0 for a stop.
         limits: Limits of the n joints.
         max_deviation: Largest distance of the motion from the path [rad or m]; kept if one of the attempts keeps it.
         more: Limits of the tip or of torques; None if there are none.
 
     Returns:
-        One run for each section of the path between two stops, in order.
+        The runs in order: one for each section of the path between two stops, or for several straight ones.
     """
-    stops = [0, *(np.flatnonzero(radii == 0.0) + 1).tolist(), len(corners) - 1]
-    vertex_places = np.concatenate([np.zeros(1), np.cumsum(np.linalg.norm(np.diff(corners, axis=0), axis=1))])
-    lines = along_lines(corners, limits) if more is None and (len(stops) > 2 or len(corners) == 2) else []
+    if more is None and not radii.any():
+        return [along_lines(line, limits)]
 
+    stops = [0, *(np.flatnonzero(radii == 0.0) + 1).tolist(), len(line.vertices) - 1]
     motions = []
     for first, last in pairwise(stops):
+        part = line if last - first == len(line.lengths) else line.part(first, last)
+        begin = float(line.along[first])
         if last == first + 1 and more is None:
-            motions.append(_straight(lines[first], corners[first], vertex_places[first]))
+            motions.append(along_lines(part, limits, begin=begin))
         else:
-            curve = Curve.of(corners[first : last + 1], radii[first : last - 1])
-            motions.append(
-                along_curve(curve, limits, max_deviation=max_deviation, more=more, begin=vertex_places[first])
-            )
+            curve = Curve.of(part, radii[first : last - 1])
+            motions.append(along_curve(curve, limits, max_deviation=max_deviation, more=more, begin=begin))
     return motions
-
-
-def _straight(pieces: Pieces, start: Vector, begin: float) -> Run:
-    travelled = np.linalg.norm(pieces.positions - start, axis=1)
-    return Run(pieces, begin + travelled, np.zeros(len(travelled)), np.ones(len(travelled), dtype=bool))
 
 
 def along_curve(
@@ -138,12 +142,11 @@ def along_curve(
     Raises:
         InputError: If the limits are too extreme for floating-point numbers.
     """
-    grid, tightest = curve.grid()
-    timed = None if more is not None else _timed(curve, grid, SMOOTHED_SHARE * tightest, limits, max_deviation)
+    timed = None if more is not None else _timed(curve, limits, max_deviation, begin)
     if timed is not None:
-        pieces, places, deviations, on_path = timed
-        return Run(pieces, begin + places, deviations, on_path)
+        return timed
 
+    grid, tightest = curve.grid()
     samples = curve.at(grid)
     extra = None if more is None else more.bounds(samples)
     bends = _lengths(samples.bends)
@@ -154,64 +157,75 @@ def along_curve(
     return min(motions, key=lambda run: (run.deviations.max() > max_deviation, run.duration))
 
 
-def _timed(
-    curve: Curve, grid: Vector, most: Vector, limits: RateLimits, max_deviation: float
-) -> tuple[Pieces, Vector, Vector, Mask] | None:
-    """Return pieces, places, deviations and mask of a run by a kernel; None without kernels or if there is no motion.
-
-    Args:
-        curve: The curve.
-        grid: Places on it, shape (m,).
-        most: Largest deviation that smoothing may add at each, shape (m,) [rad or m].
-        limits: Limits of the joints.
-        max_deviation: Largest distance of the motion from the path [rad or m].
-    """
+def _timed(curve: Curve, limits: RateLimits, max_deviation: float, begin: float) -> Run | None:
+    """Return a run by a kernel; None without kernels or if there is no motion. Arguments as of :func:`along_curve`."""
     kernels = library(KERNELS)
     if kernels is None:
         return None
-    n = curve.vertices.shape[1]
-    attempts = _attempts(limits)
-    spare = _spare_runs(_room(len(grid)), n, len(attempts))
-    try:
-        run = spare.pop()
-    except IndexError:  # none was made yet, or all are in use
-        run = RunTable(PlannedTable(_plan(_room(len(grid)), n, len(attempts))))
-    run.put(curve=curve.table(max(len(grid), MOST_PIECES + 1)), search=search_table(grid, limits))
-    run.most[: len(grid)] = most
-    run.jerk[:] = limits.jerk
-    run.window = widest_window(limits)
-    run.max_deviation = max_deviation
-    run.shares[:] = [each.window for each in attempts]
-    run.cruises.view(np.int32)[: len(attempts)] = [each.cruises for each in attempts]
-    run.widths[:] = WIDTHS[::-1]
-    count = kernels.time_run(run.address)
+    vertices, n = curve.vertices.shape
+    points = LEAST_STEPS + STEPS_PER_RADIUS * vertices
+    count = -points
+    found = None
+    while count < 0:  # the grid takes so many points
+        spare = _spare_runs(_room(vertices), _room(-count), n, _attempts(limits))
+        try:
+            run = spare.pop()
+        except IndexError:  # none was made yet, or all are in use
+            run = _run_table(_room(vertices), _room(-count), n, _attempts(limits))
+        curve.put_into(run.curve)
+        run.classes[:vertices] = curve.classes()
+        run.search.velocity[:] = limits.velocity
+        run.search.acceleration[:] = limits.acceleration
+        run.jerk[:] = limits.jerk
+        run.window = widest_window(limits)
+        run.max_deviation = max_deviation
+        count = kernels.time_run(run.address)
+        found = _found(run, count, n, begin) if count > 0 else None
+        spare.append(run)
+    return found
 
+
+def _found(run: RunTable, count: int, n: int, begin: float) -> Run:
+    """Return a copy of the run that a kernel has found; it has so many pieces."""
     rows = (run.positions, run.velocities, run.accelerations)
     positions, velocities, accelerations = (row[: count * n].reshape(count, n).copy() for row in rows)
-    on_path = run.on_path.view(np.int32)[:count] != 0
     pieces = Pieces(np.full(count, run.found_step), positions, velocities, accelerations)
-    found = pieces, run.begins[:count].copy(), run.gaps[:count].copy(), on_path
-    spare.append(run)
-    return found if count else None
+    return Run(pieces, begin + run.begins[:count], run.gaps[:count].copy(), run.on_path.view(np.int32)[:count] != 0)
 
 
-def _room(points: int) -> int:
-    """Return for how many points of a grid there is memory: a power of two, so that few sizes are kept."""
-    return 1 << (points - 1).bit_length()
+def _room(count: int) -> int:
+    """Return for how many vertices or points of a grid there is memory: a power of two, so that few sizes are kept."""
+    return 1 << (count - 1).bit_length()
 
 
 @lru_cache(maxsize=16)
-def _spare_runs(room: int, n: int, attempts: int) -> list[RunTable]:
+def _spare_runs(vertices: int, points: int, n: int, attempts: tuple[Attempt, ...]) -> list[RunTable]:
     """Return the list of tables of this size that are not in use, so that two threads never share one."""
-    del room, n, attempts
+    del vertices, points, n, attempts
     return []
 
 
+def _run_table(vertices: int, points: int, n: int, attempts: tuple[Attempt, ...]) -> RunTable:
+    """Return a table with room for so many vertices of n coordinates and points of the grid."""
+    run = RunTable(PlannedTable(_plan(vertices, points, n, len(attempts))))
+    run.put(
+        curve=curve_table(vertices, n, max(points, MOST_PIECES + 1)),
+        search=search_table(points, n),
+    )
+    run.shares[:] = [each.window for each in attempts]
+    run.cruises.view(np.int32)[: len(attempts)] = [each.cruises for each in attempts]
+    run.widths[:] = WIDTHS[::-1]
+    return run
+
+
 @lru_cache(maxsize=64)
-def _plan(points: int, n: int, attempts: int) -> TablePlan:
+def _plan(vertices: int, points: int, n: int, attempts: int) -> TablePlan:
     """Return the memory layout of a run with n coordinates on a grid of so many points; cached."""
     return sizes_of(
         RunTable,
+        room=points,
+        classes=vertices,
+        share=SMOOTHED_SHARE,
         most=points,
         jerk=n,
         shares=attempts,
@@ -223,6 +237,8 @@ def _plan(points: int, n: int, attempts: int) -> TablePlan:
         begins=CONTROLS,
         gaps=CONTROLS,
         on_path=CONTROLS,
+        knots=KNOTS * vertices,
+        tightest=KNOTS * vertices,
         times=points,
         rows=(n + 1) * CONTROLS,
         sums=(n + 1) * CONTROLS,
@@ -331,102 +347,84 @@ def _lengths(rows: Matrix) -> Vector:
     return lengths
 
 
-def along_lines(corners: Matrix, limits: RateLimits) -> list[Pieces]:
-    """Compute the fastest straight motions from rest at each row of corners to rest at the next one.
+def along_lines(line: Polyline, limits: RateLimits, *, begin: float = 0.0) -> Run:
+    """Compute the fastest straight motions from rest at each vertex to rest at the next one.
 
     Each motion has at most seven phases of constant jerk, in closed form [21, for rest at both ends]. All joints follow
     the same profile, so that the motion stays on the line; for a single moving joint it is the joint's fastest motion.
     Without a jerk limit the profile is the trapezoid of velocity, which is the fastest one on a line.
 
     Args:
-        corners: The vertices of the path, shape (k, n).
+        line: The path.
         limits: Limits of the n joints.
+        begin: Distance of its beginning from that of the whole path [rad or m].
 
     Returns:
-        The pieces of each of the k - 1 motions; phases without duration are left out.
+        All motions, one behind the other; phases without duration are left out.
 
     Raises:
         InputError: If the limits are too small or too large for floating-point numbers.
     """
-    directions, rates, phases, pushes = _profiles(corners, limits)
-    jerks = np.diff(np.concatenate([pushes, np.zeros_like(pushes[:, :1])], axis=1), axis=1)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        jerks = np.where((phases > MIN_PHASE_SECONDS) & np.isfinite(rates[2])[:, None], jerks / phases, 0.0)
+    kernels = library(KERNELS)
+    if kernels is None:
+        v, a, j = limits.along(line.directions)
+        phases, pushes = reference.phases_of_lines(line.lengths, v, a, j)
+        durations = phases.sum(axis=1)
+        usual = np.isfinite(durations) & (durations > 2.0 * MIN_PHASE_SECONDS)
+        if not usual.all():
+            raise _impossible(line, limits, int(np.argmin(usual)))
+        found = reference.time_lines(line.vertices, line.directions, line.along, phases, pushes, np.isfinite(j))
+        seconds, positions, velocities, accelerations, places = found
+    else:
+        edges, n = line.directions.shape
+        table = LinesTable(PlannedTable(_lines_plan(_room(edges), n)))
+        table.edges = edges
+        table.vertices[: (edges + 1) * n] = line.vertices.ravel()
+        table.lengths[:edges] = line.lengths
+        table.directions[: edges * n] = line.directions.ravel()
+        table.along[: edges + 1] = line.along
+        table.velocity[:] = limits.velocity
+        table.acceleration[:] = limits.acceleration
+        table.jerk[:] = limits.jerk
+        count = kernels.time_lines(table.address)
+        if count < 0:
+            raise _impossible(line, limits, -count - 1)
+        rows = (table.positions, table.velocities, table.accelerations)
+        positions, velocities, accelerations = (row[: count * n].reshape(count, n) for row in rows)
+        seconds = table.durations[:count]
+        places = table.begins[:count]
 
-    speeds = np.zeros_like(phases)
-    travelled = np.zeros_like(phases)
-    for k in range(6):
-        h = phases[:, k]
-        v = speeds[:, k]
-        a = pushes[:, k]
-        j = jerks[:, k]
-        speeds[:, k + 1] = v + h * (a + 0.5 * h * j)
-        travelled[:, k + 1] = travelled[:, k] + h * (v + h * (0.5 * a + h * j / 6.0))
-
-    is_used = phases > MIN_PHASE_SECONDS
-    return [
-        Pieces(h[phase_used], a + np.outer(s[phase_used], d), np.outer(v[phase_used], d), np.outer(p[phase_used], d))
-        for h, phase_used, a, d, s, v, p in zip(
-            phases, is_used, corners[:-1], directions, travelled, speeds, pushes, strict=True
-        )
-    ]
-
-
-def seconds_of_lines(corners: Matrix, limits: RateLimits) -> float:
-    """Return how long the motions of :func:`along_lines` take together [s]."""
-    phases = _profiles(corners, limits)[2]
-    return float(phases[phases > MIN_PHASE_SECONDS].sum())
-
-
-def _profiles(corners: Matrix, limits: RateLimits) -> tuple[Matrix, tuple[Vector, Vector, Vector], Matrix, Matrix]:
-    """Return directions of lines, limits along them, and durations and accelerations of the phases on each."""
-    edges = corners[1:] - corners[:-1]
-    lengths = np.linalg.norm(edges, axis=1)
-    directions = edges / lengths[:, None]
-    rates = limits.along(directions)
-    phases, pushes = _phases(lengths, *rates)
-    _check(phases, lengths, rates)
-    return directions, rates, phases, pushes
+    pieces = Pieces(seconds, positions, velocities, accelerations)
+    return Run(pieces, begin + places, np.zeros(len(places)), np.ones(len(places), dtype=bool))
 
 
-def _phases(length: Vector, v: Vector, a: Vector, j: Vector) -> tuple[Matrix, Matrix]:
-    """Compute the seven phases of the fastest motions over lengths, from rest to rest.
-
-    Args:
-        length: Lengths of m lines [rad or m], shape (m,).
-        v: Velocity limits along the lines, shape (m,).
-        a: Acceleration limits along the lines, shape (m,).
-        j: Jerk limits along the lines, inf for none, shape (m,).
-
-    Returns:
-        Durations of the phases [s] and accelerations at their beginnings, shape (m, 7) each.
-    """
-    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-        onset = a / j  # time until the acceleration reaches its limit
-        ramp = np.where(v >= a * onset, v / a + onset, 2.0 * np.sqrt(v / j))  # time until the speed reaches its limit
-        cruise = length / v - ramp
-        limit = a * onset
-        peak = 0.5 * (np.sqrt(limit**2 + 4.0 * a * length) - limit)  # speed if there is no cruise
-        gentle = np.cbrt(length / (2.0 * j))  # onset if neither limit is reached
-        short = length < 2.0 * limit * onset
-        fast = cruise < 0.0
-        ramp = np.where(fast, np.where(short, 2.0 * gentle, peak / a + onset), ramp)
-        onset = np.minimum(onset, 0.5 * ramp)
-
-    hold = ramp - 2.0 * onset
-    cruise = np.maximum(cruise, 0.0)
-    push = np.where(np.isinf(j), a, np.where(np.isinf(j), 0.0, j) * onset)
-    phases = np.stack([onset, hold, onset, cruise, onset, hold, onset], axis=1)
-    return phases, push[:, None] * PUSHES
+@lru_cache(maxsize=64)
+def _lines_plan(edges: int, n: int) -> TablePlan:
+    """Return the memory layout of straight motions along up to so many edges in n coordinates; cached."""
+    return sizes_of(
+        LinesTable,
+        vertices=(edges + 1) * n,
+        lengths=edges,
+        directions=edges * n,
+        along=edges + 1,
+        velocity=n,
+        acceleration=n,
+        jerk=n,
+        durations=PHASES * edges,
+        positions=PHASES * edges * n,
+        velocities=PHASES * edges * n,
+        accelerations=PHASES * edges * n,
+        begins=PHASES * edges,
+        phases=PHASES,
+        pushes=PHASES,
+        dof=n,
+    )
 
 
-def _check(phases: Matrix, lengths: Vector, rates: tuple[Vector, Vector, Vector]) -> None:
-    durations = phases.sum(axis=1)
-    usual = np.isfinite(durations) & (durations > 2.0 * MIN_PHASE_SECONDS)
-    if not usual.all():
-        k = int(np.argmin(usual))
-        v, a, j = (float(rate[k]) for rate in rates)
-        raise InputError(
-            f"no motion of {lengths[k]:.3g} rad or m within velocity {v:.3g}, acceleration {a:.3g} and jerk {j:.3g} "
-            "could be calculated; choose limits of an ordinary size"
-        )
+def _impossible(line: Polyline, limits: RateLimits, edge: int) -> InputError:
+    """Return the error of an edge along which no motion can be calculated."""
+    v, a, j = (float(rate[0]) for rate in limits.along(line.directions[edge : edge + 1]))
+    return InputError(
+        f"no motion of {line.lengths[edge]:.3g} rad or m within velocity {v:.3g}, acceleration {a:.3g} and jerk "
+        f"{j:.3g} could be calculated; choose limits of an ordinary size"
+    )

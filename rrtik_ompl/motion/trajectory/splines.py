@@ -149,6 +149,10 @@ class Splines:
         """Return upper bounds of the joints' accelerations on each piece, shape (m - 1, n) [rad/s^2 or m/s^2]."""
         return _bounds(_slopes(_slopes(self.powers))) / np.diff(self.times)[:, None] ** 2
 
+    def greatest_pushes(self, weights: Vector) -> Vector:
+        """Return upper bounds of a weighted sum of the joints' accelerations on each piece, shape (n,) -> (m - 1,)."""
+        return np.asarray(self.greatest_accelerations() @ weights)
+
     def peaks(self) -> Peaks:
         """Return the largest velocity, acceleration and jerk of each joint.
 

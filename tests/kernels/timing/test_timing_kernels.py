@@ -5,17 +5,20 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from rrtik_ompl.base.arrays import BLOCK_ROWS
+from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.kernels.reference import timing as reference
 from rrtik_ompl.kernels.reference.timing import Rows
 from rrtik_ompl.kernels.simd.library import library
 from rrtik_ompl.kernels.tables.memory import packed
 from rrtik_ompl.kernels.timing.layout import KERNELS, LINE, CurveTable, SearchTable, line_count
 from rrtik_ompl.kernels.timing.run_layout import MOST_PIECES, RunTable
-from rrtik_ompl.motion.trajectory import runs
+from rrtik_ompl.motion.trajectory import cubics, runs
+from rrtik_ompl.motion.trajectory.corners import Polyline
 from rrtik_ompl.motion.trajectory.cubics import Cubics
 from rrtik_ompl.motion.trajectory.curve import Curve
 from rrtik_ompl.motion.trajectory.limits import RateLimits
-from rrtik_ompl.motion.trajectory.runs import along_curve
+from rrtik_ompl.motion.trajectory.runs import along_curve, along_lines
 
 pytestmark = pytest.mark.kernels
 seeds = st.integers(0, 2**32 - 1)
@@ -94,7 +97,7 @@ def test_the_fastest_motion(seed, n, extra):
 def test_a_run_is_timed_as_step_by_step(seed, n, count, jerk):
     rng = np.random.default_rng(seed)
     vertices = np.cumsum(rng.normal(size=(count, n)), axis=0)
-    curve = Curve.of(vertices, rng.uniform(0.05, 0.3, count - 2))
+    curve = Curve.of(Polyline.of(vertices), rng.uniform(0.05, 0.3, count - 2))
     limits = RateLimits(*rng.uniform(0.5, 4.0, (2, n)), jerk)
     nearest = rng.uniform(0.001, 0.05)
     found = along_curve(curve, limits, max_deviation=nearest, begin=0.5)
@@ -109,6 +112,82 @@ def test_a_run_is_timed_as_step_by_step(seed, n, count, jerk):
     assert (found.on_path != wanted.on_path).mean() < 0.05
 
 
+@settings(max_examples=25)
+@given(seeds, st.integers(1, 7), st.integers(3, 40), st.floats(0.02, 3.0))
+def test_the_grid_is_that_of_numpy(seed, n, count, radius):
+    rng = np.random.default_rng(seed)
+    line = Polyline.of(np.cumsum(rng.normal(size=(count, n)), axis=0))
+    curve = Curve.of(line, radius * rng.uniform(0.05, 1.0, count - 2))
+    made = []
+
+    class Watched(RunTable):
+        def __init__(self, memory):
+            super().__init__(memory)
+            made.append(self)
+
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(runs, "RunTable", Watched)
+        runs._spare_runs.cache_clear()
+        runs.along_curve(curve, RateLimits(1.0, 2.0, 20.0))
+    runs._spare_runs.cache_clear()
+    run = made[-1]
+    grid, tightest = curve.grid()
+    points = run.search.points
+    assert run.search.grid[:points].tolist() == grid.tolist()
+    bends = np.linalg.norm(curve.at(grid).bends, axis=1)
+    np.testing.assert_allclose(run.most[:points], runs.SMOOTHED_SHARE * tightest / np.maximum(bends, 1e-300), rtol=1e-9)
+    assert all(each.intact() and each.curve.intact() and each.search.intact() for each in made)
+
+
+@settings(max_examples=30)
+@given(seeds, st.integers(1, 9), st.integers(2, 30), st.sampled_from([0.3, 20.0, 1e4, np.inf]))
+def test_straight_motions_are_those_of_numpy(seed, n, count, jerk):
+    rng = np.random.default_rng(seed)
+    rows = np.cumsum(rng.normal(size=(count, n)) * 10.0 ** rng.uniform(-3, 0, (count, 1)), axis=0)
+    line = Polyline.of(rows)
+    limits = RateLimits(*rng.uniform(0.5, 4.0, (2, n)), jerk * rng.uniform(0.5, 1.0, n))
+    found = along_lines(line, limits, begin=0.5)
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(runs, "library", lambda _: None)
+        wanted = along_lines(line, limits, begin=0.5)
+    assert len(found.places) == len(wanted.places)
+    for one, other in zip((*found.pieces, found.places), (*wanted.pieces, wanted.places), strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-12, atol=1e-14)
+
+
+def test_a_straight_motion_that_is_impossible_is_named_alike_without_kernels(monkeypatch):
+    line = Polyline.of(np.array([[0.0], [1.0], [3.0]]))
+    limits = RateLimits(1e308, 1e308)
+    said = []
+    for kernels in (runs.library, lambda _: None):
+        monkeypatch.setattr(runs, "library", kernels)
+        with pytest.raises(InputError, match="no motion of 1 rad or m within velocity 1e") as error:
+            along_lines(line, limits)
+        said.append(str(error.value))
+    assert said[0] == said[1]
+
+
+@settings(max_examples=30)
+@given(seeds, st.integers(1, 8), st.integers(2, 30))
+def test_states_and_pushes_of_cubics_are_those_of_numpy(seed, n, knots):
+    rng = np.random.default_rng(seed)
+    times = np.concatenate([[0.0], np.cumsum(rng.uniform(0.001, 0.3, knots - 1))])
+    motion = Cubics(times, *rng.normal(size=(3, knots, n)))
+    weights = rng.uniform(0.0, 2.0, n)
+    clock = rng.permutation(np.concatenate([times, rng.uniform(-0.1, times[-1] + 0.1, 50)]))
+    states = motion.states(clock)
+    pushes = motion.greatest_pushes(weights)
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(cubics, "library", lambda _: None)
+        for one, other in zip(states, motion.states(clock), strict=True):
+            np.testing.assert_array_equal(one, other)
+        np.testing.assert_allclose(pushes, motion.greatest_pushes(weights), rtol=1e-12)
+    strided = Cubics(*(np.repeat(rows, 2, axis=0)[::2] for rows in (times, *(motion.positions,) * 3)))
+    np.testing.assert_array_equal(strided.states(clock).positions[0], strided.states(clock[:1]).positions[0])
+    many = np.tile(clock, BLOCK_ROWS // len(clock) + 2)  # more than one call
+    np.testing.assert_array_equal(motion.states(many).velocities[-len(clock) :], states.velocities)
+
+
 def test_a_run_of_the_largest_size_stays_in_its_memory(monkeypatch):
     made = []
 
@@ -120,7 +199,8 @@ def test_a_run_of_the_largest_size_stays_in_its_memory(monkeypatch):
     monkeypatch.setattr(runs, "RunTable", Watched)
     runs._spare_runs.cache_clear()
     slow = RateLimits([0.01, 0.01], 1.0, 1e3)  # so slow that all pieces and parts there may be are used
-    run = along_curve(Curve.of(np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]]), np.array([0.2])), slow)
+    line = Polyline.of(np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]]))
+    run = along_curve(Curve.of(line, np.array([0.2])), slow)
     assert len(run.places) >= MOST_PIECES
     assert all(each.intact() and each.curve.intact() and each.search.intact() for each in made)
     assert made

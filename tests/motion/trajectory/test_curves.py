@@ -14,7 +14,7 @@ from rrtik_ompl.model.scene import Obstacle, Scene
 from rrtik_ompl.model.shapes import Sphere
 from rrtik_ompl.motion.trajectory import RateLimits, Trajectory, checks, time_parameterize
 from rrtik_ompl.motion.trajectory.blending import blended, joined, stops_at_corners
-from rrtik_ompl.motion.trajectory.corners import COINCIDENCE, first_radii, vertices
+from rrtik_ompl.motion.trajectory.corners import COINCIDENCE, Polyline, first_radii, vertices
 from rrtik_ompl.motion.trajectory.curve import Curve
 from rrtik_ompl.motion.trajectory.fastest import Bounds, fastest
 from rrtik_ompl.motion.trajectory.runs import PERIOD, along_curve, along_lines
@@ -31,7 +31,8 @@ def random_corners(seed, count=6, n=7):
 
 
 def curve_of(corners, blend):
-    return Curve.of(corners, np.maximum(first_radii(corners, blend), 1e-3 * blend))
+    line = Polyline.of(corners)
+    return Curve.of(line, np.maximum(first_radii(line, blend), 1e-3 * blend))
 
 
 def without_jerk(limits):
@@ -143,8 +144,9 @@ def test_a_straight_move_takes_as_long_as_by_ruckig(length, velocity, accelerati
     task.target_position, task.max_velocity = [length], [velocity]
     task.max_acceleration, task.max_jerk = [acceleration], [jerk]
     ruckig.Ruckig(1).calculate(task, found)
-    (pieces,) = along_lines(np.array([[0.0], [length]]), RateLimits(velocity, acceleration, jerk))
-    assert pieces.durations.sum() == pytest.approx(found.duration, rel=1e-6, abs=1e-8)
+    line = Polyline.of(np.array([[0.0], [length]]))
+    run = along_lines(line, RateLimits(velocity, acceleration, jerk))
+    assert run.duration == pytest.approx(found.duration, rel=1e-6, abs=1e-8)
 
 
 # What a drive accepts -----------------------------------------------------------------------------------------------
@@ -233,11 +235,12 @@ def test_many_corners_at_many_faults_need_no_table_of_all_pairs():
         return np.flatnonzero(off_path)
 
     tracemalloc.start()
-    motion = blended(path, path.waypoints, limits, 0.1, np.inf, faults)
+    line = Polyline.of(path.waypoints)
+    motion = blended(path, line, limits, 0.1, np.inf, faults)
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert motion is not None
-    stopping = joined(stops_at_corners(path.waypoints, limits, None), path, limits)
+    stopping = joined(stops_at_corners(line, limits, None), path, limits)
     assert (motion.duration, refused[-1]) == (pytest.approx(stopping.duration), 0)
     assert peak < 30e6  # [bytes]; a table of the first faults and all corners would have at least as much
     assert 8 * 200 * refused[0] > 30e6
