@@ -516,7 +516,7 @@ def pairs_that_may_touch(scene: Scene) -> frozenset[tuple[frozenset[str], float 
 
 
 def exchanged(scene: Scene, number: int, obstacle: Obstacle) -> Scene:
-    """Return the scene with an obstacle replaced by one of the same name and shape, without other checks."""
+    """Return the scene with an obstacle replaced by one of the same name, without other checks."""
     obstacles = list(scene.obstacles)
     obstacles[number] = obstacle
     return changed(scene, obstacles=tuple(obstacles))

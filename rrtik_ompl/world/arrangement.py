@@ -6,13 +6,9 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
-import pinocchio as pin
-from numpy.typing import ArrayLike
-
 from rrtik_ompl.base.arrays import Vector
-from rrtik_ompl.base.copies import Items, Once, changed
+from rrtik_ompl.base.copies import Items, Once
 from rrtik_ompl.base.errors import UnknownNameError
-from rrtik_ompl.base.poses import rigid
 from rrtik_ompl.geometry.collision.bodies import (
     DISTANCE_TOLERANCE,
     Body,
@@ -21,6 +17,7 @@ from rrtik_ompl.geometry.collision.bodies import (
     colliding_pairs,
     far_apart,
     link_bodies,
+    pieces_of,
     scene_bodies,
 )
 from rrtik_ompl.geometry.collision.bodies import in_contact as bodies_in_contact
@@ -28,9 +25,8 @@ from rrtik_ompl.geometry.collision.body_arrays import BodyArrays, arrays_in_cont
 from rrtik_ompl.geometry.collision.certificate import fixed_contact
 from rrtik_ompl.geometry.collision.containment import Containment
 from rrtik_ompl.geometry.collision.motion_bound import approach_weights, displacement_weights
-from rrtik_ompl.geometry.collision.shape_table import pieces
 from rrtik_ompl.model.robot import Robot
-from rrtik_ompl.model.scene import Obstacle, Scene, exchanged, pose_at
+from rrtik_ompl.model.scene import AttachedObject, Obstacle, Scene, exchanged, pose_at
 from rrtik_ompl.model.shapes import Mesh
 from rrtik_ompl.model.shapes.mesh import open_edges_told
 from rrtik_ompl.model.world_settings import WorldSettings
@@ -56,7 +52,7 @@ class Arrangement:
         approaches: Computes on first call weights of each checked pair, shape (dof,): its bodies come nearer by at
             most ``weights @ |b - a|`` [m] from a to b.
         numbers: Computes on first call the indices of obstacles and their bodies, which do not depend on poses.
-        arrays: The bodies as arrays.
+        arrays: Gives the bodies as arrays.
         doubts: Warnings about the description that were not given yet.
         bare: The same arrangement without contacts; None if there are none, or if it is not known.
     """
@@ -74,7 +70,7 @@ class Arrangement:
     covers: Once[tuple[Spheres, ...]]
     approaches: Once[dict[tuple[int, int], Vector]]
     numbers: Once[Numbers]
-    arrays: BodyArrays  # referenced here, so that the cache of body_arrays keeps them
+    arrays: Once[BodyArrays]  # referenced here, so that the cache of body_arrays keeps them
     doubts: list[str] = field(default_factory=list)
     bare: Arrangement | None = None
 
@@ -88,37 +84,58 @@ class Arrangement:
         """Checks whether a body is wholly inside another."""
         return Containment(self.bodies.as_tuple, self.checked, [outer for outer, _ in self.covers()])
 
-    def moved(self, name: str, pose: ArrayLike | pin.SE3) -> tuple[Arrangement, tuple[int, ...]]:
-        """Return the arrangement with one obstacle at another pose.
+    def exchanged(self, obstacle: Obstacle) -> tuple[Arrangement, tuple[int, ...]] | None:
+        """Return the arrangement with another obstacle in the place of the one of the same name.
 
         Returns:
-            The new arrangement, and the indices of the obstacle's bodies.
+            The new arrangement, and the indices of the obstacle's bodies. None where more would be different: the
+            obstacle has another margin or number of pieces, or a new shape where contacts are allowed, whose depths
+            depend on shapes.
 
         Raises:
             UnknownNameError: If there is no obstacle of that name.
-            InputError: If ``pose`` is not a pose.
         """
-        numbers = self.numbers()
-        if name not in numbers.obstacles:
-            raise UnknownNameError("obstacle", name, numbers.obstacles)
+        index = self.index_of(obstacle.name)
+        before = self.scene.obstacles[index]
+        is_same_shape = obstacle.shape is before.shape
+        own_pieces = pieces_of(obstacle)
+        numbers = self.numbers().bodies[obstacle.name]
+        if len(own_pieces) != len(numbers) or obstacle.margin != before.margin:
+            return None
+        if self.scene.contacts and not is_same_shape:
+            return None
 
-        index = numbers.obstacles[name]
-        obstacle = changed(self.scene.obstacles[index], pose=rigid(pose, f"pose of '{name}'"))
-        placements = numbers.placements(obstacle)
-
+        pose = pose_at(obstacle, 0.0)
         bodies = self.bodies
-        for number, placement in placements.items():
-            bodies = bodies.with_(number, replace(bodies[number], placement=placement))
+        for number, piece in zip(numbers, own_pieces, strict=True):
+            placement = pose * piece.placement
+            body = replace(bodies[number], placement=placement, geometry=piece.geometry, within=piece.placement)
+            bodies = bodies.with_(number, body)
 
-        pairs_at_rest = numbers.standing(None if self.always_colliding else placements)
+        pairs_at_rest = self.numbers().standing(None if self.always_colliding else numbers)
         other = replace(
             self,
             scene=exchanged(self.scene, index, obstacle),
             bodies=bodies,
+            arrays=Once(body_arrays, bodies),
             bare=None,
             always_colliding=_touching(self.robot, bodies, pairs_at_rest),
         )
-        return other, tuple(placements)
+        if not is_same_shape:
+            covers = Once(arm_cache(self.robot).covers_of, bodies)
+            other = replace(other, covers=covers, doubts=list(_doubts_of(obstacle)))
+        return other, tuple(numbers)
+
+    def index_of(self, name: str) -> int:
+        """Return the index of an obstacle in the scene.
+
+        Raises:
+            UnknownNameError: If there is none of that name.
+        """
+        known = self.numbers().obstacles
+        if name not in known:
+            raise UnknownNameError("obstacle", name, known)
+        return known[name]
 
     def with_clearance(self, clearance: float) -> Items[Body]:
         """Return the bodies with a clearance [m] added to the margins of obstacles."""
@@ -151,6 +168,8 @@ def arranged(robot: Robot, scene: Scene, self_margin: float) -> Arrangement:
     bodies = Items(link_bodies(robot, self_margin) + scene_bodies(robot, scene.at(0.0), self_margin))
     pairs = colliding_pairs(robot, scene, bodies.as_tuple)
     moving, standing = by_motion(bodies, pairs)
+    arrays = Once(body_arrays, bodies)
+    arrays()  # what needs them finds those that are kept here
 
     bare = Arrangement(
         robot,
@@ -166,7 +185,7 @@ def arranged(robot: Robot, scene: Scene, self_margin: float) -> Arrangement:
         covers=Once(arm_cache(robot).covers_of, bodies),
         approaches=Once(_approaches, robot, bodies, moving),
         numbers=Once(Numbers.of, scene.obstacles, bodies, standing),
-        arrays=body_arrays(bodies.as_tuple),
+        arrays=arrays,
         doubts=list(_doubts(robot, scene)),
     )
     return with_contacts(bare, scene) if scene.contacts else bare
@@ -180,7 +199,7 @@ def with_contacts(bare: Arrangement, scene: Scene) -> Arrangement:
     """
     robot = bare.robot
     bodies = Items(bodies_in_contact(robot, scene, bare.bodies.as_tuple))
-    arrays = arrays_in_contact(bare.arrays, bodies.as_tuple)
+    arrays = arrays_in_contact(bare.arrays(), bodies.as_tuple)
     checked = tuple(pair for pair in bare.checked if pair not in arrays.contacts)
     always_colliding = bare.always_colliding
     if any(pair in arrays.contacts for pair in bare.standing):
@@ -194,7 +213,7 @@ def with_contacts(bare: Arrangement, scene: Scene) -> Arrangement:
         in_contact=tuple(pair for pair in bare.checked if pair in arrays.contacts),
         always_colliding=always_colliding,
         approaches=Once(_approaches, robot, bodies, checked),
-        arrays=arrays,
+        arrays=Once(lambda: arrays),
         bare=bare,
     )
 
@@ -234,14 +253,6 @@ class Numbers:
 
         return cls({each.name: k for k, each in enumerate(obstacles)}, body_numbers, pairs_of_body)
 
-    def placements(self, obstacle: Obstacle) -> dict[int, pin.SE3]:
-        """Return the poses of the bodies of an obstacle, by their indices."""
-        pose = pose_at(obstacle, 0.0)
-        return {
-            number: pose * part.placement
-            for number, part in zip(self.bodies[obstacle.name], pieces(obstacle.shape), strict=True)
-        }
-
     def standing(self, moved: Iterable[int] | None) -> Pairs:
         """Return the never-moving pairs that contain one of the given bodies (indices); all such pairs if None."""
         if moved is None:
@@ -266,6 +277,13 @@ def _doubts(robot: Robot, scene: Scene) -> Iterator[str]:
     """
     if not robot.collision.geometryObjects:
         yield f"robot '{robot.name}' has no collision geometry: all is free"
-    for name, shape in ((item.name, item.shape) for items in (scene.obstacles, scene.attached) for item in items):
-        if isinstance(shape, Mesh) and not (shape.closed or shape.source):
-            yield f"the mesh of '{name}' has {open_edges_told(shape)}"
+    for items in (scene.obstacles, scene.attached):
+        for item in items:
+            yield from _doubts_of(item)
+
+
+def _doubts_of(item: Obstacle | AttachedObject) -> Iterator[str]:
+    """Yield the warnings about the geometry of one thing."""
+    shape = item.shape
+    if isinstance(shape, Mesh) and not (shape.closed or shape.source):
+        yield f"the mesh of '{item.name}' has {open_edges_told(shape)}"

@@ -24,7 +24,7 @@ from rrtik_ompl.base.poses import working_memory
 from rrtik_ompl.geometry.collision.bodies import DISTANCE_TOLERANCE, Body, kept_apart, request
 from rrtik_ompl.geometry.collision.distances import is_ours, own_gap
 from rrtik_ompl.geometry.collision.solids import around, is_mesh, solids_of
-from rrtik_ompl.kernels import FREE, UNDECIDED, FastWorld
+from rrtik_ompl.kernels import FREE, UNDECIDED, FastWorld, needs_covers
 from rrtik_ompl.kernels.search.motions.motion_table import FastMotions
 from rrtik_ompl.kernels.taken_tables import TakenTables
 from rrtik_ompl.model.robot import Robot, pinocchio_rows
@@ -72,28 +72,29 @@ class ExactChecker:
         tables = self.tables.for_thread(self._packed)
         return replace(self, tables=tables, motions={}, _data=self.solids.robot.model.createData())
 
-    def moved(self, solids: Arrangement, numbers: tuple[int, ...]) -> ExactChecker | None:
-        """Return a checker for moved bodies that takes over the tables of this one; None where that is impossible.
+    def exchanged(self, solids: Arrangement, numbers: tuple[int, ...]) -> ExactChecker | None:
+        """Return a checker for other bodies with the tables of this one; None if these must be made anew.
 
         This checker builds its tables anew if it is used again.
 
         Args:
-            solids: The arrangement with the bodies at their new poses.
-            numbers: Indices of the bodies that were moved.
+            solids: The arrangement with the bodies that are there now, as many as before.
+            numbers: Indices of the bodies that stand elsewhere or have another shape.
         """
-        bodies = solids.bodies
-        if self.clearance != 0.0:
-            bodies = self.bodies
-            for number in numbers:
-                bodies = bodies.with_(number, replace(bodies[number], placement=solids.bodies[number].placement))
-
+        bodies = self.bodies
         tables = self.tables
         covers = solids.covers()
         for number in numbers:
-            moved_tables = tables.take(number, bodies[number], covers[number])
-            if moved_tables is None:
+            body = solids.bodies[number]
+            if body.geometry is not bodies[number].geometry and any(needs_covers(body)):
+                return None  # as many tables know its spheres
+
+            kept = replace(body, margin=bodies[number].margin)  # which includes the clearance
+            bodies = bodies.with_(number, kept)
+            taken = tables.take(number, kept, covers[number])
+            if taken is None:
                 return None
-            tables = moved_tables
+            tables = taken
 
         motions = self.motions
         self.motions = {}

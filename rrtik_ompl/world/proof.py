@@ -84,12 +84,12 @@ class Prover:
         """Return a prover of the same bodies that also requires path constraints; it does not accept earlier proofs."""
         return replace(self, constraints=constraints, kin=object())
 
-    def moved(self, bodies: Sequence[Body], numbers: tuple[int, ...], *, always_colliding: bool) -> Prover:
-        """Return the prover of the world after some bodies were moved; it takes over the table of this prover.
+    def exchanged(self, bodies: Sequence[Body], numbers: tuple[int, ...], *, always_colliding: bool) -> Prover:
+        """Return the prover of a world in which some bodies are others; it takes over the table of this prover.
 
         Args:
-            bodies: All bodies at their new poses.
-            numbers: Indices of the bodies that were moved.
+            bodies: All bodies as they are now, as many as before.
+            numbers: Indices of those that stand elsewhere or have another shape.
             always_colliding: Whether two bodies that never move touch.
         """
         # Tables that are shared with those without contacts are not changed.

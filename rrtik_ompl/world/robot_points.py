@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import coal
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from rrtik_ompl.base.arrays import Mask, Matrix, bounded_array, not_negative
+from rrtik_ompl.base.arrays import Mask, Matrix, Vector, bounded_array, not_negative
 from rrtik_ompl.base.errors import require
 from rrtik_ompl.base.poses import rigid
 from rrtik_ompl.geometry.collision.bodies import Body, link_bodies, scene_bodies
-from rrtik_ompl.geometry.collision.cloud_solid import cloud_gap, cloud_solid
+from rrtik_ompl.geometry.collision.enclosure import enclosure
+from rrtik_ompl.geometry.collision.solids import inside_mesh, is_closed, is_mesh, mesh_arrays, once_per_geometry
+from rrtik_ompl.kernels.covers.points import IN_DOUBT, distances_to_nearest, inside_by_rays
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import Scene
 from rrtik_ompl.model.shapes import PointCloud
 from rrtik_ompl.world.arm_cache import arm_cache
+
+ROUNDING = 1e-6  # [m] more than double precision errs within the room of an arm
 
 
 def without_robot(
@@ -61,40 +67,109 @@ def without_robot(
     bodies = (*link_bodies(robot), *attached)
 
     outside = np.ones(len(cloud.points), dtype=bool)
-    for body, (balls, _) in zip(bodies, arm_cache(robot).covers_of(bodies), strict=True):
-        from_body = (pin.SE3(frames[body.joint]) * body.placement).actInv(cloud_pose)
-        outside &= ~_on_body(cloud, from_body, body, balls, distance + body.padding)
+    covers = [balls for balls, _ in arm_cache(robot).covers_of(bodies)]
+    from_bodies = [(pin.SE3(frames[body.joint]) * body.placement).actInv(cloud_pose) for body in bodies]
+    places = _around(cloud, bodies, from_bodies, distance)
+    for body, balls, from_body, numbers in zip(bodies, covers, from_bodies, places, strict=True):
+        points = cloud.points[numbers] @ from_body.rotation.T + from_body.translation
+        reach = distance + body.padding
+        chosen = _in_reach(points, body, balls, reach + cloud.radius + ROUNDING)
+        near = _near(points[chosen], body.geometry, cloud.radius, reach)
+        outside[numbers[chosen][near]] = False
     return cloud.only(outside, "without_robot")
 
 
-def _on_body(cloud: PointCloud, from_body: pin.SE3, body: Body, balls: Matrix, margin: float) -> Mask:
-    """Return which points of a cloud are within a margin of a body, shape (n,).
-
-    The body's bounding box and its outer balls select candidates, whose distance is then computed exactly.
+def _around(
+    cloud: PointCloud, bodies: Sequence[Body], from_bodies: Sequence[pin.SE3], margin: float
+) -> list[NDArray[np.int64]]:
+    """Return for each body the numbers of the points whose balls may be within a margin of it.
 
     Args:
         cloud: The cloud.
-        from_body: Pose of the cloud in the body's frame.
+        bodies: The bodies.
+        from_bodies: Pose of the cloud in the frame of each.
+        margin: Distance beside the padding of each body [m].
+    """
+    boxes = [body.geometry.aabb_local for body in bodies]
+    middles = [0.5 * (np.array(box.min_) + np.array(box.max_)) for box in boxes]
+    centres = np.array([pose.actInv(middle) for pose, middle in zip(from_bodies, middles, strict=True)])
+    halves = np.array([0.5 * np.linalg.norm(np.array(box.max_) - np.array(box.min_)) for box in boxes])
+    radii = halves + [margin + cloud.radius + body.padding + ROUNDING for body in bodies]
+
+    # Squares of distances of all points from all centres, seen from the arm, where they are small.
+    middle = centres.mean(axis=0)
+    points = cloud.points - middle
+    centres -= middle
+    squares = np.einsum("ij,ij->i", points, points)[:, None] - 2.0 * points @ centres.T
+    return [np.flatnonzero(column) for column in (squares <= radii**2 - (centres**2).sum(axis=1)).T]
+
+
+def _in_reach(points: Matrix, body: Body, balls: Matrix, reach: float) -> Mask:
+    """Return which points are within reach of a body's box and outer cover, shape (n,).
+
+    Args:
+        points: In the body's frame, shape (n, 3) [m].
         body: The body.
-        balls: Outer cover of the body, shape (k, 4) [m]; empty if it has none.
-        margin: The margin [m].
+        balls: Its outer cover, shape (k, 4) [m]; empty for a fixed body of a simple shape.
+        reach: Distance that is looked at [m].
     """
     box = body.geometry.aabb_local
-    reach = margin + cloud.radius
-    points = cloud.points.astype(np.float64) @ from_body.rotation.T + from_body.translation
     in_box = (points >= np.array(box.min_) - reach) & (points <= np.array(box.max_) + reach)
-    candidates = np.flatnonzero(in_box.all(axis=1))
+    in_reach: Mask = np.asarray(in_box.all(axis=1))
+    if len(balls) and in_reach.any():
+        inside = points[in_reach]
+        squares = np.einsum("ij,ij->i", inside, inside)[:, None] - 2.0 * inside @ balls[:, :3].T
+        limits = (balls[:, 3] + reach) ** 2 - (balls[:, :3] ** 2).sum(axis=1)
+        in_reach[in_reach] = (squares <= limits).any(axis=1)
+    return in_reach
 
-    is_on_body = np.zeros(len(cloud.points), dtype=bool)
-    is_on_body[candidates] = len(balls) == 0  # fixed bodies of a simple shape have no cover
-    near = points[candidates]
-    for ball in balls if len(candidates) else ():
-        off = near - ball[:3]
-        close = np.einsum("ij,ij->i", off, off) <= (ball[3] + reach) ** 2
-        is_on_body[candidates[close]] = True
 
-    at_origin = coal.Transform3s()
-    for k in np.flatnonzero(is_on_body).tolist():
-        ball_of_point = cloud_solid(PointCloud(points[k : k + 1], cloud.radius))
-        is_on_body[k] = cloud_gap((body.geometry, at_origin, ball_of_point, at_origin), margin) is None
-    return is_on_body
+def _near(points: Matrix, geometry: coal.CollisionGeometry, radius: float, margin: float) -> Mask:
+    """Return which balls around points, shape (n, 3), are within a margin of a geometry, or inside of it, shape (n,).
+
+    A mesh is compared triangle by triangle, all other geometries by coal.
+
+    Args:
+        points: The centres in the geometry's frame [m].
+        geometry: The geometry.
+        radius: Of the balls [m].
+        margin: The margin [m].
+    """
+    if not is_mesh(geometry):
+        return np.array([_touches(point, geometry, radius, margin) for point in points], dtype=bool)
+
+    near: Mask = distances_to_nearest(points, *_triangles(geometry)) <= radius + margin
+    others = ~near
+    near[others] = _inside(geometry, points[others])
+    return near
+
+
+def _touches(point: Vector, geometry: coal.CollisionGeometry, radius: float, margin: float) -> bool:
+    """Check by coal whether a ball around a point is within a margin of a solid."""
+    there = coal.Transform3s(np.eye(3), point)
+    asked = coal.CollisionRequest()
+    asked.security_margin = margin
+    ends = geometry, coal.Transform3s(), coal.Sphere(radius), there
+    return bool(coal.collide(*ends, asked, coal.CollisionResult()))
+
+
+def _inside(mesh: coal.BVHModelBase, points: Matrix) -> Mask:
+    """Return which points, shape (n, 3), that are apart from a mesh are inside of it, shape (n,)."""
+    if not is_closed(mesh):
+        hollow = enclosure(mesh)
+        return np.array([hollow.holds(point[None]) for point in points], dtype=bool)
+
+    answers = inside_by_rays(_triangles(mesh)[0], points)
+    for k in np.flatnonzero(answers == IN_DOUBT):
+        answers[k] = inside_mesh(*mesh_arrays(mesh), points[k])
+    return np.asarray(answers == 1)
+
+
+@once_per_geometry
+def _triangles(mesh: coal.BVHModelBase) -> tuple[NDArray[np.float64], Matrix, Vector]:
+    """Return the triangles of a mesh, shape (m, 3, 3), and centres and radii of balls around them."""
+    corners, faces = mesh_arrays(mesh)
+    surface = np.ascontiguousarray(corners[faces], dtype=np.float64)
+    centres = surface.mean(axis=1)
+    radii = np.linalg.norm(surface - centres[:, None], axis=2).max(axis=1)
+    return surface, centres, radii

@@ -11,9 +11,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-import pinocchio as pin
-from numpy.typing import ArrayLike
-
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector, in_blocks
 from rrtik_ompl.base.copies import changed
 from rrtik_ompl.base.errors import MeshWarning
@@ -25,7 +22,7 @@ from rrtik_ompl.kernels.search.motions.motion_table import step_counts
 from rrtik_ompl.model.goal_kind import TaskRegion
 from rrtik_ompl.model.judgement import Contact
 from rrtik_ompl.model.robot import Robot, inside_limits
-from rrtik_ompl.model.scene import AttachedObject, Scene
+from rrtik_ompl.model.scene import AttachedObject, Obstacle, Scene, exchanged
 from rrtik_ompl.model.world_settings import WorldSettings
 from rrtik_ompl.world.arrangement import Arrangement, arranged, with_contacts
 from rrtik_ompl.world.exact_checks import ExactChecker, one_way
@@ -117,22 +114,29 @@ class RowChecks:
         """The same checks without path constraints."""
         return self if self.constraints is None else checks_of(changed(self.settings, constraints=()))
 
-    def moved(self, name: str, pose: ArrayLike | pin.SE3) -> RowChecks:
-        """Return the checks with one obstacle moved; arguments and errors as of :meth:`rrtik_ompl.World.moved`.
+    def with_obstacle(self, obstacle: Obstacle) -> RowChecks:
+        """Return the checks with another obstacle in the place of the one of the same name.
 
-        The parts for the new scene are derived from the current ones and stored among the shared parts, where
-        :func:`checks_of` finds them.
+        The parts for the new scene are derived from the current ones where that is possible, and stored among the
+        shared parts, where :func:`checks_of` finds them.
+
+        Raises:
+            UnknownNameError: If there is no obstacle of that name.
         """
         settings = self.settings
-        moved, numbers = self.solids.moved(name, pose)
+        derived = self.solids.exchanged(obstacle)
+        if derived is None:
+            scene = exchanged(settings.scene, self.solids.index_of(obstacle.name), obstacle)
+            return checks_of(changed(settings, scene=scene))
 
         # The shared parts are held weakly, so these variables keep them alive until checks_of has found them.
-        solids = ARRANGEMENTS.keep(moved, settings.robot, moved.scene, settings.self_margin)
+        made, numbers = derived
+        solids = ARRANGEMENTS.keep(made, settings.robot, made.scene, settings.self_margin)
         unheld_prover = PROVERS.of(self.solids, None)
-        prover = unheld_prover.moved(solids.bodies, numbers, always_colliding=solids.always_colliding)
+        prover = unheld_prover.exchanged(solids.bodies, numbers, always_colliding=solids.always_colliding)
         PROVERS.keep(prover, solids, None)
         checks = checks_of(changed(settings, scene=solids.scene))
-        checker = self.checker.moved(solids, numbers) if "checker" in vars(self) else None
+        checker = self.checker.exchanged(solids, numbers) if "checker" in vars(self) else None
         if checker is not None:
             vars(checks)["checker"] = CHECKERS.keep(checker, solids, checker.clearance)
         return checks

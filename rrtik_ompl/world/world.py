@@ -25,6 +25,7 @@ from rrtik_ompl.base.arrays import (
 from rrtik_ompl.base.choices import Accuracy
 from rrtik_ompl.base.copies import ThreadOwn, changed, in_notebook, restored
 from rrtik_ompl.base.errors import DescriptionWarning, InputError, MeshWarning, listed, require
+from rrtik_ompl.base.poses import rigid
 from rrtik_ompl.constraints.held_regions import HeldRegions
 from rrtik_ompl.geometry.collision.bodies import Body, Pairs
 from rrtik_ompl.kernels import FastWorld
@@ -35,7 +36,7 @@ from rrtik_ompl.model.goal_kind import TaskRegion
 from rrtik_ompl.model.judgement import Contact, Judge, Judged, Violation
 from rrtik_ompl.model.proof import Proof
 from rrtik_ompl.model.robot import Robot
-from rrtik_ompl.model.scene import Scene
+from rrtik_ompl.model.scene import Obstacle, Scene
 from rrtik_ompl.model.world_settings import MOTION_RESOLUTION, WorldSettings, checked_settings
 from rrtik_ompl.world.certificates import Certifiable, certificate_for, fault_of
 from rrtik_ompl.world.judgement import judged_path
@@ -296,7 +297,34 @@ class World(Judge):
             [0.4, 0.3, 0.4]
         """
         require(name, str, "name of an obstacle")
-        return _world_with(self.checks.moved(name, pose))
+        obstacle = self.scene.obstacles[self.checks.solids.index_of(name)]
+        placed = changed(obstacle, pose=rigid(pose, f"pose of '{name}'"))
+        return _world_with(self.checks.with_obstacle(placed))
+
+    def with_obstacle(self, obstacle: Obstacle) -> World:
+        """Return the world with another obstacle in the place of the one of the same name, at a cost as :meth:`moved`.
+
+        It is meant for what sensors see anew: the cloud of the next picture, or a box that was measured again. Clouds,
+        octrees, boxes, balls, cylinders, capsules and half-spaces are put into the tables in place of one of their
+        kind. For other shapes, and with another margin, the tables are built anew.
+
+        Args:
+            obstacle: The new one; its shape, pose, margin and motion may be others.
+
+        Raises:
+            UnknownNameError: If there is no obstacle of its name.
+            InputError: If ``obstacle`` is no obstacle.
+
+        Example:
+            >>> seen = rrtik.Obstacle("seen", rrtik.PointCloud([[0.4, 0.0, 0.4]]))
+            >>> world = rrtik.World(rrtik.load_robot("ur5"), rrtik.Scene([seen]))
+            >>> cloud = rrtik.PointCloud([[0.4, 0.3, 0.4], [0.5, 0.3, 0.4]])
+            >>> world = world.with_obstacle(rrtik.Obstacle("seen", cloud))
+            >>> world.scene.obstacle("seen").shape
+            PointCloud(2 points, radius=0.01 m)
+        """
+        require(obstacle, Obstacle, "obstacle")
+        return _world_with(self.checks.with_obstacle(obstacle))
 
     def valid(self, q: ArrayLike) -> bool:
         """Check whether q, shape (dof,), is inside the limits and free of collision.

@@ -112,7 +112,7 @@ def scene_bodies(robot: Robot, scene: Scene, margin: float = 0.0) -> tuple[Body,
                 margin=obstacle.margin,
                 within=piece.placement,
             )
-            for piece in _pieces(obstacle)
+            for piece in pieces_of(obstacle)
         ]
 
     for item in scene.attached:
@@ -137,13 +137,13 @@ def scene_bodies(robot: Robot, scene: Scene, margin: float = 0.0) -> tuple[Body,
                 padding=thickness,
                 within=piece.placement,
             )
-            for piece in _pieces(item)
+            for piece in pieces_of(item)
         ]
 
     return tuple(bodies)
 
 
-def _pieces(item: Obstacle | AttachedObject) -> tuple[Piece, ...]:
+def pieces_of(item: Obstacle | AttachedObject) -> tuple[Piece, ...]:
     """Return the coal geometries of an object's shape; an error names the object."""
     try:
         return pieces(item.shape)

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector
 from rrtik_ompl.geometry.collision.bodies import DISTANCE_TOLERANCE, Body
 from rrtik_ompl.geometry.collision.body_arrays import body_arrays
+from rrtik_ompl.geometry.collision.cloud_solid import LOOK_AHEAD
 from rrtik_ompl.geometry.collision.containment import Containment
 from rrtik_ompl.geometry.collision.distances import gap_beyond
 from rrtik_ompl.geometry.collision.motion_bound import approach_weights
@@ -126,7 +127,8 @@ class Certificate:
         for row, run, pair, approach_bound, may_be_inside in zip(*(k.tolist() for k in columns), strict=True):
             i, j = self._pairs[pair].tolist()
             first, second = ((self._bodies[k].geometry, placed.pose(run, k)) for k in (i, j))
-            gap = distance(*first, *second, margin=float(self._margins[pair]))
+            look_ahead = min(2.0 * approach_bound, LOOK_AHEAD)  # beyond the bound no more has to be known
+            gap = distance(*first, *second, margin=float(self._margins[pair]), look_ahead=look_ahead)
             may_touch[row] = gap is None or gap <= approach_bound
             if gap is None:
                 colliding[middles[run]] = (i, j)
@@ -320,10 +322,11 @@ def distance(
     second: coal.CollisionGeometry,
     second_pose: Matrix,
     margin: float = 0.0,
+    look_ahead: float = LOOK_AHEAD,
 ) -> float | None:
     """Return what :func:`.distances.gap_beyond` does, for two coal geometries at poses of shape (4, 4)."""
     transforms = [coal.Transform3s(pose[:3, :3], pose[:3, 3]) for pose in (first_pose, second_pose)]
-    return gap_beyond((first, transforms[0], second, transforms[1]), margin)
+    return gap_beyond((first, transforms[0], second, transforms[1]), margin, look_ahead)
 
 
 def _half_space_pairs(

@@ -62,7 +62,7 @@ def has_cloud(ends: Ends) -> bool:
     return isinstance(ends[0], CloudSolid) or isinstance(ends[2], CloudSolid)
 
 
-def cloud_gap(ends: Ends, margin: float) -> float | None:
+def cloud_gap(ends: Ends, margin: float, look_ahead: float = LOOK_AHEAD) -> float | None:
     """Return a lower bound of the distance of a cloud and another geometry minus a margin [m]; None if it is not kept.
 
     A point that is wholly inside a hollow mesh counts as touching it.
@@ -70,9 +70,10 @@ def cloud_gap(ends: Ends, margin: float) -> float | None:
     Args:
         ends: Two geometries with their poses, one of them a cloud.
         margin: Distance that must be kept [m].
+        look_ahead: Largest bound that is of use [m]: points farther beyond the margin are not measured.
     """
     cloud, other, to_other, _ = _sides(ends)
-    points, _ = _points_near_box(cloud, other, to_other, cloud.radius + margin + LOOK_AHEAD)
+    points, _ = _points_near_box(cloud, other, to_other, cloud.radius + margin + look_ahead)
 
     element = _element(cloud)
     identity = coal.Transform3s()
@@ -80,7 +81,7 @@ def cloud_gap(ends: Ends, margin: float) -> float | None:
     collision_request = coal.CollisionRequest()
     collision_request.security_margin = margin
 
-    gap = LOOK_AHEAD
+    gap = look_ahead
     for point in points:
         point_pose.setTranslation(point)
         result = coal.CollisionResult()

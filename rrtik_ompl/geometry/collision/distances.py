@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Vector
 from rrtik_ompl.geometry.collision.bodies import Body, kept_apart, request
-from rrtik_ompl.geometry.collision.cloud_solid import Ends, Nearest, cloud_gap, has_cloud, nearest_of_cloud
+from rrtik_ompl.geometry.collision.cloud_solid import LOOK_AHEAD, Ends, Nearest, cloud_gap, has_cloud, nearest_of_cloud
 from rrtik_ompl.geometry.collision.shape_table import Core, core_of
 from rrtik_ompl.geometry.collision.solids import is_mesh, solids_of
 from rrtik_ompl.model.judgement import Contact
@@ -57,14 +57,19 @@ def transform_of(body: Body, frames: NDArray[np.float64]) -> coal.Transform3s:
     return coal.Transform3s(pose.rotation, pose.translation)
 
 
-def gap_beyond(ends: Ends, margin: float) -> float | None:
+def gap_beyond(ends: Ends, margin: float, look_ahead: float = LOOK_AHEAD) -> float | None:
     """Return a lower bound of the distance of two placed geometries minus a margin [m]; None if the margin is not kept.
 
     Each call uses a new request and result, as reused ones may miss overlaps.
+
+    Args:
+        ends: Two geometries with their poses.
+        margin: Distance that must be kept [m].
+        look_ahead: Largest bound that is of use [m]: it saves work with clouds.
     """
     ends, margin = solids_of(ends, margin)
     if is_ours(ends):
-        return own_gap(ends, margin)
+        return own_gap(ends, margin, look_ahead)
 
     result = coal.CollisionResult()
     if coal.collide(*ends, request(margin), result):
@@ -128,13 +133,13 @@ def is_ours(ends: Ends) -> bool:
     return has_cloud(ends) or (_is_capsule(ends[0]) and _is_capsule(ends[2]))
 
 
-def own_gap(ends: Ends, margin: float) -> float | None:
+def own_gap(ends: Ends, margin: float, look_ahead: float = LOOK_AHEAD) -> float | None:
     """Return a lower bound of the distance of two geometries minus a margin [m]; None if the margin is not kept.
 
     One of the geometries is a cloud, or both are capsules.
     """
     if has_cloud(ends):
-        return cloud_gap(ends, margin)
+        return cloud_gap(ends, margin, look_ahead)
     gap = own_nearest(ends).distance - margin
     return gap if gap > 0.0 else None
 

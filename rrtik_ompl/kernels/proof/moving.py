@@ -14,8 +14,9 @@ from rrtik_ompl.geometry.collision.bodies import Body
 from rrtik_ompl.kernels.proof import layout
 from rrtik_ompl.kernels.proof.groups import BLOCK
 from rrtik_ompl.kernels.proof.packing import ProofPairs, cloud_bodies, cloud_poses
-from rrtik_ompl.kernels.proof.placed import NOTHING, corner_blocks, corners_in, size_rows, solid_kind
+from rrtik_ompl.kernels.proof.placed import NOTHING, block_count, corner_blocks, corners_in, size_rows, solid_kind
 from rrtik_ompl.kernels.simd.processor import WIDTH
+from rrtik_ompl.kernels.tables.cloud_layout import LEAF
 from rrtik_ompl.kernels.tables.cloud_tables import cloud_table
 from rrtik_ompl.kernels.tables.solid_tables import ConvexSolid, convex_solids, placed_bodies
 
@@ -110,7 +111,9 @@ class MovedObstacles:
 
 
 class MovedSolids:
-    """Standing bodies of a table, put elsewhere in place one after the other; no other body is packed again.
+    """Standing bodies of a table, put in place one after the other: elsewhere, or others of the same kind.
+
+    No other body is packed again.
 
     Args:
         packed: The table.
@@ -129,11 +132,11 @@ class MovedSolids:
                 self._groups.setdefault(member, []).append(group)
 
     def put(self, number: int, body: Body) -> bool:
-        """Put a body elsewhere; whether it was done. If not, all has to be packed anew.
+        """Put a body where it is now; whether it was done. If not, all has to be packed anew.
 
         Args:
             number: Of the body.
-            body: Where it is now.
+            body: The one that is there now.
         """
         pose = np.asarray(body.placement.homogeneous)[None]
         own = placed_bodies([convex_solids(body.geometry)], pose)[0].around or (NOTHING,)
@@ -141,7 +144,14 @@ class MovedSolids:
         end = self._packed.firsts[number + 1]
         parts = self._parts(number)
         kinds = [solid_kind(body, solid) for solid in own]
-        if self._left == 0 or kinds != self._records[parts, layout.SOLID_KIND].tolist() or layout.CLOUD in kinds:
+        known = np.minimum(self._records[parts, layout.SOLID_KIND], layout.CLOUD).tolist()
+        if self._left == 0 or kinds != known:
+            return False
+        if layout.CLOUD in kinds:
+            self._put_cloud(parts[0], body)
+        firsts = self._records[parts, layout.FIRST_BLOCK]
+        ends = self._records[parts, layout.END_BLOCK]
+        if [block_count(solid.corners) for solid in own] != (ends - firsts).tolist():
             return False
         self._left -= 1
         whole = [own] if end - first > len(own) else []
@@ -160,6 +170,18 @@ class MovedSolids:
         around = [self._packed.firsts[-1] + group for group in self._groups.get(number, ())]
         self._packed.spread_sizes([*range(first, end), *around])
         return True
+
+    def _put_cloud(self, solid: int, body: Body) -> None:
+        """Put the points of a cloud in the place of others; its solid has room for all of a block's again."""
+        table = self._packed.table
+        record = self._records[solid]
+        record[layout.END_BLOCK] = record[layout.FIRST_BLOCK] + LEAF // WIDTH
+        place = int(record[layout.SOLID_KIND]) - layout.CLOUD
+        clouds = list(self._packed.clouds)
+        clouds[place] = cloud_table(body.geometry.cloud)
+        self._packed.clouds = clouds
+        table.clouds[place] = clouds[place].address
+        table.cloud_poses.reshape(-1, layout.FRAME_SIZE)[place] = cloud_poses([body])[0]
 
     def _parts(self, number: int) -> range:
         """The solids of a body, without the one that stands for all of them."""

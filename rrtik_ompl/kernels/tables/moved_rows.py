@@ -1,4 +1,4 @@
-"""The rows of one standing body in the tables of a scene, written anew in place where it is put elsewhere.
+"""The rows of one standing body in the tables of a scene, written anew in place where it is elsewhere or another one.
 
 The rows are those that packing all bodies would make; only their order, and with it the boxes around neighbours, stay
 as they were. After as many moves as there are rows the tables are better made anew, for neighbours are none any more.
@@ -16,6 +16,7 @@ from rrtik_ompl.geometry.collision.shape_table import Core, core_of
 from rrtik_ompl.kernels import layout
 from rrtik_ompl.kernels.layout import PrimitiveTable, SolidTable
 from rrtik_ompl.kernels.simd.processor import WIDTH
+from rrtik_ompl.kernels.tables.cloud_layout import CloudTable
 from rrtik_ompl.kernels.tables.moved_boxes import BoxNumbers, box_numbers
 from rrtik_ompl.kernels.tables.primitive_tables import MANY, Primitives, above, below
 from rrtik_ompl.kernels.tables.robot_tables import Spheres
@@ -56,11 +57,11 @@ class MovedRows:
         self._left = bodies if bodies >= MANY else NO_LIMIT  # moves until all is better made anew
 
     def put(self, place: int, body: Body, spheres: tuple[Spheres, Spheres], solids: Solids) -> bool:
-        """Put a body elsewhere.
+        """Put a body where it is now.
 
         Args:
             place: Its number among the standing ones.
-            body: The body where it is now.
+            body: The body that is there now: the one of before, or another one that has no spheres.
             spheres: Around and inside it, in its own frame.
             solids: Likewise.
 
@@ -90,7 +91,7 @@ class MovedRows:
         return True
 
     def _put_box(self, place: int, body: Body, core: Core) -> bool:
-        """Put a box elsewhere; whether it was done."""
+        """Put a box where it is now; whether it was done."""
         box = box_numbers(core, body.placement, body.margin + body.padding)
         slots = [own.only_slot(place, layout.BOX) for own in self._primitives]
         solid = self._solids.only_solid(place, core)
@@ -106,6 +107,7 @@ class _PrimitiveRows:
     """Rows of a table of primitives by their bodies."""
 
     def __init__(self, table: PrimitiveTable) -> None:
+        self._table = table
         self._heads = table.heads.reshape(-1, layout.HEAD_INTS)
         owners = self._heads[:, layout.STANDING_BODY]
         self._by_body = np.argsort(owners, kind="stable")
@@ -148,10 +150,20 @@ class _PrimitiveRows:
         for slot, detail in zip(slots, made.details, strict=True):
             if isinstance(detail, np.ndarray):
                 self._planes[slice(*self._heads[slot, layout.FIRST_PLANE : layout.END_PLANE + 1])] = detail
+            elif detail is not None:
+                self._exchange_cloud(int(self._heads[slot, layout.FIRST_PLANE]), detail)
 
         if self._blocks.size:
             for block in set((slots // layout.BLOCK).tolist()):
                 self._bound(block)
+
+    def _exchange_cloud(self, number: int, cloud: CloudTable) -> None:
+        """Let the table have another cloud in the place of one."""
+        place = PrimitiveTable.places["clouds"]
+        clouds = list(self._table.clouds)
+        clouds[number] = cloud
+        self._table.tables[place] = tuple(clouds)
+        self._table.memory[place][number] = cloud.address
 
     def _bound(self, block: int) -> None:
         """Write the box around some neighbours."""
@@ -170,11 +182,15 @@ class _SolidRows:
         self._corners = table.corners.reshape(-1, 3, WIDTH)
 
     def span(self, place: int, parts: Sequence[ConvexSolid]) -> tuple[int, int] | None:
-        """The first of a body's solids and the end of them, None unless there are as many of the same kinds."""
+        """The first of a body's solids and the end of them; None if their number, kinds or blocks of corners differ."""
         first = int(self._spans[place, layout.AROUND_FIRST])
         end = int(self._spans[place, layout.INSIDE_END])
-        kinds = self._solids[first:end, layout.SOLID_KIND].tolist()
-        return (first, end) if kinds == [part.kind for part in parts] else None
+        solids = self._solids[first:end]
+        kinds = solids[:, layout.SOLID_KIND].tolist()
+        blocks = (solids[:, layout.END_BLOCK] - solids[:, layout.FIRST_BLOCK]).tolist()
+        fits = kinds == [part.kind for part in parts] and blocks == [-(-len(part.corners) // WIDTH) for part in parts]
+
+        return (first, end) if fits else None
 
     def only_solid(self, place: int, core: Core) -> int | None:
         """The one solid of a body; None if there are others, or if it is none of a core with one block of corners."""
