@@ -44,6 +44,7 @@ SCRIPTS = (
     "contacts.js",
     "player.js",
     "camera.js",
+    "shots.js",
 )
 BOX_SHARE = 0.1  # side of an added box, as a share of the arm's diagonal
 STARTING = ("unpack.js", "start.js")
@@ -100,7 +101,7 @@ def page(
     recording, frame = draw(subject)
     heading = _title(subject) if title is None else title
 
-    told = story_of(subject, frame, heading)
+    told = story_of(subject, frame, heading, subject.name if title is None else "")
     told["plan"] = None if still else _planning(shown, subject, frame)
 
     if asks and (not told["plan"] or told["plan"]["courses"]):
@@ -142,6 +143,8 @@ def _title(subject: Subject) -> str:
         return subject.name
     if subject.run is not None:
         return f"{subject.name}: {subject.run.planner}, {subject.run.outcome}"
+    if subject.times is not None:
+        return f"{subject.name}: motion of {subject.times[-1]:.2f} s"
 
     moves = len(subject.waypoints) - 1
     return f"{subject.name}: path of {moves} move{'' if moves == 1 else 's'}"

@@ -40,8 +40,9 @@ def run_story(run: ReplanRun, robot: Robot, scene: Scene, frame: Frame) -> dict[
 
 def _motions(ticks: Iterable[Tick]) -> list[dict[str, Any]]:
     """Return the groups of ticks of a task, as :func:`_groups` does, one for each motion."""
-    named = [{**group, "event": "motion", "text": group["reason"]} for group in _groups(ticks)]
-    return [{**group, "caption": group["text"].partition(": ")[2]} for group in named]
+    names = [group["reason"].partition(": ")[2] for group in _groups(ticks)]
+    rows = zip(_groups(ticks), names, strict=True)
+    return [{**group, "event": "motion", "text": name, "caption": name} for group, name in rows]
 
 
 def _groups(ticks: Iterable[Tick]) -> list[dict[str, Any]]:

@@ -37,14 +37,16 @@ DIGITS = 9
 OWN_JOINTS = 3  # least number of joints of a branch that can be dragged; shorter branches are fingers
 
 
-def story_of(subject: Subject, frame: Frame, title: str) -> dict[str, Any]:
+def story_of(subject: Subject, frame: Frame, title: str, name: str = "") -> dict[str, Any]:
     """Return all data that the page's own script reads, as numbers, texts, lists and dicts (to be written as JSON).
 
-    Lengths are in metres and angles in radians; the script converts them to degrees for display.
+    Lengths are in metres and angles in radians; the script converts them to degrees for display. With a ``name`` the
+    title follows the path that the page finds.
     """
     robot = subject.robot
     return {
         "title": title,
+        "name": name,
         "robot": None if robot is None else _robot(robot, subject.tips),
         "obstacles": _obstacles(subject.scene),
         "moving": subject.run is not None or any(o.motion is not None for o in subject.scene.obstacles),

@@ -36,32 +36,10 @@ async function encoderOf(ending, { size: [width, height], rate, bits }) {
   };
 }
 
-/** Labels and the caption stand beside the 3-D picture in the page; in a film they are drawn on it. */
-function drawWords(pen, caption) {
-  for (const { element, spot } of labels) {
-    if (element.hidden || !spot) continue;
-    const { font, color, backgroundColor, borderTopColor } = getComputedStyle(element);
-    pen.font = font;
-    Object.assign(pen, { fillStyle: backgroundColor, strokeStyle: borderTopColor, textBaseline: "middle", textAlign: "center" });
-    pen.beginPath();
-    pen.roundRect(spot.x, spot.y, spot.wide, spot.tall, 8);
-    pen.fill();
-    pen.stroke();
-    pen.fillStyle = color;
-    pen.fillText(element.textContent, spot.x + spot.wide / 2, spot.y + spot.tall / 2 + 1);
-  }
-  if (!caption) return;
-  const tall = Math.max(16, pen.canvas.height / 28);
-  pen.font = `600 ${tall}px system-ui, "Segoe UI", Roboto, "DejaVu Sans", sans-serif`;
-  Object.assign(pen, { fillStyle: dark.matches ? "#e6ebf0" : "#1d2733", textBaseline: "bottom", textAlign: "left" });
-  pen.fillText(caption, tall, pen.canvas.height - 0.8 * tall);
-}
-
 async function drawFilm(wanted) {
-  const { frames, held, at, size: [width, height], rate, ending, camera, hide } = wanted;
+  const { frames, held, at, rate, ending, camera, hide } = wanted;
   hide.filter((name) => name !== "caption").forEach(hideThing);
-  const sheet = make("canvas", { width, height });
-  const pen = sheet.getContext("2d", { alpha: false });
+  const { sheet, take } = newSheet();
   const encoder = ending in CODECS ? await encoderOf(ending, wanted) : null;
   const place = cameraOf(camera, (frames - 1) / rate);
   for (let k = 0; k < frames + (encoder ? held : 0); k += 1) {
@@ -70,8 +48,7 @@ async function drawFilm(wanted) {
       if (total > 0) show(total * share);
       place(share);
       viewer.render();
-      pen.drawImage(viewer.renderer.domElement, 0, 0, width, height);
-      drawWords(pen, hide.includes("caption") ? "" : captionNow());
+      take(hide.includes("caption") ? "" : captionNow());
     }
     if (encoder) await encoder.take(sheet, k);
     if (encoder && k < frames) await send("N");

@@ -97,6 +97,21 @@ function drawTrail(rows) {
   applyEyes("trails");
 }
 
+/** The heading says what is shown now; one that was given stays. */
+function sayTitle(text) {
+  if (!story.name) return;
+  document.title = `${story.name}: ${text}`;
+  document.getElementById("title").textContent = document.title;
+}
+
+/** A path for comparison is one of the first problem: with another path it goes. */
+function dropBefore() {
+  if (!story.before) return;
+  story.before = "";
+  viewer.delete_path([...ROOT, "before"]);
+  buildTree();
+}
+
 /** Play other rows from now on; an empty list for none. */
 function replacePath(rows) {
   story.waypoints = rows.length ? rows : [state.start];
@@ -104,6 +119,8 @@ function replacePath(rows) {
   story.moves = rows.slice(1).map((to, k) => ({ from: rows[k], to, piece: k, joints: to.flatMap((value, j) => (value === rows[k][j] ? [] : [j])) }));
   story.times = rows.length ? pathTimes(rows) : [];
   drawTrail(rows);
+  sayTitle(rows.length > 1 ? `path of ${count(rows.length - 1, "move")}` : "no path");
+  dropBefore();
   document.getElementById("clearance-section").hidden = true;
   document.getElementById("proof-section").hidden = true;
   showClearance = () => {};

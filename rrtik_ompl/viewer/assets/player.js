@@ -64,12 +64,15 @@ function play() {
 }
 
 function tick(stamp) {
-  if (playingSince === null) return;
+  if (playingSince === null) return null;
   const seconds = Math.min(Math.max(stamp - playingSince, 0) / 1000, 0.25);
   playingSince = stamp;
   show(now + seconds * Number(document.getElementById("speed").value));
-  if (now >= total) pause();
-  else requestAnimationFrame(tick);
+  const again = document.getElementById("loop").checked && !recording;
+  if (now >= total && again) show(0);
+  if (now < total) return requestAnimationFrame(tick);
+  pause();
+  return recording?.ended();
 }
 
 function step(direction) {
@@ -77,13 +80,28 @@ function step(direction) {
   goTo(direction > 0 ? Math.min(...ahead, total) : Math.max(...ahead, 0));
 }
 
-const ACTIONS = {
+/** The next speed of the list, or the one before. */
+function changeSpeed(direction) {
+  const list = document.getElementById("speed");
+  list.selectedIndex = Math.min(Math.max(list.selectedIndex + direction, 0), list.options.length - 1);
+}
+
+function switchLoop() {
+  const box = document.getElementById("loop");
+  box.checked = !box.checked;
+}
+
+const ACTIONS = {  // of the player
   " ": () => (playingSince === null ? play() : pause()),
   ArrowRight: () => step(1),
   ArrowLeft: () => step(-1),
   Home: () => goTo(0),
   End: () => goTo(total),
+  "+": () => changeSpeed(1),
+  "-": () => changeSpeed(-1),
+  l: switchLoop,
 };
+const VIEW_ACTIONS = { p: () => keepPicture(), ...Object.fromEntries(Object.keys(VIEWPOINTS).map((name, k) => [`${k + 1}`, () => lookFrom(name)])) };
 
 /** Take over the moves and times of the story: bar, ticks, list of moves and labels. */
 function newPath() {
@@ -130,7 +148,7 @@ function addPlayer() {
     document.getElementById(id).addEventListener("click", ACTIONS[action]);
   }
   addEventListener("keydown", (event) => {
-    const action = story.moves.length ? ACTIONS[event.key] : undefined;
+    const action = VIEW_ACTIONS[event.key] ?? (story.moves.length ? ACTIONS[event.key] : undefined);
     const typed = "select, textarea, input:not(#scrub, [type=checkbox])";
     const own = event.key === " " ? `${typed}, button, [type=checkbox]` : typed;  // what answers this key by itself
     if (!action || event.target.matches?.(own) || event.ctrlKey || event.altKey || event.metaKey) return;

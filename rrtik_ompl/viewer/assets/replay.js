@@ -64,13 +64,15 @@ if (run) run.groups.forEach((group, k) => { for (let n = 0; n < group.count; n +
 const captionNow = () => (run ? run.groups[groupOf[Math.min(moveAt(now), groupOf.length - 1)]].caption : "");
 
 function nowText(tick, arrived) {
-  return `${now.toFixed(2)} s: ${arrived ? run.outcome : run.groups[groupOf[tick]].text}`;
+  const { event, text } = run.groups[groupOf[tick]];
+  const which = event === "motion" ? ` (motion ${groupOf[tick] + 1} of ${run.groups.length})` : "";
+  return `${now.toFixed(2)} s: ${arrived ? run.outcome : text + which}`;
 }
 
 /** The list of what happened, one row for ticks of the same kind. */
 function buildEvents(goTo) {
   document.getElementById("moves-section").hidden = false;
-  document.querySelector("#moves-section h2").firstChild.textContent = "Events ";
+  document.querySelector("#moves-section h2").firstChild.textContent = run.groups[0]?.event === "motion" ? "Motions " : "Events ";
   const table = document.getElementById("moves");
   table.append(make("tr", {}, make("th", { textContent: "no." }), make("th", { textContent: "when and what" })));
   run.groups.forEach((group, k) => {

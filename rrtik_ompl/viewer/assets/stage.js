@@ -145,12 +145,12 @@ if (robot && story.start_ghost) addGhost("start ghost", story.colors.start, stor
 if (robot && story.goal_ghost) addGhost("goal ghost", story.colors.goal, story.goal_ghost);
 story.ghosts.forEach(({ name, color, q }) => addGhost(name, color, q));
 
-/** Show the piece of the trail that is being travelled in full colour, the others pale. */
+/** Show the piece of the trail that is being travelled in full colour, the others paler; all of them where none is. */
 function highlightPiece(piece) {
   for (const group of node("trail").children) {
-    const on = group.name === `piece ${piece}`;
+    const on = piece === null || group.name === `piece ${piece}`;
     group.traverse((item) => {
-      if (item.isMesh) Object.assign(item.material, { transparent: true, opacity: on ? 1 : 0.45 });
+      if (item.isMesh) Object.assign(item.material, { transparent: true, opacity: on ? 1 : 0.6 });
     });
   }
 }

@@ -75,7 +75,7 @@ function addTrails() {
 /** All that is drawn, in the order of the tree. */
 function listThings() {
   const { colors } = story;
-  if (robot) addThing("robot", robot.name, toggles("robot"), { color: colors.robot });
+  if (robot) addThing("robot", robot.name, toggles("robot"));
   if (story.attached.length) addThing("robot", `held: ${story.attached.join(", ")}`, () => {}, { color: colors.attached });
   if (story.start_ghost) addThing("ghosts", "start", toggles("start ghost"), { color: colors.start, opacity: 0.6 });
   if (story.goal_ghost) addThing("ghosts", "goal", toggles("goal ghost"), { color: colors.goal, opacity: 0.6 });
@@ -123,7 +123,7 @@ function groupRow(name) {
   const members = things.filter(({ group }) => group === name);
   if (members.length === 1) return thingRow(members[0], `${GROUPS[name]}: ${members[0].text}`);
   const rows = make("ul", {}, ...members.map((thing) => thingRow(thing)));
-  const eye = eyeOf(GROUPS[name], true, (on) => {
+  const eye = eyeOf(GROUPS[name], groupsOn[name], (on) => {
     groupsOn[name] = on;
     rows.classList.toggle("closed", !on);
     applyEyes(name);
@@ -135,13 +135,15 @@ function groupRow(name) {
 }
 
 function buildTree() {
+  const closed = things.filter(({ on }) => !on).map(({ text }) => text);
+  const first = things.length === 0;
+  things.length = 0;
   listThings();
+  if (!first) things.forEach((thing) => { thing.on = !closed.includes(thing.text); });
   const used = Object.keys(GROUPS).filter((name) => things.some(({ group }) => group === name));
   document.getElementById("tree").replaceChildren(...used.map(groupRow));
-  const through = make("input", { type: "checkbox" });
-  through.addEventListener("change", () => seeThrough(through.checked));
-  document.getElementById("see-through").hidden = story.obstacles.length === 0;
-  document.getElementById("see-through").prepend(through);
+  document.getElementById("see-through-label").hidden = story.obstacles.length === 0;
   applyEyes();
 }
 
+document.getElementById("see-through").addEventListener("change", (event) => seeThrough(event.target.checked));

@@ -135,10 +135,10 @@ def draw_triad(node: Node, pose: pin.SE3, length: float) -> None:
         draw_tube(node[axis], np.stack([0.0 * direction, length * direction]), 0.035 * length, color)
 
 
-def draw_tube(node: Node, points: Matrix, radius: float, color: str) -> None:
+def draw_tube(node: Node, points: Matrix, radius: float, color: str, opacity: float = 1.0) -> None:
     """Draw a line through points, shape (k, 3), as a tube, because WebGL draws lines one pixel wide."""
     look = look_of_triangles(*tube(points, radius))
-    node.set_object(look.geometry, look_material(color))
+    node.set_object(look.geometry, look_material(color, opacity))
 
 
 def look_material(color: str, opacity: float = 1.0) -> Material:

@@ -17,6 +17,7 @@ from rrtik_ompl.viewer.drawing.scene_picture import draw_tube
 # [rad]; motion of the joints between two rings of a tube.
 RING_STEP = np.deg2rad(3.0)
 MAX_RINGS = 1500  # approximate total number of rings
+BEFORE_OPACITY = 0.5  # of the path for comparison: the path that counts is the strong one
 MAX_PIECES = 150  # longer paths are drawn in this many pieces of several moves each
 
 
@@ -69,7 +70,7 @@ def draw_before(vis: Node, robot: Robot, waypoints: Matrix, radius: float) -> No
     """Draw the tip's trail on another path, thinner, under ``before``; arguments as of :func:`draw_trail`."""
     tips = _way(robot, _dense(robot, waypoints, len(waypoints)), radius)
     if len(tips) > 1:
-        draw_tube(vis["before"], tips, 0.6 * radius, palette.BEFORE)
+        draw_tube(vis["before"], tips, 0.6 * radius, palette.BEFORE, BEFORE_OPACITY)
 
 
 def _way(arm: Robot, rows: Matrix, radius: float) -> Matrix:

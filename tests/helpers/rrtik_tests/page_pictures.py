@@ -20,7 +20,7 @@ PANE = np.s_[50:700, 0:860]  # of a window of that size: where the 3-D picture i
 
 
 @contextmanager
-def _ready_page(url: str, size: tuple[int, int] = SMALL) -> Iterator[Browser]:
+def opened(url: str, size: tuple[int, int] = SMALL) -> Iterator[Browser]:
     """A page that has built itself, which takes a busy machine longer than any fixed time."""
     if CHROMIUM is None:
         pytest.skip(NO_CHROMIUM)
@@ -36,7 +36,7 @@ def _ready_page(url: str, size: tuple[int, int] = SMALL) -> Iterator[Browser]:
 
 def document_of(url: str) -> str:
     """The document of a page that has built itself."""
-    with _ready_page(url) as browser:
+    with opened(url) as browser:
         return browser.ask("document.documentElement.outerHTML")
 
 
@@ -45,7 +45,7 @@ def screenshot(target: Path, fragment: str) -> np.ndarray:
     import cv2
 
     picture = target.with_suffix(".png")
-    with _ready_page(f"{target.as_uri()}{fragment}", SIZE) as browser:
+    with opened(f"{target.as_uri()}{fragment}", SIZE) as browser:
         browser.ask(DRAWN)
         browser.screenshot(picture)
     return cv2.imread(str(picture))[PANE][..., ::-1].astype(float)

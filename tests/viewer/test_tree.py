@@ -1,0 +1,81 @@
+"""The tree of what is shown, buttons and keys of a page, in a browser."""
+
+import time
+
+import pytest
+
+from rrtik_ompl import load_problem
+from rrtik_ompl.viewer.page import page
+from rrtik_tests.page_pictures import opened
+from rrtik_tests.programs import needs_chromium
+
+pytestmark = [pytest.mark.slow, needs_chromium]
+
+VISIBLE = """story.obstacles.map(({ node: leaf }) => {
+  let drawn = false;
+  const look = (item) => { if (item.isMesh && item.layers.test(viewer.camera.layers)) drawn = true; };
+  node("obstacles", leaf).traverseVisible(look);
+  return drawn && node("obstacles").visible;
+})"""
+CLICK = "[...document.querySelectorAll('#tree .eye')].find((eye) => eye.ariaLabel === 'show {}').click()"
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory):
+    problem = load_problem("planar3_boxes")
+    waypoints = [problem.start, [0.1, 0.1, 0.1]]
+    file = tmp_path_factory.mktemp("page") / "page.html"
+    file.write_text(page(problem, waypoints, before=[*waypoints, problem.start]), encoding="utf-8")
+    with opened(file.as_uri()) as found:
+        found.wait("document.documentElement.dataset.plans === 'yes'")
+        found.ask("window.kept = []; keepFile = (name, blob) => kept.push([name, blob])")
+        yield found
+
+
+def test_an_eye_hides_one_obstacle_and_that_of_the_group_all(browser):
+    everything = browser.ask(VISIBLE)
+    assert len(everything) > 1
+    assert all(everything)
+    first = browser.ask("story.obstacles[0].name")
+    browser.ask(CLICK.format(first))
+    assert browser.ask(VISIBLE) == [False, *everything[1:]]
+    browser.ask(CLICK.format("Obstacles"))
+    assert not any(browser.ask(VISIBLE))
+    browser.ask(CLICK.format("Obstacles"))
+    assert browser.ask(VISIBLE) == [False, *everything[1:]]  # the eye of the first is still closed
+    browser.ask(CLICK.format(first))
+    assert browser.ask(VISIBLE) == everything
+
+
+def test_keys_change_speed_loop_and_view(browser):
+    browser.ask("dispatchEvent(new KeyboardEvent('keydown', { key: '+' }))")
+    assert browser.ask("document.getElementById('speed').value") == "2"
+    browser.ask("dispatchEvent(new KeyboardEvent('keydown', { key: '-' }))")
+    assert browser.ask("document.getElementById('speed').value") == "1"
+    for wanted in (True, False):
+        browser.ask("dispatchEvent(new KeyboardEvent('keydown', { key: 'l' }))")
+        assert browser.ask("document.getElementById('loop').checked") is wanted
+    browser.ask("dispatchEvent(new KeyboardEvent('keydown', { key: '3' }))")
+    assert browser.ask("viewpoint") == browser.ask("Object.keys(VIEWPOINTS)[2]")
+
+
+def test_a_picture_a_view_and_a_film_are_handed_out(browser):
+    for name in ("picture", "view"):
+        browser.ask(f"document.getElementById('{name}-button').click()")
+    browser.ask("total = 0.4; document.getElementById('film-button').click()")
+    end = time.monotonic() + 90.0
+    while browser.ask("kept.length") < 3 and time.monotonic() < end:
+        time.sleep(0.2)
+    kinds = dict(browser.ask("kept.map(([name, blob]) => [name.split('.')[0], blob.size])"))
+    assert set(kinds) == {"picture", "view", "film"}
+    assert min(kinds["picture"], kinds["film"]) > 1000
+    browser.ask("newPath()")  # the whole path again
+
+
+def test_the_title_follows_the_path_and_the_one_for_comparison_goes_with_it(browser):
+    assert browser.ask("document.getElementById('title').textContent") == "planar3_boxes: path of 1 move"
+    assert "before" in browser.ask("document.getElementById('tree').textContent")
+    browser.ask("replacePath([state.start, state.start.map((value) => value + 0.01), state.start])")
+    assert browser.ask("document.getElementById('title').textContent") == "planar3_boxes: path of 2 moves"
+    assert browser.ask("document.title") == "planar3_boxes: path of 2 moves"
+    assert "before" not in browser.ask("document.getElementById('tree').textContent")
