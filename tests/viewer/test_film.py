@@ -78,7 +78,9 @@ def test_a_camera_of_a_file_is_where_the_file_says(tmp_path):
     """Seen from above by a camera of 90 degrees, a post is where a pinhole camera has it."""
     views = tmp_path / "views.yaml"
     views.write_text("views: [{eye: [0, -0.001, 2], target: [0, 0, 0], fov_deg: 90}]")
-    scene = rrtik.Scene([rrtik.Obstacle("post", rrtik.Box([0.2, 0.2, 0.2]), rrtik.pose([0.5, 0.25, 0.9]))])
+    scene = rrtik.Scene(
+        [rrtik.Obstacle("post", rrtik.Box([0.2, 0.2, 0.2]), rrtik.pose([0.5, 0.25, 0.9]), color="#c0392b")]
+    )
     shot = picture(scene, None, tmp_path / "a.png", size=(400, 400), camera=views, hide="frames,grid,labels")
     pixels = np.asarray(Image.open(shot).convert("RGB"), dtype=int)
     seen = np.argwhere(pixels.max(axis=2) - pixels.min(axis=2) > 60)
@@ -93,7 +95,7 @@ def test_a_camera_of_a_file_is_where_the_file_says(tmp_path):
 def test_what_is_hidden_is_not_in_the_picture(tmp_path):
     scene = rrtik.Scene(
         [
-            rrtik.Obstacle(name, rrtik.Box([0.2, 0.2, 0.2]), rrtik.pose([x, 0.0, 0.5]))
+            rrtik.Obstacle(name, rrtik.Box([0.2, 0.2, 0.2]), rrtik.pose([x, 0.0, 0.5]), color="#c0392b")
             for name, x in (("a", 0.0), ("b", 1.0))
         ]
     )
