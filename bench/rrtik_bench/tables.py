@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 from rrtik_bench.report.figures import Figure
-from rrtik_bench.report.rows import Row
+from rrtik_bench.report.rows import Row, row_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,8 +45,10 @@ class Collection:
         tables: No two of the same name.
         not_here: What was published and is not among them, a line each.
         also: Other words for the beginnings of names.
+        row_of: Makes a row of a record again, see `rrtik_bench.report.rows.row_of`.
     """
 
     tables: tuple[Table, ...]
     not_here: tuple[str, ...] = ()
     also: Mapping[str, str] = field(default_factory=dict)
+    row_of: Callable[[Mapping[str, Any]], Row] = row_of

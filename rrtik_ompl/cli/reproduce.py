@@ -5,30 +5,30 @@ from __future__ import annotations
 import json
 import time
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
-from typing import Annotated, Protocol
+from typing import Annotated, Any, Protocol
 
 import typer
 
 from rrtik_ompl.base.errors import InputError, UnknownNameError
 from rrtik_ompl.base.version import __version__
 from rrtik_ompl.cli import FOUND, NOT_FOUND
+from rrtik_ompl.cli.stored_round import ENDINGS, load_round, save_round
 from rrtik_ompl.cli.table import Table as Printed
 from rrtik_ompl.cli.terminal import note, plural, progress, say
 from rrtik_ompl.files.text import check_target, read_text, write_text
 
 NONE: Mapping[str, str] = MappingProxyType({})
 
-KEYS = ("name", "published", "measured", "verdict", "reading")
-HEADS = ("figure", *KEYS[1:])
+HEADS = ("figure", "published", "measured", "verdict", "reading")
 VERDICTS = ("held", "better", "differs", "refuted", "missed")
 MEANINGS = (
     "Held: as printed, within chance. Better: beyond the print on the side that is wanted. Differs: not as printed, as "
     "the reading lets expect. Refuted: a computation shows that the print is wrong. Missed: none of these. Seconds "
-    "against older machines have no verdict."
+    "against older machines have no verdict. Seen from: the least changes of the number by which the verdict becomes "
+    "another one."
 )
 
 
@@ -54,6 +54,13 @@ def reproduce(
         Path | None,
         typer.Option(help="Draw the figures of the sources from our measurements into this folder.", callback=_folder),
     ] = None,
+    store: Annotated[
+        Path | None,
+        typer.Option(help="Write every row with the numbers of its single runs to this file: .json, .json.gz."),
+    ] = None,
+    read: Annotated[
+        Path | None, typer.Option(help="Judge the rows of such a file again instead of measuring them.")
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of tables.")] = False,
 ) -> int:
     """Measure published tables again.
@@ -63,6 +70,7 @@ def reproduce(
     from rrtik_ompl.description.catalog import find_tables
 
     check_target(markdown, (".md",))
+    check_target(store, ENDINGS)
     offers = find_tables()
     known: dict[str, Table] = {table.name: table for offer in offers for table in offer.tables}
 
@@ -80,8 +88,20 @@ def reproduce(
     if plot is not None:
         return _draw(wanted, quick, plot)
 
+    readers = {table.name: offer.row_of for offer in offers for table in offer.tables}
+    if read is not None:
+        stored, quick = load_round(read, readers)
+        missing = [table.name for table in wanted if table.name not in stored]
+        if missing and not everything:
+            raise InputError(f"{read}: has no rows of {', '.join(missing)}; measure them, without --read")
+        done: Done = [(table, stored[table.name]) for table in wanted if table.name in stored]
+        if not as_json:
+            for table, rows in done:
+                _show(table, rows, "stored")
+        return _finish(done, quick, markdown, store, as_json)
+
     note(f"{plural(len(wanted), 'table')}, about {_time(sum(_seconds(each, quick) for each in wanted))} on two cores")
-    kept = Kept(markdown, quick)
+    kept = Kept(markdown, quick, readers)
 
     try:
         done = [(table, _rows(table, quick, kept, shown=not as_json)) for table in wanted]
@@ -90,20 +110,26 @@ def reproduce(
             note(f"what is done is kept in {kept.file}; the same command goes on from there")
         raise
 
+    code = _finish(done, quick, markdown, store, as_json)
+    kept.forget()
+    return code
+
+
+def _finish(done: Done, quick: bool, markdown: Path | None, store: Path | None, as_json: bool) -> int:
+    """Write the files that are wanted, print the counts or all rows, and return the exit code."""
     if markdown is not None:
         write_text(markdown, page(done, quick))
-    kept.forget()
+    if store is not None:
+        save_round(store, {table.name: rows for table, rows in done}, quick)
 
     if as_json:
-        print(json.dumps({table.name: [plain(row) for row in rows] for table, rows in done}))
+        print(json.dumps({table.name: [row.record() for row in rows] for table, rows in done}))
     else:
-        say(counted(done))
-        say(*([] if markdown is None else [f"wrote {markdown}"]))
-    return (
-        NOT_FOUND
-        if any(row.verdict is not None and not row.verdict.passes for _, rows in done for row in rows)
-        else FOUND
-    )
+        say(counted(done), *counted_apart(done))
+        say(*(f"wrote {file}" for file in (markdown, store) if file is not None))
+
+    missed = any(row.verdict is not None and not row.verdict.passes for _, rows in done for row in rows)
+    return NOT_FOUND if missed else FOUND
 
 
 def _rows(table: Table, quick: bool, kept: Kept, *, shown: bool) -> Sequence[Row]:
@@ -116,8 +142,12 @@ def _rows(table: Table, quick: bool, kept: Kept, *, shown: bool) -> Sequence[Row
 
     if shown:
         took = "kept from before" if known is not None else f"{time.perf_counter() - begin:.1f} s"
-        say(f"{table.name}: {table.title} ({table.source}), {took}", *_fitted(table), _table(rows))
+        _show(table, rows, took)
     return rows
+
+
+def _show(table: Table, rows: Sequence[Row], how: str) -> None:
+    say(f"{table.name}: {table.title} ({table.source}), {how}", *_fitted(table), _table(rows))
 
 
 def _fitted(table: Table) -> list[str]:
@@ -208,6 +238,17 @@ class Row(Protocol):
     def reading(self) -> str:
         """How the text was read, or why the figure differs."""
 
+    @property
+    def printed(self) -> bool:
+        """Whether the source prints what the number is compared with; else the bar is ours."""
+
+    @property
+    def detects(self) -> str:
+        """The least changes of the number with which the verdict would be another one."""
+
+    def record(self) -> dict[str, object]:
+        """Return plain values for JSON, with the numbers of single runs where there are any."""
+
 
 class Figure(Protocol):
     """A figure of a publication, drawn from our own measurement; see `rrtik_bench.figures.Figure`."""
@@ -236,6 +277,7 @@ class Table(Protocol):
         """Measure the table again."""
 
 
+Readers = Mapping[str, Callable[[Mapping[str, Any]], Row]]
 Done = Sequence[tuple[Table, Sequence[Row]]]
 
 
@@ -247,18 +289,23 @@ def cells(row: Row) -> tuple[str, ...]:
     return row.name, row.published, row.measured, "-" if row.verdict is None else row.verdict.value, row.reading
 
 
-def plain(row: Row) -> dict[str, str | None]:
-    """Return a row as plain values for JSON; ``verdict`` is null if nothing is compared."""
-    verdict = None if row.verdict is None else row.verdict.value
-    return {**dict(zip(KEYS, cells(row), strict=True)), "verdict": verdict}
-
-
 def counted(done: Done) -> str:
     """Return the number of each verdict, in words."""
     counts = Counter(row.verdict.value for _, rows in done for row in rows if row.verdict is not None)
     silent = sum(row.verdict is None for _, rows in done for row in rows)
     words = [f"{counts[word]} {word}" for word in sorted(counts, key=VERDICTS.index)]
     return ", ".join([*words, *([f"{silent} without a verdict"] if silent else [])])
+
+
+def counted_apart(done: Done) -> list[str]:
+    """Return the numbers of verdicts by what the source prints, and by bars of ours, in words."""
+    lines = []
+    for words, printed in (("By what the sources print", True), ("By bars of ours", False)):
+        rows = [
+            (table, [row for row in rows if row.verdict is not None and row.printed == printed]) for table, rows in done
+        ]
+        lines += [f"{words}: {counted(rows)}."] if counted(rows) else []
+    return lines
 
 
 def page(done: Done, quick: bool) -> str:
@@ -269,7 +316,7 @@ def page(done: Done, quick: bool) -> str:
 
     command = f"rrtik reproduce {'--all' if len(done) > 1 else done[0][0].name}{' --quick' if quick else ''}"
     lines = ["# Published and measured", "", f"Written by `{command}`, rrtik-ompl {__version__}, {platform.machine()}."]
-    lines += ["", MEANINGS, "", f"In all: {counted(done)}.", ""]
+    lines += ["", MEANINGS, "", f"In all: {counted(done)}.", "", *counted_apart(done), ""]
 
     rows = [(f"`{table.name}`", table.title, counted([(table, rows)])) for table, rows in done]
     lines += markdown_table(("table", "what", "verdicts"), rows)
@@ -278,7 +325,7 @@ def page(done: Done, quick: bool) -> str:
         lines += ["", f"## {table.title}", "", f"`{table.name}`, {table.source}", ""]
         lines += [f"Fitted to the published figures: {table.fitted}.", ""] if table.fitted else []
         lines += [f"Bars: {table.bars}.", ""] if table.bars else []
-        lines += markdown_table(HEADS, map(cells, each))
+        lines += markdown_table((*HEADS, "seen from"), [(*cells(row), row.detects) for row in each])
 
     return "\n".join([*lines, ""])
 
@@ -305,38 +352,17 @@ def _time(seconds: float) -> str:
 # --- what a round has done so far ------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, slots=True)
-class KeptVerdict:
-    """A verdict read back from a file."""
-
-    value: str
-
-    @property
-    def passes(self) -> bool:
-        """Whether it counts as a success."""
-        return self.value != "missed"
-
-
-@dataclass(frozen=True, slots=True)
-class KeptRow:
-    """A row read back from a file."""
-
-    name: str
-    published: str
-    measured: str
-    verdict: KeptVerdict | None
-    reading: str
-
-
 class Kept:
     """Storage for the tables that a round has measured, in a file beside its page; without a page nothing is kept.
 
     Args:
         markdown: The page.
         quick: Whether the round is the quick one; rows of another round, or of another version, are not used.
+        readers: For the rows of each table.
     """
 
-    def __init__(self, markdown: Path | None, quick: bool) -> None:
+    def __init__(self, markdown: Path | None, quick: bool, readers: Readers) -> None:
+        self._readers = readers
         self.file = None if markdown is None else markdown.with_suffix(".parts.jsonl")
         self._round = f"{__version__} {'quick' if quick else 'full'}"
         self._lines: dict[str, str] = {}
@@ -350,7 +376,7 @@ class Kept:
         line = self._lines.get(table.name)
         if line is None or json.loads(line)["round"] != self._round:
             return None
-        return [_row(each) for each in json.loads(line)["rows"]]
+        return [self._readers[table.name](each) for each in json.loads(line)["rows"]]
 
     def add(self, table: Table, rows: Sequence[Row]) -> None:
         """Store the rows of a table.
@@ -360,7 +386,7 @@ class Kept:
         """
         if self.file is None:
             return
-        line = {"table": table.name, "round": self._round, "rows": [plain(row) for row in rows]}
+        line = {"table": table.name, "round": self._round, "rows": [row.record() for row in rows]}
         self._lines[table.name] = json.dumps(line)
         write_text(self.file, "".join(f"{each}\n" for each in self._lines.values()))
 
@@ -368,8 +394,3 @@ class Kept:
         """Delete the file at the end of the round."""
         if self.file is not None:
             self.file.unlink(missing_ok=True)
-
-
-def _row(kept: dict[str, str]) -> Row:
-    name, published, measured, verdict, reading = (kept[key] for key in KEYS)
-    return KeptRow(name, published, measured, KeptVerdict(verdict) if verdict else None, reading)

@@ -190,5 +190,5 @@ def test_the_paper_tells_of_plans_in_time_what_the_stored_round_has():
 
 def test_a_table_that_says_who_set_its_bars_says_so_on_its_page():
     table = next(each for each in COLLECTION.tables if each.name == "ikurt-limits")
-    row = judged("a", "b", "c", 0.0, exactly(0, 1))
+    row = judged("a", "0", "c", 0.0, exactly(0, 1))
     assert f"\nBars: {table.bars}.\n" in page([(table, [row])], True)

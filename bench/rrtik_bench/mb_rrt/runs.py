@@ -58,12 +58,20 @@ PROCESSES = 2
 
 @dataclass(frozen=True)
 class Measured:
-    """One row: T_C [%], mu, rho at the margin of 1 % of the reach and strictly, the same after all passes."""
+    """One row: T_C [%], passes of the goals solved, rho at the margin of 1 % of the reach and strictly, at the end.
+
+    ``rho_all`` is that after all passes.
+    """
 
     converged: float
-    mean: float
+    hits: tuple[int, ...]
     rho: tuple[float, float]
     rho_all: tuple[float, float]
+
+    @property
+    def mean(self) -> float:
+        """Passes, over the goals solved; NaN where none was."""
+        return float(np.mean(self.hits)) if self.hits else float("nan")
 
 
 def arm(count: int) -> Links:
@@ -108,8 +116,7 @@ def _row(runs: list[TreeSearch], tolerance: float, rho_all: tuple[float, float])
     hits = [first_hit(run.misses, tolerance) for run in runs]
     solved = [hit for hit in hits if hit]
     stopped = [run.until(hit) if hit else run for run, hit in zip(runs, hits, strict=True)]
-    mean = float(np.mean(solved)) if solved else np.nan
-    return Measured(100.0 * len(solved) / len(runs), mean, _rho(stopped), rho_all)
+    return Measured(100.0 * len(solved) / len(runs), tuple(solved), _rho(stopped), rho_all)
 
 
 def _rho(runs: list[TreeSearch]) -> tuple[float, float]:

@@ -81,7 +81,7 @@ def shortening(quick: bool) -> list[Row]:
                f"n = 400: {pulled.questions:.0f} beside {long.questions:.0f}, lengths {pulled.ratio:.4f} and "
                f"{long.ratio:.4f}"),
         _ratio("sequential from the goal: length over that from the start", "no evidence that it helps",
-               back.ratio / cut.ratio, Bar((0.0, 10.0), held=(0.95, 1.05), better=(0.0, 0.95)), WORLDS),
+               back.ratio / cut.ratio, Bar((0.0, 10.0), held=(0.95, 1.05), differs=(0.8, 0.95)), WORLDS),
         _ratio("sequential with points between: length over that without", "better", fine.ratio / cut.ratio,
                Bar((0.0, 10.0), held=(0.5, 0.999)), "points every quarter of the planner's step"),
         _ratio("the same: questions", "a cost", fine.questions / cut.questions, Bar((0.0, 100.0), held=(1.5, 10.0)),
