@@ -618,13 +618,14 @@ class Loop:
         after = self._possible_travels or {}
         way = settings.tick * (settings.speed_bound or 0.0)  # of an obstacle in a tick [m]
         before = {name: max(travel - way, 0.0) for name, travel in after.items()}
-        reach = Reach(self._exact_world(), self.q, settings.step, self._max_change, settings.tick, before, after)
 
         # What is no faster than the bound but for rounding is not called faster.
         spare = ROUNDING + (SPEED_WARNING_RATIO - 1.0) * max(after.values(), default=0.0)
         spare += SPEED_WARNING_RATIO * TIME_RESOLUTION * (settings.speed_bound or 0.0)
+        world = self._exact_world()
+        reach = Reach(world, self.q, settings.step, self._max_change, settings.tick, before, after, spare)
         alone = self._world_of_arm
-        return way_out(reach, lambda q: alone.motion_valid(self.q, q), spare)
+        return way_out(reach, lambda q: alone.motion_valid(self.q, q))
 
     def _exact_world(self) -> World:
         """Return a world for exact distances, with obstacles where they were seen."""

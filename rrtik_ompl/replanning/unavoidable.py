@@ -3,9 +3,10 @@
 In a tick the arm goes straight, at one speed. So a motion is the configuration where it ends, and boxes cover all of
 these. In each box one obstacle, grown by what the bound on its speed allows until some time of the tick, touches one
 link on all motions that end there: at this time of the motion to the box's centre it is nearer than its growth, by more
-than any point of the arm is elsewhere then on another of these motions. Boxes of which this cannot be said are halved,
-until the motion to the centre of one of them keeps apart from all obstacles, which is a way out, or until none is left.
-A link that never moves is touched on all motions. docs/science/evasion.md has the theorem.
+than any point of the link is elsewhere then on another of these motions. Boxes of which this cannot be said are halved,
+across what moves the link that lacks most room at the centre, until the motion to the centre of one of them keeps apart
+from all obstacles, which is a way out, or until none is left. A link that never moves is touched on all motions.
+docs/science/evasion.md has the theorem.
 """
 
 from __future__ import annotations
@@ -19,12 +20,13 @@ import numpy as np
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector
 from rrtik_ompl.base.copies import as_value
 from rrtik_ompl.geometry.collision.distances import measured
+from rrtik_ompl.geometry.collision.motion_bound import approach_weights
 from rrtik_ompl.model.judgement import Contact
 from rrtik_ompl.world.world import World
 
 MOST_BOXES = 4096  # after which the search is given up, for an arm of few joints
 MANY_JOINTS = 4
-FEW_BOXES = 64  # the same for an arm of so many joints or more, whose boxes are too many to be cut small
+FEW_BOXES = 1024  # the same for an arm of so many joints or more, each of whose boxes takes longer
 FIRST_LOOKS = 4  # parts of a motion at whose ends it is looked at; twice as many where boxes are half as wide
 MOST_HALVINGS = 9  # of parts of a motion that is to be proven
 ROUNDING = 1e-6  # [m] of distances
@@ -74,6 +76,7 @@ class Reach:
         seconds: Length of the tick [s].
         before, after: How far each obstacle may be from where it was seen at the begin of the tick and at its end [m],
             by name.
+        spare: Room that a motion has to leave beside that [m], which accounts for rounding.
     """
 
     world: World
@@ -83,6 +86,7 @@ class Reach:
     seconds: float
     before: Mapping[str, float]
     after: Mapping[str, float]
+    spare: float
 
     @cached_property
     def ends(self) -> tuple[Vector, Vector]:
@@ -93,9 +97,32 @@ class Reach:
 
     @cached_property
     def pairs(self) -> tuple[tuple[str, str], ...]:
-        """The links that move, each with an obstacle that it must not touch."""
-        named = (_link_first(*pair, self.after) for pair in self.world.distances(self.q).names)
-        return tuple(pair for pair in named if pair[1] in self.after)
+        """The links that move, each with an obstacle that it must not touch and that may reach it in the tick."""
+        return tuple(self._near)
+
+    @cached_property
+    def weights(self) -> Matrix:
+        """How far any point of the link of each pair moves at most per unit of each joint [m per rad, or 1], (p, n)."""
+        return np.array(list(self._near.values())).reshape(-1, len(self.q))
+
+    @cached_property
+    def _near(self) -> dict[tuple[str, str], Vector]:
+        """The pairs and their weights."""
+        world = self.world
+        every = approach_weights(world.robot, world.bodies, world.pairs)
+        weights: dict[tuple[str, str], Vector] = {}
+        for (first, second), row in zip(world.pairs, every, strict=True):
+            pair = _link_first(world.bodies[first].name, world.bodies[second].name, self.after)
+            weights[pair] = np.maximum(weights.get(pair, 0.0), row)
+
+        found = world.distances(self.q)
+        near = {}
+        for named, distance in zip(found.names, found.values.tolist(), strict=True):
+            pair = _link_first(*named, self.after)
+            lower, upper = self.ends
+            if pair[1] in self.after and distance - (upper - lower) @ weights[pair] <= self.after[pair[1]] + self.spare:
+                near[pair] = weights[pair]
+        return near
 
     def distances(self, rows: Matrix) -> Matrix:
         """Return the distances of the pairs at configurations, shape (m, n), or lower bounds of them [m], (m, p)."""
@@ -108,13 +135,13 @@ class Reach:
         before, after = (np.array([way[obstacle] for _, obstacle in self.pairs]) for way in (self.before, self.after))
         return np.asarray(before + shares[:, None] * (after - before))
 
-    def keeps_apart(self, end: Vector, spare: float) -> bool:
-        """Check whether nothing can reach the arm on its motion to ``end``, shape (n,), with ``spare`` left [m]."""
+    def keeps_apart(self, end: Vector) -> bool:
+        """Check whether nothing can reach the arm on its motion to ``end``, shape (n,), with ``spare`` left."""
         shares = np.linspace(0.0, 1.0, FIRST_LOOKS + 1)
         way = float(np.abs(end - self.q) @ self.world.weights)
         for _ in range(MOST_HALVINGS):
             room = self.distances(self.q + shares[:, None] * (end - self.q)).T
-            growth = self.growths(shares).T + spare
+            growth = self.growths(shares).T + self.spare
             if (room <= growth).any():
                 return False
             doubtful = ~kept(room, way * np.diff(shares), growth).all(axis=0)
@@ -125,56 +152,55 @@ class Reach:
         return False
 
 
-def way_out(reach: Reach, may_go: Callable[[Vector], bool], spare: float) -> Vector | Unavoidable | None:
+def way_out(reach: Reach, may_go: Callable[[Vector], bool]) -> Vector | Unavoidable | None:
     """Return the end of a motion of a tick on which nothing can touch the arm, or a proof that there is none.
 
     Args:
         reach: What arm and obstacles can reach.
         may_go: Says of a configuration, shape (n,), whether the motion to it is free but for what may move.
-        spare: Room that the motion has to leave [m], which accounts for rounding.
 
     Returns:
         Where the motion ends, shape (n,); the proof; or None if neither was found.
     """
     q = reach.q
-    weights = reach.world.weights
     lower, upper = (corner[None] for corner in reach.ends)
     if (base := _base_touched(reach)) is not None:
         return Unavoidable(lower, upper, np.array([reach.seconds]), (base[0],), np.array([base[1]]))
     if not reach.pairs:
-        return None
+        return q if may_go(q) else None
 
     proven: list[tuple[Vector, Vector, float, tuple[str, str], float]] = []
     asked = 0
-    widest = float((upper - lower)[0] @ weights)
+    halvings = 0
     while len(lower) > 0:
         asked += len(lower)
         if asked > (MOST_BOXES if len(q) < MANY_JOINTS else FEW_BOXES):
             return None
 
-        wide = float((upper - lower)[0] @ weights)
-        shares = np.linspace(0.0, 1.0, FIRST_LOOKS * round(widest / wide) + 1)
+        shares = np.linspace(0.0, 1.0, (FIRST_LOOKS << halvings // len(q)) + 1)
         centres = 0.5 * (lower + upper)
         rows = q + shares[:, None] * (centres - q)[:, None, :]
         distances = reach.distances(rows.reshape(-1, len(q))).reshape(len(centres), len(shares), -1)
         beside = distances - reach.growths(shares)
-        least = beside.min(axis=2)
+        least = beside.min(axis=1)  # of each box and pair
 
         room = np.where(_in_reach(reach, centres), least.min(axis=1), -np.inf)
         best = int(room.argmax())
-        if room[best] > 0.0 and reach.keeps_apart(centres[best], spare) and may_go(centres[best]):
+        if room[best] > 0.0 and reach.keeps_apart(centres[best]) and may_go(centres[best]):
             return np.asarray(centres[best])
 
-        elsewhere = shares * (0.5 * (upper - lower) @ weights)[:, None]
-        looked = (least + elsewhere).argmin(axis=1)
-        at = np.arange(len(centres)), looked
-        touched = (least + elsewhere)[at] < -ROUNDING
-        pair = beside[at].argmin(axis=1)
+        # No point of a link is farther from where it is on the motion to the centre.
+        elsewhere = shares[:, None] * (0.5 * (upper - lower) @ reach.weights.T)[:, None, :]
+        most = (beside + elsewhere).reshape(len(centres), -1)
+        looked, pair = np.divmod(most.argmin(axis=1), len(reach.pairs))
+        touched = most.min(axis=1) < -ROUNDING
         for k in np.flatnonzero(touched).tolist():
             distance = float(distances[k, looked[k], pair[k]])
             proven.append((lower[k], upper[k], reach.seconds * shares[looked[k]], reach.pairs[pair[k]], distance))
 
-        lower, upper = _halves(lower[~touched], upper[~touched], weights)
+        weights = reach.weights[least.argmin(axis=1)]
+        lower, upper = _halves(lower[~touched], upper[~touched], weights[~touched])
+        halvings += 1
         within = _in_reach(reach, np.clip(q, lower, upper))
         lower, upper = lower[within], upper[within]
 
@@ -231,8 +257,8 @@ def _link_first(first: str, second: str, obstacles: Mapping[str, float]) -> tupl
     return (first, second) if second in obstacles else (second, first)
 
 
-def _halves(lower: Matrix, upper: Matrix, weights: Vector) -> tuple[Matrix, Matrix]:
-    """Return both halves of boxes, cut across the edge along which the arm moves most."""
+def _halves(lower: Matrix, upper: Matrix, weights: Matrix) -> tuple[Matrix, Matrix]:
+    """Return both halves of boxes, each cut across the edge along which most is moved by its weights, (m, n)."""
     axes = np.argmax((upper - lower) * weights, axis=1)
     rows = np.arange(len(lower))
     middles = 0.5 * (lower[rows, axes] + upper[rows, axes])

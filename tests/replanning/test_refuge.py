@@ -4,12 +4,14 @@ import re
 from dataclasses import replace
 from itertools import pairwise
 
+import coal
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.model.scene import Obstacle, Scene, TimedPoses
-from rrtik_ompl.model.shapes import Box
+from rrtik_ompl.model.shapes import Box, Sphere
 from rrtik_ompl.replanning.record import ReplanRun
 from rrtik_ompl.replanning.refuge import Guard
 from rrtik_ompl.replanning.replanner import replan, replan_with
@@ -166,8 +168,8 @@ def test_every_tick_has_a_way_out_or_a_proof_that_there_is_none():
         best = gaps(q + grid, np.linspace(0.0, 1.0, 11), q, boxes).min(axis=1).max()
         names = [each.name for each in boxes]
         before, after = dict.fromkeys(names, 0.0), dict.fromkeys(names, SPEED * TICK)
-        reach = Reach(World(robot, Scene(boxes)), q, 0.5, np.full(2, 0.5), TICK, before, after)
-        found = way_out(reach, lambda q: True, 1e-5)
+        reach = Reach(World(robot, Scene(boxes)), q, 0.5, np.full(2, 0.5), TICK, before, after, 1e-5)
+        found = way_out(reach, lambda q: True)
 
         if isinstance(found, Unavoidable):
             assert best < 0.0
@@ -185,6 +187,57 @@ def test_every_tick_has_a_way_out_or_a_proof_that_there_is_none():
             assert np.linalg.norm(found - q) <= 0.5 + 1e-9
             assert (gaps(found[None], np.linspace(0.0, 1.0, 2001), q, boxes) > 0.0).all()
     assert min(narrow.values()) >= 3
+
+
+def coal_distance(world, pair, q):
+    """Distance of a link and an obstacle by pinocchio and coal."""
+    link, obstacle = (next(body for body in world.bodies if body.name == name) for name in pair)
+    model = world.robot.model
+    data = model.createData()
+    pin.forwardKinematics(model, data, q)
+    places = data.oMi[link.joint] * link.placement, obstacle.placement
+    first, second = (coal.Transform3s(place.rotation, place.translation) for place in places)
+    request = coal.DistanceRequest()
+    return coal.distance(link.geometry, first, obstacle.geometry, second, request, coal.DistanceResult())
+
+
+def test_an_arm_of_six_joints_has_a_way_out_or_a_proof_in_most_ticks_and_coal_confirms_both():
+    robot = load_robot("ur5")
+    rng = np.random.default_rng(7)
+    step, seconds = 0.05, 0.02
+    decided = dict.fromkeys(("way out", "proof", "neither"), 0)
+    for _ in range(16):
+        q = rng.uniform(-2.0, 2.0, 6)
+        frames = robot.joint_frames(q[None])[0]
+        beside = rng.normal(size=3)
+        place = frames[int(rng.integers(2, 5)), :3, 3] + rng.uniform(0.13, 0.2) * beside / np.linalg.norm(beside)
+        ball = Obstacle("ball", Sphere(0.04), place)
+        world = World(robot, Scene([ball])).with_accuracy("exact")
+        if not world.valid(q):
+            continue
+        grown = rng.uniform(0.01, 0.2)
+        reach = Reach(world, q, step, np.full(6, step), seconds, {"ball": 0.0}, {"ball": grown}, 1e-6)
+        found = way_out(reach, lambda q: True)
+
+        if isinstance(found, Unavoidable):
+            decided["proof"] += 1
+            ways = rng.normal(size=(30, 6))
+            ends = q + step * rng.uniform(0.5, 1.0, (30, 1)) * ways / np.linalg.norm(ways, axis=1, keepdims=True)
+            for end in ends:
+                box = int(((end >= found.lower) & (end <= found.upper)).all(axis=1).nonzero()[0][0])
+                share = found.seconds[box] / seconds
+                assert coal_distance(world, found.pairs[box], q + share * (end - q)) <= grown * share + 1e-9
+        elif found is not None:
+            decided["way out"] += 1
+            pairs = [pair for pair in world.distances(q).names if "ball" in pair]
+            for share in np.linspace(0.0, 1.0, 21):
+                gap = min(coal_distance(world, pair, q + share * (found - q)) for pair in pairs)
+                assert gap > grown * share
+        else:
+            decided["neither"] += 1
+    assert decided["proof"] >= 3
+    assert decided["way out"] >= 3
+    assert decided["neither"] <= 2
 
 
 def test_moves_of_a_run_with_a_bound_are_safe_for_the_tick_they_are_made_in():
