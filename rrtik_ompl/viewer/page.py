@@ -42,6 +42,7 @@ SCRIPTS = (
     "replay.js",
     "clearance.js",
     "contacts.js",
+    "solutions.js",
     "player.js",
     "camera.js",
     "shots.js",

@@ -130,6 +130,14 @@ function showStill() {
   sayContact();
 }
 
+/** The arm in a posture, which the sliders change from there. */
+function standAt(posture) {
+  const q = posture.slice();
+  const pose = () => { setPosture(node("robot"), q); showJoints(q, null, false); };
+  onJointMoved = (j, value) => { q[j] = value; pose(); };
+  pose();
+}
+
 function addTicks() {
   const seconds = [...Array(Math.floor(total) + 1).keys()];
   const marked = story.timed ? seconds : run ? run.groups.filter((group) => group.event !== "walk").map((group) => story.times[group.first]) : story.times;
@@ -173,6 +181,7 @@ function followAddress() {
 
 if (robot) {
   buildJoints();
+  if (story.ghosts.length > 1) buildSolutions();
   addPlayer();
   if (story.proof) sayProof();
   if (story.moves.length) {
@@ -180,10 +189,7 @@ if (robot) {
     if (story.clearance) showClearance = buildClearance(goTo);
     newPath();
   } else {
-    const q = story.waypoints[0].slice();
-    const pose = () => { setPosture(node("robot"), q); showJoints(q, null, false); };
-    onJointMoved = (j, value) => { q[j] = value; pose(); };
-    pose();
+    standAt(story.ghosts.length ? story.ghosts[0].q : story.waypoints[0]);
     showContact(0);
   }
 }

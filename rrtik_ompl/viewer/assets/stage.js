@@ -122,6 +122,7 @@ function setPosture(group, q) {
 // Ghosts share the triangles of the arm. The first copy of each only fills the depth buffer, so that the second one shows the nearest
 // surface alone and looks like tinted glass, not like a heap of overlapping shells. Each is a little farther away than the one before,
 // so that the arm, or else the first of them, is seen where they coincide.
+const DRAWN_GHOSTS = 8;  // as many of all solutions: more would hide each other
 const GHOST_UNITS = 16;  // steps of the depth buffer from each ghost to the next one
 let ghostCount = 0;
 function addGhost(name, color, q) {
@@ -131,7 +132,7 @@ function addGhost(name, color, q) {
   const ghost = new THREE.Group();
   ghostCount += 1;
   [depth, glass].forEach((material, pass) => {
-    Object.assign(material, { side: THREE.DoubleSide, polygonOffset: true, polygonOffsetFactor: ghostCount, polygonOffsetUnits: GHOST_UNITS * ghostCount });
+    Object.assign(material, { side: THREE.DoubleSide, polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: GHOST_UNITS * ghostCount });
     const copy = node("robot").clone(true);
     const tipFrame = copy.getObjectByName("tip frame");
     if (tipFrame) tipFrame.parent.remove(tipFrame);
@@ -143,7 +144,8 @@ function addGhost(name, color, q) {
 }
 if (robot && story.start_ghost) addGhost("start ghost", story.colors.start, story.start_ghost);
 if (robot && story.goal_ghost) addGhost("goal ghost", story.colors.goal, story.goal_ghost);
-story.ghosts.forEach(({ name, color, q }) => addGhost(name, color, q));
+const drawnGhosts = story.ghosts.filter((_, k) => k % Math.ceil(story.ghosts.length / DRAWN_GHOSTS) === 0);
+drawnGhosts.forEach(({ name, color, q }) => addGhost(name, color, q));
 
 /** Show the piece of the trail that is being travelled in full colour, the others paler; all of them where none is. */
 function highlightPiece(piece) {

@@ -3,7 +3,8 @@ const GROUPS = {  // in this order; films hide them by these names
   robot: "Robot", ghosts: "Ghosts", trails: "Trails", goal: "Goal", obstacles: "Obstacles", margins: "Margins", contacts: "In collision", marks: "Further bodies",
   labels: "Names", frames: "Frames", grid: "Ground",
 };
-const UNFOLDED = ["ghosts", "trails", "contacts", "marks"];
+const UNFOLDED = ["ghosts", "obstacles", "trails", "contacts", "marks"];
+const FEW_COURSES = 3;  // more are a heap, and hidden at first
 const LONG_LIST = 8;  // groups with more rows are folded at first
 const things = [];
 
@@ -69,17 +70,30 @@ function addTrails() {
     addThing("trails", "path travelled", toggles("trail"), { color: colors.trail, opacity: 0.45, on: false });
   } else if (story.moves.length) addThing("trails", "path of the tip", toggles("trail", "beads"), { color: colors.trail });
   if (story.proof && story.proof.unproven.length) addThing("trails", "not proven free", () => {}, { color: colors.unproven });
+  const courses = story.obstacles.filter(({ course }) => course).length;
+  if (courses) addThing("trails", `courses of ${count(courses, "obstacle")}`, toggles("later"), { color: colors.obstacle, opacity: 0.6, on: courses <= FEW_COURSES });
   if (story.before) addThing("trails", `before: ${story.before}`, toggles("before"), { color: colors.before });
+}
+
+/** The colour of most triangles of a group. */
+function mainColor(name) {
+  const areas = new Map();
+  node(name).traverse(({ isMesh, geometry, material }) => {
+    if (!isMesh) return;
+    const color = `#${material.color.getHexString()}`;
+    areas.set(color, (areas.get(color) ?? 0) + (geometry.index?.count ?? 0));
+  });
+  return [...areas].sort(([, a], [, b]) => b - a)[0]?.[0] ?? null;
 }
 
 /** All that is drawn, in the order of the tree. */
 function listThings() {
   const { colors } = story;
-  if (robot) addThing("robot", robot.name, toggles("robot"));
+  if (robot) addThing("robot", robot.name, toggles("robot"), { color: mainColor("robot") });
   if (story.attached.length) addThing("robot", `held: ${story.attached.join(", ")}`, () => {}, { color: colors.attached });
-  if (story.start_ghost) addThing("ghosts", "start", toggles("start ghost"), { color: colors.start, opacity: 0.6 });
+  if (story.start_ghost) addThing("ghosts", "start", toggles("start ghost"), { color: colors.start, opacity: 0.6, on: story.ghosts.length === 0 });
   if (story.goal_ghost) addThing("ghosts", "goal", toggles("goal ghost"), { color: colors.goal, opacity: 0.6 });
-  story.ghosts.forEach(({ name, color }) => addThing("ghosts", name, toggles(name), { color, opacity: 0.6 }));
+  drawnGhosts.forEach(({ name, color }) => addThing("ghosts", name, toggles(name), { color, opacity: 0.6 }));
   addTrails();
   if (story.goal && story.goal !== "joint values") addThing("goal", story.goal, toggles("goal"), { color: colors.goal });
   for (const { name, node: leaf, color } of story.obstacles) {
