@@ -78,7 +78,7 @@ def view(
     """
     from rrtik_ompl.tasks import TaskPlan
     from rrtik_ompl.viewer.notebook import InlinePage, in_kernel
-    from rrtik_ompl.viewer.page import page
+    from rrtik_ompl.viewer.page import page_and_picture
     from rrtik_ompl.viewer.serve import PageServer
 
     called(on_ready, "on_ready", "an address")
@@ -88,12 +88,14 @@ def view(
     check_target(None if html is None else file_name(html), PAGE_FORMATS)
 
     played = path.played() if isinstance(path, TaskPlan) else path  # a TaskPlan brings its own timing and proof
-    text = page(shown, played, before=before, ghosts=ghosts, marks=marks, run=run, title=title, still=still)
+    text, picture = page_and_picture(
+        shown, played, before=before, ghosts=ghosts, marks=marks, run=run, title=title, still=still
+    )
     if html is not None:
         write_text(html, text)
         return Path(html)
     if in_kernel() if inline is None else inline:
-        return InlinePage(text)
+        return InlinePage(text, picture)
 
     with PageServer(text, port) as server:
         on_ready(server.url)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import html
 import sys
 from dataclasses import dataclass
@@ -10,7 +11,7 @@ from rrtik_ompl.description.catalog import robot_called
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.motion.trajectory import Trajectory
 from rrtik_ompl.planning.outcome import Plan
-from rrtik_ompl.viewer.page import page
+from rrtik_ompl.viewer.page import page_and_picture
 from rrtik_ompl.viewer.subject import Showable
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
@@ -24,19 +25,32 @@ class InlinePage:
 
     Attributes:
         text: The whole page; it needs no other file and no network.
+        picture: Its first view as a PNG, for where scripts do not run.
         height: Height of the frame around it [px].
     """
 
     text: str
+    picture: bytes
     height: int = HEIGHT
 
     def __repr__(self) -> str:
         return f"InlinePage({len(self.text) / 1e6:.1f} MB; a notebook shows it)"
 
     def _repr_html_(self) -> str:
-        """Return the page in a frame of its own, so that it does not interfere with the notebook."""
-        style = f"width: 100%; height: {self.height}px; border: 0"
-        return f'<iframe title="3-D page" style="{style}" srcdoc="{html.escape(self.text)}"></iframe>'
+        """Return the page in a frame of its own, so that it does not interfere with the notebook.
+
+        The frame covers the picture, which is seen where frames are taken out, as on sites that show notebooks.
+        """
+        source = base64.b64encode(self.picture).decode("ascii")
+        size = f"width: 100%; height: {self.height}px"
+        image = f'<img alt="first view" style="{size}; object-fit: contain" src="data:image/png;base64,{source}">'
+        style = f"position: absolute; inset: 0; {size}; border: 0"
+        frame = f'<iframe title="3-D page" style="{style}" srcdoc="{html.escape(self.text)}"></iframe>'
+        return f'<div style="position: relative; height: {self.height}px">{image}{frame}</div>'
+
+    def _repr_png_(self) -> bytes:
+        """Return the picture, which is what printed notebooks show."""
+        return self.picture
 
 
 def html_of(value: Plan | JointPath | Problem | World | Trajectory) -> str | None:
@@ -60,7 +74,7 @@ def html_of(value: Plan | JointPath | Problem | World | Trajectory) -> str | Non
         path = None
 
     planning = isinstance(value, (Plan, Problem))
-    return InlinePage(page(shown, path, still=not planning))._repr_html_()
+    return InlinePage(*page_and_picture(shown, path, still=not planning, picture=True))._repr_html_()
 
 
 def in_kernel() -> bool:

@@ -24,6 +24,7 @@ from rrtik_ompl.viewer.drawing.marks import Mark
 from rrtik_ompl.viewer.page_fixed import packed
 from rrtik_ompl.viewer.page_planner import page_planner
 from rrtik_ompl.viewer.picture import draw
+from rrtik_ompl.viewer.still import first_picture
 from rrtik_ompl.viewer.story import play_pace, story_of
 from rrtik_ompl.viewer.subject import Showable, ShownPath, Subject, subject_of, subject_of_run
 from rrtik_ompl.viewer.task_story import subject_of_task
@@ -74,6 +75,7 @@ def page(
     title: str | None = None,
     still: bool = False,
     asks: bool = False,
+    picture: bool = False,
 ) -> str:
     """Return the page that shows something, as the text of one HTML file that needs no other file and no network.
 
@@ -89,10 +91,40 @@ def page(
         title: Heading; None derives it from the name of the problem or robot.
         still: Whether to leave out the planner of the page.
         asks: Whether the page asks its server about each path that it finds.
+        picture: Whether the page has a picture of its first view, for browsers that cannot draw in 3-D.
 
     Raises:
         InputError: If the input cannot be shown, or if the page shall ask but cannot plan.
     """
+    text, _ = page_and_picture(
+        shown,
+        path,
+        before=before,
+        ghosts=ghosts,
+        marks=marks,
+        run=run,
+        title=title,
+        still=still,
+        asks=asks,
+        picture=picture,
+    )
+    return text
+
+
+def page_and_picture(
+    shown: Showable,
+    path: ShownPath | PlayedTask | None = None,
+    *,
+    before: ShownPath | None = None,
+    ghosts: ArrayLike | None = None,
+    marks: Sequence[Mark] = (),
+    run: ReplanRun | None = None,
+    title: str | None = None,
+    still: bool = False,
+    asks: bool = False,
+    picture: bool = True,
+) -> tuple[str, bytes]:
+    """Return a page as :func:`page` does, and the picture in it as a PNG, which is empty if it has none."""
     if isinstance(path, PlayedTask):
         subject = subject_of_task(shown, path)
     else:
@@ -100,6 +132,7 @@ def page(
         subject = subject_of(shown, path, before, ghosts, more) if run is None else subject_of_run(shown, run)
 
     recording, frame = draw(subject)
+    first_view = first_picture(subject, recording, frame) if picture else b""
     heading = _title(subject) if title is None else title
 
     told = story_of(subject, frame, heading, subject.name if title is None else "")
@@ -114,8 +147,9 @@ def page(
         told["plan"]["asks"] = asks
 
     story = json.dumps(told, allow_nan=False, separators=(",", ":"))
-    return Template(asset("page.html")).substitute(
+    text = Template(asset("page.html")).substitute(
         title=html.escape(heading),
+        still=_image(first_view, heading) if picture else "",
         policy=html.escape(ASKING_POLICY if asks else POLICY),
         style=asset("page.css"),
         notice=_meshcat("main.min.js.LICENSE.txt").replace("--", "- -"),
@@ -126,6 +160,12 @@ def page(
         script=_packed_scripts(SCRIPTS + (PLANNING if told["plan"] else ())),
         start="\n".join(asset(name) for name in STARTING),
     )
+    return text, first_view
+
+
+def _image(png: bytes, heading: str) -> str:
+    source = base64.b64encode(png).decode("ascii")
+    return f'<img id="still" alt="{html.escape(heading)}" src="data:image/png;base64,{source}">'
 
 
 def _planning(shown: Showable, subject: Subject, frame: Frame) -> dict[str, Any] | None:

@@ -31,7 +31,7 @@ def kernel(monkeypatch):
 
 
 def page_in(frame):
-    return html.unescape(re.fullmatch(r'<iframe [^>]* srcdoc="([^"]*)"></iframe>', frame, re.DOTALL)[1])
+    return html.unescape(re.search(r'<iframe [^>]* srcdoc="([^"]*)"></iframe>', frame, re.DOTALL)[1])
 
 
 def test_a_problem_a_world_and_a_plan_draw_the_page_of_view(problem, plan, tmp_path):

@@ -25,9 +25,9 @@ from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import Obstacle
 from rrtik_ompl.model.shapes import Shape
 from rrtik_ompl.model.shapes.surfaces import Faces
-from rrtik_ompl.pilot.overlay.triangle_raster import rasterize
 from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.viewer.drawing import palette
+from rrtik_ompl.viewer.drawing.triangle_raster import rasterize
 from rrtik_ompl.viewer.drawing.triangles import split_creases, thin_out
 
 ROBOT_TRIANGLES = 20_000

@@ -5,10 +5,12 @@ let viewer;
 try {
   viewer = new MeshCat.Viewer(pane);
   performance.mark("viewer");
+  document.getElementById("still")?.remove();
 } catch (error) {
   const sorry = document.createElement("p");
-  sorry.textContent = "This browser cannot draw in 3-D: WebGL is missing or switched off.";
-  pane.replaceChildren(sorry);
+  const picture = document.getElementById("still");
+  sorry.textContent = `This browser cannot draw in 3-D: WebGL is missing or switched off.${picture ? " The picture is the first view." : ""}`;
+  pane.replaceChildren(sorry, ...(picture ? [picture] : []));
   throw error;
 }
 const low = new THREE.Vector3(...story.frame.low);
@@ -145,7 +147,11 @@ function addGhost(name, color, q) {
 if (robot && story.start_ghost) addGhost("start ghost", story.colors.start, story.start_ghost);
 if (robot && story.goal_ghost) addGhost("goal ghost", story.colors.goal, story.goal_ghost);
 const drawnGhosts = story.ghosts.filter((_, k) => k % Math.ceil(story.ghosts.length / DRAWN_GHOSTS) === 0);
-drawnGhosts.forEach(({ name, color, q }) => addGhost(name, color, q));
+const ghostColors = story.ghosts.slice(0, DRAWN_GHOSTS).map(({ color }) => color);
+drawnGhosts.forEach((ghost, n) => {
+  ghost.color = ghostColors[n];
+  addGhost(ghost.name, ghost.color, ghost.q);
+});
 
 /** Show the piece of the trail that is being travelled in full colour, the others paler; all of them where none is. */
 function highlightPiece(piece) {

@@ -27,15 +27,30 @@ FLOATS, INDICES = ("Float32Array", 0x17), ("Uint32Array", 0x16)
 
 
 class Recording:
-    """A recording of the last command of each kind for each node, in order."""
+    """A recording of the last command of each kind for each node, in order.
+
+    Attributes:
+        drawn: The solid at each node that has one, by its path.
+        places: Pose, or pose and scale, of each node that has one relative to its parent, shape (4, 4).
+    """
 
     def __init__(self) -> None:
         self._commands: dict[tuple[str, str], bytes] = {}
+        self.drawn: dict[str, tuple[Geometry, Material]] = {}
+        self.places: dict[str, NDArray[np.float64]] = {}
 
     def set(self, kind: str, path: str, **parts: Any) -> None:
         """Record a command; it replaces an earlier one of the same kind for the same node."""
         self._commands.pop((kind, path), None)
         self._commands[kind, path] = umsgpack.packb({"type": kind, "path": path, **parts})
+
+    def pose(self, path: str) -> NDArray[np.float64]:
+        """Return the pose, or pose and scale, of a node in the world, shape (4, 4)."""
+        pose = np.eye(4)
+        steps = path.split("/")
+        for count in range(2, len(steps) + 1):
+            pose = pose @ self.places.get("/".join(steps[:count]), np.eye(4))
+        return pose
 
     @property
     def root(self) -> Node:
@@ -66,10 +81,12 @@ class Node:
 
     def set_object(self, geometry: Geometry, material: Material) -> None:
         """Place a solid at this node."""
+        self._recording.drawn[self._path] = geometry, material
         self._recording.set("set_object", self._path, object=described_object(self._path, geometry, material))
 
     def set_transform(self, matrix: NDArray[Any]) -> None:
         """Set the pose, or pose and scale, relative to the parent node, shape (4, 4)."""
+        self._recording.places[self._path] = np.asarray(matrix, dtype=np.float64)
         self._recording.set("set_transform", self._path, matrix=matrix.T.ravel().tolist())
 
 

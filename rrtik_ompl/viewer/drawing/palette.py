@@ -8,7 +8,7 @@ START = "#0072b2"
 GOAL = "#009e73"
 OBSTACLE = "#e3bd84"
 # Of obstacles that state no colour, the largest kind first; away from the hues of ghosts, trails and contacts.
-OBSTACLES = (OBSTACLE, "#a8b8c8", "#c9826b", "#9d92c7", "#cfc48a", "#83a6ab", "#d3a3b4", "#a08b77")
+OBSTACLES = (OBSTACLE, "#a8b8c8", "#cc9480", "#9d92c7", "#cfc48a", "#83a6ab", "#d3a3b4", "#a08b77")
 GROUND = "#c9bfa8"
 ATTACHED = "#cc79a7"
 INK = "#1d2733"
