@@ -23,11 +23,12 @@ from rrtik_ompl.description.catalog import robot_from_entry
 from rrtik_ompl.geometry.collision.bodies import DISTANCE_TOLERANCE, Body, kept_apart
 from rrtik_ompl.geometry.collision.body_arrays import body_arrays
 from rrtik_ompl.geometry.collision.containment import Containment
-from rrtik_ompl.geometry.collision.distances import gap_beyond, signed_gap
+from rrtik_ompl.geometry.collision.distances import signed_gap
 from rrtik_ompl.geometry.collision.solids import around
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.tasks.contact_life import CONTACT_GAP, EXTRA_DEPTH, signed_distance
 from rrtik_ompl.tasks.setting import Setting
+from rrtik_ompl.world.exact_checks import distance as gap_of
 
 MAX_LEVEL = 12  # deepest level of the bisection, with intervals of 1/4096 of the motion
 SAME = 1e-7  # [m] or [rad] tolerance for a finger's pose at the middle of its motion to be on the screw
@@ -209,7 +210,7 @@ def _beyond(first: _Part, second: _Part, share: float, distance: float) -> bool:
     if distance < 0.0:
         return _depth_apart(first, second, share) > distance
     ends = (first.body.geometry, first.at(share), second.body.geometry, second.at(share))
-    return gap_beyond(ends, distance) is not None
+    return gap_of(*ends, distance) is not None
 
 
 def _depth_apart(first: _Part, second: _Part, share: float) -> float:
