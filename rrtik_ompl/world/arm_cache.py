@@ -40,8 +40,8 @@ SLIDING_MARGIN = 1e-3  # [m] range beyond the limits of prismatic joints that th
 LOOKS = 64  # configurations by which it is told how often covers meet
 OFTEN = 0.1  # share of these, from which on balls tell too little of two links
 MOST_PIECES = 32  # pairs of convex pieces of two links; their cells are then found in a few hundredths of a second
-KEPT_ARMS = 8  # tables of an arm: empty-handed, with each thing that it takes, with its fingers open or closed
-KEPT_PROOFS = 8  # tables of proofs, likewise
+KEPT_PROOFS = 8  # tables of proofs
+KEPT_ARMS = 12  # tables of an arm: with nothing or a thing in its hand, open or closed, with its own pairs or without
 NO_SPHERES = np.empty((0, 4))
 
 Spheres = tuple[Matrix, Matrix]  # outer and inner cover of a body: centre and radius, shape (n, 4) [m]
@@ -187,14 +187,13 @@ class ArmCache:
         centres = np.einsum("mij,nj->mni", poses[:, :3, :3], cover[:, :3]) + poses[:, None, :3, 3]
         return centres, cover[:, 3]
 
-    def pack(self, bodies: Sequence[Body], pairs: Pairs, covers: Sequence[Spheres], *, share: bool = True) -> FastWorld:
-        """Pack the kernels' tables of a world.
+    def pack(self, bodies: Sequence[Body], pairs: Pairs, covers: Sequence[Spheres]) -> FastWorld:
+        """Pack the kernels' tables of a world; the arm's part is that of tables packed before where it is the same.
 
         Args:
             bodies: The bodies; those of the robot's links first.
             pairs: Pairs of indices into ``bodies`` that must not touch.
             covers: See :meth:`covers_of`.
-            share: Whether to reuse the arm's part of tables packed before, and to keep that of the new ones for reuse.
         """
         tables = FastWorld(
             self._robot.chain,
@@ -205,11 +204,10 @@ class ArmCache:
             solids=of_each((body.geometry for body in bodies), convex_solids),
             strokes=strokes(self._robot),
             cells=self.cells(bodies, pairs),
-            like=tuple(self._arms) if share else (),
+            like=tuple(self._arms),
         )
-        if share:
-            others = [each for each in self._arms if each is not tables.arm]
-            self._arms = [tables.arm, *others[: KEPT_ARMS - 1]]
+        others = [each for each in self._arms if each is not tables.arm]
+        self._arms = [tables.arm, *others[: KEPT_ARMS - 1]]
         return tables
 
 

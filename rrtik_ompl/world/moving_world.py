@@ -89,7 +89,7 @@ class MovingWorld:
             checked_pairs = tuple(p for p in checked_pairs if any(self._bodies[i].kind == "obstacle" for i in p))
 
         cache = arm_cache(self.robot)
-        self._fast = cache.pack(self._bodies, checked_pairs, cache.covers_of(self._bodies), share=self_collision)
+        self._fast = cache.pack(self._bodies, checked_pairs, cache.covers_of(self._bodies))
         self._motions: dict[tuple[bool, float], FastMotions] = {}
         self._inflation = [0.0] * len(self._bodies)
 
@@ -275,7 +275,7 @@ class MovingProver(Prover):
 
         Both are for the same thread.
         """
-        packed = super()._packed_for(0.0, 0.0).for_thread(placing=True)
+        packed = super()._packed_for(0.0, 0.0).for_thread(placing=True, same_thread=True)
         other = replace(self, tables=TakenProof(packed), kin=object(), _coal=None)
         other.obstacles = self._table_obstacles().within(packed)
         return other

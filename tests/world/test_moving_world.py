@@ -12,6 +12,7 @@ from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.geometry.collision.distances import measured
 from rrtik_ompl.kernels import FREE
+from rrtik_ompl.kernels.proof.packing import COMPUTED
 from rrtik_ompl.kernels.search.motions.motion_table import step_counts
 from rrtik_ompl.model.scene import Obstacle, Scene
 from rrtik_ompl.model.shapes import Box, HalfSpace, HeightField, Octree, PointCloud, Prism, Sphere
@@ -30,6 +31,16 @@ def arm_scenes():
         poses = [*places, pin.SE3(np.eye(3), np.array([0.0, 0.0, rng.uniform(-0.2, 0.2)]))]
         scenes.append(Scene([Obstacle(f"o{k}", s, p) for k, (s, p) in enumerate(zip(shapes, poses, strict=True))]))
     return robot, scenes
+
+
+@pytest.mark.kernels
+@pytest.mark.parametrize("self_collision", [True, False])
+def test_moving_worlds_of_an_arm_share_its_tables(self_collision):
+    robot, scenes = arm_scenes()
+    first, second = (MovingWorld(World(robot, scene), self_collision=self_collision)._fast for scene in scenes[:2])
+    other = MovingWorld(World(robot, scenes[0]), self_collision=not self_collision)._fast
+    assert first.arm is second.arm
+    assert first.arm is not other.arm
 
 
 @pytest.mark.kernels
@@ -76,6 +87,17 @@ def test_provers_from_one_table_place_their_obstacles_independently():
     for prover, answer in placed:
         assert (prover.proven(rows, ends) == answer).all()
     assert 0.1 < np.mean([answer for _, answer in placed]) < 0.95
+
+
+@pytest.mark.parametrize("placing", [True, False])
+def test_tables_of_two_threads_share_no_memory_in_which_they_compute(placing):
+    robot, scenes = arm_scenes()
+    world = World(robot, scenes[0])
+    first = MovingProver(robot, tuple(world.bodies), tuple(world.pairs))._packed_for(0.0, 0.0)
+    own = first.for_thread(placing=placing)
+    for name in COMPUTED:
+        one, other = getattr(first.table, name), getattr(own.table, name)
+        assert one.size == 0 or not np.shares_memory(one, other)
 
 
 def far(rng):

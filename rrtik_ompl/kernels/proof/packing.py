@@ -116,15 +116,16 @@ class ProofPairs:
         sizes = self.table.sizes.reshape(-1, layout.SIZE_COUNT)[self.still[blocks], : layout.STILL_SIZE]
         self.table.still.reshape(-1, layout.STILL_SIZE, WIDTH)[blocks] = sizes.transpose(0, 2, 1)
 
-    def for_thread(self, *, placing: bool = False) -> ProofPairs:
+    def for_thread(self, *, placing: bool = False, same_thread: bool = False) -> ProofPairs:
         """The same pairs in a table with memory of its own to compute in.
 
         Args:
-            placing: Whether its obstacles may be put elsewhere than those of this table. It is then for the same
-                thread, and computes frames, which take most of the memory, where this one does: each proof begins with
-                none of them.
+            placing: Whether its obstacles may be put elsewhere than those of this table.
+            same_thread: Whether it is for the thread of this table alone. Both then compute frames, which take most of
+                the memory, in the same place: each proof begins with none of them.
         """
-        own = {name: np.zeros_like(getattr(self.table, name)) for name in COMPUTED if name != "frames" or not placing}
+        computed = [name for name in COMPUTED if name != "frames" or not same_thread]
+        own = {name: np.zeros_like(getattr(self.table, name)) for name in computed}
         if self.clouds:  # points that are compared stand among the solids
             own |= {name: getattr(self.table, name) for name in ("solids", "corners")}
         if placing:
