@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from itertools import pairwise
 
 import numpy as np
 import pinocchio as pin
@@ -159,6 +160,23 @@ def test_the_way_of_an_obstacle_bounds_every_point_of_it():
             assert max(moved) <= bound
     steady = Obstacle("steady", Sphere(0.3), motion=ConstantVelocity([0.0, 3.0, 4.0]))
     assert Travel(steady, 0.3).from_middle(1.0, 1.2) == pytest.approx(0.5)
+
+
+def test_a_stretch_that_barely_reaches_full_speed_keeps_the_limits():
+    slot = 0.1
+    for slots in (2, 10):
+        for excess in np.geomspace(1e-15, 1e-3, 60):
+            fast = 0.5 * slots * (1.0 + excess)
+            steep = fast * (slots - fast)  # so that all slots are needed
+            pace = Pace(np.ones(1), np.array([fast / steep]), np.inf)
+            timing = Timing(np.array([[3.0], [3.0 + fast]]), np.array([0, slots]))
+            motion = timing.trajectory(pace, slot, JointPath(timing.rows, ("joint",)))
+
+            spline = CubicHermiteSpline(motion.times, motion.positions, motion.velocities)
+            moments = np.concatenate([np.linspace(a, b, 11) for a, b in pairwise(motion.times)])
+            assert np.abs(spline(moments, 1)).max() <= (1.0 + 1e-7) / slot
+            knots = np.concatenate([np.nextafter(motion.times[1:], 0.0), motion.times[:-1]])
+            assert np.abs(spline(knots, 2)).max() <= (1.0 + 1e-7) * fast / steep / slot**2
 
 
 def test_a_vertex_is_reached_only_onwards_in_time_and_at_a_speed_that_is_allowed():

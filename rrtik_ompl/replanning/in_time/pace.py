@@ -82,9 +82,10 @@ class Pace:
         """
         fast, steep = (float(each[0]) for each in self._needed(move[None]))
         cruise = float(np.sqrt(max(slots**2 - 4.0 * steep, 0.0)))
-        # A cubic between knots that are nearly one has any acceleration, by rounding alone.
-        if cruise < SHORTEST_CRUISE and 2.0 * fast <= slots:
-            cruise = 0.0
+        # A cubic between knots that are nearly one has any acceleration, by rounding alone. So there is no cruise, or,
+        # where the speed would be too large then, a longer one: the acceleration grows by its square alone.
+        if cruise < SHORTEST_CRUISE:
+            cruise = 0.0 if 2.0 * fast <= slots else SHORTEST_CRUISE
         return 0.5 * (slots - cruise)
 
     def shares(self, move: Vector, slots: int) -> Vector:
