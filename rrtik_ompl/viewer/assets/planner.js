@@ -81,8 +81,8 @@ function drawTrail(rows) {
   for (let k = 1; k < rows.length; k += 1) {
     const piece = new THREE.Group();
     piece.name = `piece ${k - 1}`;
-    const turn = Math.max(...rows[k].map((value, j) => Math.abs(value - rows[k - 1][j])));
-    const steps = Math.min(Math.max(Math.ceil(turn / 0.06), 1), 60);
+    const turn = rows[k].reduce((sum, value, j) => sum + Math.abs(value - rows[k - 1][j]), 0);
+    const steps = Math.min(Math.max(Math.ceil(turn / 0.1), 1), 60);
     const frames = Array.from({ length: steps + 1 }, (_, s) => jointFrames(rows[k - 1].map((a, j) => a + ((rows[k][j] - a) * s) / steps)));
     for (const tip of robot.trails) {
       const points = frames.map((each) => new THREE.Vector3().setFromMatrixPosition(carried(tip, each)).toArray());

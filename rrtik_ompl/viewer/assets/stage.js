@@ -72,6 +72,7 @@ function castShadows() {
   Object.assign(key.shadow.camera, { left: -reach, right: reach, bottom: -reach, top: reach, near: 0.1 * size, far: 6 * size });
   node().traverse((item) => { item.castShadow = item.receiveShadow = false; });
   shade(node("robot"));
+  if (robot) node("robot", robot.nodes[robot.tip.joint], "tip frame").traverse((item) => { item.castShadow = false; });
 }
 
 /** Let the solids of a group cast and receive shadows; what is seen through casts none. */

@@ -14,8 +14,8 @@ from rrtik_ompl.viewer.drawing import palette
 from rrtik_ompl.viewer.drawing.nodes import Material, Node, SphereGeometry
 from rrtik_ompl.viewer.drawing.scene_picture import draw_tube
 
-# [rad]; motion of the joints between two rings of a tube.
-RING_STEP = np.deg2rad(3.0)
+# [rad]; motion of all joints together between two rings of a tube: what turns a long arm's tip.
+RING_STEP = np.deg2rad(6.0)
 MAX_RINGS = 1500  # approximate total number of rings
 BEFORE_OPACITY = 0.5  # of the path for comparison: the path that counts is the strong one
 MAX_PIECES = 150  # longer paths are drawn in this many pieces of several moves each
@@ -87,7 +87,7 @@ def _dense(robot: Robot, waypoints: Matrix, total: int) -> Matrix:
     rows = [waypoints[:1]]
 
     for a, b in pairwise(waypoints):
-        turn = float(np.abs(b - a)[~robot.prismatic].max(initial=0.0))
+        turn = float(np.abs(b - a)[~robot.prismatic].sum())
         steps = int(np.clip(np.ceil(turn / RING_STEP), 1, most))
         rows.append(a + (b - a) * np.linspace(0.0, 1.0, steps + 1)[1:, None])
 
