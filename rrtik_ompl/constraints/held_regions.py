@@ -91,10 +91,10 @@ def held_regions(robot: Robot, scene: Scene, regions: Iterable[TaskRegion], star
         robot: The arm.
         scene: The scene, whose attached objects may carry a frame.
         regions: The regions to hold.
-        start: Configuration at which regions ``from_start`` are placed, shape (dof,); None if they have been already.
+        start: Configuration at which regions ``from_start`` are placed, shape (dof,); None if none is.
 
     Raises:
-        InputError: If one is not a region, names no existing frame, or cannot be held.
+        InputError: If one is not a region, names no existing frame, cannot be held, or is ``from_start`` without one.
     """
     prepared = []
     for number, region in enumerate(regions, 1):
@@ -116,9 +116,14 @@ def _placed(robot: Robot, scene: Scene, region: TaskRegion, label: str, start: V
         scene: The scene, whose attached objects may carry the frame.
         region: The region.
         label: Name of the region in messages.
-        start: Configuration at which a region ``from_start`` is placed, shape (dof,); None if it has been already.
+        start: Configuration at which a region ``from_start`` is placed, shape (dof,).
     """
-    if region.from_start and start is not None:
+    if region.from_start:
+        if start is None:
+            raise InputError(
+                f"{label} begins where a path does (from_start), and a world has no path; give it to a Problem, or "
+                "place it with region.started_at(pose of its frame)"
+            )
         _, joint, T_joint_frame = frame_place(robot, scene, region.frame, label)
         region = region.started_at(pin.SE3(robot.joint_frames(start)[0, joint]) * T_joint_frame)
 

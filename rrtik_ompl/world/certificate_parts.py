@@ -46,15 +46,16 @@ class Parts:
         self.spans[0, 1] = len(points)
         self.order = np.arange(len(points))
 
-        least = points.min(axis=1)
-        greatest = points.max(axis=1)
+        # A single point of an element is its least and its greatest one, as in clouds and piles of boxes.
+        least, greatest = (points.min(axis=1), points.max(axis=1)) if points.shape[1] > 1 else (points[:, 0],) * 2
+        middles = np.ascontiguousarray(0.5 * (least + greatest).T)
         for k, (node, axis, coordinate) in enumerate(cuts):
             if node > 2 * k or self.children[node, 0] >= 0:
                 raise InputError(f"cut {k} of a body divides node {node}, which is no leaf")
             begin, end = self.spans[node].tolist()
             own = self.order[begin:end]
-            below = 0.5 * (least[own, axis] + greatest[own, axis]) < coordinate
-            middle = begin + int(below.sum())
+            below = middles[axis, own] < coordinate
+            middle = begin + int(np.count_nonzero(below))
             self.order[begin:end] = np.concatenate([own[below], own[~below]])
             self.children[node] = 2 * k + 1, 2 * k + 2
             self.spans[2 * k + 1 : 2 * k + 3] = [[begin, middle], [middle, end]]
@@ -99,7 +100,8 @@ class Parts:
         ways = np.abs(self._points - centres[:, None])
         if self._half is not None:
             ways = ways + self._half[:, None]
-        return np.asarray(np.sqrt((ways * ways).sum(axis=2).max(axis=1)))
+        squares = np.einsum("nkj,nkj->nk", ways, ways)
+        return np.asarray(np.sqrt(squares.max(axis=1) if squares.shape[1] > 1 else squares[:, 0]))
 
     @cached_property
     def empty(self) -> Mask:

@@ -67,6 +67,16 @@ def test_a_cup_that_starts_upside_down_stays_so(ur5):
     np.testing.assert_allclose(down.T_world_w.rotation[:, 2], -up.T_world_w.rotation[:, 2], atol=1e-12)
 
 
+def test_a_world_without_a_path_refuses_what_begins_where_a_path_does(ur5):
+    region = rrtik.constraints.upright(ur5, tolerance_deg=5.0)
+    with pytest.raises(InputError, match=r"path constraint 1 begins where a path does .*give it to a Problem"):
+        rrtik.World(ur5, constraints=[region])
+    placed = rrtik.World(ur5, constraints=[region.started_at(ur5.fk(START))])
+    assert placed.constraints.held(START[None]).all()
+    problem = rrtik.Problem(rrtik.World(ur5), START, START, constraints=[region])
+    assert not any(each.from_start for each in problem.world.settings.constraints)
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_projected_configurations_are_in_the_region_by_the_errors_of_task_regions(ur5, kind):
     held = prepared(ur5, START, kind)

@@ -8,7 +8,13 @@ import pytest
 
 import rrtik_ompl as rrtik
 from bench.proofs.tampering import with_model_of
-from rrtik_ompl.geometry.collision.elements import compared_pairs, elements_of, named_bodies
+from rrtik_ompl.geometry.collision.elements import (
+    DIRECTIONS,
+    _extents,
+    compared_pairs,
+    elements_of,
+    named_bodies,
+)
 from rrtik_ompl.model.certificate import from_document
 from rrtik_ompl.model.scene import Obstacle, Scene
 from rrtik_ompl.motion.trajectory.splines import Splines
@@ -93,6 +99,14 @@ def test_a_point_more_in_a_cloud_is_found_whatever_the_model_says(arm, cloudy):
     dirty = World(arm, Scene([Obstacle("thing", more)]))
     assert dirty.verify(certificate, rows) == "it is for another scene: 'thing' differs"
     assert "not shown apart" in dirty.verify(with_model_of(certificate, dirty), rows)
+
+
+def test_extents_are_the_farthest_corners_in_each_direction():
+    rng = np.random.default_rng(3)
+    points, half = rng.normal(size=(50, 3)), rng.uniform(0.0, 0.5, (50, 3))
+    corners = (points[:, None] + half[:, None] * (2.0 * np.indices((2, 2, 2)).reshape(3, -1).T - 1.0)).reshape(-1, 3)
+    np.testing.assert_allclose(_extents(points, half), (corners @ DIRECTIONS.T).max(axis=0), atol=1e-9)
+    np.testing.assert_allclose(_extents(points), (points @ DIRECTIONS.T).max(axis=0), atol=1e-9)
 
 
 def test_cuts_leave_nothing_out_whatever_they_are(arm):

@@ -30,6 +30,7 @@ FEW_POINTS = 64  # up to which the points of a hull stand in a certificate
 _AXES = np.array([sign * axis for axis in np.eye(3) for sign in (1.0, -1.0)])
 _DIAGONALS = np.array(list(np.ndindex(2, 2, 2))) * 2.0 - 1.0
 DIRECTIONS = np.concatenate([_AXES, _DIAGONALS / np.sqrt(3.0)])
+OPPOSITES = ((0, 1), (2, 3), (4, 5), (6, 13), (7, 12), (8, 11), (9, 10))  # rows of these
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -211,7 +212,13 @@ def _hull(points: Matrix, radius: float) -> Elements:
 def _extents(points: Matrix, half: Matrix | None = None) -> list[float]:
     """Return the support function of points, shape (n, 3), or of boxes around them, in ``DIRECTIONS`` [m]."""
     wide = np.zeros((1, 3)) if half is None else half
-    return [round(float((points @ way + wide @ np.abs(way)).max()), 9) for way in DIRECTIONS]
+    found = [0.0] * len(DIRECTIONS)
+    for k, opposite in OPPOSITES:
+        heights = points @ DIRECTIONS[k]
+        reach = wide @ np.abs(DIRECTIONS[k])
+        found[k] = round(float((reach + heights).max()), 9)
+        found[opposite] = round(float((reach - heights).max()), 9)
+    return found
 
 
 def _moments(points: Matrix) -> list[float]:
