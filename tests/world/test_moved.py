@@ -10,6 +10,7 @@ import rrtik_ompl as rrtik
 from rrtik_ompl.base.errors import InputError, UnknownNameError
 from rrtik_ompl.kernels.checks.fast_world import FastWorld
 from rrtik_ompl.kernels.tables import moved_rows
+from rrtik_ompl.tasks.contact_life import touching_at
 from rrtik_tests.sizes import how_many
 
 MOVES = how_many(300, 24)
@@ -81,6 +82,25 @@ def test_after_any_moves_a_world_answers_as_one_made_anew(queries, count, margin
             some.append([each.any() and not each.all() for each in found[:3]])
     assert np.all(some, axis=1).any()
     assert world.fast is None or world.fast.intact()
+
+
+@pytest.mark.parametrize("name", ["box", "capsule", "hull", "bent"])
+def test_after_a_move_a_scene_with_contacts_answers_as_one_made_anew(queries, name):
+    robot, rows, ends = queries
+    rng = np.random.default_rng(5)
+    first = rrtik.World(robot, scene_of(10))
+    contacts = [rrtik.Touching(name, "wrist_3_link", -0.002)]
+    differ = []
+    for _ in range(3):
+        moved = first.moved(name, anywhere(rng, name, reach=0.5))
+        found = moved.with_scene(replace(moved.scene, contacts=contacts))
+        obstacles = [replace(each) for each in moved.scene.obstacles]
+        anew = rrtik.World(robot, replace(moved.scene, obstacles=obstacles, contacts=contacts))
+        assert found.checks.solids is not anew.checks.solids
+        assert alike(asked(found, rows, ends), asked(anew, rows, ends))
+        assert [touching_at(found, q, name) for q in rows] == [touching_at(anew, q, name) for q in rows]
+        differ.append((found.valid_batch(rows) != first.valid_batch(rows)).any())
+    assert any(differ)
 
 
 @pytest.mark.kernels
