@@ -79,7 +79,7 @@ def finger_motion(before: Setting, after: Setting, q: Vector, things_taken: Sequ
     numbers = sorted({k for pair in pairs for k in pair})
     parts = {k: _Part.of(bodies_before[k], bodies_after[k], frames) for k in numbers}
     near = _not_far_apart(bodies_before, pairs, frames, parts)
-    fault = _meeting(parts, near, frames)
+    fault = _meeting(bodies_before, parts, near, frames)
     if fault is not None:
         first, second = (bodies_before[k].name for k in fault)
         return FingerMotion(fault=f"contact of the fingers on their way: '{first}' and '{second}'; {REMEDY}")
@@ -158,22 +158,22 @@ class _Part:
         return coal.Transform3s(pose.rotation, pose.translation)
 
 
-def _meeting(parts: Mapping[int, _Part], pairs: Sequence[tuple[int, int]], frames: Matrix) -> tuple[int, int] | None:
+def _meeting(
+    bodies: tuple[Body, ...], parts: Mapping[int, _Part], pairs: Sequence[tuple[int, int]], frames: Matrix
+) -> tuple[int, int] | None:
     """Return the first pair of bodies that do not keep their required distance on the whole motion; None if all do.
 
     Args:
-        parts: The bodies by their numbers.
+        bodies: All bodies, where they are before the motion.
+        parts: Those of these pairs, by their numbers.
         pairs: Pairs of these numbers.
         frames: Poses of all joint frames, shape (joints + 1, 4, 4).
     """
     if not pairs:
         return None
-    numbers = sorted({k for pair in pairs for k in pair})
-    place = {k: row for row, k in enumerate(numbers)}
-    rows = [(place[i], place[j]) for i, j in pairs]
-    inside = Containment(tuple(parts[k].body for k in numbers), tuple(rows))
-    for (i, j), both in zip(pairs, rows, strict=True):
-        if inside.holds(both, frames) or not _apart(parts[i], parts[j]):
+    inside = Containment(bodies, tuple(pairs))
+    for i, j in pairs:
+        if inside.holds((i, j), frames) or not _apart(parts[i], parts[j]):
             return i, j
     return None
 
@@ -220,7 +220,7 @@ def _depth_apart(first: _Part, second: _Part, share: float) -> float:
 
 
 def _not_far_apart(
-    bodies: Sequence[Body], pairs: Sequence[tuple[int, int]], frames: Matrix, parts: Mapping[int, _Part]
+    bodies: tuple[Body, ...], pairs: Sequence[tuple[int, int]], frames: Matrix, parts: Mapping[int, _Part]
 ) -> list[tuple[int, int]]:
     """Return the pairs of bodies that a motion may bring together, by the boxes around them.
 
@@ -232,10 +232,9 @@ def _not_far_apart(
     """
     if not pairs:
         return []
-    place = {k: number for number, k in enumerate(parts)}
-    arrays = body_arrays(tuple(bodies[k] for k in parts))
-    numbers = np.array([(place[i], place[j]) for i, j in pairs])
-    moved = np.array([part.speed for part in parts.values()])
+    arrays = body_arrays(bodies)
+    numbers = np.array(pairs)
+    moved = np.array([parts[k].speed if k in parts else 0.0 for k in range(len(bodies))])
     required = np.maximum(arrays.kept_apart(numbers), CONTACT_GAP) + moved[numbers].sum(axis=1) + DISTANCE_TOLERANCE
     near = arrays.least_gaps(numbers, frames) <= required
     return [pair for pair, is_near in zip(pairs, near.tolist(), strict=True) if is_near]
