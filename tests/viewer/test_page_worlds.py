@@ -149,7 +149,7 @@ def check_things(page: Page, plan: TaskPlan, numbers: list[int]) -> None:
 
 def numbers_of(story: dict[str, Any]) -> list[int]:
     """The motion of each tick, as the page's list of events has it."""
-    return [int(group["text"].split()[1]) - 1 for group in story["run"]["groups"] for _ in range(group["count"])]
+    return [int(group["reason"].split()[1]) - 1 for group in story["run"]["groups"] for _ in range(group["count"])]
 
 
 @pytest.fixture(scope="module", params=list(TASKS))

@@ -2,14 +2,17 @@
 
 import time
 
+import numpy as np
 import pytest
 
 from rrtik_ompl import load_problem
-from rrtik_ompl.viewer.page import page
+from rrtik_ompl.viewer.drawing.marks import tubes
+from rrtik_ompl.viewer.page import asset, page
+from rrtik_ompl.viewer.picture import draw
+from rrtik_ompl.viewer.subject import subject_of
+from rrtik_tests.crane import WAYPOINTS, problem
 from rrtik_tests.page_pictures import opened
 from rrtik_tests.programs import needs_chromium
-
-pytestmark = [pytest.mark.slow, needs_chromium]
 
 VISIBLE = """story.obstacles.map(({ node: leaf }) => {
   let drawn = false;
@@ -20,18 +23,30 @@ VISIBLE = """story.obstacles.map(({ node: leaf }) => {
 CLICK = "[...document.querySelectorAll('#tree .eye')].find((eye) => eye.ariaLabel === 'show {}').click()"
 
 
+def test_everything_that_is_drawn_has_an_eye(crane, scene):
+    """Each node right below the root, of a picture with all kinds of things, is one that the tree shows and hides."""
+    marks = [tubes("a mark", "#112233", [np.eye(3)], 0.01)]
+    shown = subject_of(problem(crane, scene), WAYPOINTS, WAYPOINTS[:2], marks=tuple(marks))
+    held = subject_of(load_problem("ur5_upright"))
+    drawn = {path.split("/")[2] for subject in (shown, held) for path in draw(subject)[0].paths}
+    assert {"robot", "obstacles", "later", "trail", "before", "constraints", "marks", "frames"} <= drawn
+    assert {name for name in drawn if f'"{name}"' not in asset("tree.js")} == set()
+
+
 @pytest.fixture(scope="module")
 def browser(tmp_path_factory):
-    problem = load_problem("planar3_boxes")
-    waypoints = [problem.start, [0.1, 0.1, 0.1]]
+    boxes = load_problem("planar3_boxes")
+    waypoints = [boxes.start, [0.1, 0.1, 0.1]]
     file = tmp_path_factory.mktemp("page") / "page.html"
-    file.write_text(page(problem, waypoints, before=[*waypoints, problem.start]), encoding="utf-8")
+    file.write_text(page(boxes, waypoints, before=[*waypoints, boxes.start]), encoding="utf-8")
     with opened(file.as_uri()) as found:
         found.wait("document.documentElement.dataset.plans === 'yes'")
         found.ask("window.kept = []; keepFile = (name, blob) => kept.push([name, blob])")
         yield found
 
 
+@pytest.mark.slow
+@needs_chromium
 def test_an_eye_hides_one_obstacle_and_that_of_the_group_all(browser):
     everything = browser.ask(VISIBLE)
     assert len(everything) > 1
@@ -47,6 +62,8 @@ def test_an_eye_hides_one_obstacle_and_that_of_the_group_all(browser):
     assert browser.ask(VISIBLE) == everything
 
 
+@pytest.mark.slow
+@needs_chromium
 def test_keys_change_speed_loop_and_view(browser):
     browser.ask("dispatchEvent(new KeyboardEvent('keydown', { key: '+' }))")
     assert browser.ask("document.getElementById('speed').value") == "2"
@@ -59,6 +76,8 @@ def test_keys_change_speed_loop_and_view(browser):
     assert browser.ask("viewpoint") == browser.ask("Object.keys(VIEWPOINTS)[2]")
 
 
+@pytest.mark.slow
+@needs_chromium
 def test_a_picture_a_view_and_a_film_are_handed_out(browser):
     for name in ("picture", "view"):
         browser.ask(f"document.getElementById('{name}-button').click()")
@@ -72,6 +91,8 @@ def test_a_picture_a_view_and_a_film_are_handed_out(browser):
     browser.ask("newPath()")  # the whole path again
 
 
+@pytest.mark.slow
+@needs_chromium
 def test_the_title_follows_the_path_and_the_one_for_comparison_goes_with_it(browser):
     assert browser.ask("document.getElementById('title').textContent") == "planar3_boxes: path of 1 move"
     assert "before" in browser.ask("document.getElementById('tree').textContent")

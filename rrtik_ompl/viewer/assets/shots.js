@@ -56,6 +56,7 @@ let recording = null;
 /** Play from the start to the end, and record it; pressed again, it ends there. */
 function recordFilm() {
   if (recording) return recording.finish();
+  if (story.moves.length === 0) return null;  // nothing moves yet
   const kinds = ["video/mp4;codecs=avc1.640034", "video/webm;codecs=vp9", "video/webm"];
   const mimeType = kinds.find((kind) => window.MediaRecorder?.isTypeSupported(kind));
   const button = document.getElementById("film-button");

@@ -1,6 +1,6 @@
 // What one can see, as a tree: each thing has a row with an eye; that of a group hides all that is in it.
 const GROUPS = {  // in this order; films hide them by these names
-  robot: "Robot", ghosts: "Ghosts", trails: "Trails", goal: "Goal", obstacles: "Obstacles", margins: "Margins", contacts: "In collision", marks: "Further bodies",
+  robot: "Robot", ghosts: "Ghosts", trails: "Trails", goal: "Goal", obstacles: "Obstacles", courses: "Courses", margins: "Margins", contacts: "In collision", marks: "Further bodies",
   labels: "Names", frames: "Frames", grid: "Ground",
 };
 const UNFOLDED = ["ghosts", "obstacles", "trails", "contacts", "marks"];
@@ -96,9 +96,11 @@ function listThings() {
   drawnGhosts.forEach(({ name, color }) => addThing("ghosts", name, toggles(name), { color, opacity: 0.6 }));
   addTrails();
   if (story.goal && story.goal !== "joint values") addThing("goal", story.goal, toggles("goal"), { color: colors.goal });
+  if (node("constraints").children.length) addThing("goal", "path constraints", toggles("constraints"));
   for (const { name, node: leaf, color } of story.obstacles) {
     addThing("obstacles", name, (on) => setSeen(["obstacles", leaf], on), { color });
   }
+  if (node("later").children.length) addThing("courses", "of obstacles that move", toggles("later"), { color: colors.obstacle, opacity: 0.6 });
   addMargins();
   if (story.contacts.length) addThing("contacts", "bodies that touch", (on) => setVisible(["contact"], on), { color: colors.touching });
   for (const { name, color, opacity, node: leaf, shown } of story.marks) {
