@@ -98,7 +98,7 @@ def reproduce(
         if not as_json:
             for table, rows in done:
                 _show(table, rows, "stored")
-        return _finish(done, quick, markdown, store, as_json)
+        return _finish(done, quick, len(done) == len(known), markdown, store, as_json)
 
     note(f"{plural(len(wanted), 'table')}, about {_time(sum(_seconds(each, quick) for each in wanted))} on two cores")
     kept = Kept(markdown, quick, readers)
@@ -110,15 +110,15 @@ def reproduce(
             note(f"what is done is kept in {kept.file}; the same command goes on from there")
         raise
 
-    code = _finish(done, quick, markdown, store, as_json)
+    code = _finish(done, quick, everything, markdown, store, as_json)
     kept.forget()
     return code
 
 
-def _finish(done: Done, quick: bool, markdown: Path | None, store: Path | None, as_json: bool) -> int:
+def _finish(done: Done, quick: bool, everything: bool, markdown: Path | None, store: Path | None, as_json: bool) -> int:
     """Write the files that are wanted, print the counts or all rows, and return the exit code."""
     if markdown is not None:
-        write_text(markdown, page(done, quick))
+        write_text(markdown, page(done, quick, everything=everything))
     if store is not None:
         save_round(store, {table.name: rows for table, rows in done}, quick)
 
@@ -308,13 +308,14 @@ def counted_apart(done: Done) -> list[str]:
     return lines
 
 
-def page(done: Done, quick: bool) -> str:
+def page(done: Done, quick: bool, *, everything: bool = False) -> str:
     """Return the whole comparison as Markdown."""
     import platform
 
     from rrtik_ompl.benchmark.tables import markdown_table
 
-    command = f"rrtik reproduce {'--all' if len(done) > 1 else done[0][0].name}{' --quick' if quick else ''}"
+    names = "--all" if everything else " ".join(table.name for table, _ in done)
+    command = f"rrtik reproduce {names}{' --quick' if quick else ''}"
     lines = ["# Published and measured", "", f"Written by `{command}`, rrtik-ompl {__version__}, {platform.machine()}."]
     lines += ["", MEANINGS, "", f"In all: {counted(done)}.", "", *counted_apart(done), ""]
 

@@ -1,5 +1,7 @@
 """Verdicts have power: work that is lost, and prints that are wrong, are seen in figures as they are stored."""
 
+import gzip
+import json
 import re
 from types import SimpleNamespace
 
@@ -12,6 +14,7 @@ from rrtik_bench.mb_rrt import tables as mb_rrt
 from rrtik_bench.mb_rrt.runs import PUBLISHED, Measured
 from rrtik_bench.report.basis import STATEMENTS, WORDS, is_printed
 from rrtik_bench.report.rows import INFINITE, STATISTICS, Bar, Verdict, exactly, judged, judged_runs, row_of
+from rrtik_ompl.cli.app import run
 from rrtik_tests.places import ROOT
 
 RANK = {Verdict.BETTER: 0, Verdict.HELD: 0, Verdict.DIFFERS: 1, Verdict.REFUTED: 2, Verdict.MISSED: 3}
@@ -101,6 +104,25 @@ def test_runs_that_are_none_are_missed_and_come_back_so():
     again = row_of(row.record())
     assert row.verdict is again.verdict is Verdict.MISSED
     assert row.record()["value"] == "nan"
+
+
+def test_the_stored_page_follows_from_the_stored_runs(tmp_path, capsys):
+    page, stored = tmp_path / "page.md", ROOT / "bench" / "data" / "reproduce_part.json.gz"
+    assert run(["reproduce", "--all", "--read", str(stored), "--markdown", str(page)]) == 1  # some are missed
+    capsys.readouterr()
+    again, before = (file.read_text().split("\n\n", 2) for file in (page, ROOT / "bench/reports/reproduce_part.md"))
+    assert again[2] == before[2]  # what is before names the machine and the version
+
+
+def test_what_is_expected_of_environment_e_is_what_its_stored_runs_gave():
+    data = json.loads(gzip.decompress((ROOT / "bench" / "data" / "reproduce_part.json.gz").read_bytes()))
+    rows = {row["name"]: row for row in data["tables"]["crdt-e"]}
+    for name, columns in crdt.REBUILT.items():
+        for column, before in zip(crdt.COLUMNS, columns, strict=False):
+            for statistic, value in zip(crdt.STATISTICS_OF_E, before, strict=True):
+                runs = rows[f"{name}: {statistic} {column}"]["runs"]
+                assert len(runs) == crdt.RUNS_OF_E
+                assert STATISTICS[statistic](runs) == pytest.approx(value, abs=1e-3)
 
 
 # --- mutations, on figures as the full round has them ----------------------------------------------------------------
