@@ -120,7 +120,7 @@ def test_the_commands_write_what_they_say(small, tmp_path, capsys):
     assert "holds part" in said
     assert json.loads(out.read_text())["kind"] == "task_plan"
     story = html.read_text()
-    assert "motion 2 of 4: MoveTo" in story
+    assert "motion 2 of 4: carry part" in story
     assert "walk (" not in story
     assert run(["straight", "titan4_sdu", "--by", "0", "0", "0.02", "--json"]) == 0
     said = json.loads(capsys.readouterr().out)
