@@ -10,7 +10,7 @@ from rrtik_robots.example_arms import data_folder
 STEP = 0.002  # [s]
 DAMPING = 0.05  # [s]
 plan = rrtik.Task.load("panda_pick_place").plan(seed=1)
-motion = plan.time_parameterize(pause=0.3).trajectory
+motion = plan.time_parameterize(pause=0.3, tip_speed=0.3).trajectory  # friction alone holds the cup
 clock = np.arange(0.0, motion.duration, STEP)
 arm = motion(clock)
 fingers = np.repeat(motion.gripper_positions(clock), 2, axis=1)
@@ -34,7 +34,7 @@ model = spec.compile()
 data = mujoco.MjData(model)
 data.qpos[:9] = np.append(arm.positions[0], fingers[0])
 touching = set()
-for data.ctrl in np.hstack([arm.positions + DAMPING * arm.velocities, fingers - 0.001]):  # 1 mm further, to press
+for data.ctrl in np.hstack([arm.positions + DAMPING * arm.velocities, fingers - 0.002]):  # 2 mm further, to press
     mujoco.mj_step(model, data)
     touching |= {frozenset(model.body(model.geom_bodyid[g]).name for g in each.geom) for each in data.contact}
 print(*(" and ".join(sorted(pair)) for pair in touching), sep="\n")
