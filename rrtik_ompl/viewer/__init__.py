@@ -88,13 +88,14 @@ def view(
     check_target(None if html is None else file_name(html), PAGE_FORMATS)
 
     played = path.played() if isinstance(path, TaskPlan) else path  # a TaskPlan brings its own timing and proof
+    in_cell = html is None and (in_kernel() if inline is None else inline)
     text, picture = page_and_picture(
-        shown, played, before=before, ghosts=ghosts, marks=marks, run=run, title=title, still=still
+        shown, played, before=before, ghosts=ghosts, marks=marks, run=run, title=title, still=still, picture=in_cell
     )
     if html is not None:
         write_text(html, text)
         return Path(html)
-    if in_kernel() if inline is None else inline:
+    if in_cell:
         return InlinePage(text, picture)
 
     with PageServer(text, port) as server:

@@ -74,7 +74,7 @@ def html_of(value: Plan | JointPath | Problem | World | Trajectory) -> str | Non
         path = None
 
     planning = isinstance(value, (Plan, Problem))
-    return InlinePage(*page_and_picture(shown, path, still=not planning, picture=True))._repr_html_()
+    return InlinePage(*page_and_picture(shown, path, still=not planning))._repr_html_()
 
 
 def in_kernel() -> bool:

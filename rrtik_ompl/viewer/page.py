@@ -75,7 +75,6 @@ def page(
     title: str | None = None,
     still: bool = False,
     asks: bool = False,
-    picture: bool = False,
 ) -> str:
     """Return the page that shows something, as the text of one HTML file that needs no other file and no network.
 
@@ -91,7 +90,6 @@ def page(
         title: Heading; None derives it from the name of the problem or robot.
         still: Whether to leave out the planner of the page.
         asks: Whether the page asks its server about each path that it finds.
-        picture: Whether the page has a picture of its first view, for browsers that cannot draw in 3-D.
 
     Raises:
         InputError: If the input cannot be shown, or if the page shall ask but cannot plan.
@@ -106,7 +104,7 @@ def page(
         title=title,
         still=still,
         asks=asks,
-        picture=picture,
+        picture=False,
     )
     return text
 
@@ -124,7 +122,7 @@ def page_and_picture(
     asks: bool = False,
     picture: bool = True,
 ) -> tuple[str, bytes]:
-    """Return a page as :func:`page` does, and the picture in it as a PNG, which is empty if it has none."""
+    """Return a page as :func:`page` does, and a picture of its first view as a PNG, empty if none is asked for."""
     if isinstance(path, PlayedTask):
         subject = subject_of_task(shown, path)
     else:
@@ -149,7 +147,6 @@ def page_and_picture(
     story = json.dumps(told, allow_nan=False, separators=(",", ":"))
     text = Template(asset("page.html")).substitute(
         title=html.escape(heading),
-        still=_image(first_view, heading) if picture else "",
         policy=html.escape(ASKING_POLICY if asks else POLICY),
         style=asset("page.css"),
         notice=_meshcat("main.min.js.LICENSE.txt").replace("--", "- -"),
@@ -161,11 +158,6 @@ def page_and_picture(
         start="\n".join(asset(name) for name in STARTING),
     )
     return text, first_view
-
-
-def _image(png: bytes, heading: str) -> str:
-    source = base64.b64encode(png).decode("ascii")
-    return f'<img id="still" alt="{html.escape(heading)}" src="data:image/png;base64,{source}">'
 
 
 def _planning(shown: Showable, subject: Subject, frame: Frame) -> dict[str, Any] | None:

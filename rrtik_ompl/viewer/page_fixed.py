@@ -124,4 +124,4 @@ def _enclosed(body: Body) -> dict[str, Any]:
 
 def packed(data: bytes) -> str:
     """Return bytes as compressed text, which the page decompresses."""
-    return base64.b64encode(gzip.compress(data, 9, mtime=0)).decode("ascii")
+    return base64.b64encode(gzip.compress(data, 6, mtime=0)).decode("ascii")

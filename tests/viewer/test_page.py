@@ -53,7 +53,7 @@ def test_the_same_input_gives_the_same_page(text: str, crane: Robot, scene: Scen
 def test_the_page_is_written_whole_and_returned(crane: Robot, tmp_path: Path) -> None:
     target = tmp_path / "view.html"
     assert view(crane, html=target) == target
-    assert target.read_text(encoding="utf-8") == page(crane, picture=True)
+    assert target.read_text(encoding="utf-8") == page(crane)
     assert [p.name for p in tmp_path.iterdir()] == ["view.html"]
 
 

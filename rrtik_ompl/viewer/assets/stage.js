@@ -5,12 +5,10 @@ let viewer;
 try {
   viewer = new MeshCat.Viewer(pane);
   performance.mark("viewer");
-  document.getElementById("still")?.remove();
 } catch (error) {
   const sorry = document.createElement("p");
-  const picture = document.getElementById("still");
-  sorry.textContent = `This browser cannot draw in 3-D: WebGL is missing or switched off.${picture ? " The picture is the first view." : ""}`;
-  pane.replaceChildren(sorry, ...(picture ? [picture] : []));
+  sorry.textContent = "This browser cannot draw in 3-D: WebGL is missing or switched off.";
+  pane.replaceChildren(sorry);
   throw error;
 }
 const low = new THREE.Vector3(...story.frame.low);
