@@ -188,6 +188,7 @@ def other_arguments(function: Callable[..., Any]) -> dict[str, Any]:
         "cell": lambda: 0.1,
         "joints": lambda: ["turn"],
         "limit": lambda: 2**20,
+        "readers": dict,
         "scale": lambda: np.ones(3),
     }
     _, *others = signature(function).parameters.values()

@@ -298,6 +298,10 @@ def _moved(case: Case) -> Judged:
     return found + alike(back, case.truth, case)
 
 
+def _exchanged(case: Case) -> Judged:
+    return alike(case.at_first().with_obstacle(case.after.obstacles[0]), case.truth, case)
+
+
 def _region(case: Case) -> TaskRegion:
     """All places of the tip on one side of the middle."""
     tips = case.robot.fk_batch(case.Q)[:, :3, 3]
@@ -555,6 +559,7 @@ WAYS: dict[str, Way] = {
     "World.of": _of,
     "World.proving": _proving,
     "World.moved": _moved,
+    "World.with_obstacle": _exchanged,
     "World.unheld": _unheld,
     "World(constraints=)": _constraints,
     "moved with constraints": _moved_with_constraints,

@@ -192,6 +192,7 @@ WAYS: dict[str, Remade] = {
     "World.of": Remade(lambda world: World.of(world.settings)),
     "World.proving": Remade(lambda world: world.proving(0.03), "proving", same=False),
     "World.moved": Remade(lambda world: world.moved("ball", world.scene.obstacle("ball").pose)),
+    "World.with_obstacle": Remade(lambda world: world.with_obstacle(world.scene.obstacle("ball"))),
     "World.unheld": Remade(lambda world: world.unheld, "constraints", same=False),
     "pickle": Remade(lambda world: pickle.loads(pickle.dumps(world))),
     "copy": Remade(copy.copy),

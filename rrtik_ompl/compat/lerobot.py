@@ -57,9 +57,9 @@ class RobotKinematics:
         >>> from importlib.resources import files
         >>> from rrtik_ompl.compat.lerobot import RobotKinematics
         >>> arm = RobotKinematics(files("rrtik_robots.titan4") / "titan4.urdf", "grip_point")
-        >>> there = arm.forward_kinematics(np.array([10.0, 20.0, -80.0, 60.0, 5.0, 0.0]))
+        >>> there = arm.forward_kinematics(np.array([10.0, 20.0, -80.0, 60.0, 5.0, 7.0]))
         >>> arm.inverse_kinematics([0.0, 15.0, -70.0, 50.0, 0.0, 0.0], there).round(3).tolist()
-        [10.0, 20.0, -80.0, 60.0, 5.0, 0.0]
+        [10.0, 20.0, -80.0, 60.0, 5.0, 7.0]
     """
 
     def __init__(

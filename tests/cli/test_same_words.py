@@ -163,9 +163,8 @@ OF_COMMANDS |= {
 }
 
 OTHER_DEFAULTS = {  # defaults that differ, and why
-    ("time", "torque"): "a flag: False hands over None",
-    ("replan", "rate"): "of a film; that of the run is a key of the scenario's file",
     ("replan --foreseen", "rate"): "of a film; that of the run is a key of the scenario's file",
+    ("time", "torque"): "a flag: False hands over None",
     ("replan", "lookahead_ticks"): "None: the scenario's",
     ("replan", "planner"): "None: the usual one, and no word against --replay and --foreseen",
     ("replan", "seconds"): "None: the scenario's",

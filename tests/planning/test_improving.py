@@ -20,6 +20,7 @@ from rrtik_ompl.problem_files.problem import load_problem
 from rrtik_ompl.world.problem import Problem
 from rrtik_planners import FastRRTConnect
 
+SEEDS = range(1, 7)
 LONG = 20.0  # [s] a limit that the tests do not come near to
 
 
@@ -97,11 +98,15 @@ def test_planners_that_break_after_the_first_path_leave_it(few_rounds, error):
 
 def test_ctrl_c_ends_the_work_and_keeps_the_best_path():
     problem = load_problem("titan4_prisms")
-    first = plan(problem, "fastrrtconnect", seed=2)
-    kept = plan(problem, ended_by(KeyboardInterrupt(), after=3), seed=2, seconds=LONG, improve=LONG)
-    assert 0 < kept.statistics["improving_rounds"] <= 3  # a round may search twice
-    assert kept.path.length < first.path.length
-    assert kept.path.length == kept.statistics["cost_over_time"][-1][1]
+    gains = []
+    for seed in SEEDS:
+        first = plan(problem, "fastrrtconnect", seed=seed)
+        kept = plan(problem, ended_by(KeyboardInterrupt(), after=3), seed=seed, seconds=LONG, improve=LONG)
+        assert 0 < kept.statistics["improving_rounds"] <= 3  # a round may search twice
+        assert kept.path.length == kept.statistics["cost_over_time"][-1][1]
+        gains.append(first.path.length - kept.path.length)
+    assert min(gains) >= 0.0
+    assert max(gains) > 0.0  # where a path ends up differs from processor to processor
 
 
 def test_no_round_begins_when_the_time_of_all_is_up():
@@ -126,10 +131,14 @@ def test_the_command_takes_it(capsys):
 
 def test_the_first_path_alone_is_shortened_if_that_is_wanted():
     problem = load_problem("titan4_prisms")
-    first = plan(problem, "fastrrtconnect", seed=2)
-    better = plan(problem, "fastrrtconnect", seed=2, seconds=LONG, improve=LONG, strategy="shorten")
-    assert better.statistics["improving_rounds"] == 0
-    assert better.path.length < first.path.length
+    gains = []
+    for seed in SEEDS:
+        first = plan(problem, "fastrrtconnect", seed=seed)
+        better = plan(problem, "fastrrtconnect", seed=seed, seconds=LONG, improve=LONG, strategy="shorten")
+        assert better.statistics["improving_rounds"] == 0
+        gains.append(first.path.length - better.path.length)
+    assert min(gains) >= 0.0
+    assert max(gains) > 0.0
 
 
 @pytest.mark.parametrize("objective", ["time", "clearance"])

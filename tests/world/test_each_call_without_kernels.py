@@ -151,6 +151,9 @@ CALLS = {
     "World.with_clearance": lambda p, _: p.world.with_clearance(0.03).valid_batch(ROWS),
     "World.proving": lambda p, _: p.world.proving().motion_valid_batch(ROWS[:-1], ROWS[1:]),
     "World.moved": lambda p, _: p.world.moved("box", pose([1.5, 1.0, 0.0])).valid_batch(ROWS),
+    "World.with_obstacle": lambda p, _: p.world.with_obstacle(
+        Obstacle("box", Box(0.3, 0.2, 0.4), pose([1.5, 1.0, 0.0]))
+    ).valid_batch(ROWS),
     "World.valid": lambda p, _: p.world.valid(ROWS[0]),
     "World.valid_batch": lambda p, _: p.world.valid_batch(ROWS),
     "World.motion_valid": lambda p, _: p.world.motion_valid(START, GOAL),

@@ -28,7 +28,7 @@ def test_lanes_prove_what_single_pairs_prove(count, monkeypatch):
     in_lanes = rrtik.World(robot, scene)
     table = in_lanes.prover._packed_for(0.0, 0.0).table
     lengths = table.pairs.reshape(-1, layout.PAIR_SIZE)[:, layout.RUN_LENGTH]
-    assert lengths.max() > 10
+    assert lengths.max() > 4  # a run is at most as long as a vector of the processor has room for
 
     proven = in_lanes.motions_proven(starts, ends, clearance=0.01)
     monkeypatch.setattr(packing, "SHORTEST_RUN", count + 1)

@@ -94,14 +94,25 @@ POINTS = rrtik.PointCloud(np.column_stack([np.zeros(60), np.linspace(-1.0, 0.49,
 
 @pytest.mark.parametrize("obstacle", [rrtik.Obstacle("wall", WALL, IN_WALL), rrtik.Obstacle("cloud", POINTS)])
 def test_a_point_goes_over_a_wall_by_nearly_the_shortest_way(obstacle):
-    """As a string over the edge, a known length: a wall of half a metre, or points in a row that reach as high."""
+    """As a string over the edge, a known length: a wall of half a metre, or points in a row that reach as high.
+
+    A single route may end at a corner that lies a little aside, and which one does differs from processor to processor.
+    """
     world = point_among(obstacle)
-    pull = pulling(world, OVER, work=300, least_gain=1e-3)
-    pull.run()
-    assert pull.intact()
-    assert world.prove(pull.waypoints, clearance=KEPT).proven
     shortest = 2.0 * np.hypot(1.0, 0.5)
-    assert shortest < route_length(pull.waypoints) < 1.05 * shortest
+    rng = np.random.default_rng(0)
+    lengths = []
+    for _ in range(15):
+        route = OVER.copy()
+        route[1:-1] += 0.05 * rng.normal(size=route[1:-1].shape)
+        pull = pulling(world, route, work=300, least_gain=1e-3)
+        pull.run()
+        assert pull.intact()
+        assert world.prove(pull.waypoints, clearance=KEPT).proven
+        lengths.append(route_length(pull.waypoints) / shortest)
+    assert 1.0 < min(lengths) < 1.02
+    assert np.mean(lengths) < 1.06
+    assert max(lengths) < 1.1
 
 
 @pytest.mark.parametrize("work", [1, 2, 5, 20])
