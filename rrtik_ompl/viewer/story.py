@@ -110,7 +110,6 @@ def _obstacles(scene: Scene) -> list[dict[str, Any]]:
             "color": colors[o.name],
             "plate": not o.shape.bounded,
             "moving": o.motion is not None,
-            "course": o.motion is not None and o.shape.bounded,
             "margin": o.margin,
             "margin_drawn": o.margin > 0.0 and look_of_margin(o.shape, o.margin) is not None,
         }

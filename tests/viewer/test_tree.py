@@ -5,7 +5,8 @@ import time
 import numpy as np
 import pytest
 
-from rrtik_ompl import load_problem
+from rrtik_ompl import Obstacle, Problem, Scene, Sphere, World, load_problem, load_robot
+from rrtik_ompl.replanning import ConstantVelocity
 from rrtik_ompl.viewer.drawing.marks import tubes
 from rrtik_ompl.viewer.page import asset, page
 from rrtik_ompl.viewer.picture import draw
@@ -20,6 +21,24 @@ VISIBLE = """story.obstacles.map(({ node: leaf }) => {
   node("obstacles", leaf).traverseVisible(look);
   return drawn && node("obstacles").visible;
 })"""
+CHANGED = """(() => {
+  const looks = () => {
+    const found = new Map();
+    viewer.scene.traverse(({ uuid, visible, layers }) => {
+      found.set(`${uuid} visible`, visible);
+      found.set(`${uuid} layer`, layers.mask);
+    });
+    return found;
+  };
+  return things.map((thing) => {
+    thing.show(true);
+    const before = looks();
+    thing.show(false);
+    const changed = [...looks()].filter(([key, look]) => before.get(key) !== look).map(([key]) => key);
+    thing.show(isSeen(thing));
+    return [thing.text, changed];
+  });
+})()"""
 CLICK = "[...document.querySelectorAll('#tree .eye')].find((eye) => eye.ariaLabel === 'show {}').click()"
 
 
@@ -31,6 +50,26 @@ def test_everything_that_is_drawn_has_an_eye(crane, scene):
     drawn = {path.split("/")[2] for subject in (shown, held) for path in draw(subject)[0].paths}
     assert {"robot", "obstacles", "later", "trail", "before", "constraints", "marks", "frames"} <= drawn
     assert {name for name in drawn if f'"{name}"' not in asset("tree.js")} == set()
+
+
+@pytest.mark.slow
+@needs_chromium
+def test_no_two_eyes_are_of_one_thing_and_many_courses_are_hidden_at_first(tmp_path):
+    robot = load_robot("planar3", parameters={"radius": 0.02})
+    flying = [
+        Obstacle(f"ball {k}", Sphere(0.1), [6.0, k, 0.0], ConstantVelocity([0.1, 0.0, 0.0]), margin=0.05)
+        for k in range(4)
+    ]
+    file = tmp_path / "page.html"
+    file.write_text(page(Problem(World(robot, Scene(flying)), [0.0] * 3, [1.0, 0.0, 0.0])), encoding="utf-8")
+    with opened(file.as_uri()) as found:
+        changed = found.ask(CHANGED)
+        owners = [key for _, keys in changed for key in keys]
+        assert len(owners) > 10
+        assert len(owners) == len(set(owners)), changed
+        assert found.ask("node('later').visible") is False
+        found.ask(CLICK.format("Courses: of 4 obstacles"))
+        assert found.ask("node('later').visible") is True
 
 
 @pytest.fixture(scope="module")

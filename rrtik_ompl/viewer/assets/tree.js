@@ -70,8 +70,6 @@ function addTrails() {
     addThing("trails", "path travelled", toggles("trail"), { color: colors.trail, opacity: 0.45, on: false });
   } else if (story.moves.length) addThing("trails", "path of the tip", toggles("trail", "beads"), { color: colors.trail });
   if (story.proof && story.proof.unproven.length) addThing("trails", "not proven free", () => {}, { color: colors.unproven });
-  const courses = story.obstacles.filter(({ course }) => course).length;
-  if (courses) addThing("trails", `courses of ${count(courses, "obstacle")}`, toggles("later"), { color: colors.obstacle, opacity: 0.6, on: courses <= FEW_COURSES });
   if (story.before) addThing("trails", `before: ${story.before}`, toggles("before"), { color: colors.before });
 }
 
@@ -100,7 +98,8 @@ function listThings() {
   for (const { name, node: leaf, color } of story.obstacles) {
     addThing("obstacles", name, (on) => setSeen(["obstacles", leaf], on), { color });
   }
-  if (node("later").children.length) addThing("courses", "of obstacles that move", toggles("later"), { color: colors.obstacle, opacity: 0.6 });
+  const courses = node("later").children.length;
+  if (courses) addThing("courses", `of ${count(courses, "obstacle")}`, toggles("later"), { color: colors.obstacle, opacity: 0.6, on: courses <= FEW_COURSES });
   addMargins();
   if (story.contacts.length) addThing("contacts", "bodies that touch", (on) => setVisible(["contact"], on), { color: colors.touching });
   for (const { name, color, opacity, node: leaf, shown } of story.marks) {
