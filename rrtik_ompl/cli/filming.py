@@ -9,13 +9,10 @@ import typer
 
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.cli.terminal import counter, progress
-from rrtik_ompl.files.text import check_target
+from rrtik_ompl.files.text import FILM_FORMATS, PICTURE_FORMATS, check_target
 
 if TYPE_CHECKING:
     from rrtik_ompl.replanning.record import ReplanRun
-
-FILMS = (".mp4", ".webm", ".gif")
-PICTURES = (".png",)
 
 FilmFile = Annotated[Path | None, typer.Option(help="Write a film: .mp4, .webm, .gif. A headless browser draws it.")]
 PictureFile = Annotated[Path | None, typer.Option(help="Write a still picture: .png.")]
@@ -56,8 +53,8 @@ class Filming(NamedTuple):
         Raises:
             InputError: If a file cannot be written, the camera is unknown, or the size does not fit.
         """
-        check_target(self.film, FILMS)
-        check_target(self.picture, PICTURES)
+        check_target(self.film, FILM_FORMATS)
+        check_target(self.picture, PICTURE_FORMATS)
         if self.film is None and self.picture is None:
             given = {"--rate": self.rate, "--size": self.size, "--hide": self.hide or None}
             wrong = [option for option, value in given.items() if value is not None]

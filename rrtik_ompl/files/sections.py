@@ -466,7 +466,8 @@ class Section:
                 hint = f"did you mean '{near[0]}'? " if near else ""
                 raise Refused(f"unknown key '{name}'; {hint}allowed keys: {', '.join(cls.keys)}", name)
             if value is None:
-                quotes = " (a colour in quotes, as # begins a comment)" if name == "color" else ""
+                is_color = name in cls.keys and isinstance(cls.keys[name].kind, Color)
+                quotes = " (a colour in quotes, as # begins a comment)" if is_color else ""
                 raise Refused(f"nothing stands after the colon; give a value{quotes} or delete the key", name)
         return data
 

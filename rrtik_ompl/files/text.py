@@ -12,6 +12,8 @@ from rrtik_ompl.base.errors import InputError
 
 MAX_BYTES = 64 * 1024 * 1024  # [bytes] above any problem or path file; stops endless files such as /dev/zero
 PAGE_FORMATS = (".html", ".htm")  # endings of 3-D pages
+FILM_FORMATS = (".mp4", ".webm", ".gif")
+PICTURE_FORMATS = (".png",)
 
 
 def read_text(path: str | os.PathLike[str], limit: int = MAX_BYTES) -> str:

@@ -388,12 +388,6 @@ def inside_limits(robot: Robot, rows: Matrix, tolerance: float = LIMIT_TOLERANCE
     return np.asarray(np.logical_and.reduce((rows >= lower) & (upper >= rows), axis=1))
 
 
-def all_inside_limits(robot: Robot, rows: Matrix) -> bool:
-    """Check whether all configurations, shape (m, dof), lie inside the limits, as :func:`inside_limits` says."""
-    lower, upper = _widened_limits(robot, LIMIT_TOLERANCE)
-    return bool(((rows >= lower) & (upper >= rows)).all())
-
-
 def pinocchio_rows(robot: Robot, rows: Matrix) -> Matrix:
     """Convert configurations to Pinocchio's vectors, (m, dof) -> (m, nq); see :meth:`Robot.pinocchio_configuration`."""
     values = robot.chain.joint_values(rows)

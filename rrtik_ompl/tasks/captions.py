@@ -17,9 +17,13 @@ def motion_names(plan: TaskPlan) -> tuple[str, ...]:
     names = []
     for k, stage in enumerate(plan.stages):
         straight = isinstance(stage, Straight)
-        before, now, after = held[max(k - 1, 0)], held[k], held[k + 1]
-        took, takes = _new(now, before), _new(after, now)
-        gave, gives = _new(before, now), _new(now, after)
+        before = held[max(k - 1, 0)]
+        now = held[k]
+        after = held[k + 1]
+        took = _new(now, before)
+        takes = _new(after, now)
+        gave = _new(before, now)
+        gives = _new(now, after)
         later = next((new for one, two in zip(held[k:], held[k + 1 :], strict=False) if (new := _new(two, one))), "")
 
         if takes:

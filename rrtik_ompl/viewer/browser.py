@@ -62,7 +62,8 @@ def posts(text: str, wanted: Mapping[str, object], size: tuple[int, int]) -> Gen
         )
         try:
             while (message := _next(news, process, Path(browser).name)) != END:
-                kind, content = message[:1], message[1:]
+                kind = message[:1]
+                content = message[1:]
                 if kind == FAULT:
                     raise InputError(f"{Path(browser).name} cannot draw this: {content.decode('utf-8', 'replace')}")
                 yield kind, content

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from rrtik_ompl.base.errors import InputError, called, listed, require
-from rrtik_ompl.files.text import check_target, file_name, write_bytes
+from rrtik_ompl.files.text import FILM_FORMATS, PICTURE_FORMATS, check_target, file_name, write_bytes
 from rrtik_ompl.motion.trajectory import Trajectory
 from rrtik_ompl.replanning.record import ReplanRun
 from rrtik_ompl.tasks import TaskPlan
@@ -26,12 +26,12 @@ from rrtik_ompl.viewer.film_view import camera_of, sides_of
 from rrtik_ompl.viewer.page import page
 from rrtik_ompl.viewer.subject import Showable, ShownPath, subject_of
 
-FILMS = (".mp4", ".webm", ".gif")
-PICTURES = (".png",)
 BITS_PER_PIXEL = 0.1  # of an encoded film
 LEAST_BITS = 2e6  # [bit/s]
-SIZE, GIF_SIZE = (1280, 720), (640, 400)  # [px]
-RATE, GIF_RATE = 30.0, 12.0  # pictures a second
+SIZE = (1280, 720)  # [px]
+GIF_SIZE = (640, 400)  # [px]
+RATE = 30.0  # pictures a second
+GIF_RATE = 12.0
 PATH_SECONDS = 4.0  # duration of the film of a path without times
 LONGEST = 48.0  # [s] of what has times of its own; longer motions play faster
 HOLD = 0.8  # [s]; how long the last picture is shown
@@ -79,7 +79,7 @@ def film(
             file cannot be written.
     """
     target = file_name(file)
-    check_target(target, FILMS)
+    check_target(target, FILM_FORMATS)
     ending = target.suffix.lower()
     gif = ending == ".gif"
 
@@ -143,7 +143,7 @@ def picture(
         InputError: If a value is out of range, there is no browser, or the file cannot be written.
     """
     target = file_name(file)
-    check_target(target, PICTURES)
+    check_target(target, PICTURE_FORMATS)
     if not 0.0 <= at <= 1.0:
         raise InputError(f"moment of a picture: expected 0 (start) to 1 (end), got {at:g}")
     sides = sides_of(size, target.suffix.lower())

@@ -40,9 +40,11 @@ def run_story(run: ReplanRun, robot: Robot, scene: Scene, frame: Frame) -> dict[
 
 def _motions(ticks: Iterable[Tick]) -> list[dict[str, Any]]:
     """Return the groups of ticks of a task, as :func:`_groups` does, one for each motion."""
-    names = [group["reason"].partition(": ")[2] for group in _groups(ticks)]
-    rows = zip(_groups(ticks), names, strict=True)
-    return [{**group, "event": "motion", "text": name, "caption": name} for group, name in rows]
+    found = _groups(ticks)
+    for group in found:
+        name = group["reason"].partition(": ")[2]
+        group |= {"event": "motion", "text": name, "caption": name}
+    return found
 
 
 def _groups(ticks: Iterable[Tick]) -> list[dict[str, Any]]:

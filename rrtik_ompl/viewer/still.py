@@ -31,7 +31,7 @@ from rrtik_ompl.viewer.drawing.nodes import (
 )
 from rrtik_ompl.viewer.drawing.robot_picture import joint_nodes
 from rrtik_ompl.viewer.drawing.triangle_raster import rasterize
-from rrtik_ompl.viewer.drawing.triangles import split_creases
+from rrtik_ompl.viewer.drawing.triangles import split_creases, vertex_normals
 from rrtik_ompl.viewer.story import groups_to_see
 from rrtik_ompl.viewer.subject import Subject
 
@@ -43,7 +43,9 @@ FILLED = 0.85  # share of the picture's height that is filled
 GHOST = 0.42  # opacity of ghosts
 NEARER = 0.998  # what is seen through must be nearer by this factor: where it coincides with the arm, the arm is seen
 KEY = np.array([0.5, -0.7, 1.2]) / np.linalg.norm([0.5, -0.7, 1.2])  # direction of the light
-KEY_SHARE, SKY_SHARE, GROUND_SHARE = 0.5, 0.55, 0.3
+KEY_SHARE = 0.5
+SKY_SHARE = 0.55
+GROUND_SHARE = 0.3
 UP = np.array([0.0, 0.0, 1.0])
 
 
@@ -135,7 +137,7 @@ def _solids(recording: Recording, below: str = ROOT) -> Iterator[Solid]:
             pose = recording.pose(path)
             vertices = surface[0] @ pose[:3, :3].T + pose[:3, 3]
             color = np.array(fractions(f"#{material.color:06x}"))
-            yield Solid(vertices, _normals(vertices, surface[1]), surface[1], color, material.opacity)
+            yield Solid(vertices, vertex_normals(vertices, surface[1]), surface[1], color, material.opacity)
 
 
 def _ghost(recording: Recording, robot: Robot, q: Vector, color: str) -> Iterator[Solid]:
@@ -164,15 +166,6 @@ def _surface(geometry: Geometry) -> tuple[Matrix, Faces] | None:
         ends = (geometry.below + (geometry.above - geometry.below) * share) / radius
         return np.column_stack([vertices[:, :2] * ends, vertices[:, 2]])[:, [0, 2, 1]] * [1, 1, -1], faces
     return None
-
-
-def _normals(vertices: Matrix, faces: Faces) -> Matrix:
-    """Return unit normals at vertices: the means of the normals of the triangles there by their areas, shape (n, 3)."""
-    a, b, c = (vertices[faces[:, k]] for k in range(3))
-    across = np.cross(b - a, c - a)
-    total = np.stack([np.bincount(faces.ravel(), np.repeat(across[:, k], 3), len(vertices)) for k in range(3)], axis=1)
-    unit: Matrix = total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-300)
-    return unit
 
 
 def _shaded(solid: Solid, T_camera_world: Matrix) -> NDArray[np.float32]:

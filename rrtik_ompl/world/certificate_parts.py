@@ -47,7 +47,9 @@ class Parts:
         self.order = np.arange(len(points))
 
         # A single point of an element is its least and its greatest one, as in clouds and piles of boxes.
-        least, greatest = (points.min(axis=1), points.max(axis=1)) if points.shape[1] > 1 else (points[:, 0],) * 2
+        several = points.shape[1] > 1
+        least = points.min(axis=1) if several else points[:, 0]
+        greatest = points.max(axis=1) if several else points[:, 0]
         middles = np.ascontiguousarray(0.5 * (least + greatest).T)
         for k, (node, axis, coordinate) in enumerate(cuts):
             if node > 2 * k or self.children[node, 0] >= 0:

@@ -15,7 +15,7 @@ from rrtik_ompl.base.poses import rigid
 from rrtik_ompl.geometry.collision.bodies import Body, link_bodies, scene_bodies
 from rrtik_ompl.geometry.collision.enclosure import enclosure
 from rrtik_ompl.geometry.collision.solids import inside_mesh, is_closed, is_mesh, mesh_arrays, once_per_geometry
-from rrtik_ompl.kernels.covers.points import IN_DOUBT, distances_to_nearest, inside_by_rays
+from rrtik_ompl.kernels.covers.points import IN_DOUBT, bounding_balls, distances_to_nearest, inside_by_rays
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import Scene
 from rrtik_ompl.model.shapes import PointCloud
@@ -170,6 +170,5 @@ def _triangles(mesh: coal.BVHModelBase) -> tuple[NDArray[np.float64], Matrix, Ve
     """Return the triangles of a mesh, shape (m, 3, 3), and centres and radii of balls around them."""
     corners, faces = mesh_arrays(mesh)
     surface = np.ascontiguousarray(corners[faces], dtype=np.float64)
-    centres = surface.mean(axis=1)
-    radii = np.linalg.norm(surface - centres[:, None], axis=2).max(axis=1)
+    centres, radii = bounding_balls(surface)
     return surface, centres, radii

@@ -175,7 +175,9 @@ def row_of(record: Mapping[str, Any]) -> Row:
         return Row(name, published, measured, verdict, reading)
 
     bar = Bar(**{name: (float(low), float(high)) for name, (low, high) in record["bar"].items()})
-    value, runs, by = float(record["value"]), tuple(record.get("runs", ())), record.get("statistic", "")
+    value = float(record["value"])
+    runs = tuple(record.get("runs", ()))
+    by = record.get("statistic", "")
     again = STATISTICS[by](runs) if runs else value
     row = Row(name, published, measured, bar(again), reading, again, bar, runs, by)
 
@@ -261,7 +263,8 @@ def as_before(value: float, count: int, runs: Sequence[float], least: float = 0.
 
 def both(first: Span, second: Span) -> Span | None:
     """Where two spans overlap; None if they do not."""
-    low, high = max(first[0], second[0]), min(first[1], second[1])
+    low = max(first[0], second[0])
+    high = min(first[1], second[1])
     return (low, high) if low <= high else None
 
 

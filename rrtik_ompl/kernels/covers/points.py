@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rrtik_ompl.base.arrays import Matrix, Vector, box_of, products
+from rrtik_ompl.base.arrays import Matrix, Vector, bounds_of, box_of, products
 from rrtik_ompl.geometry.collision.solids import farthest_along
 from rrtik_ompl.kernels.covers.memory import called, room
 from rrtik_ompl.kernels.covers.search_layout import BOX_POINTS
@@ -41,6 +41,14 @@ def in_lanes(directions: Matrix) -> NDArray[np.float32]:
     lanes: NDArray[np.float32] = room(3 * blocks * WIDTH).reshape(blocks, 3, WIDTH)
     lanes[:] = directions[repeated].reshape(blocks, WIDTH, 3).transpose(0, 2, 1)
     return lanes
+
+
+def bounding_balls(triangles: NDArray[np.float64]) -> tuple[Matrix, Vector]:
+    """Return a ball around each triangle, shape (m, 3, 3): centres, shape (m, 3), and radii, shape (m,)."""
+    low, high = bounds_of(triangles)
+    centres = 0.5 * (low + high)
+    squares = [((triangles[:, k] - centres) ** 2).sum(axis=1) for k in range(3)]
+    return centres, np.sqrt(np.maximum(np.maximum(squares[0], squares[1]), squares[2]))
 
 
 def distances_to_nearest(points: Matrix, triangles: NDArray[np.float64], centres: Matrix, radii: Vector) -> Vector:

@@ -15,9 +15,9 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull
 
-from rrtik_ompl.base.arrays import TAU, Matrix, Vector, bounds_of, box_of, products, welded
+from rrtik_ompl.base.arrays import TAU, Matrix, Vector, box_of, products, welded
 from rrtik_ompl.geometry.collision.solids import inside_mesh, principal_axes
-from rrtik_ompl.kernels.covers.points import distances_to_nearest, farthest_beyond
+from rrtik_ompl.kernels.covers.points import bounding_balls, distances_to_nearest, farthest_beyond
 
 # Allowance for rounding, relative to the extent of the solid: far above float64's, far below any length that matters.
 ROUNDING = 1e-12
@@ -137,7 +137,7 @@ class MeshSolid:
         self.enclosed = enclosed
         self.rim = rim_caps(vertices, faces)
         self._closed = np.concatenate([self.triangles, self.rim])
-        self._centres, self._reach = _bounding_balls(self._closed)
+        self._centres, self._reach = bounding_balls(self._closed)
         self._corners = self._closed.reshape(-1, 3)
         self._indices = np.arange(len(self._corners)).reshape(-1, 3)
 
@@ -237,14 +237,6 @@ def mesh_solid(vertices: Matrix, triangles: NDArray[np.int64], boxes: tuple[Matr
     enclosed = np.where(CORNERS[None] == 1, boxes[1][:, None], boxes[0][:, None])
     local = frame.to_local(enclosed.reshape(-1, 3)).reshape(-1, 8, 3)
     return MeshSolid(frame.to_local(points), place[point_of_corner.reshape(-1, 3)], local), frame
-
-
-def _bounding_balls(triangles: Triangles) -> tuple[Matrix, Vector]:
-    """Return a ball around each triangle: centres, shape (m, 3), and radii, shape (m,)."""
-    low, high = bounds_of(triangles)
-    centres = 0.5 * (low + high)
-    squares = [((triangles[:, k] - centres) ** 2).sum(axis=1) for k in range(3)]
-    return centres, np.sqrt(np.maximum(np.maximum(squares[0], squares[1]), squares[2]))
 
 
 def rim_caps(vertices: Matrix, faces: NDArray[np.int64]) -> Triangles:

@@ -18,10 +18,10 @@ from rrtik_ompl.kernels.distances.layout import DistanceTable
 from rrtik_ompl.kernels.distances.trees import Tree, tree_of
 from rrtik_ompl.kernels.proof.layout import FRAME_SIZE
 from rrtik_ompl.kernels.proof.packing import angle_lanes, joint_rows
-from rrtik_ompl.kernels.proof.placed import KINDS, block_count, corner_blocks, size_rows
+from rrtik_ompl.kernels.proof.placed import KINDS, corner_blocks, size_rows
 from rrtik_ompl.kernels.simd.library import library
 from rrtik_ompl.kernels.tables.memory import packed
-from rrtik_ompl.kernels.tables.solid_tables import ConvexSolid
+from rrtik_ompl.kernels.tables.solid_tables import ConvexSolid, block_count
 from rrtik_ompl.model.robot import Robot
 
 KERNELS = "distances.kernels"

@@ -14,11 +14,11 @@ from rrtik_ompl.geometry.collision.bodies import Body
 from rrtik_ompl.kernels.proof import layout
 from rrtik_ompl.kernels.proof.groups import BLOCK
 from rrtik_ompl.kernels.proof.packing import ProofPairs, cloud_bodies, cloud_poses
-from rrtik_ompl.kernels.proof.placed import NOTHING, block_count, corner_blocks, corners_in, size_rows, solid_kind
+from rrtik_ompl.kernels.proof.placed import NOTHING, corner_blocks, corners_in, size_rows, solid_kind
 from rrtik_ompl.kernels.simd.processor import WIDTH
 from rrtik_ompl.kernels.tables.cloud_layout import LEAF
 from rrtik_ompl.kernels.tables.cloud_tables import cloud_table
-from rrtik_ompl.kernels.tables.solid_tables import ConvexSolid, convex_solids, placed_bodies
+from rrtik_ompl.kernels.tables.solid_tables import ConvexSolid, block_count, convex_solids, placed_bodies
 
 NO_LIMIT = 1 << 62
 _BALL = slice(layout.BALL_CENTRE, layout.BALL_CENTRE + 3)

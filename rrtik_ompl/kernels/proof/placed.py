@@ -19,7 +19,7 @@ from rrtik_ompl.kernels.proof import layout
 from rrtik_ompl.kernels.proof.groups import Members
 from rrtik_ompl.kernels.proof.layout import CLOUD, CONVEX_SOLID, HALF_SPACE, UNKNOWN, WHOLE_BODY
 from rrtik_ompl.kernels.simd.processor import WIDTH
-from rrtik_ompl.kernels.tables.solid_tables import ConvexSolid, Solids, placed_bodies
+from rrtik_ompl.kernels.tables.solid_tables import ConvexSolid, Solids, block_count, placed_bodies
 from rrtik_ompl.model.robot import Chain
 
 KINDS = {IS_CONVEX: CONVEX_SOLID, HALF_SPACE_SOLID: HALF_SPACE, CLOUD_SOLID: CLOUD}
@@ -203,11 +203,6 @@ def size_rows(groups: Sequence[Sequence[ConvexSolid]], turns: NDArray[np.float64
     for place, run in numbers.items():
         made[known, place : place + run.shape[1]] = run
     return made
-
-
-def block_count(corners: Matrix) -> int:
-    """How many blocks the corners of a solid take, shape (k, 3)."""
-    return -(-len(corners) // WIDTH)
 
 
 def corner_blocks(solids: Sequence[Matrix]) -> NDArray[np.float64]:

@@ -32,6 +32,7 @@ from rrtik_ompl.kernels.tables.solid_tables import (
     UNKNOWN,
     ConvexSolid,
     Solids,
+    block_count,
     corner_blocks,
     placed_bodies,
     solid_sizes,
@@ -188,7 +189,7 @@ class _SolidRows:
         solids = self._solids[first:end]
         kinds = solids[:, layout.SOLID_KIND].tolist()
         blocks = (solids[:, layout.END_BLOCK] - solids[:, layout.FIRST_BLOCK]).tolist()
-        fits = kinds == [part.kind for part in parts] and blocks == [-(-len(part.corners) // WIDTH) for part in parts]
+        fits = kinds == [part.kind for part in parts] and blocks == [block_count(part.corners) for part in parts]
 
         return (first, end) if fits else None
 

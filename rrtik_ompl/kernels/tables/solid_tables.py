@@ -247,6 +247,11 @@ def solid_sizes(solids: Sequence[ConvexSolid]) -> Matrix:
     return made
 
 
+def block_count(corners: Matrix) -> int:
+    """How many blocks the corners of a solid take, shape (k, 3)."""
+    return -(-len(corners) // WIDTH)
+
+
 def corner_blocks(solids: Sequence[ConvexSolid]) -> NDArray[np.float64]:
     """Corners ``WIDTH`` at a time, shape (blocks, 3, WIDTH); the first one of a solid fills up its last block."""
     counts = np.array([len(solid.corners) for solid in solids], dtype=np.int64)

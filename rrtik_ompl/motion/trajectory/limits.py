@@ -167,7 +167,7 @@ def slowing_of(limits: RateLimits, *peaks: Vector | None) -> float:
     shares = []
     for row, limit in zip(peaks, (limits.velocity, limits.acceleration, limits.jerk), strict=True):
         if row is not None:
-            limited = row if limit is not limits.jerk else np.where(np.isfinite(limit), row, 0.0)
+            limited = np.where(np.isfinite(limit), row, 0.0)
             shares.append(float((limited / limit).max(initial=0.0)))
     if max(shares) <= 1.0:
         return 1.0

@@ -28,7 +28,7 @@ from rrtik_ompl.model.shapes.surfaces import Faces
 from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.viewer.drawing import palette
 from rrtik_ompl.viewer.drawing.triangle_raster import rasterize
-from rrtik_ompl.viewer.drawing.triangles import split_creases, thin_out
+from rrtik_ompl.viewer.drawing.triangles import split_creases, thin_out, vertex_normals
 
 ROBOT_TRIANGLES = 20_000
 OBSTACLE_TRIANGLES = 5_000
@@ -67,7 +67,7 @@ def surface_of_shape(shape: Shape, color: str, frame: int = 0, triangles: int = 
         InputError: For a half-space, which has no boundary.
     """
     vertices, faces = split_creases(*_triangles(shape, triangles))
-    return Surface(vertices, _normals(vertices, faces), faces, np.array(fractions(color)), frame)
+    return Surface(vertices, vertex_normals(vertices, faces), faces, np.array(fractions(color)), frame)
 
 
 def robot_surfaces(robot: Robot, triangles: int = ROBOT_TRIANGLES) -> tuple[Surface, ...]:
@@ -162,19 +162,6 @@ def _welded(vertices: Matrix, faces: Faces) -> tuple[Matrix, Faces]:
 
     has_area = (merged != np.roll(merged, 1, axis=1)).all(axis=1)
     return vertices[first_rows], merged[has_area].astype(np.int64)
-
-
-def _normals(vertices: Matrix, faces: Faces) -> Matrix:
-    """Return vertex normals: the area-weighted means of the normals of the adjacent triangles, shape (n, 3)."""
-    a, b, c = (vertices[faces[:, k]] for k in range(3))
-    across = np.cross(b - a, c - a)
-
-    total = np.zeros_like(vertices)
-    for k in range(3):
-        np.add.at(total, faces[:, k], across)
-
-    unit: Matrix = total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-300)
-    return unit
 
 
 # --- many surfaces before a camera -----------------------------------------------------------------------------------

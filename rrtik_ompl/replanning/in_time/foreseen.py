@@ -270,7 +270,8 @@ class Travel:
 
     def _way(self, begin: float, end: float) -> float:
         """Return how far a point goes between two times at most [m]; between two poses its speed is even."""
-        first, last = self._times[:-1], self._times[1:]
+        first = self._times[:-1]
+        last = self._times[1:]
         shares = (np.minimum(last, end) - np.maximum(first, begin)) / (last - first)
         meant = shares > 0.0
         way = self._speed * (end - begin) + float(shares[meant] @ self._ways[meant])

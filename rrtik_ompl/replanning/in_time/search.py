@@ -318,7 +318,8 @@ class TimeSearch:
         """Return a way, shape (k, n), with a random corner moved towards the straight line between its neighbours."""
         corner = int(self._rng.integers(1, len(way) - 1))
         on_line, moved = self._rng.random(2)
-        before, after = way[corner - 1], way[corner + 1]
+        before = way[corner - 1]
+        after = way[corner + 1]
         shorter = way.copy()
         shorter[corner] += moved * (before + on_line * (after - before) - way[corner])
         return shorter

@@ -59,6 +59,15 @@ def _half_edge_pairs(start: Faces, end: Faces, count: int) -> tuple[Faces, Faces
     return pairs[:, 0], pairs[:, 1]
 
 
+def vertex_normals(vertices: Matrix, faces: Faces) -> Matrix:
+    """Return unit normals at vertices: the means of the normals of the triangles there by their areas, shape (n, 3)."""
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    across = np.cross(b - a, c - a)
+    total = np.stack([np.bincount(faces.ravel(), np.repeat(across[:, k], 3), len(vertices)) for k in range(3)], axis=1)
+    unit: Matrix = total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-300)
+    return unit
+
+
 def _unit_normals(vertices: Matrix, faces: Faces) -> Matrix:
     a, b, c = (vertices[faces[:, k]] for k in range(3))
     normals = np.cross(b - a, c - a)

@@ -6,8 +6,9 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rrtik_ompl.kernels.proof.placed import block_count, corner_blocks, corners_in
+from rrtik_ompl.kernels.proof.placed import corner_blocks, corners_in
 from rrtik_ompl.kernels.simd.processor import WIDTH
+from rrtik_ompl.kernels.tables.solid_tables import block_count
 
 
 @given(st.lists(st.integers(0, 3 * WIDTH), max_size=6))
