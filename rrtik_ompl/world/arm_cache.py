@@ -8,7 +8,7 @@ whose obstacles are moved in place, shares only the arm's part.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from functools import cached_property
 from itertools import product
 from random import Random
@@ -23,8 +23,10 @@ from rrtik_ompl.geometry.collision.bodies import Pairs as Pairs
 from rrtik_ompl.geometry.collision.solids import of_each, once_per_geometry
 from rrtik_ompl.kernels import FastWorld, needs_covers
 from rrtik_ompl.kernels.covers.cache import cached_inner_spheres, cached_outer_cover
-from rrtik_ompl.kernels.proof.groups import Members
+from rrtik_ompl.kernels.proof.groups import BLOCK, MANY, Members
+from rrtik_ompl.kernels.proof.moving import MovedSolids
 from rrtik_ompl.kernels.proof.neighbours import cells_of, joints_between
+from rrtik_ompl.kernels.proof.packing import ProofPairs
 from rrtik_ompl.kernels.proof.placed import PlacedBodies, bodies_in_place
 from rrtik_ompl.kernels.proof.rows import PROOF_KERNELS
 from rrtik_ompl.kernels.simd.library import library
@@ -38,6 +40,7 @@ SLIDING_MARGIN = 1e-3  # [m] range beyond the limits of prismatic joints that th
 LOOKS = 64  # configurations by which it is told how often covers meet
 OFTEN = 0.1  # share of these, from which on balls tell too little of two links
 MOST_PIECES = 32  # pairs of convex pieces of two links; their cells are then found in a few hundredths of a second
+KEPT_PROOFS = 8  # tables of proofs
 KEPT_ARMS = 12  # tables of an arm: with nothing or a thing in its hand, open or closed, with its own pairs or without
 NO_SPHERES = np.empty((0, 4))
 
@@ -57,6 +60,7 @@ class ArmCache:
         self._robot = robot
         self.covers: tuple[Spheres, ...] = tuple(_spheres(body) for body in link_bodies(robot))
         self._cells: dict[Pairs, dict[tuple[int, int], Cells]] = {}  # of the pairs of links that a world has
+        self._proofs: dict[Hashable, tuple[tuple[Body, ...], ProofPairs]] = {}  # tables that none is proven with
         self._arms: list[ArmTables] = []  # of the arm with what it has held, the latest first
 
     def links_of(self, bodies: Sequence[Body]) -> PlacedBodies | None:
@@ -66,6 +70,38 @@ class ArmCache:
             bodies: The bodies of a world; those of the robot's links first. If these are others, the result is None.
         """
         return self._links if self._begin_with_links(bodies) else None
+
+    def proof_table(self, bodies: Sequence[Body], pairs: Pairs) -> ProofPairs | None:
+        """Return the table of a proof with memory of its own, from one that was packed for bodies of the same kinds.
+
+        Only the bodies that are others, or elsewhere, are put into it. The result is None if there is no such table.
+
+        Args:
+            bodies: The bodies of a world.
+            pairs: Pairs of indices into ``bodies`` that must not touch.
+        """
+        kept = self._proofs.get(_kind_of_proof(bodies, pairs))
+        if kept is None:
+            return None
+
+        known, packed = kept
+        both = zip(bodies, known, strict=True)
+        others = [k for k, (body, other) in enumerate(both) if not _in_same_place(body, other)]
+        if any(k < len(self.covers) for k in others):  # it looks neighbours among the links up in cells of these links
+            return None
+
+        table = packed.for_thread(placing=True)
+        rows = MovedSolids(table, self._robot.chain, strokes(self._robot))
+        return table if all(rows.put(k, bodies[k]) for k in others) else None
+
+    def keep_proof(self, bodies: Sequence[Body], pairs: Pairs, packed: ProofPairs) -> None:
+        """Keep a copy of a table that was packed for bodies, for :meth:`proof_table`; arguments as there."""
+        is_put_as_packed = max(map(len, packed.groups), default=0) <= BLOCK  # what is around more is only bounded
+        few = sum(body.joint == 0 for body in bodies) < MANY  # neighbours among many depend on where they are
+        if few and is_put_as_packed and self._begin_with_links(bodies) and not any(body.contacts for body in bodies):
+            kept = tuple(bodies), packed.for_thread(placing=True)
+            others = list(self._proofs.items())[-(KEPT_PROOFS - 1) :]
+            self._proofs = dict([*others, (_kind_of_proof(bodies, pairs), kept)])
 
     @cached_property
     def _links(self) -> PlacedBodies:
@@ -176,6 +212,17 @@ class ArmCache:
         others = [each for each in self._arms if each is not tables.arm]
         self._arms = [tables.arm, *others[: KEPT_ARMS - 1]]
         return tables
+
+
+def _kind_of_proof(bodies: Sequence[Body], pairs: Pairs) -> Hashable:
+    """Return what is equal for bodies whose tables differ in what is said of single bodies alone."""
+    return pairs, tuple((body.joint, body.kind, body.margin, body.padding, body.contacts) for body in bodies)
+
+
+def _in_same_place(body: Body, other: Body) -> bool:
+    return body is other or (
+        body.geometry is other.geometry and np.array_equal(body.placement.homogeneous, other.placement.homogeneous)
+    )
 
 
 @kept_with

@@ -324,8 +324,12 @@ class Prover:
         if without_contacts is not None:
             return without_contacts.with_contacts(bodies)
 
-        solids = of_each((body.geometry for body in bodies), convex_solids)
         known = arm_cache(self.robot)
+        of_same_kind = known.proof_table(bodies, self.pairs) if self._fixed else None
+        if of_same_kind is not None:
+            return of_same_kind
+
+        solids = of_each((body.geometry for body in bodies), convex_solids)
         table = proof_pairs(
             self.robot.chain,
             bodies,
@@ -336,6 +340,8 @@ class Prover:
             cells=known.cells(bodies, self.pairs),
             links=known.links_of(bodies),
         )
+        if self._fixed:
+            known.keep_proof(bodies, self.pairs, table)
         if len(table.bodies) > MANY_PAIRS and library(PROOF_KERNELS) is None:
             notice.warn_of_minutes("proofs for an arm of so many pieces")
         return table

@@ -5,9 +5,10 @@ follows, and the answers are those of a world made from nothing, and coal's.
 """
 
 import pickle
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from inspect import get_annotations, isfunction
-from itertools import pairwise, product
+from itertools import combinations, pairwise, product
 
 import coal
 import numpy as np
@@ -16,9 +17,13 @@ import pytest
 
 import rrtik_ompl as rrtik
 from rrtik_ompl.kernels.checks.fast_world import FastWorld
+from rrtik_ompl.kernels.proof.layout import ProofTable
+from rrtik_ompl.kernels.proof.packing import COMPUTED, PLACED
+from rrtik_ompl.kernels.record import holds_array
 from rrtik_ompl.model.scene import Touching
 from rrtik_ompl.model.shapes.shape import Shape
 from rrtik_ompl.world import proof
+from rrtik_ompl.world.arm_cache import ArmCache, arm_cache
 from rrtik_tests.sizes import how_many
 
 UR5 = rrtik.load_robot("ur5")
@@ -97,6 +102,7 @@ def asked(world):
 def from_nothing(world):
     """The same world, of which nothing is known."""
     settings = world.settings
+    arm_cache(settings.robot)._proofs = {}  # of which it would copy a table
     scene = replace(settings.scene, obstacles=[replace(each) for each in settings.scene.obstacles])
     return rrtik.World.of(replace(settings, scene=scene))
 
@@ -209,3 +215,114 @@ def test_what_a_proof_has_left_in_the_table_of_a_cloud_is_no_part_of_the_next_on
         clouds = [rrtik.PointCloud(RNG.uniform(-0.3, 0.3, (count, 3)), 0.02) for count in (one, other)]
         world = with_tables(clouds[0]).with_obstacle(thing(clouds[1], 2))
         assert alike(asked(world), asked(from_nothing(world)))
+
+
+HELD = [name for name, shape in SHAPES.items() if shape.movable]
+
+
+def holding(shape, seed):
+    """A world with an obstacle, in which the arm holds a shape, somehow turned."""
+    rng = np.random.default_rng(seed)
+    pose = rrtik.pose([*rng.uniform(-0.1, 0.1, 3), *rng.uniform(-3.0, 3.0, 3)])
+    held = rrtik.AttachedObject("held", "wrist_3_link", shape, pose, allow=["ee_link"])
+    return rrtik.World(UR5, rrtik.Scene([thing(SHAPES["cloud"], seed), thing_of("box", seed)], [held]))
+
+
+def thing_of(name, seed):
+    return replace(thing(SHAPES[name], seed + 1), name=name)
+
+
+def table_of(world):
+    """The table of proofs of a world: all but what kernels compute in."""
+    packed = world.prover._packed_for(0.01, 0.0)
+    fields = [name for name in ProofTable.places if holds_array(ProofTable.kinds[name]) and name not in COMPUTED]
+    arrays = {name: getattr(packed.table, name).copy() for name in fields if name not in ("clouds", "log", "log_ways")}
+    own = {name: np.asarray(getattr(packed, name)) for name in ("bodies", "sides", "margins", "clear", "firsts")}
+    return arrays | own | {"reaches": packed.sweeps.lanes().ravel(), "cloud": packed.clouds[0].blocks}
+
+
+@pytest.mark.kernels
+@pytest.mark.parametrize("name", HELD)
+def test_the_table_of_what_is_held_elsewhere_is_the_one_that_packing_makes(name, monkeypatch):
+    for seed, shape in enumerate((SHAPES[name], SHAPES[name], OTHERS[name])):
+        world = holding(shape, seed)
+        if seed == 1:  # after the first one, bodies are only put into a copy of its table
+            monkeypatch.setattr(proof, "proof_pairs", forbidden_for(name))
+        put = table_of(world)
+        monkeypatch.undo()
+        monkeypatch.setattr(ArmCache, "proof_table", lambda *_: None)
+        made = table_of(holding(shape, seed))
+        monkeypatch.undo()
+        assert put.keys() == made.keys()
+        for field in put:
+            np.testing.assert_array_equal(put[field], made[field], err_msg=field)
+
+
+@pytest.mark.kernels
+@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("name", SHAPES)
+def test_the_table_of_what_stands_elsewhere_is_the_one_that_packing_makes(name, way, monkeypatch):
+    copied = 0
+    copy_of_kept = ArmCache.proof_table
+
+    def counted(*given):
+        nonlocal copied
+        table = copy_of_kept(*given)
+        copied += table is not None
+        return table
+
+    def standing(seed):
+        obstacles = [POST, FAR, thing(SHAPES["cloud"], seed), thing_of(name, seed)]
+        return WAYS[way](rrtik.World(UR5, rrtik.Scene(obstacles)))
+
+    for seed in range(2):
+        monkeypatch.setattr(ArmCache, "proof_table", counted)
+        put = table_of(standing(seed))
+        monkeypatch.setattr(ArmCache, "proof_table", lambda *_: None)
+        made = table_of(standing(seed))
+        assert put.keys() == made.keys()
+        for field in put:
+            np.testing.assert_array_equal(put[field], made[field], err_msg=field)
+    assert copied or way == "__reduce__"  # which has a robot of its own
+
+
+@pytest.mark.kernels
+def test_tables_that_are_copied_share_nothing_that_proofs_write_or_bodies_stand_in():
+    arm_cache(UR5)._proofs = {}
+    tables = [holding(SHAPES["box"], seed).prover._packed_for(0.0, 0.0).table for seed in range(3)]
+    (_, kept), *_ = arm_cache(UR5)._proofs.values()
+    for one, other in combinations([kept.table, *tables], 2):
+        for name in (*COMPUTED, *PLACED, "solids"):
+            assert not np.shares_memory(getattr(one, name), getattr(other, name)), name
+
+
+@pytest.mark.kernels
+def test_threads_that_remake_worlds_with_what_is_held_are_told_what_fresh_worlds_tell():
+    arm_cache(UR5)._proofs = {}
+    seeds = [(number % 6, name) for number in range(how_many(400, 5)) for name in ("box", "hull")]
+
+    def told(seed, name):
+        return holding(SHAPES[name], seed).motions_proven(ROWS, ENDS)
+
+    with ThreadPoolExecutor(4) as pool:
+        answers = list(pool.map(lambda each: told(*each), seeds))
+    for (seed, name), answer in zip(seeds, answers, strict=True):
+        arm_cache(UR5)._proofs = {}
+        np.testing.assert_array_equal(answer, told(seed, name))
+
+
+def forbidden_for(name):
+    """What packs a table, for shapes that are packed anew where they are others; nothing for all others."""
+    return None if name in ("box", "ball", "cylinder", "capsule", "hull") else proof.proof_pairs
+
+
+@pytest.mark.kernels
+def test_proofs_with_what_is_held_elsewhere_are_those_of_coal():
+    count = 0
+    for seed in range(6):
+        shape = SHAPES[HELD[seed % len(HELD)]]
+        world = holding(shape, seed)
+        touching = [any("held" in (each.first, each.second) for each in world.contacts(q)) for q in ROWS]
+        assert not world.motions_proven(ROWS, ROWS)[touching].any()
+        count += sum(touching)
+    assert count > 0

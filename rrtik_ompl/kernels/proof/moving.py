@@ -14,11 +14,12 @@ from rrtik_ompl.geometry.collision.bodies import Body
 from rrtik_ompl.kernels.proof import layout
 from rrtik_ompl.kernels.proof.groups import BLOCK
 from rrtik_ompl.kernels.proof.packing import ProofPairs, cloud_bodies, cloud_poses
-from rrtik_ompl.kernels.proof.placed import NOTHING, corner_blocks, corners_in, size_rows, solid_kind
+from rrtik_ompl.kernels.proof.placed import NOTHING, corner_blocks, reaches_of, size_rows, solid_kind
 from rrtik_ompl.kernels.simd.processor import WIDTH
 from rrtik_ompl.kernels.tables.cloud_layout import LEAF
 from rrtik_ompl.kernels.tables.cloud_tables import cloud_table
 from rrtik_ompl.kernels.tables.solid_tables import ConvexSolid, block_count, convex_solids, placed_bodies
+from rrtik_ompl.model.robot import Chain
 
 NO_LIMIT = 1 << 62
 _BALL = slice(layout.BALL_CENTRE, layout.BALL_CENTRE + 3)
@@ -111,16 +112,20 @@ class MovedObstacles:
 
 
 class MovedSolids:
-    """Standing bodies of a table, put in place one after the other: elsewhere, or others of the same kind.
+    """Bodies of a table, put in place one after the other: elsewhere on their joint, or others of the same kind.
 
     No other body is packed again.
 
     Args:
         packed: The table.
+        chain: The tree of joints; needed only for bodies that joints carry, as is ``strokes``.
+        strokes: The largest values of sliding joints [m], shape (joints,).
     """
 
-    def __init__(self, packed: ProofPairs) -> None:
+    def __init__(self, packed: ProofPairs, chain: Chain | None = None, strokes: Vector | None = None) -> None:
         self._packed = packed
+        self._chain = chain
+        self._strokes = strokes
         table = packed.table
         self._records = table.solids.reshape(-1, layout.SOLID_SIZE)
         self._sizes = table.sizes.reshape(-1, layout.SIZE_COUNT)
@@ -145,7 +150,7 @@ class MovedSolids:
         parts = self._parts(number)
         kinds = [solid_kind(body, solid) for solid in own]
         known = np.minimum(self._records[parts, layout.SOLID_KIND], layout.CLOUD).tolist()
-        if self._left == 0 or kinds != known:
+        if self._left == 0 or kinds != known or (body.joint > 0 and self._chain is None):
             return False
         if layout.CLOUD in kinds:
             self._put_cloud(parts[0], body)
@@ -163,12 +168,15 @@ class MovedSolids:
             members = self._packed.groups[group]
             place = self._packed.firsts[-1] + group
             if len(members) > BLOCK:  # what is around what was there and what is new is around all
-                solids = [_box(self._sizes[place]), *own]
+                self._sizes[place] = size_rows([[_box(self._sizes[place]), *own]], np.eye(3)[None])
             else:
-                solids = [self._solid(k) for member in members for k in self._parts(member)]
-            self._sizes[place] = size_rows([solids], np.eye(3)[None])
+                self._sizes[place] = self._around([k for member in members for k in self._parts(member)])
         around = [self._packed.firsts[-1] + group for group in self._groups.get(number, ())]
         self._packed.spread_sizes([*range(first, end), *around])
+        if self._chain is not None and self._strokes is not None and body.joint > 0:
+            packed = self._packed
+            packed.sweeps = packed.sweeps.with_body(number, reaches_of(self._chain, [body], [own], self._strokes)[0])
+            packed.table.reaches[:] = packed.sweeps.lanes().ravel()
         return True
 
     def _put_cloud(self, solid: int, body: Body) -> None:
@@ -189,16 +197,33 @@ class MovedSolids:
         end = self._packed.firsts[number + 1]
         return range(first + (end - first > 1), end)
 
-    def _solid(self, number: int) -> ConvexSolid:
-        """A solid as it stands in the table."""
-        record = self._records[number]
-        sizes = self._sizes[number]
-        return ConvexSolid(
-            corners_in(self._blocks[record[layout.FIRST_BLOCK] : record[layout.END_BLOCK]]),
-            disc=float(sizes[layout.DISC]),
-            axis=sizes[_DISC_AXIS],
-            radius=float(sizes[layout.ROUND]),
-        )
+    def _around(self, solids: Sequence[int]) -> Vector:
+        """The measures of several solids as one: a row as :func:`size_rows` makes it, with the axes of the frame.
+
+        Nothing has to be turned, and coordinates lie one after the other: links may have thousands of corners.
+        """
+        records = self._records[solids]
+        sizes = self._sizes[solids]
+        spans = [np.arange(*ends) for ends in records[:, [layout.FIRST_BLOCK, layout.END_BLOCK]].tolist()]
+        owners = np.repeat(np.arange(len(solids)), [len(span) for span in spans])
+        x, y, z = self._blocks[np.concatenate(spans)].transpose(1, 0, 2).copy()
+        rounds = sizes[:, layout.DISC] + sizes[:, layout.ROUND]
+        axes = sizes[:, _DISC_AXIS]
+        across = sizes[:, [layout.DISC]] * np.sqrt(np.maximum(0.0, 1.0 - axes**2)) + sizes[:, [layout.ROUND]]
+        beside = across[owners].T[:, :, None]
+        low = np.array([(along - wide).min() for along, wide in zip((x, y, z), beside, strict=True)])
+        high = np.array([(along + wide).max() for along, wide in zip((x, y, z), beside, strict=True)])
+        middle = 0.5 * (low + high)
+        away = np.sqrt((x - middle[0]) ** 2 + (y - middle[1]) ** 2 + (z - middle[2]) ** 2) + rounds[owners][:, None]
+
+        row = np.zeros(layout.SIZE_COUNT)
+        row[_BALL] = middle
+        row[layout.BALL_RADIUS] = away.max()
+        row[_AXES] = np.eye(3).ravel()
+        row[_MIDDLE] = middle
+        row[_HALF] = 0.5 * (high - low)
+        row[layout.DISC :] = sizes[0, layout.DISC :]
+        return row
 
 
 def _box(sizes: Vector) -> ConvexSolid:

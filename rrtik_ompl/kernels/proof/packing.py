@@ -36,7 +36,34 @@ COMPUTED = (
     *("margins", "frames", "angles", "stamps", "bends", "ways", "way_stamps", "lists", "counts"),
     *("stack", "chords", "chord_stamps", "seen", "log", "log_ways"),
 )
-PLACED = ("sizes", "corners", "still", "clouds", "cloud_poses")  # where solids stand
+PLACED = ("sizes", "corners", "reaches", "still", "clouds", "cloud_poses")  # where solids stand
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sweeps:
+    """What moves bodies as seen from the frames that their pairs are seen from.
+
+    Attributes:
+        members: The bodies of each sweep.
+        carries: Which joints carry them there, shape (sweeps, joints).
+        reaches: How far points of each body come from the axis of each joint, see :class:`PlacedBodies`.
+    """
+
+    members: Sequence[Members]
+    carries: NDArray[np.bool_]
+    reaches: Matrix
+
+    def with_body(self, number: int, reaches: Vector) -> Sweeps:
+        """Return the same sweeps with another reach of a body, shape (joints,) [m]."""
+        changed = self.reaches.copy()
+        changed[number] = reaches
+        return replace(self, reaches=changed)
+
+    def lanes(self) -> NDArray[np.float64]:
+        """Return how far points come from the axes of the joints that carry them, as the kernels read it [m]."""
+        joints = self.reaches.shape[1]
+        farthest = np.array([self.reaches[list(them)].max(axis=0) for them in self.members]).reshape(-1, joints)
+        return _in_lanes(np.where(self.carries, farthest, 0.0))
 
 
 @dataclass(slots=True, eq=False)
@@ -57,6 +84,7 @@ class ProofPairs:
         firsts: The first solid of each body, and the end of them.
         groups: Bodies that are one solid together; these solids come last.
         first_group: Number of the first pair of several bodies, which come last.
+        sweeps: What moves the bodies of its pairs.
         kept: What the kernels keep now beside the margins [m]: a clearance from obstacles, nan before the first
             :meth:`keep`, and what they keep between all bodies for rounding and slack.
     """
@@ -73,6 +101,7 @@ class ProofPairs:
     firsts: Sequence[int]
     groups: Sequence[Members]
     first_group: int
+    sweeps: Sweeps
     kept: tuple[float, float] = (float("nan"), ROOM)
 
     def keep(self, clearance: float, slack: float = 0.0) -> None:
@@ -182,8 +211,8 @@ def proof_pairs(
     looked_up = np.array([looked_up_of(k) for k in listed.top], dtype=np.int32)
     lengths, blocks, still = _runs(rows, chords[:, 0], top, top[looked_up >= 0])
     clouds = [cloud_table(bodies[k].geometry.cloud) for k in cloud_bodies(bodies)]
-    reaches = np.array([placed.reaches[list(them)].max(axis=0) for them, _ in sweeps]).reshape(-1, joints)
     carries = np.array([_carried(chain, bodies[k].joint, base) for (k, *_), base in sweeps]).reshape(-1, joints)
+    swept = Sweeps([them for them, _ in sweeps], carries, placed.reaches)
     made = packed(
         ProofTable,
         joint_count=joints,
@@ -195,7 +224,7 @@ def proof_pairs(
         corners=placed.corners,
         sweep_count=len(sweeps),
         sweeps=np.array([(bodies[k].joint, base) for (k, *_), base in sweeps], dtype=np.int32),
-        reaches=_in_lanes(np.where(carries, reaches, 0.0)),
+        reaches=swept.lanes(),
         carries=_in_lanes(carries),
         body_pair_count=len(listed.whole),
         pair_count=len(rows),
@@ -244,6 +273,7 @@ def proof_pairs(
         firsts=placed.firsts,
         groups=listed.together,
         first_group=count,
+        sweeps=swept,
     )
     pairs_of_bodies.spread_sizes()
     return pairs_of_bodies

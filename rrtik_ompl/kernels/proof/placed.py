@@ -109,7 +109,7 @@ def bodies_in_place(chain: Chain, bodies: Sequence[Body], solids: Sequence[Solid
         np.array(rows, dtype=np.int32).reshape(-1, layout.SOLID_SIZE),  # none where all is free
         size_rows(groups, poses[owners, :3, :3]),
         corner_blocks([solid.corners for own in parts for solid in own]),
-        _reaches(chain, bodies, parts, np.broadcast_to(strokes, len(chain.parent))),
+        reaches_of(chain, bodies, parts, np.broadcast_to(strokes, len(chain.parent))),
     )
 
 
@@ -119,7 +119,7 @@ def solid_kind(body: Body, solid: ConvexSolid) -> int:
     return UNKNOWN if kind == HALF_SPACE and body.joint > 0 else kind
 
 
-def _reaches(chain: Chain, bodies: Sequence[Body], parts: Sequence[Sequence[ConvexSolid]], strokes: Vector) -> Matrix:
+def reaches_of(chain: Chain, bodies: Sequence[Body], parts: Sequence[Sequence[ConvexSolid]], strokes: Vector) -> Matrix:
     """How far points of bodies come from the axis of each joint that carries them, in any posture, (bodies, joints)."""
     reaches = np.zeros((len(bodies), len(chain.parent)))
     convex = np.array([all(solid.kind == IS_CONVEX for solid in own) for own in parts], dtype=bool)
@@ -216,8 +216,3 @@ def corner_blocks(solids: Sequence[Matrix]) -> NDArray[np.float64]:
     numbers = np.minimum(numbers, np.repeat(counts - 1, lanes)) + np.repeat(np.cumsum(counts) - counts, lanes)
     corners = np.concatenate([np.zeros((0, 3)), *solids])[numbers]
     return np.ascontiguousarray(corners.reshape(-1, WIDTH, 3).transpose(0, 2, 1))
-
-
-def corners_in(blocks: NDArray[np.float64]) -> Matrix:
-    """The corners in blocks, shape (k, 3), those that fill up among them."""
-    return np.asarray(blocks.transpose(0, 2, 1).reshape(-1, 3))

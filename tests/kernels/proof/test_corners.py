@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rrtik_ompl.kernels.proof.placed import corner_blocks, corners_in
+from rrtik_ompl.kernels.proof.placed import corner_blocks
 from rrtik_ompl.kernels.simd.processor import WIDTH
 from rrtik_ompl.kernels.tables.solid_tables import block_count
 
@@ -19,7 +19,7 @@ def test_blocks_hold_the_corners_of_each_solid_in_order(counts: list[int]) -> No
     assert blocks.shape == (sum(map(block_count, solids)), 3, WIDTH)
     first = 0
     for corners in solids:
-        held = corners_in(blocks[first : first + block_count(corners)])
+        held = blocks[first : first + block_count(corners)].transpose(0, 2, 1).reshape(-1, 3)
         assert (held[: len(corners)] == corners).all()
         assert (held[len(corners) :] == corners[-1:]).all()
         first += block_count(corners)

@@ -6,13 +6,15 @@ import pytest
 import rrtik_ompl as rrtik
 from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.kernels.proof import layout, packing
+from rrtik_ompl.world.arm_cache import ArmCache
 from rrtik_ompl.world.world import World
 
 pytestmark = pytest.mark.kernels
 
 
 @pytest.fixture(autouse=True)
-def forgotten():
+def forgotten(monkeypatch):
+    monkeypatch.setattr(ArmCache, "proof_table", lambda *_: None)  # tables are packed, not copied
     yield
     packing._listed.cache_clear()
 
