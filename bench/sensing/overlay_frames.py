@@ -21,7 +21,7 @@ from rrtik_ompl.pilot.overlay.rasterizer import FARTHEST_DRAWN, Canvas, figure_o
 from rrtik_ompl.pilot.overlay.virtual_camera import orbit_pose
 from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.cameras.pictures import Picture
-from rrtik_ompl.sensing.markers.detection import marker_cells
+from rrtik_ompl.sensing.markers.dictionaries import marker_cells
 from rrtik_ompl.sensing.sensor import Sensor
 
 BUDGET = 20.0  # [ms] of processor time

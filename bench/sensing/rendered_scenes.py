@@ -13,7 +13,7 @@ from rrtik_bench.report.page import Report
 from rrtik_bench.sensing.runs import CAMERA, DICTIONARY, SIDE, facing, in_view
 from rrtik_bench.sensing.synthetic_camera import Print, clean_picture, marker_print, photograph
 from rrtik_ompl.base.poses import pose
-from rrtik_ompl.sensing.markers.detection import marker_cells
+from rrtik_ompl.sensing.markers.dictionaries import marker_cells
 from rrtik_ompl.sensing.markers.marker_map import MarkedObject, MarkerMap, MountedMarker
 from rrtik_ompl.sensing.sight import Sighting, detect_objects
 from rrtik_ompl.sensing.tracker import PoseTracker, Tracked

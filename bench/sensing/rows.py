@@ -26,7 +26,7 @@ from rrtik_ompl import load_robot
 from rrtik_ompl.base.poses import pose
 from rrtik_ompl.ik.analytic.closed_form import solutions
 from rrtik_ompl.pilot.overlay.virtual_camera import orbit_pose
-from rrtik_ompl.sensing.markers.detection import marker_cells
+from rrtik_ompl.sensing.markers.dictionaries import marker_cells
 from rrtik_ompl.sensing.markers.marker_map import MarkedObject, MarkerMap, MountedMarker
 from rrtik_ompl.sensing.scene_from_view import objects_in_base
 from rrtik_ompl.sensing.sight import detect_objects

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.sensing.cameras.camera import Camera
-from rrtik_ompl.sensing.markers.detection import marker_cells
+from rrtik_ompl.sensing.markers.dictionaries import marker_cells
 
 Light = NDArray[np.float32]
 
@@ -92,6 +92,45 @@ def taken(
     if trouble.motion[1] > 0.0:
         light = _moved(light, rng.uniform(*trouble.motion), rng.uniform(0.0, np.pi))
     return _coded(light, trouble, rng)
+
+
+def with_clear_marker(
+    picture: NDArray[np.uint8],
+    camera: Camera,
+    truth: Any,
+    marker: tuple[str, int],
+    rng: np.random.Generator,
+) -> NDArray[np.uint8]:
+    """The picture with a piece of a clear one that shows another marker, apart from the one that is in it.
+
+    Args:
+        picture: Shape (height, width).
+        camera: Its camera.
+        truth: Pose of the marker that is in it.
+        marker: Dictionary and number of the other one.
+        rng: Says where it is.
+    """
+    low, high = _box(camera, truth)
+    for attempt in range(1000):
+        T = facing(rng, camera, (0.4 + 1e-3 * attempt, 0.8 + 2e-3 * attempt), (0.0, 40.0))
+        begin, end = _box(camera, T)
+        if (begin > high).any() or (end < low).any():
+            break
+    clear = taken(camera, [(T, marker[1])], marker[0], Trouble(), rng)
+    piece = np.s_[begin[1] : end[1], begin[0] : end[0]]
+    both = picture.copy()
+    both[piece] = clear[piece]
+    return both
+
+
+def _box(camera: Camera, T: Any) -> tuple[Matrix, Matrix]:
+    """Left top and right bottom of a marker with its rim and a little more [pixels]."""
+    reach = 0.5 * SIDE * 1.4
+    outline = np.array([[x, y, 0.0] for x in (-reach, reach) for y in (-reach, reach)])
+    pixels = camera.project(outline @ T.rotation.T + T.translation)
+    low = np.clip(np.floor(pixels.min(axis=0)).astype(int) - 3, 0, [camera.width, camera.height])
+    high = np.clip(np.ceil(pixels.max(axis=0)).astype(int) + 4, 0, [camera.width, camera.height])
+    return low, high
 
 
 def _blurred(light: Light, spot: float) -> Light:

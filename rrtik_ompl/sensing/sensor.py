@@ -128,7 +128,7 @@ class Sensor:
         self.marker_map = marker_map
         self._sigmas = checked_sigmas(sigmas)
         self._trackers = {each.name: PoseTracker() for each in marker_map.objects} if smooth else {}
-        self._before: tuple[Sighting, ...] = ()
+        self._last: dict[str, Sighting] = {}  # where each object was sighted last
         self._count = 0  # number of pictures so far
         self._blank: NDArray[np.uint8] | None = None  # last picture without any marker of the map
 
@@ -144,7 +144,8 @@ class Sensor:
                 times go backwards.
         """
         detected = self._detected(picture, others)
-        self._before = detected if self._trackers else ()
+        if self._trackers:
+            self._last |= {sighting.object.name: sighting for sighting in detected}
         self._count += 1
 
         seen = tuple(self._tracked(sighting, picture.time) for sighting in detected)
@@ -168,7 +169,8 @@ class Sensor:
             return detect_in_rig([each.pixels for each in (picture, *others)], self._rig, self.marker_map)
 
         near = bool(self._trackers) and self._count % WHOLE_EVERY != 0
-        return detect_objects(picture.pixels, self.camera, self.marker_map, before=self._before, near=near)
+        last = tuple(self._last.values())
+        return detect_objects(picture.pixels, self.camera, self.marker_map, before=last, near=near, turn=self._count)
 
     def why_nothing(self, source: str) -> str:
         """Return one line on why no object was found in the last picture without one, with a remedy.

@@ -87,6 +87,7 @@ def detect_objects(
     align: bool = True,
     before: Sequence[Sighting] = (),
     near: bool = False,
+    turn: int = 0,
 ) -> tuple[Sighting, ...]:
     """Detect the objects of a map in a picture; they are returned in the order of the map.
 
@@ -95,8 +96,9 @@ def detect_objects(
         camera: Camera of the picture, with the same size.
         marker_map: The map of all objects.
         align: Refine the corners (`alignment`).
-        before: Sightings in the previous picture of a film, which make alignment faster.
-        near: Search for markers only near their previous places, unless one of them has disappeared.
+        before: Where the objects were sighted last in earlier pictures of a film, which makes alignment faster.
+        near: Search for markers only near those places, unless one of them has disappeared.
+        turn: Number of the picture in the film: parts of the picture take turns in the search for missing objects.
 
     Raises:
         InputError: If the picture does not have the camera's size, or is invalid.
@@ -118,7 +120,14 @@ def detect_objects(
 
     last_markers = [marker for last_sighting in before for marker in last_sighting.markers]
     markers_seen = find_markers(
-        gray, marker_map.dictionary, align=align, tone=camera.tone, before=last_markers, near=near
+        gray,
+        marker_map.dictionary,
+        align=align,
+        tone=camera.tone,
+        wanted=[marker.number for marked_object in marker_map.objects for marker in marked_object.markers],
+        before=last_markers,
+        near=near,
+        turn=turn,
     )
 
     sightings = (sighting(camera, marked_object, markers_seen) for marked_object in marker_map.objects)

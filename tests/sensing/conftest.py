@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from rrtik_bench.sensing.synthetic_camera import clean_picture, marker_print, photograph
-from rrtik_ompl.sensing.markers.detection import marker_cells
+from rrtik_ompl.sensing.markers.dictionaries import marker_cells
 from rrtik_tests.marker_files import CAMERA
 from rrtik_tests.marker_views import facing
 

@@ -17,7 +17,8 @@ from rrtik_ompl.sensing.cameras.pan_tilt_zoom import PanTiltZoom
 from rrtik_ompl.sensing.cameras.pictures import Picture, pictures_from, read_picture
 from rrtik_ompl.sensing.depth import cloud_from_depth
 from rrtik_ompl.sensing.markers.chessboard import Chessboard
-from rrtik_ompl.sensing.markers.detection import charuco_board, marker_cells
+from rrtik_ompl.sensing.markers.detection import charuco_board
+from rrtik_ompl.sensing.markers.dictionaries import marker_cells
 from rrtik_ompl.sensing.markers.marker_map import GraspType, MarkedObject, MarkerMap, MountedMarker
 from rrtik_ompl.sensing.markers.sheets import print_board, print_markers
 from rrtik_ompl.sensing.rig import Rig, detect_in_rig

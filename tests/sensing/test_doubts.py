@@ -10,7 +10,8 @@ from rrtik_ompl.base.poses import pose
 from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.markers import sheets
 from rrtik_ompl.sensing.markers.corner_pose import pose_of_square, square_corners
-from rrtik_ompl.sensing.markers.detection import SeenMarker, find_markers, marker_cells
+from rrtik_ompl.sensing.markers.detection import SeenMarker, find_markers
+from rrtik_ompl.sensing.markers.dictionaries import marker_cells
 from rrtik_ompl.sensing.markers.marker_map import MarkedObject, MarkerMap, MountedMarker
 from rrtik_ompl.sensing.sight import sighting
 from rrtik_tests.marker_views import CAMERA, SIDE, facing

@@ -10,7 +10,8 @@ from rrtik_ompl.sensing.calibration import calibrate
 from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.markers.chessboard import Chessboard
 from rrtik_ompl.sensing.markers.corner_pose import pose_of_square
-from rrtik_ompl.sensing.markers.detection import charuco_board, dictionary_of, find_markers, marker_cells
+from rrtik_ompl.sensing.markers.detection import charuco_board, dictionary_of, find_markers
+from rrtik_ompl.sensing.markers.dictionaries import marker_cells
 from rrtik_ompl.sensing.markers.lighting import coded
 from rrtik_tests.marker_views import CAMERA, SIDE, facing
 

@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from rrtik_bench.sensing.synthetic_camera import clean_picture, marker_print, photograph, published_camera
 from rrtik_ompl.base.errors import InputError, UnknownNameError
 from rrtik_ompl.sensing.markers.corner_pose import pose_of_square, square_corners
-from rrtik_ompl.sensing.markers.detection import DICTIONARIES, dictionaries_seen, find_markers, marker_cells
+from rrtik_ompl.sensing.markers.detection import dictionaries_seen, find_markers
+from rrtik_ompl.sensing.markers.dictionaries import DICTIONARIES, marker_cells
 from rrtik_tests.marker_views import CAMERA, SIDE, facing, picture_of
 
 

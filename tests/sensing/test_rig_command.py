@@ -9,7 +9,7 @@ import pytest
 from rrtik_bench.sensing.synthetic_camera import clean_picture, marker_print, photograph
 from rrtik_ompl.base.poses import pose_from_rpy
 from rrtik_ompl.sensing.markers.corner_pose import square_corners
-from rrtik_ompl.sensing.markers.detection import marker_cells
+from rrtik_ompl.sensing.markers.dictionaries import marker_cells
 from rrtik_tests.command_line import rrtik
 from rrtik_tests.marker_files import CAMERA
 from rrtik_tests.marker_views import SIDE, facing

@@ -13,7 +13,7 @@ from rrtik_ompl.base.poses import pose, pose_from_rpy
 from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.cameras.pan_tilt_zoom import Encoder, PanTiltZoom
 from rrtik_ompl.sensing.markers.corner_pose import pose_of_square, square_corners
-from rrtik_ompl.sensing.markers.detection import marker_cells
+from rrtik_ompl.sensing.markers.dictionaries import marker_cells
 from rrtik_ompl.sensing.markers.marker_map import MarkedObject, MarkerMap, MountedMarker
 from rrtik_ompl.sensing.rig import Rig, detect_in_rig
 from rrtik_ompl.sensing.sight import detect_objects

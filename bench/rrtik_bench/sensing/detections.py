@@ -14,7 +14,8 @@ from rrtik_bench.report.rows import Bar, Row, exactly, judged
 from rrtik_bench.sensing.runs import CAMERA, DICTIONARY, HARD, PLAIN, SIDE, random_poses
 from rrtik_bench.sensing.synthetic_camera import clean_picture, marker_print, photograph
 from rrtik_bench.tables import Table
-from rrtik_ompl.sensing.markers.detection import find_markers, marker_cells
+from rrtik_ompl.sensing.markers.detection import find_markers
+from rrtik_ompl.sensing.markers.dictionaries import marker_cells
 
 DISTANCES = (500, 1000, 1500, 2000)  # [mm]
 NUMBERS = 50  # of the dictionary

@@ -21,7 +21,8 @@ from rrtik_ompl.sensing.markers.corner_pose import (
     pose_of_square,
     square_corners,
 )
-from rrtik_ompl.sensing.markers.detection import find_markers, marker_cells
+from rrtik_ompl.sensing.markers.detection import find_markers
+from rrtik_ompl.sensing.markers.dictionaries import marker_cells
 
 DICTIONARY = "4x4_50"
 SIDE = 0.08  # of the published markers [m]

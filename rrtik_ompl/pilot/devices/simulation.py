@@ -24,7 +24,7 @@ from rrtik_ompl.pilot.devices.arm import Arm, SimulatedArm
 from rrtik_ompl.pilot.overlay.augment import Augmenter
 from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.cameras.pictures import Picture
-from rrtik_ompl.sensing.markers.detection import marker_cells
+from rrtik_ompl.sensing.markers.dictionaries import marker_cells
 from rrtik_ompl.sensing.markers.marker_map import MarkedObject, MarkerMap
 
 PIXELS_PER_CELL = 24  # resolution of a marker's image

@@ -82,7 +82,7 @@ class MarkerMapFile(Section):
 
     def build(self, document: YamlDocument) -> MarkerMap:
         """Return the map; error messages name the line of the object."""
-        from rrtik_ompl.sensing.markers.detection import marker_cells
+        from rrtik_ompl.sensing.markers.dictionaries import marker_cells
 
         objects = []
         for k, entry in enumerate(self.objects):

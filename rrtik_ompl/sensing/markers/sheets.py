@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from rrtik_ompl.base.arrays import finite_number, whole_number
 from rrtik_ompl.base.errors import InputError, at_most, listed, require
 from rrtik_ompl.files.text import check_target, file_name, write_bytes
-from rrtik_ompl.sensing.markers.detection import charuco_board, marker_cells
+from rrtik_ompl.sensing.markers.detection import charuco_board
+from rrtik_ompl.sensing.markers.dictionaries import marker_cells
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -7,7 +7,7 @@ from rrtik_bench.sensing.synthetic_camera import clean_picture, marker_print, ph
 from rrtik_ompl.base.poses import pose
 from rrtik_ompl.model.scene import Obstacle
 from rrtik_ompl.model.shapes import Box
-from rrtik_ompl.sensing.markers.detection import marker_cells
+from rrtik_ompl.sensing.markers.dictionaries import marker_cells
 from rrtik_ompl.sensing.markers.marker_map import GraspType, MarkedObject, MountedMarker
 
 CAMERA = published_camera((0.05, -0.12, 0.0005, -0.0007, 0.03))
