@@ -224,10 +224,12 @@ def _cells(
     directions = _directions(camera, pose.rotation.tobytes(), side)
     offset = (pose.translation - low) / side
     with np.errstate(invalid="ignore"):
-        places = [z * row + np.float32(start) for row, start in zip(directions, offset, strict=True)]
+        places = [z * row for row in directions]
         inside = is_measured
-        for place, count in zip(places, counts, strict=True):
-            inside = inside & (place >= 0.0) & (place < count)
+        for place, start, count in zip(places, offset.astype(np.float32), counts, strict=True):
+            place += start
+            inside &= place >= 0.0
+            inside &= place < count
     chosen = np.flatnonzero(inside)
     x, y, z = (place[chosen] for place in places)
     if boxes:

@@ -67,15 +67,18 @@ def without_robot(
     bodies = (*link_bodies(robot), *attached)
 
     outside = np.ones(len(cloud.points), dtype=bool)
-    covers = [balls for balls, _ in arm_cache(robot).covers_of(bodies)]
+    covers = arm_cache(robot).covers_of(bodies)
     from_bodies = [(pin.SE3(frames[body.joint]) * body.placement).actInv(cloud_pose) for body in bodies]
     places = _around(cloud, bodies, from_bodies, distance)
-    for body, balls, from_body, numbers in zip(bodies, covers, from_bodies, places, strict=True):
+    for body, (outer, inner), from_body, around in zip(bodies, covers, from_bodies, places, strict=True):
+        numbers = around[outside[around]]  # those on a body before this one are removed already
+        if not len(numbers):
+            continue
         points = cloud.points[numbers] @ from_body.rotation.T + from_body.translation
         reach = distance + body.padding
-        chosen = _in_reach(points, body, balls, reach + cloud.radius + ROUNDING)
-        near = _near(points[chosen], body.geometry, cloud.radius, reach)
-        outside[numbers[chosen][near]] = False
+        chosen = np.flatnonzero(_in_reach(points, body, outer, reach + cloud.radius + ROUNDING))
+        near = _near(points[chosen], body.geometry, inner, cloud.radius, reach)
+        outside[numbers[chosen[near]]] = False
     return cloud.only(outside, "without_robot")
 
 
@@ -98,14 +101,19 @@ def _around(
 
     # Squares of distances of all points from all centres, seen from the arm, where they are small.
     middle = centres.mean(axis=0)
-    points = cloud.points - middle
-    centres -= middle
-    squares = np.einsum("ij,ij->i", points, points)[:, None] - 2.0 * points @ centres.T
-    return [np.flatnonzero(column) for column in (squares <= radii**2 - (centres**2).sum(axis=1)).T]
+    return [np.flatnonzero(row) for row in _within(cloud.points - middle, centres - middle, radii)]
+
+
+def _within(points: Matrix, centres: Matrix, radii: Vector) -> NDArray[np.bool_]:
+    """Return which points, shape (n, 3), are within radii of centres, shapes (k,) and (k, 3), shape (k, n)."""
+    limits = radii**2 - np.einsum("ij,ij->i", centres, centres)
+    squares = (-2.0 * centres) @ points.T
+    squares += np.einsum("ij,ij->i", points, points)
+    return np.asarray(squares <= limits[:, None])
 
 
 def _in_reach(points: Matrix, body: Body, balls: Matrix, reach: float) -> Mask:
-    """Return which points are within reach of a body's box and outer cover, shape (n,).
+    """Return which points are within reach of a body's outer cover, or of its box if it has none, shape (n,).
 
     Args:
         points: In the body's frame, shape (n, 3) [m].
@@ -113,28 +121,43 @@ def _in_reach(points: Matrix, body: Body, balls: Matrix, reach: float) -> Mask:
         balls: Its outer cover, shape (k, 4) [m]; empty for a fixed body of a simple shape.
         reach: Distance that is looked at [m].
     """
+    if len(balls):
+        return _by_balls(points, balls, reach)
     box = body.geometry.aabb_local
     in_box = (points >= np.array(box.min_) - reach) & (points <= np.array(box.max_) + reach)
-    in_reach: Mask = np.asarray(in_box.all(axis=1))
-    if len(balls) and in_reach.any():
-        inside = points[in_reach]
-        squares = np.einsum("ij,ij->i", inside, inside)[:, None] - 2.0 * inside @ balls[:, :3].T
-        limits = (balls[:, 3] + reach) ** 2 - (balls[:, :3] ** 2).sum(axis=1)
-        in_reach[in_reach] = (squares <= limits).any(axis=1)
-    return in_reach
+    return np.asarray(in_box.all(axis=1))
 
 
-def _near(points: Matrix, geometry: coal.CollisionGeometry, radius: float, margin: float) -> Mask:
+def _by_balls(points: Matrix, balls: Matrix, reach: float) -> Mask:
+    """Return which points, shape (n, 3), are within reach [m] of one of some balls, shape (k, 4), shape (n,)."""
+    return np.asarray(_within(points, balls[:, :3], np.maximum(balls[:, 3] + reach, 0.0)).any(axis=0))
+
+
+def _near(points: Matrix, geometry: coal.CollisionGeometry, inner: Matrix, radius: float, margin: float) -> Mask:
     """Return which balls around points, shape (n, 3), are within a margin of a geometry, or inside of it, shape (n,).
 
-    A mesh is compared triangle by triangle, all other geometries by coal.
+    What is near to a ball inside of the geometry is near to it. The others are compared with a mesh triangle by
+    triangle, with a box in closed form, with all other geometries by coal.
 
     Args:
         points: The centres in the geometry's frame [m].
         geometry: The geometry.
-        radius: Of the balls [m].
+        inner: Balls inside of it, shape (k, 4) [m].
+        radius: Of the balls around points [m].
         margin: The margin [m].
     """
+    near = _by_balls(points, inner, radius + margin - ROUNDING)
+    open_ = np.flatnonzero(~near)
+    if len(open_):
+        near[open_] = _near_solid(points[open_], geometry, radius, margin)
+    return near
+
+
+def _near_solid(points: Matrix, geometry: coal.CollisionGeometry, radius: float, margin: float) -> Mask:
+    """As :func:`_near`, without balls inside of the geometry."""
+    if isinstance(geometry, coal.Box):
+        beyond = np.maximum(np.abs(points) - geometry.halfSide, 0.0)
+        return np.asarray(np.einsum("ij,ij->i", beyond, beyond) <= (radius + margin) ** 2)
     if not is_mesh(geometry):
         return np.array([_touches(point, geometry, radius, margin) for point in points], dtype=bool)
 

@@ -1,5 +1,6 @@
 """The arm's own points are left out of a cloud, and no others."""
 
+import coal
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -9,6 +10,8 @@ from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.geometry.collision.bodies import link_bodies
 from rrtik_ompl.geometry.collision.solids import is_mesh, mesh_arrays
 from rrtik_ompl.model.shapes import PointCloud
+from rrtik_ompl.world import robot_points
+from rrtik_ompl.world.arm_cache import arm_cache
 from rrtik_ompl.world.world import World
 
 
@@ -54,3 +57,26 @@ def test_bad_input_is_one_line():
         rrtik.sensing.without_robot(cloud, robot, np.zeros(3), 0.5)
     with pytest.raises(InputError, match="margin must not be negative"):
         rrtik.sensing.without_robot(cloud, robot, np.zeros(3), -0.5)
+
+
+@pytest.mark.parametrize("name", ["panda", "ur5_gripper", "so101", "titan4"])
+def test_what_balls_inside_of_a_link_decide_is_what_its_surface_decides(name):
+    robot = rrtik.load_robot(name)
+    rng = np.random.default_rng(5)
+    decided = 0
+    for body, (_, inner) in zip(link_bodies(robot), arm_cache(robot).covers, strict=True):
+        box = body.geometry.aabb_local
+        points = rng.uniform(np.array(box.min_) - 0.05, np.array(box.max_) + 0.05, (80, 3))
+        near = robot_points._near(points, body.geometry, inner, 0.01, 0.02)
+        by_surface = robot_points._near(points, body.geometry, np.empty((0, 4)), 0.01, 0.02)
+        np.testing.assert_array_equal(near, by_surface, err_msg=body.name)
+        decided += robot_points._by_balls(points, inner, 0.03).sum()
+    assert decided > 0
+
+
+def test_points_near_a_box_are_those_that_coal_finds():
+    box = coal.Box(0.2, 0.1, 0.3)
+    points = np.random.default_rng(6).uniform(-0.2, 0.2, (300, 3))
+    by_coal = [robot_points._touches(point, box, 0.01, 0.03) for point in points]
+    np.testing.assert_array_equal(robot_points._near_solid(points, box, 0.01, 0.03), by_coal)
+    assert 0.1 < np.mean(by_coal) < 0.9
