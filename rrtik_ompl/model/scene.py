@@ -6,6 +6,7 @@ import os
 import re
 from collections import Counter
 from collections.abc import Hashable, Iterable
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
 from typing import TypeAlias
 
@@ -413,7 +414,9 @@ class Scene:
         return replace(self, obstacles=(*self.obstacles, *obstacles))
 
     def without(self, *names: str) -> Scene:
-        """Return the scene without some obstacles and attached objects, and without the pairs that contain them.
+        """Return the scene without some obstacles and attached objects, and without all that names them.
+
+        These are allowed pairs, contacts, and what the remaining attached objects may touch.
 
         Raises:
             UnknownNameError: If there is none of that name.
@@ -422,12 +425,10 @@ class Scene:
             require(name, str, "name of an obstacle or attached object")
             if name not in self.names:
                 raise UnknownNameError("obstacle or attached object", name, self.names)
-        return Scene(
-            tuple(o for o in self.obstacles if o.name not in names),
-            tuple(a for a in self.attached if a.name not in names),
-            tuple(pair for pair in self.allowed_collisions if not set(pair) & set(names)),
-            tuple(contact for contact in self.contacts if not contact.pair & set(names)),
-        )
+        gone = set(names)
+        obstacles = tuple(o for o in self.obstacles if o.name not in gone)
+        attached = tuple(a for a in self.attached if a.name not in gone)
+        return unnamed(replace(self, obstacles=obstacles, attached=attached), gone)
 
     def attaching(
         self,
@@ -511,8 +512,23 @@ def pose_at(obstacle: Obstacle, time: float) -> pin.SE3:
 
 def pairs_that_may_touch(scene: Scene) -> frozenset[tuple[frozenset[str], float | None]]:
     """Return the pairs of names that may touch, each with the least distance of a contact [m] or None."""
-    allowed = ((frozenset(pair), None) for pair in scene.allowed_collisions)
+    held = ((item.name, name) for item in scene.attached for name in item.allow)
+    allowed = ((frozenset(pair), None) for pair in (*scene.allowed_collisions, *held))
     return frozenset([*allowed, *((each.pair, each.distance) for each in scene.contacts)])
+
+
+def unnamed(scene: Scene, gone: AbstractSet[str]) -> Scene:
+    """Return a scene in which no pair, contact or grasp names what is gone; the same one if none does."""
+    pairs = tuple(pair for pair in scene.allowed_collisions if not gone & set(pair))
+    contacts = tuple(contact for contact in scene.contacts if not gone & contact.pair)
+    attached = tuple(
+        replace(item, allow=tuple(name for name in item.allow if name not in gone)) if gone & set(item.allow) else item
+        for item in scene.attached
+    )
+    kept = len(pairs) == len(scene.allowed_collisions) and len(contacts) == len(scene.contacts)
+    if kept and all(new is old for new, old in zip(attached, scene.attached, strict=True)):
+        return scene
+    return replace(scene, attached=attached, allowed_collisions=pairs, contacts=contacts)
 
 
 def exchanged(scene: Scene, number: int, obstacle: Obstacle) -> Scene:

@@ -6,7 +6,7 @@ The rule behind the answers: what a scene adds counts at once, and what it takes
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Set
 from dataclasses import dataclass, replace
 from typing import Literal, TypeAlias
 
@@ -14,7 +14,7 @@ import numpy as np
 
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.base.poses import travel_bound
-from rrtik_ompl.model.scene import Obstacle, Scene
+from rrtik_ompl.model.scene import Obstacle, Scene, unnamed
 from rrtik_ompl.model.shapes import HalfSpace, Shape, same_shape
 from rrtik_ompl.model.shapes.shape import same_but_for_points
 
@@ -37,6 +37,7 @@ ANSWERS: Mapping[FaultKind, str] = {
 UNFORESEEN: tuple[FaultKind, ...] = ("appears", "appears on the arm", "changes size", "changes shape")
 MOST_DROPPED = 1000  # scenes in a row; a feed that goes on like that stands still
 PLACE_NOISE = 1e-6  # [m]: what is nearer to its last place than that has not moved
+TIME_RESOLUTION = 1e-6  # [s]: a double holds a time since 1970 to a quarter of this
 BEFORE = " (before)"  # is added to the name of an obstacle whose shape has changed, for its old shape
 
 
@@ -113,6 +114,7 @@ class _Sighting:
         reported: The shape that the scene gave.
         since: Since when the scenes give this shape [s].
         scene: The scene, which says what may touch the obstacle.
+        name: Its name there; an old shape counts under another one.
     """
 
     time: float
@@ -120,6 +122,7 @@ class _Sighting:
     reported: Shape
     since: float
     scene: Scene
+    name: str
 
 
 class SceneMemory:
@@ -135,6 +138,7 @@ class SceneMemory:
         self._speed_bound = speed_bound or 0.0
         self._sightings: dict[str, _Sighting] = {}
         self._given: set[str] = set()  # names of the obstacles of the last scene
+        self._ever: set[str] = set()  # names of all obstacles that have counted
         self._time = -np.inf
         self._known: Known | None = None
 
@@ -159,9 +163,9 @@ class SceneMemory:
         for obstacle in scene.obstacles:
             name = obstacle.name
             seen_at = time - unseen.get(name, 0.0)
-            sighting = _Sighting(seen_at, obstacle, obstacle.shape, seen_at, scene)
+            sighting = _Sighting(seen_at, obstacle, obstacle.shape, seen_at, scene, name)
             if name in before:
-                now |= self._seen_again(before[name], sighting, faults)
+                now |= self._seen_again(before[name], sighting, {*before, *given}, faults)
                 continue
 
             now[name] = sighting
@@ -173,6 +177,8 @@ class SceneMemory:
                 faults.append(Fault(time, "appears", name))
 
         for name, sighting in missing.items():
+            if _is_back(sighting, name, now):
+                continue
             if time - sighting.time > self._patience:
                 faults.append(Fault(time, "stays away", name))
             else:
@@ -182,11 +188,29 @@ class SceneMemory:
         self._sightings = now
         self._time = time
         self._given = given
-        self._known = Known(_scene_of(now, scene), _unseen_of(now, given, time, unseen), tuple(faults))
+        self._ever |= now.keys()
+        known = unnamed(_scene_of(now, scene), self._ever - now.keys())
+        ages = {name: time - each.time for name, each in now.items() if each.time < time}
+        self._known = Known(known, ages, tuple(faults))
         return self._known
 
-    def _seen_again(self, before: _Sighting, now: _Sighting, faults: list[Fault]) -> dict[str, _Sighting]:
-        """Return what counts of an obstacle that was known before, by name: it and, maybe, its old shape."""
+    def _seen_again(
+        self, before: _Sighting, now: _Sighting, taken: Set[str], faults: list[Fault]
+    ) -> dict[str, _Sighting]:
+        """Return what counts of an obstacle that was known before, by name: it and, maybe, its old shape.
+
+        Args:
+            before: How it was seen last.
+            now: How it is seen now.
+            taken: Names that other obstacles may have.
+            faults: Those that are found are added.
+        """
+        # An obstacle that is still out of view is where it was seen last, whatever pose a scene gives it.
+        if now.time < before.time + 0.5 * TIME_RESOLUTION:
+            there = replace(now.obstacle, pose=before.obstacle.pose)
+            moved = not np.array_equal(there.pose.homogeneous, now.obstacle.pose.homogeneous)
+            now = replace(now, time=before.time, obstacle=there if moved else now.obstacle)
+
         obstacle = now.obstacle
         name = obstacle.name
         shape = obstacle.shape
@@ -204,6 +228,8 @@ class SceneMemory:
 
         faults.append(Fault(now.time, "changes shape", name, f"from {before.reported.key} to {shape.key}"))
         ghost = name + BEFORE
+        while ghost in taken:
+            ghost += BEFORE
         return {name: now, ghost: replace(before, obstacle=replace(before.obstacle, name=ghost))}
 
     def _old_name(self, obstacle: Obstacle, time: float, missing: Mapping[str, _Sighting]) -> str | None:
@@ -236,6 +262,12 @@ def shape_around(first: Shape, second: Shape) -> Shape | None:
     return second if same_shape(around, second) else around
 
 
+def _is_back(sighting: _Sighting, name: str, now: Mapping[str, _Sighting]) -> bool:
+    """Check whether a sighting is the old shape of an obstacle that has this shape again."""
+    again = now.get(sighting.name)
+    return name != sighting.name and again is not None and same_shape(again.reported, sighting.obstacle.shape)
+
+
 def _scene_of(sightings: Mapping[str, _Sighting], given: Scene) -> Scene:
     """Return the scene of all sightings: the given one, if nothing else counts."""
     obstacles = tuple(each.obstacle for each in sightings.values())
@@ -245,17 +277,11 @@ def _scene_of(sightings: Mapping[str, _Sighting], given: Scene) -> Scene:
     # What is no longer in the scene keeps its pairs of the last scene that had it.
     allowed = list(given.allowed_collisions)
     for name, each in sightings.items():
-        old_name = name.removesuffix(BEFORE)
-        for first, second in each.scene.allowed_collisions:
-            kept = (name if first == old_name else first, name if second == old_name else second)
-            if each.scene is not given and old_name in (first, second) and kept not in allowed:
+        if each.scene is given:
+            continue
+        held = ((item.name, other) for item in each.scene.attached for other in item.allow)
+        for first, second in (*each.scene.allowed_collisions, *held):
+            kept = (name if first == each.name else first, name if second == each.name else second)
+            if each.name in (first, second) and kept not in allowed:
                 allowed.append(kept)
     return replace(given, obstacles=obstacles, allowed_collisions=tuple(allowed))
-
-
-def _unseen_of(
-    sightings: Mapping[str, _Sighting], given: set[str], time: float, unseen: Mapping[str, float]
-) -> dict[str, float]:
-    """Return how long ago each obstacle was seen that was out of view [s], by name."""
-    missing = {name: time - each.time for name, each in sightings.items() if name not in given}
-    return {**{name: age for name, age in unseen.items() if name in given}, **missing}

@@ -13,12 +13,12 @@ from typing import Any, Generic, TypeAlias, TypeVar
 
 import numpy as np
 
-from rrtik_ompl.base.errors import InputError, called, require
+from rrtik_ompl.base.arrays import not_negative
+from rrtik_ompl.base.errors import InputError, UnknownNameError, called, require
 from rrtik_ompl.model.scene import Scene
-from rrtik_ompl.replanning.faults import MOST_DROPPED, Fault, fault_of_time
+from rrtik_ompl.replanning.faults import MOST_DROPPED, TIME_RESOLUTION, Fault, fault_of_time
 
 SILENCE_SECONDS = 2.0  # A run ends after so long without a new scene [s].
-TIME_RESOLUTION = 1e-6  # [s]: a double holds a time since 1970 to a quarter of this
 LATEST = 1e11  # [s]: a clock that counts seconds reaches this in three thousand years
 
 
@@ -32,6 +32,7 @@ class Snapshot:
         unseen: For each obstacle that was out of view then, how long before ``time`` it was seen last [s].
         stated: Whether the scene states how its obstacles move; then obstacles without a motion are at rest.
         faults: What was wrong with the feed since the snapshot before.
+        passed: Snapshots that came since the one before and were followed by this one at once, in the order of time.
 
     Example:
         >>> from rrtik_ompl.replanning.feed import Snapshot
@@ -45,6 +46,7 @@ class Snapshot:
     unseen: Mapping[str, float] = field(default_factory=dict)
     stated: bool = False
     faults: Sequence[Fault] = ()
+    passed: Sequence[Snapshot] = ()
 
     def __iter__(self) -> Iterator[Any]:
         return iter((self.time, self.scene))
@@ -160,6 +162,7 @@ class Stream:
             InputError: If a snapshot is no pair of a time and a scene, if times stand still or go back by more than the
                 patience, or if the second one is later than the first by more than the patience.
         """
+        new: list[Snapshot] = []
         while True:
             if self._next is None and not self._has_ended:
                 self._next = self._read()
@@ -167,8 +170,9 @@ class Stream:
             if self._next is None or self._next.time > time + TIME_RESOLUTION:
                 faults = tuple(self._faults)
                 self._faults.clear()
-                return replace(self._latest, faults=faults)
+                return replace(self._latest, faults=faults, passed=new[:-1])
             self._latest = self._next
+            new.append(self._next)
             self._next = None
 
     def _read(self) -> Snapshot | None:
@@ -203,9 +207,19 @@ def _snapshot(item: object) -> Snapshot:
     pair = (item.time, item.scene) if isinstance(item, Snapshot) else item
     match pair:
         case (float() | int() | np.number() as time, Scene() as scene) if np.isfinite(time):
-            unseen = dict(item.unseen) if isinstance(item, Snapshot) else {}
-            return Snapshot(float(time), scene, unseen)
+            return Snapshot(float(time), scene, _unseen(item, scene) if isinstance(item, Snapshot) else {})
     raise InputError(f"scene feed: expected pairs of a time [s] and a scene, got {item!r:.80}")
+
+
+def _unseen(snapshot: Snapshot, scene: Scene) -> dict[str, float]:
+    """Check for how long obstacles of a snapshot were out of view, and return it."""
+    where = f"scene feed: unseen of the snapshot of {snapshot.time:g} s"
+    require(snapshot.unseen, Mapping, where, "give names and seconds, such as {'post': 0.2}")
+    known = {o.name for o in scene.obstacles}
+    for name in snapshot.unseen:
+        if name not in known:
+            raise UnknownNameError("obstacle", name, known, where=where)
+    return {name: not_negative(seconds, f"{where}: '{name}'") for name, seconds in snapshot.unseen.items()}
 
 
 Answer = TypeVar("Answer")
@@ -245,7 +259,7 @@ class PatientFeed(Generic[Answer]):
         """
         self._times.put(time)
         try:
-            answer, error = self._answers.get(timeout=self._patience)
+            answer, error = self._answers.get(timeout=min(self._patience, threading.TIMEOUT_MAX))
         except queue.Empty:
             late = f"no answer for {time:g} s within {self._patience:g} s, and the run was ended"
             raise InputError(f"{self._what}: {late}; is its source still there? feed_patience allows more") from None

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 import warnings
 from bisect import bisect_left
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -19,12 +19,12 @@ from rrtik_ompl.model.goal import JOINT_TOLERANCE
 from rrtik_ompl.model.scene import Scene, pairs_that_may_touch
 from rrtik_ompl.model.shapes.shape import same_but_for_points
 from rrtik_ompl.replanning.evading import evasion
-from rrtik_ompl.replanning.faults import UNFORESEEN, Fault, FaultKind, FeedWarning, SceneMemory
-from rrtik_ompl.replanning.feed import SILENCE_SECONDS, TIME_RESOLUTION, Snapshot, Watch
+from rrtik_ompl.replanning.faults import TIME_RESOLUTION, UNFORESEEN, Fault, FaultKind, FeedWarning, SceneMemory
+from rrtik_ompl.replanning.feed import SILENCE_SECONDS, Snapshot, Watch
 from rrtik_ompl.replanning.record import ReplanRun, joints_of
 from rrtik_ompl.replanning.refuge import SPARE, Guard, Refuge, ticks_of
 from rrtik_ompl.replanning.settings import PREDICTED_PLACES, ReplanSettings, make_planner
-from rrtik_ompl.replanning.start_and_goals import GoalFeed, check_start, every_goal, goal_now, held_pairs, sampling_box
+from rrtik_ompl.replanning.start_and_goals import GoalFeed, arm_alone, check_start, every_goal, goal_now, sampling_box
 from rrtik_ompl.replanning.tick import Tick
 from rrtik_ompl.replanning.travels import (
     SPEED_WARNING_RATIO,
@@ -85,7 +85,7 @@ class Loop:
         self._memory = SceneMemory(patience, settings.speed_bound)
         self._warned_faults = set[FaultKind]()
         self._now = 0.0  # begin of the tick [s]
-        self._snapshot = self._read_feed(0.0)
+        self._snapshot = self._read_feed(0.0)[-1]
         scene = self._snapshot.scene
         refuse_endless_turns(scene)
         first_world = problem.world.with_accuracy("exact").with_scene(scene)
@@ -125,6 +125,7 @@ class Loop:
             prismatic=joints_of(robot, robot.prismatic), continuous=joints_of(robot, robot.continuous),
         )  # fmt: skip
 
+        self._note_faults(self._snapshot)
         self._read_scene(0.0)
         # The start is checked against present places only, since it may lie where an obstacle is merely predicted:
         # all copies of an obstacle are put where it is now.
@@ -142,13 +143,11 @@ class Loop:
         self-collision, so its clearance is that to obstacles. ``_world_of_arm`` has no obstacles. From then on
         obstacles are moved within the first two.
         """
-        scene = first_world.scene
         copies = PREDICTED_PLACES if self._settings.lookahead_ticks else 1
         self._world = MovingWorld(first_world, copies=copies)
         self._world_of_obstacles = MovingWorld(first_world, self_collision=False)
         self._moved_ahead = np.nan, 0  # the time [s] and the ticks ahead that this world was moved for
-        empty_scene = Scene((), scene.attached, held_pairs(scene))
-        self._world_of_arm = first_world.with_accuracy("conservative").with_scene(empty_scene)
+        self._world_of_arm = arm_alone(first_world)
         # With a bound on the speed of obstacles, motions are chosen that nothing can reach in time.
         self._guard: Guard | None = None
         if self._settings.speed_bound is not None:
@@ -241,13 +240,17 @@ class Loop:
         silence = f"no scene since {self._snapshot.time:.3g} s: the scene feed has ended, or has been silent for longer"
         return f"{silence} than feed_patience ({self._patience:g} s)"
 
-    def _read_feed(self, now: float) -> Snapshot:
-        """Return the latest snapshot of the feed, with what is remembered of obstacles that it does not show.
+    def _read_feed(self, now: float) -> list[Snapshot]:
+        """Return the snapshots since the last tick, or the last one, with what is remembered of unseen obstacles.
 
         Raises:
             InputError: If the arm holds other objects than in the problem.
         """
-        seen = self._feed(now)
+        latest = self._feed(now)
+        return [self._known(seen) for seen in (*latest.passed, replace(latest, passed=()))]
+
+    def _known(self, seen: Snapshot) -> Snapshot:
+        """Return a snapshot with what is remembered of obstacles that it does not show."""
         check_held(seen.scene, self._problem.world.scene)
         if seen.stated:
             return seen
@@ -262,16 +265,20 @@ class Loop:
         since the obstacle was seen and within the tick, and ``_required_if_moving`` also for obstacles at rest that may
         begin to move.
         """
-        snapshot = self._read_feed(now)
+        changed = False
+        for snapshot in self._read_feed(now):
+            self._note_faults(snapshot)
+            changed |= self._tracker.update(snapshot)
+            self._doubt_moves_since(self._tracker.faster_since)
+            self._snapshot = snapshot
+            self.run.see(snapshot)
+            if self._tracker.fault:
+                break
+
+        snapshot = self._snapshot
         scene = snapshot.scene
         ages = snapshot.ages(now)
-
-        renewed = self._renew_worlds(scene)
-        self._note_faults(snapshot.faults)
-        changed = self._tracker.update(snapshot) or renewed
-        self._doubt_moves_since(self._tracker.faster_since)
-        self._snapshot = snapshot
-        self.run.see(snapshot)
+        changed |= self._renew_worlds(scene)
 
         self._scene_is_old = max(ages.values(), default=0.0) > self._settings.tick
         self._travels_since_seen = self._travels.since_seen(scene, ages)
@@ -315,11 +322,11 @@ class Loop:
         self._planner.path = path
         return True
 
-    def _note_faults(self, faults: Iterable[Fault]) -> None:
+    def _note_faults(self, snapshot: Snapshot) -> None:
         """Record what is wrong with the feed, warn once of each kind, and doubt moves that could not know of it."""
-        for fault in faults:
+        for fault in snapshot.faults:
             if fault.kind == "appears":
-                fault = self._where_it_appears(fault)
+                fault = self._where_it_appears(fault, snapshot.scene)
             self.run.faults.append(fault)
             if fault.kind in UNFORESEEN:
                 self._doubt_moves_since(self._snapshot.seen_at(fault.obstacle))
@@ -327,9 +334,8 @@ class Loop:
                 self._warned_faults.add(fault.kind)
                 warnings.warn(FeedWarning(f"scene feed: {fault}"), stacklevel=6)
 
-    def _where_it_appears(self, fault: Fault) -> Fault:
+    def _where_it_appears(self, fault: Fault, scene: Scene) -> Fault:
         """Return the fault that an obstacle appears on the arm if it does, and else the given one."""
-        scene = self._world.scene
         others = [o.name for o in scene.obstacles if o.name != fault.obstacle]
         alone = self._problem.world.with_accuracy("exact").with_scene(scene.without(*others))
         if alone.valid(self.q):

@@ -542,6 +542,7 @@ def scenes_data(snapshots: Sequence[Snapshot]) -> Json:
     previous_rows = dict[str, Json]()
     allowed: list[list[str]] | None = None
     contacts = list[list[Any]]()
+    allow_before = list[tuple[str, ...]]()
     for snapshot in snapshots:
         entry: Json = {"time": snapshot.time}
         rows = {o.name: _obstacle_data(o, number_of(o.shape)) for o in snapshot.scene.obstacles}
@@ -557,8 +558,10 @@ def scenes_data(snapshots: Sequence[Snapshot]) -> Json:
         if touching != contacts:
             entry["contacts"] = contacts = touching
 
-        if not entries and snapshot.scene.attached:
+        allow = [item.allow for item in snapshot.scene.attached]  # All else of what is held stays.
+        if allow != allow_before:
             entry["attached"] = [_held_data(held, number_of(held.shape)) for held in snapshot.scene.attached]
+            allow_before = allow
         entry |= {"unseen": dict(snapshot.unseen)} if snapshot.unseen else {}
         entry |= {"stated": True} if snapshot.stated else {}
         entries.append(entry)
@@ -569,8 +572,8 @@ def scenes_data(snapshots: Sequence[Snapshot]) -> Json:
 def scenes_of(document: Mapping[str, Any]) -> list[Snapshot]:
     """Return the snapshots of a record, the inverse of :func:`scenes_data`; an old record has none.
 
-    An entry holds only what differs from the one before it, so obstacles, allowed pairs and contacts are carried on
-    from entry to entry.
+    An entry holds only what differs from the one before it, so obstacles, attached objects, allowed pairs and contacts
+    are carried on from entry to entry.
 
     Raises:
         InputError: If a snapshot is malformed.

@@ -8,7 +8,7 @@ obstacles do [78]. docs/science/evasion.md has the theorem. Accelerations of the
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector
 from rrtik_ompl.model.scene import Scene
 from rrtik_ompl.replanning.evading import directions
-from rrtik_ompl.replanning.feed import TIME_RESOLUTION
+from rrtik_ompl.replanning.faults import TIME_RESOLUTION
 from rrtik_ompl.replanning.settings import ReplanSettings
 from rrtik_ompl.replanning.travels import SPEED_WARNING_RATIO
 from rrtik_ompl.replanning.unavoidable import kept
@@ -305,10 +305,4 @@ def ticks_of(edges: Matrix, step: float, max_change: Vector) -> Vector:
 
 def _part_of(scene: Scene, names: frozenset[str]) -> Scene:
     """Return a scene with only some of its obstacles."""
-    gone = {o.name for o in scene.obstacles} - names
-    return replace(
-        scene,
-        obstacles=tuple(o for o in scene.obstacles if o.name in names),
-        allowed_collisions=tuple(pair for pair in scene.allowed_collisions if not gone & set(pair)),
-        contacts=tuple(each for each in scene.contacts if not gone & {each.first, each.second}),
-    )
+    return scene.without(*(o.name for o in scene.obstacles if o.name not in names))

@@ -11,7 +11,6 @@ from rrtik_ompl.base.arrays import TAU, Matrix, Vector
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.ik.goal_configurations import goal_configurations
 from rrtik_ompl.model.robot import Robot
-from rrtik_ompl.model.scene import Scene
 from rrtik_ompl.world.moving_world import MovingWorld
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
@@ -52,6 +51,12 @@ def check_start(q: Vector, world: World, moving: MovingWorld) -> None:
         pair = "" if nearest is None else f" ('{nearest.first}' to '{nearest.second}': {nearest.distance:.3g} m)"
         remedy = "lower margin, clearance or speed_bound, or raise rate"
         raise InputError(f"start: nearer to contact than the margin{pair}; {remedy}")
+
+
+def arm_alone(world: World) -> World:
+    """Return the conservative world of the arm and what it holds, without obstacles."""
+    obstacles = (o.name for o in world.scene.obstacles)
+    return world.with_accuracy("conservative").with_scene(world.scene.without(*obstacles))
 
 
 def every_goal(problem: Problem, world_of_arm: World, rng: np.random.Generator) -> Matrix:
@@ -97,9 +102,3 @@ def sampling_box(robot: Robot, ends: Matrix) -> tuple[Vector, Vector]:
     lower = np.where(np.isfinite(robot.lower), robot.lower, ends.min(axis=0) - TAU)
     upper = np.where(np.isfinite(robot.upper), robot.upper, ends.max(axis=0) + TAU)
     return lower, upper
-
-
-def held_pairs(scene: Scene) -> tuple[tuple[str, str], ...]:
-    """Return the allowed collisions that do not concern obstacles, as pairs of names."""
-    obstacle_names = {o.name for o in scene.obstacles}
-    return tuple(pair for pair in scene.allowed_collisions if not obstacle_names & set(pair))

@@ -19,7 +19,8 @@ from rrtik_ompl.base.poses import ROTATION_NOISE, travel_bound
 from rrtik_ompl.geometry.collision.shape_table import farthest
 from rrtik_ompl.model.scene import ConstantVelocity, Obstacle, Scene, TimedPoses
 from rrtik_ompl.model.shapes import same_shape
-from rrtik_ompl.replanning.feed import TIME_RESOLUTION, Snapshot
+from rrtik_ompl.replanning.faults import PLACE_NOISE, TIME_RESOLUTION
+from rrtik_ompl.replanning.feed import Snapshot
 
 SPEED_WARNING_RATIO = 1.0 + 1e-6  # ratio of a speed to the bound above which a warning is given
 ROUNDING = 1e-9  # [m]: rounding of places that are computed from times
@@ -82,7 +83,7 @@ class MotionTracker:
             if time > last_time:
                 self._velocities.pop(name, None)
                 if moved:
-                    self._measure(obstacle, last_seen.pose, last_time, time)
+                    self._measure(obstacle, last_seen, last_time, time)
             self._sightings[name] = (time, obstacle)
 
         # What is gone is forgotten, but for its speed: should it come back, it may have been anywhere.
@@ -122,10 +123,11 @@ class MotionTracker:
         """Return how far clouds whose points have changed, which cannot be predicted, may go in a time [s] [m]."""
         return dict.fromkeys(self._reshaped, (self._bound or 0.0) * seconds)
 
-    def _measure(self, obstacle: Obstacle, old_pose: pin.SE3, last_time: float, now: float) -> None:
+    def _measure(self, obstacle: Obstacle, last_seen: Obstacle, last_time: float, now: float) -> None:
         # Store the velocity and the largest speed of an obstacle that moved between two sightings, and warn if it is
-        # faster than the bound.
+        # faster than the bound, or has said that it stays.
         name = obstacle.name
+        old_pose = last_seen.pose
         seconds = now - last_time
         shift = obstacle.pose.translation - old_pose.translation
         turn = pin.log3(old_pose.rotation.T @ obstacle.pose.rotation)
@@ -137,13 +139,17 @@ class MotionTracker:
             raise turns_without_end(name)
 
         speed = travel / seconds
+        has_moved = name in self.speeds
         self._velocities[name] = (shift / seconds, turn / seconds)
         self.speeds[name] = max(speed, self.speeds.get(name, 0.0))
 
-        if self._bound is None or travel <= SPEED_WARNING_RATIO * self._bound * (seconds + TIME_RESOLUTION):
+        if states_rest(last_seen) and not has_moved and travel > PLACE_NOISE:
+            fault = rest_warning(name, speed, now)
+        elif self._bound is not None and travel > SPEED_WARNING_RATIO * self._bound * (seconds + TIME_RESOLUTION):
+            fault = speed_warning(name, speed, now, self._bound)
+        else:
             return
         self.faster_since = min(last_time, self.faster_since)
-        fault = speed_warning(name, speed, now, self._bound)
         self.fault = self.fault or fault
         warnings.warn(SpeedWarning(fault), stacklevel=4)
 
@@ -174,6 +180,19 @@ def speed_warning(name: str, speed: float, time: float, bound: float) -> str:
         f"obstacle '{name}' moves at {speed:.3g} m/s at {time:.3g} s, {speed - bound:.3g} m/s faster than the stated "
         f"speed_bound of {bound:g} m/s: a contact cannot be ruled out; raise speed_bound"
     )
+
+
+def rest_warning(name: str, speed: float, time: float) -> str:
+    """Return the text of the warning that an obstacle moves [m/s] at a time [s] that has said that it is at rest."""
+    return (
+        f"obstacle '{name}' moves at {speed:.3g} m/s at {time:.3g} s, and its motion says that it stays: a contact "
+        "cannot be ruled out; leave out the motion with velocity zero"
+    )
+
+
+def states_rest(obstacle: Obstacle) -> bool:
+    """Check whether an obstacle states that it is at rest for good."""
+    return isinstance(obstacle.motion, ConstantVelocity) and not obstacle.motion.velocity.any()
 
 
 def required_distances(scene: Scene, margin: float, travels: Mapping[str, float]) -> dict[str, float]:
@@ -256,8 +275,7 @@ class Travels:
 
     def _stays(self, obstacle: Obstacle) -> bool:
         """Check whether an obstacle states that it is at rest and was not seen to move."""
-        stated = isinstance(obstacle.motion, ConstantVelocity) and not obstacle.motion.velocity.any()
-        return stated and obstacle.name not in self._measured
+        return states_rest(obstacle) and obstacle.name not in self._measured
 
     def _speed(self, obstacle: Obstacle) -> float:
         """Return the assumed speed of an obstacle that states a motion or was seen to move [m/s]; else 0."""

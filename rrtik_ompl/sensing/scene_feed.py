@@ -71,7 +71,8 @@ def scenes_of_pictures(pictures: Iterable[Picture], sensor: Sensor, scene: Scene
 
         if (given | seen.keys()).issuperset(solids):
             begin = picture.time if begin is None else begin
-            unseen = {name: picture.time - last.get(name, begin) for name in solids if name not in now}
+            ages = {name: picture.time - last.get(name, begin) for name in solids if name not in now}
+            unseen = {name: max(age, 0.0) for name, age in ages.items()}  # pictures may be out of order
             yield Snapshot(picture.time - begin, scene_with(around, seen.values()), unseen)
 
         why = view.why_not_placed

@@ -327,8 +327,11 @@ def check_held(scene: Scene, before: Scene) -> None:
 
 
 def _held_alike(first: AttachedObject, second: AttachedObject) -> bool:
-    """Check whether two attached objects are the same, at the same pose on the same link."""
-    same_link = first.link == second.link and set(first.allow) == set(second.allow)
+    """Check whether two attached objects are the same, at the same pose on the same link.
+
+    What they may touch counts among the pairs of the scene (:func:`pairs_that_may_touch`).
+    """
+    same_link = first.link == second.link
     same_margins = first.padding == second.padding and first.margin == second.margin
     same_place = np.allclose(first.pose.homogeneous, second.pose.homogeneous, rtol=0.0, atol=SAME_PLACE)
     return same_link and same_margins and same_place and same_shape(first.shape, second.shape)

@@ -15,6 +15,7 @@ from rrtik_ompl.model.goal_kind import TaskRegion
 from rrtik_ompl.model.scene import AttachedObject, Obstacle, Scene, TimedPoses
 from rrtik_ompl.model.shapes import HalfSpace, Sphere
 from rrtik_ompl.motion.trajectory.limits import RateLimits
+from rrtik_ompl.replanning.feed import Snapshot
 from rrtik_ompl.replanning.in_time import plan_in_time
 from rrtik_ompl.replanning.replanner import replan
 from rrtik_ompl.replanning.travels import SpeedWarning
@@ -50,6 +51,29 @@ def test_a_clock_that_goes_wrong_later_is_named(later):
     readings = chain([0.001 * k for k in range(20)], repeat(later))
     with pytest.raises(InputError, match="clock: what it gives"):
         replan(crossing(), **{**OPTIONS, "clock": lambda: next(readings)})
+
+
+@pytest.mark.parametrize(
+    ("unseen", "words"),
+    [
+        ({"box": -0.1}, "'box' must not be negative, got -0.1"),
+        ({"box": float("nan")}, "'box': must be a finite number"),
+        ({"box": "long"}, "'box': expected numbers, got 'long'"),
+        ({"bax": 0.1}, "no obstacle 'bax'"),
+        ([("box", 0.1)], "must be of type Mapping, got list; give names and seconds"),
+        (3, "must be of type Mapping, got int"),
+    ],
+)
+@pytest.mark.parametrize("source", [iter, lambda pairs: lambda time: pairs[0]])
+def test_how_long_an_obstacle_was_out_of_view_is_checked(unseen, words, source):
+    snapshots = [Snapshot(0.0, Scene([box("box", 10.0, 16.0)]), unseen)]
+    with pytest.raises(InputError, match=f"scene feed: unseen of the snapshot of 0 s.* {words}"):
+        replan(crossing(), source(snapshots), **OPTIONS)
+
+
+def test_a_patience_of_ages_is_no_error():
+    still = Scene([box("box", 10.0, 16.0)])
+    assert replan(crossing(), lambda _: still, **OPTIONS, seconds=0.1, feed_patience=1e300).ticks
 
 
 def test_an_unknown_planner_is_answered_with_those_there_are():

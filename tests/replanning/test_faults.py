@@ -13,13 +13,15 @@ import pytest
 
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.description.catalog import load_robot
-from rrtik_ompl.model.scene import Obstacle, Scene
+from rrtik_ompl.model.scene import AttachedObject, ConstantVelocity, Obstacle, Scene, Touching, pairs_that_may_touch
 from rrtik_ompl.model.shapes import Box, Capsule, Cylinder, HalfSpace, PointCloud, Sphere, same_shape
 from rrtik_ompl.motion.trajectory.limits import RateLimits
 from rrtik_ompl.replanning.faults import ANSWERS, FeedWarning, SceneMemory, shape_around
 from rrtik_ompl.replanning.feed import Snapshot
+from rrtik_ompl.replanning.in_time import plan_in_time
 from rrtik_ompl.replanning.record import ReplanRun
 from rrtik_ompl.replanning.replanner import replan
+from rrtik_ompl.replanning.travels import SpeedWarning
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
 from rrtik_tests.run_judge import judged
@@ -145,6 +147,93 @@ def test_a_new_name_far_away_is_another_obstacle():
         known = take([POST], [pole])[-1]
         assert [fault.kind for fault in known.faults] == kinds
         assert len(known.scene.obstacles) == len(kinds)
+
+
+@pytest.mark.parametrize("kind", FEEDS)
+def test_what_scenes_between_two_ticks_show_is_not_missed(kind):
+    feed, _ = FEEDS[kind]
+    found = []
+    for rate in (RATE, RATE / 5.0):
+        with pytest.warns(FeedWarning):
+            run = replan(ball(), feed, **{**OPTIONS, "rate": rate, "step": 1.25 / rate})
+        found.append([(each.time, each.obstacle) for each in run.faults if each.time < 1.0])
+    assert found[0] == found[1]
+    assert found[0]
+
+
+@pytest.mark.parametrize("there", [(POST, ON_ARM), (replace(POST, pose=at(-0.4, 0.0)),)])
+def test_a_move_is_not_called_proven_that_a_scene_between_two_ticks_refutes(there):
+    pairs = [(0.01 * k, Scene(there if k % 4 == 1 and k > 8 else (POST,))) for k in range(300)]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        run = replan(ball(), pairs, **OPTIONS)
+    touching = {each.tick for each in run.violations(ball()) if each.touches}
+    assert len(there) == 1 or touching
+    assert len(there) == 2 or (run.outcome, run.ticks[-1].time) == ("too fast", 0.12)
+    assert not any(run.ticks[k].proven for k in touching)
+    assert not any(each.proven for each in run.ticks if 0.04 < each.time < 0.13)
+
+
+@pytest.mark.parametrize("bound", [None, 10.0])
+def test_what_says_that_it_stays_and_moves_ends_the_run(bound):
+    def feed(time):
+        stays = replace(POST, motion=ConstantVelocity([0.0, 0.0, 0.0]), pose=at(0.1, 0.3 - 0.1 * max(time - 0.3, 0.0)))
+        return Scene([stays])
+
+    with pytest.warns(SpeedWarning, match="'post' moves at 0.05 m/s at 0.32 s, and its motion says that it stays"):
+        run = replan(ball(), feed, **{**OPTIONS, "speed_bound": bound})
+    assert run.outcome == "too fast"
+    proven = [each.proven for each in run.ticks[:-1]]
+    assert proven == [True] * 7 + [False]
+
+
+def test_what_is_out_of_view_is_where_it_was_seen_last():
+    memory = SceneMemory(9.0, SPEED)
+    memory.take(0.5, Scene([POST]), {})
+    for age in (0.1, 0.2):  # seen last at the same time again, and before
+        away = Scene([replace(POST, pose=at(-0.4, 0.0))])
+        known = memory.take(0.6, away, {"post": age}) if age == 0.1 else memory.take(0.7, away, {"post": 0.4})
+        assert np.array_equal(known.scene.obstacle("post").pose.homogeneous, POST.pose.homogeneous)
+        assert known.unseen["post"] == pytest.approx(age)
+
+
+@pytest.mark.parametrize("others", [(), (NEW,), (replace(NEW, name="post (before)"),)])
+def test_each_old_shape_counts_until_it_is_out_of_date_or_there_again(others):
+    shapes = Box([0.1, 0.3, 0.4]), Sphere(0.1), Cylinder(0.1, 0.2), Capsule(0.1, 0.2)
+    scenes = [(replace(POST, shape=shape), *others) for shape in (*shapes, shapes[1], *[shapes[0]] * 9)]
+    known = take(*scenes, patience=0.45)
+    there = [
+        {each.shape.key for each in one.scene.obstacles if each.name not in {o.name for o in others}} for one in known
+    ]
+    keys = [shape.key for shape in shapes]
+    assert there[:4] == [set(keys[: k + 1]) for k in range(4)]
+    assert there[4] == there[5] == set(keys)
+    assert there[-1] == {keys[0]}
+    for one in known:
+        assert all(any(o is other for o in one.scene.obstacles) for other in others)
+
+
+@pytest.mark.parametrize("says", ["allow", "pair", "contact"])
+@pytest.mark.parametrize("forgets", [True, False])
+def test_a_thing_that_held_objects_may_touch_may_go_away(says, forgets, tmp_path):
+    problem = ball()
+    cup = AttachedObject("cup", problem.robot.link_names[-1], Sphere(0.02), allow=["post"] if says == "allow" else [])
+    pairs = [("cup", "post")] if says == "pair" else []
+    contacts = [Touching("cup", "post", 0.0)] if says == "contact" else []
+    scene = Scene([POST], [cup], pairs, contacts)
+    left = scene.without("post") if forgets else replace(scene, obstacles=())
+    feed = [(k / RATE, left if k > 3 else scene) for k in range(150)]
+    held = Problem(World(problem.robot, scene), problem.start, problem.goal)
+    with pytest.warns(FeedWarning):
+        run = judged(replan(held, feed, **OPTIONS), held)
+    assert [fault.kind for fault in run.faults] == ["vanishes", "stays away"]
+    assert run.found, run.reason
+    run.save(tmp_path / "run.json")
+    may_touch = [pairs_that_may_touch(each.scene) for each in ReplanRun.load(tmp_path / "run.json").scenes]
+    assert may_touch == [pairs_that_may_touch(each.scene) for each in run.scenes]
+    assert may_touch[0] != may_touch[-1]
+    assert World(problem.robot, scene.without("post")).valid(problem.start)
+    assert plan_in_time(held, rate=5.0, iterations=200).found
 
 
 def test_pairs_that_may_touch_stay_with_what_is_remembered():

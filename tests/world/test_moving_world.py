@@ -14,7 +14,7 @@ from rrtik_ompl.geometry.collision.distances import measured
 from rrtik_ompl.kernels import FREE
 from rrtik_ompl.kernels.proof.packing import COMPUTED
 from rrtik_ompl.kernels.search.motions.motion_table import step_counts
-from rrtik_ompl.model.scene import Obstacle, Scene
+from rrtik_ompl.model.scene import AttachedObject, Obstacle, Scene, Touching
 from rrtik_ompl.model.shapes import Box, HalfSpace, HeightField, Octree, PointCloud, Prism, Sphere
 from rrtik_ompl.world.moving_world import MovingProver, MovingWorld
 from rrtik_ompl.world.world import World
@@ -41,6 +41,28 @@ def test_moving_worlds_of_an_arm_share_its_tables(self_collision):
     other = MovingWorld(World(robot, scenes[0]), self_collision=not self_collision)._fast
     assert first.arm is second.arm
     assert first.arm is not other.arm
+
+
+@pytest.mark.parametrize("margins", [(0.0, 0.03), (0.03, 0.0), (0.03, 0.03, 0.0, 0.02)])
+@pytest.mark.parametrize("deepest", [None, 0.0, -0.005])
+@pytest.mark.parametrize("inflation", [0.0, 0.01])
+def test_another_margin_does_not_change_how_deep_a_contact_may_be(margins, deepest, inflation):
+    robot = load_robot("point2d", parameters={"radius": 0.05, "bounds": [[-1, 1], [-1, 1]]})
+    cup = AttachedObject("cup", robot.link_names[-1], Sphere(0.05), [0.12, 0.0, 0.0])
+    contacts = [] if deepest is None else [Touching("cup", "table", deepest)]
+    starts = np.column_stack([np.linspace(-0.06, 0.08, 57), np.zeros(57)])
+    apart = 0.2 - 0.17 - starts[:, 0]  # from the cup to the front of the table
+
+    def scene(margin):
+        table = Obstacle("table", Box([0.2, 0.2, 0.1]), [0.3, 0.0, 0.0], margin=margin)
+        return Scene([table], [cup], contacts=contacts)
+
+    moving = MovingWorld(World(robot, scene(margins[0])))
+    for margin in margins:
+        moving.move(scene(margin), inflation={"table": inflation})
+        proven = moving.motions_proven(starts, starts)
+        kept = inflation + (margin if deepest is None else deepest)
+        assert (proven == (apart > kept))[abs(apart - kept) > 1e-4].all()
 
 
 @pytest.mark.kernels

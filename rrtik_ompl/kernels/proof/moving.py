@@ -57,7 +57,10 @@ class MovedObstacles:
         sides = [(row, place[k]) for row, pair in enumerate(packed.bodies.tolist()) for k in pair if k in place]
         self._pairs: NDArray[np.int64] = np.array(sides, dtype=np.int64).reshape(-1, 2)
         obstacles = np.array([bodies[k].margin for k in self._numbers])
-        self._paddings = packed.margins[self._pairs[:, 0]] - obstacles[self._pairs[:, 1]]  # of what moves
+        # The margins of obstacles do not apply to bodies that are in contact with them.
+        self._margins_apply = ~np.isin(self._pairs[:, 0], packed.touching)
+        own_margins = obstacles[self._pairs[:, 1]] * self._margins_apply
+        self._paddings = packed.margins[self._pairs[:, 0]] - own_margins  # of what moves
 
     def within(self, packed: ProofPairs) -> MovedObstacles:
         """Return the same obstacles in a copy of the table, wherever they are there."""
@@ -73,8 +76,9 @@ class MovedObstacles:
             room: For each body what is to be kept from it beside its margin [m]; read for obstacles.
         """
         packed = self._packed
-        kept = np.array([bodies[k].margin + room[k] for k in self._numbers])
-        packed.margins[self._pairs[:, 0]] = kept[self._pairs[:, 1]] + self._paddings
+        margins, rooms = np.array([(bodies[k].margin, room[k]) for k in self._numbers]).reshape(-1, 2).T
+        own_margins = margins[self._pairs[:, 1]] * self._margins_apply
+        packed.margins[self._pairs[:, 0]] = own_margins + rooms[self._pairs[:, 1]] + self._paddings
         packed.kept = (float("nan"), packed.kept[1])  # so that margins are written anew
         changes = [bodies[k].placement * back for k, back in zip(self._numbers, self._back, strict=True)]
         turns = np.array([change.rotation for change in changes]).reshape(-1, 3, 3)

@@ -17,7 +17,6 @@ from rrtik_ompl.base.poses import pose_row
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.result import required
 from rrtik_ompl.model.robot import Robot
-from rrtik_ompl.model.scene import Scene
 from rrtik_ompl.motion.trajectory.limits import RateLimits
 from rrtik_ompl.motion.trajectory.motion import Trajectory
 from rrtik_ompl.replanning.drrt_con import without_points_between
@@ -26,7 +25,7 @@ from rrtik_ompl.replanning.in_time.foreseen import ForeseenWorlds
 from rrtik_ompl.replanning.in_time.pace import Pace, Timing
 from rrtik_ompl.replanning.in_time.search import Ends, TimeSearch
 from rrtik_ompl.replanning.record import ReplanRun, joints_of
-from rrtik_ompl.replanning.start_and_goals import every_goal, held_pairs, refuse_constraints, sampling_box
+from rrtik_ompl.replanning.start_and_goals import arm_alone, every_goal, refuse_constraints, sampling_box
 from rrtik_ompl.replanning.tick import Tick
 from rrtik_ompl.replanning.travels import refuse_endless_turns
 from rrtik_ompl.world.clearances import CLEARANCE
@@ -239,15 +238,13 @@ def _search(problem: Problem, options: _Options) -> tuple[TimeSearch, str]:
         The search, and a line that says when an obstacle reaches the fixed base before the horizon, or "".
     """
     robot = problem.robot
-    scene = problem.world.scene
     rng = np.random.default_rng(options.budget.seed)
 
     if options.limits is not None:
         require(options.limits, RateLimits, "limits", "use RateLimits(velocity, acceleration)")
     rates = RateLimits.of(robot) if options.limits is None else options.limits.for_joints(robot.dof)
 
-    world_of_arm = problem.world.with_accuracy("conservative").with_scene(Scene((), scene.attached, held_pairs(scene)))
-    goals = every_goal(problem, world_of_arm, rng) if options.goal is None else options.goal
+    goals = every_goal(problem, arm_alone(problem.world), rng) if options.goal is None else options.goal
     lower, upper = sampling_box(robot, np.vstack([problem.start, goals]))
 
     worlds = ForeseenWorlds(problem.world, options.slot, options.margin + options.clearance)
