@@ -171,6 +171,7 @@ class GraspEntry(Section):
     friction = key(POSITIVE, "coefficient of friction between fingers and object", default=0.5)
     clearance = key(NOT_NEGATIVE, "what arm and open hand keep from obstacles [m]", default=0.002)
     approach = key(NOT_NEGATIVE, "length of the straight way to the grasp [m]", default=0.1)
+    opened = key(Number(0.0, 1.0), "how far the gripper is open before it closes", default=1.0)
     seed = key(WHOLE, "the same seed gives the same grasps", default=0)
 
 
@@ -189,6 +190,7 @@ class GraspsEntry(StageEntry):
             friction=how.friction,
             clearance=how.clearance,
             approach=how.approach,
+            opened=how.opened,
             seed=how.seed,
         )
         if not found:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import coal
 import numpy as np
 import pinocchio as pin
 import pytest
 
 import rrtik_ompl as rrtik
 from rrtik_ompl.base.errors import InputError, UnknownNameError
-from rrtik_ompl.tasks.grasps import _pairs
+from rrtik_ompl.tasks import MoveTo
+from rrtik_ompl.tasks.grasp_points import pairs as pairs_on
 
 FRICTION = 0.5
 LINES = 256
@@ -23,6 +25,31 @@ def mesh_of(shape):
     return rrtik.Mesh(*shape.surface())
 
 
+def cone(below, above, height, sides=24):
+    """A cone without its point, along z, as a mesh."""
+    turns = 2.0 * np.pi * np.arange(sides) / sides
+    ring = np.column_stack([np.cos(turns), np.sin(turns)])
+    ends = [np.column_stack([r * ring, np.full(sides, z)]) for r, z in ((below, -0.5 * height), (above, 0.5 * height))]
+    k = np.arange(sides)
+    after = (k + 1) % sides
+    walls = np.vstack([np.column_stack([k, after, k + sides]), np.column_stack([after, after + sides, k + sides])])
+    fans = np.column_stack([np.zeros(sides - 2, int), np.arange(2, sides), np.arange(1, sides - 1)])
+    return rrtik.Mesh(np.vstack(ends), np.vstack([walls, fans, fans[:, [0, 2, 1]] + sides]))
+
+
+def least_angles_from_mesh(mesh, points):
+    """Least angle [rad] between the line of each pair, inwards, and the inward normal of a face at its end, (k, 2)."""
+    triangles = mesh.vertices[mesh.triangles]
+    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    beyond = np.einsum("kpfj,fj->kpf", points[:, :, None] - triangles[:, 0], normals)
+    assert np.abs(beyond.max(axis=2)).max() < 1e-5, "the points are on the surface of this convex mesh"
+    ways = points[:, ::-1] - points
+    ways /= np.linalg.norm(ways, axis=2)[:, :, None]
+    angles = np.arccos(np.clip(-ways @ normals.T, -1.0, 1.0))
+    return np.where(np.abs(beyond) < 1e-5, angles, np.inf).min(axis=2)
+
+
 SHAPES = {
     "box": rrtik.Box(0.05, 0.06, 0.1),
     "ball": rrtik.Sphere(0.02),
@@ -31,6 +58,8 @@ SHAPES = {
     "prism": WEDGE,
     "mesh": mesh_of(rrtik.Box(0.05, 0.04, 0.1)),
     "mesh of a can": mesh_of(rrtik.Cylinder(0.03, 0.1)),
+    "cone": cone(0.035, 0.018, 0.1),
+    "roof": mesh_of(rrtik.Prism([[-0.035, -0.03], [0.035, -0.03], [0.018, 0.03], [-0.018, 0.03]], height=0.1)),
 }
 
 
@@ -95,7 +124,7 @@ def angles_from_normals(name, pairs):
 @pytest.mark.parametrize("friction", [0.05, 0.5])
 @pytest.mark.parametrize("name", NORMALS)
 def test_the_line_of_two_fingers_is_in_the_friction_cones_of_both_points(name, friction):
-    pairs = _pairs(SHAPES[name], np.cos(np.arctan(friction)), 0.08, LINES, np.random.default_rng(2))
+    pairs = pairs_on(SHAPES[name], np.cos(np.arctan(friction)), 0.08, LINES, np.random.default_rng(2))
     assert len(pairs) > LINES // 5
     assert angles_from_normals(name, pairs).max() <= np.arctan(friction) + 1e-6
     assert np.linalg.norm(pairs[:, 1] - pairs[:, 0], axis=1).max() <= 0.08
@@ -103,10 +132,10 @@ def test_the_line_of_two_fingers_is_in_the_friction_cones_of_both_points(name, f
 
 def test_a_slope_is_pressed_only_where_friction_holds_it():
     cones = [np.cos(np.arctan(friction)) for friction in (0.05, 0.5)]
-    slippery, rough = (_pairs(WEDGE, cone, 0.08, LINES, np.random.default_rng(2)) for cone in cones)
+    slippery, rough = (pairs_on(WEDGE, cone, 0.08, LINES, np.random.default_rng(2)) for cone in cones)
     steepest = [angles_from_normals("prism", pairs).max() for pairs in (slippery, rough)]
-    assert steepest[0] < 1e-6
-    assert steepest[1] == pytest.approx(np.arctan(8.0 / 60.0))  # of the side that slopes
+    slope = np.arctan(8.0 / 60.0)
+    assert steepest[0] < slope < steepest[1]
 
 
 def world_with(shape, height):
@@ -127,6 +156,8 @@ def test_a_grasp_is_reached_free_and_its_fingers_touch(name):
     pairs = np.stack([(grasp.points - place.translation) @ place.rotation for grasp in found])
     if name in NORMALS:
         assert angles_from_normals(name, pairs).max() <= np.arctan(FRICTION) + 1e-6
+    else:
+        assert least_angles_from_mesh(shape, pairs).max() <= np.arctan(FRICTION) + 1e-6
 
     for grasp in found:
         assert world.valid(grasp.q)
@@ -211,12 +242,56 @@ JAW = f"""<robot name="jaw">
 </robot>"""
 
 
-def test_a_jaw_that_turns_is_no_pair_of_fingers(tmp_path):
+def test_fingers_that_do_not_close_on_each_other_are_refused(tmp_path):
     file = tmp_path / "jaw.urdf"
     file.write_text(JAW)
     robot = rrtik.load_robot(file, tip="hand", gripper={"open": {"jaw": 1.0}, "closed": {"jaw": 0.0}})
-    with pytest.raises(InputError, match="'jaw': its gripper is no pair of fingers that slide"):
+    with pytest.raises(InputError, match="'jaw': its fingers do not part where they would hold something"):
         rrtik.grasps(with_robot(world_with(rrtik.Sphere(0.03), 0.03), robot), "thing")
+
+
+def link_gap(robot, q, link, solid, place):
+    """Distance of a link from a solid [m], by pinocchio and coal."""
+    data = robot.model.createData()
+    pin.forwardKinematics(robot.model, data, robot.pinocchio_configuration(q[None])[0])
+    gaps = []
+    for item in robot.collision.geometryObjects:
+        if robot.link_of(item) == link:
+            pose = data.oMi[item.parentJoint] * item.placement
+            ends = [coal.Transform3s(each.rotation, each.translation) for each in (pose, place)]
+            request = coal.DistanceRequest()
+            gaps.append(coal.distance(item.geometry, ends[0], solid, ends[1], request, coal.DistanceResult()))
+    return min(gaps)
+
+
+@pytest.mark.kernels
+def test_a_jaw_that_turns_closes_on_a_block_and_the_other_one_touches_it_from_the_side():
+    task = rrtik.Task.load("so101_pick_place")
+    block = task.world.scene.obstacle("block")
+    (grasp,) = rrtik.grasps(task.world, "block", count=1, approach=0.03, opened=0.7)
+    pairs = (grasp.points - block.pose.translation) @ block.pose.rotation
+    normals, off = normals_of_box(pairs, block.shape.size)
+    assert off.max() < 1e-5
+    line = (pairs[1] - pairs[0]) / np.linalg.norm(pairs[1] - pairs[0])
+    assert np.arccos(normals[1] @ line) <= np.arctan(FRICTION)
+    assert np.arccos(-normals[0] @ line) <= np.arctan(FRICTION)
+
+    solid = coal.Box(*block.shape.size)
+    hand = task.world.robot.gripper
+    shut, wide = (rrtik.load_robot("so101", locked=hand.at(share)) for share in (grasp.opening, 0.7))
+    jaw, rest = "moving_jaw_so101_v1_link", "gripper_link"
+    assert -1e-5 < link_gap(shut, grasp.q, jaw, solid, block.pose) < 6e-4
+    assert 0.0 < link_gap(shut, grasp.q, rest, solid, block.pose) < 6e-4
+    assert grasp.way.shape == (2, 5)
+    for share in np.linspace(0.0, 1.0, 9):  # until the last step, both keep the clearance
+        q = (1.0 - share) * grasp.way[0] + share * grasp.way[1]
+        assert min(link_gap(wide, q, link, solid, block.pose) for link in (jaw, rest)) >= 0.002 - 1e-6
+
+    up = MoveTo(rrtik.PositionGoal(grasp.pose.translation + np.array([0.0, 0.0, 0.05]), tolerance=0.005))
+    plan = rrtik.Task([*grasp.stages(), up], task.world, task.start).plan(seed=1)
+    assert plan.found, plan.reason
+    assert plan.proven
+    assert not plan.violations()
 
 
 FILE = """\
