@@ -330,13 +330,13 @@ class _Press:
     def __init__(self, point: Vector, finger: Vector) -> None:
         self.point = np.asarray(point)
         way = np.asarray(finger) - self.point
-        self.outward = way / max(np.linalg.norm(way), POINT)
+        self.outward = way / max(float(np.linalg.norm(way)), POINT)
 
 
 def _holds(first: _Press, second: _Press, cone: float) -> bool:
     """Check whether the line of two points is in the friction cones of both, given the cosine of half their angle."""
     way = second.point - first.point
-    line = way / max(np.linalg.norm(way), POINT)
+    line = way / max(float(np.linalg.norm(way)), POINT)
     return bool(-first.outward @ line >= cone and second.outward @ line >= cone)
 
 

@@ -30,6 +30,7 @@ from rrtik_ompl.files.sections import (
     Later,
     Listed,
     Mapped,
+    Number,
     Refused,
     Section,
     ToldApart,
