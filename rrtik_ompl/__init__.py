@@ -92,6 +92,8 @@ if TYPE_CHECKING:
     from rrtik_ompl.tasks.grasps import grasps as grasps
     from rrtik_ompl.tasks.task_file import list_tasks as list_tasks
     from rrtik_ompl.viewer import view as view
+    from rrtik_ompl.viewer.film import film as film
+    from rrtik_ompl.viewer.film import picture as picture
     from rrtik_ompl.viewer.plots.joints import plot_joints as plot_joints
     from rrtik_ompl.world.problem import Problem as Problem
     from rrtik_ompl.world.world import World as World
@@ -190,6 +192,7 @@ else:
         ),
         "tasks.task_file": ("list_tasks",),
         "viewer": ("view",),
+        "viewer.film": ("film", "picture"),
         "viewer.plots.joints": ("plot_joints",),
     }
     __getattr__, __dir__, __all__ = lazy_names(

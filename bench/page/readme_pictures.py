@@ -33,7 +33,8 @@ def sheet(file: Path) -> None:
     shots = []
     with tempfile.TemporaryDirectory() as folder:
         for name in ARMS:
-            shot = picture(*planned(name), Path(folder, f"{name}.png"), size=(2 * WIDTH, 5 * WIDTH // 4))
+            problem, path = planned(name)
+            shot = picture(problem, Path(folder, f"{name}.png"), path, size=(2 * WIDTH, 5 * WIDTH // 4))
             pixels = cv2.imread(str(shot))
             assert pixels is not None
             shots.append(cv2.resize(pixels, (WIDTH, 5 * WIDTH // 8), interpolation=cv2.INTER_AREA))
@@ -43,5 +44,6 @@ def sheet(file: Path) -> None:
 
 def main(folder: Annotated[Path, Option(help="Of the pictures.")] = REPORTS) -> None:
     """Draw both."""
-    film(*planned(ARMS[0]), folder / "panda_shelf.gif", seconds=3.5, rate=10.0)
+    problem, path = planned(ARMS[0])
+    film(problem, folder / "panda_shelf.gif", path, seconds=3.5, rate=10.0)
     sheet(folder / "arms.png")

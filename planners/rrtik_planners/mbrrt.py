@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import ClassVar
 
 import numpy as np
 
-from rrtik_ompl.base.arrays import Matrix
+from rrtik_ompl.base.arrays import Matrix, frozen
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.ik.mb_rrt.axes import misfit
 from rrtik_ompl.ik.mb_rrt.search import tree_aims
 from rrtik_ompl.model.goal import Goal, TipGoal
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SearchResult, Stop
 from rrtik_ompl.ompl_bridge.bindings import ob
+from rrtik_ompl.ompl_bridge.results import PlannerGraph
 from rrtik_ompl.world.world import World
 from rrtik_planners.bicrdt import BiCRDT
 
@@ -59,18 +62,29 @@ class MBRRT(BiCRDT):
 
     def search(self, starts: Matrix, goals: Matrix, checker: MotionChecker, ptc: Stop) -> SearchResult:
         """See :meth:`rrtik_ompl.ompl_bridge.SafePlanner.search`."""
-        aims = self._aims(starts)
+        trees: list[list[Matrix]] = []
+        aims = self._aims(starts, trees)
         result = super().search(starts, aims if len(aims) else goals, checker, ptc)
-        return replace(result, statistics={**result.statistics, "tree_goals": len(aims)})
+        graph = None if result.graph is None else partial(_with_links, result.graph, trees)
+        return replace(result, statistics={**result.statistics, "tree_goals": len(aims)}, graph=graph)
 
-    def _aims(self, starts: Matrix) -> Matrix:
-        """Return free configurations at the goal of the tip inside the bounds of the space, shape (k, n)."""
+    def _aims(self, starts: Matrix, trees: list[list[Matrix]]) -> Matrix:
+        """Return free configurations at the goal of the tip inside the bounds of the space, shape (k, n).
+
+        The links of the trees that found them are added to ``trees``, if the graph is wanted.
+        """
         if self.goal is None or not isinstance(self._world, World):
             return np.zeros((0, starts.shape[1]))
-        rows = tree_aims(self._world, self.goal, starts[0], self.rng, seconds=self.ik_seconds)
+        keep = trees.append if self.graph_wanted else None
+        rows = tree_aims(self._world, self.goal, starts[0], self.rng, seconds=self.ik_seconds, on_links=keep)
         lower, upper = self.bounds()
         inside: Matrix = rows[((rows >= lower) & (rows <= upper)).all(axis=1)]
         return inside
+
+
+def _with_links(make: Callable[[], PlannerGraph], trees: list[list[Matrix]]) -> PlannerGraph:
+    """Return a graph with the links of trees in the workspace, joint by joint."""
+    return replace(make(), links=tuple(map(frozen, map(np.concatenate, zip(*trees, strict=True)))))
 
 
 def _check_fit(world: MotionQueries | None) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from functools import partial
 from typing import ClassVar
 
 import numpy as np
@@ -12,9 +13,10 @@ from rrtik_ompl.base.errors import InputError, PlannerError, require
 from rrtik_ompl.geometry.collision.digests import world_digest
 from rrtik_ompl.kernels.search import connect_layout
 from rrtik_ompl.kernels.search.roadmap.graph import KernelGraph
-from rrtik_ompl.kernels.search.roadmap.layout import KERNELS
+from rrtik_ompl.kernels.search.roadmap.layout import KERNELS, SURE
 from rrtik_ompl.ompl_bridge import MotionChecker, MotionQueries, SafePlanner, SearchResult, Stop
 from rrtik_ompl.ompl_bridge.bindings import ob
+from rrtik_ompl.ompl_bridge.results import PlannerGraph, graph_of
 from rrtik_ompl.planning.search.roadmap import NEAR, Graph, Roadmap, checked_near, graph_in
 from rrtik_ompl.world.world import World
 from rrtik_planners.fast_rrt_connect import FastRRTConnect
@@ -76,7 +78,8 @@ class RoadmapPlanner(SafePlanner):
         if isinstance(graph, KernelGraph):
             checker.checked_motions += int(counts["motions"])
         checker.checked_motions += asked
-        return SearchResult(None if path is None else _without_repeats(path), counts)
+        drawn = partial(_checked_graph, graph) if self.graph_wanted else None
+        return SearchResult(None if path is None else _without_repeats(path), counts, graph=drawn)
 
     def _connected(self, starts: Matrix, goals: Matrix, ptc: Stop) -> tuple[Matrix | None, int]:
         """Run RRT-Connect; return its path, shape (k, n), or None, and the number of motions checked."""
@@ -92,6 +95,12 @@ class RoadmapPlanner(SafePlanner):
         graph = graph_in(self._world, *self.bounds(), near=self.near, seed=seed, checks=checker)
         graph.grow(FIRST_VERTICES, ptc)
         return graph
+
+
+def _checked_graph(graph: Graph) -> PlannerGraph:
+    """Return the free edges of a roadmap, also those that no query has needed."""
+    graph.check(lambda: False)
+    return graph_of(graph.rows, graph.edges[graph.states == SURE])
 
 
 def _without_repeats(path: Matrix) -> Matrix:

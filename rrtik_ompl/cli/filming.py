@@ -97,8 +97,8 @@ class Filming(NamedTuple):
         given: dict[str, Any] = {"run": run, "camera": self.camera, "hide": self.hide}
         if self.picture is not None:
             with progress("drawing"):
-                picture(shown, path, self.picture, size=SIZE if self.size is None else self.size, **given)
+                picture(shown, self.picture, path, size=SIZE if self.size is None else self.size, **given)
         if self.film is not None:
             with counter("drawing", 1) as drawn:
-                film(shown, path, self.film, rate=self.rate, size=self.size, seconds=seconds, on_picture=drawn, **given)
+                film(shown, self.film, path, rate=self.rate, size=self.size, seconds=seconds, on_picture=drawn, **given)
         return [file for file in (self.film, self.picture) if file is not None]

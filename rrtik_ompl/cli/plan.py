@@ -85,6 +85,9 @@ def plan(
     out: Annotated[Path | None, typer.Option(help="Save the path: .json, .csv or .txt (OMPL matrix).")] = None,
     html: Annotated[Path | None, typer.Option(help="Write a self-contained 3-D page to this file.")] = None,
     still: Annotated[bool, typer.Option("--still", help="A page that does not plan by itself: smaller.")] = False,
+    tree: Annotated[
+        bool, typer.Option("--tree", help="Show in the page of --html how the planner searched, step by step.")
+    ] = False,
     certificate: Annotated[
         Path | None, typer.Option(help="Write the certificate of the path: .json; the file of --out can hold both.")
     ] = None,
@@ -98,6 +101,8 @@ def plan(
     check_target(out, PATH_FORMATS)
     check_target(html, PAGE_FORMATS)
     check_target(certificate, (".json",))
+    if tree and html is None:
+        raise InputError("--tree is for the page: give --html too, or leave it out")
 
     from rrtik_ompl import load_problem
     from rrtik_ompl.cli import plan_report as report
@@ -124,10 +129,16 @@ def plan(
             objective=objective,
             strategy=strategy,
             shorten=False if shorten == "none" else shorten,
+            tree=tree,
         )
 
     path = found.path
-    lack = "" if path is None else _write(question, path, found.unshortened, out, html, certificate, still=still)
+    if html is not None and (path is not None or found.tree is not None):
+        from rrtik_ompl.viewer import view
+
+        with progress("drawing"):
+            view(found, html=html, still=still)
+    lack = "" if path is None else _write(question, path, out, certificate)
     if as_json:
         print(json.dumps(report.document(question, found)))
     elif path is None:
@@ -138,6 +149,8 @@ def plan(
         _say_path(path, (out, html, None if lack else certificate))
         suggest(*_next_steps(problem, path, out, html))
 
+    if tree and found.tree is None:
+        note(f"planner {found.planner} keeps no tree: the page shows none; RRTConnect, bicrdt or roadmap have one")
     if lack:
         note(lack)
     elif less := report.less_clearance(path, clearance):
@@ -164,24 +177,10 @@ def _say_path(path: JointPath | None, written: tuple[Path | None, ...]) -> None:
     say(*(f"wrote {file}" for file in written if file is not None))
 
 
-def _write(
-    problem: Problem,
-    path: JointPath,
-    before: JointPath | None,
-    out: Path | None,
-    html: Path | None,
-    certificate: Path | None,
-    *,
-    still: bool,
-) -> str:
-    """Write the requested files; return why there is no certificate, "" if nothing is missing."""
+def _write(problem: Problem, path: JointPath, out: Path | None, certificate: Path | None) -> str:
+    """Write the path and its certificate; return why there is no certificate, "" if nothing is missing."""
     if out is not None:
         path.save(out)
-    if html is not None:
-        from rrtik_ompl.viewer import view
-
-        with progress("drawing"):
-            view(problem, path, html=html, before=before, still=still)
     if certificate is None:
         return ""
 

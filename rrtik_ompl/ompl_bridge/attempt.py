@@ -26,6 +26,7 @@ from rrtik_ompl.ompl_bridge.bindings import ob, og, ou
 from rrtik_ompl.ompl_bridge.ownership import foreign_code
 from rrtik_ompl.ompl_bridge.planner_options import is_safe, other_planner, safe_planner
 from rrtik_ompl.ompl_bridge.planner_traits import OMPL_TRAITS, PlannerFactory, traits_of
+from rrtik_ompl.ompl_bridge.results import PlannerGraph, graph_of
 from rrtik_ompl.ompl_bridge.safe_planner import SafePlanner
 from rrtik_ompl.ompl_bridge.setup import (
     ValidityCallback,
@@ -63,6 +64,7 @@ class Attempt:
         statistics: Plain counts.
         reason: Why there is no path, if the planner says so; else "".
         counting: Time spent on counting the vertices and edges of an OMPL planner [s], which is not planning time.
+        graph: What the planner has grown, if that was wanted and the planner keeps it.
     """
 
     rows: Matrix | None
@@ -70,6 +72,7 @@ class Attempt:
     statistics: Mapping[str, int | float]
     reason: str = ""
     counting: float = 0.0
+    graph: PlannerGraph | None = None
 
 
 def attempt(
@@ -80,6 +83,7 @@ def attempt(
     *,
     parameters: Mapping[str, Any] = NO_PARAMETERS,
     checked: bool = False,
+    keep_graph: bool = False,
 ) -> Attempt:
     """Let a planner search from the start of a problem to any of ``goals``, within a budget.
 
@@ -95,6 +99,7 @@ def attempt(
         budget: Time from now on, iterations and the seed.
         parameters: Options of the planner.
         checked: Whether start and goals are known to be free, so that an array planner does not check them again.
+        keep_graph: Whether to keep what the planner has grown.
 
     Raises:
         InputError: If the planner does not take a parameter.
@@ -106,14 +111,19 @@ def attempt(
     if len(goals) and not traits.one_joint and has_weights(problem):
         weighted = WeightedProblem(problem)
         aims = weighted.weighted_rows(goals)
-        found = attempt(weighted.problem, factory, aims, budget, parameters=parameters, checked=checked)
-        return replace(found, rows=weighted.joint_path(found.rows, goals))
+        found = attempt(
+            weighted.problem, factory, aims, budget, parameters=parameters, checked=checked, keep_graph=keep_graph
+        )
+        graph = found.graph
+        if graph is not None:
+            graph = replace(graph, vertices=weighted.joint_rows(graph.vertices, goals))
+        return replace(found, rows=weighted.joint_path(found.rows, goals), graph=graph)
 
     with quiet():
         seed_ompl(budget.seed)
         if is_safe(factory):
-            return _on_arrays(problem, factory, goals, budget, parameters, checked=checked)
-        return _in_ompl(problem, factory, goals, budget, parameters)
+            return _on_arrays(problem, factory, goals, budget, parameters, checked=checked, keep_graph=keep_graph)
+        return _in_ompl(problem, factory, goals, budget, parameters, keep_graph=keep_graph)
 
 
 def seed_ompl(seed: int) -> None:
@@ -140,6 +150,7 @@ def _on_arrays(
     parameters: Mapping[str, Any],
     *,
     checked: bool,
+    keep_graph: bool,
 ) -> Attempt:
     """Run an attempt of an array planner, which needs only a space of OMPL."""
     name = factory.__name__
@@ -153,13 +164,22 @@ def _on_arrays(
     if straight is not None:
         return Attempt(straight, "Exact solution", {})
 
-    status, rows = planner.solve_rows(problem.start[None], goals, bounds, budget.over, checked=checked)
+    status, rows = planner.solve_rows(
+        problem.start[None], goals, bounds, budget.over, checked=checked, keep_graph=keep_graph
+    )
     _raise_failure(planner, name, status, None)
-    return Attempt(rows, str(status), dict(planner.statistics), planner.reason)
+    graph = planner.kept_graph() if keep_graph else None
+    return Attempt(rows, str(status), dict(planner.statistics), planner.reason, graph=graph)
 
 
 def _in_ompl(
-    problem: Problem, factory: PlannerFactory, goals: Matrix, budget: Budget, parameters: Mapping[str, Any]
+    problem: Problem,
+    factory: PlannerFactory,
+    goals: Matrix,
+    budget: Budget,
+    parameters: Mapping[str, Any],
+    *,
+    keep_graph: bool,
 ) -> Attempt:
     """Run an attempt of an OMPL planner or a third-party one; all OMPL objects are local to this function."""
     name = getattr(factory, "__name__", str(factory))
@@ -169,6 +189,8 @@ def _in_ompl(
 
     # Make the problem definition and the planner.
     validity = ValidityCallback(one_by_one(problem.world), most_motions=max_motions)
+    if keep_graph:
+        validity.seen = {}
     si = space_information(problem, goals, validity)
     definition = problem_definition(problem, goals, si)
     with _named(name):
@@ -196,8 +218,14 @@ def _in_ompl(
 
     # Count the vertices and edges, and measure how long that takes.
     counting_began = time.perf_counter()
-    graph = _graph(planner, si) if factory in OMPL_TRAITS and traits.has_graph else {}
-    return Attempt(rows, str(status), {**validity.counts(), **graph}, counting=time.perf_counter() - counting_began)
+    counts: dict[str, int] = {}
+    kept = None
+    if factory in OMPL_TRAITS and traits.has_graph:
+        grown = _graph(planner, si)
+        counts = {"vertices": grown.numVertices(), "edges": grown.numEdges()}
+        kept = None if validity.seen is None else _copied(grown, si, validity.seen)
+    counting = time.perf_counter() - counting_began
+    return Attempt(rows, str(status), {**validity.counts(), **counts}, counting=counting, graph=kept)
 
 
 @contextmanager
@@ -295,11 +323,32 @@ def in_short(error: Exception) -> str:
     return str(error) or type(error).__name__
 
 
-def _graph(planner: ob.Planner, si: ob.SpaceInformation) -> dict[str, int]:
-    """Count the vertices and edges of an OMPL planner; with planners written in Python this may end the process."""
+def _graph(planner: ob.Planner, si: ob.SpaceInformation) -> ob.PlannerData:
+    """Return the graph of an OMPL planner; with planners written in Python this may end the process."""
     graph = ob.PlannerData(si)
     planner.getPlannerData(graph)
-    return {"vertices": graph.numVertices(), "edges": graph.numEdges()}
+    return graph
+
+
+def _copied(data: ob.PlannerData, si: ob.SpaceInformation, seen: Mapping[bytes, int]) -> PlannerGraph:
+    """Return a graph of OMPL as arrays.
+
+    OMPL lists vertices as its search structure holds them, so the order in which they came is that in which their
+    configurations were checked.
+
+    Args:
+        data: The graph, of a planner that still lives.
+        si: The SpaceInformation of the planner.
+        seen: When each configuration was first checked, by its bytes.
+    """
+    io = StateIO(si)
+    count = data.numVertices()
+    rows = np.array([io.read(data.getVertex(k).getState()) for k in range(count)]).reshape(count, io.dof)
+    edges = [(k, head) for k in range(count) for head in data.getEdges(k)]
+    births = [seen.get(row.tobytes(), 0) for row in rows]
+    starts = [data.getStartIndex(k) for k in range(data.numStartVertices())]
+    goals = [data.getGoalIndex(k) for k in range(data.numGoalVertices())]
+    return graph_of(rows, edges, starts, goals, births)
 
 
 def simplified(problem: Problem, route: Matrix, budget: Budget) -> tuple[Matrix, int]:

@@ -120,6 +120,8 @@ class PlannerGraph:
         costs: Length of each edge, shape (e,) [unit of the space].
         starts: Indices of the vertices that are starts.
         goals: Indices of the vertices that are goals.
+        births: When each vertex came, shape (v,), from 0; each of two trees of ours counts its own.
+        links: Links that MB-RRT has placed in the workspace, for each joint shape (passes, 2, 3) [m].
     """
 
     vertices: Matrix
@@ -127,6 +129,8 @@ class PlannerGraph:
     costs: Vector
     starts: Numbers
     goals: Numbers
+    births: Numbers
+    links: tuple[Matrix, ...] = ()
 
     def save(self, file: str | os.PathLike[str]) -> None:
         """Write the graph as GraphML, which Gephi, NetworkX, igraph and others read.
@@ -171,7 +175,13 @@ class PlannerGraph:
         return data
 
 
-def graph_of(vertices: Matrix, edges: ArrayLike, starts: ArrayLike = (), goals: ArrayLike = ()) -> PlannerGraph:
+def graph_of(
+    vertices: Matrix,
+    edges: ArrayLike,
+    starts: ArrayLike = (),
+    goals: ArrayLike = (),
+    births: ArrayLike | None = None,
+) -> PlannerGraph:
     """Return a graph whose costs are the lengths of its edges.
 
     Args:
@@ -179,11 +189,13 @@ def graph_of(vertices: Matrix, edges: ArrayLike, starts: ArrayLike = (), goals: 
         edges: Index pairs of vertices, shape (e, 2).
         starts: Indices of vertices.
         goals: Indices of vertices.
+        births: When each vertex came, shape (v,); None if that is their order.
     """
     pairs = np.asarray(edges, dtype=np.int64).reshape(-1, 2)
     costs = np.linalg.norm(vertices[pairs[:, 1]] - vertices[pairs[:, 0]], axis=1)
-    joined, first, last = (frozen(each, dtype=np.int64) for each in (pairs, starts, goals))
-    return PlannerGraph(frozen(vertices), joined, frozen(costs), first, last)
+    came = np.arange(len(vertices)) if births is None else births
+    joined, first, last, born = (frozen(each, dtype=np.int64) for each in (pairs, starts, goals, came))
+    return PlannerGraph(frozen(vertices), joined, frozen(costs), first, last, born)
 
 
 def graph_of_trees(starts: Tree | LaterTree, goals: Tree | LaterTree | None = None) -> PlannerGraph:
@@ -191,6 +203,7 @@ def graph_of_trees(starts: Tree | LaterTree, goals: Tree | LaterTree | None = No
     rows: list[Matrix] = []
     edges = []
     roots = []
+    births = []
     count = 0
 
     for given in (starts, goals):
@@ -202,9 +215,11 @@ def graph_of_trees(starts: Tree | LaterTree, goals: Tree | LaterTree | None = No
         rows.append(vertices)
         edges.append(np.stack([parents[grown], grown], axis=1) + count)
         roots.append(np.flatnonzero(parents < 0) + count)
+        births.append(np.arange(len(vertices)))
         count += len(vertices)
 
-    return graph_of(np.concatenate(rows), np.concatenate(edges), *roots)
+    first, last = roots
+    return graph_of(np.concatenate(rows), np.concatenate(edges), first, last, np.concatenate(births))
 
 
 def graph_of_path(path: Matrix) -> PlannerGraph:

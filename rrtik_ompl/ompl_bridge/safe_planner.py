@@ -185,6 +185,10 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
             self._graph = self._graph()
         return self._graph
 
+    def kept_graph(self) -> PlannerGraph | None:
+        """Return the graph of the last ``solve``; None if there is none, as the planner keeps no tree."""
+        return None if self._graph is None else self.graph()
+
     def grown(
         self, starts: Callable[[], Tree | LaterTree], goals: Callable[[], Tree | LaterTree] | None = None
     ) -> Callable[[], PlannerGraph] | None:
@@ -237,7 +241,14 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
         return ob.PlannerStatus(status)
 
     def solve_rows(
-        self, starts: Matrix, goals: Matrix, bounds: tuple[Vector, Vector], stop: Stop, *, checked: bool = False
+        self,
+        starts: Matrix,
+        goals: Matrix,
+        bounds: tuple[Vector, Vector],
+        stop: Stop,
+        *,
+        checked: bool = False,
+        keep_graph: bool = False,
     ) -> tuple[ob.PlannerStatus, Matrix | None]:
         """Solve as :meth:`solve` does, in the planner's world, without OMPL's states and goals.
 
@@ -247,17 +258,20 @@ class SafePlanner(ob.Planner):  # type: ignore[misc]  # OMPL has no types
             bounds: Finite lower and upper bounds of the planner's space, shapes (n,).
             stop: Returns True when it is time to stop.
             checked: Whether starts and goals are known to be free.
+            keep_graph: Whether :meth:`kept_graph` can be asked for afterwards.
 
         Returns:
             The status, and the path, shape (k, n), if there is an exact one.
         """
         self._bounds = bounds
-        self.graph_wanted = False
+        self.graph_wanted = keep_graph
         status, found = self._run_search(
             lambda: self._search_between_free_ends(starts, goals, stop, known_free=checked)
         )
         if found is None:
             return ob.PlannerStatus(status), None
+        if keep_graph:
+            self._graph = found.graph
         is_exact = found.difference <= 0.0
         return ob.PlannerStatus(status), found.path if is_exact else None
 

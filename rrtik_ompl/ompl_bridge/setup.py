@@ -27,7 +27,8 @@ class ValidityCallback:
 
     An error must not be raised inside OMPL. After the ``deadline`` [s, of ``time.monotonic``] every answer is False,
     because some planners make hundreds of checks between two readings of their clock. After ``most_motions`` checks of
-    motions every answer is False, too, and the planner is stopped.
+    motions every answer is False, too, and the planner is stopped. ``seen``, if it is a dict, notes which configuration
+    was checked first, second, and so on, by its bytes.
     """
 
     world: MotionQueries
@@ -38,6 +39,7 @@ class ValidityCallback:
     stop: Callable[[], object] | None = None  # ends the planner
     deadline: float = np.inf
     most_motions: float = np.inf
+    seen: dict[bytes, int] | None = None
 
     @property
     def late(self) -> bool:
@@ -69,6 +71,9 @@ class ValidityCallback:
         """Return the answer of a check; False after an error or the deadline, or if the check raises an error."""
         if self.error is not None or self.late:
             return False
+        if self.seen is not None:
+            for q in arguments:
+                self.seen.setdefault(q.tobytes(), len(self.seen))
 
         try:
             return bool(check(*arguments))

@@ -36,10 +36,12 @@ from rrtik_ompl.ik.methods import load_kernels
 from rrtik_ompl.kernels.proof.rows import PROOF_KERNELS
 from rrtik_ompl.kernels.warming import load_together
 from rrtik_ompl.model.path import JointPath
+from rrtik_ompl.model.search_tree import SearchTree
 from rrtik_ompl.ompl_bridge.attempt import MOTIONS_PER_ITERATION, Attempt, attempt, attempt_seeds
 from rrtik_ompl.ompl_bridge.planner_options import check_options
 from rrtik_ompl.ompl_bridge.planner_traits import PlannerFactory, planners_with, traits_of
 from rrtik_ompl.planning.goal_choice import GoalChoice
+from rrtik_ompl.planning.grown import tree_of
 from rrtik_ompl.planning.outcome import NamedPlanner, Plan, Request
 from rrtik_ompl.planning.second_check import SecondCheck
 from rrtik_ompl.world.problem import Problem, densely_checked, problem_in
@@ -111,6 +113,7 @@ def walk(turns: Iterable[Turn]) -> Iterator[Turn]:
                     row.budget,
                     parameters=turn.parameters,
                     checked=row.checked,
+                    keep_graph=turn.keeps_tree,
                 )
                 turn.take(row, outcome)
         except PlannerError as error:
@@ -133,6 +136,7 @@ class Turn:
         error: The error that broke the planner, or None.
         goal_fault: One line that says why no configuration is at the goal, if that is why there is no path; else "".
         out_of_time: Whether the time was up before there was a path.
+        keeps_tree: Whether the tree of the attempt that finds the path is kept, or else that of the last one.
 
     Args:
         problem: The problem to solve.
@@ -151,6 +155,8 @@ class Turn:
         self.error: PlannerError | None = None
         self.goal_fault = ""
         self.out_of_time = False
+        self.keeps_tree = request.tree
+        self._tree: SearchTree | None = None
 
         traits = traits_of(planner.factory)
         seeds = attempt_seeds(self.budget.seed, request.restarts)
@@ -217,6 +223,9 @@ class Turn:
             describes_path = key in self._traits.path_statistics
             self.totals[key] = value if describes_path else self.totals.get(key, 0) + value
 
+        if outcome.graph is not None:
+            self._tree = tree_of(self.planner.name, outcome.graph, one_joint=self._traits.one_joint)
+
         self._num_attempts[row.kind] += 1
         self._motions_spent[row.kind] += int(outcome.statistics.get("checked_motions", 0))
         # Each attempt also has a fixed cost beyond the motions that it checks.
@@ -254,6 +263,7 @@ class Turn:
             self.budget.seed,
             MappingProxyType(self.totals),
             problem=self._problem,
+            tree=self._tree,
         )
 
     def _decide_without_attempts(self) -> bool:

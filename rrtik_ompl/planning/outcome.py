@@ -12,6 +12,7 @@ from rrtik_ompl.base.copies import as_value, in_notebook, in_one_line
 from rrtik_ompl.base.errors import require
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.result import required
+from rrtik_ompl.model.search_tree import SearchTree
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.route_check import as_it_stands
 
@@ -40,6 +41,7 @@ class Request:
         parameters: Options of the planner.
         proof: Whether motions have to be proven free.
         clearance: Clearance to keep from obstacles [m], or None.
+        tree: Whether to keep the tree of the search.
         among_many: Whether it is one of many, so that Ctrl-C ends all of them and not its shortening alone.
     """
 
@@ -48,6 +50,7 @@ class Request:
     parameters: Mapping[str, Any] = field(default_factory=dict)
     proof: ProofMode = "preferred"
     clearance: float | None = None
+    tree: bool = False
     among_many: bool = False
 
     @property
@@ -90,6 +93,8 @@ class Plan:
             was shortened also ``shortening_seconds``, and with ``improve=`` the cost over time.
         member: For a goal set, the index of the member that the path reaches, from 0; None for other goals.
         unshortened: The planner's own path, if ``path`` was shortened from it; None otherwise.
+        tree: What the planner has grown, where ``plan(tree=True)`` asked for it; None otherwise, and from planners that
+            keep no tree.
         problem: The problem that was solved; None in a plan that comes from another process, which is sent without it.
 
     Example:
@@ -107,6 +112,7 @@ class Plan:
     statistics: Mapping[str, Any]
     member: int | None = None
     unshortened: JointPath | None = None
+    tree: SearchTree | None = field(default=None, repr=False)
     problem: Problem | None = field(default=None, repr=False)
 
     __repr__ = in_one_line

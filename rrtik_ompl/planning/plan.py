@@ -41,6 +41,7 @@ def plan(
     objective: PathObjective = "length",
     strategy: ImproveStrategy = "restart-shorten",
     shorten: ShorteningMethod | bool = "auto",
+    tree: bool = False,
 ) -> Plan:
     """Find a collision-free path from the start to the goal of a problem, and shorten it.
 
@@ -93,6 +94,8 @@ def plan(
             moves and looks for the fewest. The path keeps the rules of single-joint moves in ``parameters``. False
             leaves the planner's own path, which is also ``unshortened`` in the plan of a shortened one. Ctrl-C ends
             the shortening, and leaves the path that was found.
+        tree: Whether to keep the tree that the planner has grown, as :attr:`Plan.tree`, for :func:`view`. "auto" then
+            begins with its planners, as the brief searches before them keep no trees, so its path may be another.
 
     Raises:
         UnknownNameError: If there is no planner, accuracy, objective, strategy or method of shortening of that name.
@@ -114,6 +117,7 @@ def plan(
         raise InputError(f"restarts must be a whole number from 0 to {MAX_RESTARTS}, got {restarts!r}")
     require(parameters, Mapping | None, "parameters of a planner", "use {name of an option: value}")
     one_of(PROOF_MODES, proof, "proof")
+    require(tree, bool, "tree")
     method = shortening_method(shorten)
     problem = problem if accuracy is None else problem.with_accuracy(accuracy)
     check_clearance(problem.world, clearance, fixed_ends(problem))
@@ -122,7 +126,7 @@ def plan(
         one_of(OBJECTIVES, objective, "objective"),
         one_of(STRATEGIES, strategy, "strategy of improve"),
     )
-    request = Request(Budget(seed_of(seed), limit), restarts, parameters or {}, proof, clearance)
+    request = Request(Budget(seed_of(seed), limit), restarts, parameters or {}, proof, clearance, tree)
 
     found = planned_and_finished(problem, planner, request, method)
     if found.found and how.seconds > 0.0:
@@ -165,7 +169,8 @@ def planned_and_finished(
         PlannerError: If the planner broke.
     """
     refuse_covered_goal(problem)
-    short = short_path(problem, request, pull=method == "auto") if _is_auto(planner) else None
+    brief = _is_auto(planner) and not request.tree
+    short = short_path(problem, request, pull=method == "auto") if brief else None
     if short is not None and method in ("auto", None):
         return short
     found = short

@@ -1,6 +1,7 @@
 """Pictures that a person can turn, play and step through: one HTML page, written to a file or served to this machine.
 
-No package below this one imports it. Only the script of meshcat's viewer is used; meshcat itself is not imported.
+No package below this one imports it. Only the script of meshcat's viewer is used; meshcat itself is imported by those
+alone who give a visualizer of it.
 """
 
 from __future__ import annotations
@@ -18,35 +19,36 @@ from rrtik_ompl.files.text import PAGE_FORMATS, check_target, file_name, write_t
 
 if TYPE_CHECKING:
     from rrtik_ompl.replanning.record import ReplanRun
-    from rrtik_ompl.tasks import TaskPlan
-    from rrtik_ompl.tasks.played import PlayedTask
+    from rrtik_ompl.viewer.asked import Asked, AskedPath, AskedTree
     from rrtik_ompl.viewer.drawing.marks import Mark
     from rrtik_ompl.viewer.notebook import InlinePage
-    from rrtik_ompl.viewer.subject import Showable, ShownPath
+    from rrtik_ompl.viewer.subject import ShownPath
     from rrtik_ompl.world.problem import Problem
 
 __all__ = ["play", "view"]
 
 
 def view(
-    shown: Showable,
-    path: ShownPath | TaskPlan | PlayedTask | None = None,
+    shown: Asked,
+    path: AskedPath | None = None,
     *,
     before: ShownPath | None = None,
     ghosts: ArrayLike | None = None,
     marks: Sequence[Mark] = (),
     run: ReplanRun | None = None,
+    tree: AskedTree | None = None,
     html: str | os.PathLike[str] | None = None,
     title: str | None = None,
     still: bool = False,
     inline: bool | None = None,
+    meshcat: object = None,
     port: int = 0,
     on_ready: Callable[[str], object] = webbrowser.open,
 ) -> Path | InlinePage | None:
     """Show a problem and a path: robot, obstacles, start and goal as ghosts, the trail of the tip, and a player.
 
     Args:
-        shown: A ``Problem``, ``World``, ``Robot`` or ``Scene``.
+        shown: A ``Problem``, ``World``, ``Robot`` or ``Scene``; or a ``Plan`` or ``TaskPlan``, which bring their path.
         path: A ``JointPath``, or waypoints of shape (k, dof) [rad or m]; None shows no motion. A ``Trajectory`` is
             played in real time; a ``TaskPlan`` (with the first of its worlds), or the result of its ``played()``, is
             played motion by motion, with the objects that are carried.
@@ -57,16 +59,20 @@ def view(
             plans to the ghost that is chosen there.
         marks: Further bodies: see ``rrtik_ompl.viewer.drawing.marks``.
         run: A ``ReplanRun`` of :func:`rrtik_ompl.replan` to replay instead of a path.
+        tree: How a planner has searched: ``plan(tree=True).tree``, or a ``Roadmap``; it is drawn, and grows step by
+            step. None and True stand for the tree that a ``Plan`` has kept, if there is one; False draws none.
         html: File to write. If None, the page is served on 127.0.0.1 until Ctrl-C is pressed.
         title: Heading of the page; None derives it from the name of the problem or robot.
         still: Whether to leave out the planner of the page. With it, start, goal and obstacles of a problem can be
             dragged, and the page finds new paths by itself, without a network.
         inline: Whether to return the page for the output of a notebook's cell; None: if this runs in a notebook.
+        meshcat: A ``meshcat.Visualizer`` or pinocchio's ``MeshcatVisualizer`` to draw into, below its node "rrtik", in
+            place of a page: arm, obstacles, goal, trail, and the motion as an animation. Its server has to run.
         port: Port to serve on; 0 chooses a free one.
         on_ready: Called with the URL once the page is being served; opens the browser by default.
 
     Returns:
-        The file that was written, the page that a notebook shows, or None after serving.
+        The file that was written, the page that a notebook shows, or None after serving or with ``meshcat``.
 
     Raises:
         InputError: If the input cannot be shown, the file cannot be written or the port cannot be used.
@@ -76,7 +82,7 @@ def view(
         >>> rrtik.view(problem, rrtik.plan(problem, seed=1).path, html="plan.html").name
         'plan.html'
     """
-    from rrtik_ompl.tasks import TaskPlan
+    from rrtik_ompl.viewer.asked import parts_of
     from rrtik_ompl.viewer.notebook import InlinePage, in_kernel
     from rrtik_ompl.viewer.page import page_and_picture
     from rrtik_ompl.viewer.serve import PageServer
@@ -87,16 +93,32 @@ def view(
     require(inline, bool | None, "inline")
     check_target(None if html is None else file_name(html), PAGE_FORMATS)
 
-    played = path.played() if isinstance(path, TaskPlan) else path  # a TaskPlan brings its own timing and proof
+    parts = parts_of(shown, path, before, tree)
+    if meshcat is not None:
+        if html is not None:
+            raise InputError("view: give html or meshcat, not both; call view twice")
+        from rrtik_ompl.viewer.meshcat_door import draw_into
+
+        draw_into(meshcat, parts, run)
+        return None
     in_cell = html is None and (in_kernel() if inline is None else inline)
-    text, picture = page_and_picture(
-        shown, played, before=before, ghosts=ghosts, marks=marks, run=run, title=title, still=still, picture=in_cell
+    text, image = page_and_picture(
+        parts.shown,
+        parts.path,
+        before=parts.before,
+        ghosts=ghosts,
+        marks=marks,
+        run=run,
+        tree=parts.tree,
+        title=title,
+        still=still,
+        picture=in_cell,
     )
     if html is not None:
         write_text(html, text)
         return Path(html)
     if in_cell:
-        return InlinePage(text, picture)
+        return InlinePage(text, image)
 
     with PageServer(text, port) as server:
         on_ready(server.url)

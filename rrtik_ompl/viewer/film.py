@@ -15,16 +15,17 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from rrtik_ompl.base.errors import InputError, called, listed, require
+from rrtik_ompl.base.interrupts import tidied_before_the_end
 from rrtik_ompl.files.text import FILM_FORMATS, PICTURE_FORMATS, check_target, file_name, write_bytes
 from rrtik_ompl.motion.trajectory import Trajectory
 from rrtik_ompl.replanning.record import ReplanRun
-from rrtik_ompl.tasks import TaskPlan
 from rrtik_ompl.tasks.played import PlayedTask
+from rrtik_ompl.viewer.asked import Asked, AskedPath, AskedTree, Parts, parts_of
 from rrtik_ompl.viewer.browser import posts
 from rrtik_ompl.viewer.film_file import webm, whole_film
 from rrtik_ompl.viewer.film_view import camera_of, sides_of
 from rrtik_ompl.viewer.page import page
-from rrtik_ompl.viewer.subject import Showable, ShownPath, subject_of
+from rrtik_ompl.viewer.subject import subject_of
 
 BITS_PER_PIXEL = 0.1  # of an encoded film
 LEAST_BITS = 2e6  # [bit/s]
@@ -40,11 +41,12 @@ COLORS = 255  # colours of a GIF
 
 
 def film(
-    shown: Showable,
-    path: ShownPath | TaskPlan | PlayedTask | None,
+    shown: Asked,
     file: str | os.PathLike[str],
+    path: AskedPath | None = None,
     *,
     run: ReplanRun | None = None,
+    tree: AskedTree | None = None,
     seconds: float | None = None,
     rate: float | None = None,
     size: str | Sequence[int] | None = None,
@@ -52,17 +54,19 @@ def film(
     hide: str | Iterable[str] = "",
     on_picture: Callable[[int, int], object] = lambda done, count: None,
 ) -> Path:
-    """Write a film of a path, a timed motion, a task or a run of replanning.
+    """Write a film of a plan, a path, a timed motion, a task or a run of replanning.
 
     A headless browser draws it, by software alone, so that it needs neither a screen nor a graphics card. The file
     appears only when it is complete.
 
     Args:
-        shown: A ``Problem``, ``World``, ``Robot`` or ``Scene``.
-        path: What is played: a path, a ``Trajectory``, a ``TaskPlan``; None with a run.
+        shown: What :func:`rrtik_ompl.view` shows: a ``Plan`` or ``TaskPlan``, or a problem, world or robot with a path.
         file: .mp4 (H.264), .webm (VP9) or .gif.
+        path: What is played: a path, a ``Trajectory``, a ``TaskPlan``; None for the path of a plan, and with a run.
         run: A run of :func:`rrtik_ompl.replan` in place of a path.
-        seconds: Duration [s]; None for 4 s of a path, or for the time that the motion itself takes, at most 48 s.
+        tree: As for :func:`rrtik_ompl.view`; it grows in the first half of the film.
+        seconds: Duration [s]; None for 4 s of a path, and as many of a tree, or for the time that the motion itself
+            takes, at most 48 s.
         rate: Pictures a second; None for 30, of a GIF 12.
         size: Width and height [px], (1920, 1080) or "1920x1080"; None for 1280 x 720, of a GIF 640 x 400.
         camera: "overview", "front", "side", "top"; "orbit" goes once around everything, "follow" stays beside the tip;
@@ -77,14 +81,19 @@ def film(
     Raises:
         InputError: If there is nothing that moves, a value is out of range, there is no browser or no encoder, or the
             file cannot be written.
+
+    Example:
+        >>> plan = rrtik.plan(rrtik.load_problem("planar3_boxes"), "bicrdt", seed=1)
+        >>> rrtik.film(plan, "plan.gif", size="160x100", seconds=1.0, camera="top").name  # doctest: +SKIP
+        'plan.gif'
     """
     target = file_name(file)
     check_target(target, FILM_FORMATS)
     ending = target.suffix.lower()
     gif = ending == ".gif"
 
-    played = path.played() if isinstance(path, TaskPlan) else path
-    length = _seconds(shown, played, run, target) if seconds is None else float(seconds)
+    parts = parts_of(shown, path, None, tree)
+    length = _seconds(parts, run, target) if seconds is None else float(seconds)
     speed = (GIF_RATE if gif else RATE) if rate is None else float(rate)
     width, height = sides_of((GIF_SIZE if gif else SIZE) if size is None else size, ending)
     frames = round(length * speed) + 1 if np.isfinite(length * speed) else 0
@@ -102,7 +111,7 @@ def film(
         "bits": max(BITS_PER_PIXEL * width * height * speed, LEAST_BITS),
     }
     called(on_picture, "on_picture", "how many are finished", "how many there are")
-    with closing(posts(page(shown, played, run=run, still=True), wanted, (width, height))) as messages:
+    with tidied_before_the_end(), closing(posts(_page(parts, run), wanted, (width, height))) as messages:
         counted = _counted(messages, on_picture, frames)
         if ending == ".mp4":
             _write_mp4(target, counted, speed, (width, height))
@@ -114,11 +123,12 @@ def film(
 
 
 def picture(
-    shown: Showable,
-    path: ShownPath | TaskPlan | PlayedTask | None,
+    shown: Asked,
     file: str | os.PathLike[str],
+    path: AskedPath | None = None,
     *,
     run: ReplanRun | None = None,
+    tree: AskedTree | None = None,
     at: float = 0.0,
     size: str | Sequence[int] = SIZE,
     camera: str | os.PathLike[str] = "overview",
@@ -127,10 +137,11 @@ def picture(
     """Write a still picture (.png) of what :func:`film` films; for its arguments see there.
 
     Args:
-        shown: A ``Problem``, ``World``, ``Robot`` or ``Scene``.
-        path: A path, or None.
+        shown: A ``Plan`` or ``TaskPlan``; or a problem, world, robot or scene.
         file: .png.
+        path: A path, or None.
         run: A run in place of a path.
+        tree: As for :func:`rrtik_ompl.view`.
         at: Which moment is drawn: 0 is the start, 1 the end.
         size: Width and height [px].
         camera: Name of a camera, or a file of views.
@@ -141,6 +152,11 @@ def picture(
 
     Raises:
         InputError: If a value is out of range, there is no browser, or the file cannot be written.
+
+    Example:
+        >>> robot = rrtik.load_robot("panda")
+        >>> rrtik.picture(robot, "panda.png", size="640x480", camera="front").name  # doctest: +SKIP
+        'panda.png'
     """
     target = file_name(file)
     check_target(target, PICTURE_FORMATS)
@@ -149,8 +165,8 @@ def picture(
     sides = sides_of(size, target.suffix.lower())
     wanted = {**_wanted(camera, hide, sides), "frames": 1, "held": 0, "at": at, "rate": 1.0, "ending": ".png"}
 
-    played = path.played() if isinstance(path, TaskPlan) else path
-    with closing(posts(page(shown, played, run=run, still=True), wanted, sides)) as messages:
+    text = _page(parts_of(shown, path, None, tree), run)
+    with tidied_before_the_end(), closing(posts(text, wanted, sides)) as messages:
         write_bytes(target, next(data for _, data in messages))
     return target
 
@@ -181,17 +197,25 @@ def _wanted(camera: str | os.PathLike[str], hide: str | Iterable[str], size: tup
     return {"camera": camera_of(camera), "hide": [name.strip() for name in names if name.strip()], "size": list(size)}
 
 
-def _seconds(shown: Showable, path: ShownPath | PlayedTask | None, run: ReplanRun | None, target: Path) -> float:
+def _page(parts: Parts, run: ReplanRun | None) -> str:
+    return page(parts.shown, parts.path, run=run, tree=parts.tree, still=True)
+
+
+def _seconds(parts: Parts, run: ReplanRun | None, target: Path) -> float:
     """Return the duration of a film [s] if none is given."""
+    path = parts.path
     if run is not None:
         return min(max(float(run.times[-1]), 1.0), LONGEST)
     if isinstance(path, PlayedTask):
         return min(len(path.waypoints) / path.rate, LONGEST)
     if isinstance(path, Trajectory):
         return min(path.duration, LONGEST)
-    if not subject_of(shown, path).is_path:
+    growth = 0.0 if parts.tree is None else PATH_SECONDS
+    if subject_of(parts.shown, path).is_path:
+        return growth + PATH_SECONDS
+    if not growth:
         raise InputError(f"{target}: a film needs a path; give one (rrtik plan --out path.json), or ask for a picture")
-    return PATH_SECONDS
+    return growth
 
 
 def _counted(

@@ -63,18 +63,21 @@ def html_of(value: Plan | JointPath | Problem | World | Trajectory) -> str | Non
             return None if value.path is None else html_of(value.path)
         shown: Showable = value.problem
         path: JointPath | Trajectory | None = value.path
+        tree = value.tree
     elif isinstance(value, (JointPath, Trajectory)):
         robot = robot_called(value.robot_name, value.joint_names)
         if robot is None:
             return None
         shown = robot
         path = value
+        tree = None
     else:
         shown = value
         path = None
+        tree = None
 
     planning = isinstance(value, (Plan, Problem))
-    return InlinePage(*page_and_picture(shown, path, still=not planning))._repr_html_()
+    return InlinePage(*page_and_picture(shown, path, tree=tree, still=not planning))._repr_html_()
 
 
 def in_kernel() -> bool:

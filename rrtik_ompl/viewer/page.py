@@ -24,11 +24,13 @@ from rrtik_ompl.viewer.drawing.marks import Mark
 from rrtik_ompl.viewer.page_fixed import packed
 from rrtik_ompl.viewer.page_planner import page_planner
 from rrtik_ompl.viewer.picture import draw
+from rrtik_ompl.viewer.search_story import joint_space, search_story, search_tree_of
 from rrtik_ompl.viewer.still import first_picture
 from rrtik_ompl.viewer.story import play_pace, story_of
 from rrtik_ompl.viewer.subject import Showable, ShownPath, Subject, subject_of, subject_of_run
 from rrtik_ompl.viewer.task_story import subject_of_task
 from rrtik_ompl.world.problem import Problem
+from rrtik_ompl.world.world import World
 
 # The page may run only its own script, and send no request to other machines.
 # WebAssembly may be compiled; text must not be evaluated as script.
@@ -49,6 +51,7 @@ SCRIPTS = (
     "shots.js",
 )
 BOX_SHARE = 0.1  # side of an added box, as a share of the arm's diagonal
+WITH_SEARCH = tuple(each for name in SCRIPTS for each in ((name, "search.js") if name == "panel.js" else (name,)))
 STARTING = ("unpack.js", "start.js")
 KERNELS = ("kernels.js", "obstacles.js", "fixed.js")
 PLANNING = (
@@ -72,6 +75,7 @@ def page(
     ghosts: ArrayLike | None = None,
     marks: Sequence[Mark] = (),
     run: ReplanRun | None = None,
+    tree: object = None,
     title: str | None = None,
     still: bool = False,
     asks: bool = False,
@@ -87,6 +91,7 @@ def page(
         ghosts: Configurations drawn transparently, shape (k, dof).
         marks: Further bodies.
         run: A run to replay instead of a path; obstacles are where they were in it.
+        tree: A ``SearchTree`` or ``Roadmap`` that is drawn, and grows.
         title: Heading; None derives it from the name of the problem or robot.
         still: Whether to leave out the planner of the page.
         asks: Whether the page asks its server about each path that it finds.
@@ -101,6 +106,7 @@ def page(
         ghosts=ghosts,
         marks=marks,
         run=run,
+        tree=tree,
         title=title,
         still=still,
         asks=asks,
@@ -117,6 +123,7 @@ def page_and_picture(
     ghosts: ArrayLike | None = None,
     marks: Sequence[Mark] = (),
     run: ReplanRun | None = None,
+    tree: object = None,
     title: str | None = None,
     still: bool = False,
     asks: bool = False,
@@ -129,6 +136,7 @@ def page_and_picture(
         more = listed(marks, "marks")
         subject = subject_of(shown, path, before, ghosts, more) if run is None else subject_of_run(shown, run)
 
+    grown = search_tree_of(tree, subject.robot)
     recording, frame = draw(subject)
     first_view = first_picture(subject, recording, frame) if picture else b""
     heading = _title(subject) if title is None else title
@@ -144,6 +152,11 @@ def page_and_picture(
     if told["plan"]:
         told["plan"]["asks"] = asks
 
+    world = getattr(shown, "world", shown)
+    joints = joint_space(subject, world if isinstance(world, World) else None, grown)
+    search = {"tree": None if grown is None else search_story(grown), "joints": joints}
+    scripts = SCRIPTS if grown is None and joints is None else WITH_SEARCH
+
     story = json.dumps(told, allow_nan=False, separators=(",", ":"))
     text = Template(asset("page.html")).substitute(
         title=html.escape(heading),
@@ -154,7 +167,8 @@ def page_and_picture(
         story=story.replace("<", "\\u003c"),  # escaped, so that no name can close the script element
         commands=packed(json.dumps([base64.b64encode(each).decode("ascii") for each in recording.commands]).encode()),
         kernels=_packed_scripts(KERNELS if told["plan"] else ()),
-        script=_packed_scripts(SCRIPTS + (PLANNING if told["plan"] else ())),
+        search=packed(json.dumps(search, allow_nan=False, separators=(",", ":")).encode()),
+        script=_packed_scripts(scripts + (PLANNING if told["plan"] else ())),
         start="\n".join(asset(name) for name in STARTING),
     )
     return text, first_view

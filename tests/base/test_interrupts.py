@@ -1,6 +1,8 @@
 """Ctrl-C is not lost in a library that catches it."""
 
 import signal
+import subprocess
+import sys
 from contextlib import suppress
 from threading import Thread
 
@@ -35,6 +37,25 @@ def test_errors_pass_and_other_threads_are_left_alone():
     thread.start()
     thread.join()
     assert seen == [1]
+
+
+ENDED = """
+import signal, sys
+from rrtik_ompl.base.interrupts import tidied_before_the_end
+with tidied_before_the_end():
+    try:
+        signal.raise_signal(getattr(signal, sys.argv[1]))
+        print("goes on")
+    finally:
+        print("tidied", flush=True)
+print("not reached")
+"""
+
+
+@pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP"])
+def test_who_is_ended_by_a_signal_has_tidied_up_and_is_ended_by_it(name):
+    found = subprocess.run([sys.executable, "-c", ENDED, name], capture_output=True, text=True, check=False)
+    assert (found.stdout, found.returncode) == ("tidied\n", -getattr(signal, name))
 
 
 def test_ctrl_c_while_a_mesh_is_read_is_not_lost(monkeypatch, tmp_path):

@@ -16,7 +16,7 @@ from ompl import tools as ot
 import rrtik_ompl as rrtik
 from rrtik_ompl.base.errors import InputError, PlannerError, UnknownNameError
 from rrtik_ompl.ompl_bridge.contract import outside_bar, outside_wall, small_problem, solution_rows
-from rrtik_planners import CRDT, IKURT, MBRRT, BiCRDT, CBiRRT, DRRTCon, FastRRTConnect, FewestMoves, RoadmapPlanner
+from rrtik_planners import CRDT, IKURT, MBRRT, BiCRDT, CBiRRT, DRRTCon, FastRRTConnect, FewestMoves
 
 GROWING = (BiCRDT, CBiRRT, CRDT, FastRRTConnect, IKURT, MBRRT)
 TWO_TREES = (BiCRDT, CBiRRT, DRRTCon, FastRRTConnect, MBRRT)
@@ -45,7 +45,7 @@ def test_every_edge_of_a_graph_is_free_and_its_path_lies_in_it(planner: Any) -> 
     assert len(graph.edges) >= len(graph.vertices) - len(graph.starts) - len(graph.goals) > 0 or planner is CBiRRT
 
 
-@pytest.mark.parametrize("planner", [DRRTCon, FewestMoves, RoadmapPlanner], ids=lambda p: p.__name__)
+@pytest.mark.parametrize("planner", [DRRTCon, FewestMoves], ids=lambda p: p.__name__)
 def test_a_planner_without_a_tree_shows_its_path(planner: Any) -> None:
     setup, made, _ = solved(planner)
     graph, rows = made.graph(), solution_rows(setup)

@@ -42,7 +42,7 @@ def differ(one, other):
 @needs_chromium
 def test_a_film_shows_the_arm_moving(tmp_path):
     robot = rrtik.load_robot("planar3")
-    with Image.open(film(robot, WAYPOINTS, tmp_path / "film.gif", seconds=1.0, rate=2.0, size="320x200")) as moving:
+    with Image.open(film(robot, tmp_path / "film.gif", WAYPOINTS, seconds=1.0, rate=2.0, size="320x200")) as moving:
         assert (moving.size, moving.n_frames) == ((320, 200), 3)  # at 0, 0.5 and 1 s
         pictures = []
         for k in range(3):
@@ -59,7 +59,7 @@ def test_a_film_has_its_size_rate_and_codec_and_holds_its_last_picture(tmp_path,
     told = []
     file = tmp_path / f"film{ending}"
     size, say = (320, 200), lambda *done: told.append(done)
-    film(rrtik.load_robot("planar3"), WAYPOINTS, file, seconds=0.5, rate=10.0, size=size, on_picture=say)
+    film(rrtik.load_robot("planar3"), file, WAYPOINTS, seconds=0.5, rate=10.0, size=size, on_picture=say)
     frames, rate = frames_of(file)
     assert rate == pytest.approx(10.0)
     assert {each.shape for each in frames} == {(200, 320, 3)}
@@ -81,7 +81,7 @@ def test_a_camera_of_a_file_is_where_the_file_says(tmp_path):
     scene = rrtik.Scene(
         [rrtik.Obstacle("post", rrtik.Box([0.2, 0.2, 0.2]), rrtik.pose([0.5, 0.25, 0.9]), color="#c0392b")]
     )
-    shot = picture(scene, None, tmp_path / "a.png", size=(400, 400), camera=views, hide="frames,grid,labels")
+    shot = picture(scene, tmp_path / "a.png", size=(400, 400), camera=views, hide="frames,grid,labels")
     pixels = np.asarray(Image.open(shot).convert("RGB"), dtype=int)
     seen = np.argwhere(pixels.max(axis=2) - pixels.min(axis=2) > 60)
     # The upper face, 1 m below the eye, covers 0.4 to 0.6 and 0.15 to 0.35 m; half of the picture shows 1 m there.
@@ -101,15 +101,13 @@ def test_what_is_hidden_is_not_in_the_picture(tmp_path):
     )
     shares = []
     for hide in ("", "b", "obstacles"):
-        shot = picture(
-            scene, None, tmp_path / "a.png", size=(400, 300), camera="side", hide=f"frames,grid,labels,{hide}"
-        )
+        shot = picture(scene, tmp_path / "a.png", size=(400, 300), camera="side", hide=f"frames,grid,labels,{hide}")
         pixels = np.asarray(Image.open(shot).convert("RGB"), dtype=int)
         shares.append((pixels.max(axis=2) - pixels.min(axis=2) > 60).mean())
     assert shares[0] == pytest.approx(2.0 * shares[1], rel=0.1)
     assert shares[2] == 0.0
     with pytest.raises(rrtik.InputError, match="nothing here is called 'ghost'; what can be hidden: robot, ghosts"):
-        picture(scene, None, tmp_path / "b.png", hide="ghost")
+        picture(scene, tmp_path / "b.png", hide="ghost")
     assert not (tmp_path / "b.png").exists()
 
 
@@ -130,7 +128,7 @@ def test_what_is_hidden_is_not_in_the_picture(tmp_path):
 )
 def test_what_is_no_film_is_said_in_a_line(path, name, options, said, tmp_path):
     with pytest.raises(rrtik.InputError, match=said):
-        film(rrtik.load_robot("planar3"), path, tmp_path / name, **options)
+        film(rrtik.load_robot("planar3"), tmp_path / name, path, **options)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -160,7 +158,7 @@ def test_views_are_taken_in_the_order_of_their_times(tmp_path):
 def test_without_a_browser_it_is_said_in_a_line(tmp_path, monkeypatch):
     monkeypatch.setattr(module.shutil, "which", lambda name: None)
     with pytest.raises(rrtik.InputError, match="needs a browser"):
-        film(rrtik.load_robot("planar3"), WAYPOINTS, tmp_path / "film.gif")
+        film(rrtik.load_robot("planar3"), tmp_path / "film.gif", WAYPOINTS)
 
 
 def test_a_browser_that_draws_nothing_is_said_in_a_line(tmp_path, monkeypatch):
@@ -169,7 +167,7 @@ def test_a_browser_that_draws_nothing_is_said_in_a_line(tmp_path, monkeypatch):
     browser.chmod(0o755)
     monkeypatch.setattr(module.shutil, "which", lambda name: str(browser))
     with pytest.raises(rrtik.InputError, match="chromium ended or drew nothing more"):
-        film(rrtik.load_robot("planar3"), WAYPOINTS, tmp_path / "film.mp4")
+        film(rrtik.load_robot("planar3"), tmp_path / "film.mp4", WAYPOINTS)
     assert [each.name for each in tmp_path.iterdir()] == ["chromium"]
 
 
@@ -186,7 +184,7 @@ def test_ctrl_c_ends_the_browser_and_leaves_no_file(tmp_path, monkeypatch, name)
 
     monkeypatch.setattr("rrtik_ompl.viewer.film.posts", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        film(rrtik.load_robot("planar3"), WAYPOINTS, tmp_path / name)
+        film(rrtik.load_robot("planar3"), tmp_path / name, WAYPOINTS)
     assert ended == [True]
     assert list(tmp_path.iterdir()) == []
 

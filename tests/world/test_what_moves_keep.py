@@ -108,7 +108,7 @@ ALONG = {  # motions of the tip past a post
 }
 STILL = {  # take a world or a problem, and make no motion
     "prove",
-    *("view", "plot_joints"),
+    *("view", "film", "picture", "plot_joints"),
     *("GoalSampler", "simple_setup", "space_information", "solve_ik", "solve_ik_many", "solve_trajectory"),
     *("grasps", "Reach", "time_parameterize_many"),
     *(

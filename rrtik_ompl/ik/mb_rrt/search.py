@@ -64,7 +64,15 @@ def mb_rrt(request: IkRequest) -> IkResponse:
     return IkResponse(rows, request.near if len(rows) else nearest_posture(request), passes, found.timed_out)
 
 
-def tree_aims(world: World, goal: TipGoal, near: Vector, rng: np.random.Generator, *, seconds: float) -> Matrix:
+def tree_aims(
+    world: World,
+    goal: TipGoal,
+    near: Vector,
+    rng: np.random.Generator,
+    *,
+    seconds: float,
+    on_links: Callable[[list[Matrix]], object] | None = None,
+) -> Matrix:
     """Return free configurations at a goal, nearest to a given configuration first.
 
     Args:
@@ -73,6 +81,7 @@ def tree_aims(world: World, goal: TipGoal, near: Vector, rng: np.random.Generato
         near: The given configuration, shape (dof,).
         rng: Source of random numbers.
         seconds: Time limit [s].
+        on_links: Called with the links of each tree, see :func:`placed_links`.
 
     Returns:
         Shape (k, dof), k <= `MAX_CONFIGURATIONS`, none if none was found in time.
@@ -88,6 +97,8 @@ def tree_aims(world: World, goal: TipGoal, near: Vector, rng: np.random.Generato
         found = search(robot, target, near=near, accept=accept, rng=rng, budget=budget, world=world)
         rows = np.vstack([rows, robot.clamp(found.q)])
         rows = rows[goal.satisfied(robot, rows) & world.valid_batch(rows)] if len(rows) else rows
+        if on_links is not None and found.tree is not None:
+            on_links(placed_links(robot, axes_of(robot, target.oriented), found.tree))
         if found.timed_out or len(rows) >= MAX_CONFIGURATIONS:
             break
 
@@ -105,11 +116,13 @@ class Found:
         q: Configurations at the goal inside the limits, shape (k, dof).
         passes: Number of passes done.
         timed_out: Whether the time was up.
+        tree: What was grown; None if the goal is out of reach.
     """
 
     q: Matrix
     passes: int
     timed_out: bool = False
+    tree: WorkspaceTree | None = None
 
 
 def search(
@@ -154,9 +167,31 @@ def search(
         if not collect_all and accept(ends).any():
             break
         if budget.over():
-            return Found(solutions, tree.passes, True)
+            return Found(solutions, tree.passes, True, tree)
 
-    return Found(solutions, tree.passes)
+    return Found(solutions, tree.passes, tree=tree)
+
+
+def placed_links(robot: Robot, axes: Axes, tree: WorkspaceTree) -> list[Matrix]:
+    """Return the links that a tree has placed, in order: for each joint from its origin to the next one, or the tip.
+
+    Args:
+        robot: The arm.
+        axes: Its joints.
+        tree: The tree.
+
+    Returns:
+        For each joint shape (k, 2, 3) [m].
+    """
+    joints = _joint_order(robot, axes)
+    links = []
+    for level, joint in enumerate(joints):
+        rows = tree.nodes(level + 1)
+        frames = robot.chain.joint_frames(rows)[:, :, :3, 3]
+        last = level + 1 == len(joints)
+        ends = robot.fk_batch(rows)[:, :3, 3] if last else frames[:, joints[level + 1]]
+        links.append(np.stack([frames[:, joint], ends], axis=1))
+    return links
 
 
 def out_of_reach(robot: Robot, target: Target) -> bool:

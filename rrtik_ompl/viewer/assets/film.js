@@ -45,7 +45,8 @@ async function drawFilm(wanted) {
   for (let k = 0; k < frames + (encoder ? held : 0); k += 1) {
     if (k < frames) {
       const share = frames > 1 ? k / (frames - 1) : at;
-      if (total > 0) show(total * share);
+      if (frames > 1) showShare(share);
+      else if (total > 0) show(total * at);
       place(share);
       viewer.render();
       take(hide.includes("caption") ? "" : captionNow());

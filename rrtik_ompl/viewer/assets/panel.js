@@ -28,6 +28,12 @@ document.getElementById("subtitle").textContent = [
   story.goal ? `goal: ${story.goal}` : "",
 ].filter((text) => text).join("  \u00b7  ");
 
+// What search.js does, in pages of a planner's search and of two joints.
+const growing = [];  // trees as they grow
+let onPosture = () => {};
+let dropSearch = () => {};
+let showShare = (share) => { if (total > 0) show(total * share); };  // of a film
+
 // Joints -----------------------------------------------------------------------------------------------------------
 const jointRows = [];
 let onJointMoved = () => {};
@@ -69,6 +75,7 @@ function buildJoints() {
 }
 
 function showJoints(q, move, moving) {
+  onPosture(q);
   q.forEach((value, j) => {
     const row = jointRows[j];
     const active = moving && move.joints.includes(j);

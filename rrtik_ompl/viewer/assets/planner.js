@@ -121,6 +121,7 @@ function replacePath(rows) {
   drawTrail(rows);
   sayTitle(rows.length > 1 ? `path of ${count(rows.length - 1, "move")}` : "no path");
   dropBefore();
+  dropSearch();
   document.getElementById("clearance-section").hidden = true;
   document.getElementById("proof-section").hidden = true;
   showClearance = () => {};

@@ -51,6 +51,27 @@ function keepPicture() {
   sheet.toBlob((blob) => keepFile("picture.png", blob), "image/png");
 }
 
+const LOOKS = ["fill", "stroke", "stroke-width", "opacity", "font-size"];  // of parts of a plot
+
+/** A plot as a file of its own, in the colours that it has in the page. */
+function plotText(plot) {
+  const copy = plot.cloneNode(true);
+  const parts = [...copy.querySelectorAll("*")];
+  [...plot.querySelectorAll("*")].forEach((part, k) => {
+    const look = getComputedStyle(part);
+    parts[k].setAttribute("style", LOOKS.map((name) => `${name}: ${look.getPropertyValue(name)}`).join("; "));
+  });
+  copy.setAttribute("xmlns", "http://www.w3.org/2000/svg");
+  copy.setAttribute("style", `font-family: sans-serif; background: ${getComputedStyle(document.body).backgroundColor}`);
+  return copy.outerHTML;
+}
+
+const shownPlots = () => [...document.querySelectorAll("aside svg")].filter((plot) => plot.closest("section").hidden === false);
+
+function keepPlots() {
+  for (const plot of shownPlots()) keepFile(`${plot.id}.svg`, new Blob([plotText(plot)], { type: "image/svg+xml" }));
+}
+
 let recording = null;
 
 /** Play from the start to the end, and record it; pressed again, it ends there. */
@@ -90,5 +111,7 @@ function recordFilm() {
 
 document.getElementById("picture-button").addEventListener("click", keepPicture);
 document.getElementById("film-button").addEventListener("click", recordFilm);
+document.getElementById("plot-button").addEventListener("click", keepPlots);
+document.getElementById("plot-button").hidden = shownPlots().length === 0;
 document.getElementById("view-button").addEventListener("click", () => keepFile("view.yaml", new Blob([viewText()])));
 document.getElementById("film-button").hidden = !robot || (story.moves.length === 0 && !story.plan);

@@ -1,9 +1,9 @@
 // What one can see, as a tree: each thing has a row with an eye; that of a group hides all that is in it.
 const GROUPS = {  // in this order; films hide them by these names
-  robot: "Robot", ghosts: "Ghosts", trails: "Trails", goal: "Goal", obstacles: "Obstacles", courses: "Courses", margins: "Margins", contacts: "In collision", marks: "Further bodies",
+  robot: "Robot", ghosts: "Ghosts", trails: "Trails", search: "Search", goal: "Goal", obstacles: "Obstacles", courses: "Courses", margins: "Margins", contacts: "In collision", marks: "Further bodies",
   labels: "Names", frames: "Frames", grid: "Ground",
 };
-const UNFOLDED = ["ghosts", "obstacles", "trails", "contacts", "marks"];
+const UNFOLDED = ["ghosts", "obstacles", "trails", "search", "contacts", "marks"];
 const FEW_COURSES = 3;  // more are a heap, and hidden at first
 const LONG_LIST = 8;  // groups with more rows are folded at first
 const things = [];
@@ -93,6 +93,7 @@ function listThings() {
   if (story.goal_ghost) addThing("ghosts", "goal", toggles("goal ghost"), { color: colors.goal, opacity: 0.6 });
   drawnGhosts.forEach(({ name, color }) => addThing("ghosts", name, toggles(name), { color, opacity: 0.6 }));
   addTrails();
+  growing.forEach(({ name, color, leaf }) => addThing("search", name, toggles(leaf), { color }));
   if (story.goal && story.goal !== "joint values") addThing("goal", story.goal, toggles("goal"), { color: colors.goal });
   if (node("constraints").children.length) addThing("goal", "path constraints", toggles("constraints"));
   for (const { name, node: leaf, color } of story.obstacles) {
