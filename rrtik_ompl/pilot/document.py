@@ -28,6 +28,7 @@ def state_document(session: Session) -> dict[str, Any]:
         "message": session.message,
         "level": session.level.value,
         "fault_of_arm": known.fault,
+        "stopped": state.stopped,
         "picture_age": None if not np.isfinite(age) else round(age, 3),
         "stale": bool(age > STALE_SECONDS),
         "selected": state.selected,

@@ -1,6 +1,7 @@
 """Decide which commands are refused, given what is known of the picture, the arm and the route.
 
-The rule: nothing moves, is planned or is accepted on a stale picture or on joint values that are no longer read, and
+The rule: nothing moves after STOP until it is reset; nothing moves, is planned or is accepted on a stale picture or on
+joint values that are no longer read, and
 no route is followed that was not accepted. Where the vehicle moves, no route is proposed or followed past objects that
 were not seen recently; driving by hand remains possible. Commands that stop, choose or leave are never refused here.
 Arguments of commands come from outside and are checked: only what a command expects is accepted.
@@ -30,7 +31,9 @@ STALE_SECONDS = 0.5  # an older picture does not show the present
 UNSEEN_SECONDS = 2.0  # if the vehicle moves, routes must not depend on objects out of view for longer
 LATE_SECONDS = 0.3  # a pilot who sees the motion of the arm with a larger delay must not drive it
 
-ACKNOWLEDGE: Final = "STOP acknowledges that"
+ACKNOWLEDGE: Final = "'reset' acknowledges that"
+RESET: Final = "'reset' lets the arm be driven again"
+STOPPED: Final = f"STOP was pressed; {RESET}"
 
 BY_HAND: Final = (MANOEUVRE, CHOOSING, PROPOSED)
 ON_A_ROUTE: Final = "a route is being followed: 'next' makes its next move, 'stop' leaves it"
@@ -90,6 +93,7 @@ class Knowledge:
         arm_off: How joint values and pictures contradict each other; "" if they do not.
         unusable: Why the last photograph or picture of a film could not be used; "" if it could.
         fault: What the arm did against its set points; "" if nothing, or if the pilot has acknowledged it.
+        stopped: Whether STOP was pressed and has not been reset.
         sight: What the pilot's page shows; None without a page.
         unseen: Which object of the scene has not been in view recently, in one line; "" if there is none.
     """
@@ -100,6 +104,7 @@ class Knowledge:
     arm_off: str = ""
     unusable: str = ""
     fault: str = ""
+    stopped: bool = False
     sight: Sight | None = None
     unseen: str = ""
 
@@ -144,6 +149,8 @@ def refusal(verb: Verb, mode: str, known: Knowledge) -> str:
 
     if verb.present and known.trouble:
         return f"refused: {known.trouble}" + (f"; {ACKNOWLEDGE}" if known.trouble == known.fault else "")
+    if verb.present and known.stopped:
+        return f"refused: {STOPPED}"
     if verb.guided and known.unseen:
         return f"refused: {known.unseen}; bring it into view, or drive by hand"
     return f"refused: {known.blind}" if verb.held and known.blind else ""

@@ -15,8 +15,8 @@ command is refused.
 | `jog`, `go`, `move`, `servo`, `lead` | | | | refused |
 | `close` on something loose, `open` with something | manoeuvre | manoeuvre | manoeuvre | refused |
 | `next`, `settle` | refused | refused | refused | |
-| `stop`, `halt` | | | | proposed |
-| `select`, `speed`, `release` | | | | |
+| `stop`, `halt`, `stand` | | | | proposed |
+| `select`, `speed`, `release`, `reset` | | | | |
 | measured: the last move is made, and nothing is driven | | | | manoeuvre |
 | judged: picture or arm are not known any more | | | | proposed |
 | judged: what the route stands on is out of view | | | | proposed |
@@ -24,7 +24,8 @@ command is refused.
 
 Driving is independent of the mode: the arm moves while a press is held (`Press`, `Drive`). The press ends, and the arm
 stops, when it is not renewed in time, when the arm does not follow, when any other command is given, when something
-comes into the way, and whenever the arm or the picture is no longer known. Commands that are not allowed in a mode, or
+comes into the way, and whenever the arm or the picture is no longer known. STOP latches: nothing moves until `reset`,
+which also acknowledges what the arm did against its set points. Commands that are not allowed in a mode, or
 whose preconditions are not met, are refused: see `interlock`.
 
 To add a command, write its function, add a row to the `VERBS` of its module, and add a button to the page.
@@ -68,6 +69,7 @@ from rrtik_ompl.pilot.interlock import (
     FOLLOWING,
     MAX_WORD_LENGTH,
     PROPOSED,
+    RESET,
     Verb,
     fitting,
     refusal,
@@ -76,7 +78,7 @@ from rrtik_ompl.pilot.motion import hand, held, leading
 from rrtik_ompl.pilot.queries import grasp_fault, known, out_of_view
 from rrtik_ompl.pilot.state import Means, Pictures, State
 
-# A stop this soon after a fault does not acknowledge it: the pilot cannot have read the message yet.
+# A reset this soon after a fault does not acknowledge it: the pilot cannot have read the message yet.
 READ_SECONDS = 1.0
 
 
@@ -164,13 +166,29 @@ def _grasp(means: Means, state: State, type: str, level: float) -> State:
 
 
 def _stop(_: Means, state: State) -> State:
-    """Stop the arm; acknowledge a fault if the pilot has had time to read it."""
-    stopped, said = _end_motion(state)
-    if not state.fault:  # a fault found since the last `Judged` stays: nobody has read it yet
-        return stopped.say(news(said))
-    if state.time - state.fault_at <= READ_SECONDS:
+    """Stop the arm; it does not move again until the pilot resets the stop."""
+    stopped, said = _end_motion(replace(state, stopped=True))
+    if state.fault:
         return stopped.say(alarm(f"stopped; {state.fault}; {ACKNOWLEDGE}"))
-    return replace(stopped, fault="").do(Acknowledge()).say(news(said))
+    return stopped.say(news(f"stopped: {RESET}{said.removeprefix('stopped')}"))
+
+
+def _reset(_: Means, state: State) -> State:
+    """Let the arm be driven again after STOP; acknowledge a fault if the pilot has had time to read it."""
+    if not state.stopped and not state.fault:
+        return state.say(refused("there is nothing to reset"))
+    if state.fault and state.time - state.fault_at <= READ_SECONDS:
+        return state.say(alarm(f"{state.fault}; read this, then 'reset' again"))
+
+    free = replace(state.stand_still(), stopped=False)
+    if state.fault:  # a fault found since the last `Judged` stays: nobody has read it yet
+        free = replace(free, fault="").do(Acknowledge())
+    return free.say(news("reset: the arm can be driven again; it stands still"))
+
+
+def _stand(_: Means, state: State) -> State:
+    """Stop the arm as the session itself once did: a record says so, and a replay, which sees no trouble, does it."""
+    return _end_motion(state)[0]
 
 
 def _halt(_: Means, state: State) -> State:
@@ -195,6 +213,8 @@ VERBS: dict[str, Verb] = {
     "object": Verb(_object),
     "grasp": Verb(_grasp),
     "stop": Verb(_stop),
+    "reset": Verb(_reset),
+    "stand": Verb(_stand),
     "halt": Verb(_halt),
     **held.VERBS,
     **guide.VERBS,
@@ -299,8 +319,8 @@ def _watch_view(means: Means, state: State) -> State:
 
 
 def _write_stop(state: State) -> State:
-    """Record a stop command, because a replay, whose arm and pictures are never lost, would not stop here by itself."""
-    return state.do(Write("command", state.time, {"name": "stop", "arguments": {}}))
+    """Record that the session stopped: a replay, whose arm and pictures are never lost, would not do so by itself."""
+    return state.do(Write("command", state.time, {"name": "stand", "arguments": {}}))
 
 
 def _check_motion(state: State) -> State:

@@ -22,6 +22,7 @@ def known(means: Means, state: State) -> Knowledge:
         state.check.off,
         state.pictures.unusable,
         state.fault,
+        state.stopped,
         state.sight,
         out_of_view(means, state),
     )

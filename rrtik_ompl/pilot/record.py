@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.base.errors import InputError
 
+RECORD_VERSION = 2  # in records before the second, nothing resets a stop
 SUFFIX = ".mjpeg"
 QUALITY = 85
 

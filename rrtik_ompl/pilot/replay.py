@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -140,7 +141,7 @@ def entries_for(path: str | os.PathLike[str], problem: str, robot: Robot, marker
 
     if not begin:
         raise InputError(f"{path}: holds no line 'begin'; give a record of rrtik pilot")
-    return entries
+    return entries if begin.get("record") else list(_with_resets(entries))
 
 
 def start_of(entries: list[Entry], usual: Vector) -> tuple[Vector, int]:
@@ -152,6 +153,14 @@ def start_of(entries: list[Entry], usual: Vector) -> tuple[Vector, int]:
     """
     begin = _begin(entries)
     return np.asarray(begin.get("q", usual)), int(begin.get("seed", 0))
+
+
+def _with_resets(entries: list[Entry]) -> Iterator[Entry]:
+    """Yield the entries of a record of the first version, in which a stop did not have to be reset."""
+    for entry in entries:
+        yield entry
+        if entry["kind"] == "command" and entry["name"] == "stop":
+            yield entry | {"name": "reset", "arguments": {}}
 
 
 def _begin(entries: list[Entry]) -> Entry:

@@ -19,7 +19,7 @@ from rrtik_ompl.pilot.devices.wrong_arm import WrongArm
 from rrtik_ompl.pilot.engine import Engine
 from rrtik_ompl.pilot.overlay.virtual_camera import orbit_pose
 from rrtik_ompl.pilot.perception import CameraOfRig, LivePerception
-from rrtik_ompl.pilot.record import PictureRecord, Record, RecordedPictures, beside
+from rrtik_ompl.pilot.record import RECORD_VERSION, PictureRecord, Record, RecordedPictures, beside
 from rrtik_ompl.pilot.replay import RecordedArm, RecordedPerception, entries_for, start_of
 from rrtik_ompl.pilot.session import Session
 from rrtik_ompl.pilot.surroundings import Structure
@@ -102,7 +102,7 @@ def open_session(options: SessionOptions) -> OpenSession:
 
     perception = _perception(options, vehicle, source)
     record = Record(options.record)
-    record.write("begin", 0.0, problem=problem.name, seed=options.seed, q=arm.read().tolist())
+    record.write("begin", 0.0, record=RECORD_VERSION, problem=problem.name, seed=options.seed, q=arm.read().tolist())
 
     past = isinstance(options.source, Path)
     master = None if options.master is None else _line_arm(problem, options.master, "--master")

@@ -262,6 +262,7 @@ class State:
         arm_lost: Why the connection to the arm is lost; "" if it is not.
         fault: What the arm did against its set points; "" if nothing, or if the pilot has acknowledged it.
         fault_at: Time at which the fault was reported [s].
+        stopped: Whether STOP was pressed; nothing moves until the pilot resets it.
         trouble: Why nothing moves, as it was reported last; "" if all is well.
         unseen: What is out of view, as it was reported last; "" if nothing.
         way: The route.
@@ -289,6 +290,7 @@ class State:
     arm_lost: str = ""
     fault: str = ""
     fault_at: float = -np.inf
+    stopped: bool = False
     trouble: str = ""
     unseen: str = ""
     way: Way = field(default_factory=Way)

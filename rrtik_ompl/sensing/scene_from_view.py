@@ -149,7 +149,7 @@ def grasp_problem(problem: Problem, seen: Iterable[SeenObject], name: str, kind:
     part of the problem, so nothing may touch the object along the path. Solids of detected objects have their margins.
 
     Args:
-        problem: Its robot, start and scene are kept.
+        problem: Its robot, start, scene and planner are kept.
         seen: Objects in the base frame.
         name: Name of the object to be grasped.
         kind: Grasp type.
@@ -174,7 +174,9 @@ def grasp_problem(problem: Problem, seen: Iterable[SeenObject], name: str, kind:
     world = problem.world.with_accuracy("exact").with_scene(scene)
 
     approach_pose = target.grasp_pose(kind, level - 1) * pose([0.0, 0.0, -target.object.grasp(kind).approach])
-    return Problem(world, problem.start, PoseGoal(approach_pose), name=f"{name}_{kind}_{level}")
+    return Problem(
+        world, problem.start, PoseGoal(approach_pose), name=f"{name}_{kind}_{level}", planner=problem.planner
+    )
 
 
 class NoBaseError(InputError):

@@ -54,6 +54,7 @@ def put_into(planned, route, mode, link, picture):
     made.state = replace(
         made.state,
         mode=mode,
+        stopped=False,
         selected=0,
         choice=("front", 0),
         speed=1.0,
@@ -137,6 +138,7 @@ def test_a_stop_outlasts_the_key_that_is_still_held():
     there = arm.read()
     time = held_for(made, arm, 1.0, time)
     assert arm.read() == pytest.approx(there, abs=0.0)
+    made.command("reset", time)
     held_for(made, arm, 1.0, time, press=8)
     assert arm.read()[0] > there[0] + np.radians(5.0)
 
@@ -231,3 +233,24 @@ def test_the_page_chooses_an_object_by_its_name():
     engine.execute({"name": "object", "object": "valve"}, 0.1)
     assert engine.session.target == "valve"
     assert engine.session.level is Level.NEWS
+
+
+@pytest.mark.parametrize("verb", PRESENT)
+def test_after_stop_nothing_moves_until_it_is_reset(planned, verb):
+    made, _ = put_into(planned, planned[0].route, FOLLOWING if verb == "next" else PROPOSED, "", "fresh")
+    arguments = ARGUMENTS.get(verb, {})
+    made.command("stop", 100.0)
+    made.command(verb, 100.0, **arguments)
+    assert not made.driving
+    assert verb in ("next", "settle") or refused(made, "STOP was pressed", "'reset'")
+
+    made.command("reset", 100.0)
+    assert not made.state.stopped
+    made.command(verb, 100.0, **arguments | {"press": 99} if "press" in arguments else arguments)
+    assert "STOP was pressed" not in made.message
+
+
+def test_reset_says_where_there_is_nothing_to_reset():
+    made, _ = session()
+    made.command("reset", 0.0)
+    assert refused(made, "nothing to reset")

@@ -39,6 +39,8 @@ def page(tab, running):
     time.sleep(0.3)
     tab.wait("state && state.lamps.length === 6 && role.role === 'pilot' && !state.trouble && picture")
     tab.press("r")
+    tab.ask("state.stopped && send('reset')")
+    tab.wait("!state.stopped && !state.fault_of_arm")
     return tab
 
 
@@ -93,7 +95,13 @@ def test_a_joint_moves_while_its_key_is_held_and_a_degree_farther_at_most(page, 
 def test_space_stops_although_the_arrow_is_still_held(page, running):
     page.press("1")
     before = azimuth(running)
-    page.keep(lambda: page.key_down("ArrowRight"), lambda: page.press(" "), f"state.joints[0].value > {before} + 2")
+
+    def end():
+        """Stop once the arm has moved; a press that lapsed before that is only let go."""
+        moved = page.ask(f"state.joints[0].value > {before} + 2")
+        return page.press(" ") if moved else page.key_up("ArrowRight")
+
+    page.keep(lambda: page.key_down("ArrowRight"), end, f"state.joints[0].value > {before} + 2")
     page.wait("state.message.startsWith('stopped') && !state.driving")
     there = settled(running, 0.2)
     assert settled(running) == there
@@ -106,9 +114,10 @@ def test_who_watches_may_stop_the_arm_and_the_button_is_large(page):
     page.wait("role.role === 'watching'")
     assert page.ask("document.getElementById('stop').disabled") is False
     page.ask("document.getElementById('stop').click()")
-    page.wait("state.message.startsWith('stopped')")
+    page.wait("state.stopped && !byId('latch').hidden && byId('reset').hidden")
     page.press("t")
     page.wait("role.role === 'pilot'")
+    page.wait("!byId('reset').hidden")
     for width, height in ((800, 600), (1280, 720), (3840, 2160)):
         page.size(width, height)
         box = page.ask(

@@ -39,6 +39,9 @@ def stands(running):
 
 def driving(page, running):
     """The azimuth moves by its key, which stays down."""
+    if page.ask("state.stopped"):
+        page.press("Backspace")
+        page.wait("!state.stopped && byId('latch').hidden && byId('reset').hidden")
     page.press("1")
     page.wait("state.selected === 0")
     key = "ArrowLeft" if azimuth(running) > 20.0 else "ArrowRight"
@@ -62,7 +65,7 @@ def test_space_stops_with_any_modifier_whatever_has_the_focus(page, running, mod
     words = {"key": " ", "code": "Space", "windowsVirtualKeyCode": 32, "modifiers": MODIFIERS[modifier]}
     page.call("Input.dispatchKeyEvent", type="keyDown", **words)
     page.call("Input.dispatchKeyEvent", type="keyUp", **words)
-    page.wait("state.message.startsWith('stopped') && !state.driving")
+    page.wait("state.stopped && !state.driving && !byId('latch').hidden && !byId('reset').hidden")
     stands(running)
     page.key_up(key)
     page.ask("document.activeElement.blur()")

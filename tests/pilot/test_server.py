@@ -137,6 +137,15 @@ def test_a_pilot_that_returns_is_the_pilot_again_and_the_arm_stands_still_meanwh
     assert Page(server, "one").role() == "pilot"
 
 
+def test_a_page_that_is_loaded_again_before_its_old_line_has_ended_is_the_pilot_again(server):
+    first = Page(server, "one")
+    again = Page(server, "one")
+    assert (first.role(), again.role()) == ("pilot", "watching")
+    first.leave()
+    assert server.commands.get(timeout=5)[1]["name"] == "halt"
+    assert again.role() == "pilot"
+
+
 def test_a_pilot_that_returns_too_late_watches(server):
     first = Page(server, "one")
     second = Page(server, "two")

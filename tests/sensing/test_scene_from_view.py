@@ -11,11 +11,13 @@ from rrtik_ompl.sensing.markers.marker_map import MarkedObject, MarkerMap, Mount
 from rrtik_ompl.sensing.scene_from_view import (
     NoBaseError,
     base_from_camera,
+    grasp_problem,
     objects_in_base,
     place_in_base,
     scene_from_image,
 )
 from rrtik_ompl.sensing.sight import detect_objects
+from rrtik_tests import pilot_session
 from rrtik_tests.marker_views import BOX, CAMERA, SIDE, STAND, T_BOX_MARKERS, facing, picture_of
 
 
@@ -124,3 +126,9 @@ def test_a_picture_of_another_size_is_refused():
 def test_a_map_that_contradicts_itself_is_refused(objects, message):
     with pytest.raises(InputError, match=message):
         MarkerMap("4x4_50", objects)
+
+
+def test_the_task_of_a_pilots_problem_is_planned_as_the_problem_is():
+    assert pilot_session.PROBLEM.planner == "bicrdt"
+    seen = pilot_session.seen_at(pilot_session.PLACE)
+    assert grasp_problem(pilot_session.PROBLEM, [seen], "valve", "front", 1).planner == "bicrdt"

@@ -106,6 +106,9 @@ class Clients:
         if client is self.pilot:
             self.pilot = None
             self._on_left()
+            returned = next((each for each in self._all if each.name == self._last_pilot), None)
+            if returned is not None:  # it was loaded again before its old connection ended
+                self._make_pilot(returned)
         self._send_roles()
 
     def take_over(self, client: Client) -> str:

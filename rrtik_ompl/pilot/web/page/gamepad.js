@@ -9,10 +9,10 @@ const PAD_TAPPED = new Map([
   [6, () => chooseGrasp(1, 0)], [7, () => chooseGrasp(0, 1)], [12, () => neighbourJoint(-1)],
   [11, () => send("lift")], [13, () => neighbourJoint(1)], [14, () => changeSpeed(-1)], [15, () => changeSpeed(1)],
 ]);
-const PAD_ENABLED = new Map([[10, () => toggleGripper()]]);  // only while the shoulder button is held, too
+const PAD_ENABLED = new Map([[9, () => send("reset")], [10, () => toggleGripper()]]);  // only while the shoulder button is held, too
 const PAD_WORDS = "gamepad: LB held enables · left stick drives the joint · A held: next move · B: STOP · X plan · Y accept · "
   + "RB held: joint to its value · RT held with LB: the last centimetres by sight · D-pad: joint, speed · LT type · "
-  + "RT without LB: level · left stick pressed: gripper · right stick pressed: lift";
+  + "RT without LB: level · left stick pressed: gripper · Start with LB: reset after STOP · right stick pressed: lift";
 let padBefore = [], padWasThere = false;
 
 const NEUTRAL_WORDS = "gamepad: let the stick go, then press LB anew";
@@ -36,7 +36,7 @@ function readPad() {
     if (tapped(number) && now[ENABLE] && padArmed) hold(`pad ${number}`, () => padArmed && isDown(firstPad(), ENABLE) && isDown(firstPad(), number) ? make() : null);
     if (!now[number]) letGo(`pad ${number}`);
   }
-  for (const [number, act] of PAD_TAPPED) if (tapped(number) && state && !(now[ENABLE] && PAD_HELD.has(number))) { letGo(); act(); }
+  for (const [number, act] of PAD_TAPPED) if (tapped(number) && state && !(now[ENABLE] && (PAD_HELD.has(number) || PAD_ENABLED.has(number)))) { letGo(); act(); }
   for (const [number, act] of PAD_ENABLED) if (tapped(number) && now[ENABLE] && state) { letGo(); act(); }
   if (stick()) hold("stick", stick); else letGo("stick");
   padBefore = now;

@@ -4,6 +4,7 @@
 
 const KEYS = [
   ["Space", [], "stop at once (every page may)", null],
+  ["Backspace", ["Backspace"], "let the arm be driven again after STOP, or after it went wrong", () => send("reset")],
   ["1 … 9", [..."123456789"], "select a joint", (key) => selectJoint(Number(key) - 1)],
   ["↑ ↓", ["ArrowUp", "ArrowDown"], "previous, next joint", (key) => neighbourJoint(key === "ArrowUp" ? -1 : 1)],
   ["← →", ["ArrowLeft", "ArrowRight"], "hold: drive the joint", null, (key) => ["jog", { direction: key === "ArrowLeft" ? -1 : 1 }]],

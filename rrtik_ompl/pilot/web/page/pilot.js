@@ -98,7 +98,7 @@ function showState(said) {
   for (const item of byId("modes").children)
     item.dataset.mode === said.mode ? item.setAttribute("aria-current", "step") : item.removeAttribute("aria-current");
   if (newMessage || performance.now() > heldUntil) say(inWords(said.message) || FIRST_WORDS, said.level, 0);
-  showJoints(); showTarget(); showLamps(); showRoute(); showAim(); showButtons(); showGripper(); showViews(); showPreview(); showAge();
+  showJoints(); showTarget(); showLamps(); showRoute(); showAim(); showButtons(); showLatch(); showGripper(); showViews(); showPreview(); showAge();
   if (said.mode !== "proposed" && playing) pausePlay();
   if (newRoute && role.role === "pilot" && !said.replay && !playing) togglePlay();
 }
@@ -307,7 +307,7 @@ function showAim() {
 function showButtons() {
   byId("pause").hidden = !state.replay || role.role !== "pilot";
   set(byId("pause").firstChild, state.paused ? "Go on" : "Pause");
-  const mine = role.role === "pilot" && !state.replay && !state.trouble, at = (...modes) => mine && modes.includes(state.mode);
+  const mine = role.role === "pilot" && !state.replay && !state.trouble && !state.stopped, at = (...modes) => mine && modes.includes(state.mode);
   const led = mine && !state.unseen;
   for (const [id, good] of [["accept", at("proposed") && !state.route?.withdrawn], ["reject", role.role === "pilot" && state.mode === "proposed"], ["next", at("following")], ["plan", led],
     ["together", led && at("proposed")], ["servo", led && at("manoeuvre", "choosing", "proposed") && Boolean(state.choice)], ["replan", led && Boolean(state.route)], ["back", led && Boolean(state.route)], ["stop", !state.replay],
@@ -315,12 +315,18 @@ function showButtons() {
   for (const id of ["play", "step_back", "step_on", "scrub", "live"]) byId(id).disabled = role.role !== "pilot" || state.mode !== "proposed";
 }
 
+function showLatch() {
+  const latched = state.stopped || Boolean(state.fault_of_arm);
+  byId("latch").hidden = !latched;
+  byId("reset").hidden = !latched || role.role !== "pilot" || state.replay;
+}
+
 function showGripper() {
   const { closed, holds } = state.gripper;
   set(byId("grip").firstChild, closed ? "Open gripper" : "Close gripper");
   byId("grip").setAttribute("aria-pressed", String(closed));
   set(byId("holds"), holds ? `holds ${holds}` : closed ? "closed, empty" : "open");
-  const free = role.role === "pilot" && !state.replay && !state.trouble && state.mode !== "following";
+  const free = role.role === "pilot" && !state.replay && !state.trouble && !state.stopped && state.mode !== "following";
   byId("grip").disabled = !free;
   byId("lift").disabled = !free || !holds || Boolean(state.unseen);
 }
@@ -350,7 +356,7 @@ function showPreview() {
 
 // --- buttons, mouse ---------------------------------------------------------------------------------------------
 
-for (const name of ["plan", "replan", "accept", "reject", "back", "take", "hand_over", "pause"]) byId(name).onclick = () => send(name);
+for (const name of ["plan", "replan", "accept", "reject", "back", "take", "hand_over", "pause", "reset"]) byId(name).onclick = () => send(name);
 byId("grip").onclick = toggleGripper;
 byId("lift").onclick = () => send("lift");
 byId("stop").onpointerdown = stopNow;
