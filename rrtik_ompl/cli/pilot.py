@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rrtik_ompl.base.errors import InputError
-from rrtik_ompl.cli import FOUND
+from rrtik_ompl.cli import FOUND, NOT_FOUND
 from rrtik_ompl.cli.terminal import ProblemName, Seed, note, progress, say
 
 if TYPE_CHECKING:
@@ -46,6 +46,10 @@ def pilot(
         str | None,
         typer.Option(metavar="HOST:PORT", help="A master arm, whose joints the arm follows while K is held."),
     ] = None,
+    conform: Annotated[
+        str | None,
+        typer.Option(metavar="HOST:PORT", help="Check the server of an arm, and move it a little; opens no page."),
+    ] = None,
     port: Annotated[int, typer.Option(help="Port of the page; 0 takes a free one.", min=0, max=65535)] = 0,
     host: Annotated[str, typer.Option(help="Address for other machines; needs --token.")] = "127.0.0.1",
     token: Annotated[str, typer.Option(help="Secret word for --host, at least 16 letters.")] = "",
@@ -59,6 +63,9 @@ def pilot(
 
     It shows the camera with the arm drawn in, grasps, routes and moves. Ctrl-C ends it.
     """
+    if conform is not None:
+        return _conform(problem, conform)
+
     given = (camera is not None, video is not None, images is not None, simulated or bool(vehicle), replay is not None)
     if sum(given) != 1 and not (sum(given) == 2 and given[3] and given[4]):
         named = [name for name, there in zip(SOURCES, given, strict=True) if there]
@@ -101,6 +108,25 @@ def pilot(
     if record is not None:
         say(f"wrote {record}")
     return FOUND
+
+
+def _conform(name: str, address: str) -> int:
+    """Check the server of an arm, and print a line for each finding."""
+    from rrtik_ompl.pilot.devices.conformance import Conformance
+    from rrtik_ompl.pilot.setup import address_of
+    from rrtik_ompl.problem_files.problem import load_problem
+
+    checks = Conformance(load_problem(name), *address_of(address, "--conform"))
+    note("the arm is moved: each joint by a degree or 2 mm, one of them for up to a second at a time")
+    failed = 0
+    for finding in checks.run():
+        failed += not finding.held
+        say(
+            f"{'held  ' if finding.held else 'FAILED'}  {finding.what}"
+            + (f": {finding.measured}" if finding.measured else "")
+        )
+    say("all held" if not failed else f"{failed} failed")
+    return NOT_FOUND if failed else FOUND
 
 
 def _second(given: str | None) -> int | Path | None:

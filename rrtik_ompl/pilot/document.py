@@ -44,6 +44,12 @@ def state_document(session: Session) -> dict[str, Any]:
         "range": _joint_range(session),
         "aim": _aim(session),
         "arm_lost": state.arm_lost,
+        "arm_fault": state.arm_fault,
+        "arm_age": None if session.arm_health is None else round(state.arm_age, 3),
+        "arm_health": [
+            {"name": each.name, "value": each.value, "unit": each.unit, "ok": each.ok}
+            for each in session.arm_health or ()
+        ],
         "trouble": known.trouble,
         "unseen": known.unseen,
         "speed": state.speed,

@@ -58,11 +58,15 @@ class Measured:
     Attributes:
         q: Joint values, shape (dof,) [rad or m].
         arm_lost: Why the connection to the arm is lost; "" if it is not.
+        arm_fault: What the arm says is wrong with itself; "" if nothing.
+        arm_age: How old the joint values are at most [s].
     """
 
     q: Vector
     time: float
     arm_lost: str = ""
+    arm_fault: str = ""
+    arm_age: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -94,6 +94,8 @@ class Knowledge:
         unusable: Why the last photograph or picture of a film could not be used; "" if it could.
         fault: What the arm did against its set points; "" if nothing, or if the pilot has acknowledged it.
         stopped: Whether STOP was pressed and has not been reset.
+        arm_fault: What the arm says is wrong with itself; "" if nothing.
+        arm_age: How old the joint values are at most [s].
         sight: What the pilot's page shows; None without a page.
         unseen: Which object of the scene has not been in view recently, in one line; "" if there is none.
     """
@@ -105,14 +107,18 @@ class Knowledge:
     unusable: str = ""
     fault: str = ""
     stopped: bool = False
+    arm_fault: str = ""
+    arm_age: float = 0.0
     sight: Sight | None = None
     unseen: str = ""
 
     @property
     def trouble(self) -> str:
         """Return why the present is not known, or why the arm cannot be trusted; "" if all is well."""
-        if self.arm_lost or self.fault or self.arm_off:
-            return self.arm_lost or self.fault or self.arm_off
+        if of_arm := self.arm_lost or self.arm_fault or self.fault or self.arm_off:
+            return of_arm
+        if self.arm_age > LATE_SECONDS:
+            return f"the joints come from the arm more than {LATE_SECONDS:g} s late"
         if self.past or self.picture_age <= STALE_SECONDS:
             return self.unusable if self.past else ""
         return "there is no picture yet" if self.picture_age == float("inf") else "the picture is stale"

@@ -263,7 +263,14 @@ def _unusable(_: Means, state: State, event: Unusable) -> State:
 
 def _measured(means: Means, state: State, event: Measured) -> State:
     """Store the configuration that was read, and end a press that was not renewed in time."""
-    now = replace(state, time=max(state.time, event.time), arm_lost=event.arm_lost, q=frozen(event.q))
+    now = replace(
+        state,
+        time=max(state.time, event.time),
+        arm_lost=event.arm_lost,
+        arm_fault=event.arm_fault,
+        arm_age=event.arm_age,
+        q=frozen(event.q),
+    )
     if not np.array_equal(state.q, now.q):
         now = now.do(Write("joints", event.time, {"q": now.q.tolist()}))
         around = now.around.settle(now.q)
@@ -291,10 +298,16 @@ def _watch(means: Means, state: State) -> State:
 
     named = trouble == state.fault
     how = f"; {ACKNOWLEDGE}" if named else ""
-    now = replace(state, trouble=trouble, fault_at=state.time if named else state.fault_at)
+    now = replace(
+        state,
+        trouble=trouble,
+        fault_at=state.time if named else state.fault_at,
+        stopped=state.stopped or bool(state.arm_fault),  # what has stopped the arm at its side needs a reset here, too
+    )
 
     if not trouble:
-        return now.say(news("picture and arm are known again; the arm stands still"))
+        waits = RESET if now.stopped else "the arm stands still"
+        return now.say(news(f"picture and arm are known again; {waits}"))
     if state.mode != FOLLOWING and not state.drive.active:
         return now.do(Stop()).say(alarm(trouble + how))
 

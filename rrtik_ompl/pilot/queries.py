@@ -23,6 +23,8 @@ def known(means: Means, state: State) -> Knowledge:
         state.pictures.unusable,
         state.fault,
         state.stopped,
+        state.arm_fault,
+        state.arm_age,
         state.sight,
         out_of_view(means, state),
     )

@@ -20,9 +20,10 @@ from rrtik_ompl.base.errors import InputError, RrtikError
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.pilot import events, queries
 from rrtik_ompl.pilot.devices.arm import Arm, joint_rates
+from rrtik_ompl.pilot.devices.arm_protocol import Health
 from rrtik_ompl.pilot.devices.line_arm import LineArm
 from rrtik_ompl.pilot.events import Answer, Level, alarm
-from rrtik_ompl.pilot.interlock import UNSEEN_SECONDS, Knowledge, Sight
+from rrtik_ompl.pilot.interlock import LATE_SECONDS, UNSEEN_SECONDS, Knowledge, Sight
 from rrtik_ompl.pilot.machine import handle
 from rrtik_ompl.pilot.motion.leading import GraspServo
 from rrtik_ompl.pilot.motion.supervisor import Supervisor
@@ -118,7 +119,7 @@ class Session:
 
     def tick(self, time: float) -> None:
         """Read the arm and update its progress along the route; stop it if the present is no longer known."""
-        self._take(events.Measured(self.arm.read(), time, self.arm.lost))
+        self._take(self._measured(time))
 
         standing = None
         if not self.means.recorded:
@@ -211,7 +212,18 @@ class Session:
             raise InputError("there is no master arm: --master HOST:PORT names one")
         if self.master.lost:
             raise InputError(f"master arm: {self.master.lost}")
+        if isinstance(self.master, LineArm):
+            if self.master.fault:
+                raise InputError(f"master arm: {self.master.fault}")
+            if self.master.age > LATE_SECONDS:
+                raise InputError(f"master arm: its joints come more than {LATE_SECONDS:g} s late")
         return self.master.read()
+
+    def _measured(self, time: float) -> events.Measured:
+        """Read the arm; one behind a line also says how it is, and how old that is."""
+        if isinstance(self.arm, LineArm):
+            return events.Measured(self.arm.read(), time, self.arm.lost, self.arm.fault, self.arm.age)
+        return events.Measured(self.arm.read(), time, self.arm.lost)
 
     def _arms_time(self) -> float:
         """Return the current time by the clock of the component that reads the arm [s]."""
@@ -253,6 +265,11 @@ class Session:
     def driving(self) -> bool:
         """Whether the arm is driven."""
         return self.state.drive.active
+
+    @property
+    def arm_health(self) -> tuple[Health, ...] | None:
+        """How the arm is, as it says itself; None for an arm that is not behind a line."""
+        return self.arm.health if isinstance(self.arm, LineArm) else None
 
     @property
     def surroundings(self) -> Surroundings:

@@ -8,8 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
+from rrtik_ompl.base.arrays import Vector
 from rrtik_ompl.base.errors import InputError
-from rrtik_ompl.pilot.devices.arm import Arm, SimulatedArm
+from rrtik_ompl.pilot.devices.arm import Arm, SimulatedArm, joint_rates
 from rrtik_ompl.pilot.devices.camera_feed import Feed, FurtherCamera, LiveCamera
 from rrtik_ompl.pilot.devices.line_arm import LineArm
 from rrtik_ompl.pilot.devices.simulated_vehicle import SimulatedVehicle, find_vehicle, load_vehicle
@@ -107,8 +108,8 @@ def open_session(options: SessionOptions) -> OpenSession:
     past = isinstance(options.source, Path)
     master = None if options.master is None else _line_arm(problem, options.master, "--master")
     session = Session(
-        problem, arm, record=record, seed=options.seed, past=past, structure=_structure(vehicle), master=master,
-        patience=_patience(vehicle),
+        problem, arm, rates=_rates(problem, arm), record=record, seed=options.seed, past=past,
+        structure=_structure(vehicle), master=master, patience=_patience(vehicle),
     )  # fmt: skip
     simulated = [each for each in (arm, source) if isinstance(each, SimulatedArm | SimulatedSource)]
 
@@ -161,6 +162,12 @@ def _simulated_arm(vehicle: SimulatedVehicle | None, problem: Problem) -> Simula
     if vehicle is None or vehicle.faults is None:
         return SimulatedArm(problem.robot, problem.start)
     return WrongArm(problem.robot, problem.start, vehicle.faults)
+
+
+def _rates(problem: Problem, arm: Arm) -> Vector | None:
+    """Return the rates at which an arm behind a line is driven: its own, and no more than the default rates."""
+    rates = arm.greeting.rates if isinstance(arm, LineArm) else None
+    return None if rates is None else np.minimum(rates, joint_rates(problem.robot))
 
 
 def _structure(vehicle: SimulatedVehicle | None) -> Structure | None:
@@ -253,10 +260,19 @@ def _simulated(vehicle: SimulatedVehicle, problem: Problem) -> SimulatedCamera:
 
 
 def _line_arm(problem: Problem, address: str, option: str = "--arm") -> LineArm:
-    host, colon, port = address.rpartition(":")
+    return LineArm(problem.robot, *address_of(address, option))
+
+
+def address_of(text: str, option: str) -> tuple[str, int]:
+    """Return host and port of an address.
+
+    Raises:
+        InputError: If it is none.
+    """
+    host, colon, port = text.rpartition(":")
     if not colon or not host or not port.isdecimal() or not 0 < int(port) <= LAST_PORT:
-        raise InputError(f"{option} {address}: expected HOST:PORT, for example 127.0.0.1:5600")
-    return LineArm(problem.robot, host.strip("[]"), int(port))
+        raise InputError(f"{option} {text}: expected HOST:PORT, for example 127.0.0.1:5600")
+    return host.strip("[]"), int(port)
 
 
 def _replay(options: SessionOptions, problem: Problem, file: Path) -> OpenSession:

@@ -260,6 +260,8 @@ class State:
         pictures: What the pictures have shown.
         check: Comparison of camera and joints.
         arm_lost: Why the connection to the arm is lost; "" if it is not.
+        arm_fault: What the arm says is wrong with itself; "" if nothing.
+        arm_age: How old the joint values are at most [s].
         fault: What the arm did against its set points; "" if nothing, or if the pilot has acknowledged it.
         fault_at: Time at which the fault was reported [s].
         stopped: Whether STOP was pressed; nothing moves until the pilot resets it.
@@ -288,6 +290,8 @@ class State:
     pictures: Pictures = field(default_factory=Pictures)
     check: ArmCheck = field(default_factory=ArmCheck)
     arm_lost: str = ""
+    arm_fault: str = ""
+    arm_age: float = 0.0
     fault: str = ""
     fault_at: float = -np.inf
     stopped: bool = False

@@ -84,6 +84,16 @@ class SimulatedArm:
         return self._q.copy()
 
     @property
+    def rates(self) -> Vector:
+        """Rates of the joints, shape (dof,) [rad/s or m/s]."""
+        return self._rates.copy()
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether no joint is told to move."""
+        return self._goal is None and self._course is None
+
+    @property
     def moving(self) -> int | None:
         """The number of the joint that moves; None if no single joint does."""
         return None if self._goal is None else self._goal[0]

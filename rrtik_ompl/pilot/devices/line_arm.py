@@ -1,20 +1,4 @@
-"""An arm on the other side of a TCP connection, and the server that offers one.
-
-The protocol is one JSON object a line, UTF-8, at most 64 kB. Joints are in the robot's order, values in rad or m.
-
-- the server greets: ``{"protocol": "rrtik-arm", "version": 1, "joints": ["azimuth", ..]}``
-- ``{"do": "read"}`` is answered by ``{"q": [..]}``
-- ``{"do": "move", "joint": 2, "target": 0.5}`` sends one joint (counted from 0) to a value; a new move replaces the
-  last; answered by ``{"q": [..]}``
-- ``{"do": "follow", "q": [..]}`` sends all joints to set points, for trajectories; answered by ``{"q": [..]}``
-- ``{"do": "grip", "closed": true}`` closes or opens the gripper; answered by ``{"q": [..]}``
-- ``{"do": "stop"}`` stops at once; answered by ``{"q": [..]}``
-- ``"seconds": 0.04`` in a move or a follow limits its validity: if no next request comes in this time, the arm stops
-- a request that cannot be fulfilled is answered by ``{"error": "one line"}``
-
-The client requests the joints about 30 times a second. A server stops the arm when its client has gone, or has sent
-no complete request for half a second. A client counts the connection as lost when no complete answer comes in that
-time, or an invalid one: too long, nested too deep, or with joint values that the arm cannot have.
+"""An arm on the other side of a TCP connection, and the server that offers one; `arm_protocol` is what they speak.
 
 An arm that a pilot drives has a judge. It is called in the thread that talks to the arm, so that nothing else delays
 it: each reading is judged when it comes, and while there is a fault every request is a stop. The last set point is
@@ -26,10 +10,11 @@ machine is too busy to stop it.
 
 from __future__ import annotations
 
-import json
+import itertools
 import socket
 import threading
 import time
+from collections.abc import Mapping
 from contextlib import suppress
 from typing import Any, Protocol
 
@@ -38,12 +23,23 @@ from numpy.typing import ArrayLike
 
 from rrtik_ompl.base.arrays import LARGEST, Vector
 from rrtik_ompl.base.errors import InputError, printable
-from rrtik_ompl.files.messages import message_in, quoted
+from rrtik_ompl.files.messages import quoted
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.pilot.devices.arm import SimulatedArm
+from rrtik_ompl.pilot.devices.arm_protocol import (
+    MAX_PASSED,
+    PROTOCOL,
+    SET_POINTS,
+    TIMEOUT_SECONDS,
+    VERSION,
+    Answer,
+    Greeting,
+    Health,
+    Line,
+    answer_in,
+    greeting_in,
+)
 
-PROTOCOL = "rrtik-arm"
-VERSION = 1
 POLL_SECONDS = 1.0 / 30.0  # between two requests for the joints
 DRIVEN_POLL_SECONDS = 0.02  # the same interval while an arm with a judge is driven
 # The last set point is repeated for this long; an arm without faults has reached it by then.
@@ -51,51 +47,8 @@ RENEW_SECONDS = 0.1
 # Longest motion between the last reading that was judged and the end of the validity of a set point.
 UNSEEN_SECONDS = 0.09
 SHORTEST_SECONDS = 0.005  # least validity of a set point
-TIMEOUT_SECONDS = 0.5  # time limit for a complete answer
-LIMIT_SLACK = 0.2  # [rad or m]; by how much a reading may exceed the limits
 RETRY_SECONDS = 1.0
-MAX_LINE_BYTES = 64 * 1024
-SET_POINTS = ("move", "follow")
-
-
-class Line:
-    """Exchange complete JSON objects over a socket."""
-
-    def __init__(self, connection: socket.socket) -> None:
-        connection.settimeout(TIMEOUT_SECONDS)
-        self._socket = connection
-        self._unread_bytes = b""
-
-    def send(self, **words: object) -> None:
-        """Send an object."""
-        self._socket.sendall(json.dumps(words).encode() + b"\n")
-
-    def receive(self) -> dict[str, Any]:
-        """Wait for the next object and return it.
-
-        Raises:
-            OSError: If the connection ends, nothing comes in time, or what comes is no JSON object.
-        """
-        end = time.monotonic() + TIMEOUT_SECONDS
-        while b"\n" not in self._unread_bytes:
-            # One deadline applies to the whole line, however slowly its bytes arrive.
-            self._socket.settimeout(max(end - time.monotonic(), 1e-3))
-            received = self._socket.recv(4096)
-            self._unread_bytes += received
-            if not received or len(self._unread_bytes) > MAX_LINE_BYTES:
-                raise ConnectionError("the other side has closed the connection" if not received else "an endless line")
-
-        line, _, self._unread_bytes = self._unread_bytes.partition(b"\n")
-        self._socket.settimeout(TIMEOUT_SECONDS)
-
-        message = message_in(line)
-        if message is None:
-            raise ConnectionError("the other side does not send JSON lines")
-        return message
-
-    def close(self) -> None:
-        """End the connection."""
-        self._socket.close()
+MAX_ID = 2**53  # the largest whole number that every JSON reader keeps
 
 
 class Judge(Protocol):
@@ -121,6 +74,9 @@ class LineArm:
         robot: The robot model of the arm.
         judge: Judges its readings; None for no judge.
         lost: Why the connection is lost; "" if it is not.
+        fault: Why the arm does not do what it is told, as it says itself (an emergency stop, a fault); "" if it does.
+        health: How it is, as it says itself.
+        greeting: What its server greeted with.
         reported: Time of the last sign of life of its thread, by ``time.monotonic()``.
     """
 
@@ -138,6 +94,9 @@ class LineArm:
         self.robot = robot
         self._address = (host, port)
         self.lost = ""
+        self.fault = ""
+        self.health: tuple[Health, ...] = ()
+        self.greeting = Greeting(VERSION)
         self.reported = time.monotonic()
         self.judge: Judge | None = None
 
@@ -145,6 +104,8 @@ class LineArm:
         self._set_point: dict[str, Any] | None = None  # the last set point; None after a stop
         self._set_point_time = -np.inf  # time at which it was given
         self._valid_seconds = 0.0  # remaining validity of the last request sent [s]
+        self._ids = itertools.count(1)
+        self._read_at = -np.inf  # time of the last reading, by this machine's clock
         self._grip: dict[str, Any] | None = None  # sent before anything else; a move does not replace it
 
         self._lock = threading.Lock()
@@ -153,7 +114,10 @@ class LineArm:
 
         try:
             self._line = self._connect()
-            self._q = self._exchange({"do": "read"})
+            first = self._exchange({"do": "read"})
+            if first is None:
+                raise ConnectionError(self.fault)
+            self._q = first
         except (OSError, OverflowError) as error:
             raise InputError(f"arm at {host}:{port}: {error}; is its server running?") from None
 
@@ -164,6 +128,11 @@ class LineArm:
         """Return the joint values received last, shape (dof,) [rad or m]."""
         with self._lock:
             return self._q.copy()
+
+    @property
+    def age(self) -> float:
+        """How old the last reading is at most [s]: from the arm, over the line, until now."""
+        return time.monotonic() - self._read_at
 
     def move(self, joint: int, target: float) -> None:
         """Send one joint to a value [rad or m].
@@ -218,39 +187,46 @@ class LineArm:
     def _connect(self) -> Line:
         line = Line(socket.create_connection(self._address, timeout=TIMEOUT_SECONDS))
         try:
-            self._check(line.receive())
+            self.greeting = greeting_in(line.receive(), self.robot)
         except OSError:
             line.close()
             raise
         return line
 
-    def _check(self, greeting: dict[str, Any]) -> None:
-        if greeting.get("protocol") != PROTOCOL or greeting.get("version") != VERSION:
-            raise ConnectionError(f"the other side does not greet as {PROTOCOL} {VERSION}")
-        if greeting.get("joints") != list(self.robot.joint_names):
-            joints = quoted(greeting.get("joints"))
-            raise ConnectionError(f"it has the joints {joints}, not those of '{self.robot.name}'")
+    def _exchange(self, message: dict[str, Any]) -> Vector | None:
+        """Send a request, and return the joint values of the answer, shape (dof,); None if it has none."""
+        if self.greeting.version == 1 and self._line.has_more():
+            raise ConnectionError("an answer that nobody has asked for: late, or doubled")
 
-    def _exchange(self, message: dict[str, Any]) -> Vector:
-        """Send a request, and return the joint values of the answer, shape (dof,)."""
-        self._line.send(**message)
-        answer = self._line.receive()
-        if "error" in answer:
-            raise ConnectionError(quoted(answer["error"]))
-        try:
-            q = self.robot.configuration(answer.get("q", ()), "q")
-        except InputError as error:
-            raise ConnectionError(f"an answer without the joints: {error}") from None
-        if not (self.robot.within_limits(q, LIMIT_SLACK)[0] and np.abs(q).max() <= LARGEST):
-            raise ConnectionError(f"an answer with joints that the arm cannot have: {self.robot.limit_fault(q)}")
-        return q
+        number = next(self._ids)
+        sent_at = time.monotonic()
+        self._line.send(**message, id=number)
+        answer = self._answer_to(number, sent_at + TIMEOUT_SECONDS)
+
+        self.fault = answer.fault
+        self.health = answer.health
+        if answer.q is not None:
+            self._read_at = sent_at - answer.age
+        return answer.q
+
+    def _answer_to(self, number: int, deadline: float) -> Answer:
+        """Wait for the answer to a request; answers to earlier ones are late, or doubled, and are left out."""
+        for _ in range(MAX_PASSED):
+            message = self._line.receive(deadline - time.monotonic())
+            version = self.greeting.version
+            if version == 1 or message.get("id") == number:
+                return answer_in(message, self.robot, version)
+            if type(message.get("id")) is not int or message["id"] > number:
+                raise ConnectionError(f"an answer with the id {quoted(message.get('id'))}, which was not asked")
+        raise ConnectionError("it answers more than it is asked")
 
     def _next_request(self) -> dict[str, Any]:
         """Return the request to send next.
 
         A gripper command goes first, then the last command given. Without one, an arm with a judge gets its last set
-        point again while that is recent, then a stop; otherwise the joints are read. While the judge has a fault, every
-        request is a stop. Set points get a validity that keeps the unobserved motion within what the judge allows.
+        point again while that is recent, then a stop; otherwise the joints are read. While the judge has a fault, or
+        the arm itself says that it has one, every request is a stop. Set points get a validity that keeps the
+        unobserved motion within what the judge allows.
         """
         with self._lock:
             message = self._grip
@@ -266,7 +242,7 @@ class LineArm:
         message = message or {"do": "read"}
         if self.judge is None:
             return message
-        if self.judge.fault:
+        if self.judge.fault or self.fault:
             message = {"do": "stop"}
 
         if message["do"] == "stop":
@@ -300,9 +276,10 @@ class LineArm:
                     self._line = self._connect()
                     message = {"do": "read"}  # commands given before the loss are out of date
                 q = self._exchange(message)
-                self._judge(q)
+                if q is not None:
+                    self._judge(q)
                 with self._lock:
-                    self._q = q
+                    self._q = self._q if q is None else q
                     self.lost = ""
             except Exception as error:  # no message, however malformed, may end this thread
                 self._line.close()
@@ -327,6 +304,7 @@ class LineServer:
             InputError: If the port cannot be used.
         """
         self.arm = arm
+        self.says: Mapping[str, object] = {}  # what it says of its arm in each answer: state, fault, health
         try:
             self._listening = socket.create_server((host, port))
         except (OSError, OverflowError) as error:
@@ -363,10 +341,16 @@ class LineServer:
             line = Line(connection)
             # The client has left, is silent, or sends no valid request.
             with suppress(Exception):
-                line.send(protocol=PROTOCOL, version=VERSION, joints=list(self.arm.robot.joint_names))
+                line.send(**self._greeting())
                 self._answer(line)
             self.arm.stop()
             line.close()
+
+    def _greeting(self) -> dict[str, object]:
+        robot = self.arm.robot
+        rates = self.arm.rates.tolist()
+        joints = list(robot.joint_names)
+        return {"protocol": PROTOCOL, "version": VERSION, "joints": joints, "rates": rates, "hold": TIMEOUT_SECONDS}
 
     def _answer(self, line: Line) -> None:
         """Answer requests of one client.
@@ -390,7 +374,9 @@ class LineServer:
             fault = self._execute(request)
             if request.get("do") in SET_POINTS and not fault:
                 expiry_time = now + request.get("seconds", np.inf)
-            line.send(**({"error": fault} if fault else {"q": self.arm.read().tolist()}))
+            state = "ready" if self.arm.at_rest else "moving"
+            answer = {"id": request.get("id"), "q": self.arm.read().tolist(), "age": 0.0, "state": state, **self.says}
+            line.send(**answer, **({"error": fault} if fault else {}))
 
     def _execute(self, request: dict[str, Any]) -> str:
         """Execute a request, and return what is wrong with it; "" if nothing is."""
@@ -398,6 +384,9 @@ class LineServer:
         joint = request.get("joint")
         target = request.get("target")
         seconds = request.get("seconds", 1.0)
+        number = request.get("id")
+        if type(number) is not int or not 0 <= number <= MAX_ID:
+            return "a request needs an id, a whole number"
         if action in SET_POINTS and not (type(seconds) in (int, float) and 0.0 < seconds < LARGEST):
             return f"{action} needs seconds above 0, if any"
 

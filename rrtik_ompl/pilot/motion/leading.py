@@ -28,6 +28,7 @@ NEAR = 0.15  # [m]; from farther away the straight motion to a grasp may be bloc
 TURNED = np.deg2rad(30.0)  # largest angle between the tool and the grasp, for the same reason
 # The master arm leads only if each of its joints is this close to the same joint of the arm.
 ALIGNED = np.deg2rad(5.0)
+AHEAD = 3.0  # a master that is farther ahead than this multiple of `ALIGNED` leads no more
 ALIGNED_SLIDING = 0.01  # [m]; the same for a sliding joint
 MAX_STEP_SECONDS = 0.2  # longest time step between two renewals
 WHY_NOT = {  # reasons by the state of a `ServoStep`
@@ -124,6 +125,7 @@ def _begin_lead(means: Means, state: State, master: Vector) -> State:
 def _go_on_leading(means: Means, state: State, master: Vector) -> State:
     """Move towards the master's joints, as far as one step allows; refuse a step that is not free."""
     to_go = means.robot.clamp(master) - state.q
+    _check_aligned(means.robot, to_go, AHEAD)
     max_lead = means.rates * pace(means, state) * LEASH_SECONDS
     point = state.q + np.clip(to_go, -max_lead, max_lead)
 
@@ -140,8 +142,8 @@ def _led(means: Means, state: State, point: Vector) -> State:
     return lead_to(means, replace(state, desired=desired), desired, pace(means, state))
 
 
-def _check_aligned(robot: Robot, errors: Vector) -> None:
-    error_shares = np.abs(errors) / np.where(robot.prismatic, ALIGNED_SLIDING, ALIGNED)
+def _check_aligned(robot: Robot, errors: Vector, times: float = 1.0) -> None:
+    error_shares = np.abs(errors) / (times * np.where(robot.prismatic, ALIGNED_SLIDING, ALIGNED))
     worst = int(error_shares.argmax())
     if error_shares[worst] > 1.0:
         shown_error, unit = reading(float(errors[worst]), joint_unit(robot.prismatic[worst]))
