@@ -14,15 +14,16 @@ import numpy as np
 from bench.robustness.messages import Witness, comes_true, drain, leave, mutated, send_in_pieces, silence
 from rrtik_ompl import load_problem
 from rrtik_ompl.pilot.devices import line_arm
-from rrtik_ompl.pilot.devices.line_arm import PROTOCOL, VERSION, LineArm, LineServer
+from rrtik_ompl.pilot.devices.arm_protocol import LIMIT_SLACK, PROTOCOL
+from rrtik_ompl.pilot.devices.line_arm import LineArm, LineServer
 from rrtik_ompl.viewer.serve import PageServer
 
 LINE_REQUESTS = (
-    '{"do": "read"}',
-    '{"do": "move", "joint": 2, "target": 0.1}',
-    '{"do": "move", "joint": 0, "target": -0.4}',
-    '{"do": "follow", "q": [0.1, 0.2, 0.1, 0.0, 0.3, 0.1]}',
-    '{"do": "stop"}',
+    '{"id": 1, "do": "read"}',
+    '{"id": 1, "do": "move", "joint": 2, "target": 0.1}',
+    '{"id": 1, "do": "move", "joint": 0, "target": -0.4}',
+    '{"id": 1, "do": "follow", "q": [0.1, 0.2, 0.1, 0.0, 0.3, 0.1]}',
+    '{"id": 1, "do": "stop"}',
 )
 ON_A_LINE = 12  # messages of a client before it goes
 BETWEEN_LOOKS = 2e-4  # [s] at an arm, which leave its line the processor
@@ -111,7 +112,7 @@ def arm_of_a_line(first: int, count: int) -> list[str]:
         with silence(faults):
             arm = LineArm(problem.robot, "127.0.0.1", server.port)
             while server.left > 0:
-                if not problem.robot.within_limits(arm.read(), line_arm.LIMIT_SLACK)[0]:
+                if not problem.robot.within_limits(arm.read(), LIMIT_SLACK)[0]:
                     faults.append(f"{server.seed}: joints that the arm cannot have: {arm.read().tolist()}")
                 if not arm.lost.isprintable():
                     faults.append(f"{server.seed}: a line that cannot be shown: {arm.lost!r}")
@@ -141,7 +142,7 @@ class _BadServer:
         self.left, self.seed = count, first
         self._listening = socket.create_server(("127.0.0.1", 0))
         self.port = int(self._listening.getsockname()[1])
-        self._greeting = json.dumps({"protocol": PROTOCOL, "version": VERSION, "joints": list(joints)})
+        self._greeting = json.dumps({"protocol": PROTOCOL, "version": 1, "joints": list(joints)})
         self._good, self._ended = json.dumps({"q": q}), threading.Event()
         threading.Thread(target=self._serve, daemon=True).start()
 

@@ -20,7 +20,7 @@ SOURCES = ("--camera", "--video", "--images", "--simulated", "--replay")
 
 
 def pilot(
-    problem: ProblemName,
+    problem: ProblemName = "",
     camera: Annotated[int | None, typer.Option(help="Number of a camera device.", min=0)] = None,
     video: Annotated[Path | None, typer.Option(help="A video file in place of a camera.")] = None,
     images: Annotated[Path | None, typer.Option(help="A folder of images, one a second.")] = None,
@@ -50,6 +50,7 @@ def pilot(
         str | None,
         typer.Option(metavar="HOST:PORT", help="Check the server of an arm, and move it a little; opens no page."),
     ] = None,
+    explain: Annotated[Path | None, typer.Option(help="Tell in words what happened in a recorded session.")] = None,
     port: Annotated[int, typer.Option(help="Port of the page; 0 takes a free one.", min=0, max=65535)] = 0,
     host: Annotated[str, typer.Option(help="Address for other machines; needs --token.")] = "127.0.0.1",
     token: Annotated[str, typer.Option(help="Secret word for --host, at least 16 letters.")] = "",
@@ -63,6 +64,10 @@ def pilot(
 
     It shows the camera with the arm drawn in, grasps, routes and moves. Ctrl-C ends it.
     """
+    if explain is not None:
+        return _explain(explain)
+    if not problem:
+        raise InputError("name a problem, for example: rrtik pilot titan4_sdu --simulated")
     if conform is not None:
         return _conform(problem, conform)
 
@@ -107,6 +112,15 @@ def pilot(
         raise InputError(opened.record.fault)
     if record is not None:
         say(f"wrote {record}")
+    return FOUND
+
+
+def _explain(record: Path) -> int:
+    """Print the story of a record."""
+    from rrtik_ompl.pilot.explain import explain
+
+    for line in explain(record):
+        say(line)
     return FOUND
 
 

@@ -27,6 +27,7 @@ CHOOSING = "choosing"
 PROPOSED = "proposed"
 FOLLOWING = "following"
 MODES: Final = (MANOEUVRE, CHOOSING, PROPOSED, FOLLOWING)
+NO_PICTURE: Final = "there is no picture yet"
 STALE_SECONDS = 0.5  # an older picture does not show the present
 UNSEEN_SECONDS = 2.0  # if the vehicle moves, routes must not depend on objects out of view for longer
 LATE_SECONDS = 0.3  # a pilot who sees the motion of the arm with a larger delay must not drive it
@@ -76,10 +77,12 @@ class Sight:
     Attributes:
         state: Age of the last state shown [s]; inf if the page does not say.
         picture: Age of the last camera picture shown [s]; inf if the page does not say.
+        page: Number of the page; 0 for none.
     """
 
     state: float
     picture: float
+    page: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,7 +124,7 @@ class Knowledge:
             return f"the joints come from the arm more than {LATE_SECONDS:g} s late"
         if self.past or self.picture_age <= STALE_SECONDS:
             return self.unusable if self.past else ""
-        return "there is no picture yet" if self.picture_age == float("inf") else "the picture is stale"
+        return NO_PICTURE if self.picture_age == float("inf") else "the picture is stale"
 
     @property
     def blind(self) -> str:

@@ -16,7 +16,7 @@ command is refused.
 | `close` on something loose, `open` with something | manoeuvre | manoeuvre | manoeuvre | refused |
 | `next`, `settle` | refused | refused | refused | |
 | `stop`, `halt`, `stand` | | | | proposed |
-| `select`, `speed`, `release`, `reset` | | | | |
+| `select`, `speed`, `release`, `reset`, `control` | | | | |
 | measured: the last move is made, and nothing is driven | | | | manoeuvre |
 | judged: picture or arm are not known any more | | | | proposed |
 | judged: what the route stands on is out of view | | | | proposed |
@@ -68,8 +68,10 @@ from rrtik_ompl.pilot.interlock import (
     CHOOSING,
     FOLLOWING,
     MAX_WORD_LENGTH,
+    NO_PICTURE,
     PROPOSED,
     RESET,
+    Sight,
     Verb,
     fitting,
     refusal,
@@ -80,6 +82,7 @@ from rrtik_ompl.pilot.state import Means, Pictures, State
 
 # A reset this soon after a fault does not acknowledge it: the pilot cannot have read the message yet.
 READ_SECONDS = 1.0
+FIRST_WORDS = "choose a grasp with G and L, then plan with P; or a joint with 1 to 9, then hold an arrow key"
 
 
 def handle(means: Means, state: State, event: Event) -> tuple[State, tuple[Effect, ...]]:
@@ -134,10 +137,19 @@ def _executed(means: Means, state: State, event: Command, renewed: bool) -> Stat
         if not row.held and verb != "release":  # `release` ends the motion itself
             state = state.released()
         if not renewed:
-            state = state.do(Write("command", event.time, {"name": verb, "arguments": given}))
+            values = {"name": verb, "arguments": given} | _who(event.sight)
+            state = state.do(Write("command", event.time, values))
         return row.act(means, state, **given)
     except RrtikError as error:
         return held.refuse(state, str(error))
+
+
+def _who(sight: Sight | None) -> dict[str, object]:
+    """Return what the record says of the page of a command: its number, and the ages of what it had shown [s]."""
+    if sight is None:
+        return {}
+    ages = {"seen": sight.state, "shown": sight.picture}
+    return {"page": sight.page} | {key: round(age, 3) for key, age in ages.items() if np.isfinite(age)}
 
 
 def _select(means: Means, state: State, joint: float) -> State:
@@ -196,6 +208,12 @@ def _halt(_: Means, state: State) -> State:
     return _end_motion(state)[0].say(alarm("the pilot has left; the arm stands still"))
 
 
+def _control(_: Means, state: State) -> State:
+    """Greet a page that has become the pilot."""
+    waits = f"; {RESET}" if state.stopped or state.fault else f": {FIRST_WORDS}"
+    return state.say(news(f"you have control, and the arm stands still{waits}"))
+
+
 def _end_motion(state: State) -> tuple[State, str]:
     """Stop the arm, and stop following a route.
 
@@ -216,6 +234,7 @@ VERBS: dict[str, Verb] = {
     "reset": Verb(_reset),
     "stand": Verb(_stand),
     "halt": Verb(_halt),
+    "control": Verb(_control),
     **held.VERBS,
     **guide.VERBS,
     **hand.VERBS,
@@ -307,6 +326,8 @@ def _watch(means: Means, state: State) -> State:
 
     if not trouble:
         waits = RESET if now.stopped else "the arm stands still"
+        if state.trouble == NO_PICTURE and not now.stopped:
+            return now.say(news(f"ready: {FIRST_WORDS}"))
         return now.say(news(f"picture and arm are known again; {waits}"))
     if state.mode != FOLLOWING and not state.drive.active:
         return now.do(Stop()).say(alarm(trouble + how))

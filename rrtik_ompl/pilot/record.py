@@ -1,14 +1,18 @@
 """Records of sessions: lines of JSON, and optionally the pictures in a second file, both written as they happen.
 
-The lines contain objects seen, commands, and configurations of the arm. Pictures are stored as JPEGs one after the
-other, and a line of the record gives the position of each. Such a stream (Motion JPEG) can be played by video players
-and needs no codec. However the session ends, all lines and pictures written before remain readable.
+The lines contain objects seen, commands with the page that gave them, set points, what the pilot was told, and
+configurations of the arm. A thread brings them to the disk twice a second: if the power fails, no more is lost.
+Pictures are stored as JPEGs one after the other, and a line of the record gives the position of each. Such a stream
+(Motion JPEG) can be played by video players and needs no codec. However the session ends, all lines and pictures
+written before remain readable.
 """
 
 from __future__ import annotations
 
 import json
 import os
+import threading
+import time
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
@@ -21,6 +25,7 @@ from numpy.typing import NDArray
 from rrtik_ompl.base.errors import InputError
 
 RECORD_VERSION = 2  # in records before the second, nothing resets a stop
+SYNC_SECONDS = 0.5
 SUFFIX = ".mjpeg"
 QUALITY = 85
 
@@ -61,6 +66,7 @@ class Record(GrowingFile):
         """
         self._path = path
         self._end = 0
+        self._written = threading.Event()
         if path is not None:
             try:
                 self._file = open(path, "ab", buffering=0)  # noqa: SIM115 - open as long as the session
@@ -69,16 +75,17 @@ class Record(GrowingFile):
                     raise InputError(f"{path}: holds something already; choose another name, or delete it")
             except OSError as error:
                 raise InputError(f"{path}: cannot be written: {error.strerror or error}") from None
+            threading.Thread(target=self._sync, daemon=True).start()
 
-    def write(self, kind: str, time: float, **values: object) -> None:
-        """Add a line.
+    def write(self, kind: str, at: float, /, **values: object) -> None:
+        """Add a line of a kind, at a time of the session [s].
 
         If the disk is full, the incomplete line is removed and the record ends; the session goes on.
         """
         if self._file is None:
             return
 
-        line = (json.dumps({"time": round(time, 6), "kind": kind, **values}) + "\n").encode()
+        line = (json.dumps({"time": round(at, 6), "kind": kind, **values}) + "\n").encode()
         written = 0
         try:
             while written < len(line):
@@ -89,6 +96,16 @@ class Record(GrowingFile):
                 self._file.truncate(self._end)
             self.close()
         self._end += len(line)
+        self._written.set()
+
+    def _sync(self) -> None:
+        """Bring what was written to the disk, again and again, without holding up the session."""
+        while (file := self._file) is not None:
+            if self._written.wait(SYNC_SECONDS):
+                self._written.clear()
+                with suppress(OSError, ValueError):  # the record may have been closed meanwhile
+                    os.fsync(file.fileno())
+                time.sleep(SYNC_SECONDS)
 
 
 def read_record(path: str | os.PathLike[str]) -> Iterator[dict[str, Any]]:

@@ -50,6 +50,7 @@ class Loop:
         self._time = 0.0
         self._read_at = clock.monotonic()  # when `time` was evaluated last
         self._audience = 0
+        self._pilot = 0  # number of the pilot's page, as the session was told
         self._outside_too = False
         self.reported = self._read_at
         self.fault: Callable[[], str] = str
@@ -79,6 +80,7 @@ class Loop:
         server = self._server
         self.reported = clock.monotonic()
         engine.update(self.time)
+        self._greet_pilot()
         if fault := self.fault():
             engine.session.say(alarm(fault))
         self._show_state()
@@ -99,6 +101,14 @@ class Loop:
         outside = engine.outside_picture(anew=self._audience != audience)
         if outside is not None:
             server.show_frame(OUTSIDE, self.time, outside)
+
+    def _greet_pilot(self) -> None:
+        """Tell the session when another page has become the pilot."""
+        pilot = self._server.clients.pilot
+        number = 0 if pilot is None else pilot.number
+        if number not in (0, self._pilot):
+            self._engine.execute({"name": "control"}, self.time, Sight(np.inf, np.inf, number))
+        self._pilot = number
 
     def _show_state(self) -> None:
         if len(self._server.clients):
@@ -125,7 +135,7 @@ class Loop:
             return
 
         sequence = command.pop("seq", None)
-        sight = Sight(self._age(command.pop("seen", None)), self._age(command.pop("picture", None)))
+        sight = Sight(self._age(command.pop("seen", None)), self._age(command.pop("picture", None)), client)
         try:
             self._engine.execute(command, self.time, sight)
         except Exception as error:  # no input of a page may end the session

@@ -38,6 +38,8 @@ from rrtik_ompl.sensing.scene_from_view import SeenObject
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
 
+ALIVE_SECONDS = 1.0
+
 
 class Session:
     """One pilot, one arm, one scene.
@@ -99,6 +101,7 @@ class Session:
 
         self._grasp_servo = GraspServo(problem.robot)
         self._record = record or Record(None)
+        self._alive_at = -np.inf  # time of the last line that only says that the session goes on [s]
         self._read_by_arm = isinstance(arm, LineArm)  # its own thread passes its readings to the supervisor
         if isinstance(arm, LineArm):
             arm.judge = self.supervisor
@@ -130,6 +133,9 @@ class Session:
 
         self._take(events.Judged(self.supervisor.fault, standing))
 
+        if self.time - self._alive_at >= ALIVE_SECONDS:  # where the record ends, the session ended less than this later
+            self._alive_at = self.time
+            self._record.write("alive", self.time, arm_age=round(self.state.arm_age, 3))
         if ended := self._record.news():
             self.say(alarm(ended))
 
@@ -161,7 +167,9 @@ class Session:
 
     def _take(self, event: events.Event) -> None:
         """Go on to the next state and carry out its effects; each answer is handled before the next effect."""
+        before = self.state.answer
         self.state, effects = handle(self.means, self.state, event)
+        self._write_said(before, event)
 
         for effect in effects:
             try:
@@ -172,6 +180,13 @@ class Session:
             if following is not None:
                 self._take(following)
 
+    def _write_said(self, before: Answer, event: events.Event) -> None:
+        """Record what the pilot is told without having asked; answers to commands have lines of their own."""
+        said = self.state.answer
+        asked = isinstance(event, events.Command | events.Reply) and said.level is not Level.ALARM
+        if said != before and not asked and not self.means.recorded:
+            self._record.write("said", self.time, text=said.text, level=said.level.value)
+
     def _carry_out(self, effect: events.Effect) -> events.Event | None:
         """Carry out one effect; return the event that results from it, None for none."""
         match effect:
@@ -180,6 +195,7 @@ class Session:
                 self.arm.stop()
             case events.SetPoint(aim, ahead, joint):
                 self.supervisor.told(aim, ahead, self.state.q, self._arms_time())
+                self._record.write("set", self.time, joint=joint, q=np.round(aim, 5).tolist())
                 if joint is None:
                     self.arm.follow(aim)
                 else:

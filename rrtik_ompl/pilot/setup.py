@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from datetime import datetime, timezone
 from pathlib import Path
 
 import numpy as np
 
 from rrtik_ompl.base.arrays import Vector
 from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.version import __version__
 from rrtik_ompl.pilot.devices.arm import Arm, SimulatedArm, joint_rates
 from rrtik_ompl.pilot.devices.camera_feed import Feed, FurtherCamera, LiveCamera
 from rrtik_ompl.pilot.devices.line_arm import LineArm
@@ -79,6 +81,7 @@ class OpenSession:
     def close(self) -> None:
         """Stop the arm, and release arm, camera and record."""
         self.engine.session.arm.stop()
+        self.record.write("end", self.engine.session.time)
         for close in self.closing:
             close()
 
@@ -103,7 +106,7 @@ def open_session(options: SessionOptions) -> OpenSession:
 
     perception = _perception(options, vehicle, source)
     record = Record(options.record)
-    record.write("begin", 0.0, record=RECORD_VERSION, problem=problem.name, seed=options.seed, q=arm.read().tolist())
+    record.write("begin", 0.0, **_begin(options, problem, arm))
 
     past = isinstance(options.source, Path)
     master = None if options.master is None else _line_arm(problem, options.master, "--master")
@@ -127,6 +130,23 @@ def open_session(options: SessionOptions) -> OpenSession:
 
     engine = Engine(session, perception, simulated=simulated, further=further, pictures=pictures)
     return OpenSession(engine, (*closing, engine.close), reports, record)
+
+
+def _begin(options: SessionOptions, problem: Problem, arm: Arm) -> dict[str, object]:
+    """Return the first line of a record: when, of what, with which devices, and where the arm is."""
+    behind_line = f"at {options.arm}, protocol {arm.greeting.version}" if isinstance(arm, LineArm) else "simulated"
+    return {
+        "record": RECORD_VERSION,
+        "date": datetime.now(timezone.utc).isoformat(timespec="milliseconds"),
+        "version": __version__,
+        "problem": problem.name,
+        "arm": behind_line,
+        "camera": "simulated" if options.source is None else str(options.source),
+        "seed": options.seed,
+        "joints": list(problem.robot.joint_names),
+        "sliding": problem.robot.prismatic.tolist(),
+        "q": arm.read().tolist(),
+    }
 
 
 def _picture_record(options: SessionOptions, record: Record) -> PictureRecord | None:

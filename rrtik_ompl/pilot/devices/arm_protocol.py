@@ -207,9 +207,9 @@ def _joints(given: ArrayLike, robot: Robot) -> Vector:
     return q
 
 
-def _rates(given: ArrayLike, robot: Robot) -> Vector:
+def _rates(given: object, robot: Robot) -> Vector:
     try:
-        rates = finite_array(given, (robot.dof,), "rates")
+        rates = finite_array(given if isinstance(given, list) else [], (robot.dof,), "rates")
     except (InputError, TypeError, ValueError) as error:
         raise ConnectionError(f"it greets without the rates of its joints: {error}") from None
     if (rates <= 0.0).any():

@@ -36,7 +36,20 @@ PLACE = pin.SE3(ROBOT.fk(PROBLEM.goal.q).rotation, np.array([1.30, 0.17, 0.09]))
 MOVING = ("jog", "go", "next", "servo", "lead")  # held: the arm moves only as long as they are renewed
 PRESENT = (*MOVING, "move", "plan", "replan", "accept", "back", "close", "open", "lift", "together")
 GUIDED = ("plan", "replan", "accept", "back", "together", "lift", "next", "servo")
-ALWAYS = ("stop", "reset", "stand", "release", "halt", "select", "speed", "object", "grasp", "reject", "settle")
+ALWAYS = (
+    "stop",
+    "reset",
+    "stand",
+    "control",
+    "release",
+    "halt",
+    "select",
+    "speed",
+    "object",
+    "grasp",
+    "reject",
+    "settle",
+)
 
 
 def seen_at(T):
