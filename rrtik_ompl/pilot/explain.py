@@ -115,7 +115,7 @@ class Story:
         """Yield a line for the motion since the last one, if there was any."""
         change = self._q - self._before
         if (np.abs(change) > LEAST).any():
-            shown = [self._amount(k, float(change[k])) for k in np.flatnonzero(np.abs(change) > LEAST)]
+            shown = [self._amount(int(k), float(change[k])) for k in np.flatnonzero(np.abs(change) > LEAST)]
             yield f"{self.clock(self._since)}    moved: {', '.join(shown)}{self._untold}"
         self._before = self._q.copy()
         self._untold = ""

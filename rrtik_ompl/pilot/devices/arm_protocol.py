@@ -82,7 +82,7 @@ class Health:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Answer:
+class ArmAnswer:
     """What a server answers.
 
     Attributes:
@@ -165,7 +165,7 @@ def greeting_in(message: Mapping[str, Any], robot: Robot) -> Greeting:
     return Greeting(version, _rates(message.get("rates"), robot))
 
 
-def answer_in(message: Mapping[str, Any], robot: Robot, version: int) -> Answer:
+def answer_in(message: Mapping[str, Any], robot: Robot, version: int) -> ArmAnswer:
     """Return what a server answers.
 
     What an arm says of itself is believed in every version: nobody says "estop" without need.
@@ -194,7 +194,7 @@ def answer_in(message: Mapping[str, Any], robot: Robot, version: int) -> Answer:
         raise ConnectionError(f"an answer whose joints have the age {quoted(age)}")
 
     q = None if error is not None and "q" not in message else _joints(message.get("q", ()), robot)
-    return Answer(q, float(age), fault, _health(message.get("health", ())))
+    return ArmAnswer(q, float(age), fault, _health(message.get("health", ())))
 
 
 def _joints(given: ArrayLike, robot: Robot) -> Vector:

@@ -24,7 +24,7 @@ from rrtik_ompl.pilot.devices.arm_protocol import (
     MAX_LINE_BYTES,
     TIMEOUT_SECONDS,
     VERSION,
-    Answer,
+    ArmAnswer,
     Greeting,
     Line,
     answer_in,
@@ -89,7 +89,7 @@ class Probe:
         self._ids = itertools.count(1)
         self.greeting: Greeting = greeting_in(self.line.receive(), self.robot)
 
-    def ask(self, **words: object) -> tuple[Answer, dict[str, Any]]:
+    def ask(self, **words: object) -> tuple[ArmAnswer, dict[str, Any]]:
         """Send a request with the next id; return its answer, checked, and as it came.
 
         Raises:

@@ -32,7 +32,7 @@ from rrtik_ompl.pilot.devices.arm_protocol import (
     SET_POINTS,
     TIMEOUT_SECONDS,
     VERSION,
-    Answer,
+    ArmAnswer,
     Greeting,
     Health,
     Line,
@@ -209,7 +209,7 @@ class LineArm:
             self._read_at = sent_at - answer.age
         return answer.q
 
-    def _answer_to(self, number: int, deadline: float) -> Answer:
+    def _answer_to(self, number: int, deadline: float) -> ArmAnswer:
         """Wait for the answer to a request; answers to earlier ones are late, or doubled, and are left out."""
         for _ in range(MAX_PASSED):
             message = self._line.receive(deadline - time.monotonic())
@@ -353,7 +353,7 @@ class LineServer:
         return {"protocol": PROTOCOL, "version": VERSION, "joints": joints, "rates": rates, "hold": TIMEOUT_SECONDS}
 
     def _answer(self, line: Line) -> None:
-        """Answer requests of one client.
+        """ArmAnswer requests of one client.
 
         The simulated arm advances in real time, and stops when a set point's validity ends.
         """
