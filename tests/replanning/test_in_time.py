@@ -179,6 +179,28 @@ def test_a_stretch_that_barely_reaches_full_speed_keeps_the_limits():
             assert np.abs(spline(knots, 2)).max() <= (1.0 + 1e-7) * fast / steep / slot**2
 
 
+def test_stretches_of_all_lengths_keep_the_limits():
+    random = np.random.default_rng(0)
+    slot = 0.1
+    for _ in range(2000):
+        change = slot * random.uniform(0.5, 3.0, 3)
+        rise = slot * change * 10.0 ** random.uniform(-2.0, 2.0)
+        pace = Pace(change, rise, np.inf)
+        start = random.uniform(-3.0, 3.0, 3)
+        end = start + 10.0 ** random.uniform(-16.0, 0.5) * random.uniform(-1.0, 1.0, 3)
+        least = max(1, int(pace.whole_slots((end - start)[None])[0]))
+        wait = random.integers(1, 150)
+        slots = np.array([0, wait, wait + least + random.integers(0, 5)])
+        timing = Timing(np.array([start, start, end]), slots)
+        motion = timing.trajectory(pace, slot, JointPath(timing.rows, ("a", "b", "c")))
+
+        spline = CubicHermiteSpline(motion.times, motion.positions, motion.velocities)
+        begins = 2.0 * spline.c[1]
+        ends = begins + 6.0 * spline.c[0] * np.diff(motion.times)[:, None]
+        assert (np.abs([begins, ends]) <= (1.0 + 1e-6) * rise / slot**2).all()
+        assert (np.abs(motion.velocities) <= (1.0 + 1e-9) * change / slot).all()
+
+
 def test_a_vertex_is_reached_only_onwards_in_time_and_at_a_speed_that_is_allowed():
     pace = Pace(np.array([1.0, 0.5]), np.full(2, 1e12), np.inf)
     for onward in (1, -1):

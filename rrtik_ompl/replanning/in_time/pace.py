@@ -16,6 +16,7 @@ from rrtik_ompl.motion.trajectory.motion import Trajectory
 
 ROUNDING = 1e-9  # [slots]
 SHORTEST_CRUISE = 1e-4  # [slots]
+SHORTEST_RAMP = 1e-2  # [slots] where a longer one does not cost the speed limit
 NEVER = 1 << 40  # a finite number of slots that is larger than that of any plan
 
 
@@ -81,12 +82,17 @@ class Pace:
             slots: Number of slots of the stretch, not less than it needs.
         """
         fast, steep = (float(each[0]) for each in self._needed(move[None]))
-        cruise = float(np.sqrt(max(slots**2 - 4.0 * steep, 0.0)))
+        if steep == 0.0:
+            return 0.0
         # A cubic between knots that are nearly one has any acceleration, by rounding alone. So there is no cruise, or,
         # where the speed would be too large then, a longer one: the acceleration grows by its square alone.
+        cruise = float(np.sqrt(max(slots**2 - 4.0 * steep, 0.0)))
         if cruise < SHORTEST_CRUISE:
             cruise = 0.0 if 2.0 * fast <= slots else SHORTEST_CRUISE
-        return 0.5 * (slots - cruise)
+            return 0.5 * (slots - cruise)
+        # As the half of slots - cruise, but without the digits that cancel out for a small move.
+        ramp = 2.0 * steep / (slots + cruise)
+        return max(ramp, min(SHORTEST_RAMP, slots - fast))
 
     def shares(self, move: Vector, slots: int) -> Vector:
         """Return the share of a stretch that is done at the begin of each of its slots and at its end, (slots + 1,).
