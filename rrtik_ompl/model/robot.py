@@ -388,6 +388,17 @@ def inside_limits(robot: Robot, rows: Matrix, tolerance: float = LIMIT_TOLERANCE
     return np.asarray(np.logical_and.reduce((rows >= lower) & (upper >= rows), axis=1))
 
 
+def all_inside_limits(robot: Robot, rows: Matrix, tolerance: float = LIMIT_TOLERANCE) -> bool:
+    """Check whether all configurations, shape (m, dof), lie inside the limits widened by a tolerance.
+
+    To know this of all takes less time than to know it of each.
+    """
+    lower, upper = _widened_limits(robot, tolerance)
+    inside = rows >= lower
+    inside &= upper >= rows
+    return bool(np.logical_and.reduce(inside, axis=None))
+
+
 def pinocchio_rows(robot: Robot, rows: Matrix) -> Matrix:
     """Convert configurations to Pinocchio's vectors, (m, dof) -> (m, nq); see :meth:`Robot.pinocchio_configuration`."""
     values = robot.chain.joint_values(rows)

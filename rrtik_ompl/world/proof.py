@@ -34,7 +34,7 @@ from rrtik_ompl.kernels.simd.library import library
 from rrtik_ompl.kernels.tables.solid_tables import convex_solids
 from rrtik_ompl.model.certificate import Certificate, Route
 from rrtik_ompl.model.proof import Gap, Proof
-from rrtik_ompl.model.robot import Robot, inside_limits
+from rrtik_ompl.model.robot import Robot, all_inside_limits, inside_limits
 from rrtik_ompl.world.arm_cache import Pairs, arm_cache, strokes
 from rrtik_ompl.world.coal_proof import NOT_LOOKED_AT, PROVEN, CoalProof, distance_between, suggest_planes
 
@@ -170,7 +170,8 @@ class Prover:
         ends_sound = None if sound is None else sound[: len(starts)] & sound[len(starts) :]
 
         gaps = self._gaps((starts, ends), (values, values[len(starts) :]), ends_sound, distances, None)
-        mask[[gap.motion for gap in gaps]] = False
+        if gaps:
+            mask[[gap.motion for gap in gaps]] = False
         if self.constraints is not None:
             mask[mask] = self.constraints.motions_held(starts[mask], ends[mask])
         return mask
@@ -239,10 +240,10 @@ class Prover:
         They have to be inside the limits, and joint values must not exceed ``LARGEST_VALUE``, up to which rounding is
         bounded.
         """
-        within_limits = inside_limits(self.robot, rows)
-        if within_limits.all() and (_joints(self.robot)[2] or np.abs(values).max(initial=0.0) <= LARGEST_VALUE):
+        bounded = _joints(self.robot)[2] or np.abs(values).max(initial=0.0) <= LARGEST_VALUE
+        if bounded and all_inside_limits(self.robot, rows):
             return None
-        return np.asarray(within_limits & (np.abs(values) <= LARGEST_VALUE).all(axis=1))
+        return np.asarray(inside_limits(self.robot, rows) & (np.abs(values) <= LARGEST_VALUE).all(axis=1))
 
     def _gaps(
         self, rows: Ends, values: Ends, sound: Mask | None, distances: tuple[float, float], seconds: float | None

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.model.proof import Gap, Proof
-from rrtik_ompl.model.robot import inside_limits
+from rrtik_ompl.model.robot import all_inside_limits
 from rrtik_ompl.motion.trajectory.cubics import State, even_parts
 from rrtik_ompl.world.route_check import VERIFICATION_DENSITY, not_proven
 from rrtik_ompl.world.world import World
@@ -160,7 +160,7 @@ def _not_proven_together(
 
     # Only the ends of chords are compared with limits and constraints, so the knots between them are looked at here.
     knots = motion.positions
-    if not inside_limits(world.robot, knots).all():
+    if not all_inside_limits(world.robot, knots):
         return number
 
     begins_stretch = np.ones(len(pieces), dtype=bool)
