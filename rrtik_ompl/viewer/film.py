@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from rrtik_ompl.base.arrays import finite_number, positive
 from rrtik_ompl.base.errors import InputError, called, listed, require
 from rrtik_ompl.base.interrupts import tidied_before_the_end
 from rrtik_ompl.files.text import FILM_FORMATS, PICTURE_FORMATS, check_target, file_name, write_bytes
@@ -93,11 +94,11 @@ def film(
     gif = ending == ".gif"
 
     parts = parts_of(shown, path, None, tree)
-    length = _seconds(parts, run, target) if seconds is None else float(seconds)
-    speed = (GIF_RATE if gif else RATE) if rate is None else float(rate)
+    length = _seconds(parts, run, target) if seconds is None else positive(seconds, "seconds of a film")
+    speed = (GIF_RATE if gif else RATE) if rate is None else positive(rate, "rate of a film")
     width, height = sides_of((GIF_SIZE if gif else SIZE) if size is None else size, ending)
-    frames = round(length * speed) + 1 if np.isfinite(length * speed) else 0
-    if not (speed > 0.0 and 2 <= frames <= MOST_FRAMES):
+    frames = round(min(length * speed, MOST_FRAMES)) + 1
+    if not 2 <= frames <= MOST_FRAMES:
         raise InputError(
             f"a film of {length:g} s, {speed:g} pictures a second: out of range (2 to {MOST_FRAMES} in all)"
         )
@@ -160,7 +161,7 @@ def picture(
     """
     target = file_name(file)
     check_target(target, PICTURE_FORMATS)
-    if not 0.0 <= at <= 1.0:
+    if not 0.0 <= finite_number(at, "moment of a picture") <= 1.0:
         raise InputError(f"moment of a picture: expected 0 (start) to 1 (end), got {at:g}")
     sides = sides_of(size, target.suffix.lower())
     wanted = {**_wanted(camera, hide, sides), "frames": 1, "held": 0, "at": at, "rate": 1.0, "ending": ".png"}

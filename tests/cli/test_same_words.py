@@ -85,6 +85,8 @@ OTHER_WORDS = {  # arguments that no option is called by, and why
     "inline": "of notebooks",
     "limits": "made of --share and of --velocity-deg and its like",
     "marks": "bodies made in Python",
+    "meshcat": "a visualizer that runs in Python",
+    "tree": "rrtik plan --tree --html shows it",
     "checks": "an engine",
     "run": "rrtik replan --replay --html shows it",
     "path": "an argument of the command",

@@ -15,8 +15,8 @@ from rrtik_ompl.base.lazy import public_values
 from rrtik_ompl.description.dh import DhRow, robot_from_dh
 from rrtik_ompl.viewer.subject import subject_of
 
-MOTIONS = re.compile(r"\b(JointPath|Trajectory|HasWaypoints|ShownPath)\b")
-ROBOTS = re.compile(r"\b(Robot|World|Judge|Problem|Showable)\b")
+MOTIONS = re.compile(r"\b(JointPath|Trajectory|HasWaypoints|ShownPath|AskedPath)\b")
+ROBOTS = re.compile(r"\b(Robot|World|Judge|Problem|Showable|Asked)\b")
 NAMES = ("first", "second", "third")
 LIMITS = rrtik.RateLimits(1.0, 2.0)
 
@@ -55,6 +55,8 @@ TAKERS = {  # what takes a motion and a robot: how it is called
     "time_parameterize in a world": lambda names, task, file: rrtik.time_parameterize(
         path(names), LIMITS, blend=0.05, world=task.world
     ),
+    "film": lambda names, task, file: rrtik.film(task, file.with_suffix(".gif"), path(names)),
+    "picture": lambda names, task, file: rrtik.picture(task, file.with_suffix(".png"), path(names)),
     "view of a path before": lambda names, task, file: subject_of(task, path(NAMES), path(names)),
     "view of a trajectory": lambda names, task, file: subject_of(task, motion(names)),
     "JointPath.load": lambda names, task, file: _of_a_file(names, task, file, path, rrtik.JointPath.load),

@@ -17,7 +17,7 @@ from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import Scene
 from rrtik_ompl.viewer import view
-from rrtik_ompl.viewer.page import page
+from rrtik_ompl.viewer.page import KERNELS, PLANNING, WITH_SEARCH, asset, page
 from rrtik_tests.crane import WAYPOINTS, problem, story
 
 
@@ -68,6 +68,21 @@ def test_a_failed_picture_leaves_the_old_file_alone(crane: Robot, tmp_path: Path
 def test_a_folder_that_does_not_exist_is_named(crane: Robot, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="nowhere"):
         view(crane, html=tmp_path / "nowhere" / "view.html")
+
+
+DECLARED = re.compile(r"^(?:const|let|class|(?:async )?function) +(\[.*?\]|\{.*?\}|\w+)", re.MULTILINE)
+
+
+def test_no_two_scripts_of_a_page_declare_the_same_name():
+    """All of them are one script in the browser, which would refuse it as a whole."""
+    names = [
+        name
+        for file in (*KERNELS, *WITH_SEARCH, *PLANNING, "film.js")
+        for found in DECLARED.findall(asset(file))
+        for name in re.findall(r"\w+", found)
+    ]
+    assert len(names) > 200
+    assert {name for name in names if names.count(name) > 1} == set()
 
 
 @pytest.mark.parametrize("name", ["view.pdf", "view.png", "view"])

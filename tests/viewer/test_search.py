@@ -109,7 +109,7 @@ def test_a_plan_stands_for_its_problem_path_and_tree(problem, tmp_path):
 @needs_chromium
 def test_the_search_grows_step_by_step_and_goes_with_another_path(problem, tmp_path):
     plan = rrtik.plan(problem, "crdt", seed=1, tree=True)
-    file = Path(rrtik.view(plan, html=tmp_path / "plan.html"))
+    file = Path(rrtik.view(plan, html=tmp_path / "plan.html")).as_uri()
     drawn = "growing[0].mesh.geometry.drawRange.count"
     moves = "(document.querySelector('#joint-space .tree').getAttribute('d').match(/M/g) ?? []).length"
     with opened(file) as browser:

@@ -51,7 +51,7 @@ function keepPicture() {
   sheet.toBlob((blob) => keepFile("picture.png", blob), "image/png");
 }
 
-const LOOKS = ["fill", "stroke", "stroke-width", "opacity", "font-size"];  // of parts of a plot
+const PLOT_LOOKS = ["fill", "stroke", "stroke-width", "opacity", "font-size"];  // of parts of a plot
 
 /** A plot as a file of its own, in the colours that it has in the page. */
 function plotText(plot) {
@@ -59,7 +59,7 @@ function plotText(plot) {
   const parts = [...copy.querySelectorAll("*")];
   [...plot.querySelectorAll("*")].forEach((part, k) => {
     const look = getComputedStyle(part);
-    parts[k].setAttribute("style", LOOKS.map((name) => `${name}: ${look.getPropertyValue(name)}`).join("; "));
+    parts[k].setAttribute("style", PLOT_LOOKS.map((name) => `${name}: ${look.getPropertyValue(name)}`).join("; "));
   });
   copy.setAttribute("xmlns", "http://www.w3.org/2000/svg");
   copy.setAttribute("style", `font-family: sans-serif; background: ${getComputedStyle(document.body).backgroundColor}`);
