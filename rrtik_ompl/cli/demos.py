@@ -35,6 +35,11 @@ def demos(
     format: Annotated[
         Format, typer.Option(help="Arrays alone, one HDF5 file as robomimic has it, or a dataset of LeRobot (v3.0).")
     ] = Format.npz,
+    camera: Annotated[
+        list[str] | None,
+        typer.Option(help="Pictures: front, side, top, or a file of a view; for several cameras, several times."),
+    ] = None,
+    size: Annotated[str, typer.Option(help="Of pictures, WIDTHxHEIGHT [px].")] = "320x240",
     jobs: Annotated[
         int | None, typer.Option(help="Processes; the number of cores if left out.", min=1, show_default=False)
     ] = None,
@@ -52,6 +57,11 @@ def demos(
     from rrtik_ompl.tasks import Task
 
     loaded = Task.load(task)
+    pictures = None
+    if camera:
+        from rrtik_ompl.pilot.overlay.demo_pictures import DemoPictures
+
+        pictures = DemoPictures(loaded, camera, size)
     now = Progress(0, count, 0)
     with counter(loaded.name, count) as show:
 
@@ -63,7 +73,7 @@ def demos(
         try:
             made = record(
                 loaded, count, out, seed=seed, rate=rate, share=share, pause=pause, seconds=seconds,
-                format=format.value, jobs=jobs, scheduler=scheduler, on_attempt=on_attempt,
+                format=format.value, jobs=jobs, scheduler=scheduler, pictures=pictures, on_attempt=on_attempt,
             )  # fmt: skip
         except KeyboardInterrupt:
             note(f"what is done is kept in {out}, {now.done} of {count}; the same command goes on")

@@ -10,7 +10,7 @@ import json
 from collections.abc import Iterator, Mapping
 from io import BytesIO
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,12 +35,24 @@ class AttemptFile(LineFile):
     full = "what is done is kept: make room, then give the same command again"
 
 
+class Pictures(Protocol):
+    """Draws pictures of demonstrations, such as `rrtik_ompl.pilot.overlay.demo_pictures.DemoPictures`."""
+
+    names: tuple[str, ...]
+    size: tuple[int, int]
+
+    def of(self, arrays: Mapping[str, NDArray[Any]]) -> Iterator[dict[str, NDArray[np.uint8]]]:
+        """Yield the pictures at each tick, by camera: red, green, blue, shape (height, width, 3)."""
+        ...
+
+
 class DemoFolder:
     """A folder of demonstrations.
 
     Args:
         path: The folder, which need not exist.
         head: What the data depend on, as plain values.
+        drawn: What draws the pictures of its datasets; None for none.
 
     Attributes:
         records: The lines of the attempts that are done, by their numbers.
@@ -49,8 +61,9 @@ class DemoFolder:
         InputError: If the folder has demonstrations that depend on something else, or cannot be read.
     """
 
-    def __init__(self, path: Path, head: Mapping[str, Any]) -> None:
+    def __init__(self, path: Path, head: Mapping[str, Any], drawn: Pictures | None = None) -> None:
         self.path = path
+        self.drawn = drawn
         self.head = {"version": 1, "kind": "demos", **head}
         self.records: dict[int, Record] = {}
         file = path / ATTEMPTS
@@ -118,6 +131,10 @@ class DemoFolder:
         failed = [record for number, record in done.items() if number <= last and not record["found"]]
         text = {**self.head, **summary, "attempts": last + 1, "failed": len(failed)}
         write_text(self.path / SUMMARY, json.dumps(text, indent=2) + "\n")
+
+    def pictures(self, arrays: Mapping[str, NDArray[Any]]) -> Iterator[dict[str, NDArray[np.uint8]]]:
+        """Yield the pictures of a demonstration at each tick, by camera."""
+        return iter(()) if self.drawn is None else self.drawn.of(arrays)
 
     def episodes(self, count: int) -> Iterator[tuple[Record, Mapping[str, NDArray[Any]]]]:
         """Yield the line and the arrays of the first demonstrations, in the order of their attempts.

@@ -48,6 +48,8 @@ def _size(folder: DemoFolder, count: int) -> int:
     for record, arrays in folder.episodes(1):
         columns = _columns(arrays)
         a_tick = sum(values.nbytes for values in columns.values()) / max(record["ticks"], 1)
+        if folder.drawn is not None:
+            a_tick += len(folder.drawn.names) * (3.1 * np.prod(folder.drawn.size) + OVERHEAD)
         found = [each for _, each in sorted(folder.records.items()) if each["found"]][:count]
         return int(a_tick * sum(each["ticks"] for each in found)) + len(found) * len(columns) * OVERHEAD + OVERHEAD
     return OVERHEAD
@@ -70,6 +72,18 @@ def _write(folder: DemoFolder, count: int, file: Path) -> None:
             demo.attrs["attempt"] = record["attempt"]
             for name, values in _columns(arrays).items():
                 demo.create_dataset(name, data=values)
+            if folder.drawn is not None:
+                width, height = folder.drawn.size
+                shape = (record["ticks"], height, width, 3)
+                films = {
+                    name: demo.create_dataset(
+                        f"obs/{name}_image", shape, np.uint8, chunks=(1, *shape[1:]), compression=1
+                    )
+                    for name in folder.drawn.names
+                }
+                for tick, seen in enumerate(folder.pictures(arrays)):
+                    for name, picture in seen.items():
+                        films[name][tick] = picture
             total += record["ticks"]
         data.attrs["total"] = total
         data.attrs["env_args"] = json.dumps({"env_name": folder.head["task"], "type": 0, "env_kwargs": folder.head})

@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import shutil
 from collections.abc import Iterator, Mapping
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
+from PIL import Image
 
 from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.base.errors import InputError
@@ -33,12 +35,14 @@ FILE = "chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
 STATE = "observation.state"
 ACTION = "action"
 SURROUNDINGS = "observation.environment_state"
+IMAGES = "observation.images"
 INDICES = ("frame_index", "episode_index", "index", "task_index")
 QUANTILES = (0.01, 0.1, 0.5, 0.9, 0.99)
 FULLY_OPEN = 100.0
 
 Columns = dict[str, NDArray[Any]]
 Statistics = dict[str, dict[str, NDArray[Any]]]
+FewStatistics = dict[str, NDArray[Any]]
 
 
 def write_lerobot(folder: DemoFolder, robot: Robot, count: int) -> Path:
@@ -84,6 +88,11 @@ class _Writer:
         self.features: dict[str, dict[str, Any]] = {
             name: {"dtype": "float32", "shape": [len(parts)], "names": parts} for name, parts in names.items()
         }
+        self.cameras = {} if folder.drawn is None else {name: f"{IMAGES}.{name}" for name in folder.drawn.names}
+        for name in self.cameras.values():
+            width, height = folder.drawn.size if folder.drawn is not None else (0, 0)
+            shape = [height, width, 3]
+            self.features[name] = {"dtype": "image", "shape": shape, "names": ["height", "width", "channels"]}
         self.features["timestamp"] = {"dtype": "float32", "shape": [1], "names": None}
         for name in INDICES:
             self.features[name] = {"dtype": "int64", "shape": [1], "names": None}
@@ -95,10 +104,10 @@ class _Writer:
         statistics: list[Statistics] = []
         files = _Files(self.root / "data")
         try:
-            for episode, columns in enumerate(self._episodes(count)):
-                table = self._table(columns)
+            for episode, (columns, arrays) in enumerate(self._episodes(count)):
+                table, seen = self._with_pictures(self._table(columns), arrays)
                 place = files.write(table)
-                statistics.append(statistics_of(columns))
+                statistics.append({**statistics_of(columns), **seen})
                 begin = int(columns["index"][0])
                 rows.append(
                     {
@@ -119,8 +128,21 @@ class _Writer:
         self._write_json("stats", _plain(joined(statistics)))
         self._write_json("info", self._info(rows))
 
-    def _episodes(self, count: int) -> Iterator[Columns]:
-        """Yield the columns of each demonstration."""
+    def _with_pictures(self, table: pa.Table, arrays: Mapping[str, NDArray[Any]]) -> tuple[pa.Table, Statistics]:
+        """Return the rows of a demonstration with its pictures (PNG), and the statistics of these."""
+        cells: dict[str, list[dict[str, Any]]] = {name: [] for name in self.cameras}
+        counts = {name: np.zeros((3, 256), dtype=np.int64) for name in self.cameras}
+        for tick, seen in enumerate(self.demos.pictures(arrays)):
+            for name, picture in seen.items():
+                cells[name].append({"bytes": png(picture), "path": f"frame-{tick:06d}.png"})
+                counts[name] += [np.bincount(picture[:, :, k].ravel(), minlength=256) for k in range(3)]
+        kind = pa.struct([("bytes", pa.binary()), ("path", pa.string())])
+        for name, column in self.cameras.items():
+            table = table.append_column(column, pa.array(cells[name], kind))
+        return table, {self.cameras[name]: statistics_of_colors(each, len(table)) for name, each in counts.items()}
+
+    def _episodes(self, count: int) -> Iterator[tuple[Columns, Mapping[str, NDArray[Any]]]]:
+        """Yield the columns of each demonstration, and its arrays."""
         begin = 0
         for episode, (_, arrays) in enumerate(self.demos.episodes(count)):
             state = self._state(arrays)
@@ -134,7 +156,7 @@ class _Writer:
             columns["index"] = np.arange(begin, begin + length)
             columns["task_index"] = np.zeros(length, dtype=np.int64)
             begin += length
-            yield columns
+            yield columns, arrays
 
     def _state(self, arrays: Mapping[str, NDArray[Any]]) -> Matrix:
         """Return the positions of all motors at each tick, shape (k, motors)."""
@@ -267,6 +289,32 @@ def statistics_of(columns: Mapping[str, NDArray[Any]]) -> Statistics:
             **{f"q{round(100 * q):02d}": row for q, row in zip(QUANTILES, quantiles, strict=True)},
         }
     return found
+
+
+def statistics_of_colors(counts: NDArray[np.int64], pictures: int) -> FewStatistics:
+    """Return the statistics of some pictures, from 0 to 1, by how often each channel has each value, shape (3, 256).
+
+    Every pixel counts, where LeRobot's own writer takes a part of the pictures, and of their pixels.
+    """
+    values = np.arange(256) / 255.0
+    shares = counts / counts.sum(axis=1, keepdims=True)
+    mean = shares @ values
+    below = np.cumsum(shares, axis=1)
+    found = {
+        "min": values[(counts > 0).argmax(axis=1)],
+        "max": values[255 - (counts[:, ::-1] > 0).argmax(axis=1)],
+        "mean": mean,
+        "std": np.sqrt(np.maximum(shares @ values**2 - mean**2, 0.0)),
+        **{f"q{round(100 * q):02d}": values[(below >= q - 1e-12).argmax(axis=1)] for q in QUANTILES},
+    }
+    return {**{word: row.reshape(3, 1, 1) for word, row in found.items()}, "count": np.array([pictures])}
+
+
+def png(picture: NDArray[np.uint8]) -> bytes:
+    """Return a picture as PNG."""
+    file = BytesIO()
+    Image.fromarray(picture).save(file, "PNG", compress_level=6)
+    return file.getvalue()
 
 
 def joined(statistics: list[Statistics]) -> Statistics:

@@ -17,7 +17,7 @@ from rrtik_ompl.base.choices import one_of
 from rrtik_ompl.base.errors import InputError, require
 from rrtik_ompl.base.version import __version__
 from rrtik_ompl.demos.episode import Episode, Timing, attempted, observed
-from rrtik_ompl.demos.folder import DemoFolder
+from rrtik_ompl.demos.folder import DemoFolder, Pictures
 from rrtik_ompl.demos.formats import check_format, write_dataset
 from rrtik_ompl.files.digest import sha256
 from rrtik_ompl.files.kinds import FilePath
@@ -102,6 +102,7 @@ def record(
     format: DemoFormat = "npz",
     jobs: int | None = None,
     scheduler: str | None = None,
+    pictures: Pictures | None = None,
     on_attempt: Callable[[Progress], object] = lambda _: None,
 ) -> Recording:
     """Record demonstrations of a task of which something is random, until there are as many as wanted.
@@ -124,6 +125,7 @@ def record(
             LeRobot, version 3.0.
         jobs: Number of processes; None for the number of cores, 1 for this process.
         scheduler: Address of a Dask scheduler whose workers plan instead.
+        pictures: What draws pictures for the dataset, of format "hdf5" or "lerobot", such as `DemoPictures`.
         on_attempt: Called after each attempt.
 
     Returns:
@@ -154,12 +156,14 @@ def record(
         raise InputError("demonstrations: give jobs or scheduler, not both")
     path = file_name(out)
     check_format(format, timing.rate)
+    if pictures is not None and format == "npz":
+        raise InputError("pictures of demonstrations: format npz has none; use lerobot or hdf5")
 
     known = task if isinstance(task, Task) else Task.load(task)
     draws = Draws(known)
     RateLimits.of(known.world.robot, share=timing.share)
     about = _about(known, first_seed, timing)
-    folder = DemoFolder(path, about)
+    folder = DemoFolder(path, about, pictures)
     run = _Run(draws, first_seed, timing, folder)
 
     with folder.opened() as file:

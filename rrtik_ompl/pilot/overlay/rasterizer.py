@@ -9,7 +9,7 @@ focal lengths, the principal point and half a pixel are folded into the view mat
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import cv2
@@ -70,13 +70,16 @@ def surface_of_shape(shape: Shape, color: str, frame: int = 0, triangles: int = 
     return Surface(vertices, vertex_normals(vertices, faces), faces, np.array(fractions(color)), frame)
 
 
-def robot_surfaces(robot: Robot, triangles: int = ROBOT_TRIANGLES) -> tuple[Surface, ...]:
+def robot_surfaces(
+    robot: Robot, triangles: int = ROBOT_TRIANGLES, frames: Sequence[int] | None = None
+) -> tuple[Surface, ...]:
     """Return the surfaces of the links with about ``triangles`` triangles at most.
 
-    The visual geometry is used; a robot without it is drawn by its collision geometry.
+    The visual geometry is used; a robot without it is drawn by its collision geometry. ``frames`` has the number of the
+    frame that carries each of these solids in place of its joint's.
     """
-    drawn = _link_surfaces(robot.visual.geometryObjects, triangles)
-    return drawn or _link_surfaces(robot.collision.geometryObjects, triangles)
+    drawn = _link_surfaces(robot.visual.geometryObjects, triangles, frames)
+    return drawn or _link_surfaces(robot.collision.geometryObjects, triangles, frames)
 
 
 class ShapeSurfaces:
@@ -119,13 +122,16 @@ def moved(surface: Surface, rotation: NDArray[np.float64], translation: NDArray[
     return Surface(vertices, surface.normals @ rotation.T, surface.faces, surface.color, surface.frame)
 
 
-def _link_surfaces(bodies: Sequence[object], triangles: int) -> tuple[Surface, ...]:
+def _link_surfaces(
+    bodies: Sequence[object], triangles: int, frames: Sequence[int] | None = None
+) -> tuple[Surface, ...]:
     counts = [int(b.geometry.num_tris) if is_mesh(b.geometry) else 0 for b in bodies]  # type: ignore[attr-defined]
     surfaces = []
-    for body, count in zip(bodies, counts, strict=True):
+    numbers: Sequence[int | None] = [None] * len(counts) if frames is None else frames
+    for body, count, frame in zip(bodies, counts, numbers, strict=True):
         surface = _link_surface(body, max(triangles * count // max(sum(counts), 1), 200))
         if surface is not None:
-            surfaces.append(surface)
+            surfaces.append(surface if frame is None else replace(surface, frame=frame))
     return tuple(surfaces)
 
 
