@@ -27,7 +27,7 @@ from rrtik_ompl.model.robot import LIMIT_TOLERANCE, Robot, inside_limits, joint_
 from rrtik_ompl.motion.received.points import ReceivedMotion
 from rrtik_ompl.motion.trajectory import Trajectory
 from rrtik_ompl.motion.trajectory.messages import seconds, yaml_documents
-from rrtik_ompl.motion.trajectory.text import GRIPPER
+from rrtik_ompl.motion.trajectory.text import GRIPPER, is_own_mcap
 
 BAGS = (".bag", ".db3", ".mcap")
 PARQUET = ".parquet"
@@ -128,6 +128,8 @@ def load_motions(
 def _own(path: Path, robot: Robot) -> tuple[JointPath | Trajectory] | None:
     """Return the motion in a file of this library; None if it is another program's."""
     ending = path.suffix.lower()
+    if ending == ".mcap" and path.is_file() and is_own_mcap(path):
+        return (Trajectory.load(path, robot),)
     if path.is_dir() or ending in (".yaml", ".yml", ".npz", ".npy", PARQUET, *BAGS):
         return None
     known_ending(path, ENDINGS, "motion")

@@ -20,7 +20,7 @@ from rrtik_ompl.model.robot import Robot, joint_order
 from rrtik_ompl.motion.trajectory.cubics import Cubics
 from rrtik_ompl.motion.trajectory.gripper_text import read_ros_commands
 from rrtik_ompl.motion.trajectory.motion import Trajectory
-from rrtik_ompl.motion.trajectory.text import FIELDS, FORMATS, loads
+from rrtik_ompl.motion.trajectory.text import FIELDS, FORMATS, loads, read_mcap
 
 
 def read_trajectory(
@@ -32,9 +32,9 @@ def read_trajectory(
         InputError: If the file is missing, malformed, or does not fit the robot; the message names file and line.
     """
     require(robot, Robot | None, "robot of a trajectory", "use load_robot(name)")
-    ending = known_ending(file, FORMATS, "trajectory")
+    ending = known_ending(file, (*FORMATS, ".mcap"), "trajectory")
     try:
-        document = loads(read_text(file), ending)
+        document = read_mcap(file) if ending == ".mcap" else loads(read_text(file), ending)
         if robot is not None and document["joint_names"] is not None:
             document = _sorted(document, robot)
         document["gripper"] = _of_gripper(robot, document["gripper"])

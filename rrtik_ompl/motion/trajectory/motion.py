@@ -456,7 +456,7 @@ class Trajectory:
         by other curves), three cubics lead there instead, so that the acceleration does not jump.
 
         Args:
-            file: A .json, .yaml or .csv file.
+            file: A .json, .yaml, .csv or .mcap file.
             robot: If given, the motion must have its joints; columns in another order are sorted by name, with a
                 warning.
             gripper: The file of the commands to a gripper that was written beside a message.

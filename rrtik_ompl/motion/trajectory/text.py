@@ -12,7 +12,7 @@ from typing import Any
 
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.files.tables import json_object, table_rows
-from rrtik_ompl.files.text import file_name, known_ending, write_bytes
+from rrtik_ompl.files.text import file_name, known_ending, read_bytes, write_bytes
 from rrtik_ompl.model.gripper import Events, GripperEvent, states_at, targets_at
 from rrtik_ompl.motion.trajectory.gripper_text import events_of_document, gripper_document
 from rrtik_ompl.motion.trajectory.messages import NANOSECONDS, duration, from_yaml, seconds, to_yaml
@@ -20,6 +20,8 @@ from rrtik_ompl.motion.trajectory.messages import NANOSECONDS, duration, from_ya
 FORMATS = (".json", ".csv", ".yaml")
 ROS_JSON = ".ros.json"  # A file with just the message, as ROS rejects fields that it does not know.
 KIND = "joint_trajectory"
+LIBRARY = "rrtik-ompl"  # says in an MCAP file that we have written it
+STATES, COMMANDS = "/joint_states", "/gripper_command"
 GRIPPER = "gripper "  # begins the name of a column of CSV that has where a joint of the gripper has been told to go
 FIELDS = ("positions", "velocities", "accelerations")  # fields of a point; the last one may be missing
 _SCHEMA = {
@@ -218,9 +220,9 @@ def write_mcap(
 
     sink = BytesIO()
     writer = Writer(sink)
-    writer.start(profile="", library="rrtik-ompl")
+    writer.start(profile="", library=LIBRARY)
     schema = writer.register_schema("sensor_msgs/JointState", "jsonschema", json.dumps(_SCHEMA).encode())
-    channel = writer.register_channel("/joint_states", "json", schema, {"robot": robot})
+    channel = writer.register_channel(STATES, "json", schema, {"robot": robot})
 
     joints = [*names, *(joint for event in gripper[:1] for joint in event.joints)]
     none: list[list[float]] = [[]] * len(columns[0])
@@ -233,7 +235,7 @@ def write_mcap(
         writer.add_message(channel, stamp, json.dumps(state).encode(), stamp, number)
 
     if gripper:
-        told = writer.register_channel("/gripper_command", "json", schema, {"gripper": gripper[0].gripper})
+        told = writer.register_channel(COMMANDS, "json", schema, {"gripper": gripper[0].gripper})
     for number, event in enumerate(gripper):
         stamp = round(event.time * NANOSECONDS)
         effort = [] if event.effort is None else [event.effort] * len(event.joints)
@@ -242,3 +244,68 @@ def write_mcap(
 
     writer.finish()
     write_bytes(file, sink.getvalue())
+
+
+def is_own_mcap(file: str | os.PathLike[str]) -> bool:
+    """Check whether :func:`write_mcap` wrote a file; False, too, without the package mcap."""
+    try:
+        from mcap.reader import make_reader
+    except ImportError:
+        return False
+    try:
+        return bool(make_reader(BytesIO(read_bytes(file))).get_header().library == LIBRARY)
+    except InputError:
+        raise
+    except Exception:  # whatever a damaged file leads the package to
+        return False
+
+
+def read_mcap(file: str | os.PathLike[str]) -> dict[str, Any]:
+    """Read what :func:`write_mcap` wrote, as :func:`loads` does; how long a gripper takes is not in such a file.
+
+    Raises:
+        InputError: If the package mcap is not installed, or the file is another one or not whole.
+    """
+    try:
+        from mcap.reader import make_reader
+    except ImportError:
+        raise InputError("MCAP files need the package mcap: pip install 'rrtik-ompl[mcap]'") from None
+    if not is_own_mcap(file):
+        raise InputError("not an MCAP file of Trajectory.save; load_motions(file, robot) reads bags of ROS")
+
+    states: list[tuple[float, dict[str, Any]]] = []
+    told: list[tuple[float, dict[str, Any]]] = []
+    about: dict[str, dict[str, str]] = {STATES: {}, COMMANDS: {}}
+    try:
+        for _, channel, message in make_reader(BytesIO(read_bytes(file))).iter_messages():
+            about[channel.topic] = channel.metadata
+            row = message.log_time / NANOSECONDS, json.loads(message.data)
+            (states if channel.topic == STATES else told).append(row)
+
+        fingers = told[0][1]["name"] if told else []
+        joints = states[0][1]["name"][: len(states[0][1]["name"]) - len(fingers)]
+        events = tuple(
+            GripperEvent(
+                time,
+                each["name"],
+                each["position"],
+                about[COMMANDS]["gripper"],
+                effort=max(each["effort"], default=None),
+            )
+            for time, each in told
+        )
+        fields = zip(FIELDS, ("position", "velocity", "acceleration"), strict=True)
+        rows = {field: [state[name][: len(joints)] for _, state in states] for field, name in fields}
+    except InputError:
+        raise
+    except Exception as error:  # whatever a damaged file leads the package to
+        raise InputError(f"not a whole MCAP file: {error}; save the motion again") from None
+    times = [time for time, _ in states]
+    return {
+        "times": times,
+        **rows,
+        "joint_names": joints,
+        "units": None,
+        "robot": about[STATES]["robot"],
+        "gripper": events,
+    }

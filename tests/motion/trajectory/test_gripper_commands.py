@@ -115,6 +115,10 @@ def test_mcap_has_the_states_of_the_fingers_and_the_commands(tmp_path):
     assert [state["position"][-1] for _, state in states] == pytest.approx(held.tolist())
     told = [(time, state["position"]) for topic, time, state in found if topic == "/gripper_command"]
     assert told == [(event.time, list(event.positions)) for event in EVENTS]
+    read = rrtik.Trajectory.load(tmp_path / "motion.mcap")
+    assert [(e.time, e.joints, e.positions, e.gripper, e.effort) for e in read.gripper] == [
+        (e.time, e.joints, e.positions, e.gripper, e.effort) for e in motion.gripper
+    ]
 
 
 @pytest.mark.parametrize(

@@ -101,6 +101,24 @@ def test_mcap_holds_joint_states_at_their_times(tmp_path, motion):
     assert messages[0][1]["name"] == list(motion.joint_names)
 
 
+def test_mcap_is_read_back_as_the_motion_that_was_saved(tmp_path, motion):
+    pytest.importorskip("mcap.reader")
+    for options in ({}, {"rate": 50.0}):
+        motion.save(tmp_path / "motion.mcap", **options)
+        motion.save(tmp_path / "motion.csv", **options)
+        read, same = (Trajectory.load(tmp_path / f"motion.{ending}") for ending in ("mcap", "csv"))
+        assert read.joint_names == motion.joint_names
+        assert np.abs(read.times - same.times).max() < 1e-9
+        clock = np.linspace(0.0, motion.duration, 101)
+        assert np.abs(read(clock).positions - same(clock).positions).max() < 1e-7
+
+    data = (tmp_path / "motion.mcap").read_bytes()
+    (tmp_path / "motion.mcap").write_bytes(data[: len(data) // 2])
+    with pytest.raises(InputError, match="MCAP") as caught:
+        Trajectory.load(tmp_path / "motion.mcap")
+    assert "\n" not in str(caught.value)
+
+
 def test_the_report_names_peaks_switches_and_jumps(motion):
     found = motion.report(LIMITS)
     assert found.kept
