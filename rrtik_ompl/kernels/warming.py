@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from rrtik_ompl.files.cache import nobody_else_s
 from rrtik_ompl.files.notice import COMPILING, tell_once
@@ -15,12 +14,15 @@ from rrtik_ompl.kernels.simd.code_files import kernel_modules, kernels_by_size
 from rrtik_ompl.kernels.simd.library import code_file, is_loaded, library
 from rrtik_ompl.kernels.threads import cores
 
-if TYPE_CHECKING:
-    import subprocess
-
 ROOT = Path(__file__).parents[2]  # where this package stands: another process shall take no other
-MAKE = "import sys; sys.path.insert(0, sys.argv[1]); from rrtik_ompl.kernels.simd.library import library; "
-MAKE += "sys.exit(None in [library(name) for name in sys.argv[2:]])"
+# Reads names, a line each; writes an empty line as soon as such a library is made.
+MAKE = """
+import sys; sys.path.insert(0, sys.argv[1])
+from rrtik_ompl.kernels.simd.library import library
+for name in sys.stdin:
+    library(name.strip())
+    print(flush=True)
+"""
 
 
 def warm_up(report: Callable[[str], None], *, jobs: int | None = None) -> bool:
@@ -60,26 +62,48 @@ def load_together(names: Sequence[str]) -> None:
 def _share(names: list[str]) -> None:
     """Make libraries here and in other processes, which end with this call."""
     shares = [names[k :: cores()] for k in range(min(cores(), len(names)))]
-    others: list[subprocess.Popen[bytes]] = []
+    others: list[_Maker] = []
     try:
         with suppress(OSError):  # no process can be begun: all is made here
-            others += [_maker(share) for share in shares[1:]]
+            for share in shares[1:]:
+                others.append(_Maker())
+                others[-1].begin(share)
         for name in shares[0]:
             library(name)
-        for other in others:
-            other.wait()
+        for other, share in zip(others, shares[1:], strict=False):
+            for _ in share:
+                other.has_made_one()
     finally:
         for other in others:
-            other.terminate()
-            other.wait()
+            other.end()
 
 
-def _maker(names: list[str]) -> subprocess.Popen[bytes]:
-    """A process that makes libraries and keeps them in the user's cache."""
-    import subprocess  # where all kernels are made nobody needs it
+class _Maker:
+    """A process that makes libraries and keeps them in the user's cache. What several share it compiles once."""
 
-    command = [sys.executable, "-W", "ignore", "-c", MAKE, str(ROOT), *names]
-    return subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    def __init__(self) -> None:
+        import subprocess  # where all kernels are made nobody needs it
+
+        command = [sys.executable, "-W", "ignore", "-c", MAKE, str(ROOT)]
+        pipe = subprocess.PIPE
+        self._process = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=subprocess.DEVNULL, text=True)
+
+    def begin(self, names: Iterable[str]) -> None:
+        """Have libraries made, one after the other."""
+        assert self._process.stdin is not None
+        self._process.stdin.write("".join(f"{name}\n" for name in names))
+        self._process.stdin.flush()
+
+    def has_made_one(self) -> bool:
+        """Wait for the next library; False if the process has ended before."""
+        assert self._process.stdout is not None
+        return bool(self._process.stdout.readline())
+
+    def end(self) -> None:
+        """End the process, whatever it does."""
+        self._process.terminate()
+        with suppress(OSError), self._process:  # closes the pipes
+            pass
 
 
 def _missing(name: str) -> bool:
@@ -99,11 +123,18 @@ def _made_by_others(names: list[str], jobs: int) -> Iterator[Callable[[str], Non
         return
     if any(packaged_bitcode(name) is None for name in names):
         tell_once(COMPILING)
-    others: list[subprocess.Popen[bytes]] = []
+    idle: list[_Maker] = []
+    others: list[_Maker] = []
 
     def make(name: str) -> None:
-        with _maker([name]) as process:
-            others.append(process)
+        with suppress(OSError):  # no process can be begun
+            try:
+                maker = idle.pop()
+            except IndexError:
+                others.append(maker := _Maker())
+            maker.begin([name])
+            if maker.has_made_one():
+                idle.append(maker)
 
     from concurrent.futures import ThreadPoolExecutor  # whoever finds all kernels made needs no threads
 
@@ -113,5 +144,5 @@ def _made_by_others(names: list[str], jobs: int) -> Iterator[Callable[[str], Non
         yield lambda name: made[name].result() if name in made else None
     finally:
         pool.shutdown(wait=False, cancel_futures=True)
-        for process in others:
-            process.terminate()
+        for maker in others:
+            maker.end()

@@ -16,7 +16,7 @@ from rrtik_ompl.cli import terminal
 from rrtik_ompl.cli.app import run
 from rrtik_ompl.files import notice
 from rrtik_ompl.files.cache import cache_folder, one_at_a_time
-from rrtik_ompl.kernels import shipped, warm_up
+from rrtik_ompl.kernels import shipped, warm_up, warming
 from rrtik_ompl.kernels.simd import bitcode, bitcode_store, code_files, compiled, library
 
 # kernels are compiled anew here, which takes minutes on a busy machine
@@ -268,16 +268,29 @@ def test_warming_up_makes_all_kernels(kept, cached, capsys):
 @pytest.mark.slow
 def test_several_kernels_are_made_by_other_processes(kept, cached, monkeypatch):
     shutil.copytree(kept, cached.parent, dirs_exist_ok=True)
-    names = ["checks.distance_kernels", "ik.ik_kernels"]
+    names = ["checks.distance_kernels", "ik.ik_kernels", "timing.kernels"]
     before = {name: library.code_file(name).read_bytes() for name in names}
     for name in names:
         library.code_file(name).unlink()
     monkeypatch.setattr(library, "_made", None)  # this process makes none
+    made = []
+    monkeypatch.setattr(warming, "_Maker", lambda make=warming._Maker: made.append(make()) or made[-1])
     said = []
     assert warm_up(said.append, jobs=2)
+    assert len(made) <= 2  # a process goes on with what it has compiled
     assert said == [f"{name}: ready" for name in code_files.kernel_modules()]
     for name in names:
         assert described(library.code_file(name).read_bytes()) == described(before[name])
+
+
+def test_what_a_process_does_not_live_to_make_is_made_here(kept, cached, monkeypatch):
+    shutil.copytree(kept, cached.parent, dirs_exist_ok=True)
+    files = [library.code_file(name) for name in ("ik.ik_kernels", "timing.kernels")]
+    for file in files:
+        file.unlink()
+    monkeypatch.setattr(warming, "MAKE", "input()")
+    assert warm_up(lambda _: None, jobs=2)
+    assert all(file.is_file() for file in files)
 
 
 def test_compiling_is_told_in_one_line(monkeypatch, capsys):

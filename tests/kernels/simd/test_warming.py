@@ -52,3 +52,7 @@ def test_of_two_libraries_another_process_makes_one(bitcode):
 
 def test_where_no_process_can_be_begun_all_are_made_here(bitcode):
     assert made_here(bitcode, before="warming.sys.executable = '/nowhere/python'") == ["2", "True", "True"]
+
+
+def test_what_a_process_does_not_live_to_make_is_made_here(bitcode):
+    assert made_here(bitcode, before="warming.MAKE = 'input()'") == ["2", "True", "True"]
