@@ -55,8 +55,8 @@ def test_the_site_names_nothing_elsewhere_to_load(site):
 
 @pytest.mark.slow
 @needs_chromium
-def test_a_browser_that_shows_the_site_asks_no_other_host(site, tmp_path):
-    with served(site) as address, closing(Browser(tmp_path)) as browser:
+def test_a_browser_that_shows_the_site_asks_no_other_host(site):
+    with served(site) as address, closing(Browser()) as browser:
         for page in ("index.html", "reference/plan.html"):
             browser.open(address + page)
             browser.wait("document.querySelector('.md-source') !== null")

@@ -7,9 +7,9 @@ from rrtik_tests.programs import CHROMIUM, NO_CHROMIUM
 
 
 @pytest.fixture(scope="module")
-def browser(tmp_path_factory):
+def browser():
     if CHROMIUM is None:
         pytest.skip(NO_CHROMIUM)
-    made = Browser(tmp_path_factory.mktemp("chromium"))
+    made = Browser()
     yield made
     made.close()

@@ -14,8 +14,7 @@ TOOL = Path(find_vehicle("titan4_sdu")).with_name("titan4_tool.yaml")
 
 
 @pytest.mark.slow
-def test_a_tool_is_taken_and_put_into_its_rack(browser, monkeypatch):
-    monkeypatch.setattr("rrtik_ompl.pilot.run.PERIOD_SECONDS", 0.08)  # most of the work is pictures
+def test_a_tool_is_taken_and_put_into_its_rack(browser):
     with Running(SessionOptions("titan4_sdu", vehicle=TOOL, seed=1)) as running:
         pick_and_place(browser, running, Keyboard, Gamepad)
         made = running.opened.engine.perception.source.camera.places["tool"]

@@ -1,7 +1,9 @@
-"""A crane among obstacles of every shape, the page that shows it, and a tree of MB-RRT."""
+"""A crane among obstacles of every shape, the page that shows it, a tree of MB-RRT, and arms of few triangles."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from functools import partial
 from types import SimpleNamespace
 from typing import Any
 
@@ -15,8 +17,20 @@ from rrtik_ompl.ik.mb_rrt.published import grow
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import AttachedObject, ConstantVelocity, Obstacle, Scene, TimedPoses
 from rrtik_ompl.model.shapes import Box, Capsule, Cylinder, HalfSpace, Prism, Sphere
+from rrtik_ompl.viewer import picture
 from rrtik_ompl.viewer.page import page
 from rrtik_tests.crane import TETRAHEDRON, URDF, WAYPOINTS, problem
+
+
+@pytest.fixture(scope="module")
+def coarse_arms() -> Iterator[None]:
+    """Arms of few triangles, for pages whose looks are not tested.
+
+    Software draws each arm, its ghosts and its shadow anew in every frame, which took half a second.
+    """
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(picture, "link_parts", partial(picture.link_parts, triangles=1_000))
+        yield
 
 
 @pytest.fixture(scope="module")

@@ -56,6 +56,7 @@ def test_the_page_reads_degrees_metres_and_the_tip_where_the_robot_has_it(file: 
     assert f"tip (hand): x {x:.3f}, y {y:.3f}, z {z:.3f} m" in shown
 
 
+@pytest.mark.usefixtures("coarse_arms")
 def test_the_page_shows_the_clearance_along_the_path_and_what_is_not_proven(tmp_path: Path) -> None:
     problem = rrtik_ompl.load_problem("titan4_sdu")
     path = rrtik_ompl.plan(problem, "RRTConnect", seed=1).path

@@ -15,6 +15,7 @@ from rrtik_tests.programs import needs_chromium
 
 pytestmark = [
     pytest.mark.kernels,
+    pytest.mark.usefixtures("coarse_arms"),
     needs_chromium,
 ]
 SAID = "document.getElementById('plan-state').textContent"
@@ -41,6 +42,7 @@ def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
     problem = shown_problem()
     text = page(problem, rrtik.plan(problem, seed=1).path)
     with planning_page(text, folder) as opened:
+        opened.coarsen_shadows()
         yield opened
 
 

@@ -101,10 +101,11 @@ def test_questions_of_the_page_itself_are_answered_and_no_others() -> None:
 
 
 @needs_chromium
+@pytest.mark.usefixtures("coarse_arms")
 def test_in_a_browser_each_dragged_path_is_marked(problem: rrtik.Problem, tmp_path: Path) -> None:
     with (
         PageServer(page(problem, asks=True), 0, lambda question: opinion(problem, question)) as server,
-        closing(Browser(tmp_path / "browser", DRAWING_3D)) as browser,
+        closing(Browser(DRAWING_3D)) as browser,
     ):
         browser.open(server.url)
         browser.wait("document.documentElement.dataset.plans")

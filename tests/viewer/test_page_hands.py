@@ -81,7 +81,7 @@ def test_a_finger_drags_the_goal(text: str, tmp_path: Path) -> None:
 def test_without_memory_the_page_says_so_and_plays_on(text: str, tmp_path: Path) -> None:
     (tmp_path / "page.html").write_text(text, encoding="utf-8")
     spent = "WebAssembly.Memory = class { constructor() { throw new RangeError('out of memory'); } };"
-    with closing(Browser(tmp_path / "browser", DRAWING_3D)) as browser:
+    with closing(Browser(DRAWING_3D)) as browser:
         browser.open("about:blank")
         browser.call("Page.enable")
         browser.call("Page.addScriptToEvaluateOnNewDocument", source=spent)

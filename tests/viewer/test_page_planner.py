@@ -267,12 +267,14 @@ def type_in(browser: Browser, name: str, value: float) -> None:
     )
 
 
+@pytest.mark.usefixtures("coarse_arms")
 @needs_chromium
 def test_in_a_browser_goal_and_obstacles_are_dragged_and_the_saved_files_hold(tmp_path):
     crate = rrtik.Obstacle("crate", rrtik.Box([0.2, 0.2, 0.2]), rrtik.pose([0.6, 0.6, 0.6]))
     world = rrtik.World(rrtik.load_robot("ur5"), Scene((crate,)))
     problem = Problem(world, [0.0, -1.2, 1.0, 0.2, 0.0, 0.0], [1.6, -1.2, 1.0, 0.2, 0.0, 0.0])
     with planning_page(page(problem, rrtik.plan(problem, seed=1).path), tmp_path) as browser:
+        browser.coarsen_shadows()
         spot = browser.ask(SPOT % "goal")
         browser.drag(spot, [spot[0] - 12.0, spot[1] - 8.0])
         browser.ask(FRAMES)

@@ -18,6 +18,7 @@ from rrtik_tests.programs import needs_chromium
 
 pytestmark = [
     pytest.mark.kernels,
+    pytest.mark.usefixtures("coarse_arms"),
     needs_chromium,
 ]
 STATE = "document.getElementById('plan-state').textContent"
@@ -67,6 +68,7 @@ def browser(tmp_path_factory: pytest.TempPathFactory, problem: rrtik.Problem) ->
     folder = tmp_path_factory.mktemp("running")
     text = page(problem, rrtik.plan(problem, seed=1).path)
     with planning_page(text, folder) as opened:
+        opened.coarsen_shadows()
         yield opened
 
 

@@ -90,7 +90,7 @@ def test_the_picture_is_framed_as_the_page_is(tmp_path: Path) -> None:
 def test_without_webgl_the_page_says_so(tmp_path: Path) -> None:
     file = view(rrtik.Scene(), html=tmp_path / "page.html")
     none = "HTMLCanvasElement.prototype.getContext = () => null;"
-    with closing(Browser(tmp_path / "browser", DRAWING_3D)) as browser:
+    with closing(Browser(DRAWING_3D)) as browser:
         browser.open("about:blank")
         browser.call("Page.enable")
         browser.call("Page.addScriptToEvaluateOnNewDocument", source=none)

@@ -1,19 +1,23 @@
 """A headless Chromium and a session with its server: what the tests of the pilot's page share."""
 
 import asyncio
+import atexit
 import base64
 import json
 import subprocess
+import tempfile
 import threading
 import time
-import urllib.request
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from functools import partial
 from pathlib import Path
+from typing import ClassVar
+from unittest.mock import patch
 
 import tornado.websocket
 
+from rrtik_ompl.pilot import run
 from rrtik_ompl.pilot.run import Loop
 from rrtik_ompl.pilot.setup import open_session
 from rrtik_ompl.pilot.web.server import PilotServer
@@ -22,38 +26,17 @@ from rrtik_tests.programs import CHROMIUM
 OPTIONS = ("--headless=new", "--no-sandbox", "--hide-scrollbars", "--remote-debugging-port=0")
 FLAT, DRAWING_3D = ("--disable-gpu",), ("--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 WIDTH, HEIGHT = 1280, 720
+PERIOD_SECONDS = 0.08  # most of the work of a session is pictures
 SMALL = (480, 300)  # of pages that draw in 3-D, where a processor computes every pixel of every frame
 
 
-class Browser:
-    """A headless Chromium, told what to do through its debugging port."""
+class Wire:
+    """A connection to the debugging port of a Chromium, or of one of its pages."""
 
-    def __init__(self, folder, graphics=FLAT):
-        self._process = subprocess.Popen(
-            [CHROMIUM, *OPTIONS, *graphics, f"--user-data-dir={folder}", "about:blank"],
-            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-        )  # fmt: skip
-        port_file = Path(folder) / "DevToolsActivePort"
-        waited = self._until(lambda: port_file.exists() and port_file.read_text().strip(), 60.0)
-        self._port = int(waited.split()[0])
-        self._loop, self._count, self._socket = asyncio.new_event_loop(), 0, None
-        self._size = SMALL if graphics is DRAWING_3D else (WIDTH, HEIGHT)
-
-    @staticmethod
-    def _until(look, seconds):
-        end = time.monotonic() + seconds
-        while not (found := look()):
-            assert time.monotonic() < end, "waited in vain"
-            time.sleep(0.03)
-        return found
-
-    def open(self, url):
-        request = urllib.request.Request(f"http://127.0.0.1:{self._port}/json/new?about:blank", method="PUT")
-        page = json.loads(urllib.request.urlopen(request).read())["webSocketDebuggerUrl"]
-        connect = partial(tornado.websocket.websocket_connect, page, max_message_size=1 << 26)
+    def __init__(self, url):
+        self._loop, self._count = asyncio.new_event_loop(), 0
+        connect = partial(tornado.websocket.websocket_connect, url, max_message_size=1 << 26)
         self._socket = self._loop.run_until_complete(self._await(connect))
-        self.size(*self._size)
-        self.call("Page.navigate", url=url)
 
     @staticmethod
     async def _await(thing):
@@ -68,6 +51,81 @@ class Browser:
                 assert "error" not in answer, answer
                 return answer["result"]
 
+    def close(self):
+        self._socket.close()
+        self._loop.run_until_complete(asyncio.sleep(0))
+        self._loop.close()
+
+
+class Chromium:
+    """A headless Chromium, which takes a second of processor time to begin and more until its first page is drawn."""
+
+    _running: ClassVar[dict[tuple[str, ...], "Chromium"]] = {}  # by what it draws with
+
+    def __init__(self, graphics):
+        folder = tempfile.TemporaryDirectory(prefix="chromium-", ignore_cleanup_errors=True)
+        self._process = subprocess.Popen(
+            [CHROMIUM, *OPTIONS, *graphics, f"--user-data-dir={folder.name}", "about:blank"],
+            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+        )  # fmt: skip
+        atexit.register(self._end, folder)
+        port_file = Path(folder.name) / "DevToolsActivePort"
+        port, path = until(lambda: _two_words(port_file), 60.0)
+        self.address = f"ws://127.0.0.1:{port}"
+        self.wire = Wire(f"{self.address}{path}")
+
+    def _end(self, folder):
+        self._process.terminate()
+        self._process.wait(timeout=30)
+        folder.cleanup()
+
+    @classmethod
+    def of(cls, graphics):
+        """The one of this process, begun anew if it has ended."""
+        found = cls._running.get(graphics)
+        if found is None or found._process.poll() is not None:
+            found = cls._running[graphics] = cls(graphics)
+        return found
+
+
+def _two_words(file):
+    """The port and the path that a Chromium writes; None before it has."""
+    words = file.read_text().split() if file.exists() else []
+    return words if len(words) == 2 else None
+
+
+def until(look, seconds):
+    """What a look finds, as soon as it finds something."""
+    end = time.monotonic() + seconds
+    while not (found := look()):
+        assert time.monotonic() < end, "waited in vain"
+        time.sleep(0.03)
+    return found
+
+
+class Browser:
+    """A browser of its own for a test: windows of this process's Chromium that share no storage with others."""
+
+    def __init__(self, graphics=FLAT):
+        self._chromium, self._page, self._window = Chromium.of(graphics), None, None
+        made = self._chromium.wire.call("Target.createBrowserContext", disposeOnDetach=True)
+        self._context = made["browserContextId"]
+        self._size = SMALL if graphics is DRAWING_3D else (WIDTH, HEIGHT)
+
+    def open(self, url):
+        """Show a page in a new window; the one before, which would go on drawing, is closed."""
+        call, before = self._chromium.wire.call, self._window
+        self._window = call("Target.createTarget", url="about:blank", browserContextId=self._context)["targetId"]
+        if before is not None:
+            self._page.close()
+            call("Target.closeTarget", targetId=before)
+        self._page = Wire(f"{self._chromium.address}/devtools/page/{self._window}")
+        self.size(*self._size)
+        self.call("Page.navigate", url=url)
+
+    def call(self, method, **parameters):
+        return self._page.call(method, **parameters)
+
     def ask(self, script):
         found = self.call("Runtime.evaluate", expression=script, returnByValue=True, awaitPromise=True)
         assert "exceptionDetails" not in found, found
@@ -75,7 +133,7 @@ class Browser:
 
     def wait(self, script, seconds=90.0):
         try:
-            return self._until(lambda: self.ask(f"document.readyState === 'complete' && ({script})"), seconds)
+            return until(lambda: self.ask(f"document.readyState === 'complete' && ({script})"), seconds)
         except AssertionError:
             raise AssertionError(f"{script}: waited in vain; message: {self.text('message')}") from None
 
@@ -116,6 +174,10 @@ class Browser:
             time.sleep(0.03)
         release()
 
+    def coarsen_shadows(self):
+        """Compute shadows of few pixels, where looks are not tested: there are four million in each frame."""
+        self.ask("key.shadow.mapSize.set(64, 64); key.shadow.map?.dispose(); key.shadow.map = null; 0")
+
     def drag(self, begin, end, steps=8):
         """Press the mouse at one place [pixels], move it to another, let go."""
         places = [[a + (b - a) * k / steps for a, b in zip(begin, end, strict=True)] for k in range(steps + 1)]
@@ -135,9 +197,9 @@ class Browser:
         Path(file).write_bytes(base64.b64decode(self.call("Page.captureScreenshot", format="png")["data"]))
 
     def close(self):
-        self._process.terminate()
-        self._process.wait(timeout=30)
-        self._loop.close()
+        if self._page is not None:
+            self._page.close()
+        self._chromium.wire.call("Target.disposeBrowserContext", browserContextId=self._context)
 
 
 class PatientLoop(Loop):
@@ -168,7 +230,7 @@ class Running:
 
     def _run(self):
         self.opened = open_session(self._wanted)
-        with PilotServer(title="test") as server:
+        with patch.object(run, "PERIOD_SECONDS", PERIOD_SECONDS), PilotServer(title="test") as server:
             self.server = server
             self._ready.set()
             PatientLoop(self.opened.engine, server).run(self._ended.is_set)
@@ -189,7 +251,7 @@ def planning_page(text: str, folder: Path, until: str = "document.documentElemen
     """A page that plans, opened from a file in a folder, as soon as a condition holds: it can plan."""
     file = folder / "page.html"
     file.write_text(text, encoding="utf-8")
-    with closing(Browser(folder / "browser", DRAWING_3D)) as browser:
+    with closing(Browser(DRAWING_3D)) as browser:
         browser.open(file.as_uri())
         browser.wait(until)
         yield browser

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
@@ -24,10 +23,7 @@ def opened(url: str, size: tuple[int, int] = SMALL) -> Iterator[Browser]:
     """A page that has built itself, which takes a busy machine longer than any fixed time."""
     if CHROMIUM is None:
         pytest.skip(NO_CHROMIUM)
-    with (
-        tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder,
-        closing(Browser(folder, DRAWING_3D)) as browser,
-    ):
+    with closing(Browser(DRAWING_3D)) as browser:
         browser.open(url)
         browser.size(*size)
         browser.wait(READY, seconds=100.0)
