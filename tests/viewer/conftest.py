@@ -18,6 +18,7 @@ from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import AttachedObject, ConstantVelocity, Obstacle, Scene, TimedPoses
 from rrtik_ompl.model.shapes import Box, Capsule, Cylinder, HalfSpace, Prism, Sphere
 from rrtik_ompl.viewer import picture
+from rrtik_ompl.viewer.drawing.robot_picture import link_parts
 from rrtik_ompl.viewer.page import page
 from rrtik_tests.crane import TETRAHEDRON, URDF, WAYPOINTS, problem
 
@@ -29,7 +30,7 @@ def coarse_arms() -> Iterator[None]:
     Software draws each arm, its ghosts and its shadow anew in every frame, which took half a second.
     """
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(picture, "link_parts", partial(picture.link_parts, triangles=1_000))
+        patch.setattr(picture, "link_parts", partial(link_parts, triangles=1_000))
         yield
 
 
