@@ -88,8 +88,18 @@ class ProblemSetup(og.SimpleSetup):  # type: ignore[misc]  # OMPL has no types
         twice.
 
         Raises:
-            InputError: If PRM is to minimise an objective that is written in Python, for which it would wait as well.
+            InputError: If PRM is to minimise an objective that is written in Python, for which it would wait as well,
+                or if the planner does not know the space.
         """
+        try:
+            return self._solve(*limit, **named)
+        except RuntimeError as error:
+            if "only supports" not in str(error):
+                raise
+            message = f"{self.getPlanner().getName()}: it does not know this space: {error}"
+            raise InputError(f"{message.rstrip('.')}; leave so2 out, or use another planner") from None
+
+    def _solve(self, *limit: Any, **named: Any) -> ob.PlannerStatus:
         self.setup()  # also makes the default planner if none is set
         planner = self.getPlanner()
         definition = self.getProblemDefinition()

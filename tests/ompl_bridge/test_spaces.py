@@ -151,3 +151,24 @@ def test_joints_without_limits_are_angles_in_ompl(name: str) -> None:
     assert setup.getSolutionPath().check()
     if name.startswith("ours"):  # straight, the short way past half a turn
         assert setup.getSolutionPath().length() == pytest.approx(2.0 * np.pi - 6.0, abs=1e-6)
+
+
+OMPLS = [each for each in vars(og).values() if isinstance(each, type) and issubclass(each, ob.Planner)]
+
+
+@pytest.mark.parametrize("kind", OMPLS, ids=lambda kind: kind.__name__)
+def test_a_planner_of_ompl_that_does_not_know_angles_is_refused_in_one_line(kind: type) -> None:
+    robot = rrtik.load_robot("kinova")
+    middle = np.array(robot.posture("arm_up"))
+    middle[1] += 1.0
+    turn = np.eye(robot.dof)[0]
+    box = rrtik.Obstacle("in the way", rrtik.Box([0.05, 0.05, 0.05]), robot.fk(middle).translation)
+    world = rrtik.World(robot, rrtik.Scene([box]))
+    setup = rrtik.ompl.simple_setup(rrtik.Problem(world, middle - turn, middle + turn), so2=True)
+    setup.setPlanner(kind(setup.getSpaceInformation()))
+    if kind.__name__ in ("BITstar", "InformedRRTstar", "SORRTstar", "AORRTC"):
+        with pytest.raises(InputError, match=r"does not know this space: .* leave so2 out") as caught:
+            setup.solve(0.1)
+        assert "\n" not in str(caught.value)
+    else:
+        setup.solve(0.1)

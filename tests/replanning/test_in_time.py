@@ -327,12 +327,13 @@ def met_at(x, gap):
     ("motion", "until"),
     [
         (None, np.inf),
+        (ConstantVelocity([0.0, 0.0, 0.0]), np.inf),
         (ConstantVelocity([-2.0, 0.0, 0.0]), met_at(60.0, 0.011)),
         (ConstantVelocity([2.0, 0.0, 0.0]), 25.0),
         (TimedPoses([0.0, 20.0], [place(60.0, 10.0), place(20.0, 10.0)]), met_at(60.0, 0.011)),
         (TimedPoses([0.0, 19.0], [place(60.0, 10.0), place(22.0, 10.0)]), np.inf),
     ],
-    ids=["rests", "comes", "goes", "comes and stops", "stops short"],
+    ids=["rests", "says that it rests", "comes", "goes", "comes and stops", "stops short"],
 )
 def test_until_when_the_arm_may_stay_where_it_arrives(motion, until):
     problem = plane(box("block", 60.0, 10.0, motion=motion))

@@ -21,7 +21,7 @@ from rrtik_ompl.geometry.collision.bodies import Body, kept_apart
 from rrtik_ompl.geometry.collision.certificate import distance
 from rrtik_ompl.geometry.collision.shape_table import farthest
 from rrtik_ompl.model.scene import ConstantVelocity, Obstacle, Scene, TimedPoses, pose_at
-from rrtik_ompl.replanning.travels import turns_without_end
+from rrtik_ompl.replanning.travels import states_rest, turns_without_end
 from rrtik_ompl.world.moving_world import MovingProver
 from rrtik_ompl.world.world import World
 
@@ -138,7 +138,7 @@ class ForeseenWorlds:
         Returns:
             The time [s]: until then the arm is proven free; inf if it is for ever.
         """
-        obstacles = {o.name: o for o in self._world.scene.obstacles if o.motion is not None}
+        obstacles = {o.name: o for o in self._world.scene.obstacles if o.motion is not None and not states_rest(o)}
         bodies = self._world.bodies
         frames = self._world.robot.chain.joint_frames(q[None])[0]
         clearance = self._clearance + self._world.settings.clearance
