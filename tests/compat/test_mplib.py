@@ -266,6 +266,24 @@ def test_a_cloud_counts_unless_the_call_says_otherwise(planner):
     assert not planner.remove_point_cloud()
 
 
+def test_the_next_cloud_gives_the_answers_of_a_new_planner(planner):
+    x, z = np.meshgrid(np.linspace(0.35, 0.8, 60), np.linspace(0.0, 0.45, 60))
+    wall = np.column_stack([x.ravel(), np.full(x.size, 0.2), z.ravel()])
+    goal = np.array([0.45, 0.42, 0.25, *DOWN])
+    rows = np.random.default_rng(3).uniform(-1.0, 1.0, (40, 9)) * 0.6 + START
+    clouds = [wall, wall[::3] + np.array([0.0, 0.1, 0.0]), wall + np.array([0.05, -0.05, 0.0])]
+    for cloud in clouds:
+        planner.update_point_cloud(cloud, 0.005)
+        fresh = mplib.Planner(URDF, HAND, SRDF)
+        fresh.update_point_cloud(cloud, 0.005)
+        hits = [[len(each.check_for_env_collision(row)) for row in rows] for each in (planner, fresh)]
+        assert hits[0] == hits[1]
+        assert any(hits[0])
+        around = planner.plan_pose(goal, START)
+        assert around["proven"]
+        assert free_rows(planner, around["position"], [rrtik.Obstacle("wall", rrtik.PointCloud(cloud, 0.005))]).all()
+
+
 def test_points_that_are_none_are_counted_and_an_empty_cloud_is_none(planner):
     with pytest.warns(CloudWarning, match="2 of 3 points are not finite"):
         planner.update_point_cloud([[0.5, 0.5, np.nan], [np.inf, 0.0, 0.0], [0.5, 0.5, 0.5]])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import ceil
 from pathlib import Path
@@ -272,8 +272,23 @@ class Planner:
             self.remove_point_cloud(name)
             return
         room = positive(resolution if radius is None else radius, "resolution of a cloud")
-        self._objects[name] = [(PointCloud(kept, room), pin.SE3.Identity())]
-        self._changed()
+        cloud = PointCloud(kept, room)
+        before = self._objects.get(name)
+        self._objects[name] = [(cloud, pin.SE3.Identity())]
+        if before is not None and len(before) == 1 and isinstance(before[0][0], PointCloud) and name not in self._held:
+            self._see(Obstacle(name, cloud, self.base.inverse()))
+        else:
+            self._changed()
+
+    def _see(self, seen: Obstacle) -> None:
+        """Put a cloud in the place of the last one of its name: tables of worlds are kept but for its points."""
+        for counting, before in self._scenes.items():
+            if seen.name in before.names:
+                obstacles = [seen if each.name == seen.name else each for each in before.obstacles]
+                scene = replace(before, obstacles=tuple(obstacles))
+                self._scenes[counting] = scene
+                for robot, known in [key for key in self._worlds if key[1] is before]:
+                    self._worlds[robot, scene] = self._worlds.pop((robot, known)).with_obstacle(seen)
 
     def remove_point_cloud(self, name: str = "scene_pcd") -> bool:
         """Remove a cloud; return whether there was one."""
