@@ -219,3 +219,8 @@ else:
         """What a notebook shows of a value (`_repr_html_`), or None."""
         drawn: str | None = import_module(f"rrtik_ompl.{_NOTEBOOK}").html_of(value)
         return drawn
+
+    def png_of(value: object) -> bytes | None:
+        """The picture of a value in a printed notebook (`_repr_png_`), or None."""
+        drawn: bytes | None = import_module(f"rrtik_ompl.{_NOTEBOOK}").png_of(value)
+        return drawn

@@ -229,6 +229,13 @@ def in_notebook(thing: object) -> str | None:
     return drawn
 
 
+def in_print(thing: object) -> bytes | None:
+    """Return the picture of a value that a printed notebook shows, as its ``_repr_png_``; see :func:`in_notebook`."""
+    package: Any = sys.modules["rrtik_ompl"]
+    drawn: bytes | None = package.png_of(thing)
+    return drawn
+
+
 class ForThread(Protocol):
     """An object that serves one thread at a time, and can be copied for another."""
 

@@ -21,7 +21,7 @@ from rrtik_ompl.base.arrays import (
     truths,
     usable_waypoints,
 )
-from rrtik_ompl.base.copies import as_value, changed, in_notebook
+from rrtik_ompl.base.copies import as_value, changed, in_notebook, in_print
 from rrtik_ompl.base.errors import InputError, in_file, listed, name_of, require
 from rrtik_ompl.base.kept import kept_with
 from rrtik_ompl.base.units import joint_units
@@ -75,6 +75,7 @@ class JointPath(Rows):
 
     __reduce__ = as_value
     _repr_html_ = in_notebook
+    _repr_png_ = in_print
 
     def __init__(
         self,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from rrtik_ompl.base.budget import Budget
 from rrtik_ompl.base.choices import ImproveStrategy, PathObjective, ProofMode
-from rrtik_ompl.base.copies import as_value, in_notebook, in_one_line
+from rrtik_ompl.base.copies import as_value, in_notebook, in_one_line, in_print
 from rrtik_ompl.base.errors import require
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.model.result import required
@@ -117,6 +117,7 @@ class Plan:
 
     __repr__ = in_one_line
     _repr_html_ = in_notebook
+    _repr_png_ = in_print
 
     def __post_init__(self) -> None:
         require(self.path, JointPath | None, "path of a plan")

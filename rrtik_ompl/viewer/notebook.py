@@ -12,7 +12,9 @@ from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.motion.trajectory import Trajectory
 from rrtik_ompl.planning.outcome import Plan
 from rrtik_ompl.viewer.page import page_and_picture
-from rrtik_ompl.viewer.subject import Showable
+from rrtik_ompl.viewer.picture import draw
+from rrtik_ompl.viewer.still import first_picture
+from rrtik_ompl.viewer.subject import Showable, subject_of
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
 
@@ -54,30 +56,38 @@ class InlinePage:
 
 
 def html_of(value: Plan | JointPath | Problem | World | Trajectory) -> str | None:
-    """Return what a notebook shows of a value; None if nothing can be drawn, so that its text is shown.
+    """Return what a notebook shows of a value; None if nothing can be drawn, so that its text is shown."""
+    parts = _parts_of(value)
+    if parts is None:
+        return None
+    planning = isinstance(value, (Plan, Problem))
+    return InlinePage(*page_and_picture(*parts, tree=getattr(value, "tree", None), still=not planning))._repr_html_()
+
+
+def png_of(value: Plan | JointPath | Problem | World | Trajectory) -> bytes | None:
+    """Return the picture that a printed notebook shows of a value; None if nothing can be drawn."""
+    parts = _parts_of(value)
+    if parts is None:
+        return None
+    subject = subject_of(*parts)
+    return first_picture(subject, *draw(subject))
+
+
+def _parts_of(
+    value: Plan | JointPath | Problem | World | Trajectory,
+) -> tuple[Showable, JointPath | Trajectory | None] | None:
+    """Return what is shown of a value, and the motion that is played; None if nothing can be drawn.
 
     A path or a trajectory knows its robot only by name, so it is drawn only for shipped robots.
     """
     if isinstance(value, Plan):
         if value.problem is None:
-            return None if value.path is None else html_of(value.path)
-        shown: Showable = value.problem
-        path: JointPath | Trajectory | None = value.path
-        tree = value.tree
-    elif isinstance(value, (JointPath, Trajectory)):
+            return None if value.path is None else _parts_of(value.path)
+        return value.problem, value.path
+    if isinstance(value, (JointPath, Trajectory)):
         robot = robot_called(value.robot_name, value.joint_names)
-        if robot is None:
-            return None
-        shown = robot
-        path = value
-        tree = None
-    else:
-        shown = value
-        path = None
-        tree = None
-
-    planning = isinstance(value, (Plan, Problem))
-    return InlinePage(*page_and_picture(shown, path, tree=tree, still=not planning))._repr_html_()
+        return None if robot is None else (robot, value)
+    return value, None
 
 
 def in_kernel() -> bool:

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from rrtik_ompl.base.arrays import TAU, Matrix, Vector, dimensions, frozen
 from rrtik_ompl.base.choices import Accuracy
-from rrtik_ompl.base.copies import as_value, changed, in_notebook, restored
+from rrtik_ompl.base.copies import as_value, changed, in_notebook, in_print, restored
 from rrtik_ompl.base.errors import InputError, ProblemError, listed, require
 from rrtik_ompl.base.kept import kept_with
 from rrtik_ompl.base.poses import rigid
@@ -131,6 +131,7 @@ class Problem:
 
     __reduce__ = as_value
     _repr_html_ = in_notebook
+    _repr_png_ = in_print
 
     def __repr__(self) -> str:
         return f"Problem('{self.name}', World({self.settings.summary}), to a {type(self.goal).__name__})"

@@ -23,7 +23,7 @@ from rrtik_ompl.base.arrays import (
     whole_number,
 )
 from rrtik_ompl.base.choices import Accuracy
-from rrtik_ompl.base.copies import ThreadOwn, changed, in_notebook, restored
+from rrtik_ompl.base.copies import ThreadOwn, changed, in_notebook, in_print, restored
 from rrtik_ompl.base.errors import DescriptionWarning, InputError, MeshWarning, listed, require
 from rrtik_ompl.base.poses import rigid
 from rrtik_ompl.constraints.held_regions import HeldRegions
@@ -137,6 +137,7 @@ class World(Judge):
         return f"World({self._settings.summary})"
 
     _repr_html_ = in_notebook
+    _repr_png_ = in_print
 
     @property
     def settings(self) -> WorldSettings:

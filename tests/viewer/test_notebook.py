@@ -1,5 +1,6 @@
 """What a notebook shows: short lines and pages in frames; nothing that waits for Ctrl-C."""
 
+import base64
 import html
 import pickle
 import re
@@ -40,6 +41,14 @@ def test_a_problem_a_world_and_a_plan_draw_the_page_of_view(problem, plan, tmp_p
         assert page_in(shown._repr_html_()) == (tmp_path / "page.html").read_text()
     rrtik.view(problem, plan.path, html=tmp_path / "page.html")
     assert page_in(plan._repr_html_()) == (tmp_path / "page.html").read_text()
+
+
+def test_a_printed_notebook_shows_the_first_view_alone(problem, plan):
+    """The picture beside the page, in its own right; text where nothing can be drawn."""
+    motion = rrtik.time_parameterize(plan.path, rrtik.load_robot("planar3"))
+    for shown in (problem, problem.world, plan, plan.path, motion):
+        assert base64.b64encode(shown._repr_png_()).decode() in shown._repr_html_()
+    assert rrtik.JointPath([[0.0], [1.0]], robot_name="nobody's")._repr_png_() is None
 
 
 def test_paths_and_trajectories_draw_their_robot(plan):

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.base.arrays import MOST_ROWS, Mask, Matrix, Rows, Vector, finite_array, frozen, not_negative, positive
-from rrtik_ompl.base.copies import as_value, changed, in_notebook, in_one_line, restored
+from rrtik_ompl.base.copies import as_value, changed, in_notebook, in_one_line, in_print, restored
 from rrtik_ompl.base.errors import InputError, PathWarning, at_most, require
 from rrtik_ompl.base.units import joint_units
 from rrtik_ompl.files.kinds import read
@@ -116,6 +116,7 @@ class Trajectory:
 
     __reduce__ = as_value
     _repr_html_ = in_notebook
+    _repr_png_ = in_print
 
     def __init__(
         self,
