@@ -13,7 +13,7 @@ from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.pilot import guide
 from rrtik_ompl.pilot.events import Answer, Give, SetPoint, alarm, news, refused
 from rrtik_ompl.pilot.interlock import BY_HAND, FOLLOWING, ON_A_ROUTE, Verb
-from rrtik_ompl.pilot.motion.supervisor import FOLLOW_SECONDS, amount, slack_of
+from rrtik_ompl.pilot.motion.supervisor import FAULTS, FOLLOW_SECONDS, amount, slack_of
 from rrtik_ompl.pilot.queries import joint_range, out_of_view, world_by_hand
 from rrtik_ompl.pilot.routes.follower import MADE, Follower, Track
 from rrtik_ompl.pilot.routes.manoeuvre import check_move, move_refusal, way_out
@@ -228,9 +228,9 @@ def watch(means: Means, state: State, standing: tuple[int, float, float] | None)
     if is_near:
         return released.say(refused(f"{name} comes no nearer than {amount(remaining, prismatic=prismatic)}: stopped"))
 
-    description = f"does not move ({amount(moved, prismatic=prismatic)} in {seconds:.1f} s)"
+    description = FAULTS["dead"].format(joint=name, amount=amount(moved, prismatic=prismatic), seconds=seconds)
     stopped = f"stopped, for an arm that follows later than {FOLLOW_SECONDS:g} s is not driven"
-    return released.say(alarm(f"{name} {description}: {stopped}"))
+    return released.say(alarm(f"{description}: {stopped}"))
 
 
 def still_free(state: State) -> bool:

@@ -28,6 +28,17 @@ from rrtik_ompl.base.units import joint_unit, reading
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.pilot.routes.follower import SLIDING_TOLERANCE, TOLERANCE
 
+FAULTS = {
+    "jump": "{joint} jumped by {amount} between two readings",
+    "fast": "{joint} moves faster than {amount}/s",
+    "reverse": "{joint} goes the wrong way, by {amount}",
+    "other": "{joint} moved by {amount} while {driven} driven",
+    "untold": "{joint} moved by {amount} untold",
+    "runaway": "{joint} moved on by {amount} after the stop",
+    "beyond": "{joint} went {amount} too far",
+    "dead": "{joint} does not move ({amount} in {seconds:.1f} s)",
+}  # what an arm can do against its set points, however it is driven; the last is no fault that is latched
+
 FASTEST = 1.5  # a joint may move at this multiple of its rate
 REACTION_SECONDS = 0.08  # time from a reading until an arm that is stopped because of it stands still
 # The same for a joint that moves backwards. It may be shorter: the way back is free, and valves oscillate a little.
@@ -257,8 +268,9 @@ class Supervisor:
         name = self._names[joint]
         distance = self._amount_in_words(joint, float(change[joint]))
         if abs(change[joint]) > self._slack[joint] + allowed[joint]:
-            return f"{name} jumped by {distance} between two readings"
-        return f"{name} moves faster than {self._amount_in_words(joint, FASTEST * float(self._rates[joint]))}/s"
+            return FAULTS["jump"].format(joint=name, amount=distance)
+        fastest = self._amount_in_words(joint, FASTEST * float(self._rates[joint]))
+        return FAULTS["fast"].format(joint=name, amount=fastest)
 
     def _off_course(self, q: Vector, change: Vector, time: float) -> str:
         """Return, in words, which joint would leave its slack before the arm could be stopped; "" if none would.
@@ -290,28 +302,27 @@ class Supervisor:
 
         joint = int(excess.argmax())
         if excess[joint] > 1.0 and direction[joint] != 0.0:
-            return (
-                f"{self._names[joint]} goes the wrong way, by {self._amount_in_words(joint, float(deviation[joint]))}"
-            )
+            wrong_way = self._amount_in_words(joint, float(deviation[joint]))
+            return FAULTS["reverse"].format(joint=self._names[joint], amount=wrong_way)
         if excess[joint] > 1.0 and (self._active or self._changes_after_stop >= GOING_ON):
             return self._off_course_in_words(joint, float(deviation[joint]))
 
         joint = int(overshoot.argmax())
         if overshoot[joint] > 1.0:
             beyond = self._amount_in_words(joint, float(q[joint] - self._set_point[joint]))
-            return f"{self._names[joint]} went {beyond} too far"
+            return FAULTS["beyond"].format(joint=self._names[joint], amount=beyond)
         return ""
 
     def _off_course_in_words(self, joint: int, deviation: float) -> str:
         name = self._names[joint]
         distance = self._amount_in_words(joint, deviation)
         if not self._active:
-            return f"{name} moved on by {distance} after the stop"
+            return FAULTS["runaway"].format(joint=name, amount=distance)
         driven = [self._names[k] for k in np.flatnonzero(self._direction != 0.0)]
         if not driven:
-            return f"{name} moved by {distance} untold"
-        what_was_driven = driven[0] if len(driven) == 1 else "others"
-        return f"{name} moved by {distance} while {what_was_driven} was driven"
+            return FAULTS["untold"].format(joint=name, amount=distance)
+        what_was_driven = f"{driven[0]} was" if len(driven) == 1 else "others were"
+        return FAULTS["other"].format(joint=name, amount=distance, driven=what_was_driven)
 
     def _note_motion(self, q: Vector, time: float) -> None:
         """Store value and time for each joint that has moved, or that need not move since it is near its set point."""

@@ -24,16 +24,25 @@ class HostileArm(SimulatedArm):
 
     Attributes:
         fault: "other" (the next joint moves in place of the one that is told), "reverse", "jump" (the reading of the
-            joint that moves jumps by 34 degrees), "dead", "runaway" (it does not stop); "" for none.
+            joint that moves jumps by 34 degrees), "dead", "runaway" (it does not stop), "fast" (by five times),
+            "frozen" (its reading stays as it is), "offset" (its first joint reads 34 degrees too much); "" for none.
     """
 
     def __init__(self, robot=ROBOT, start=PROBLEM.start, fault=""):
         super().__init__(robot, start)
         self.fault = fault
         self._told = None
+        self._frozen = None
 
     def read(self):
         q = super().read()
+        self._frozen = (q if self._frozen is None else self._frozen) if self.fault == "frozen" else None
+        if self._frozen is not None:
+            return self._frozen.copy()
+        if self.fault == "offset":
+            return q + 0.6 * np.eye(len(q))[0]
+        if self.fault == "jump" and self._course is not None:
+            return q + 0.6 * np.eye(len(q))[int(np.abs(self._course - q).argmax())] * (-1.0 if q.max() > 0.0 else 1.0)
         if self.fault == "jump" and self._goal is not None:
             joint = self._goal[0]
             q[joint] += 0.6 if q[joint] < 0.0 else -0.6  # to where the joint can be
@@ -43,8 +52,24 @@ class HostileArm(SimulatedArm):
         if self.fault != "runaway":
             super().stop()
 
+    def _advance_course(self, seconds):
+        """All joints are told to move: the next ones do, or backwards, or none, or on and on."""
+        step = np.clip(self._course - self._q, -self._rates * seconds, self._rates * seconds)
+        if self.fault == "runaway":
+            self._told = np.sign(step) if self._told is None else self._told
+            step = self._told * self._rates * seconds
+        self._q = (
+            self._q + {"other": np.roll(step, 1), "reverse": -step, "dead": 0.0 * step, "runaway": step}[self.fault]
+        )
+
     def advance(self, seconds):
-        if self.fault in ("", "jump") or self._goal is None:
+        if self.fault == "fast":
+            super().advance(5.0 * seconds)
+            return
+        if self.fault in ("other", "reverse", "dead", "runaway") and self._course is not None:
+            self._advance_course(seconds)
+            return
+        if self.fault in ("", "jump", "frozen", "offset") or self._goal is None:
             super().advance(seconds)
             return
         joint, target = self._goal

@@ -129,6 +129,7 @@ function showAge() {
   const reasons = [];
   if (state.camera_lost && !past) reasons.push(`Camera lost: ${state.camera_lost}. What is shown is the last known state.`);
   if (state.arm_lost) reasons.push(`${state.arm_lost}`);
+  if (state.arm_fault) reasons.push(`${state.arm_fault}. It has to be mended there, and reset here.`);
   if (!reasons.length && silent > STALE_S && !past) reasons.push(`No news from the server for ${fixed(silent)} s. The arm stops where it hears nothing from this page.`);
   else if (!reasons.length && stale && age !== null) reasons.push(state.stale ? "The picture is stale: nothing moves." : `The picture comes late: it is up to ${fixed(age)} s old.`);
   if (state.unseen && !past) reasons.push(`${inWords(state.unseen)}: no route is led past it, and by hand it may be elsewhere.`);
@@ -293,6 +294,7 @@ function showAim() {
   const { nearest, to_target: edges } = state.aids, gap = (pair) => inWords(`${pair.first} – ${pair.second}`);
   if (nearest) rows.push([gap(nearest), `${fixed(nearest.mm, 0)} mm`]);
   if (edges && aim.to) rows.push(["gripper to its edges", `${fixed(edges.mm, 0)} mm`]);
+  for (const each of state.arm_health) rows.push([`arm: ${each.name}${each.ok ? "" : " ⚠"}`, `${fixed(each.value)} ${each.unit}`]);
   for (const seen of state.objects) rows.push([`${seen.name} seen to within`, `± ${fixed(seen.sigma_mm, 2)} mm`]);
   for (const gone of state.objects.filter(isOutOfView)) rows.push([`${gone.name} not in view for`, `${fixed(gone.unseen, 0)} s`]);
   const list = byId("depth"), key = rows.map((row) => row[0]).join();
