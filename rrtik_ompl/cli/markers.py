@@ -111,7 +111,7 @@ def calibrate_camera(
 
     with progress("detecting the board"):
         taken = list(pictures_from(photographs[0]))
-        found = calibrate([picture.pixels for picture in taken], board)
+        found = calibrate([picture.pixels for picture in taken], board, [picture.name for picture in taken])
     found.save(out)
 
     _tell(found, [picture.name for picture in taken])
@@ -156,6 +156,8 @@ def _tell(found: Calibration, names: list[str]) -> None:
     heads = ("fx", "fy", "cx", "cy")
     say(", ".join(f"{n} {v:.2f} +- {s:.2f}" for n, v, s in zip(heads, values, found.sigmas, strict=True)))
 
+    if found.advice:
+        say(f"warning: {found.advice}")
     if found.camera.tone is not None:
         say(f"tone {found.camera.tone:.2f} (0: grey values are linear, 1: coded as sRGB)")
 

@@ -7,6 +7,7 @@ import pytest
 from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.cameras.pictures import Picture
 from rrtik_ompl.sensing.markers import search as searching
+from rrtik_ompl.sensing.markers.alignment import MIN_LIKENESS
 from rrtik_ompl.sensing.markers.detection import find_markers
 from rrtik_ompl.sensing.markers.dictionaries import marker_cells
 from rrtik_ompl.sensing.markers.marker_map import MarkedObject, MarkerMap, MountedMarker
@@ -45,6 +46,24 @@ def test_a_clear_marker_hides_no_faint_one(size):
     corners = 380.0 + 8 * np.array([1, 9, 9, 1]) - 0.5
     assert np.abs(faint.corners[:, 0] - corners).max() < 0.3
     assert faint.likeness > 0.9
+
+
+@pytest.mark.parametrize(("family", "accepted"), [("4x4_50", False), ("16h5", False), (FAMILY, True)])
+def test_a_code_of_few_bits_is_accepted_only_if_every_cell_is_right(family, accepted):
+    """A white cell of which 45 % are black still counts as white where bits are read."""
+    family = f"apriltag_{family}" if family == "16h5" else family
+    cells = np.pad(marker_cells(family, 3), 1, constant_values=255)
+    drawn = np.kron(cells, np.ones((20, 20)))
+    row, column = np.argwhere(cells[2:-2, 2:-2])[0] + 2
+    whole = drawn.copy()
+    drawn[20 * row : 20 * row + 9, 20 * column : 20 * column + 20] = 0
+    for sheet, fine in ((whole, True), (drawn, accepted)):
+        gray = np.full((480, 640), 128.0)
+        gray[100 : 100 + len(sheet), 200 : 200 + len(sheet)] = 20 + 0.8 * sheet
+        picture = cv2.GaussianBlur(gray, (0, 0), 0.8).round().astype(np.uint8)
+        (marker,) = find_markers(picture, family, wanted=[3])
+        assert (marker.likeness >= MIN_LIKENESS) == fine
+        assert (marker.spread is not None) == fine
 
 
 @pytest.fixture

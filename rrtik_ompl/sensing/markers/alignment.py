@@ -23,6 +23,8 @@ from rrtik_ompl.sensing.markers.lighting import LINEAR, SRGB, TONES, likenesses,
 Pixels = NDArray[np.float32]
 
 MIN_LIKENESS = 0.9  # below it the marker is partly covered or the picture is not sharp
+# Largest error of a cell as a share of the contrast: cells of markers have up to 0.21, of a symbol on a box 0.47.
+MAX_CELL_ERROR = 0.3
 _MAX_CORNER_SHIFT = 0.25  # share of a side; the detector sometimes returns inner edges instead of outer ones
 # Range of pixels per cell in the ideal picture. It should be near the cell's size in the camera's picture, because
 # coarser sampling shifts the corners.
@@ -81,6 +83,7 @@ def aligned_corners(
     cells: NDArray[np.uint8],
     tone: float | None = None,
     before: Look | None = None,
+    spoilt: int = 0,
 ) -> Aligned:
     """Refine the corners of a detected marker, and estimate their covariance.
 
@@ -90,9 +93,11 @@ def aligned_corners(
         cells: The ideal marker including its border, shape (n, n).
         tone: Tone of the picture; None to use the one with which the marker fits best.
         before: Look of the marker in the previous picture; a search that starts there is three times as fast.
+        spoilt: Number of cells that may look as they should not, because the code can tell its markers without them.
 
     Returns:
-        The aligned marker; with a likeness below `MIN_LIKENESS` it has the corners that were given.
+        The aligned marker; its likeness is at most that of the worst cell, if that one is too unlike. With a likeness
+        below `MIN_LIKENESS` it has the corners that were given.
     """
     framed = np.pad(cells, 1, constant_values=255)
     low, square, fit = _lay_over(gray, corners, framed, _CELL_PIXELS, tone, before)
@@ -103,8 +108,10 @@ def aligned_corners(
     moved_corners = np.asarray(moved, dtype=np.float64)
     if np.abs(moved_corners + low - corners).max() > max(2.0, _MAX_CORNER_SHIFT * mean_side(corners)):
         return Aligned(corners, 0.0, None, None)
-    if fit.likeness < MIN_LIKENESS:
-        return Aligned(corners, fit.likeness, None, None)
+    worst = float(np.sort(cell_errors(fit.model, fit.seen, len(cells)))[-1 - spoilt])
+    likeness = fit.likeness if worst <= MAX_CELL_ERROR else min(fit.likeness, 1.0 - worst)
+    if likeness < MIN_LIKENESS:
+        return Aligned(corners, likeness, None, None)
 
     corners, spread = corner_spread(fit.model, fit.seen, square, moved_corners)
     return Aligned(corners + low, fit.likeness, spread, fit.look)
@@ -125,6 +132,36 @@ def look_of(gray: NDArray[np.uint8], corners: Matrix, framed: NDArray[np.uint8])
 def mean_side(corners: Matrix) -> float:
     """Return the mean length of the edges of a marker, from its corners, shape (4, 2), in their unit."""
     return float(np.linalg.norm(np.roll(corners, -1, 0) - corners, axis=1).mean())
+
+
+def cell_errors(model: Pixels, seen: Pixels, count: int) -> Vector:
+    """Return how far cells of a marker are from what they should be, as shares of the contrast of black and white.
+
+    An error of 1 is a white cell that looks black; above 0.5 a cell is nearer to the other colour. A correlation of the
+    whole marker does not see single cells: any dark square with a light blot has a likeness of 0.95 with some marker.
+
+    Args:
+        model: The ideal marker as the picture would render it, with a rim, shape (h, h).
+        seen: The picture in the frame of the model, of the same shape.
+        count: Cells along a side of the marker.
+
+    Returns:
+        Errors of the cells, row by row, then of the pieces of the white rim, shape (count^2 + 4 count,).
+    """
+    cell = round(len(model) / (count + 2.0 * _RIM_CELLS))
+    rim = (len(model) - count * cell) // 2
+    inset = cell // 4
+    lines = [slice(rim + k * cell + inset, rim + (k + 1) * cell - inset) for k in range(count)]
+    before, after = slice(0, rim), slice(len(model) - rim, len(model))
+
+    pieces = [np.s_[row, column] for row in lines for column in lines]
+    pieces += [piece for line in lines for side in (before, after) for piece in (np.s_[side, line], np.s_[line, side])]
+    shown_means = np.array([model[piece].mean() for piece in pieces])
+    seen_means = np.array([seen[piece].mean() for piece in pieces])
+
+    middle = 0.5 * (shown_means.min() + shown_means.max())
+    contrast = shown_means[shown_means > middle].mean() - shown_means[shown_means <= middle].mean()
+    return np.asarray(np.abs(seen_means - shown_means) / max(float(contrast), 1e-6), dtype=np.float64)
 
 
 class _Fit(NamedTuple):

@@ -14,7 +14,7 @@ from rrtik_ompl.base.arrays import LARGEST, Matrix, finite_number, frozen, whole
 from rrtik_ompl.base.errors import InputError, require
 from rrtik_ompl.sensing.markers.alignment import Look, aligned_corners, mean_side
 from rrtik_ompl.sensing.markers.chessboard import SMALLEST_SIDE
-from rrtik_ompl.sensing.markers.dictionaries import DICTIONARIES, marker_cells, table_of
+from rrtik_ompl.sensing.markers.dictionaries import DICTIONARIES, marker_cells, spare_bits, table_of
 from rrtik_ompl.sensing.markers.search import quick, search
 
 
@@ -79,7 +79,8 @@ def find_markers(
             markers.append(SeenMarker(dictionary, number, frozen(rough), np.nan))
             continue
 
-        fit = aligned_corners(gray, rough, marker_cells(dictionary, number), tone, last_looks.get(number))
+        cells = marker_cells(dictionary, number)
+        fit = aligned_corners(gray, rough, cells, tone, last_looks.get(number), spare_bits(dictionary))
         markers.append(SeenMarker(dictionary, number, frozen(fit.corners), fit.likeness, fit.spread, fit.look))
 
     return tuple(markers)

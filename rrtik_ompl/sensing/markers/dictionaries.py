@@ -20,6 +20,8 @@ DICTIONARIES = {
     "aruco_original": "DICT_ARUCO_ORIGINAL",
     "aruco_mip_36h12": "DICT_ARUCO_MIP_36h12",
 }
+# Bits that a code must be able to correct, so that markers with wrong cells are accepted.
+_FAR_APART = 3
 
 
 def marker_cells(dictionary: str, number: int) -> NDArray[np.uint8]:
@@ -38,6 +40,15 @@ def marker_cells(dictionary: str, number: int) -> NDArray[np.uint8]:
 
     cells = cv2.aruco.generateImageMarker(table, number, table.markerSize + 2)
     return np.ascontiguousarray(np.rot90(cells, 2 if is_turned(dictionary) else 0), dtype=np.uint8)
+
+
+def spare_bits(dictionary: str) -> int:
+    """Return how many cells of a marker may be wrong without a doubt about its number; 0 for codes of few bits.
+
+    Codes that cannot correct at least `_FAR_APART` bits are found in any clutter, if wrong cells are allowed.
+    """
+    bits = int(table_of(dictionary).maxCorrectionBits)
+    return bits if bits >= _FAR_APART else 0
 
 
 def is_turned(dictionary: str) -> bool:

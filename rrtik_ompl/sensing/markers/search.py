@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.sensing.markers.alignment import mean_side
-from rrtik_ompl.sensing.markers.dictionaries import is_turned, table_of
+from rrtik_ompl.sensing.markers.dictionaries import is_turned, spare_bits, table_of
 
 Gray = NDArray[np.uint8]
 Pixels = NDArray[np.float32]
@@ -37,8 +37,6 @@ _LEAST_PERIMETER = 24.0  # [pixels]; of a marker in the picture that is searched
 # [pixels]; largest threshold window of the thorough detector, which also corrects as many bits as the code allows.
 # OpenCV's default is 23.
 _WIDEST = 53
-# Bits that a dictionary must be able to correct for this; others would find markers in any clutter.
-_FAR_APART = 3
 # How far a marker may have moved since the previous picture, in sides and in pixels.
 _NEAR_SIDES, _NEAR_PIXELS = 1.0, 16
 _NEAR_OUTLINE_SHARE = 0.5  # share of the longer side of that window; smaller outlines are noise
@@ -344,8 +342,7 @@ def _detector(
 
     if thorough:
         parameters.adaptiveThreshWinSizeMax = _WIDEST
-        far_apart = table_of(dictionary).maxCorrectionBits >= _FAR_APART
-        parameters.errorCorrectionRate = 1.0 if far_apart else parameters.errorCorrectionRate
+        parameters.errorCorrectionRate = 1.0 if spare_bits(dictionary) else parameters.errorCorrectionRate
     if single:
         parameters.adaptiveThreshWinSizeMin = parameters.adaptiveThreshWinSizeMax = _SINGLE
 
