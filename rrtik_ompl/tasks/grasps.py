@@ -147,8 +147,12 @@ def grasps(
     kept_apart = not_negative(clearance, "clearance of grasps")
     length = not_negative(approach, "approach of grasps")
     share = positive(opened, "opened of grasps")
-    at_most(share, 1.0, "opened of grasps")
+    if share > 1.0:
+        raise InputError(f"opened of grasps: expected a share above 0, at most 1, got {share:g}")
     posture = mid_range_configuration(world.robot) if near is None else world.robot.configuration(near, "near")
+    fault = world.robot.limit_fault(posture)
+    if fault:
+        raise InputError(f"near, of grasps: {fault}")
     thing = world.scene.obstacle(obstacle)
     if not thing.shape.bounded:
         raise InputError(f"grasps: '{obstacle}' is not bounded, so that no hand goes around it; give a box, or a mesh")

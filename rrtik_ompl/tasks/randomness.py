@@ -13,7 +13,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.base.arrays import Matrix, Vector, finite_array, frozen, not_negative
+from rrtik_ompl.base.arrays import TAU, Matrix, Vector, finite_array, frozen, not_negative
 from rrtik_ompl.base.copies import as_value, set_fields
 from rrtik_ompl.base.errors import InputError, ProblemError, UnknownNameError, listed, require
 from rrtik_ompl.geometry.collision.distances import measured
@@ -69,6 +69,9 @@ class Displacement:
     ) -> None:
         given = zip(COORDINATES, (x, y, z, roll, pitch, yaw), strict=True)
         rows = [_range(values, f"displacement: {name}") for name, values in given]
+        for name, row in zip(COORDINATES[3:], rows[3:], strict=True):
+            if np.abs(row).max() > TAU:
+                raise InputError(f"displacement: {name}: {np.abs(row).max():g} rad is more than a turn; give radians")
         require(along_with, str | None, "along_with of a displacement", "name an obstacle")
         centre = None if about is None else frozen(finite_array(about, (3,), "displacement: about"))
         set_fields(self, bounds=frozen(rows), about=centre, along_with=along_with)

@@ -294,3 +294,8 @@ def test_the_command_prints_what_has_come_of_it(capsys):
     assert (said["count"], said["wanted"], said["reason"]) == (2, 2, "")
     assert run(["demos", "reach.yaml", "--out", "out", "--count", "2", "--seed", "5"]) == 2
     assert "was begun with another seed" in capsys.readouterr().err.replace("\n  ", " ")
+
+
+def test_angles_in_degrees_are_no_displacement():
+    with pytest.raises(InputError, match="yaw: 45 rad is more than a turn; give radians"):
+        Displacement(yaw=(-45, 45))

@@ -212,6 +212,12 @@ def test_a_hand_whose_fingers_are_guided_side_by_side_has_grasps_too():
         (lambda world: rrtik.grasps(world, "thing", friction=0.0), InputError, "friction of grasps"),
         (lambda world: rrtik.grasps(world, "thing", clearance=-1.0), InputError, "clearance of grasps"),
         (lambda world: rrtik.grasps(world, "thing", near=[0.0]), InputError, "near"),
+        (
+            lambda world: rrtik.grasps(world, "thing", near=[0, -45, 0, -135, 0, 90, 45]),
+            InputError,
+            "near, of grasps: .*outside its limits",
+        ),
+        (lambda world: rrtik.grasps(world, "thing", opened=1.5), InputError, "opened of grasps"),
         (lambda world: rrtik.grasps(world, "floor"), InputError, "'floor' is not bounded"),
         (
             lambda world: rrtik.grasps(with_robot(world, rrtik.load_robot("planar3")), "thing"),
