@@ -1,4 +1,4 @@
-"""Read and write calibrated cameras as YAML files; files of OpenCV and ROS can be read, too."""
+"""Read and write calibrated cameras as YAML files; files of OpenCV, ROS and kalibr can be read, too."""
 
 from __future__ import annotations
 
@@ -90,6 +90,8 @@ def read_camera(file: str | os.PathLike[str]) -> Camera:
     document = read_yaml(file)
     if is_of_ros(document):
         return camera_from_ros(document)
+    if "cam0" in document.data:
+        return camera_from_kalibr(document)
 
     entry = parse(document, CameraFile).camera
     with document.at(("camera",)):
@@ -187,6 +189,29 @@ def camera_from_ros(document: YamlDocument) -> Camera:
     entry = parse(document, CameraInfo)
     with document.at(()):
         return entry.build()
+
+
+def camera_from_kalibr(document: YamlDocument) -> Camera:
+    """Return the first camera of a file of kalibr (camchain).
+
+    Raises:
+        InputError: If it cannot be used, such as one with the lens of a fisheye; one line with file, line and key.
+    """
+    entry = document.data["cam0"]
+    with document.at(("cam0",)):
+        try:
+            models = f"{entry['camera_model']}-{entry['distortion_model']}"
+            (fx, fy, cx, cy), lens, (width, height) = (
+                entry[word] for word in ("intrinsics", "distortion_coeffs", "resolution")
+            )
+        except (KeyError, TypeError, ValueError):
+            raise InputError(
+                "a file of kalibr needs camera_model, distortion_model, intrinsics of four numbers, distortion_coeffs "
+                "and resolution"
+            ) from None
+        if models != "pinhole-radtan":
+            raise InputError(f"a file of kalibr with the model {models}; pinhole-radtan is read: calibrate with that")
+        return _camera([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]], lens, width, height)
 
 
 def is_of_ros(document: YamlDocument) -> bool:

@@ -84,6 +84,30 @@ def test_what_is_no_camera_of_this_kind_is_refused_in_one_line(tmp_path, text, s
     assert "\n" not in str(refused.value)
 
 
+KALIBR = """\
+cam0:
+  camera_model: pinhole
+  distortion_model: radtan
+  distortion_coeffs: [-0.36, 0.11, 0.001, 0.0005]
+  intrinsics: [438.78, 437.35, 305.59, 243.73]
+  resolution: [640, 480]
+  rostopic: /camera
+"""
+
+
+def test_a_file_of_kalibr_is_read_or_named_as_such(tmp_path):
+    file = tmp_path / "camchain.yaml"
+    file.write_text(KALIBR)
+    found = Camera.load(file)
+    assert found.matrix[[0, 1, 0, 1], [0, 1, 2, 2]].tolist() == [438.78, 437.35, 305.59, 243.73]
+    assert found.distortion.tolist() == [-0.36, 0.11, 0.001, 0.0005, 0.0]
+    assert (found.width, found.height) == (640, 480)
+    for wrong in (KALIBR.replace("radtan", "equidistant"), KALIBR.replace("resolution", "size")):
+        file.write_text(wrong)
+        with pytest.raises(InputError, match=r"camchain.yaml:\d+: cam0: a file of kalibr"):
+            Camera.load(file)
+
+
 def test_a_file_of_opencv_without_the_pictures_size_says_what_is_missing(tmp_path):
     file = tmp_path / "intrinsics.yml"
     storage = cv2.FileStorage(str(file), cv2.FILE_STORAGE_WRITE)

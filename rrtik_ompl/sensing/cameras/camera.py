@@ -94,7 +94,7 @@ class Camera:
 
     @staticmethod
     def load(file: str | os.PathLike[str]) -> Camera:
-        """Read a camera file: our own format, the files of OpenCV's tools, or a camera_info file of ROS.
+        """Read a camera file: our own format, or one of OpenCV, ROS (camera_info) or kalibr.
 
         Raises:
             InputError: If the file cannot be used; one line with file, line, key, what was found and the remedy.
