@@ -263,5 +263,9 @@ class PathWarning(UserWarning):
     """A path or motion is not taken, or not changed, in the way that its author may have meant; the line says how."""
 
 
+class PictureWarning(UserWarning):
+    """A picture shows less than there is; checks and plans use all of it."""
+
+
 class ProofWarning(UserWarning):
     """A configuration cannot be proven free, so that no motion from or to it counts as free."""

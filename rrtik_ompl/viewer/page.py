@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import html
 import json
+import warnings
 from collections.abc import Sequence
 from functools import cache
 from importlib.resources import files
@@ -15,12 +16,13 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.base.errors import InputError, listed
+from rrtik_ompl.base.errors import InputError, PictureWarning, listed
 from rrtik_ompl.model.transitions import single_joint
 from rrtik_ompl.replanning.record import ReplanRun
 from rrtik_ompl.tasks.played import PlayedTask
 from rrtik_ompl.viewer.drawing.framing import Frame
 from rrtik_ompl.viewer.drawing.marks import Mark
+from rrtik_ompl.viewer.drawing.meshes import drawn_coarser
 from rrtik_ompl.viewer.page_fixed import packed
 from rrtik_ompl.viewer.page_planner import page_planner
 from rrtik_ompl.viewer.picture import draw
@@ -50,6 +52,7 @@ SCRIPTS = (
     "camera.js",
     "shots.js",
 )
+SMALL_PICTURE = 560, 350  # [px]; of the first view, for browsers without WebGL
 BOX_SHARE = 0.1  # side of an added box, as a share of the arm's diagonal
 WITH_SEARCH = tuple(each for name in SCRIPTS for each in ((name, "search.js") if name == "panel.js" else (name,)))
 STARTING = ("unpack.js", "start.js")
@@ -62,6 +65,8 @@ PLANNING = (
     "opinion.js",
     "planner.js",
     "running.js",
+    "reaching.js",
+    "handles.js",
     "dragging.js",
     "controls.js",
 )
@@ -138,10 +143,17 @@ def page_and_picture(
 
     grown = search_tree_of(tree, subject.robot)
     recording, frame = draw(subject)
+    coarser = drawn_coarser(subject.scene)
+    if coarser:
+        warnings.warn(f"{subject.name}: {coarser}", PictureWarning, stacklevel=3)
     first_view = first_picture(subject, recording, frame) if picture else b""
+    small = (
+        b"" if picture else first_picture(subject, recording, frame, SMALL_PICTURE, 1.0)
+    )  # a notebook has the large one
     heading = _title(subject) if title is None else title
 
     told = story_of(subject, frame, heading, subject.name if title is None else "")
+    told["coarser"] = coarser
     told["plan"] = None if still else _planning(shown, subject, frame)
 
     if asks and (not told["plan"] or told["plan"]["courses"]):
@@ -162,6 +174,7 @@ def page_and_picture(
         title=html.escape(heading),
         policy=html.escape(ASKING_POLICY if asks else POLICY),
         style=asset("page.css"),
+        picture=base64.b64encode(small).decode("ascii"),
         notice=_meshcat("main.min.js.LICENSE.txt").replace("--", "- -"),
         meshcat=_packed_engine(),
         story=story.replace("<", "\\u003c"),  # escaped, so that no name can close the script element
@@ -181,7 +194,7 @@ def _planning(shown: Showable, subject: Subject, frame: Frame) -> dict[str, Any]
         return None
 
     one_joint = subject.is_path and bool(single_joint(subject.waypoints))
-    found = page_planner(shown, subject.end, BOX_SHARE * frame.arm, one_joint=one_joint)
+    found = page_planner(shown, subject.end, BOX_SHARE * frame.arm, whole=frame.size, one_joint=one_joint)
     return None if found is None else found | play_pace(shown.robot, frame.arm)
 
 

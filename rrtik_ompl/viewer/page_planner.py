@@ -15,6 +15,7 @@ from rrtik_ompl.base.arrays import Vector
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.base.poses import pose, pose_row
 from rrtik_ompl.geometry.collision.bodies import Body
+from rrtik_ompl.geometry.collision.distances import measured
 from rrtik_ompl.geometry.collision.shape_table import core_of
 from rrtik_ompl.ik.kernel_tables import call_table, limb_of
 from rrtik_ompl.ik.numeric.descent import PATIENCE, STEPS
@@ -43,6 +44,7 @@ from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import Obstacle, Scene, TimedPoses
 from rrtik_ompl.model.shapes import Box, Capsule, Cylinder, Shape, Sphere
 from rrtik_ompl.problem_files.problem import problem_data
+from rrtik_ompl.viewer.drawing.framing import obstacle_corners
 from rrtik_ompl.viewer.drawing.robot_picture import node_name
 from rrtik_ompl.viewer.page_fixed import packed, standing_parts
 from rrtik_ompl.viewer.story import dragged_tips, tip_entry
@@ -54,6 +56,8 @@ SAMPLES = 60_000  # samples of a search
 TRIES = 2000  # attempted shortcuts
 SPARES = {"box": 4, "sphere": 2, "cylinder": 2, "capsule": 2}  # obstacles that a user can add
 FAR_AWAY = 1e3  # [m] below the arm
+LARGE_SHARE = 0.5  # of all that is shown: larger obstacles are locked, and so are those that touch the base
+NEAR_SHARE = 0.025  # so near to the base, an obstacle counts as touching it
 PATH_RESULTS = ("length", "transitions", "waypoints")  # fields of a path file that the page fills in
 
 BASE = 1 << 20  # address of the image; the stack of the kernels lies below
@@ -78,7 +82,9 @@ TABLES: dict[str, type[Record]] = {
 }
 
 
-def page_planner(problem: Problem, goal: Vector, side: float, *, one_joint: bool = False) -> dict[str, Any] | None:
+def page_planner(
+    problem: Problem, goal: Vector, side: float, *, whole: float = np.inf, one_joint: bool = False
+) -> dict[str, Any] | None:
     """Return the data with which a page plans from the start of a problem to joint values, as values of JSON.
 
     Obstacles that move are at their places of time 0.
@@ -87,6 +93,7 @@ def page_planner(problem: Problem, goal: Vector, side: float, *, one_joint: bool
         problem: What the page shows.
         goal: End of the path, shape (dof,).
         side: Initial side of the obstacles that a user may add [m].
+        whole: Diagonal of the box around all that is shown [m]: obstacles that are large beside it are locked at first.
         one_joint: Whether the page moves one joint at a time at first.
 
     Returns:
@@ -115,7 +122,8 @@ def page_planner(problem: Problem, goal: Vector, side: float, *, one_joint: bool
     except InputError:  # joint ranges exceed what the margins of the kernels cover
         return None
 
-    obstacles = _obstacles(problem.world, motions.fast, clearances.searched_clearance, spare)
+    locked = _locked(problem.world, whole)
+    obstacles = _obstacles(problem.world, motions.fast, clearances.searched_clearance, spare, locked)
     fixed = standing_parts(problem.world)
     if fixed is None or not {course["name"] for course in courses} <= {obstacle["name"] for obstacle in obstacles}:
         return None
@@ -204,7 +212,25 @@ def _tips(problem: Problem, image: MemoryImage) -> list[dict[str, Any]]:
     return tips
 
 
-def _obstacles(world: World, fast: FastWorld, kept: float, spare: set[str]) -> list[dict[str, Any]]:
+def _locked(world: World, whole: float) -> set[str]:
+    """Return the obstacles that do not follow the pointer at first: floors, walls, and what the base stands on."""
+    locked = set()
+    for obstacle in world.scene.obstacles:
+        corners = obstacle_corners(obstacle) if obstacle.shape.bounded else np.zeros((1, 3))
+        if float(np.linalg.norm(np.ptp(corners, axis=0))) > LARGE_SHARE * whole:
+            locked.add(obstacle.name)
+
+    standing = [k for k, body in enumerate(world.bodies) if body.joint == 0]
+    base = [k for k in standing if world.bodies[k].kind != "obstacle"]
+    others = [k for k in standing if world.bodies[k].kind == "obstacle" and world.bodies[k].name not in locked]
+    pairs = [(k, other) for k in base for other in others]
+    frames = world.robot.joint_frames(np.zeros((1, world.robot.dof)))[0]
+    near = NEAR_SHARE * whole if np.isfinite(whole) else 0.0
+    contacts = measured(world.bodies, pairs, frames, near_only=False)
+    return locked | {contact.second for contact in contacts if contact.distance < near}
+
+
+def _obstacles(world: World, fast: FastWorld, kept: float, spare: set[str], locked: set[str]) -> list[dict[str, Any]]:
     """Return the movable obstacles, which are simple shapes, in packed form and with their clearance [m]."""
     found = []
     shapes = {obstacle.name: obstacle.shape for obstacle in world.scene.obstacles}
@@ -221,6 +247,7 @@ def _obstacles(world: World, fast: FastWorld, kept: float, spare: set[str]) -> l
                     "node": node_name(body.name),
                     "place": place,
                     "spare": body.name in spare,
+                    "locked": body.name in locked,
                     "margin": body.margin + kept,
                     "pose": placed.ravel().tolist(),
                     "shape": shape.key,

@@ -21,7 +21,7 @@ GOAL_ON_SCREEN = """(() => {
   const places = [];
   for (let x = r.left + 5; x < r.right; x += 12) for (let y = r.top + 5; y < r.bottom; y += 12) {
     pointerAt({ clientX: x, clientY: y });
-    if (hitThing()?.hit && hitThing().name === "goal") places.push([x, y]);
+    if (hitThing()?.name === "goal" && !hitHandle()) places.push([x, y]);
   }
   return places[Math.floor(places.length / 2)];
 })()"""

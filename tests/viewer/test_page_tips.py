@@ -20,7 +20,7 @@ GRASP = """(() => {
     pointerAt({ clientX: x, clientY: y });
     const found = hitThing();
     const { point, object } = found?.hit ?? {};
-    if (found?.name !== "goal") continue;
+    if (found?.name !== "goal" || hitHandle()) continue;
     const tip = tipOf(object, state.goal, new THREE.Vector3(point.x, -point.z, point.y));
     if (tip.name === "right_grip_point") places.push([x, y]);
   }

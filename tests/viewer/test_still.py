@@ -87,7 +87,7 @@ def test_the_picture_is_framed_as_the_page_is(tmp_path: Path) -> None:
 
 
 @needs_chromium
-def test_without_webgl_the_page_says_so(tmp_path: Path) -> None:
+def test_without_webgl_the_page_shows_a_picture_and_says_so(tmp_path: Path) -> None:
     file = view(rrtik.Scene(), html=tmp_path / "page.html")
     none = "HTMLCanvasElement.prototype.getContext = () => null;"
     with closing(Browser(DRAWING_3D)) as browser:
@@ -95,4 +95,5 @@ def test_without_webgl_the_page_says_so(tmp_path: Path) -> None:
         browser.call("Page.enable")
         browser.call("Page.addScriptToEvaluateOnNewDocument", source=none)
         browser.call("Page.navigate", url=file.as_uri())
-        browser.wait("document.getElementById('pane').textContent.includes('WebGL is missing')")
+        browser.wait("document.getElementById('pane').textContent.includes('The picture is the first view')")
+        browser.wait("document.querySelector('#pane img').naturalWidth === 560")

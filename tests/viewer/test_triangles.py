@@ -2,15 +2,27 @@
 
 from __future__ import annotations
 
+import json
+import re
+
 import numpy as np
 import pytest
 
+from rrtik_ompl.base.errors import PictureWarning
 from rrtik_ompl.geometry.collision.shape_table import pieces
+from rrtik_ompl.model.scene import Obstacle, Scene
 from rrtik_ompl.model.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, Prism, Shape, Sphere
 from rrtik_ompl.model.shapes.surfaces import extruded
-from rrtik_ompl.viewer.drawing.meshes import half_space_plate, look_of_coal, look_of_shape, thickened
+from rrtik_ompl.viewer.drawing.meshes import (
+    MAX_OBSTACLE_TRIANGLES,
+    half_space_plate,
+    look_of_coal,
+    look_of_shape,
+    thickened,
+)
 from rrtik_ompl.viewer.drawing.nodes import SphereGeometry
 from rrtik_ompl.viewer.drawing.triangles import split_creases, thin_out, tube
+from rrtik_ompl.viewer.page import page
 
 L_SHAPE = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 3.0], [0.0, 3.0]])
 
@@ -49,6 +61,23 @@ def test_a_thinned_mesh_keeps_to_the_limit_and_nearly_to_its_box() -> None:
     assert 500 < len(thin_faces) <= 2000 < len(faces)
     assert np.allclose(np.ptp(thin_vertices, axis=0), [0.6, 0.6, 1.6], atol=0.1)
     assert volume(thin_vertices, thin_faces) == pytest.approx(volume(vertices, faces), rel=0.1)
+
+
+def test_a_scene_that_is_drawn_coarser_says_so_in_the_page_and_by_a_warning() -> None:
+    fine = Mesh(*Capsule(0.3, 1.0).surface(segments=400))
+    rough = Mesh(*extruded(L_SHAPE, 0.5))
+    assert len(fine.surface()[1]) > MAX_OBSTACLE_TRIANGLES
+    assert page_text(Scene([Obstacle("rough", rough)]), "coarser") == ""
+    with pytest.warns(PictureWarning, match=f"'fine' with at most 30,000 of its {len(fine.surface()[1]):,} triangles"):
+        said = page_text(Scene([Obstacle("fine", fine), Obstacle("rough", rough)]), "coarser")
+    assert "'fine'" in said
+    assert "rough" not in said
+
+
+def page_text(scene: Scene, name: str) -> str:
+    story = re.search(r'<script id="story" type="application/json">\n(.*)\n</script>', page(scene))
+    assert story is not None
+    return str(json.loads(story[1])[name])
 
 
 def test_a_mesh_below_the_limit_is_not_touched() -> None:

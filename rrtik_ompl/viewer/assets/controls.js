@@ -3,7 +3,18 @@
 function select(thing) {
   selected = thing;
   document.getElementById("plan-selected").value = String(thing);
+  document.getElementById("plan-lock-label").hidden = isEnd(thing) || !isMovable(thing);
+  document.getElementById("plan-lock").checked = isLocked(thing);
+  outlineThing(isLocked(thing) ? thing : null);
+  placeHandles();
   showSelected();
+  viewer.set_dirty();
+}
+
+/** Lock what is selected, or let the pointer take hold of it. */
+function lockSelected(locked) {
+  planning.obstacles[selected].locked = locked;
+  fillSelection();
 }
 
 const fields = [];
@@ -91,7 +102,7 @@ function showState() {
 
 function fillSelection() {
   const things = [...ENDS.keys(), ...planning.obstacles.keys()].filter((thing) => isEnd(thing) || isMovable(thing));
-  document.getElementById("plan-selected").replaceChildren(...things.map((thing) => make("option", { value: String(thing), textContent: nameOf(thing) })));
+  document.getElementById("plan-selected").replaceChildren(...things.map((thing) => make("option", { value: String(thing), textContent: `${nameOf(thing)}${isLocked(thing) ? " (locked)" : ""}` })));
   select(things.includes(selected) ? selected : "goal");
 }
 
@@ -148,6 +159,7 @@ function wireControls() {
     state.seed = seed;
     return changed();
   });
+  on("plan-lock", "change", (event) => lockSelected(event.target.checked));
   on("plan-shorten", "change", changed);
   on("plan-undo", "click", undo);
   on("plan-add", "change", (event) => {
@@ -168,6 +180,10 @@ function wireControls() {
   pane.addEventListener("pointermove", goOnDragging, true);
   pane.addEventListener("pointerup", endDrag, true);
   pane.addEventListener("pointercancel", endDrag, true);
+  pane.addEventListener("pointerleave", leavePane, true);
+  buildHandles();
+  const render = viewer.render;
+  viewer.render = () => { placeHandles(); render(); };
 }
 
 function startPlanning() {
@@ -185,9 +201,10 @@ function startPlanning() {
   document.getElementById("plan-add").append(...spares.map((value) => make("option", { value, textContent: value })));
   const planners = Object.entries(PLANNERS).map(([value, { label }]) => make("option", { value, textContent: label }));
   document.getElementById("plan-planner").append(...planners);
+  given = { waypoints: story.waypoints, showClearance };
   showState();
   wireControls();
-  planStatus("drag a ghost or an obstacle: the arm finds a new path");
+  planStatus("drag the handles, or click something else: the arm finds a new path");
   if (planning.asks && !story.moves.length) changed();
   else askOpinion();
   document.documentElement.dataset.plans = "yes";

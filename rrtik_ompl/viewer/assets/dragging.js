@@ -1,8 +1,11 @@
-// What a person moves in the picture: ghosts by their tips, obstacles, by mouse or finger; with the shift key they turn.
-const TURN_PER_PIXEL = 0.01;  // [rad], with the shift key
+// What a person moves in the picture. A click selects a ghost or an obstacle; what is selected is moved by its handles, or dragged
+// itself, with the shift key turned. All else turns the view.
+const TURN_PER_PIXEL = 0.01;  // [rad], with the shift key or a ring that is seen from its edge
 const GHOSTS_FIRST = 0.05;  // of the picture's size: so much nearer a ghost counts than it is
+const CLICK_PIXELS = 4;  // a pointer that moves less clicks
+const OUT_OF_REACH = "#8a949e";  // colour of a ghost that cannot follow
 let selected = "goal";
-let held = planning?.tips[0];  // the tip by which a ghost is moved
+let held = planning?.tips[0] ?? robot?.tip;  // the tip by which a ghost is moved
 
 /** The joints from a tip's to the base. */
 function jointsOf(joint) {
@@ -19,43 +22,75 @@ function tipOf(object, q, point) {
   const rank = planning.tips.map((tip) => ({
     tip,
     shared: jointsOf(tip.joint).filter((k) => jointsOf(joint).includes(k)).length,
-    away: new THREE.Vector3().setFromMatrixPosition(carried(tip, frames)).distanceTo(point),
+    away: originOf(carried(tip, frames)).distanceTo(point),
   }));
-  return rank.sort((a, b) => b.shared - a.shared || a.away - b.away)[0]?.tip;
+  return rank.sort((a, b) => b.shared - a.shared || a.away - b.away)[0]?.tip ?? held;
 }
 
-/** Move the tip that is held of an end by a shift [m] and a turn about z [rad], through inverse kinematics. */
-function moveEnd(end, shift, turn) {
-  if (held === undefined) return false;
-  const frame = carried(held, jointFrames(state[end]));
-  const e = new THREE.Matrix4().makeRotationZ(turn).multiply(new THREE.Matrix4().extractRotation(frame)).elements;
-  const at = new THREE.Vector3().setFromMatrixPosition(frame).add(shift);
-  const pose = [e[0], e[4], e[8], e[1], e[5], e[9], e[2], e[6], e[10], at.x, at.y, at.z];
-  const q = kernels.reach(pose, state[end], held);
-  if (q !== null) state[end] = q;
-  return q !== null;
+/** Where a thing is: the tip of an end, or an obstacle. */
+const poseOf = (thing) => (isEnd(thing) ? carried(held, jointFrames(state[thing])) : rowMajor(state.obstacles[thing].pose));
+
+const isLocked = (thing) => !isEnd(thing) && (planning.obstacles[thing].locked || !isMovable(thing));
+const nodeOf = (thing) => (isEnd(thing) ? node(ENDS.get(thing)) : node("obstacles", planning.obstacles[thing].node));
+/** What is drawn of a thing: of a ghost the outer one of its two copies; undefined of one that is not drawn. */
+const bodyOf = (thing) => (isEnd(thing) ? nodeOf(thing).children[0]?.children[0] : nodeOf(thing));
+
+/** A pose that is moved by a shift [m], and turned about an axis through its origin or another point. */
+function movedPose(pose, shift, angle, axis, centre = originOf(pose)) {
+  const turn = new THREE.Matrix4().makeRotationAxis(axis, angle);
+  const place = originOf(pose).sub(centre).applyMatrix4(turn).add(centre).add(shift);
+  return turn.multiply(new THREE.Matrix4().extractRotation(pose)).setPosition(place);
+}
+
+/** Bring the tip that is held of an end to a pose, or as near as it comes; what keeps it from there, in words. */
+function placeEnd(end, wanted) {
+  const e = wanted.elements;
+  const pose = [e[0], e[4], e[8], e[1], e[5], e[9], e[2], e[6], e[10], e[12], e[13], e[14]];
+  const q = held.ik === undefined ? null : kernels.reach(pose, state[end], held);
+  const near = q === null ? nearestReach(held, wanted, state[end]) : { q, out: false, text: "" };
+  state[end] = near.q;
+  farEnd = near.out ? end : null;
+  return near.text && `${end}: ${near.text}`;
 }
 
 function moveObstacle(k, shift, turn) {
-  const turned = new THREE.Matrix4().makeRotationZ(turn).multiply(rowMajor(state.obstacles[k].pose).setPosition(0, 0, 0));
-  const old = state.obstacles[k].pose;
-  turned.setPosition(old[3] + shift.x, old[7] + shift.y, old[11] + shift.z);
-  state.obstacles[k].pose = turned.clone().transpose().elements.slice();
+  placeObstacleAt(k, movedPose(rowMajor(state.obstacles[k].pose), shift, turn, AXES[2]));
+}
+
+function placeObstacleAt(k, wanted) {
+  state.obstacles[k].pose = wanted.clone().transpose().elements.slice();
   applyObstacle(k);
 }
 
 const numberOf = (name) => planning.obstacles.findIndex((obstacle) => obstacle.name === name);
 
-function moveSelected(shift, turn) {
-  const moved = isEnd(selected) ? moveEnd(selected, shift, turn) : (moveObstacle(selected, shift, turn), true);
-  if (moved) {
-    showSelected();
-    changed();
-  }
+let farEnd = null;  // the end that cannot follow the pointer now
+/** Bring what is selected to a pose; a path follows, and a word where it cannot go there. */
+function placeSelected(wanted) {
+  const word = isEnd(selected) ? placeEnd(selected, wanted) : (placeObstacleAt(selected, wanted), "");
+  showSelected();
+  changed();
+  if (word) planRefusal(word);
+  showReach(word, wanted);
 }
 
+/** Move what is selected by a shift [m] and a turn about z [rad]. */
+function moveSelected(shift, turn) {
+  placeSelected(movedPose(poseOf(selected), shift, turn, AXES[2]));
+}
+
+/** What keeps a ghost from following stands beside the handle that is held. */
+function showReach(word, wanted) {
+  dropLabels("reach");
+  if (drag && word) addLabel(word, "reach", originOf(wanted));
+}
+
+// meshcat's picture has y up, the world z
+const inWorld = ({ x, y, z }) => new THREE.Vector3(x, -z, y);
+const fromWorld = ({ x, y, z }) => new THREE.Vector3(x, z, -y);
 const ray = new THREE.Raycaster();
 ray.params.Line.threshold = 0;  // edges are drawn as lines, and count as a metre thick by default
+const rayInWorld = () => ({ origin: inWorld(ray.ray.origin), direction: inWorld(ray.ray.direction) });
 function pointerAt(event) {
   const box = pane.getBoundingClientRect();
   const place = { x: (2 * (event.clientX - box.left)) / box.width - 1, y: 1 - (2 * (event.clientY - box.top)) / box.height };
@@ -63,53 +98,120 @@ function pointerAt(event) {
   ray.setFromCamera(place, viewer.camera);
 }
 
+/** What a pointer can take hold of: ghosts, and obstacles that are not locked. */
 function thingsToDrag() {
-  const ends = [...ENDS].map(([end, ghost]) => ({ thing: end, object: node(ghost) }));
-  const solids = planning.obstacles.map((obstacle, k) => ({ thing: k, object: node("obstacles", obstacle.node), shown: isMovable(k) }));
-  return [...ends, ...solids].filter(({ object, shown }) => shown !== false && object.visible);
+  const free = [...planning.obstacles.keys()].filter((k) => !isLocked(k));
+  return [...ENDS.keys(), ...free].filter((thing) => nodeOf(thing).visible && bodyOf(thing) !== undefined);
 }
 
 function hitThing() {
-  const hits = thingsToDrag().flatMap(({ thing, object }) => ray.intersectObject(object, true).slice(0, 1).map((hit) => ({ thing, name: nameOf(thing), hit })));
+  const hits = thingsToDrag().flatMap((thing) => ray.intersectObject(bodyOf(thing), true).slice(0, 1).map((hit) => ({ thing, name: nameOf(thing), hit })));
   const away = ({ thing, hit }) => hit.distance - (isEnd(thing) ? GHOSTS_FIRST * size : 0);
   return hits.sort((a, b) => away(a) - away(b))[0];
 }
 
+// The pointer ------------------------------------------------------------------------------------------------------
 let drag = null;
+let pressed = null;  // where a click may select something
+
+/** What a drag of a handle, or else in the plane of the picture, does to the pose where it began. */
+function dragBy(handle, point) {
+  const from = poseOf(selected);
+  const centre = originOf(from);
+  const none = new THREE.Vector3();
+  if (!handle) {
+    const away = viewer.camera.getWorldDirection(new THREE.Vector3());
+    const plane = new THREE.Plane().setFromNormalAndCoplanarPoint(away, point);
+    return () => {
+      const spot = ray.ray.intersectPlane(plane, new THREE.Vector3());
+      const shift = spot === null ? none : inWorld(spot.sub(point));
+      if (story.planar) shift.z = 0;
+      return movedPose(from, shift, 0, AXES[2]);
+    };
+  }
+  const { kind, axis } = handle.userData;
+  const line = AXES[axis];
+  if (kind === "arrow") {
+    const begin = alongAxis(line, centre);
+    return () => movedPose(from, line.clone().multiplyScalar(alongAxis(line, centre) - begin), 0, line);
+  }
+  const begin = aroundAxis(line, centre);
+  return (event) => {
+    const now = begin === null ? (event.clientX - drag.x) * TURN_PER_PIXEL : (aroundAxis(line, centre) ?? begin) - begin;
+    return movedPose(from, none, now, line);
+  };
+}
+
 function startDrag(event) {
-  if (event.button !== 0 || !event.isPrimary) return;
+  if (event.button !== 0 || !event.isPrimary || clock.running) return;
   pointerAt(event);
-  const found = hitThing();
-  if (!found) return;
+  const handle = hitHandle();
+  const found = handle ? null : hitThing();
+  pressed = found && { thing: found.thing, hit: found.hit, x: event.clientX, y: event.clientY };
+  if (!handle && found?.thing !== selected) return;
   event.stopPropagation();
   event.preventDefault();
-  remember();
-  select(found.thing);
-  const { point } = found.hit;
-  if (isEnd(found.thing)) held = tipOf(found.hit.object, state[found.thing], new THREE.Vector3(point.x, -point.z, point.y));  // meshcat's picture has y up
-  const away = viewer.camera.getWorldDirection(new THREE.Vector3());
-  drag = { plane: new THREE.Plane().setFromNormalAndCoplanarPoint(away, found.hit.point), last: found.hit.point.clone(), x: event.clientX };
+  if (found) holdTip(found);
+  drag = { moves: dragBy(handle, found?.hit.point), from: poseOf(selected), x: event.clientX, y: event.clientY, begun: false, wanted: null };
   pane.setPointerCapture(event.pointerId);
 }
 
+function holdTip({ thing, hit }) {
+  if (isEnd(thing)) held = tipOf(hit.object, state[thing], inWorld(hit.point));
+}
+
+const clicked = (from, event) => Math.hypot(event.clientX - from.x, event.clientY - from.y) < CLICK_PIXELS;
+
 function goOnDragging(event) {
-  if (drag === null) return;
+  if (drag === null) return hover(event);
   event.stopPropagation();
-  if (event.shiftKey) {
-    moveSelected(new THREE.Vector3(), (event.clientX - drag.x) * TURN_PER_PIXEL);
-  } else {
-    pointerAt(event);
-    const point = ray.ray.intersectPlane(drag.plane, new THREE.Vector3());
-    if (point === null) return;
-    const way = point.clone().sub(drag.last);
-    moveSelected(new THREE.Vector3(way.x, -way.z, story.planar ? 0 : way.y), 0);  // meshcat's picture has y up
-    drag.last = point;
-  }
-  drag.x = event.clientX;
+  if (!drag.begun && clicked(drag, event)) return null;
+  if (!drag.begun) remember();
+  drag.begun = true;
+  pointerAt(event);
+  drag.wanted = event.shiftKey
+    ? movedPose(drag.from, new THREE.Vector3(), (event.clientX - drag.x) * TURN_PER_PIXEL, AXES[2])
+    : drag.moves(event);
+  return placeSelected(drag.wanted);
 }
 
 function endDrag(event) {
+  if (pressed && clicked(pressed, event)) {
+    holdTip(pressed);
+    select(pressed.thing);
+  }
+  pressed = null;
   if (drag === null) return;
   event.stopPropagation();
   drag = null;
+  farEnd = null;
+  dropLabels("reach");
+  for (const end of ENDS.keys()) showFree(end);
+  viewer.set_dirty();
+}
+
+/** Outside of the picture nothing is under the pointer. */
+function leavePane() {
+  if (drag !== null) return;
+  lightHandle(null);
+  outlineThing(isLocked(selected) ? selected : null);
+}
+
+let looking = false;
+/** Show what a press would take hold of, once a picture. */
+function hover(event) {
+  if (looking || event.buttons || handsHidden) return;
+  looking = true;
+  requestAnimationFrame(() => {
+    looking = false;
+    if (drag !== null || clock.running) return;
+    pointerAt(event);
+    const handle = hitHandle();
+    const found = handle ? null : hitThing();
+    lightHandle(handle);
+    outlineThing(found ? found.thing : isLocked(selected) ? selected : null);
+    pane.style.cursor = handle || found?.thing === selected ? "grab" : found ? "pointer" : "";
+    pane.title = found ? nameOf(found.thing) : "";
+    viewer.set_dirty();
+  });
 }

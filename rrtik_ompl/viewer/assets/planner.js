@@ -29,12 +29,19 @@ const planRefusal = (text) => {
 // The picture ------------------------------------------------------------------------------------------------------
 function moveGhost(end, q, free) {
   const name = ENDS.get(end);
-  const color = free ? story.colors[end] : "#c2185b";
+  const color = !free ? "#c2185b" : farEnd === end ? OUT_OF_REACH : story.colors[end];
   if (!viewer.scene_tree.find([...ROOT, name]).object.children.length) addGhost(name, color, q);
   for (const copy of node(name).children[0].children) {
     setPosture(copy, q);
     copy.traverse((item) => { if (item.isMesh && item.material.emissive) item.material.color.set(color); });
   }
+}
+
+/** Draw an end where it is; true if it is free. */
+function showFree(end) {
+  const free = kernels.free(state[end]);
+  moveGhost(end, state[end], free);
+  return free;
 }
 
 /** Draw an obstacle where it is; anew if the page has added it or made it another size. */
@@ -76,7 +83,8 @@ function pathTimes(rows) {
   return times.map((time) => time * scale);
 }
 
-function drawTrail(rows) {
+/** Draw the way of the tips; moves that are not proven free have another colour. */
+function drawTrail(rows, unproven = []) {
   const trail = new THREE.Group();
   for (let k = 1; k < rows.length; k += 1) {
     const piece = new THREE.Group();
@@ -87,7 +95,7 @@ function drawTrail(rows) {
     for (const tip of robot.trails) {
       const points = frames.map((each) => new THREE.Vector3().setFromMatrixPosition(carried(tip, each)).toArray());
       const apart = points.filter((point, s) => s === 0 || Math.hypot(...point.map((x, i) => x - points[s - 1][i])) > 1e-6);
-      if (apart.length > 1) piece.add(lineMesh(apart, story.colors.trail, 0.0025 * size));
+      if (apart.length > 1) piece.add(lineMesh(apart, unproven.includes(k - 1) ? story.colors.unproven : story.colors.trail, 0.0025 * size));
     }
     trail.add(piece);
   }
@@ -118,29 +126,55 @@ function replacePath(rows) {
   story.contacts = [];  // what the page plans is free
   story.moves = rows.slice(1).map((to, k) => ({ from: rows[k], to, piece: k, joints: to.flatMap((value, j) => (value === rows[k][j] ? [] : [j])) }));
   story.times = rows.length ? pathTimes(rows) : [];
-  drawTrail(rows);
-  sayTitle(rows.length > 1 ? `path of ${count(rows.length - 1, "move")}` : "no path");
-  dropBefore();
-  dropSearch();
-  document.getElementById("clearance-section").hidden = true;
-  document.getElementById("proof-section").hidden = true;
-  showClearance = () => {};
+  showPath();
+}
+
+let pathIsOfState = true;  // whether the path that is shown is one of the state, or of what it was before
+let given = null;  // the path with which the page began: Python has judged it
+
+/** Show the path of the story, and of that with which the page began what Python says of it. */
+function showPath() {
+  const judged = story.waypoints === given.waypoints;
+  drawTrail(story.moves.length ? story.waypoints : [], judged ? story.proof?.unproven : []);
+  sayTitle(story.moves.length ? `path of ${count(story.moves.length, "move")}` : "no path");
+  if (!judged) {
+    dropBefore();
+    dropSearch();
+  }
+  document.getElementById("clearance-section").hidden = !(judged && story.clearance);
+  document.getElementById("proof-section").hidden = !(judged && story.proof);
+  showClearance = judged ? given.showClearance : () => {};
+  pathIsOfState = true;
   newPath();
   askOpinion();
 }
 
 // The state --------------------------------------------------------------------------------------------------------
+/** Keep the state and the path that is shown for it, if there is one by now. */
 function remember() {
-  past.push(copyOf(state));
+  const { waypoints, moves, times, contacts } = story;
+  const { textContent: text, className } = document.getElementById("plan-state");
+  past.push({ state: copyOf(state), shown: pathIsOfState ? { story: { waypoints, moves, times, contacts }, text, bad: className === "bad" } : null });
   if (past.length > UNDO_STEPS) past.shift();
 }
 
+/** The state before the last change, with the same path. */
 function undo() {
   if (past.length === 0) return;
-  state = past.pop();
+  const { state: before, shown } = past.pop();
+  state = before;
   state.obstacles.forEach((_, k) => applyObstacle(k));
   showState();
-  changed();
+  if (shown === null) {
+    changed();
+    return;
+  }
+  shortening += 1;
+  planRefusal("");
+  for (const end of ENDS.keys()) showFree(end);
+  Object.assign(story, shown.story);
+  showPath();
+  planStatus(shown.text, shown.bad);
 }
 
 /** Where the kernels find an obstacle, in the size that it has now. */
@@ -176,12 +210,9 @@ function changed() {
 
 function plan() {
   shortening += 1;
+  pathIsOfState = false;
   const begin = performance.now();
-  const blocked = [...ENDS.keys()].filter((end) => {
-    const free = kernels.free(state[end]);
-    moveGhost(end, state[end], free);
-    return !free;
-  });
+  const blocked = [...ENDS.keys()].filter((end) => !showFree(end));
   viewer.set_dirty();
   if (blocked.length) {
     replacePath([]);

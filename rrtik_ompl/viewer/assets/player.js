@@ -13,7 +13,7 @@ function show(time) {
   const arrived = now >= total;
   showJoints(q, story.moves[k], !arrived);
   if (!story.timed) showMove(arrived ? null : k);
-  highlightPiece(arrived ? null : story.moves[k].piece);
+  highlightPiece(arrived || now === 0 ? null : story.moves[k].piece);
   scrub.value = now;
   showClearance(now);
   const place = placeAt(now);

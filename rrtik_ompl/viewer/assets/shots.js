@@ -2,6 +2,8 @@
 const FILM_RATE = 30;  // pictures a second of a film that the page records
 const LAST_SECONDS = 0.8;  // how long it shows the last picture
 
+let hideHands = () => {};  // pages that plan have handles, which are on no picture
+
 /** Hand a file to the person. */
 function keepFile(name, blob) {
   const url = URL.createObjectURL(blob);
@@ -46,8 +48,10 @@ function newSheet() {
 
 function keepPicture() {
   const { sheet, take } = newSheet();
+  hideHands(true);
   viewer.render();  // what was drawn before may be gone from the canvas
   take();
+  hideHands(false);
   sheet.toBlob((blob) => keepFile("picture.png", blob), "image/png");
 }
 
@@ -94,6 +98,7 @@ function recordFilm() {
   recorder.addEventListener("dataavailable", ({ data }) => parts.push(data));
   recorder.addEventListener("stop", () => keepFile(`film.${mimeType.includes("mp4") ? "mp4" : "webm"}`, new Blob(parts, { type: mimeType })));
   const finish = () => {
+    hideHands(false);
     viewer.render = render;
     recording = null;
     button.textContent = "Film";
@@ -102,6 +107,7 @@ function recordFilm() {
   };
   recording = { finish, ended: () => setTimeout(() => recording?.finish(), 1000 * LAST_SECONDS) };
   button.textContent = "Stop";
+  hideHands(true);
   goTo(0);
   viewer.render();
   recorder.start();

@@ -7,8 +7,11 @@ try {
   performance.mark("viewer");
 } catch (error) {
   const sorry = document.createElement("p");
-  sorry.textContent = "This browser cannot draw in 3-D: WebGL is missing or switched off.";
-  pane.replaceChildren(sorry);
+  const picture = new Image();
+  const drawn = document.getElementById("picture").textContent;
+  sorry.textContent = `This browser cannot draw in 3-D: WebGL is missing or switched off.${drawn ? " The picture is the first view." : ""}`;
+  Object.assign(picture, { id: "still", alt: "first view", src: `data:image/png;base64,${drawn}` });
+  pane.replaceChildren(sorry, ...(drawn ? [picture] : []));
   throw error;
 }
 const low = new THREE.Vector3(...story.frame.low);
@@ -57,8 +60,15 @@ key.position.multiplyScalar(2 * size).add(centre);
 key.target.position.copy(centre);
 [key, fill, sky, key.target].forEach((light, k) => viewer.set_object(["Lights", `page ${k}`], light));
 
-// Soft shadows on the ground and on what stands there show what touches what.
-const SHADOW_PIXELS = 2048;
+// Soft shadows on the ground and on what stands there show what touches what. A browser that draws by software alone has coarser
+// ones; films and pictures of the command line, which are drawn like that, take their time.
+const SHADOW_PIXELS = document.getElementById("film") || !drawsBySoftware() ? 2048 : 768;
+function drawsBySoftware() {
+  const gl = viewer.renderer.getContext();
+  const known = gl.getExtension("WEBGL_debug_renderer_info");
+  return /swiftshader|llvmpipe|softpipe|software|basic render/i.test(known ? gl.getParameter(known.UNMASKED_RENDERER_WEBGL) : "");
+}
+
 function castShadows() {
   if (story.planar) return;
   const reach = 0.65 * size;
@@ -80,6 +90,27 @@ function shade(group) {
   });
 }
 castShadows();
+
+/** What casts shadows, and where it is. */
+function castersNow() {
+  const found = [key.castShadow];
+  viewer.scene.updateMatrixWorld();
+  viewer.scene.traverseVisible((item) => {
+    if (item.castShadow && item.layers.test(viewer.camera.layers)) found.push(item.id, ...item.matrixWorld.elements);
+  });
+  return found;
+}
+
+let castersDrawn = [];
+/** Draw the shadows again if what casts them has moved: they cost as much as the picture. */
+function renewShadows() {
+  const casters = castersNow();
+  const { shadowMap } = viewer.renderer;
+  shadowMap.autoUpdate = false;
+  if (casters.length === castersDrawn.length && casters.every((value, k) => value === castersDrawn[k])) return;
+  shadowMap.needsUpdate = true;
+  castersDrawn = casters;
+}
 
 function addGrid() {
   const cell = story.grid;
@@ -172,6 +203,7 @@ function addLabel(text, kind, position, thing = null) {
   const element = document.createElement("span");
   element.textContent = text;
   element.className = kind;
+  element.hidden = true;  // until it has its place
   document.getElementById("labels").append(element);
   labels.push({ element, kind, position: new THREE.Vector3(position.x, position.z, -position.y), on: true, thing, from: thing && worldPlace(thing) });
 }
@@ -273,4 +305,8 @@ viewer.set_3d_pane_size = () => {
 };
 viewer.set_3d_pane_size();
 const render = viewer.render.bind(viewer);
-viewer.render = () => { render(); placeLabels(); };
+viewer.render = () => {
+  renewShadows();
+  render();
+  placeLabels();
+};

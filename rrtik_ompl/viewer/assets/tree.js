@@ -158,6 +158,7 @@ function buildTree() {
   if (!first) things.forEach((thing) => { thing.on = !closed.includes(thing.text); });
   const used = Object.keys(GROUPS).filter((name) => things.some(({ group }) => group === name));
   document.getElementById("tree").replaceChildren(...used.map(groupRow));
+  Object.assign(document.getElementById("coarser"), { textContent: story.coarser, hidden: !story.coarser });
   document.getElementById("see-through-label").hidden = story.obstacles.length === 0;
   applyEyes();
 }

@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rrtik_ompl.base.arrays import Matrix
-from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.errors import InputError, few
 from rrtik_ompl.geometry.collision.shape_table import shape_of
 from rrtik_ompl.geometry.collision.solids import is_mesh, once_per_geometry
+from rrtik_ompl.model.scene import AttachedObject, Obstacle, Scene
 from rrtik_ompl.model.shapes import Box, Cylinder, HalfSpace, PointCloud, Shape, Sphere
 from rrtik_ompl.model.shapes.surfaces import Faces
 from rrtik_ompl.viewer.drawing.nodes import (
@@ -64,6 +65,22 @@ def look_of_shape(shape: Shape, limit: int = MAX_OBSTACLE_TRIANGLES) -> Look:
         return look_of_triangles(*surface)
 
     return look_of_triangles(*split_creases(*(thin_out(*surface, limit) if shape.fine else surface)))
+
+
+def drawn_coarser(scene: Scene) -> str:
+    """Return in words which obstacles and held objects are drawn with fewer triangles or points than they have."""
+    told = []
+    things: list[Obstacle | AttachedObject] = [*scene.obstacles, *scene.attached]
+    for each in things:
+        if isinstance(each.shape, PointCloud):
+            count, most, elements = len(each.shape.points), MOST_POINTS, "points"
+        else:
+            count = len(each.shape.surface()[1]) if each.shape.fine else 0
+            most, elements = MAX_OBSTACLE_TRIANGLES, "triangles"
+        if count > most:
+            told.append(f"'{each.name}' with at most {most:,} of its {count:,} {elements}")
+
+    return f"drawn coarser than it is: {few(told)}; checks and plans use all of them" if told else ""
 
 
 def look_of_margin(shape: Shape, margin: float) -> Look | None:
