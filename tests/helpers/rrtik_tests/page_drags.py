@@ -2,7 +2,6 @@
 
 import json
 import sys
-import tempfile
 from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import dataclass
@@ -162,10 +161,7 @@ def main(problem: str, count: int, *files: str) -> None:
     loaded = rrtik.load_problem(problem)
     things: list[object] = []
     for number, file in enumerate(files):
-        with (
-            tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder,
-            closing(Browser(folder, DRAWING_3D)) as browser,
-        ):
+        with closing(Browser(DRAWING_3D)) as browser:
             browser.open(Path(file).as_uri())
             browser.size(*SMALL)
             browser.wait("document.documentElement.dataset.plans", 200.0)
