@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -117,7 +118,7 @@ def dragged(browser: Browser, thing: object, rng: np.random.Generator, *, by_han
     return True
 
 
-def outcome(problem: rrtik.Problem, said: dict) -> str:
+def outcome(problem: rrtik.Problem, said: dict[str, Any]) -> str:
     """Judge the state of a page by Python: "proven", "word", or what is wrong."""
     if said["faults"]:
         return f"page error: {said['faults']}"
