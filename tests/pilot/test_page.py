@@ -65,7 +65,9 @@ def test_a_grasp_is_chosen_and_its_route_planned_accepted_and_begun_by_keys_alon
 
         make_moves(browser, running, 2)
         browser.press(" ")
-        browser.wait("state.mode === 'proposed'")  # "accept" would go on with it
+        browser.wait("state.mode === 'proposed' && state.stopped")  # "accept" would go on with it
+        browser.press("Backspace")
+        browser.wait("!state.stopped")
 
         browser.press("ArrowUp")
         browser.key_down("ArrowRight")
