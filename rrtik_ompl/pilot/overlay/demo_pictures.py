@@ -28,7 +28,7 @@ from rrtik_ompl.viewer.drawing import palette
 from rrtik_ompl.viewer.film_view import camera_of, sides_of
 
 SIDES = {"front": (1.0, 0.0, 0.6), "side": (0.0, -1.0, 0.6), "top": (0.0, 0.0, 1.0)}  # where a camera is, from the task
-AWAY = 0.35  # [m] that it is farther away than the task is from the base
+FARTHER = 2.2  # times as far from the middle as the task is from the base
 OPENING = 45.0  # [deg] of its view, from the upper to the lower edge
 FINER = 2  # drawn so much finer, then made smaller: edges without steps
 BACKGROUND = 0.88  # from 0 to 1
@@ -128,10 +128,14 @@ class DemoPictures:
         if camera in SIDES:
             scene = self._task.world.scene
             places = [scene.obstacle(name).pose.translation for name in observed(self._task)]
-            target = np.mean(places, axis=0) if places else self._robot.fk(self._task.start).translation
+            start = self._task.start
+            q = self._robot.posture(start) if isinstance(start, str) else start
+            place = np.mean(places, axis=0) if places else self._robot.fk(q).translation
+            base = np.array(self._robot.model.jointPlacements[1].translation)
+            far = max(float(np.linalg.norm(place - base)), 0.1)
+            target = 0.5 * (place + base)
             way = np.array(SIDES[str(camera)])
-            far = np.linalg.norm(target) + AWAY
-            return _looking(target + far * way / np.linalg.norm(way), target), OPENING
+            return _looking(target + FARTHER * far * way / np.linalg.norm(way), target), OPENING
 
         if not Path(file_name(camera)).is_file():
             raise InputError(f"camera '{camera}': expected {', '.join(SIDES)}, or a file of a view")
