@@ -7,6 +7,7 @@ from rrtik_ompl.base.lazy import lazy_names
 if TYPE_CHECKING:
     from rrtik_ompl.demos.recording import Recording as Recording
     from rrtik_ompl.demos.recording import record as record
+    from rrtik_ompl.pilot.overlay.demo_pictures import DemoPictures as DemoPictures
     from rrtik_ompl.tasks.randomness import Displacement as Displacement
     from rrtik_ompl.tasks.randomness import Randomness as Randomness
 else:
@@ -15,6 +16,7 @@ else:
             "Recording",
             "record",
         ),
+        "pilot.overlay.demo_pictures": ("DemoPictures",),
         "tasks.randomness": (
             "Displacement",
             "Randomness",

@@ -36,7 +36,7 @@ class AttemptFile(LineFile):
 
 
 class Pictures(Protocol):
-    """Draws pictures of demonstrations, such as `rrtik_ompl.pilot.overlay.demo_pictures.DemoPictures`."""
+    """Draws pictures of demonstrations, such as `DemoPictures`."""
 
     names: tuple[str, ...]
     size: tuple[int, int]

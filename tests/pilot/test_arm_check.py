@@ -47,7 +47,7 @@ def test_an_arm_that_reads_wrong_angles_stands_still(tmp_path, offset):
     made = opened.engine.session
     for count in range(5):
         engine.update((1.0 + STILL_SECONDS) * count / 4)
-    assert any(each.object.role == "arm" for each in engine.perception._sensor._before)
+    assert any(each.object.role == "arm" for each in engine.perception._sensor._last.values())
     said = made.command("plan", made.time)
     assert ("from where the joints say" in said) == (offset > 0.0), said
     opened.close()

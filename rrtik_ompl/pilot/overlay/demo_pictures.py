@@ -52,8 +52,7 @@ class DemoPictures:
         InputError: If a camera cannot be used, or two have one name.
 
     Example:
-        >>> from rrtik_ompl.pilot.overlay.demo_pictures import DemoPictures
-        >>> DemoPictures(rrtik.Task.load("panda_pick_place"), ["front", "top"]).names
+        >>> rrtik.demos.DemoPictures(rrtik.Task.load("panda_pick_place"), ["front", "top"]).names
         ('front', 'top')
     """
 
