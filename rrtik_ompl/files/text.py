@@ -41,7 +41,8 @@ def read_bytes(path: str | os.PathLike[str], limit: int = MAX_BYTES) -> bytes:
     try:
         with open(path, "rb") as file:
             length = os.fstat(file.fileno()).st_size  # 0 for devices and pipes
-            data = file.read(limit + 1) if length <= limit else b""
+            # Python takes memory for as much as is asked for, before it reads.
+            data = file.read((length or limit) + 1) if length <= limit else b""
     except FileNotFoundError:
         raise InputError(f"{path}: no such file{_similar(Path(path))}") from None
     except IsADirectoryError:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Matrix
-from rrtik_ompl.base.copies import in_one_line
+from rrtik_ompl.base.copies import as_value, in_one_line
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,4 +41,5 @@ class SearchTree:
     goals: NDArray[np.int64]
     links: tuple[Matrix, ...] = ()
 
+    __reduce__ = as_value
     __repr__ = in_one_line

@@ -147,9 +147,8 @@ def page_and_picture(
     if coarser:
         warnings.warn(f"{subject.name}: {coarser}", PictureWarning, stacklevel=3)
     first_view = first_picture(subject, recording, frame) if picture else b""
-    small = (
-        b"" if picture else first_picture(subject, recording, frame, SMALL_PICTURE, 1.0)
-    )  # a notebook has the large one
+    # For a browser without WebGL; a notebook has the large one beside the page.
+    small = b"" if picture else first_picture(subject, recording, frame, SMALL_PICTURE, 1.0)
     heading = _title(subject) if title is None else title
 
     told = story_of(subject, frame, heading, subject.name if title is None else "")

@@ -26,7 +26,7 @@ from rrtik_ompl.kernels.covers.cache import cached_inner_spheres, cached_outer_c
 from rrtik_ompl.kernels.proof.groups import BLOCK, MANY, Members
 from rrtik_ompl.kernels.proof.moving import MovedSolids
 from rrtik_ompl.kernels.proof.neighbours import cells_of, joints_between
-from rrtik_ompl.kernels.proof.packing import ProofPairs
+from rrtik_ompl.kernels.proof.packing import ProofPairs, cloud_bodies
 from rrtik_ompl.kernels.proof.placed import PlacedBodies, bodies_in_place
 from rrtik_ompl.kernels.proof.rows import PROOF_KERNELS
 from rrtik_ompl.kernels.simd.library import library
@@ -95,7 +95,12 @@ class ArmCache:
         return table if all(rows.put(k, bodies[k]) for k in others) else None
 
     def keep_proof(self, bodies: Sequence[Body], pairs: Pairs, packed: ProofPairs) -> None:
-        """Keep a copy of a table that was packed for bodies, for :meth:`proof_table`; arguments as there."""
+        """Keep a copy of a table that was packed for bodies, for :meth:`proof_table`; arguments as there.
+
+        Clouds are large, and no cache keeps them from being freed.
+        """
+        if cloud_bodies(bodies):
+            return
         is_put_as_packed = max(map(len, packed.groups), default=0) <= BLOCK  # what is around more is only bounded
         few = sum(body.joint == 0 for body in bodies) < MANY  # neighbours among many depend on where they are
         if few and is_put_as_packed and self._begin_with_links(bodies) and not any(body.contacts for body in bodies):

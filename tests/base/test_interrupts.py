@@ -42,6 +42,7 @@ def test_errors_pass_and_other_threads_are_left_alone():
 ENDED = """
 import signal, sys
 from rrtik_ompl.base.interrupts import tidied_before_the_end
+signal.signal(getattr(signal, sys.argv[1]), signal.SIG_DFL)  # nohup, too, hands on that it is ignored
 with tidied_before_the_end():
     try:
         signal.raise_signal(getattr(signal, sys.argv[1]))

@@ -112,6 +112,7 @@ SAMPLES = {
     "Robot": arm,
     "Route": lambda: Route(POINTS, np.arange(3.0), np.ones((2, 1, 3)), moving=True),
     "Scene": lambda: rrtik.Scene([BALL]),
+    "SearchTree": lambda: rrtik.plan(rrtik.load_problem("planar3_a"), "crdt", seed=1, tree=True).tree,
     "Sphere": lambda: rrtik.Sphere(0.1),
     "TaskCertificate": lambda: TaskCertificate((certificate(),)),
     "TaskRegion": lambda: rrtik.TaskRegion(AT, np.zeros((6, 2))),

@@ -48,6 +48,7 @@ BY_NAME: tuple[str, ...] = (
     "planning/outcome.py",
     "planning/short_path.py",
     "kernels/wasm/page_kernels.py",
+    "viewer/search_story.py",  # the name of what is drawn
     "viewer/page_planner.py",
 )
 

@@ -35,12 +35,17 @@ def page_in(frame):
     return html.unescape(re.search(r'<iframe [^>]* srcdoc="([^"]*)"></iframe>', frame, re.DOTALL)[1])
 
 
+def without_picture(page):
+    """A page without the picture for browsers that draw nothing; in a notebook a larger one stands beside it."""
+    return re.sub(r'(?<=type="image/png">)[\w+/=]*', "", page)
+
+
 def test_a_problem_a_world_and_a_plan_draw_the_page_of_view(problem, plan, tmp_path):
     for shown, path, still in ((problem, None, False), (problem.world, None, True)):
         rrtik.view(shown, path, html=tmp_path / "page.html", still=still)
-        assert page_in(shown._repr_html_()) == (tmp_path / "page.html").read_text()
+        assert page_in(shown._repr_html_()) == without_picture((tmp_path / "page.html").read_text())
     rrtik.view(problem, plan.path, html=tmp_path / "page.html")
-    assert page_in(plan._repr_html_()) == (tmp_path / "page.html").read_text()
+    assert page_in(plan._repr_html_()) == without_picture((tmp_path / "page.html").read_text())
 
 
 def test_a_printed_notebook_shows_the_first_view_alone(problem, plan):

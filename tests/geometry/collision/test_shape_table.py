@@ -256,7 +256,7 @@ def test_a_shape_with_a_formula_for_the_kernels_touches_six_files():
     library = (ROOT / "rrtik_ompl").rglob("*.py")
     found = {str(p.relative_to(ROOT)) for p in library if _says_what_it_is(p.read_text(), "Capsule")}
     # The first names it for users, the second by the words of MPlib; the third takes what has no formula by triangles.
-    others = {"rrtik_ompl/__init__.py", "rrtik_ompl/compat/mplib/fcl.py", "rrtik_ompl/tasks/grasps.py"}
+    others = {"rrtik_ompl/__init__.py", "rrtik_ompl/compat/mplib/fcl.py", "rrtik_ompl/tasks/grasp_points.py"}
     assert found - others == {
         "rrtik_ompl/model/shapes/__init__.py",
         "rrtik_ompl/geometry/collision/shape_table.py",
