@@ -12,9 +12,10 @@ import rrtik_ompl as rrtik
 from rrtik_ompl import AttachedObject, Obstacle, Scene, World, pose
 from rrtik_ompl.geometry.collision.cloud_solid import CloudSolid
 from rrtik_ompl.geometry.collision.solids import bvh
-from rrtik_ompl.kernels.distances import packing
-from rrtik_ompl.kernels.distances.layout import NODE_CENTRES
+from rrtik_ompl.kernels.distances import packing, trees
+from rrtik_ompl.kernels.distances.layout import AROUND, HULL, NODE_CENTRES, TRIANGLE
 from rrtik_ompl.kernels.distances.trees import _blocks_of, tree_of
+from rrtik_ompl.kernels.tables.solid_tables import ConvexSolid
 from rrtik_ompl.model.shapes import SHAPES
 from rrtik_ompl.model.shapes.octree import FEW_CELLS
 
@@ -357,3 +358,20 @@ def test_a_triangle_that_is_nearer_by_less_than_a_nanometre_is_not_left_out():
     pair = [("wrist_1_link", "box")]
     found = world.distances(q, pair).gradients
     assert np.allclose(found, differences(world, q, pairs=pair), rtol=0.0, atol=GRADIENT)
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 7, 50, 333])
+def test_levels_of_triangles_halved_at_once_are_those_halved_one_by_one(count):
+    random = np.random.default_rng(count)
+    vertices = random.normal(size=(count // 2 + 3, 3)).round(2)
+    triangles = random.integers(0, len(vertices), (count, 3))
+
+    def around(own):
+        corners = trees._hull_of(vertices[np.unique(triangles[own])])
+        return ConvexSolid(corners), HULL if len(own) == count else AROUND
+
+    leaves = [trees._leaf(ConvexSolid(corners), TRIANGLE) for corners in vertices[triangles]]
+    wanted = trees._above(leaves, vertices[triangles].mean(axis=1), around)
+    tree = trees._tree_of_triangles(vertices, triangles)
+    assert np.array_equal(tree.nodes, wanted.nodes)
+    assert all(np.array_equal(a.corners, b.corners) for a, b in zip(tree.solids, wanted.solids, strict=True))

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import coal
 import numpy as np
@@ -26,6 +27,7 @@ from rrtik_ompl.kernels.distances.layout import (
     HULL,
     NODE_CENTRES,
     NODE_FIRST,
+    NODE_KIND,
     NODE_PART,
     NODE_SECOND,
     NODE_SOLID,
@@ -98,14 +100,62 @@ def _leaf(solid: ConvexSolid, kind: int) -> Tree:
 
 
 def _tree_of_triangles(vertices: Matrix, triangles: Numbers) -> Tree:
-    """Return the tree of a mesh."""
+    """Return the tree of a mesh, halved as :func:`_above` does it.
 
-    def around(own: Numbers) -> tuple[ConvexSolid, int]:
-        corners = _hull_of(vertices[distinct(triangles[own])])
-        return ConvexSolid(corners), HULL if len(own) == len(triangles) else AROUND
+    There may be 100,000 triangles, so all nodes of a level are halved at once.
+    """
+    middles = vertices[triangles].mean(axis=1)
+    corners_of: list[Matrix] = [vertices[:0]] * (2 * len(triangles) - 1)
+    nodes = np.tile(np.array([0, *LEAF, AROUND, -1, -1]), (len(corners_of), 1))
+    nodes[:, NODE_SOLID] = np.arange(len(nodes))  # each node has the solid of its number
+    nodes[0, NODE_KIND] = HULL
 
-    leaves = [_leaf(ConvexSolid(corners), TRIANGLE) for corners in vertices[triangles]]
-    return _above(leaves, vertices[triangles].mean(axis=1), around)
+    # The triangles of the nodes of a level, one node after the other; where each begins, and its number.
+    order = np.arange(len(triangles))
+    starts = np.zeros(1, dtype=np.int64)
+    places = np.zeros(1, dtype=np.int64)
+    while len(order):
+        sizes = np.diff(starts, append=len(order))
+        whole = sizes == 1
+        for place, corners in zip(places[whole].tolist(), vertices[triangles[order[starts[whole]]]], strict=True):
+            corners_of[place] = corners
+        nodes[places[whole], NODE_KIND] = TRIANGLE
+
+        order = order[np.repeat(~whole, sizes)]
+        sizes = sizes[~whole]
+        places = places[~whole]
+        starts = np.cumsum(sizes) - sizes
+        for place, corners in zip(places.tolist(), _corners_of_each(vertices, triangles[order], sizes), strict=True):
+            corners_of[place] = _hull_of(corners)
+
+        if len(order):
+            order = _sorted_along(middles, order, starts, sizes)
+            firsts = sizes // 2
+            seconds = sizes - firsts
+            # The second half follows its parent, and the first half what is below the second.
+            nodes[places, NODE_SECOND] = places + 1
+            nodes[places, NODE_FIRST] = places + 2 * seconds
+            places = nodes[places][:, BRANCHES].ravel()
+            starts = np.column_stack([starts, starts + firsts]).ravel()
+    return Tree([ConvexSolid(corners) for corners in corners_of], nodes)
+
+
+def _corners_of_each(vertices: Matrix, triangles: Numbers, sizes: Numbers) -> list[Matrix]:
+    """Return the distinct vertices of each of several runs of triangles, in their order."""
+    owners = np.repeat(np.arange(len(sizes)), 3 * sizes)
+    keys = distinct(owners * len(vertices) + triangles.ravel())
+    corners = vertices[keys % len(vertices)]
+    ends = np.searchsorted(keys, np.arange(len(sizes) + 1) * len(vertices)).tolist()
+    return [corners[first:end] for first, end in pairwise(ends)]
+
+
+def _sorted_along(points: Matrix, order: Numbers, starts: Numbers, sizes: Numbers) -> Numbers:
+    """Return numbers of points, each of several runs sorted along the longest side of the box around its points."""
+    own = points[order]
+    sides = np.maximum.reduceat(own, starts) - np.minimum.reduceat(own, starts)
+    along = np.repeat(sides.argmax(axis=1), sizes)
+    run = np.repeat(np.arange(len(sizes)), sizes)
+    return order[np.lexsort((own[np.arange(len(own)), along], run))]
 
 
 def _hull_of(corners: Matrix) -> Matrix:
