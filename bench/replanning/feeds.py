@@ -39,7 +39,7 @@ GROWTH = 1.2
 GLARE_SCENES = 3
 AWAY = pin.SE3(np.eye(3), np.array([0.0, 0.0, 1e3]))
 NEWS = ("appears on the arm", "appears", "changes size", "changes shape")
-WORDS = ("an obstacle is too near", "an obstacle closes in")
+WORDS = ("an obstacle is too near", "an obstacle closes in", "no motion of the arm rules out a contact")
 
 
 @dataclass(frozen=True)
@@ -293,6 +293,6 @@ READING = (
     f"UR5 reads the feed {RATE:g} times a second and keeps {1e3 * MARGIN:g} mm, the point {scenes.RATE:g} times and "
     "keeps no margin; the speed bound is that of the obstacles. A contact is judged by coal alone, five times a tick, "
     "against where everything was in truth. It has a word if the record does not call the move proven, and says in "
-    "that tick that an obstacle is too near, or within a second that this obstacle has appeared or has changed its "
-    "size or shape: before a scene shows that, nobody can say it."
+    "that tick that an obstacle is too near or that no motion rules a contact out, or within a second that this "
+    "obstacle has appeared or has changed its size or shape: before a scene shows that, nobody can say it."
 )
