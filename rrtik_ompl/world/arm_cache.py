@@ -60,7 +60,7 @@ class ArmCache:
         self._robot = robot
         self.covers: tuple[Spheres, ...] = tuple(_spheres(body) for body in link_bodies(robot))
         self._cells: dict[Pairs, dict[tuple[int, int], Cells]] = {}  # of the pairs of links that a world has
-        self._proofs: dict[Hashable, tuple[tuple[Body, ...], ProofPairs]] = {}  # tables that none is proven with
+        self._proofs: dict[Hashable, tuple[tuple[Body | None, ...], ProofPairs]] = {}  # tables that none is proven with
         self._arms: list[ArmTables] = []  # of the arm with what it has held, the latest first
 
     def links_of(self, bodies: Sequence[Body]) -> PlacedBodies | None:
@@ -97,16 +97,18 @@ class ArmCache:
     def keep_proof(self, bodies: Sequence[Body], pairs: Pairs, packed: ProofPairs) -> None:
         """Keep a copy of a table that was packed for bodies, for :meth:`proof_table`; arguments as there.
 
-        Clouds are large, and no cache keeps them from being freed.
+        Of a cloud it keeps no body, so that a scan is freed when nobody else holds it: clouds are always put in anew.
         """
-        if cloud_bodies(bodies):
-            return
         is_put_as_packed = max(map(len, packed.groups), default=0) <= BLOCK  # what is around more is only bounded
         few = sum(body.joint == 0 for body in bodies) < MANY  # neighbours among many depend on where they are
-        if few and is_put_as_packed and self._begin_with_links(bodies) and not any(body.contacts for body in bodies):
-            kept = tuple(bodies), packed.for_thread(placing=True)
-            others = list(self._proofs.items())[-(KEPT_PROOFS - 1) :]
-            self._proofs = dict([*others, (_kind_of_proof(bodies, pairs), kept)])
+        if any(body.contacts for body in bodies) or not (few and is_put_as_packed and self._begin_with_links(bodies)):
+            return
+
+        clouds = cloud_bodies(bodies)
+        known = tuple(None if k in clouds else body for k, body in enumerate(bodies))
+        kept = known, packed.for_thread(placing=True)
+        others = list(self._proofs.items())[-(KEPT_PROOFS - 1) :]
+        self._proofs = dict([*others, (_kind_of_proof(bodies, pairs), kept)])
 
     @cached_property
     def _links(self) -> PlacedBodies:
@@ -224,10 +226,11 @@ def _kind_of_proof(bodies: Sequence[Body], pairs: Pairs) -> Hashable:
     return pairs, tuple((body.joint, body.kind, body.margin, body.padding, body.contacts) for body in bodies)
 
 
-def _in_same_place(body: Body, other: Body) -> bool:
-    return body is other or (
-        body.geometry is other.geometry and np.array_equal(body.placement.homogeneous, other.placement.homogeneous)
-    )
+def _in_same_place(body: Body, other: Body | None) -> bool:
+    """Check whether a body is another one, or in its place; None is in no place."""
+    if body is other or other is None:
+        return body is other
+    return body.geometry is other.geometry and np.array_equal(body.placement.homogeneous, other.placement.homogeneous)
 
 
 @kept_with
