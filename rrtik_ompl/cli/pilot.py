@@ -135,10 +135,9 @@ def _conform(name: str, address: str) -> int:
     failed = 0
     for finding in checks.run():
         failed += not finding.held
-        say(
-            f"{'held  ' if finding.held else 'FAILED'}  {finding.what}"
-            + (f": {finding.measured}" if finding.measured else "")
-        )
+        verdict = "held  " if finding.held else "FAILED"
+        measured = f": {finding.measured}" if finding.measured else ""
+        say(f"{verdict}  {finding.what}{measured}")
     say("all held" if not failed else f"{failed} failed")
     return NOT_FOUND if failed else FOUND
 

@@ -88,11 +88,13 @@ class _Writer:
         self.features: dict[str, dict[str, Any]] = {
             name: {"dtype": "float32", "shape": [len(parts)], "names": parts} for name, parts in names.items()
         }
-        self.cameras = {} if folder.drawn is None else {name: f"{IMAGES}.{name}" for name in folder.drawn.names}
-        for name in self.cameras.values():
-            width, height = folder.drawn.size if folder.drawn is not None else (0, 0)
-            shape = [height, width, 3]
-            self.features[name] = {"dtype": "image", "shape": shape, "names": ["height", "width", "channels"]}
+        self.cameras: dict[str, str] = {}
+        if folder.drawn is not None:
+            self.cameras = {name: f"{IMAGES}.{name}" for name in folder.drawn.names}
+            width, height = folder.drawn.size
+            axes = ["height", "width", "channels"]
+            for column in self.cameras.values():
+                self.features[column] = {"dtype": "image", "shape": [height, width, 3], "names": axes}
         self.features["timestamp"] = {"dtype": "float32", "shape": [1], "names": None}
         for name in INDICES:
             self.features[name] = {"dtype": "int64", "shape": [1], "names": None}

@@ -66,8 +66,9 @@ def _share(names: list[str]) -> None:
     try:
         with suppress(OSError):  # no process can be begun: all is made here
             for share in shares[1:]:
-                others.append(_Maker())
-                others[-1].begin(share)
+                other = _Maker()
+                others.append(other)
+                other.begin(share)
         for name in shares[0]:
             library(name)
         for other, share in zip(others, shares[1:], strict=False):
@@ -131,7 +132,8 @@ def _made_by_others(names: list[str], jobs: int) -> Iterator[Callable[[str], Non
             try:
                 maker = idle.pop()
             except IndexError:
-                others.append(maker := _Maker())
+                maker = _Maker()
+                others.append(maker)
             maker.begin([name])
             if maker.has_made_one():
                 idle.append(maker)

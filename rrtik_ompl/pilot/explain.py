@@ -124,19 +124,15 @@ class Story:
         if np.array_equal(self._q, self._before):
             self._since = time
         if time - self._set_at > TOLD_SECONDS and (np.abs(q - self._q) > LEAST).any() and not self._untold:
-            last = (
-                "there was none before" if self._set_at == -np.inf else f"the last was {time - self._set_at:.1f} s ago"
-            )
+            has_any = np.isfinite(self._set_at)
+            last = f"the last was {time - self._set_at:.1f} s ago" if has_any else "there was none before"
             self._untold = f" WITHOUT A SET POINT ({last})"
         self._q = q
 
     def _amount(self, joint: int, change: float) -> str:
         value, unit = reading(change, joint_unit(bool(self._sliding[joint])))
-        return (
-            f"{self._names[joint]} {value:+.1f} {unit}"
-            if unit == "deg"
-            else f"{self._names[joint]} {value:+.4f} {unit}"
-        )
+        digits = 1 if unit == "deg" else 4
+        return f"{self._names[joint]} {value:+.{digits}f} {unit}"
 
 
 def _command(entry: Mapping[str, Any]) -> str:
@@ -154,7 +150,6 @@ def _command(entry: Mapping[str, Any]) -> str:
     what = WORDS.get(name, f"'{name}'" + (f" ({said})" if said else ""))
 
     seen = entry.get("seen")
-    old = (
-        f"; the page showed what was {seen:.2f} s old" if isinstance(seen, float) and seen > WHO_SHOWED_SECONDS else ""
-    )
+    is_old = isinstance(seen, float) and seen > WHO_SHOWED_SECONDS
+    old = f"; the page showed what was {seen:.2f} s old" if is_old else ""
     return printable(f"{who}: {what}{old}")

@@ -1,9 +1,9 @@
 """Decide which commands are refused, given what is known of the picture, the arm and the route.
 
 The rule: nothing moves after STOP until it is reset; nothing moves, is planned or is accepted on a stale picture or on
-joint values that are no longer read, and
-no route is followed that was not accepted. Where the vehicle moves, no route is proposed or followed past objects that
-were not seen recently; driving by hand remains possible. Commands that stop, choose or leave are never refused here.
+joint values that are no longer read, and no route is followed that was not accepted. Where the vehicle moves, no route
+is proposed or followed past objects that were not seen recently; driving by hand remains possible. Commands that stop,
+choose or leave are never refused here.
 Arguments of commands come from outside and are checked: only what a command expects is accepted.
 """
 

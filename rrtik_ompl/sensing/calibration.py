@@ -244,7 +244,7 @@ def _tone(views: Sequence[tuple[NDArray[np.uint8], Matrix]], board: Board) -> fl
 
 
 def _looks_of_markers(grays: Sequence[NDArray[np.uint8]], dictionary: str | None) -> list[Look | None]:
-    seen = (
-        [] if dictionary is None else [marker for gray in grays for marker in find_markers(gray, dictionary, wanted=())]
-    )
+    if dictionary is None:
+        return []
+    seen = [marker for gray in grays for marker in find_markers(gray, dictionary, wanted=())]
     return [each.look for each in seen if each.side >= MIN_TONE_SIDE]

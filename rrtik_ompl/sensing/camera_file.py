@@ -201,9 +201,9 @@ def camera_from_kalibr(document: YamlDocument) -> Camera:
     with document.at(("cam0",)):
         try:
             models = f"{entry['camera_model']}-{entry['distortion_model']}"
-            (fx, fy, cx, cy), lens, (width, height) = (
-                entry[word] for word in ("intrinsics", "distortion_coeffs", "resolution")
-            )
+            fx, fy, cx, cy = entry["intrinsics"]
+            lens = entry["distortion_coeffs"]
+            width, height = entry["resolution"]
         except (KeyError, TypeError, ValueError):
             raise InputError(
                 "a file of kalibr needs camera_model, distortion_model, intrinsics of four numbers, distortion_coeffs "

@@ -257,11 +257,15 @@ class TwoFingers:
             there = replace(ball, placement=pin.SE3(np.eye(3), point + shift * across))
             return [_nearest(side, [there], self._no_frames) for side in sides]
 
-        low, high = -FARTHEST, FARTHEST
+        low = -FARTHEST
+        high = FARTHEST
         for _ in range(HALVINGS):
             middle = 0.5 * (low + high)
             first, second = nearest(middle)
-            low, high = (middle, high) if first.distance < second.distance else (low, middle)
+            if first.distance < second.distance:
+                low = middle
+            else:
+                high = middle
         return np.array([contact.point_first for contact in nearest(0.5 * (low + high))])
 
     def _chord(self, share: float) -> Matrix:

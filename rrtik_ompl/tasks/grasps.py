@@ -312,11 +312,9 @@ def _with_any_turn(world: World, poses: Sequence[pin.SE3], points: NDArray[np.fl
 
     for attempt in range(ROUNDS):
         left = np.flatnonzero(np.isnan(found[:, 0]))
-        Q = (
-            np.tile(near, (len(left), 1))
-            if attempt == 0
-            else rng.uniform(*robot.finite_range(), (len(left), robot.dof))
-        )
+        Q = np.tile(near, (len(left), 1))
+        if attempt > 0:
+            Q = rng.uniform(*robot.finite_range(), Q.shape)
         for _ in range(STEPS):
             T, J = robot.fk_jacobian_batch(Q)
             arms = np.einsum("kij,kj->ki", T[:, :3, :3], in_tip[left])

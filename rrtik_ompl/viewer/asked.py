@@ -44,7 +44,9 @@ def parts_of(
     own = shown.tree if isinstance(shown, Plan) else None
     if tree is True and own is None:
         raise InputError("tree to show: there is none; plan(problem, tree=True) keeps it, where the planner has one")
-    drawn = own if tree is None or tree is True else None if tree is False else tree
+    drawn = own if tree is None else tree
+    if isinstance(drawn, bool):
+        drawn = own if drawn else None
 
     if isinstance(shown, Plan | TaskPlan) and path is not None:
         raise InputError(f"path to show: a {type(shown).__name__} has its own; give the problem in its place")

@@ -13,7 +13,6 @@ from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.base.poses import pose_from_xyzw
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.replanning.record import ReplanRun
-from rrtik_ompl.tasks.played import PlayedTask
 from rrtik_ompl.viewer.asked import Parts
 from rrtik_ompl.viewer.drawing import palette
 from rrtik_ompl.viewer.drawing.nodes import ROOT, Material, Recording
@@ -21,8 +20,8 @@ from rrtik_ompl.viewer.drawing.robot_picture import joint_nodes
 from rrtik_ompl.viewer.picture import draw
 from rrtik_ompl.viewer.run_story import run_story
 from rrtik_ompl.viewer.story import play_times
-from rrtik_ompl.viewer.subject import Subject, subject_of, subject_of_run
-from rrtik_ompl.viewer.task_story import subject_of_task
+from rrtik_ompl.viewer.subject import Subject
+from rrtik_ompl.viewer.task_story import subject_asked
 
 OWN = "rrtik"  # the node below which everything is drawn; a second call replaces it
 RATE = 30  # poses a second of the animation
@@ -41,13 +40,7 @@ def draw_into(visualizer: object, parts: Parts, run: ReplanRun | None) -> None:
         InputError: If it is neither, or has no server yet.
     """
     vis = _meshcat_of(visualizer)
-    if isinstance(parts.path, PlayedTask):
-        subject = subject_of_task(parts.shown, parts.path)
-    elif run is not None:
-        subject = subject_of_run(parts.shown, run)
-    else:
-        subject = subject_of(parts.shown, parts.path, parts.before)
-
+    subject = subject_asked(parts.shown, parts.path, run, parts.before)
     recording, frame = draw(subject)
     if subject.robot is not None and subject.end is not None:
         _draw_goal(recording, subject.robot, subject.end)

@@ -16,7 +16,7 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.base.errors import InputError, PictureWarning, listed
+from rrtik_ompl.base.errors import InputError, PictureWarning
 from rrtik_ompl.model.transitions import single_joint
 from rrtik_ompl.replanning.record import ReplanRun
 from rrtik_ompl.tasks.played import PlayedTask
@@ -29,8 +29,8 @@ from rrtik_ompl.viewer.picture import draw
 from rrtik_ompl.viewer.search_story import joint_space, search_story, search_tree_of
 from rrtik_ompl.viewer.still import first_picture
 from rrtik_ompl.viewer.story import play_pace, story_of
-from rrtik_ompl.viewer.subject import Showable, ShownPath, Subject, subject_of, subject_of_run
-from rrtik_ompl.viewer.task_story import subject_of_task
+from rrtik_ompl.viewer.subject import Showable, ShownPath, Subject
+from rrtik_ompl.viewer.task_story import subject_asked
 from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
 
@@ -135,12 +135,7 @@ def page_and_picture(
     picture: bool = True,
 ) -> tuple[str, bytes]:
     """Return a page as :func:`page` does, and a picture of its first view as a PNG, empty if none is asked for."""
-    if isinstance(path, PlayedTask):
-        subject = subject_of_task(shown, path)
-    else:
-        more = listed(marks, "marks")
-        subject = subject_of(shown, path, before, ghosts, more) if run is None else subject_of_run(shown, run)
-
+    subject = subject_asked(shown, path, run, before, ghosts, marks)
     grown = search_tree_of(tree, subject.robot)
     recording, frame = draw(subject)
     coarser = drawn_coarser(subject.scene)

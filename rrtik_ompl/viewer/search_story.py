@@ -13,6 +13,8 @@ from rrtik_ompl.base.arrays import Mask, Matrix, Vector
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.search_tree import SearchTree
+from rrtik_ompl.ompl_bridge.results import graph_of
+from rrtik_ompl.planning.grown import tree_of
 from rrtik_ompl.planning.search.roadmap import Roadmap
 from rrtik_ompl.viewer.drawing import palette
 from rrtik_ompl.viewer.subject import Subject
@@ -35,11 +37,7 @@ def search_tree_of(tree: object, robot: Robot | None) -> SearchTree | None:
     if tree is None:
         return None
     if isinstance(tree, Roadmap):
-        edges = tree.edges.astype(np.int64)
-        steps = edges.max(axis=1, initial=0)
-        order = np.argsort(steps, kind="stable")
-        none = np.zeros(0, dtype=np.int64)
-        tree = SearchTree("roadmap", tree.vertices, edges[order], steps[order], none, none)
+        tree = tree_of("roadmap", graph_of(tree.vertices, tree.edges), one_joint=False)
     if not isinstance(tree, SearchTree):
         raise InputError(f"tree to show: expected plan(tree=True).tree or a Roadmap, got a {type(tree).__name__}")
     if robot is None or tree.vertices.shape[1] != robot.dof:
@@ -111,9 +109,8 @@ def _thinned(tree: SearchTree, edges: NDArray[np.int64], most: int) -> NDArray[n
 
     before = _predecessors(tree, edges, roots)
     ends = tree.edges[edges]
-    later = np.where(
-        before[ends[:, 1]] == ends[:, 0], ends[:, 1], ends[:, 0]
-    )  # of each edge, the end away from its root
+    outwards = before[ends[:, 1]] == ends[:, 0]
+    later = np.where(outwards, ends[:, 1], ends[:, 0])  # of each edge the end away from its root
     spacing = 2
     while True:
         wanted = np.zeros(len(tree.vertices), dtype=bool)

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import ArrayLike
 
 from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.base.errors import listed
 from rrtik_ompl.base.poses import pose_row
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import AttachedObject, Obstacle, Scene
@@ -16,13 +19,33 @@ from rrtik_ompl.replanning.tick import Tick
 from rrtik_ompl.tasks import TaskPlan
 from rrtik_ompl.tasks.captions import motion_names
 from rrtik_ompl.tasks.played import PlayedTask
+from rrtik_ompl.viewer.drawing.marks import Mark
 from rrtik_ompl.viewer.drawing.robot_picture import joint_nodes, node_name
-from rrtik_ompl.viewer.subject import Fingers, Showable, Subject, replayed
+from rrtik_ompl.viewer.subject import Fingers, Showable, ShownPath, Subject, replayed, subject_of, subject_of_run
 from rrtik_ompl.world.world import World
 
 TASK = "task"  # name of the planner in a run that shows a task
 SAME_PLACE = 1e-9  # [m], and the same for rotation matrices
 NO_SHIFT = 1e-9  # the same for a finger on its joint
+
+
+def subject_asked(
+    shown: Showable,
+    path: ShownPath | PlayedTask | None,
+    run: ReplanRun | None = None,
+    before: ShownPath | None = None,
+    ghosts: ArrayLike | None = None,
+    marks: Sequence[Mark] = (),
+) -> Subject:
+    """Return the subject of whatever is asked for, a path, a task or a run; the arguments are those of a page.
+
+    Raises:
+        InputError: If it does not fit what is shown.
+    """
+    if isinstance(path, PlayedTask):
+        return subject_of_task(shown, path)
+    more = listed(marks, "marks")
+    return subject_of(shown, path, before, ghosts, more) if run is None else subject_of_run(shown, run)
 
 
 def subject_of_task(shown: Showable, played: PlayedTask) -> Subject:

@@ -157,7 +157,8 @@ def _near_solid(points: Matrix, geometry: coal.CollisionGeometry, radius: float,
     """As :func:`_near`, without balls inside of the geometry."""
     if isinstance(geometry, coal.Box):
         beyond = np.maximum(np.abs(points) - geometry.halfSide, 0.0)
-        return np.asarray(np.einsum("ij,ij->i", beyond, beyond) <= (radius + margin) ** 2)
+        reach = radius + margin + geometry.getSweptSphereRadius()
+        return np.asarray(np.einsum("ij,ij->i", beyond, beyond) <= reach**2)
     if not is_mesh(geometry):
         return np.array([_touches(point, geometry, radius, margin) for point in points], dtype=bool)
 

@@ -247,9 +247,9 @@ def _above(trees: Sequence[Tree], middles: Matrix, around: Callable[[Numbers], t
 
 def _halved(points: Matrix) -> tuple[Numbers, Numbers]:
     """Return the numbers of two halves of points, shape (n, 3), along the longest side of their box."""
-    axis = int(np.argmax(np.ptp(points, axis=0)))
-    order = np.argsort(points[:, axis], kind="stable")
-    return order[: len(order) // 2], order[len(order) // 2 :]
+    count = len(points)
+    order = _sorted_along(points, np.arange(count), np.array([0]), np.array([count]))
+    return order[: count // 2], order[count // 2 :]
 
 
 def _box_solid(low: NDArray[np.float64], high: NDArray[np.float64]) -> ConvexSolid:

@@ -253,9 +253,8 @@ def is_own_mcap(file: str | os.PathLike[str]) -> bool:
     except ImportError:
         return False
     try:
-        return bool(make_reader(BytesIO(read_bytes(file))).get_header().library == LIBRARY)
-    except InputError:
-        raise
+        with open(file, "rb") as stream:  # bags may be large, and the header stands first
+            return bool(make_reader(stream).get_header().library == LIBRARY)
     except Exception:  # whatever a damaged file leads the package to
         return False
 
@@ -270,6 +269,7 @@ def read_mcap(file: str | os.PathLike[str]) -> dict[str, Any]:
         from mcap.reader import make_reader
     except ImportError:
         raise InputError("MCAP files need the package mcap: pip install 'rrtik-ompl[mcap]'") from None
+    data = read_bytes(file)
     if not is_own_mcap(file):
         raise InputError("not an MCAP file of Trajectory.save; load_motions(file, robot) reads bags of ROS")
 
@@ -277,7 +277,7 @@ def read_mcap(file: str | os.PathLike[str]) -> dict[str, Any]:
     told: list[tuple[float, dict[str, Any]]] = []
     about: dict[str, dict[str, str]] = {STATES: {}, COMMANDS: {}}
     try:
-        for _, channel, message in make_reader(BytesIO(read_bytes(file))).iter_messages():
+        for _, channel, message in make_reader(BytesIO(data)).iter_messages():
             about[channel.topic] = channel.metadata
             row = message.log_time / NANOSECONDS, json.loads(message.data)
             (states if channel.topic == STATES else told).append(row)

@@ -353,7 +353,7 @@ class LineServer:
         return {"protocol": PROTOCOL, "version": VERSION, "joints": joints, "rates": rates, "hold": TIMEOUT_SECONDS}
 
     def _answer(self, line: Line) -> None:
-        """ArmAnswer requests of one client.
+        """Answer requests of one client.
 
         The simulated arm advances in real time, and stops when a set point's validity ends.
         """

@@ -152,7 +152,8 @@ def cell_errors(model: Pixels, seen: Pixels, count: int) -> Vector:
     rim = (len(model) - count * cell) // 2
     inset = cell // 4
     lines = [slice(rim + k * cell + inset, rim + (k + 1) * cell - inset) for k in range(count)]
-    before, after = slice(0, rim), slice(len(model) - rim, len(model))
+    before = slice(0, rim)
+    after = slice(len(model) - rim, len(model))
 
     pieces = [np.s_[row, column] for row in lines for column in lines]
     pieces += [piece for line in lines for side in (before, after) for piece in (np.s_[side, line], np.s_[line, side])]

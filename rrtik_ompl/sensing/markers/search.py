@@ -26,26 +26,30 @@ Pixels = NDArray[np.float32]
 Window = tuple[int, int, int, int]  # left, top, right, bottom [pixels]
 
 # [pixels]; how much of a picture is searched closely: of a single one, and of each picture of a film.
-BUDGET, FILM_BUDGET = 640 * 480, 320 * 320
+BUDGET = 640 * 480
+FILM_BUDGET = 320 * 320
 # [pixels]; pictures are reduced to less for the search of large markers.
 _REDUCED = 600_000
 # [pixels]; larger pictures are searched for small markers with one threshold window, reduced with all of them.
 _LARGE = 3_000_000
 _SINGLE = 13  # [pixels]; that window
-_TILE, _OVERLAP = 320, 64  # [pixels]; side of the parts that take turns, and what neighbouring ones share
+_TILE = 320  # [pixels]; side of the parts that take turns,
+_OVERLAP = 64  # [pixels]; and what neighbouring ones share
 _LEAST_PERIMETER = 24.0  # [pixels]; of a marker in the picture that is searched
 # [pixels]; largest threshold window of the thorough detector, which also corrects as many bits as the code allows.
 # OpenCV's default is 23.
 _WIDEST = 53
 # How far a marker may have moved since the previous picture, in sides and in pixels.
-_NEAR_SIDES, _NEAR_PIXELS = 1.0, 16
+_NEAR_SIDES = 1.0
+_NEAR_PIXELS = 16
 _NEAR_OUTLINE_SHARE = 0.5  # share of the longer side of that window; smaller outlines are noise
 
 _ENLARGED = 2.0  # scale of the picture in a close search
 # [enlarged pixels]; standard deviation of the blur against noise in the first and second attempt of a close search.
 _CALM = 1.0, 1.4
 # Sharpening of the second attempt: factor of the detail that is added, and its size [enlarged pixels].
-_SHARPENED, _EDGE = 8.0, 3.0
+_SHARPENED = 8.0
+_EDGE = 3.0
 _CALM_WHOLE = 0.7  # [pixels]; the blur against noise where the whole picture is evened
 _AROUND = 21  # side of the window in which brightness and contrast are equalised, in fours of pixels
 _FAINT = 1.5  # grey values; smaller contrast is noise

@@ -73,10 +73,13 @@ def drawn_coarser(scene: Scene) -> str:
     things: list[Obstacle | AttachedObject] = [*scene.obstacles, *scene.attached]
     for each in things:
         if isinstance(each.shape, PointCloud):
-            count, most, elements = len(each.shape.points), MOST_POINTS, "points"
+            count = len(each.shape.points)
+            most = MOST_POINTS
+            elements = "points"
         else:
             count = len(each.shape.surface()[1]) if each.shape.fine else 0
-            most, elements = MAX_OBSTACLE_TRIANGLES, "triangles"
+            most = MAX_OBSTACLE_TRIANGLES
+            elements = "triangles"
         if count > most:
             told.append(f"'{each.name}' with at most {most:,} of its {count:,} {elements}")
 

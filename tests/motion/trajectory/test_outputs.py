@@ -9,8 +9,10 @@ import yaml
 
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.description.catalog import load_robot
+from rrtik_ompl.files.text import MAX_BYTES
 from rrtik_ompl.model.path import JointPath
 from rrtik_ompl.motion.trajectory import RateLimits, Trajectory, time_parameterize
+from rrtik_ompl.motion.trajectory.text import is_own_mcap
 from rrtik_ompl.viewer import view
 from rrtik_ompl.viewer.plots.joints import plot_joints
 
@@ -221,3 +223,14 @@ def test_a_tick_just_before_the_end_is_the_end(tmp_path, robot):
     assert np.diff(motion.sample(1000.0).times).min() > 0.9e-3
     motion.save(tmp_path / "motion.yaml", rate=1000.0)
     assert Trajectory.load(tmp_path / "motion.yaml").duration == pytest.approx(3.1)
+
+
+def test_a_large_bag_of_another_program_is_told_by_its_header_alone(tmp_path):
+    writer = pytest.importorskip("mcap.writer")
+    bag = tmp_path / "bag.mcap"
+    with bag.open("wb") as file:
+        other = writer.Writer(file)
+        other.start(library="another one")
+        other.finish()
+        file.truncate(MAX_BYTES + 1)
+    assert not is_own_mcap(bag)

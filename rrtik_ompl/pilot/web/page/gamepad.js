@@ -9,7 +9,9 @@ const PAD_TAPPED = new Map([
   [6, () => chooseGrasp(1, 0)], [7, () => chooseGrasp(0, 1)], [12, () => neighbourJoint(-1)],
   [11, () => send("lift")], [13, () => neighbourJoint(1)], [14, () => changeSpeed(-1)], [15, () => changeSpeed(1)],
 ]);
-const PAD_ENABLED = new Map([[9, () => (state.stopped || state.fault_of_arm ? send("reset") : nextObject())], [10, () => toggleGripper()]]);  // only while the shoulder button is held, too
+const PAD_ENABLED = new Map([  // only while the shoulder button is held, too
+  [9, () => (isLatched() ? send("reset") : nextObject())], [10, () => toggleGripper()],
+]);
 const PAD_WORDS = "gamepad: LB held enables · left stick drives the joint · A held: next move · B: STOP · X plan · Y accept · "
   + "RB held: joint to its value · RT held with LB: the last centimetres by sight · D-pad: joint, speed · LT type · "
   + "RT without LB: level · left stick pressed: gripper · Start with LB: reset after STOP · right stick pressed: lift";

@@ -317,10 +317,11 @@ function showButtons() {
   for (const id of ["play", "step_back", "step_on", "scrub", "live"]) byId(id).disabled = role.role !== "pilot" || state.mode !== "proposed";
 }
 
+const isLatched = () => state.stopped || Boolean(state.fault_of_arm);
+
 function showLatch() {
-  const latched = state.stopped || Boolean(state.fault_of_arm);
-  byId("latch").hidden = !latched;
-  byId("reset").hidden = !latched || role.role !== "pilot" || state.replay;
+  byId("latch").hidden = !isLatched();
+  byId("reset").hidden = !isLatched() || role.role !== "pilot" || state.replay;
 }
 
 function showGripper() {
