@@ -9,13 +9,15 @@ import sys
 from collections.abc import Callable, Iterable, Mapping
 from functools import wraps
 from importlib import import_module
-from inspect import Signature, signature
+from inspect import Signature, getattr_static, signature
 from types import FunctionType, ModuleType
 from typing import Any
 
 from rrtik_ompl.base.collector import collector_waits
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.base.floors import DependencyError, fitting_packages, name_old_packages
+
+MAKERS = classmethod, staticmethod
 
 
 def lazy_names(
@@ -104,7 +106,7 @@ def _wrong_call(kind: type, args: tuple[Any, ...], options: dict[str, Any]) -> s
 
     whole = "missing" not in fault
     forms = [getattr(kind, "call", "") or _form(kind, kind.__name__, whole=whole)]
-    others = (name for name in ("of", "load") if hasattr(kind, name))
+    others = (name for name in ("of", "load") if isinstance(getattr_static(kind, name, None), MAKERS))
     forms += [_form(getattr(kind, name), f"{kind.__name__}.{name}", whole=False) for name in others]
     return f"{kind.__name__}: {fault}; write {' or '.join(forms)}"
 

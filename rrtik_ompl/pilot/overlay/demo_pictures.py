@@ -16,7 +16,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Matrix, Vector
-from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.errors import InputError, listed, require
 from rrtik_ompl.demos.episode import observed
 from rrtik_ompl.files.text import file_name
 from rrtik_ompl.model.robot import Robot
@@ -59,13 +59,15 @@ class DemoPictures:
     def __init__(
         self, task: Task, cameras: Sequence[str | os.PathLike[str]], size: str | Sequence[int] = (320, 240)
     ) -> None:
+        require(task, Task, "task of pictures", "use Task.load(file)")
+        known = listed(cameras, "cameras of demonstrations")
         self.size = sides_of(size, ".png")
-        self.names = tuple(each if each in SIDES else file_name(each).stem for each in map(str, cameras))
+        self.names = tuple(each if each in SIDES else file_name(each).stem for each in map(str, known))
         if not self.names or len(set(self.names)) < len(self.names):
             raise InputError(f"cameras of demonstrations: expected different names, got {', '.join(self.names)}")
         self._task = task
         self._robot = task.world.robot
-        self._views = [self._view(camera) for camera in cameras]
+        self._views = [self._view(camera) for camera in known]
         self._make()
 
     def of(self, arrays: Mapping[str, NDArray[Any]]) -> Iterator[dict[str, NDArray[np.uint8]]]:
