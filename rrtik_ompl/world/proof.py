@@ -78,7 +78,8 @@ class Prover:
 
     def for_thread(self) -> Prover:
         """Return the same prover for another thread."""
-        return replace(self, tables=self.tables.for_thread(self.bodies), _coal=None)
+        bare = None if self.bare is None else self.bare.for_thread()
+        return replace(self, tables=self.tables.for_thread(self.bodies), bare=bare, _coal=None)
 
     def holding(self, constraints: HeldRegions) -> Prover:
         """Return a prover of the same bodies that also requires path constraints; it does not accept earlier proofs."""
@@ -192,18 +193,12 @@ class Prover:
 
     def settles(self, pair: int) -> bool:
         """Check whether coal may prove a pair of the table apart where the kernels do not."""
-        packed = self.tables.get(self.bodies, self._new_table)
-        return bool(self._coal_proof(packed).links[pair])
+        return bool(self._coal_proof(self.packed()).links[pair])
 
     def prepare(self) -> None:
         """Make the tables, for a caller that has few configurations now and motions to prove later."""
         if not self.always_colliding:
-            self.tables.get(self.bodies, self._new_table)
-
-    def lent_table(self) -> ProofPairs | None:
-        """Return the table with memory of its own to compute in; None if another prover has taken it."""
-        self.tables.get(self.bodies, self._new_table)
-        return self.tables.for_thread(self.bodies).packed
+            self.packed()
 
     def still_proven(self, rows: Matrix, *, clearance: float) -> Mask:
         """Return which configurations, shape (m, dof), are proven free with a clearance [m], shape (m,).
@@ -309,9 +304,15 @@ class Prover:
 
     def _packed_for(self, clearance: float, slack: float) -> ProofPairs:
         """Return the table, set to the clearance and the slack that proofs have to keep [m]."""
-        packed = self.tables.get(self.bodies, self._new_table)
+        packed = self.packed()
         packed.keep(clearance, slack)
         return packed
+
+    def packed(self) -> ProofPairs:
+        """Return the table; that of bodies in contact stands in the memory of the one without contacts."""
+        if self.bare is None:
+            return self.tables.get(self.bodies, self._new_table)
+        return self.tables.beside(self.bare.packed(), self.bodies)
 
     def _coal_proof(self, packed: ProofPairs) -> CoalProof:
         """Return the prover by coal for a table. It compares links alone, so it is kept wherever obstacles move."""
@@ -321,10 +322,6 @@ class Prover:
 
     def _new_table(self) -> ProofPairs:
         bodies = tuple(self.bodies)
-        without_contacts = None if self.bare is None else self.bare.lent_table()
-        if without_contacts is not None:
-            return without_contacts.with_contacts(bodies)
-
         known = arm_cache(self.robot)
         of_same_kind = known.proof_table(bodies, self.pairs) if self._fixed else None
         if of_same_kind is not None:

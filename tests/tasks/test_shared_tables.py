@@ -83,3 +83,23 @@ def test_a_scene_with_a_contact_is_moved_without_changing_the_tables_of_others(r
     assert moved.prover.route(path.waypoints).proven
     assert not world.moved("wall", world.robot.fk(path.end)).prover.route(path.waypoints).proven
     assert world.prover.route(path.waypoints).proven
+
+
+def test_a_world_in_contact_stays_as_it_is_where_the_one_without_contacts_is_moved(resting):
+    world, path = resting
+    bare = world.with_scene(replace(world.scene, contacts=()))
+    assert bare.prover is world.prover.bare
+    assert world.prover.route(path.waypoints).proven
+    table = bare.prover.tables.packed
+
+    in_the_way = bare.moved("wall", world.robot.fk(path.end))
+    blocked = in_the_way.with_scene(replace(in_the_way.scene, contacts=world.scene.contacts))
+    assert blocked.prover.bare is in_the_way.prover
+    assert not blocked.prover.route(path.waypoints).proven
+    assert in_the_way.prover.tables.packed is table  # its rows were written where the world in contact had them
+    assert world.prover.route(path.waypoints).proven
+
+    aside = in_the_way.moved("wall", [5.0, 5.0, 5.0])
+    assert not aside.prover.route(path.waypoints).proven  # the cup is on the table
+    assert not blocked.prover.route(path.waypoints).proven
+    assert world.prover.route(path.waypoints).proven

@@ -32,10 +32,8 @@ from rrtik_ompl.model.robot import Chain
 LISTED = 64  # lists of pairs that are kept: numbers of a robot, and of what it holds and what stands around it
 SHORTEST_RUN = 4  # pairs that are compared in lanes
 ROOM = 1e-8  # [m] for rounding: float64 misplaces points of an arm of 30 joints and 100 m by less than a tenth of it
-COMPUTED = (
-    *("margins", "frames", "angles", "stamps", "bends", "ways", "way_stamps", "lists", "counts"),
-    *("stack", "chords", "chord_stamps", "seen", "log", "log_ways"),
-)
+REMEMBERED = ("margins", "stamps", "ways", "way_stamps", "chord_stamps", "log", "log_ways")  # from proof to proof
+COMPUTED = (*REMEMBERED, "frames", "angles", "bends", "lists", "counts", "stack", "chords", "seen")
 PLACED = ("sizes", "corners", "reaches", "still", "clouds", "cloud_poses")  # where solids stand
 
 
@@ -121,10 +119,10 @@ class ProofPairs:
 
         Args:
             placing: Whether its obstacles may be put elsewhere than those of this table.
-            same_thread: Whether it is for the thread of this table alone. Both then compute frames, which take most of
-                the memory, in the same place: each proof begins with none of them.
+            same_thread: Whether it is for the thread of this table alone. Both then compute in the same place what no
+                proof finds there from an earlier one; stamps tell each whether it has made a frame or a chord itself.
         """
-        computed = [name for name in COMPUTED if name != "frames" or not same_thread]
+        computed = REMEMBERED if same_thread else COMPUTED
         own = {name: np.zeros_like(getattr(self.table, name)) for name in computed}
         if self.clouds:  # points that are compared stand among the solids
             own |= {name: getattr(self.table, name) for name in ("solids", "corners")}

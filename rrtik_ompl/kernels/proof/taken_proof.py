@@ -21,6 +21,7 @@ class TakenProof:
         self.packed = packed
         self._rows: MovedSolids | None = None
         self._moved: tuple[int, ...] = ()  # bodies that stand elsewhere than in the table
+        self._bare: ProofPairs | None = None  # the table without contacts in whose memory it stands
         self._lent = False
         self._lock = threading.Lock()
 
@@ -37,9 +38,27 @@ class TakenProof:
                 packed = self.packed = self._brought_up(bodies) or make()
         return packed
 
+    def beside(self, bare: ProofPairs, bodies: Sequence[Body]) -> ProofPairs:
+        """The table of bodies in contact, which shares the places of solids with that of the bodies without contacts.
+
+        When the other one was taken, its solids may be moved. So it is made again as soon as there is another one.
+
+        Args:
+            bare: The table without contacts, of the same thread.
+            bodies: All bodies, with their contacts.
+        """
+        with self._lock:
+            packed = self.packed
+            if packed is None or self._bare is not bare:
+                packed = bare.for_thread(same_thread=True).with_contacts(bodies)
+                self.packed, self._bare = packed, bare
+        return packed
+
     def for_thread(self, bodies: Sequence[Body]) -> TakenProof:
         """The same table with memory of its own to compute in, if there is one."""
         other = TakenProof()
+        if self._bare is not None:  # the other thread has a table without contacts of its own, too
+            return other
         with self._lock:
             self.packed = self._brought_up(bodies)
             other.packed = None if self.packed is None else self.packed.for_thread()
