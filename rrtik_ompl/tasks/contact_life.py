@@ -27,9 +27,9 @@ from rrtik_ompl.geometry.collision.solids import is_mesh
 from rrtik_ompl.model.path import JointPath, path_through
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.model.scene import Scene, Touching
+from rrtik_ompl.tasks.nearness import beyond
 from rrtik_ompl.tasks.worlds import Worlds
 from rrtik_ompl.world.clearances import proved
-from rrtik_ompl.world.exact_checks import distance
 from rrtik_ompl.world.proof import Prover
 from rrtik_ompl.world.route_check import violations_of
 from rrtik_ompl.world.world import World, form_of
@@ -170,10 +170,11 @@ def signed_distance(robot: Robot, pair: tuple[Body, Body], q: Vector, frames: Ma
         frames: Poses of all joint frames at q, shape (joints + 1, 4, 4).
     """
     poses = _transforms(pair, frames)
-    if distance(pair[0].geometry, poses[0], pair[1].geometry, poses[1], CONTACT_GAP) is not None:
+    ends = (pair[0].geometry, poses[0], pair[1].geometry, poses[1])
+    if beyond(ends, CONTACT_GAP):
         return np.inf
 
-    gap = signed_gap((pair[0].geometry, poses[0], pair[1].geometry, poses[1]))
+    gap = signed_gap(ends)
     if gap > CONTACT_GAP:
         return np.inf
     if any(is_mesh(body.geometry) for body in pair):
@@ -370,7 +371,7 @@ def _keep_apart(pair: tuple[Body, Body], frames: Matrix) -> bool:
     """Check whether two bodies do not touch and keep the distance that is required without a contact."""
     poses = _transforms(pair, frames)
     limit = usually_apart(*pair) + CONTACT_GAP
-    return distance(pair[0].geometry, poses[0], pair[1].geometry, poses[1], limit) is not None
+    return beyond((pair[0].geometry, poses[0], pair[1].geometry, poses[1]), limit)
 
 
 def _transforms(pair: tuple[Body, Body], frames: Matrix) -> list[coal.Transform3s]:

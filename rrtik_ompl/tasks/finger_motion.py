@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import TypeAlias
 
 import coal
 import numpy as np
@@ -24,14 +25,15 @@ from rrtik_ompl.geometry.collision.bodies import DISTANCE_TOLERANCE, Body, kept_
 from rrtik_ompl.geometry.collision.body_arrays import body_arrays
 from rrtik_ompl.geometry.collision.containment import Containment
 from rrtik_ompl.geometry.collision.distances import signed_gap
-from rrtik_ompl.geometry.collision.solids import around
+from rrtik_ompl.geometry.collision.solids import Ends, around
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.tasks.contact_life import CONTACT_GAP, EXTRA_DEPTH, signed_distance
+from rrtik_ompl.tasks.nearness import beyond, beyond_by_pieces
 from rrtik_ompl.tasks.setting import Setting
-from rrtik_ompl.world.exact_checks import distance as gap_of
 
 MAX_LEVEL = 12  # deepest level of the bisection, with intervals of 1/4096 of the motion
 SAME = 1e-7  # [m] or [rad] tolerance for a finger's pose at the middle of its motion to be on the screw
+Check: TypeAlias = Callable[[Ends, float], bool]  # whether two placed geometries are farther apart than a distance [m]
 REMEDY = "attach the object, move the gripper less, or allow the pair"
 
 
@@ -179,7 +181,10 @@ def _meeting(
 
 
 def _apart(first: _Part, second: _Part) -> bool:
-    """Check whether two parts keep their distance, by bisection with a bound on how fast they move [16]."""
+    """Check whether two parts keep their distance on the whole motion.
+
+    Their convex pieces are compared first. Meshes, which take much longer, are compared where these tell too little.
+    """
     required = kept_apart(first.body, second.body)
     # A thing that the fingers release may continue to touch them, but hardly deeper.
     if not _beyond(first, second, 0.0, CONTACT_GAP):
@@ -187,30 +192,33 @@ def _apart(first: _Part, second: _Part) -> bool:
         required = min(required, overlap_now - EXTRA_DEPTH)
 
     least = required + DISTANCE_TOLERANCE
+    return any(_always_beyond(first, second, least, check) for check in (beyond_by_pieces, beyond))
+
+
+def _always_beyond(first: _Part, second: _Part, least: float, check: Check) -> bool:
+    """Check whether two parts are always farther apart than a distance [m], with a bound on how fast they move [16]."""
     speed = first.speed + second.speed
     undecided = [(0, 0)]  # level and number of intervals
     while undecided:
         level, number = undecided.pop()
         width = 0.5**level
         middle = (number + 0.5) * width
-        if _beyond(first, second, middle, least + 0.5 * width * speed):
+        if _beyond(first, second, middle, least + 0.5 * width * speed, check):
             continue
-        if level == MAX_LEVEL or not _beyond(first, second, middle, least):
+        if level == MAX_LEVEL or not _beyond(first, second, middle, least, check):
             return False
         undecided += [(level + 1, 2 * number + 1), (level + 1, 2 * number)]
     return True
 
 
-def _beyond(first: _Part, second: _Part, share: float, distance: float) -> bool:
+def _beyond(first: _Part, second: _Part, share: float, distance: float, check: Check = beyond) -> bool:
     """Check whether two parts are farther apart than a distance [m] at a share of their motion.
 
-    A negative distance is compared with that of their convex hulls. Where one is a mesh, to measure how far they are
-    apart takes several times as long.
+    A negative distance is compared with that of their convex hulls.
     """
     if distance < 0.0:
         return _depth_apart(first, second, share) > distance
-    ends = (first.body.geometry, first.at(share), second.body.geometry, second.at(share))
-    return gap_of(*ends, distance) is not None
+    return check((first.body.geometry, first.at(share), second.body.geometry, second.at(share)), distance)
 
 
 def _depth_apart(first: _Part, second: _Part, share: float) -> float:
