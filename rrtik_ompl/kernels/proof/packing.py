@@ -108,9 +108,13 @@ class ProofPairs:
             self.kept = clearance, ROOM + slack
             self.table.margins[: len(self.margins)] = self.margins + self.kept[1] + clearance * self.clear
 
-    def spread_sizes(self, solids: ArrayLike | None = None) -> None:
+    def spread_sizes(self, solids: Sequence[int] | None = None) -> None:
         """Let the blocks hold the sizes of some solids, or of all, as they are now."""
-        blocks = slice(None) if solids is None else np.isin(self.still, solids).any(axis=1)
+        blocks: slice | NDArray[np.bool_] = slice(None)
+        if solids is not None:
+            written = np.zeros(len(self.table.sizes) // layout.SIZE_COUNT, dtype=bool)
+            written[solids] = True
+            blocks = np.asarray(written[self.still].any(axis=1))
         sizes = self.table.sizes.reshape(-1, layout.SIZE_COUNT)[self.still[blocks], : layout.STILL_SIZE]
         self.table.still.reshape(-1, layout.STILL_SIZE, WIDTH)[blocks] = sizes.transpose(0, 2, 1)
 
