@@ -57,7 +57,7 @@ def draw(subject: Subject) -> tuple[Recording, Frame]:
 
     draw_scene(vis, scene, frame)
     draw_marks(vis, subject.marks)
-    draw_triad(vis["frames"]["world"], pin.SE3.Identity(), 0.1 * frame.arm)
+    draw_triad(vis["frames"]["world"], pin.SE3.Identity(), 0.1 * frame.arm, _axes(robot))
 
     if robot is not None and robot.planar:
         _flatten(vis, frame)
@@ -86,9 +86,16 @@ def _draw_robot(vis: Node, robot: Robot, subject: Subject) -> Frame:
     _draw_parts(vis["robot"], robot, parts, frames[0], frame)
 
     tip = robot.model.frames[robot.model.getFrameId(robot.tip)]
-    draw_triad(vis["robot"][joint_nodes(robot)[tip.parentJoint]]["tip frame"], tip.placement, 0.07 * frame.arm)
+    draw_triad(
+        vis["robot"][joint_nodes(robot)[tip.parentJoint]]["tip frame"], tip.placement, 0.07 * frame.arm, _axes(robot)
+    )
 
     return frame
+
+
+def _axes(robot: Robot | None) -> str:
+    """Return the axes of frames that are drawn: seen from above, the third one is a point."""
+    return "xy" if robot is not None and robot.planar else "xyz"
 
 
 def _draw_parts(node: Node, robot: Robot, parts: list[Part], frames: NDArray[np.float64], frame: Frame) -> None:

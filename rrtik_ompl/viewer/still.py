@@ -40,12 +40,12 @@ FINER = 1.5  # drawn so much finer, then made smaller: edges without steps
 COLORS = 256  # of the file
 OPENING = np.deg2rad(32.0)  # angle of view from the upper to the lower edge, as in the page
 FILLED = 0.85  # share of the picture's height that is filled
-GHOST = 0.42  # opacity of ghosts
+GHOST = 0.55  # opacity of ghosts
 NEARER = 0.998  # what is seen through must be nearer by this factor: where it coincides with the arm, the arm is seen
 KEY = np.array([0.5, -0.7, 1.2]) / np.linalg.norm([0.5, -0.7, 1.2])  # direction of the light
 KEY_SHARE = 0.5
-SKY_SHARE = 0.55
-GROUND_SHARE = 0.3
+SKY_SHARE = 0.53
+GROUND_SHARE = 0.28
 UP = np.array([0.0, 0.0, 1.0])
 
 

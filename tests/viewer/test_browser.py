@@ -46,6 +46,15 @@ def test_a_browser_shows_obstacles_trail_ghosts_and_a_robot_that_moves(file: Pat
     assert (np.abs(at_start - later).max(axis=2) > 30).mean() > 0.005
 
 
+@pytest.mark.slow
+def test_the_ground_of_the_page_hides_no_floor_of_the_scene(tmp_path: Path) -> None:
+    target = tmp_path / "view.html"
+    floor = rrtik_ompl.Obstacle("floor", rrtik_ompl.HalfSpace([0.0, 0.0, 1.0], offset=-0.02), color="#cc3366")
+    world = rrtik_ompl.World(rrtik_ompl.load_robot("panda_primitives"), rrtik_ompl.Scene([floor]))
+    target.write_text(page(world), encoding="utf-8")
+    assert share_of("#cc3366", screenshot(target, ""), 0.95) > 0.3
+
+
 def test_the_page_reads_degrees_metres_and_the_tip_where_the_robot_has_it(file: Path, crane: Robot) -> None:
     shown = document_of(f"{file.as_uri()}#waypoint=3").replace("\u2212", "-")
     assert re.search(r">slew</td><td[^>]*>68\.8 deg</td><td[^>]*>\u2192 -57\.3<", shown)

@@ -39,6 +39,7 @@ async function encoderOf(ending, { size: [width, height], rate, bits }) {
 async function drawFilm(wanted) {
   const { frames, held, at, rate, ending, camera, hide } = wanted;
   hide.filter((name) => name !== "caption").forEach(hideThing);
+  hideHands(true);
   const { sheet, take } = newSheet();
   const encoder = ending in CODECS ? await encoderOf(ending, wanted) : null;
   const place = cameraOf(camera, (frames - 1) / rate);

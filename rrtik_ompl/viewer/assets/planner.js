@@ -33,7 +33,7 @@ function moveGhost(end, q, free) {
   if (!viewer.scene_tree.find([...ROOT, name]).object.children.length) addGhost(name, color, q);
   for (const copy of node(name).children[0].children) {
     setPosture(copy, q);
-    copy.traverse((item) => { if (item.isMesh && item.material.emissive) item.material.color.set(color); });
+    copy.traverse((item) => { if (item.isMesh && item.material.emissive) tintGlass(item.material, color); });
   }
 }
 

@@ -7,7 +7,7 @@ function lineMesh(points, color, radius) {
   const curve = new THREE.CurvePath();
   const spots = points.map((point) => new THREE.Vector3(...point));
   for (let k = 1; k < spots.length; k += 1) curve.add(new THREE.LineCurve3(spots[k - 1], spots[k]));
-  const material = new THREE.MeshPhongMaterial({ color, shininess: 10 });
+  const material = glowing(new THREE.MeshPhongMaterial({ color, shininess: 10 }));
   return new THREE.Mesh(new THREE.TubeGeometry(curve, 3 * points.length, radius, 6), material);
 }
 

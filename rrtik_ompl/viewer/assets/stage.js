@@ -28,6 +28,8 @@ function node(...path) {
   return viewer.scene_tree.find([...ROOT, ...path]).object;
 }
 
+const tipFrame = () => node("robot", robot.nodes[robot.tip.joint], "tip frame");
+
 function setVisible(path, on) {
   viewer.scene_tree.find([...ROOT, ...path]).object.visible = on;
   viewer.set_dirty();
@@ -42,7 +44,7 @@ const toned = (name) => story.colors[dark.matches ? `${name}_dark` : name];
 
 function showGround() {
   viewer.set_property(["Background"], "top_color", rgb(toned("background_top")));
-  viewer.set_property(["Background"], "bottom_color", rgb(toned("background_bottom")));
+  viewer.set_property(["Background"], "bottom_color", rgb(toned(story.planar ? "background_top" : "background_bottom")));
   addGrid();
 }
 for (const light of ["SpotLight", "PointLightNegativeX", "PointLightPositiveX", "AmbientLight", "FillLight"]) {
@@ -52,9 +54,9 @@ viewer.set_property(["Grid"], "visible", false);
 viewer.set_property(["Axes"], "visible", false);
 const key = new THREE.DirectionalLight(0xffffff, 0.48);
 key.position.set(0.5, -0.7, 1.2);
-const fill = new THREE.DirectionalLight(0xffffff, 0.14);
+const fill = new THREE.DirectionalLight(0xffffff, 0.12);
 fill.position.set(-1, 0.6, 0.3);
-const sky = new THREE.HemisphereLight(0xffffff, 0xa4aeba, 0.6);
+const sky = new THREE.HemisphereLight(0xffffff, 0x98a4b0, 0.53);  // together less than 1, so that white arms keep their form
 sky.position.set(0, 0, 1);
 key.position.multiplyScalar(2 * size).add(centre);
 key.target.position.copy(centre);
@@ -80,7 +82,7 @@ function castShadows() {
   Object.assign(key.shadow.camera, { left: -reach, right: reach, bottom: -reach, top: reach, near: 0.1 * size, far: 6 * size });
   node().traverse((item) => { item.castShadow = item.receiveShadow = false; });
   shade(node("robot"));
-  if (robot) node("robot", robot.nodes[robot.tip.joint], "tip frame").traverse((item) => { item.castShadow = false; });
+  if (robot) tipFrame().traverse((item) => { item.castShadow = false; });
 }
 
 /** Let the solids of a group cast and receive shadows; what is seen through casts none. */
@@ -112,12 +114,21 @@ function renewShadows() {
   castersDrawn = casters;
 }
 
+const FADING = {  // of the lines of the ground with the distance from its middle
+  vertexShader: `attribute vec3 color; uniform float reach; varying vec3 tone; varying vec2 at;
+    void main() { tone = color; at = position.xz / reach; gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0); }`,
+  fragmentShader: "varying vec3 tone; varying vec2 at; void main() { gl_FragColor = vec4(tone, 1.0 - smoothstep(0.3, 1.0, length(at))); }",
+};
+
 function addGrid() {
   const cell = story.grid;
-  const cells = 2 * Math.ceil(Math.max(high.x - low.x, high.y - low.y, size / 2) * 0.75 / cell);
+  const wide = Math.max(high.x - low.x, high.y - low.y, size / 2) * (story.planar ? 2.5 : 1.5);
+  const cells = 2 * Math.ceil(wide / cell);
   const grid = new THREE.GridHelper(cells * cell, cells, toned("grid_middle"), toned("grid"));
+  grid.material = new THREE.ShaderMaterial({ ...FADING, uniforms: { reach: { value: wide } }, transparent: true, depthWrite: false });
   grid.rotation.x = Math.PI / 2;
-  const floor = new THREE.Mesh(new THREE.PlaneGeometry(cells * cell, cells * cell), new THREE.ShadowMaterial({ opacity: 0.2 }));
+  const shadows = new THREE.ShadowMaterial({ opacity: 0.2, depthWrite: false });  // a floor of the scene may lie below it
+  const floor = new THREE.Mesh(new THREE.PlaneGeometry(cells * cell, cells * cell), shadows);
   floor.receiveShadow = true;
   const snap = (value) => Math.round(value / cell) * cell;
   const ground = new THREE.Group().add(grid, floor);
@@ -141,6 +152,35 @@ function outline(group) {
 }
 outline(node("obstacles"));
 
+/** A material that keeps its colour on the side away from the light: for paths and axes, whose colour says what they are. */
+function glowing(material) {
+  material.emissive.copy(material.color).multiplyScalar(0.7);
+  material.color.multiplyScalar(0.35);
+  return material;
+}
+for (const name of ["trail", "beads", "before", "frames", "goal"]) {
+  node(name).traverse((item) => { if (item.isMesh) glowing(item.material); });
+}
+if (robot) tipFrame().traverse((item) => { if (item.isMesh) glowing(item.material); });
+
+/** Points have no shading: those higher up are lighter, and all are round. */
+function showPoints(points) {
+  const dot = Object.assign(document.createElement("canvas"), { width: 32, height: 32 });
+  const pen = dot.getContext("2d");
+  pen.fillStyle = "#ffffff";
+  pen.arc(16, 16, 15, 0, 2 * Math.PI);
+  pen.fill();
+  const { position } = points.geometry.attributes;
+  const place = new THREE.Vector3();
+  const heights = Array.from({ length: position.count }, (_, k) => place.fromBufferAttribute(position, k).applyMatrix4(points.matrixWorld).y);
+  const [least, most] = heights.reduce(([a, b], height) => [Math.min(a, height), Math.max(b, height)], [Infinity, -Infinity]);
+  const tones = heights.flatMap((height) => Array(3).fill(0.35 + (0.65 * (height - least)) / (most - least || 1)));
+  points.geometry.setAttribute("color", new THREE.Float32BufferAttribute(tones, 3));
+  Object.assign(points.material, { map: new THREE.CanvasTexture(dot), alphaTest: 0.5, vertexColors: true, needsUpdate: true });
+}
+viewer.scene.updateMatrixWorld(true);
+node("obstacles").traverse((item) => { if (item.isPoints) showPoints(item); });
+
 // Postures ---------------------------------------------------------------------------------------------------------
 function setPosture(group, q) {
   const frames = jointFrames(q);
@@ -157,10 +197,15 @@ function setPosture(group, q) {
 const DRAWN_GHOSTS = 8;  // as many of all solutions: more would hide each other
 const GHOST_UNITS = 16;  // steps of the depth buffer from each ghost to the next one
 let ghostCount = 0;
+function tintGlass(glass, color) {
+  glass.color.set(color);
+  glass.emissive.set(color).multiplyScalar(dark.matches ? 0.7 : 0.3);
+  return glass;
+}
+
 function addGhost(name, color, q) {
   const depth = new THREE.MeshBasicMaterial({ colorWrite: false, transparent: true });
-  const glass = new THREE.MeshLambertMaterial({ color, transparent: true, opacity: 0.42, depthWrite: false });
-  glass.emissive = new THREE.Color(color).multiplyScalar(0.4);
+  const glass = tintGlass(new THREE.MeshLambertMaterial({ transparent: true, opacity: 0.55, depthWrite: false }), color);
   const ghost = new THREE.Group();
   ghostCount += 1;
   [depth, glass].forEach((material, pass) => {

@@ -17,10 +17,10 @@ UNPROVEN = "#7b3294"  # trail of the tip on motions that are not proven free
 BEFORE = "#56b4e9"
 TOUCHING = "#d1242f"  # bodies in collision
 SERIES = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#8c6bb1", "#7f7f7f")  # in this order
-AXES = ("#d55e00", "#009e73", "#0072b2")  # x, y, z
-BACKGROUND_TOP = "#fbfcfd"
-BACKGROUND_BOTTOM = "#e3e9ef"
-GRID_MIDDLE, GRID = "#bcc6d0", "#d2d9e0"
+AXES = ("#d64545", "#3a9d3a", "#3a6fd8")  # x, y, z, as of the handles; away from trail and goal
+BACKGROUND_TOP = "#f4f7f9"
+BACKGROUND_BOTTOM = "#d8e0e8"
+GRID_MIDDLE, GRID = "#a9b5c1", "#bfc9d3"
 BACKGROUND_TOP_DARK, BACKGROUND_BOTTOM_DARK = "#2b3541", "#171d24"  # used if the system prefers dark pages
 GRID_MIDDLE_DARK, GRID_DARK = "#4d5965", "#38434f"
 

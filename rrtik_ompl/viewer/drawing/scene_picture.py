@@ -128,11 +128,11 @@ def goal_frames(region: TaskRegion) -> NDArray[np.float64]:
     return region.poses(np.array(rows))
 
 
-def draw_triad(node: Node, pose: pin.SE3, length: float) -> None:
-    """Draw a frame: x, y and z axes of a given length [m] in three colours."""
+def draw_triad(node: Node, pose: pin.SE3, length: float, axes: str = "xyz") -> None:
+    """Draw a frame: axes of a given length [m] in three colours; those of a planar world are x and y."""
     node.set_transform(pose.homogeneous)
-    for axis, color, direction in zip("xyz", palette.AXES, np.eye(3), strict=True):
-        draw_tube(node[axis], np.stack([0.0 * direction, length * direction]), 0.035 * length, color)
+    for axis, color, direction in zip(axes, palette.AXES, np.eye(3), strict=False):
+        draw_tube(node[axis], np.stack([0.0 * direction, length * direction]), 0.025 * length, color)
 
 
 def draw_tube(node: Node, points: Matrix, radius: float, color: str, opacity: float = 1.0) -> None:
