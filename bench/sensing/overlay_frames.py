@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -61,7 +62,7 @@ def wide(camera: Camera) -> Camera:
     matrix = np.array(camera.matrix)
     matrix[:2] *= 2.0
     matrix[1, 2] -= 120.0
-    return Camera(matrix, 1280, 720, camera.distortion)
+    return replace(camera, matrix=matrix, width=1280, height=720)
 
 
 def frame_times(report: Report, count: int) -> None:

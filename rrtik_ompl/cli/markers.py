@@ -32,6 +32,14 @@ BOARD_MARKER = 0.73  # default side of a board's markers, as a share of a chess 
 PICTURES, SCENES = (".png", ".jpg"), (".yaml", ".yml")
 
 
+class Model(str, Enum):
+    """The lens models (`sensing.cameras.lenses`)."""
+
+    brown = "brown"
+    rational = "rational"
+    fisheye = "fisheye"
+
+
 class Kind(str, Enum):
     """The sheets that can be printed."""
 
@@ -88,6 +96,9 @@ def calibrate_camera(
     ] = None,
     dictionary: Dictionary = "4x4_50",
     chessboard: Annotated[bool, typer.Option("--chessboard", help="The board has no markers.")] = False,
+    model: Annotated[
+        Model, typer.Option(help="Of the lens: brown (k1, k2, p1, p2), rational (eight numbers), or fisheye.")
+    ] = Model.brown,
 ) -> int:
     """Calibrate a camera, or cameras that are fixed to each other.
 
@@ -107,19 +118,20 @@ def calibrate_camera(
         inner = BOARD_MARKER * square if marker_mm is None else 1e-3 * marker_mm
         board = charuco_board(columns, rows, square, inner, dictionary)
     if len(photographs) > 1:
-        return _calibrate_rig(photographs, out, board)
+        return _calibrate_rig(photographs, out, board, model)
 
     with progress("detecting the board"):
         taken = list(pictures_from(photographs[0]))
-        found = calibrate([picture.pixels for picture in taken], board, [picture.name for picture in taken])
+        names = [picture.name for picture in taken]
+        found = calibrate([picture.pixels for picture in taken], board, names, lens=model.value)
     found.save(out)
 
-    _tell(found, [picture.name for picture in taken])
+    _tell(found, names)
     say(f"error {found.error:.3f} px over {sum(not r for r in found.unused)} photographs; wrote {out}")
     return FOUND
 
 
-def _calibrate_rig(photographs: list[Path], out: Path, board: Board) -> int:
+def _calibrate_rig(photographs: list[Path], out: Path, board: Board, model: Model) -> int:
     """Calibrate cameras that are fixed to each other, write their files, and print the results."""
     import numpy as np
     from pinocchio.rpy import matrixToRpy
@@ -129,7 +141,8 @@ def _calibrate_rig(photographs: list[Path], out: Path, board: Board) -> int:
 
     with progress("detecting the board"):
         moments = list(pictures_together([str(each) for each in photographs]))
-        found = calibrate_rig([[each[k].pixels for each in moments] for k in range(len(photographs))], board)
+        pictures = [[each[k].pixels for each in moments] for k in range(len(photographs))]
+        found = calibrate_rig(pictures, board, lens=model.value)
 
     files = found.rig.save(out)
     rig = found.rig

@@ -5,17 +5,18 @@ from __future__ import annotations
 import os
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Matrix, Vector, frozen
-from rrtik_ompl.base.errors import InputError, listed, require
+from rrtik_ompl.base.errors import InputError, UnknownNameError, listed, require
 from rrtik_ompl.files.kinds import KINDS, found
+from rrtik_ompl.sensing.calibration_fit import Fit, View, fit_camera, with_focal_scaled
 from rrtik_ompl.sensing.cameras.camera import Camera
+from rrtik_ompl.sensing.cameras.lenses import LENSES
 from rrtik_ompl.sensing.markers.alignment import Look, look_of
 from rrtik_ompl.sensing.markers.chessboard import Chessboard
 from rrtik_ompl.sensing.markers.detection import charuco_corners, dictionary_of, find_markers
@@ -28,13 +29,17 @@ MIN_CORNERS, MIN_VIEWS = 8, 5
 TONE_VIEWS, TONE_LOOKS = 3, 12
 MIN_TONE_SIDE = 20.0  # [pixels]; least side of a marker or a piece of a chessboard for this estimate
 GOOD_DOUBT = 0.005  # standard deviation of a focal length as a share of it; distances are uncertain by as much
+# Share of the picture in which corners should be seen; the picture has so many parts along each side.
+GOOD_COVERAGE = 0.7
+_PARTS = 4
 # Other focal lengths, as multiples: if one explains the photographs nearly as well, they say nothing of it. The
 # standard deviations of a fit do not show this, as fits to frontal views end anywhere.
 _OTHERS = (0.6, 0.95, 1.05, 1.7)
 # Twice the logarithm of the likelihood ratio at which another one is three standard deviations off.
 _WORSE = 9.0
-# Share of the squared error that a fisheye's model leaves: below it the lens is one.
-_FISHEYE = 0.85
+# Share of the squared error that another lens model leaves: below it the lens is of that kind.
+_BETTER = 0.85
+_MODELS = {"brown": "a usual one (Brown's)", "rational": "a rational one", "fisheye": "a fisheye"}
 _MIN_POINTS = 100  # corners in all photographs, for the comparison of models
 TILT = "tilt the board by 30 to 50 degrees to all sides, near and far, in the middle and in the corners of the picture"
 MAX_VIEW_ERROR = 1.0  # [pixels]; a view with a larger error is blurred, bent or mismatched
@@ -50,6 +55,7 @@ class Calibration:
         error: Root mean square reprojection error over all views [pixels].
         view_errors: The same for each photograph, shape (m,); NaN where it was not used.
         unused: For each photograph, why it was not used; "" if it was.
+        covered: Share of the picture, in sixteen parts, in which corners were seen.
     """
 
     camera: Camera
@@ -57,14 +63,20 @@ class Calibration:
     error: float
     view_errors: Vector
     unused: tuple[str, ...]
+    covered: float = 1.0
 
     @property
     def advice(self) -> str:
         """What would make the calibration better; "" if it is good."""
         share = self.sigmas[0] / self.camera.matrix[0, 0]
-        if share <= GOOD_DOUBT:
-            return ""
-        return f"the focal length is uncertain by {100.0 * share:.1f} %, and so are distances: {TILT}"
+        if share > GOOD_DOUBT:
+            return f"the focal length is uncertain by {100.0 * share:.1f} %, and so are distances: {TILT}"
+        if self.covered < GOOD_COVERAGE:
+            seen = round(self.covered * _PARTS**2)
+            return (
+                f"corners were seen in {seen} of {_PARTS**2} parts of the picture, and the lens is known there: {TILT}"
+            )
+        return ""
 
     def save(self, file: str | os.PathLike[str]) -> None:
         """Write the camera with the errors of its calibration, as a file that :meth:`Camera.load` reads.
@@ -75,29 +87,38 @@ class Calibration:
         found(KINDS["Camera"].writer)(self, file)
 
 
-def board_corners(gray: NDArray[np.uint8], board: Board) -> tuple[Matrix, Matrix]:
+def board_corners(gray: NDArray[np.uint8], board: Board) -> View:
     """Return the corners of a board in a grey picture: positions on the board [m], (k, 3), and pixels, (k, 2)."""
     return board.corners(gray) if isinstance(board, Chessboard) else charuco_corners(gray, board)
 
 
-def calibrate(pictures: Sequence[NDArray[np.uint8]], board: Board, names: Sequence[str] | None = None) -> Calibration:
-    """Calibrate a camera from photographs of one board, taken from different angles; ``names`` are for error messages.
+def calibrate(
+    pictures: Sequence[NDArray[np.uint8]], board: Board, names: Sequence[str] | None = None, *, lens: str = "brown"
+) -> Calibration:
+    """Calibrate a camera from photographs of one board, taken from different angles.
 
-    The board is made by `detection.charuco_board` or `Chessboard`. The third radial coefficient stays 0, because the
-    second one is not stable together with it. The tone of the camera is the median over the tones with which the
-    board's markers, or the pieces of a chessboard, correlate best with the photographs.
+    The tone of the camera is the median over the tones with which the board's markers, or the pieces of a chessboard,
+    correlate best with the photographs.
+
+    Args:
+        pictures: The photographs.
+        board: Made by `detection.charuco_board` or `Chessboard`.
+        names: Names of the photographs for error messages; None to count them.
+        lens: The lens model: "brown", "rational" or "fisheye" (`Camera`).
 
     Raises:
         InputError: If the photographs differ in size, fewer than five show the board well enough, they do not determine
-            the focal length, or the lens is a fisheye.
+            the focal length, or another lens model explains them much better.
     """
     require(board, cv2.aruco.CharucoBoard | Chessboard, "board", "use charuco_board(...) or Chessboard(...)")
-    return calibrate_by_corners(*seen_boards(listed(pictures, "photographs"), board, names), board)
+    if not isinstance(lens, str) or lens not in LENSES:
+        raise UnknownNameError("lens model", lens, LENSES)
+    return calibrate_by_corners(*seen_boards(listed(pictures, "photographs"), board, names), board, lens)
 
 
 def seen_boards(
     pictures: Sequence[NDArray[np.uint8]], board: Board, names: Sequence[str] | None = None
-) -> tuple[list[NDArray[np.uint8]], list[tuple[Matrix, Matrix]]]:
+) -> tuple[list[NDArray[np.uint8]], list[View]]:
     """Convert photographs to grey values, and find the corners of the board in each.
 
     Args:
@@ -125,24 +146,30 @@ def seen_boards(
 
 
 def calibrate_by_corners(
-    grays: Sequence[NDArray[np.uint8]], found: Sequence[tuple[Matrix, Matrix]], board: Board
+    grays: Sequence[NDArray[np.uint8]], found: Sequence[View], board: Board, lens: str = "brown"
 ) -> Calibration:
     """Calibrate as :func:`calibrate` does, from the results of :func:`seen_boards`."""
     unused = ["" if len(points) >= MIN_CORNERS else _too_few(len(points)) for points, _ in found]
     used = [k for k, reason in enumerate(unused) if not reason]
 
-    # Views are removed one at a time, the worst first, because a bad view also increases the errors of the others.
-    result = None
+    # Views are removed one at a time, the worst first, because a bad view also increases the errors of the others. A
+    # wrong lens model makes many views bad.
+    fit = None
+    checked = False
     while len(used) >= MIN_VIEWS:
-        result = _solve([found[k] for k in used], grays[0].shape)
-        errors = np.ravel(result[-1])
-        worst = int(errors.argmax())
-        if errors[worst] <= MAX_VIEW_ERROR:
+        fit = fit_camera([found[k] for k in used], grays[0].shape, lens)
+        if fit is None:
+            raise InputError(f"{_MODELS[lens]} lens does not explain the photographs at all; try another --model")
+        worst = int(fit.view_errors.argmax())
+        if fit.view_errors[worst] <= MAX_VIEW_ERROR:
             break
-        unused[used.pop(worst)] = f"corners lie {errors[worst]:.1f} pixels off: blurred, or the board is bent"
-        result = None
+        if not checked:
+            _check_lens([found[k] for k in used], grays[0].shape, fit)
+            checked = True
+        unused[used.pop(worst)] = f"corners lie {fit.view_errors[worst]:.1f} pixels off: blurred, or the board is bent"
+        fit = None
 
-    if result is None:
+    if fit is None:
         reasons = "; ".join(sorted({reason for reason in unused if reason})) or "there are no more"
         raise InputError(
             f"{len(used)} of {len(grays)} photographs show the board well, at least {MIN_VIEWS} must ({reasons}); "
@@ -150,72 +177,62 @@ def calibrate_by_corners(
             "is another kind of board, and has to be in view as a whole"
         )
 
-    error, matrix, distortion, _, _, sigmas, _, each = result
-    _check([found[k] for k in used], grays[0].shape, result)
+    views = [found[k] for k in used]
+    _check_focal(views, fit)
+    _check_lens(views, grays[0].shape, fit)
     view_errors = np.full(len(grays), np.nan)
-    view_errors[used] = np.ravel(each)
-    height, width = grays[0].shape
-    doubts = np.ravel(sigmas)[:9]
+    view_errors[used] = fit.view_errors
 
     tone = _tone([(grays[k], found[k][1]) for k in used[:TONE_VIEWS]], board)
-    camera = Camera(matrix, width, height, np.ravel(distortion)[:5], sigmas=doubts, tone=tone)
-    return Calibration(camera, frozen(doubts[:4]), float(error), frozen(view_errors), tuple(unused))
+    camera = replace(fit.with_doubts(sum(len(points) for points, _ in views)), tone=tone)
+    covered = _covered(np.vstack([pixels for _, pixels in views]), grays[0].shape)
+    return Calibration(camera, frozen(camera.sigmas[:4]), fit.error, frozen(view_errors), tuple(unused), covered)
 
 
-def _solve(
-    views: Sequence[tuple[Matrix, Matrix]], shape: tuple[int, ...], fixed: tuple[Matrix, Matrix] | None = None
-) -> tuple[Any, ...]:
-    """Run OpenCV's calibration; ``fixed`` is a camera matrix, of which the focal lengths are kept, and a lens."""
-    points = [np.ascontiguousarray(p, dtype=np.float32) for p, _ in views]
-    pixels = [np.ascontiguousarray(q, dtype=np.float32) for _, q in views]
-    solve: Any = cv2.calibrateCameraExtended  # the stub of OpenCV does not allow None for the initial guesses
-    flags = cv2.CALIB_FIX_K3
-    matrix, lens = (None, None) if fixed is None else (each.copy() for each in fixed)
-    if fixed is not None:
-        flags |= cv2.CALIB_USE_INTRINSIC_GUESS | cv2.CALIB_FIX_FOCAL_LENGTH
-    solved: tuple[Any, ...] = solve(points, pixels, shape[::-1], matrix, lens, flags=flags)
-    return solved
+def _covered(pixels: Matrix, shape: tuple[int, ...]) -> float:
+    """Return the share of the parts of a picture, `_PARTS` along each side, that hold corners."""
+    row_of = np.clip((pixels[:, 1] * _PARTS / shape[0]).astype(int), 0, _PARTS - 1)
+    column_of = np.clip((pixels[:, 0] * _PARTS / shape[1]).astype(int), 0, _PARTS - 1)
+    return len(set(zip(row_of.tolist(), column_of.tolist(), strict=True))) / _PARTS**2
 
 
-def _check(views: Sequence[tuple[Matrix, Matrix]], shape: tuple[int, ...], result: tuple[Any, ...]) -> None:
-    """Refuse a calibration that says nothing, or whose lens model is wrong.
+def _check_focal(views: Sequence[View], fit: Fit) -> None:
+    """Refuse photographs that do not determine the focal length.
 
     Raises:
-        InputError: If another focal length, or the model of a fisheye, explains the photographs as well or better.
+        InputError: If another focal length explains them as well.
     """
-    error, matrix, lens = result[:3]
     count = sum(len(points) for points, _ in views)
+    focal = fit.camera.matrix[0, 0]
     for factor in _OTHERS:
-        scaled = matrix * [[factor, 1.0, 1.0], [1.0, factor, 1.0], [1.0, 1.0, 1.0]]
-        other = float(_solve(views, shape, (scaled, lens))[0])
-        if 4.0 * count * np.log(max(other, 1e-12) / max(float(error), 1e-12)) < _WORSE:
+        other = with_focal_scaled(views, fit, factor)
+        if other is not None and 4.0 * count * np.log(max(other.error, 1e-12) / max(fit.error, 1e-12)) < _WORSE:
             raise InputError(
-                f"the photographs do not say the focal length: {matrix[0, 0]:.0f} and {scaled[0, 0]:.0f} pixels "
+                f"the photographs do not say the focal length: {focal:.0f} and {factor * focal:.0f} pixels "
                 f"explain them alike, because the board is seen too much alike in them: {TILT}"
             )
 
-    if count < _MIN_POINTS:
+
+def _check_lens(views: Sequence[View], shape: tuple[int, ...], fit: Fit) -> None:
+    """Refuse a wrong lens model.
+
+    Raises:
+        InputError: If another lens model explains the photographs much better.
+    """
+    if sum(len(points) for points, _ in views) < _MIN_POINTS:
         return
-    fisheye_error = _fisheye_error(views, shape)
-    if fisheye_error**2 < _FISHEYE * float(error) ** 2:
+    fits = {lens: fit_camera(views, shape, lens) for lens in LENSES if lens != fit.camera.lens}
+    errors = {lens: other.error for lens, other in fits.items() if other is not None}
+    least = min(errors.values(), default=np.inf)
+    if least**2 < _BETTER * fit.error**2:
+        # A rational lens can be like a fisheye: of models that are nearly alike, the one with the fewest numbers.
+        alike = [lens for lens in errors if _BETTER * errors[lens] ** 2 < least**2]
+        best = min(alike, key=lambda lens: len(LENSES[lens].names))
         raise InputError(
-            f"the lens is a fisheye: its model leaves {fisheye_error:.3f} pixels, that of k1, k2, p1, p2 leaves "
-            f"{float(error):.3f}, and poses far from the middle would be wrong by centimetres; take a lens of less "
-            "than 100 degrees, or photographs that are rectified"
+            f"the lens is {_MODELS[best]}: its model leaves {errors[best]:.3f} pixels, that of "
+            f"{_MODELS[fit.camera.lens]} leaves {fit.error:.3f}, and poses far from the middle would be wrong; "
+            f"calibrate with --model {best}"
         )
-
-
-def _fisheye_error(views: Sequence[tuple[Matrix, Matrix]], shape: tuple[int, ...]) -> float:
-    """Return the root mean square error that the model of Kannala and Brandt leaves [pixels]; infinite if it fails."""
-    points = [np.ascontiguousarray(p, dtype=np.float64)[None] for p, _ in views]
-    pixels = [np.ascontiguousarray(q, dtype=np.float64)[None] for _, q in views]
-    solve: Any = cv2.fisheye.calibrate  # the stub of OpenCV does not allow None for the initial guesses
-    home: Any = cv2 if hasattr(cv2, "CALIB_FIX_SKEW") else cv2.fisheye  # OpenCV 5, and before
-    flags = home.CALIB_RECOMPUTE_EXTRINSIC | home.CALIB_FIX_SKEW
-    try:
-        return float(solve(points, pixels, shape[::-1], None, None, flags=flags)[0])
-    except cv2.error:  # the views do not determine it
-        return np.inf
 
 
 def _size(shape: tuple[int, ...]) -> str:

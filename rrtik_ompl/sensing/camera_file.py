@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
 import cv2
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rrtik_ompl.base.arrays import Vector
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.files.sections import (
     NAME,
@@ -32,29 +33,43 @@ from rrtik_ompl.files.strict_yaml import YamlDocument, read_yaml, write_yaml
 from rrtik_ompl.files.text import read_text
 from rrtik_ompl.sensing.calibration import Calibration
 from rrtik_ompl.sensing.cameras.camera import Camera
+from rrtik_ompl.sensing.cameras.lenses import LENSES
 
 PIXELS = Whole(1, 100_000)
 # Beginnings of OpenCV's files, and a tag for newer ones, which begin with %YAML 1.2.
 _STARTS, _TAG = ("%YAML:1", "<?xml"), "!!opencv-matrix"
 _MATRICES = ("camera_matrix", "Camera_Matrix", "cameraMatrix", "K", "M1")  # keys in the files of OpenCV's samples
 _LENSES = ("distortion_coefficients", "Distortion_Coefficients", "distCoeffs", "dist_coeffs", "D", "D1")
+_FISHEYE = ("fisheye_model",)  # not 0 in files of OpenCV's sample for calibration if the lens is one
 _WIDTHS, _HEIGHTS = ("image_width", "image_Width", "width"), ("image_height", "image_Height", "height")
+
+# Names of lens models in files of ROS and of kalibr.
+_OF_ROS = {"plumb_bob": "brown", "rational_polynomial": "rational", "equidistant": "fisheye", "fisheye": "fisheye"}
+_OF_KALIBR = {"pinhole-radtan": "brown", "pinhole-equidistant": "fisheye", "pinhole-equi": "fisheye"}
 
 Read = TypeVar("Read")
 
 
 class CameraEntry(Section):
-    """Intrinsics in OpenCV's conventions; all in pixels, distortion as k1, k2, p1, p2, k3."""
+    """Intrinsics in OpenCV's conventions; all in pixels."""
 
     size = key(Listed(PIXELS, 2, 2))
     fx = key(POSITIVE)
     fy = key(POSITIVE)
     cx = key(NUMBER)
     cy = key(NUMBER)
-    distortion = key(Listed(NUMBER, 4, 5), default=[0.0] * 5)
+    lens = key(Choice(*LENSES), "the lens model", default="brown")
+    distortion = key(
+        Listed(NUMBER, 4, 8),
+        "k1, k2, p1, p2, k3; of a rational lens k4, k5, k6, too; of a fisheye k1, k2, k3, k4",
+        default=None,
+    )
     error_px = key(NOT_NEGATIVE, "root mean square reprojection error of the calibration", default=None)
     sigmas_px = key(VECTOR4, "standard deviations of fx, fy, cx, cy", default=None)
-    distortion_sigmas = key(Listed(NOT_NEGATIVE, 4, 5), "standard deviations of the distortion", default=None)
+    distortion_sigmas = key(Listed(NOT_NEGATIVE, 4, 8), "standard deviations of the distortion", default=None)
+    correlation = key(
+        Listed(NUMBERS), "correlations of the errors of fx, fy, cx, cy and of the distortion, in rows", default=None
+    )
     tone = key(
         Number(-1.0, 2.0),
         "how light is coded as grey: 0 linear, 1 sRGB; estimated in each picture if absent",
@@ -65,9 +80,18 @@ class CameraEntry(Section):
     def build(self) -> Camera:
         """Return the camera."""
         matrix = [[self.fx, 0.0, self.cx], [0.0, self.fy, self.cy], [0.0, 0.0, 1.0]]
-        doubts = (*(self.sigmas_px or (0.0,) * 4), *(*(self.distortion_sigmas or (0.0,) * 5), 0.0)[:5])
-        lens = (*self.distortion, 0.0)[:5]
-        return Camera(matrix, self.size[0], self.size[1], lens, sigmas=doubts, tone=self.tone)
+        lens = _coefficients(self.distortion or [], self.lens)
+        doubts = [*(self.sigmas_px or [0.0] * 4), *_coefficients(self.distortion_sigmas or [], self.lens)]
+        return Camera(
+            matrix,
+            self.size[0],
+            self.size[1],
+            lens,
+            sigmas=doubts,
+            tone=self.tone,
+            lens=self.lens,
+            correlation=self.correlation,
+        )
 
 
 class CameraFile(Section):
@@ -107,11 +131,15 @@ def write_camera(camera: Camera | Calibration, file: str | os.PathLike[str]) -> 
     lens = camera.camera if isinstance(camera, Calibration) else camera
     (fx, _, cx), (_, fy, cy), _ = lens.matrix.tolist()
     data: dict[str, Any] = {"size": [lens.width, lens.height], "fx": fx, "fy": fy, "cx": cx, "cy": cy}
+    if lens.lens != "brown":
+        data["lens"] = lens.lens
     data["distortion"] = lens.distortion.tolist()
 
     if lens.sigmas.any():
         data["sigmas_px"] = lens.sigmas[:4].tolist()
         data["distortion_sigmas"] = lens.sigmas[4:].tolist()
+    if not np.array_equal(lens.correlation, np.eye(len(lens.sigmas))):
+        data["correlation"] = lens.correlation.tolist()
     if lens.tone is not None:
         data["tone"] = lens.tone
 
@@ -137,14 +165,16 @@ class CameraInfo(Section):
     image_height = key(PIXELS)
     camera_name = key(NAME, default=None)
     camera_matrix = key(MatrixEntry)
-    distortion_model = key(Choice("plumb_bob", "rational_polynomial"), default="plumb_bob")
+    distortion_model = key(Choice(*_OF_ROS), default="plumb_bob")
     distortion_coefficients = key(MatrixEntry)
     rectification_matrix = key(MatrixEntry, default=None)
     projection_matrix = key(MatrixEntry, default=None)
 
     def build(self) -> Camera:
         """Return the camera; rectification and projection do not apply to raw pictures."""
-        return _camera(self.camera_matrix.data, self.distortion_coefficients.data, self.image_width, self.image_height)
+        lens = _OF_ROS[self.distortion_model]
+        size = self.image_width, self.image_height
+        return _camera(self.camera_matrix.data, self.distortion_coefficients.data, *size, lens)
 
 
 def is_of_opencv(text: str) -> bool:
@@ -165,7 +195,7 @@ def camera_from_opencv(text: str, name: str) -> Camera:
     try:
         storage = cv2.FileStorage(text, cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY)
         matrix, lens = (_first(storage, names, cv2.FileNode.mat) for names in (_MATRICES, _LENSES))
-        width, height = (_first(storage, names, cv2.FileNode.real) for names in (_WIDTHS, _HEIGHTS))
+        width, height, fisheye = (_first(storage, names, cv2.FileNode.real) for names in (_WIDTHS, _HEIGHTS, _FISHEYE))
     except (cv2.error, SystemError):
         raise InputError(f"{name}: is not a file of OpenCV that can be read; write the camera anew") from None
 
@@ -175,7 +205,8 @@ def camera_from_opencv(text: str, name: str) -> Camera:
         raise InputError(f"{name}: has no image_width and image_height; add the size of the calibrated pictures")
 
     try:
-        return _camera(matrix, np.zeros(5) if lens is None else lens, width, height)
+        coefficients = np.zeros(0) if lens is None else lens
+        return _camera(matrix, coefficients, width, height, "fisheye" if fisheye else _by_count(coefficients))
     except InputError as error:
         raise InputError(f"{name}: {error}") from None
 
@@ -209,9 +240,10 @@ def camera_from_kalibr(document: YamlDocument) -> Camera:
                 "a file of kalibr needs camera_model, distortion_model, intrinsics of four numbers, distortion_coeffs "
                 "and resolution"
             ) from None
-        if models != "pinhole-radtan":
-            raise InputError(f"a file of kalibr with the model {models}; pinhole-radtan is read: calibrate with that")
-        return _camera([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]], lens, width, height)
+        if models not in _OF_KALIBR:
+            read = "pinhole-radtan and pinhole-equi are read: calibrate with one of them"
+            raise InputError(f"a file of kalibr with the model {models}; {read}")
+        return _camera([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]], lens, width, height, _OF_KALIBR[models])
 
 
 def is_of_ros(document: YamlDocument) -> bool:
@@ -227,15 +259,29 @@ def _first(storage: cv2.FileStorage, names: tuple[str, ...], read: Callable[[cv2
     return None
 
 
-def _camera(matrix: ArrayLike, lens: ArrayLike, width: float, height: float) -> Camera:
-    numbers = np.ravel(np.asarray(lens, dtype=np.float64))
-    rest = 5
-    if np.any(numbers[rest:]):
-        raise InputError(
-            f"the lens has {len(numbers)} coefficients; five are modelled: k1, k2, p1, p2, k3; calibrate with these"
-        )
+def _by_count(coefficients: ArrayLike) -> str:
+    """Return the lens model of OpenCV's coefficients, which may be followed by zeros of larger models."""
+    return "rational" if np.any(np.ravel(coefficients)[len(LENSES["brown"].names) :]) else "brown"
 
+
+def _camera(matrix: ArrayLike, coefficients: ArrayLike, width: float, height: float, lens: str) -> Camera:
     square = np.asarray(matrix, dtype=np.float64)
     if square.size != 9:
         raise InputError(f"camera matrix must have 3 x 3 numbers, got {square.size}")
-    return Camera(square.reshape(3, 3), width, height, np.pad(numbers[:rest], (0, max(rest - len(numbers), 0))))
+    numbers = _coefficients(np.ravel(np.asarray(coefficients, dtype=np.float64)), lens)
+    return Camera(square.reshape(3, 3), width, height, numbers, lens=lens)
+
+
+def _coefficients(numbers: Sequence[float] | Vector, lens: str) -> Vector:
+    """Return as many coefficients as a lens model has; those that are left out are 0.
+
+    Raises:
+        InputError: If there are more that are not 0.
+    """
+    names = LENSES[lens].names
+    if np.any(numbers[len(names) :]):
+        raise InputError(
+            f"the lens has {len(numbers)} coefficients; {len(names)} are modelled: {', '.join(names)}; calibrate with "
+            "these"
+        )
+    return np.pad(np.asarray(numbers[: len(names)], dtype=np.float64), (0, max(len(names) - len(numbers), 0)))

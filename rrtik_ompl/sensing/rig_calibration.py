@@ -54,7 +54,9 @@ class RigCalibration:
     errors: tuple[float, ...]
 
 
-def calibrate_rig(pictures: Sequence[Sequence[NDArray[np.uint8]]], board: Board) -> RigCalibration:
+def calibrate_rig(
+    pictures: Sequence[Sequence[NDArray[np.uint8]]], board: Board, *, lens: str = "brown"
+) -> RigCalibration:
     """Calibrate cameras and their relative poses from pictures of a board.
 
     Each camera is calibrated from all of its own pictures. Its pose then minimises the reprojection error of the
@@ -65,11 +67,16 @@ def calibrate_rig(pictures: Sequence[Sequence[NDArray[np.uint8]]], board: Board)
         pictures: For each camera the same number of pictures, in the order of time.
         board: The board; a chessboard must have an even number of squares along one side and an odd one along the
             other.
+        lens: The lens model of all cameras: "brown" or "rational" (`Camera`).
 
     Raises:
         InputError: If there are fewer than two cameras, the numbers of pictures differ, too few of them show the board,
-            or the cameras moved relative to each other.
+            the cameras moved relative to each other, or they are fisheyes.
     """
+    if lens == "fisheye":
+        raise InputError(
+            "cameras with fisheyes are not calibrated as a rig: calibrate each by itself, and write the rig's file"
+        )
     require(board, cv2.aruco.CharucoBoard | Chessboard, "board", "use charuco_board(...) or Chessboard(...)")
     pictures = [listed(each, "pictures of a camera") for each in listed(pictures, "pictures of a rig")]
 
@@ -89,7 +96,7 @@ def calibrate_rig(pictures: Sequence[Sequence[NDArray[np.uint8]]], board: Board)
     for number, camera_pictures in enumerate(pictures, start=1):
         try:
             grays, found = seen_boards(camera_pictures, board)
-            cameras.append(calibrate_by_corners(grays, found, board))
+            cameras.append(calibrate_by_corners(grays, found, board, lens))
             corners.append(found)
         except InputError as reason:
             raise InputError(f"camera {number}: {reason}") from None

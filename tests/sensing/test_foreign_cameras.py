@@ -66,7 +66,7 @@ def test_a_camera_info_of_ros_is_read(tmp_path):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        (ROS.replace("plumb_bob", "equidistant"), "distortion_model"),
+        (ROS.replace("plumb_bob", "omni"), "distortion_model"),
         (ROS.replace("640", "-3"), "image_width"),
         (ROS.replace("cols: 3\n  data: [438.78, ", "cols: 3\n  data: [", 1), "3 x 3 numbers, got 8"),
         (ROS.replace("0.000505, 0.0]", "0.000505, 0.0, 0.2]"), "6 coefficients"),
@@ -102,7 +102,7 @@ def test_a_file_of_kalibr_is_read_or_named_as_such(tmp_path):
     assert found.matrix[[0, 1, 0, 1], [0, 1, 2, 2]].tolist() == [438.78, 437.35, 305.59, 243.73]
     assert found.distortion.tolist() == [-0.36, 0.11, 0.001, 0.0005, 0.0]
     assert (found.width, found.height) == (640, 480)
-    for wrong in (KALIBR.replace("radtan", "equidistant"), KALIBR.replace("resolution", "size")):
+    for wrong in (KALIBR.replace("pinhole", "omni"), KALIBR.replace("resolution", "size")):
         file.write_text(wrong)
         with pytest.raises(InputError, match=r"camchain.yaml:\d+: cam0: a file of kalibr"):
             Camera.load(file)

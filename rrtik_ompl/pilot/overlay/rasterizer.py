@@ -326,7 +326,7 @@ def half_as_fine(camera: Camera) -> Camera:
     matrix = np.array(camera.matrix)
     matrix[:2, :2] *= 0.5
     matrix[:2, 2] = 0.5 * (matrix[:2, 2] + 0.5) - 0.5
-    return Camera(matrix, (camera.width + 1) // 2, (camera.height + 1) // 2, camera.distortion)
+    return replace(camera, matrix=matrix, width=(camera.width + 1) // 2, height=(camera.height + 1) // 2)
 
 
 def _matrix(camera: Camera) -> tuple[NDArray[np.float64], float]:
@@ -347,8 +347,11 @@ def _matrix(camera: Camera) -> tuple[NDArray[np.float64], float]:
 
 def _bent(points: NDArray[np.float32], camera: Camera) -> NDArray[np.float32]:
     """Shift points so that a pinhole camera shows them where the lens does; edges between them stay straight."""
-    if not camera.distortion.any():
+    if camera.is_pinhole:
         return points
+    if camera.lens != "brown":
+        in_front = np.column_stack([points[:, :2], np.maximum(points[:, 2], NEAREST_DRAWN)])
+        return np.column_stack([in_front[:, 2:] * camera.distorted(in_front), points[:, 2]]).astype(np.float32)
 
     k1, k2, p1, p2, k3 = camera.distortion.astype(np.float32)
     depth = np.maximum(points[:, 2], NEAREST_DRAWN)

@@ -1,24 +1,21 @@
-"""A pinhole camera with lens distortion, which converts points to pixels and back. Immutable."""
+"""A camera with a lens model, which converts points to pixels and back. Immutable."""
 
 from __future__ import annotations
 
 import os
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rrtik_ompl.base.arrays import Matrix, Vector, finite_array, finite_number, frozen
-from rrtik_ompl.base.copies import as_value
-from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.copies import as_value, set_fields
+from rrtik_ompl.base.errors import InputError, UnknownNameError
 from rrtik_ompl.files.kinds import read, write
+from rrtik_ompl.sensing.cameras.lenses import LENSES
 
-ORIGIN = np.zeros(3)
-MOST_STEPS = 30  # of Newton's method
-LONGEST_STEP = 0.2  # on the plane z = 1, so that none jumps over the fold of a lens
-CONVERGED = 1e-12  # on the plane z = 1
 MOST_MISSED = 0.01  # pixels by which a ray may miss its pixel
+_ROUNDED = 1e-6  # error of correlations that are written to files
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -27,12 +24,15 @@ class Camera:
 
     Attributes:
         matrix: Camera matrix with fx, fy, cx, cy in pixels, shape (3, 3); skew is not modelled and must be 0.
-        distortion: Brown's k1, k2, p1, p2, k3 [59], shape (5,).
+        distortion: Coefficients of the lens, shape (k,): Brown's k1, k2, p1, p2, k3 [59]; of the rational model [83]
+            also k4, k5, k6; of a fisheye k1, k2, k3, k4 of Kannala and Brandt [84].
         width: Width of the picture in pixels.
         height: Height of the picture in pixels.
-        sigmas: Standard deviations of fx, fy, cx, cy [pixels] and of the five distortion coefficients, shape (9,);
+        sigmas: Standard deviations of fx, fy, cx, cy [pixels] and of the distortion coefficients, shape (4 + k,);
             0 where the calibration gives none.
         tone: How the camera codes light as grey values (`markers.lighting`); None to estimate it for each marker.
+        lens: The lens model: "brown", "rational" or "fisheye".
+        correlation: Correlations of the errors whose standard deviations are ``sigmas``, shape (4 + k, 4 + k).
 
     Example:
         >>> camera = rrtik.sensing.Camera([[600.0, 0.0, 320.0], [0.0, 600.0, 240.0], [0.0, 0.0, 1.0]], 640, 480)
@@ -46,6 +46,8 @@ class Camera:
     height: int
     sigmas: Vector
     tone: float | None
+    lens: str
+    correlation: Matrix
 
     __reduce__ = as_value
 
@@ -54,16 +56,29 @@ class Camera:
         matrix: ArrayLike,
         width: float,
         height: float,
-        distortion: ArrayLike = (0.0,) * 5,
+        distortion: ArrayLike | None = None,
         *,
-        sigmas: ArrayLike = (0.0,) * 9,
+        sigmas: ArrayLike | None = None,
         tone: float | None = None,
+        lens: str = "brown",
+        correlation: ArrayLike | None = None,
     ) -> None:
         """Check and copy the intrinsics.
 
+        Args:
+            matrix: See `Camera`.
+            width: See `Camera`.
+            height: See `Camera`.
+            distortion: None for a lens whose coefficients are 0.
+            sigmas: None if nothing is uncertain.
+            tone: See `Camera`.
+            lens: See `Camera`.
+            correlation: None if the errors are independent.
+
         Raises:
-            InputError: If the matrix is not that of a pinhole, a number is not finite, the size is not positive, or a
-                standard deviation is negative.
+            InputError: If the matrix is not that of a pinhole, a number is not finite, the size is not positive, there
+                is no such lens model, it has another number of coefficients, a standard deviation is negative, or the
+                correlations are none.
         """
         given = finite_array(matrix, (3, 3), "camera matrix")
         expected = [[given[0, 0], 0.0, given[0, 2]], [0.0, given[1, 1], given[1, 2]], [0.0, 0.0, 1.0]]
@@ -73,16 +88,27 @@ class Camera:
         if any(side != int(side) or side < 1 for side in sides):
             raise InputError(f"camera size must be two positive whole numbers, got {width} x {height}")
 
-        doubts = finite_array(sigmas, (9,), "camera sigmas")
+        if not isinstance(lens, str) or lens not in LENSES:
+            raise UnknownNameError("lens model", lens, LENSES)
+        count = len(LENSES[lens].names)
+        coefficients = finite_array(
+            np.zeros(count) if distortion is None else distortion, (count,), "camera distortion"
+        )
+        doubts = finite_array(np.zeros(4 + count) if sigmas is None else sigmas, (4 + count,), "camera sigmas")
         if (doubts < 0.0).any():
             raise InputError(f"camera sigmas must be 0 or more, got {doubts.min():g}")
 
-        object.__setattr__(self, "matrix", frozen(given))
-        object.__setattr__(self, "sigmas", frozen(doubts))
-        object.__setattr__(self, "distortion", frozen(finite_array(distortion, (5,), "camera distortion")))
-        object.__setattr__(self, "tone", None if tone is None else finite_number(tone, "camera tone"))
-        object.__setattr__(self, "width", int(width))
-        object.__setattr__(self, "height", int(height))
+        set_fields(
+            self,
+            matrix=frozen(given),
+            distortion=frozen(coefficients),
+            width=int(width),
+            height=int(height),
+            sigmas=frozen(doubts),
+            tone=None if tone is None else finite_number(tone, "camera tone"),
+            lens=lens,
+            correlation=frozen(np.eye(4 + count) if correlation is None else _correlations(correlation, 4 + count)),
+        )
 
     def save(self, file: str | os.PathLike[str]) -> None:
         """Write the camera as YAML; if writing fails, no incomplete file is left.
@@ -101,45 +127,42 @@ class Camera:
         """
         return read(Camera, file)
 
+    @property
+    def is_pinhole(self) -> bool:
+        """Whether straight lines are straight in its pictures."""
+        return self.lens != "fisheye" and not self.distortion.any()
+
     def project(self, points: ArrayLike) -> Matrix:
         """Project points in the camera frame, shape (m, 3) [m], to pixels, shape (m, 2)."""
-        rows = finite_array(points, (None, 3), "points to project")
-        pixels, _ = cv2.projectPoints(rows[:, None], ORIGIN, ORIGIN, self.matrix, self.distortion)
-        return np.asarray(pixels, dtype=np.float64)[:, 0]
+        return self._pixels(self.distorted(finite_array(points, (None, 3), "points to project")))
+
+    def distorted(self, points: Matrix) -> Matrix:
+        """Return where points in the camera frame, shape (m, 3) [m], appear on the plane z = 1, shape (m, 2)."""
+        return LENSES[self.lens].distorted(np.ascontiguousarray(points, dtype=np.float64), self.distortion)
+
+    def directions(self, pixels: Matrix) -> Matrix:
+        """Return the directions that pixels show, shape (m, 3): of any length, and wrong where there is no ray."""
+        places = (np.asarray(pixels, dtype=np.float64) - self.matrix[:2, 2]) / self._focal
+        return LENSES[self.lens].directions(places, self.distortion)
 
     def rays(self, pixels: ArrayLike) -> Matrix:
         """Return where the rays of pixels, shape (m, 2), meet the plane z = 1 of the camera frame, shape (m, 2).
 
         Rows are NaN for pixels that no ray reaches. A strong lens model folds back at some distance from the axis:
-        beyond its fold there is no picture, though the formula has values.
+        beyond its fold there is no picture, though the formula has values. Neither do rays of a fisheye meet that plane
+        which are a right angle or more from the axis.
         """
         rows = finite_array(pixels, (None, 2), "pixels")
-        if not self.distortion.any():
-            return (rows - self.matrix[:2, 2]) / np.diag(self.matrix)[:2]
-
-        # Newton's method with bounded steps, from the ray of a lens without distortion.
-        bent = (rows - self.matrix[:2, 2]) / np.diag(self.matrix)[:2]
-        rays = bent.copy()
-        with np.errstate(all="ignore"):  # a pixel that no ray reaches may lead anywhere
-            for _ in range(MOST_STEPS):
-                found, (a, b, d) = _bent(rays, self.distortion)
-                off = bent - found
-                if (np.abs(off) < CONVERGED).all():
-                    break
-                step = np.column_stack([d * off[:, 0] - b * off[:, 1], a * off[:, 1] - b * off[:, 0]])
-                step /= (a * d - b * b)[:, None]
-                rays += step * np.minimum(1.0, LONGEST_STEP / np.linalg.norm(step, axis=1))[:, None]
-            missed = np.abs(bent - _bent(rays, self.distortion)[0]) * np.diag(self.matrix)[:2]
-            reached = (missed < MOST_MISSED).all(axis=1) & (np.einsum("ni,ni->n", rays, rays) < self._fold())
+        directions = self.directions(rows)
+        with np.errstate(all="ignore"):  # a pixel that no ray reaches may have any direction
+            rays = np.asarray(directions[:, :2] / directions[:, 2:], dtype=np.float64)
+            if self.is_pinhole:
+                return rays
+            missed = np.abs(rows - self._pixels(self.distorted(np.nan_to_num(directions))))
+            reached = (missed < MOST_MISSED).all(axis=1) & (directions[:, 2] > 0.0)
+            reached &= LENSES[self.lens].within_fold(directions, self.distortion)
         rays[~reached] = np.nan
         return rays
-
-    def _fold(self) -> float:
-        """Return the square of the radius, on the plane z = 1, at which the radial distortion turns back."""
-        k1, k2, _, _, k3 = self.distortion
-        roots = np.roots([7.0 * k3, 5.0 * k2, 3.0 * k1, 1.0])  # derivative of r (1 + k1 r^2 + k2 r^4 + k3 r^6)
-        turns = roots.real[(np.abs(roots.imag) < 1e-9 * np.abs(roots)) & (roots.real > 0.0)]
-        return float(turns.min(initial=np.inf))
 
     def jacobian(self, points: ArrayLike, translation: ArrayLike) -> Matrix:
         """Return the Jacobian of the pixels of an object's points with respect to its pose, shape (2 m, 6).
@@ -152,43 +175,52 @@ class Camera:
             d pixel / d (translation [m], small rotation about the axes of the camera [rad]).
         """
         rows = np.ascontiguousarray(points, dtype=np.float64)
-        shift = np.ascontiguousarray(translation, dtype=np.float64)
-        _, slopes = cv2.projectPoints(rows[:, None], ORIGIN, shift, self.matrix, self.distortion)
-        return np.hstack([slopes[:, 3:6], slopes[:, :3]])
+        by_point, _ = LENSES[self.lens].slopes(rows + np.asarray(translation, dtype=np.float64), self.distortion)
+        shifts = self._focal[:, None] * by_point
+        turns = np.cross(
+            rows[:, None], shifts
+        )  # a small rotation w moves a point p by w x p, and g (w x p) = (p x g) w
+        return np.concatenate([shifts, turns], axis=2).reshape(-1, 6)
 
     def own_slopes(self, points: ArrayLike) -> Matrix:
-        """Return the Jacobian of the pixels of points with respect to the intrinsics, shape (2 m, 9).
+        """Return the Jacobian of the pixels of points with respect to the intrinsics, shape (2 m, 4 + k).
 
         Args:
             points: In the camera frame, shape (m, 3) [m].
 
         Returns:
-            d pixel / d (fx, fy, cx, cy [pixels], k1, k2, p1, p2, k3).
+            d pixel / d (fx, fy, cx, cy [pixels], coefficients of the lens).
         """
         rows = np.ascontiguousarray(points, dtype=np.float64)
-        _, slopes = cv2.projectPoints(rows[:, None], ORIGIN, ORIGIN, self.matrix, self.distortion)
-        return np.asarray(slopes[:, 6:15], dtype=np.float64)
+        _, by_coefficient = LENSES[self.lens].slopes(rows, self.distortion)
+        by_focal = self.distorted(rows)[:, :, None] * np.eye(2)
+        by_middle = np.broadcast_to(np.eye(2), by_focal.shape)
+        slopes = np.concatenate([by_focal, by_middle, self._focal[:, None] * by_coefficient], axis=2)
+        return np.asarray(slopes.reshape(2 * len(rows), -1), dtype=np.float64)
 
     def doubt(self, points: ArrayLike) -> Matrix:
         """Return the covariance of the pixels of points that results from `sigmas`, shape (2 m, 2 m) [pixels^2]."""
         each = self.own_slopes(points) * self.sigmas
-        return np.asarray(each @ each.T, dtype=np.float64)
+        return np.asarray(each @ self.correlation @ each.T, dtype=np.float64)
+
+    @property
+    def _focal(self) -> Vector:
+        """Focal lengths, shape (2,) [pixels]."""
+        return self.matrix[[0, 1], [0, 1]]
+
+    def _pixels(self, places: Matrix) -> Matrix:
+        """Return the pixels of places on the plane z = 1, shape (m, 2)."""
+        return np.asarray(places * self._focal + self.matrix[:2, 2], dtype=np.float64)
 
 
-def _bent(rays: Matrix, distortion: Vector) -> tuple[Matrix, tuple[Vector, Vector, Vector]]:
-    """Return where a lens bends rays to by Brown's formula [59], on the plane z = 1, shape (m, 2), and its slopes.
+def _correlations(values: ArrayLike, count: int) -> Matrix:
+    """Check correlations of that many errors.
 
-    The slopes are dx'/dx, dx'/dy = dy'/dx and dy'/dy, shape (m,) each.
+    Raises:
+        InputError: If they are not those of any errors.
     """
-    k1, k2, p1, p2, k3 = distortion
-    x, y = rays.T
-    square = x * x + y * y
-    factor = 1.0 + square * (k1 + square * (k2 + square * k3))
-    slope = 2.0 * (k1 + square * (2.0 * k2 + square * 3.0 * k3))
-
-    bent_x = x * factor + 2.0 * p1 * x * y + p2 * (square + 2.0 * x * x)
-    bent_y = y * factor + p1 * (square + 2.0 * y * y) + 2.0 * p2 * x * y
-    xx = factor + x * x * slope + 2.0 * p1 * y + 6.0 * p2 * x
-    xy = x * y * slope + 2.0 * (p1 * x + p2 * y)
-    yy = factor + y * y * slope + 6.0 * p1 * y + 2.0 * p2 * x
-    return np.column_stack([bent_x, bent_y]), (xx, xy, yy)
+    found = finite_array(values, (count, count), "camera correlation")
+    least = np.linalg.eigvalsh(0.5 * (found + found.T))[0]
+    if np.abs(found - found.T).max() > _ROUNDED or np.abs(np.diag(found) - 1.0).max() > _ROUNDED or least < -_ROUNDED:
+        raise InputError("camera correlation must be symmetric, with 1 on its diagonal and no negative eigenvalue")
+    return found

@@ -6,6 +6,7 @@ Source: [1, ch. 4.6.2] (two rotations before the camera, intrinsics that depend 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -74,6 +75,8 @@ class PanTiltZoom:
             raise InputError("a zoom lens needs a camera for each of its zooms, which increase")
         if len({(each.width, each.height) for each in self.cameras}) > 1:
             raise InputError("cameras of one zoom lens have one size of pictures")
+        if len({each.lens for each in self.cameras}) > 1:
+            raise InputError("cameras of one zoom lens have one lens model")
 
         self.T_base_head = rigid(T_base_head, "pose of the head")
         self.T_head_camera = rigid(T_head_camera, "pose of the camera on its head")
@@ -114,4 +117,5 @@ class PanTiltZoom:
         lens = (1.0 - share) * first.distortion + share * second.distortion
         sigmas = np.maximum(first.sigmas, second.sigmas)
         tone = first.tone if first.tone == second.tone else None
-        return Camera(matrix, first.width, first.height, lens, sigmas=sigmas, tone=tone)
+        changed: Camera = replace(first, matrix=matrix, distortion=lens, sigmas=sigmas, tone=tone)
+        return changed

@@ -32,6 +32,7 @@ MAX_DISTANCE = 1e4  # [m]
 # [rad]; minima closer than this are the same. Distinct ones differ by at least 0.03.
 MIN_BRANCH_ANGLE = 1e-3
 _MAX_STEPS = 40
+_NEAREST_DEPTH = 1e-3  # of a direction of length 1, in the view of a pinhole to the middle of all
 _PLACES = 9  # sample points along each side of the marker with its rim for the effect of the lens
 _OF_HOMOGRAPHIES = 8  # number of columns of `_motions` that are homographies; the others are bends
 _RIM = 1.1  # size of the marker with its rim, as a multiple of the side
@@ -177,7 +178,7 @@ def lens_bend(camera: Camera, corners: Matrix, side: float) -> Matrix:
         corners: Corners of the marker, shape (4, 2) [pixels].
         side: Side of the marker [m].
     """
-    if not camera.distortion.any():
+    if camera.is_pinhole:
         return np.zeros((4, 2))
 
     at = pose_of_square(camera, corners, side).T_camera_object
@@ -225,13 +226,32 @@ def _motions(places: Matrix) -> tuple[Matrix, Matrix]:
 
 def _guesses(camera: Camera, points: Matrix, pixels: Matrix, method: int = cv2.SOLVEPNP_SQPNP) -> list[pin.SE3]:
     """Return closed-form poses that explain the pixels, best first; implausible ones are left out."""
+    view = np.eye(3)
+    intrinsics = camera.matrix, camera.distortion
+    if camera.lens == "fisheye":
+        # OpenCV's closed forms know no fisheye, and pinholes that look elsewhere do not see all of what it sees.
+        view, pixels = _seen_by_pinhole(camera, pixels)
+        intrinsics = np.eye(3), np.zeros(5)
+
     object_points = np.ascontiguousarray(points)
     image_points = np.ascontiguousarray(pixels)
-    _, turns, shifts, _ = cv2.solvePnPGeneric(
-        object_points, image_points, camera.matrix, camera.distortion, flags=method
-    )
+    _, turns, shifts, _ = cv2.solvePnPGeneric(object_points, image_points, *intrinsics, flags=method)
     poses = [pin.SE3(cv2.Rodrigues(r)[0], t.ravel()) for r, t in zip(turns, shifts, strict=True)]
-    return [T for T in poses if _plausible(T, method == cv2.SOLVEPNP_IPPE_SQUARE)]
+    plausible = [T for T in poses if _plausible(T, method == cv2.SOLVEPNP_IPPE_SQUARE)]
+    return [pin.SE3(view, np.zeros(3)) * T for T in plausible]
+
+
+def _seen_by_pinhole(camera: Camera, pixels: Matrix) -> tuple[Matrix, Matrix]:
+    """Return a view from the camera's place to the middle of pixels, and what a pinhole that looks there sees.
+
+    Returns:
+        ``R_camera_view``, and the pixels' rays on the plane z = 1 of the view, shape (m, 2).
+    """
+    directions = camera.directions(pixels)
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    view: Matrix = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), directions.mean(axis=0)).matrix()
+    turned = directions @ view
+    return view, turned[:, :2] / np.maximum(turned[:, 2:], _NEAREST_DEPTH)
 
 
 def _plausible(pose: pin.SE3, facing: bool) -> bool:
