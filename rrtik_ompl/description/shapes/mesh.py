@@ -40,6 +40,8 @@ _OF_SEVERAL = (".obj", ".dae", ".glb", ".gltf")  # kinds of files that may hold 
 _PART = re.compile(rb"^[ \t]*(usemtl|mtllib|g|o)\b.*$", re.MULTILINE)
 # Begins a PLY that assimp does not read.
 _FACES_FIRST = re.compile(rb"ply\b(?:(?!\nelement vertex\b|\nend_header\b)[\s\S])*?\nelement face\b")
+# Matches in a DAE what is no number in a list of whole numbers; assimp reads it for ever, until the memory is full.
+_NO_INDEX = re.compile(rb"<(?:p|h|v|vcount)(?:\s[^>]*)?>[\s0-9-]*[^\s0-9<-]")
 # Matches nan, inf, and numbers that overflow float32 (in which assimp reads), in a text file.
 _NOT_FINITE = re.compile(
     rb"[\s>][-+]?(?:(?:nan|inf)(?:inity)?|[0-9.]+e\+?0*(?:[0-9]{3,}|[4-9][0-9]|39)|[0-9]{39,}[0-9.]*)(?=[\s<]|$)",
@@ -116,6 +118,9 @@ def load_surface(path: Path, scale: Vector) -> coal.BVHModelBase:
         return _by_ourselves(path, data, scale)
     if not _finite(data, kind):
         raise InputError(f"{path}: not a usable mesh: it holds numbers that are not finite; export it again")
+
+    if kind == ".dae" and _NO_INDEX.search(data):
+        raise InputError(f"{path}: not a usable mesh: a list of indices holds what is no number; export it again")
 
     scale = scale * stated_unit(path, data)
     surface = _by_trimesh(path, scale) if kind == ".ply" and _FACES_FIRST.match(data) else _by_assimp(path, scale)

@@ -400,6 +400,16 @@ def test_a_damaged_file_gives_a_mesh_or_one_line(tmp_path, name, wounds):
     assert name in message if message else np.isfinite(mesh.vertices).all()
 
 
+@pytest.mark.parametrize("wrong", ['0"2', "0 2 x", "0 \xe9 2", "0,2", "1.0"])
+@pytest.mark.parametrize("tag", ["p", "vcount", "v", "h"])
+def test_an_index_that_is_no_number_is_refused_before_assimp_reads_it_for_ever(tmp_path, tag, wrong):
+    primitives = b"<p>0 2 1" if tag == "p" else f"<{tag}>0</{tag}><p>0 2 1".encode()
+    damaged = GOOD["part.dae"].replace(b"<p>0 2 1", primitives)
+    (tmp_path / "part.dae").write_bytes(damaged.replace(f"<{tag}>0".encode(), f"<{tag}>{wrong}".encode()))
+    with pytest.raises(InputError, match=r"part\.dae: .* a list of indices holds what is no number"):
+        Mesh.load(tmp_path / "part.dae")
+
+
 @pytest.mark.parametrize("number", ["nan", "-inf", "1e999", "1.5E+0308", "1e39", "9" * 60])
 def test_numbers_that_are_not_finite_are_refused_before_c_sees_them(tmp_path, capfd, number):
     file = tmp_path / "a.stl"
