@@ -12,12 +12,13 @@ function drawn(tag, attributes, text = "") {
 
 const millimetres = (metres) => `${Number((1000 * metres).toPrecision(3))} mm`;
 
-/** What the library says of the motion that is played. */
-function sayProof() {
-  document.getElementById("proof-section").hidden = false;
+/** What is proven of the motion that is played: { text, proven }, or null where nothing is said. */
+function sayProof(proof) {
+  document.getElementById("proof-section").hidden = !proof;
+  if (!proof) return;
   const note = document.getElementById("proof-note");
-  note.textContent = story.proof.text;
-  note.className = story.proof.proven ? "proven" : "doubtful";
+  note.textContent = proof.text;
+  note.className = proof.proven ? "proven" : "doubtful";
 }
 
 function buildClearance(goTo) {

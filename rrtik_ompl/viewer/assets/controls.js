@@ -204,7 +204,7 @@ function startPlanning() {
   given = { waypoints: story.waypoints, showClearance };
   showState();
   wireControls();
-  planStatus("drag the handles, or click something else: the arm finds a new path");
+  planStatus("drag the goal (green) by its handles, or click something else and drag that: the arm finds a new path");
   if (planning.asks && !story.moves.length) changed();
   else askOpinion();
   document.documentElement.dataset.plans = "yes";

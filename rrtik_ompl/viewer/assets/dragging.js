@@ -70,8 +70,9 @@ function placeSelected(wanted) {
   const word = isEnd(selected) ? placeEnd(selected, wanted) : (placeObstacleAt(selected, wanted), "");
   showSelected();
   changed();
-  if (word) planRefusal(word);
-  showReach(word, wanted);
+  if (word) planRefusal(word, { mild: farEnd === null });
+  if (drag) drag.word = farEnd === null ? "" : word;
+  sayBesideHand();
 }
 
 /** Move what is selected by a shift [m] and a turn about z [rad]. */
@@ -79,10 +80,13 @@ function moveSelected(shift, turn) {
   placeSelected(movedPose(poseOf(selected), shift, turn, AXES[2]));
 }
 
-/** What keeps a ghost from following stands beside the handle that is held. */
-function showReach(word, wanted) {
+/** Why there is no path, or what keeps a ghost from following, stands beside the handle that is held. */
+function sayBesideHand() {
+  if (!drag?.wanted) return;
+  const text = trouble || drag.word;
   dropLabels("reach");
-  if (drag && word) addLabel(word, "reach", originOf(wanted));
+  if (text) addLabel(text, "reach", originOf(drag.wanted));
+  placeLabels();
 }
 
 // meshcat's picture has y up, the world z
@@ -152,7 +156,7 @@ function startDrag(event) {
   event.stopPropagation();
   event.preventDefault();
   if (found) holdTip(found);
-  drag = { moves: dragBy(handle, found?.hit.point), from: poseOf(selected), x: event.clientX, y: event.clientY, begun: false, wanted: null };
+  drag = { moves: dragBy(handle, found?.hit.point), from: poseOf(selected), x: event.clientX, y: event.clientY, begun: false, wanted: null, word: "" };
   pane.setPointerCapture(event.pointerId);
 }
 
@@ -184,6 +188,7 @@ function endDrag(event) {
   if (drag === null) return;
   event.stopPropagation();
   drag = null;
+  if (farEnd) planRefusal(document.getElementById("plan-refusal").textContent, { mild: true });  // the ghost stands where it can be
   farEnd = null;
   dropLabels("reach");
   for (const end of ENDS.keys()) showFree(end);

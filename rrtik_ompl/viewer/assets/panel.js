@@ -152,6 +152,7 @@ function labelPath() {
   }
   places.forEach(({ tip, text, kind }) => addLabel(text, kind, tip));
   applyEyes("labels");
+  placeLabels();  // at once: while a path is made shorter there is a new one in each picture
 }
 
 viewer.scene.updateMatrixWorld(true);

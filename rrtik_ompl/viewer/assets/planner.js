@@ -18,12 +18,15 @@ const planStatus = (text, bad = false) => {
   const line = document.getElementById("plan-state");
   line.textContent = text;
   line.classList.toggle("bad", bad);
+  trouble = bad ? text : "";
+  sayBesideHand();
 };
 /** Say why an input was not taken; it stands until the next change, as a path may be in the making that says its own. */
-const planRefusal = (text) => {
+const planRefusal = (text, { mild = false } = {}) => {
   const line = document.getElementById("plan-refusal");
   line.textContent = text;
   line.hidden = !text;
+  line.classList.toggle("mild", mild);
 };
 
 // The picture ------------------------------------------------------------------------------------------------------
@@ -131,6 +134,10 @@ function replacePath(rows) {
 
 let pathIsOfState = true;  // whether the path that is shown is one of the state, or of what it was before
 let given = null;  // the path with which the page began: Python has judged it
+const OWN_PROOF = {  // of a path that the page has found
+  proven: false,
+  text: `found here, and free at each step of its check; ${planning?.asks ? "what rrtik proves of it stands above" : "rrtik check problem.yaml path.json proves the way between, from the files of Save problem and Save path"}`,
+};
 
 /** Show the path of the story, and of that with which the page began what Python says of it. */
 function showPath() {
@@ -142,7 +149,7 @@ function showPath() {
     dropSearch();
   }
   document.getElementById("clearance-section").hidden = !(judged && story.clearance);
-  document.getElementById("proof-section").hidden = !(judged && story.proof);
+  sayProof(judged ? story.proof : story.moves.length ? OWN_PROOF : null);
   showClearance = judged ? given.showClearance : () => {};
   pathIsOfState = true;
   newPath();
@@ -215,8 +222,8 @@ function plan() {
   const blocked = [...ENDS.keys()].filter((end) => !showFree(end));
   viewer.set_dirty();
   if (blocked.length) {
-    replacePath([]);
     planStatus(blocked.map((end) => `${end}: ${kernels.blame(state[end])}`).join("; "), true);
+    replacePath([]);
     return;
   }
   const { search, shorten } = PLANNERS[state.planner];
@@ -224,8 +231,8 @@ function plan() {
     each: () => planStatus("searching ..."),
     end: (found) => {
       if (!found) {
-        replacePath([]);
         planStatus(`no path found in ${planning.samples.toLocaleString("en")} samples; another seed may find one`, true);
+        replacePath([]);
         return;
       }
       const searched = performance.now() - begin;
@@ -271,6 +278,7 @@ function finish(rows, searched) {
     least = Math.min(least, kernels.nearest(postureAt((story.times[story.times.length - 1] * s) / CLEARANCE_SAMPLES)).metres);
   }
   const when = story.moving ? " at time 0" : "";
-  const near = least === Infinity ? "" : `, ${(1000 * least).toFixed(1)} mm clear${when} at the nearest of ${CLEARANCE_SAMPLES + 1} places`;
-  planStatus(`${count(rows.length - 1, "move")}, length ${lengthOf(rows).toFixed(2)}${near}; found in ${searched.toFixed(1)} ms`);
+  const clear = least > 0 ? `, at least ${millimetres(least)} clear${when} at each of ${CLEARANCE_SAMPLES + 1} places` : `, free but close${when}: nearer than the covers can measure`;
+  const told = least === Infinity ? "" : clear;  // the distance of the covers is a lower bound
+  planStatus(`${count(rows.length - 1, "move")}, length ${lengthOf(rows).toFixed(2)}${told}; found in ${searched.toFixed(1)} ms`);
 }

@@ -4,6 +4,7 @@ const scrub = document.getElementById("scrub");
 let now = 0;
 let playingSince = null;
 let showClearance = () => {};
+let trouble = "";  // why there is no path, in pages that plan
 
 function show(time) {
   now = Math.min(Math.max(time, 0), total);
@@ -125,7 +126,7 @@ function showStill() {
   now = 0;
   setPosture(node("robot"), story.waypoints[0]);
   showJoints(story.waypoints[0], null, false);
-  document.getElementById("now").textContent = "no path";
+  document.getElementById("now").textContent = trouble || "no path";
   showContact(0);
   sayContact();
 }
@@ -183,7 +184,7 @@ if (robot) {
   buildJoints();
   if (story.ghosts.length > 1) buildSolutions();
   addPlayer();
-  if (story.proof) sayProof();
+  sayProof(story.proof);
   if (story.moves.length) {
     if (run) buildEvents(goTo);
     if (story.clearance) showClearance = buildClearance(goTo);

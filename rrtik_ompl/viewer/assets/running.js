@@ -142,6 +142,7 @@ function startRun() {
   const rows = story.waypoints;
   shortening += 1;  // what is still being made shorter is left
   replacePath([]);
+  sayTitle("obstacles move");
   if (rows.length > 1) drawTrail(rows);
   document.getElementById("player").hidden = true;
   viewer.set_3d_pane_size();

@@ -278,6 +278,7 @@ function placeLabels() {
     const [x, y] = [(0.5 + 0.5 * place.x) * pane.clientWidth, (0.5 - 0.5 * place.y) * pane.clientHeight];
     const spots = spotsBeside(x, y, label);
     const spot = spots.find((box) => !taken.some((other) => overlap(box, other))) ?? spots[0];
+    if (label.kind === "reach") keepInPicture(spot);
     taken.push(spot);
     label.spot = spot;  // films draw it there
     label.element.style.transform = `translate(${spot.x}px, ${spot.y}px)`;
@@ -289,6 +290,11 @@ function spotsBeside(x, y, { kind, wide, tall }) {
   const columns = kind === "start" ? [x - wide - 9, x + 9] : [x + 9, x - wide - 9];
   const rows = [y - tall, y + 4, y - 2 * tall - 2, y + tall + 6];
   return rows.flatMap((top) => columns.map((left) => ({ x: left, y: top, wide, tall })));
+}
+
+function keepInPicture(spot) {
+  spot.x = Math.max(0, Math.min(spot.x, pane.clientWidth - spot.wide - 1));  // widths are rounded
+  spot.y = Math.max(0, Math.min(spot.y, pane.clientHeight - spot.tall));
 }
 
 function overlap(a, b) {

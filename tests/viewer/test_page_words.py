@@ -1,0 +1,141 @@
+"""What a page that plans says, and where: by the pointer, by the player, of clearance and of proof."""
+
+import re
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+import rrtik_ompl as rrtik
+from rrtik_ompl.viewer.page import page
+from rrtik_tests.browser import Browser, planning_page
+from rrtik_tests.page_drags import IDLE, RESET, SPOTS, begin
+from rrtik_tests.programs import needs_chromium
+
+pytestmark = [pytest.mark.kernels, needs_chromium]
+LINES = """Object.fromEntries(["plan-state", "plan-refusal", "now", "title", "proof-note"].map((id) => {
+  const line = document.getElementById(id);
+  return [id, { text: line.hidden || line.closest("section")?.hidden ? "" : line.textContent, kind: line.className }];
+}))"""
+BESIDE_HAND = """(() => {
+  placeLabels();
+  const label = labels.find(({ kind }) => kind === "reach")?.element;
+  if (!label) return null;
+  const [inner, outer] = [label, pane].map((each) => each.getBoundingClientRect());
+  const across = inner.left >= outer.left && inner.right <= outer.right;
+  return { text: label.textContent, inside: across && inner.top >= outer.top && inner.bottom <= outer.bottom };
+})()"""
+PLACES = 201
+
+
+@pytest.fixture(scope="module")
+def problem() -> rrtik.Problem:
+    return rrtik.load_problem("planar3_boxes")
+
+
+@pytest.fixture(scope="module")
+def opened(tmp_path_factory: pytest.TempPathFactory, problem: rrtik.Problem) -> Iterator[Browser]:
+    text = page(problem, rrtik.plan(problem, seed=1).path)
+    with planning_page(text, tmp_path_factory.mktemp("words")) as browser:
+        begin(browser)
+        yield browser
+
+
+@pytest.fixture
+def browser(opened: Browser) -> Browser:
+    opened.ask(RESET)
+    opened.ask(IDLE)
+    return opened
+
+
+def held_goal(browser: Browser, x: float, y: float) -> None:
+    """Take hold of the goal, and move the pointer by so many pixels."""
+    spots = browser.ask(SPOTS % '"goal"')
+    spot = spots[len(spots) // 2]
+    for kind, place in (("mousePressed", spot), ("mouseMoved", [spot[0] + x / 2, spot[1] + y / 2])):
+        browser.call("Input.dispatchMouseEvent", type=kind, x=place[0], y=place[1], button="left", buttons=1)
+    browser.call("Input.dispatchMouseEvent", type="mouseMoved", x=spot[0] + x, y=spot[1] + y, button="left", buttons=1)
+
+
+def let_go(browser: Browser) -> None:
+    browser.call("Input.dispatchMouseEvent", type="mouseReleased", x=1, y=1, button="left", buttons=0, clickCount=1)
+    browser.ask(IDLE)
+
+
+def test_the_clearance_that_is_said_is_not_more_than_there_is(browser: Browser, problem: rrtik.Problem) -> None:
+    browser.ask("state.goal = state.start.map((value) => value + 0.1); changed()")
+    said = browser.ask(IDLE)
+    told = re.search(r"at least ([\d.]+) mm clear at each of 201 places", said["text"])
+    assert told is not None, said["text"]
+    rows = np.array(said["waypoints"])
+    shares = np.linspace(0.0, len(rows) - 1.0, PLACES)
+    between = np.column_stack([np.interp(shares, range(len(rows)), column) for column in rows.T])
+    clearances = [problem.world.clearance(q) for q in between]
+    assert 0.0 < float(told[1]) / 1000.0 <= min(clearances) + 1e-4
+
+
+def test_a_lower_bound_below_nothing_is_not_called_a_clearance(browser: Browser) -> None:
+    browser.ask("kernels.nearest = (q) => ({ metres: -0.002, pair: null }); changed()")
+    said = browser.ask(IDLE)["text"]
+    browser.ask("delete kernels.nearest")
+    assert "free but close: nearer than the covers can measure" in said
+    assert "-" not in said
+
+
+def test_a_path_of_the_page_is_not_called_proven_until_undo_gives_back_the_one_that_is(browser: Browser) -> None:
+    browser.ask("shortening += 1; replacePath(given.waypoints)")
+    assert browser.ask(LINES)["proof-note"] == {"text": "every move is proven free", "kind": "proven"}
+    browser.ask("remember(); moveSelected(new THREE.Vector3(-0.05, 0.05, 0), 0)")
+    browser.ask(IDLE)
+    own = browser.ask(LINES)["proof-note"]
+    assert own["kind"] == "doubtful"
+    assert "rrtik check problem.yaml path.json proves" in own["text"]
+    browser.ask("undo()")
+    assert browser.ask(LINES)["proof-note"]["text"] == "every move is proven free"
+
+
+def test_names_stand_at_a_new_path_before_the_next_picture(browser: Browser) -> None:
+    browser.ask("replacePath([state.start, state.goal])")
+    hidden = browser.ask(
+        "labels.filter(({ kind }) => ['start', 'goal'].includes(kind)).map((each) => each.element.hidden)"
+    )
+    assert hidden == [False, False]
+
+
+def test_what_keeps_a_ghost_back_stands_beside_the_hand_within_the_picture_and_is_mild_in_the_end(
+    browser: Browser,
+) -> None:
+    pane = browser.ask("(({ left, top }) => [left, top])(pane.getBoundingClientRect())")
+    held_goal(browser, -1000.0 + pane[0], -700.0 + pane[1])
+    browser.ask(IDLE)
+    beside = browser.ask(BESIDE_HAND)
+    line = browser.ask(LINES)["plan-refusal"]
+    let_go(browser)
+    assert beside["inside"]
+    assert beside["text"] in (line["text"], browser.ask(LINES)["plan-state"]["text"])
+    assert line["text"].startswith("goal: out of reach by")
+    assert "mild" not in line["kind"]
+    after = browser.ask(LINES)["plan-refusal"]
+    assert after == {"text": line["text"], "kind": "mild"}
+    assert browser.ask(BESIDE_HAND) is None
+
+
+def test_a_goal_in_an_obstacle_says_so_beside_the_hand_and_by_the_player(browser: Browser) -> None:
+    browser.ask("state.obstacles[0].pose = rowsOf(poseOf('goal')); applyObstacle(0); changed()")
+    held_goal(browser, 6.0, 0.0)
+    browser.ask(IDLE)
+    lines = browser.ask(LINES)
+    beside = browser.ask(BESIDE_HAND)
+    let_go(browser)
+    assert lines["plan-state"]["text"].endswith("too near each other")
+    assert lines["now"]["text"] == lines["plan-state"]["text"]
+    assert beside == {"text": lines["plan-state"]["text"], "inside": True}
+    assert lines["title"]["text"].endswith("no path")
+
+
+def test_a_turn_that_few_joints_cannot_keep_is_no_fault(browser: Browser) -> None:
+    browser.ask("placeSelected(movedPose(poseOf('goal'), new THREE.Vector3(), 1.0, AXES[1]))")  # out of the plane
+    browser.ask(IDLE)
+    line = browser.ask(LINES)["plan-refusal"]
+    assert line["text"].startswith("goal: turned by")
+    assert line["kind"] == "mild"
