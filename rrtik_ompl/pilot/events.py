@@ -156,12 +156,12 @@ class SetPoint:
 
     Attributes:
         aim: The set point, shape (dof,) [rad or m].
-        ahead: Largest distance of the set point from the present value of each joint, shape (dof,) [rad or m].
+        speed: Speed at which each joint shall go there, shape (dof,) [rad/s or m/s].
         joint: Number of the only joint that moves; None if all do.
     """
 
     aim: Vector
-    ahead: Vector
+    speed: Vector
     joint: int | None = None
 
 

@@ -193,8 +193,8 @@ class Session:
             case events.Stop():
                 self.supervisor.stopped(self._arms_time())
                 self.arm.stop()
-            case events.SetPoint(aim, ahead, joint):
-                self.supervisor.told(aim, ahead, self.state.q, self._arms_time())
+            case events.SetPoint(wanted, speed, joint):
+                aim = self.supervisor.told(wanted, speed, self.state.q, self._arms_time())
                 self._record.write("set", self.time, joint=joint, q=np.round(aim, 5).tolist())
                 if joint is None:
                     self.arm.follow(aim)

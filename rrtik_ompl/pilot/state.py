@@ -26,9 +26,21 @@ TIP_SIGMAS = 3.0
 MIN_CHANGE = 1e-4  # [rad or m]; smaller changes of a reading are noise
 
 LEASH_SECONDS = 0.1  # largest lead of a set point over the arm, as time at the present speed
+# It may always be this far ahead, as time at the joint's rate: arms that stick, or whose encoders are coarse, need it.
+LEAST_LEASH_SECONDS = 0.05
 HOLD_SECONDS = 0.25  # a drive ends if it is not renewed within this time
 # Duration of the motion that the first command of a press asks for: a short tap moves the arm this far.
 FIRST_SECONDS = 0.04
+
+
+def leash(speed: Vector, rates: Vector) -> Vector:
+    """Return how far a set point may be ahead of each joint at most, shape (dof,) [rad or m].
+
+    Args:
+        speed: Speed of each joint, shape (dof,) [rad/s or m/s].
+        rates: Their rates at full speed, shape (dof,).
+    """
+    return np.maximum(speed * LEASH_SECONDS, rates * LEAST_LEASH_SECONDS)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -182,7 +194,7 @@ class Press:
 class Drive:
     """How the arm is driven at present: one joint, or all joints together, only as long as the command is renewed.
 
-    Each renewal gives the arm a set point that is ahead of it by at most `LEASH_SECONDS` of motion. Without a renewal,
+    Each renewal gives the arm a set point that is ahead of it by its `leash` at most. Without a renewal,
     whatever the reason (the key is released, the page or the line hangs), the arm stops there.
 
     Attributes:
@@ -217,23 +229,22 @@ class Drive:
         """Return a new drive of a joint that is at the value ``here`` [rad or m]."""
         return Drive(point=here, renewed=time - FIRST_SECONDS)
 
-    def on(self, joint: int, goal: float, rate: float, here: float, time: float) -> Drive:
+    def on(self, joint: int, goal: float, speed: float, lead: float, here: float, time: float) -> Drive:
         """Return the drive after its set point has moved on towards a goal.
 
-        The set point advances at the rate for the time since the last renewal, and never leads the joint by more than
-        `LEASH_SECONDS`.
+        The set point advances at the speed for the time since the last renewal.
 
         Args:
             joint: Number of the joint.
             goal: Value at which the drive ends [rad or m].
-            rate: Rate of the joint [rad/s or m/s].
+            speed: Speed of the joint [rad/s or m/s].
+            lead: How far the set point may be ahead of the joint [rad or m].
             here: Present value of the joint [rad or m].
             time: Current time [s].
         """
         seconds = float(np.clip(time - self.renewed, 0.0, LEASH_SECONDS))
-        step = np.clip(goal - self.point, -rate * seconds, rate * seconds)
-        leash = rate * LEASH_SECONDS
-        point = float(np.clip(self.point + step, here - leash, here + leash))
+        step = np.clip(goal - self.point, -speed * seconds, speed * seconds)
+        point = float(np.clip(self.point + step, here - lead, here + lead))
         return Drive(joint, goal, False, point, max(time, self.renewed))
 
     def led(self, time: float) -> Drive:

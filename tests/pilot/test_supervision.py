@@ -191,10 +191,10 @@ def driven(motion, seconds=2.0):
         q = PROBLEM.start + motion(time_)
         watching.read(q, time_)
         aim = q.copy()
-        ahead = np.zeros(ROBOT.dof)
-        ahead[0] = 0.1 * RATES[0]
-        aim[0] += ahead[0]
-        watching.told(aim, ahead, q, time_)
+        speed = np.zeros(ROBOT.dof)
+        speed[0] = RATES[0]
+        aim[0] += 0.1 * RATES[0]
+        watching.told(aim, speed, q, time_)
         if watching.fault or watching.standing(time_):
             break
     return watching, time_
@@ -231,7 +231,7 @@ def test_an_arm_that_goes_the_wrong_way_does_so_for_a_degree_at_most_however_oft
         if k % every == 0:
             gone += 0.25
             q = PROBLEM.start + along(-gone)
-            watching.told(q + along(1.0), np.abs(along(1.0)), q, time_)
+            watching.told(q + along(1.0), along(10.0), q, time_)
         else:
             watching.stopped(time_)
         watching.read(PROBLEM.start + along(-gone), time_)

@@ -226,16 +226,17 @@ class Conformance:
         """Drive a joint to a value as the pilot's tool does, and return the joints once it is there."""
         judge = Supervisor(self._robot, self._rates)
         q = probe.joints()
-        lead = np.zeros(self._robot.dof)
-        lead[joint] = self._rates[joint] * LEAD_SECONDS
+        speed = np.zeros(self._robot.dof)
+        speed[joint] = self._rates[joint]
+        lead = self._rates[joint] * LEAD_SECONDS
         end = time.monotonic() + 5.0 * abs(goal - float(q[joint])) / float(self._rates[joint]) + 2.0
 
         while abs(goal - float(q[joint])) > NEAR * self._slack[joint]:
             now = time.monotonic()
             judge.read(q, now)
             point = q.copy()
-            point[joint] += np.clip(goal - q[joint], -lead[joint], lead[joint])
-            judge.told(point, lead, q, now)
+            point[joint] += np.clip(goal - q[joint], -lead, lead)
+            point = judge.told(point, speed, q, now)
             standing = judge.standing(now)
             if judge.fault or standing or now > end:
                 raise ConnectionError(judge.fault or f"{self._robot.joint_names[joint]} does not get there")

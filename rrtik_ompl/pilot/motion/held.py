@@ -17,7 +17,7 @@ from rrtik_ompl.pilot.motion.supervisor import FAULTS, FOLLOW_SECONDS, amount, s
 from rrtik_ompl.pilot.queries import joint_range, out_of_view, world_by_hand
 from rrtik_ompl.pilot.routes.follower import MADE, Follower, Track
 from rrtik_ompl.pilot.routes.manoeuvre import check_move, move_refusal, way_out
-from rrtik_ompl.pilot.state import HOLD_SECONDS, LEASH_SECONDS, Means, Press, State
+from rrtik_ompl.pilot.state import HOLD_SECONDS, LEASH_SECONDS, LEAST_LEASH_SECONDS, Means, Press, State, leash
 
 # If the arm has come no nearer to the end of a move for this long, it will not get there.
 STUCK_SECONDS = 0.8
@@ -144,7 +144,8 @@ def _along(means: Means, state: State, track: Track, anew: bool) -> State:
         return state.released().say(news("all joints are there"))
 
     share = pace(means, state)
-    return lead_to(means, state, track.ahead(share * LEASH_SECONDS), share).say(news("driving all joints"))
+    point = track.ahead(max(share * LEASH_SECONDS, LEAST_LEASH_SECONDS))
+    return lead_to(means, state, point, share).say(news("driving all joints"))
 
 
 def _begin_move(means: Means, state: State, due: Follower) -> State:
@@ -267,7 +268,7 @@ def pace(means: Means, state: State) -> float:
 
 
 def lead_to(means: Means, state: State, point: Vector, share: float) -> State:
-    """Send all joints towards a set point, which may be at most `LEASH_SECONDS` of motion ahead of the arm.
+    """Send all joints towards a set point, which may be ahead of the arm by its `leash` at most.
 
     Args:
         means: What the session works with.
@@ -277,7 +278,7 @@ def lead_to(means: Means, state: State, point: Vector, share: float) -> State:
     """
     before = state if state.drive.joint is None else state.at_rest()
     led = replace(before, drive=before.drive.led(state.time))
-    return led.do(SetPoint(point, share * means.rates * LEASH_SECONDS))
+    return led.do(SetPoint(point, share * means.rates))
 
 
 def _drive(means: Means, state: State, joint: int, goal: float, share: float, at_goal: Answer) -> State:
@@ -296,16 +297,16 @@ def _drive(means: Means, state: State, joint: int, goal: float, share: float, at
         return state.released().say(at_goal)
 
     speed = max(min(state.speed * share, pace(means, state)), 1e-3)
-    rate = speed * float(means.rates[joint])
+    speeds = np.zeros(means.robot.dof)
+    speeds[joint] = speed * means.rates[joint]
     if not state.drive.goes_on_to(joint, goal):
         rested = state.at_rest()
         state = replace(rested, drive=rested.drive.begun(value, state.time))
 
-    drive = state.drive.on(joint, goal, rate, value, state.time)
-    max_lead = np.zeros(means.robot.dof)
-    max_lead[joint] = rate * LEASH_SECONDS
+    lead = float(leash(speeds, means.rates)[joint])
+    drive = state.drive.on(joint, goal, float(speeds[joint]), lead, value, state.time)
 
-    driven = replace(state, drive=drive).do(SetPoint(_with(state.q, joint, drive.point), max_lead, joint))
+    driven = replace(state, drive=drive).do(SetPoint(_with(state.q, joint, drive.point), speeds, joint))
     return driven.say(news(f"driving {means.robot.joint_names[joint]}"))
 
 

@@ -21,7 +21,7 @@ from rrtik_ompl.pilot.events import ReadMaster, StepToGrasp, news
 from rrtik_ompl.pilot.interlock import BY_HAND, ON_A_ROUTE, Verb
 from rrtik_ompl.pilot.motion.held import begins, lead_to, pace
 from rrtik_ompl.pilot.queries import unseen_for, world_by_hand
-from rrtik_ompl.pilot.state import LEASH_SECONDS, Means, State
+from rrtik_ompl.pilot.state import LEASH_SECONDS, Means, State, leash
 from rrtik_ompl.world.world import World
 
 NEAR = 0.15  # [m]; from farther away the straight motion to a grasp may be blocked
@@ -126,7 +126,7 @@ def _go_on_leading(means: Means, state: State, master: Vector) -> State:
     """Move towards the master's joints, as far as one step allows; refuse a step that is not free."""
     to_go = means.robot.clamp(master) - state.q
     _check_aligned(means.robot, to_go, AHEAD)
-    max_lead = means.rates * pace(means, state) * LEASH_SECONDS
+    max_lead = leash(means.rates * pace(means, state), means.rates)
     point = state.q + np.clip(to_go, -max_lead, max_lead)
 
     world = world_by_hand(state)

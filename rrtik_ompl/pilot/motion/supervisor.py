@@ -27,6 +27,7 @@ from rrtik_ompl.base.arrays import Mask, Vector
 from rrtik_ompl.base.units import joint_unit, reading
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.pilot.routes.follower import SLIDING_TOLERANCE, TOLERANCE
+from rrtik_ompl.pilot.state import FIRST_SECONDS, LEASH_SECONDS, LEAST_LEASH_SECONDS, leash
 
 FAULTS = {
     "jump": "{joint} jumped by {amount} between two readings",
@@ -53,6 +54,9 @@ FOLLOW_SECONDS = 0.4  # a driven joint must begin to move within this time
 NOISE = 0.05  # share of the slack; smaller changes of a reading are noise
 # Share of the largest lead of a set point; a joint that is nearer to its set point need not move.
 MIN_LEAD_SHARE = 0.25
+# Whatever is sent, a joint goes no farther than this, as time at its rate, beyond the reading before the last one that
+# has shown it moving: so far does an arm go whose readings stand still from then on, until that is named.
+UNCONFIRMED_SECONDS = 0.095
 
 
 def slack_of(robot: Robot) -> Vector:
@@ -99,10 +103,12 @@ class Supervisor:
         self._last_change_time = -np.inf  # time of the last reading that differed from its predecessor
         self._watch_until = -np.inf  # end of the watch after a stop
         self._active = False  # whether it is driven
+        self._told_at = -np.inf  # time of the last set point
 
         zeros = np.zeros(robot.dof)
         self._direction = zeros.copy()  # direction of each driven joint: 1 up, -1 down; 0 if it must stand still
         self._set_point = zeros.copy()  # where each joint shall be
+        self._speed = zeros.copy()  # speed at which each joint shall move
         self._max_lead = zeros.copy()  # largest lead of the set point over the arm
         self._wrong_way_travel = zeros.copy()  # how far each joint has moved against its direction
         self._slack_used = 0.0  # error of the worst joint at the last reading, as a share of its slack
@@ -112,6 +118,8 @@ class Supervisor:
         self._last_good_time = zeros.copy()  # when each joint was last where it should be
         self._coasts_until = np.full(robot.dof, -np.inf)  # end of coasting after a stop or a change of direction
         self._coast_direction = zeros.copy()  # direction in which a coasting joint was driven
+        self._confirmed = zeros.copy()  # value of each joint at the last reading that has shown it moving
+        self._confirmed_step = zeros.copy()  # how far it had moved since the one before, forwards or backwards
         self._position_at_last_move = zeros.copy()  # value of each joint at its last motion
         self._time_of_last_move = zeros.copy()  # and the time of it
 
@@ -129,8 +137,8 @@ class Supervisor:
         with self._lock:
             return 0.0 if self.fault else max(1.0 - self._slack_used, 0.0)
 
-    def told(self, set_point: Vector, max_lead: Vector, q: Vector, time: float) -> None:
-        """Register a set point that is sent to the arm.
+    def told(self, set_point: Vector, speed: Vector, q: Vector, time: float) -> Vector:
+        """Register a set point that shall be sent to the arm, and return the one that may be sent, shape (dof,).
 
         A joint that changes its direction may coast first, and its error counts from now on. A joint that goes on in
         the direction it had before a stop keeps its error, so that repeated stops cannot hide a motion in the wrong
@@ -138,7 +146,7 @@ class Supervisor:
 
         Args:
             set_point: Shape (dof,) [rad or m]; for joints that shall stand still, their present value.
-            max_lead: Largest lead of the set point over the arm, shape (dof,) [rad or m].
+            speed: Speed at which each joint shall go there, shape (dof,) [rad/s or m/s].
             q: Present configuration, shape (dof,) [rad or m].
             time: Current time [s].
         """
@@ -147,6 +155,7 @@ class Supervisor:
             if not self._active:
                 self._restart(q, time)
 
+            set_point = self._within_reach(set_point, speed, q, time)
             to_go = set_point - q
             direction = np.where(np.abs(to_go) > 0.0, np.sign(to_go), self._direction)
             is_reversed = (direction != self._direction) & (self._direction != 0.0)
@@ -163,8 +172,10 @@ class Supervisor:
             self._time_of_last_move[has_new_direction] = time
 
             self._direction = direction
-            self._max_lead = max_lead
+            self._speed = speed
+            self._max_lead = leash(speed, self._rates)
             self._set_point = np.where(direction != 0.0, set_point, self._set_point)
+            return set_point
 
     def stopped(self, time: float) -> None:
         """Register a stop: the driven joints may coast, and the arm is watched until it has come to rest."""
@@ -219,7 +230,8 @@ class Supervisor:
             if not self._active or self._q is None:
                 return None
 
-            patience = np.maximum(FOLLOW_SECONDS, 0.4 * NOISE * self._slack / np.maximum(self._max_lead, 1e-9))
+            visible_after = NOISE * self._slack / np.maximum(self._speed, 1e-9)
+            patience = np.maximum(FOLLOW_SECONDS, 4.0 * visible_after)
             is_late = (self._direction != 0.0) & (time - self._time_of_last_move > patience)
             if not is_late.any():
                 return None
@@ -227,6 +239,25 @@ class Supervisor:
             joint = int(np.flatnonzero(is_late)[0])
             moved = abs(self._q[joint] - self._position_at_last_move[joint])
             return joint, float(moved), float(time - self._time_of_last_move[joint])
+
+    def _within_reach(self, wanted: Vector, speed: Vector, q: Vector, time: float) -> Vector:
+        """Return the set point next to a wanted one that may be sent now, shape (dof,).
+
+        It is near enough that an arm which moves while its readings stand still stops by itself within
+        `UNCONFIRMED_SECONDS` of motion. It advances no faster than the joint shall move: an arm that is too fast gains
+        nothing by it. It never goes back for these reasons: readings that come late stand still at times while an
+        honest arm is on its way, and one that has overshot would hunt.
+        """
+        step = np.abs(self._confirmed_step)
+        reach = np.maximum(UNCONFIRMED_SECONDS * self._rates - step, LEAST_LEASH_SECONDS * self._rates)
+
+        advance = speed * float(np.clip(time - self._told_at, 0.0, LEASH_SECONDS))
+        self._told_at = time
+
+        sent = self._set_point
+        low = np.maximum(q - reach, np.minimum(q, sent) - advance)
+        high = np.minimum(q + reach, np.maximum(q, sent) + advance)
+        return np.clip(wanted, np.minimum(low, sent), np.maximum(high, sent))
 
     def _amount_in_words(self, joint: int, value: float) -> str:
         return amount(value, prismatic=bool(self._prismatic[joint]))
@@ -236,12 +267,15 @@ class Supervisor:
         if self._q is None:
             self._q = q.copy()
         self._set_point = np.where(self._direction != 0.0, self._set_point, q)
+        self._told_at = time - FIRST_SECONDS
         self._wrong_way_travel[:] = 0.0
         self._last_good_time[:] = time
         self._speed_allowance = self._slack.copy()
         self._slack_used = 0.0
         self._last_change_time = time
         self._active = active
+        self._confirmed = q.copy()
+        self._confirmed_step[:] = 0.0
         self._position_at_last_move = q.copy()
         self._time_of_last_move = np.full(len(q), time)
 
@@ -326,6 +360,11 @@ class Supervisor:
 
     def _note_motion(self, q: Vector, time: float) -> None:
         """Store value and time for each joint that has moved, or that need not move since it is near its set point."""
+        step = q - self._confirmed
+        is_confirmed = np.abs(step) >= NOISE * self._slack
+        self._confirmed_step[is_confirmed] = step[is_confirmed]
+        self._confirmed[is_confirmed] = q[is_confirmed]
+
         must_move: Mask = self._direction * (self._set_point - q) >= MIN_LEAD_SHARE * self._max_lead
         moved = ~must_move | (np.abs(q - self._position_at_last_move) >= NOISE * self._slack)
         self._position_at_last_move[moved] = q[moved]
