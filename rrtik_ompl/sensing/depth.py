@@ -15,11 +15,14 @@ from rrtik_ompl.base.arrays import Mask, Vector, bounded_array, not_negative, po
 from rrtik_ompl.base.copies import changed
 from rrtik_ompl.base.errors import CloudWarning, InputError, at_most, listed, require
 from rrtik_ompl.base.poses import rigid
+from rrtik_ompl.kernels.covers.memory import called
+from rrtik_ompl.kernels.simd.library import library
 from rrtik_ompl.model.scene import Obstacle
 from rrtik_ompl.model.shapes import Box, PointCloud
 from rrtik_ompl.model.shapes.point_cloud import RADIUS
 from rrtik_ompl.sensing.cameras.camera import Camera
 
+KERNELS = "clouds.picture_kernels"
 MOST_CELLS = 1 << 27  # of the grid of `cloud_from_depths`
 ROUNDING = 1e-5  # [m] more than single precision errs within the farthest depth
 
@@ -208,28 +211,54 @@ def _cells(
         grid: Lowest coordinates [m], side of a cube [m], and number of cubes along each axis.
         boxes: Poses T_box_world and half sides [m] of the boxes that are left out.
     """
-    scale, nearest, farthest = range_of_depths
     low, side, counts = grid
     picture = _picture(
         np.ma.filled(depth, 0.0) if np.ma.isMaskedArray(depth) else depth, camera, "depth picture", np.float32
     )
-    z = (picture * np.float32(scale)).ravel()
-    with np.errstate(invalid="ignore"):
-        is_measured = (z >= nearest) & (z <= farthest)
-    missed = len(z) - int(np.count_nonzero(is_measured))
-    for mask in masks:
-        is_measured &= (_picture(mask, camera, "mask of a depth picture") != 0).ravel()
+    used = [(_picture(mask, camera, "mask of a depth picture") != 0).ravel() for mask in masks]
 
     # In units of cubes from the lowest corner of the grid.
     directions = _directions(camera, pose.rotation.tobytes(), side)
     offset = (pose.translation - low) / side
+    kernels = library(KERNELS)
+    if kernels is None:
+        return _cells_in_numpy(picture, used, (directions, offset), range_of_depths, grid, boxes)
+
+    pixels = np.ascontiguousarray(picture)
+    numbers = np.array([*range_of_depths, *offset, *counts, *low, side])
+    rows = np.array([[*to_box.rotation.ravel(), *to_box.translation, *half] for to_box, half in boxes])
+    mask = np.logical_and.reduce(used).astype(np.int32) if used else np.empty(0, dtype=np.int32)
+    keys = np.empty(pixels.size, dtype=np.int64)
+    measured = np.zeros(1, dtype=np.int64)
+    asked = (pixels, pixels.size, mask, len(used), directions, numbers, rows, len(boxes))
+    found = called(kernels.find_cells, *asked, keys, measured)
+    return pixels.size - int(measured[0]), keys[:found]
+
+
+def _cells_in_numpy(
+    picture: NDArray[np.float32],
+    used: list[Mask],
+    rays: tuple[NDArray[np.float32], Vector],
+    range_of_depths: tuple[float, float, float],
+    grid: tuple[Vector, float, NDArray[np.int64]],
+    boxes: list[tuple[pin.SE3, Vector]],
+) -> tuple[int, NDArray[np.int64]]:
+    """As _cells, without kernels."""
+    scale, nearest, farthest = range_of_depths
+    low, side, counts = grid
+    directions, offset = rays
+    z = (picture * np.float32(scale)).ravel()
+    with np.errstate(invalid="ignore"):
+        inside = (z >= nearest) & (z <= farthest)
+    missed = len(z) - int(np.count_nonzero(inside))
+    for mask in used:
+        inside &= mask
+
     with np.errstate(invalid="ignore"):
         places = [z * row for row in directions]
-        inside = is_measured
         for place, start, count in zip(places, offset.astype(np.float32), counts, strict=True):
             place += start
-            inside &= place >= 0.0
-            inside &= place < count
+            inside &= (place >= 0.0) & (place < count)
     chosen = np.flatnonzero(inside)
     x, y, z = (place[chosen] for place in places)
     if boxes:
@@ -246,13 +275,13 @@ def _cells(
 
 
 @lru_cache(maxsize=8)
-def _directions(camera: Camera, rotation: bytes, side: float) -> tuple[NDArray[np.float32], ...]:
-    """Return the rays of all pixels in world axes, three rows of float32; a depth times one of them is in cubes."""
+def _directions(camera: Camera, rotation: bytes, side: float) -> NDArray[np.float32]:
+    """Return the rays of all pixels in world axes, shape (3, pixels); a depth times one of them is in cubes."""
     column, row = np.meshgrid(np.arange(camera.width), np.arange(camera.height))
     rays = camera.rays(np.column_stack([column.ravel(), row.ravel()]).astype(np.float64))
     axes = np.frombuffer(rotation).reshape(3, 3)
     turned = axes @ np.vstack([rays.T, np.ones(len(rays))]) / side
-    return tuple(np.ascontiguousarray(line, dtype=np.float32) for line in turned)
+    return np.ascontiguousarray(turned, dtype=np.float32)
 
 
 def _inverse_of(obstacle: Obstacle) -> tuple[pin.SE3, Vector]:

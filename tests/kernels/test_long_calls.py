@@ -37,7 +37,8 @@ IN_BLOCKS = {  # the number of rows, which come in blocks
     "search.motions.proven_kernels": ("judge",),
     "timing.run_kernels": ("sample_cubics",),
 }
-ONE_THING = {  # one pose, one query, one path, or one solid whose cover is made once
+ONE_THING = {  # one pose, one picture, one query, one path, or one solid whose cover is made once
+    "clouds.picture_kernels": ("find_cells",),
     "covers.cell_kernels": ("cut_at_planes", "merge", "winding_numbers"),
     "covers.cut_kernels": ("hull_volume_of", "cut_volumes"),
     "covers.point_kernels": ("farthest_points", "farthest_beyond", "distances", "inside", "choose_balls"),

@@ -10,6 +10,7 @@ from rrtik_ompl import sensing
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.model.scene import Obstacle
 from rrtik_ompl.model.shapes import Box, Sphere
+from rrtik_ompl.sensing import depth as depth_pictures
 from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.depth import cloud_from_depth
 from rrtik_tests.grey_pictures import grey_png
@@ -168,6 +169,21 @@ def test_what_is_to_be_grasped_is_left_out_by_a_box_or_a_mask():
     assert len(half.points) <= np.count_nonzero(mask & (np.nan_to_num(depth, posinf=0.0) > 0.0))
     hidden = sensing.cloud_from_depths([(np.ma.masked_array(depth, mask == 0), camera, T)], everywhere, cell=0.04)
     assert np.array_equal(hidden.points, half.points)
+
+
+@pytest.mark.kernels
+def test_numpy_finds_the_same_points_as_the_kernel(monkeypatch):
+    views, points, _ = views_of_a_room(2)
+    views = [(depth, camera, T, np.random.default_rng(3).integers(0, 3, depth.shape)) for depth, camera, T in views]
+    cup = Obstacle("cup", Box(0.6, 0.8, 0.5), pin.SE3(pin.exp3(np.array([0.3, -0.2, 0.5])), points[100]))
+    some = [([-1.0, -0.8, 0.5], [1.5, 0.9, 2.2]), ([-4.0] * 3, [4.0] * 3)]
+    clouds = []
+    for kernels in (depth_pictures.library, lambda name: None):
+        monkeypatch.setattr(depth_pictures, "library", kernels)
+        clouds += [sensing.cloud_from_depths(views, within, cell=0.03, without=[cup]) for within in some]
+    for one, other in zip(clouds[:2], clouds[2:], strict=True):
+        assert np.array_equal(one.points, other.points)
+        assert one.dropped == other.dropped > 0
 
 
 @pytest.mark.parametrize(
