@@ -119,7 +119,7 @@ class Arrangement:
             bodies=bodies,
             arrays=Once(body_arrays, bodies),
             bare=None,
-            always_colliding=_touching(self.robot, bodies, pairs_at_rest),
+            always_colliding=_touching(bodies, pairs_at_rest),
         )
         if not is_same_shape:
             covers = Once(arm_cache(self.robot).covers_of, bodies)
@@ -180,7 +180,7 @@ def arranged(robot: Robot, scene: Scene, self_margin: float) -> Arrangement:
         in_contact=(),
         standing=standing,
         weights=displacement_weights(robot, [body for body in bodies if body.kind != "obstacle"]),
-        always_colliding=fixed_contact(robot, bodies.as_tuple, standing) is not None,
+        always_colliding=fixed_contact(bodies.as_tuple, standing) is not None,
         self_margin=self_margin,
         covers=Once(arm_cache(robot).covers_of, bodies),
         approaches=Once(_approaches, robot, bodies, moving),
@@ -203,7 +203,7 @@ def with_contacts(bare: Arrangement, scene: Scene) -> Arrangement:
     checked = tuple(pair for pair in bare.checked if pair not in arrays.contacts)
     always_colliding = bare.always_colliding
     if any(pair in arrays.contacts for pair in bare.standing):
-        always_colliding = fixed_contact(robot, bodies.as_tuple, bare.standing) is not None
+        always_colliding = fixed_contact(bodies.as_tuple, bare.standing) is not None
 
     return replace(
         bare,
@@ -264,10 +264,10 @@ def _approaches(robot: Robot, bodies: Items[Body], pairs: Pairs) -> dict[tuple[i
     return dict(zip(pairs, approach_weights(robot, bodies, pairs), strict=True))
 
 
-def _touching(robot: Robot, bodies: Sequence[Body], pairs: Pairs) -> bool:
+def _touching(bodies: Sequence[Body], pairs: Pairs) -> bool:
     """Check whether any of some pairs of fixed bodies touches; bounding balls exclude most pairs first."""
     pairs_nearby = [(bodies[i], bodies[j]) for i, j in pairs if not far_apart(bodies[i], bodies[j], DISTANCE_TOLERANCE)]
-    return any(fixed_contact(robot, both, ((0, 1),)) is not None for both in pairs_nearby)
+    return any(fixed_contact(both, ((0, 1),)) is not None for both in pairs_nearby)
 
 
 def _doubts(robot: Robot, scene: Scene) -> Iterator[str]:

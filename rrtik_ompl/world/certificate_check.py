@@ -141,7 +141,7 @@ def _fault_of_header(certificate: Certificate, world: World, route: Route, clear
     passing = {each.name for each in world.scene.obstacles if route.moving and each.motion is not None}
     at_rest = [body.joint == 0 and body.name not in passing for body in world.bodies]
     pairs_at_rest = tuple(pair for pair in world.pairs if all(at_rest[k] for k in pair))
-    touching = fixed_contact(robot, world.bodies, pairs_at_rest)
+    touching = fixed_contact(world.bodies, pairs_at_rest)
     if touching is not None:
         return f"{' and '.join(map(repr, touching))} touch and never move"
 

@@ -243,7 +243,7 @@ class MovingWorld:
 
     def _contact_of_base(self) -> str:
         """Return the line for ``blocked``. Copies at predicted poses do not count, as the base cannot avoid them."""
-        names = fixed_contact(self.robot, tuple(self._bodies), self._pairs_at_rest)
+        names = fixed_contact(tuple(self._bodies), self._pairs_at_rest)
         return "" if names is None else f"'{names[0]}' and '{names[1]}' overlap, and the base cannot give way"
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Mask, Matrix, Vector
-from rrtik_ompl.geometry.collision.bodies import DISTANCE_TOLERANCE, Body
+from rrtik_ompl.geometry.collision.bodies import DISTANCE_TOLERANCE, Body, kept_apart
 from rrtik_ompl.geometry.collision.body_arrays import body_arrays
 from rrtik_ompl.geometry.collision.cloud_solid import LOOK_AHEAD
 from rrtik_ompl.geometry.collision.containment import Containment
@@ -263,16 +263,24 @@ class Boxes:
         return centres, np.einsum("kij,kj->ki", np.abs(rotations), self._halves[bodies])
 
 
-def fixed_contact(robot: Robot, bodies: tuple[Body, ...], pairs: tuple[tuple[int, int], ...]) -> tuple[str, str] | None:
+def fixed_contact(bodies: tuple[Body, ...], pairs: tuple[tuple[int, int], ...]) -> tuple[str, str] | None:
     """Return the names of two bodies that touch and never move (such as base and obstacle); None if there are none.
 
     Args:
-        robot: The arm.
         bodies: All bodies of the world.
         pairs: Numbers of the bodies that never move and must not touch.
     """
     meeting = _boxes_meet(bodies, pairs) if pairs else ()
-    return Certificate(robot, bodies, meeting).first_pairs(np.zeros((1, robot.dof)))[0] if meeting else None
+    if not meeting:
+        return None
+    inside = Containment(bodies, meeting)
+    for i, j in meeting[::-1]:
+        one, other = bodies[i], bodies[j]
+        ends = (one.geometry, one.placement.homogeneous, other.geometry, other.placement.homogeneous)
+        apart = distance(*ends, kept_apart(one, other), 2.0 * DISTANCE_TOLERANCE) is not None
+        if not apart or inside.holds((i, j), np.eye(4)[None]):
+            return one.name, other.name
+    return None
 
 
 def _boxes_meet(bodies: tuple[Body, ...], pairs: tuple[tuple[int, int], ...]) -> tuple[tuple[int, int], ...]:
