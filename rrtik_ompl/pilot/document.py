@@ -9,6 +9,7 @@ import pinocchio as pin
 
 from rrtik_ompl.base.units import joint_unit, reading
 from rrtik_ompl.pilot.interlock import STALE_SECONDS
+from rrtik_ompl.pilot.postures import named_postures
 from rrtik_ompl.pilot.routes.follower import Follower, Track
 from rrtik_ompl.pilot.session import Session
 from rrtik_ompl.planning.moves.text import spoken_moves
@@ -54,6 +55,7 @@ def state_document(session: Session) -> dict[str, Any]:
         "unseen": known.unseen,
         "speed": state.speed,
         "gripper": {"closed": state.gripper.closed, "holds": state.holds or state.gripper.fixed},
+        "postures": list(named_postures(session.means, state)),
         "driving": session.driving,
     }
 

@@ -9,10 +9,11 @@ command is refused.
 | `plan`, `replan`: a route is found | proposed | proposed | proposed | proposed |
 | the same, none is found; `reject` | manoeuvre, or choosing with a grasp | the same | the same | the same |
 | `back`, with a route; `lift`, with something held | proposed | proposed | proposed | proposed (`lift`: refused) |
+| `posture`: a route is found | proposed | proposed | proposed | refused |
 | `together` | refused | refused | proposed | refused |
 | `accept`: the rest is free | refused | refused | following | refused |
 | `accept`, `next`: the rest is not free | refused | refused | proposed, withdrawn | proposed, withdrawn |
-| `jog`, `go`, `move`, `servo`, `lead` | | | | refused |
+| `jog`, `go`, `move`, `servo`, `lead`, `keep` | | | | refused |
 | `close` on something loose, `open` with something | manoeuvre | manoeuvre | manoeuvre | refused |
 | `next`, `settle` | refused | refused | refused | |
 | `stop`, `halt`, `stand` | | | | proposed |
@@ -41,7 +42,7 @@ import numpy as np
 
 from rrtik_ompl.base.arrays import frozen
 from rrtik_ompl.base.errors import InputError, RrtikError, UnknownNameError
-from rrtik_ompl.pilot import guide
+from rrtik_ompl.pilot import guide, postures
 from rrtik_ompl.pilot.events import (
     Acknowledge,
     Broken,
@@ -239,6 +240,7 @@ VERBS: dict[str, Verb] = {
     **guide.VERBS,
     **hand.VERBS,
     **leading.VERBS,
+    **postures.VERBS,
 }
 
 

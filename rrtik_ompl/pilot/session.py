@@ -39,6 +39,7 @@ from rrtik_ompl.world.problem import Problem
 from rrtik_ompl.world.world import World
 
 ALIVE_SECONDS = 1.0
+BEGIN = "begin"  # name of the posture in which a session began
 
 
 class Session:
@@ -97,7 +98,7 @@ class Session:
         self.master = master
         self.supervisor = Supervisor(problem.robot, self.means.rates)
         q = frozen(arm.read())
-        self.state = State(Surroundings(problem.world, structure), q, q)
+        self.state = State(Surroundings(problem.world, structure), q, q, kept={BEGIN: q})
 
         self._grasp_servo = GraspServo(problem.robot)
         self._record = record or Record(None)

@@ -282,6 +282,7 @@ class State:
         press: The press that drives the arm, or did so last.
         drive: How the arm is driven.
         gripper: The gripper.
+        kept: Postures that routes may lead to, by name, shape (dof,) each: the one at the begin, and those kept since.
         servoed_at: Time of the last step of visual servoing [s].
         given: The last command, and the number of its press; None if the command is not held.
         due: The effects to carry out, in this order; `machine.handle` returns and clears them.
@@ -312,6 +313,7 @@ class State:
     press: Press = field(default_factory=Press)
     drive: Drive = field(default_factory=Drive)
     gripper: Gripper = field(default_factory=Gripper)
+    kept: Mapping[str, Vector] = field(default_factory=dict)
     servoed_at: float = 0.0
     given: tuple[str, object] = ("", None)
     due: tuple[Effect, ...] = ()

@@ -26,6 +26,7 @@ ARGUMENTS = {
     "speed": {"share": 0.5},
     "object": {"name": "valve"},
     "grasp": {"type": "front", "level": 0},
+    "posture": {"name": "stowed"},
 }
 PICTURES = {"none": -np.inf, "fresh": 0.0, "stale": -60.0}  # when the last one was taken, before now
 ONE_DEGREE = np.radians(1.0)

@@ -6,7 +6,7 @@ const COLOR_WORDS = { green: "reach", amber: "blocked", red: "no reach" };
 const NEAR_LIMIT = 0.04, MARK = 0.006, UNSEEN_S = 1, HOLD_MS = 3000, SLOW_LINK_MS = 250;
 const FIRST_WORDS = "Choose a grasp with G and L, then plan with P. Or choose a joint with 1 … 9 and hold ← or → to drive it.";
 let state = null, role = { role: "watching", free: false, pages: 1 }, preset = 0, playing = null;
-let previousAlert = "", heldUntil = 0;
+let previousAlert = "", heldUntil = 0, posture = -1;
 
 const byId = (id) => document.getElementById(id);
 const set = (element, text) => { if (element.textContent !== text) element.textContent = text; };
@@ -39,6 +39,10 @@ function chooseGrasp(byType, byLevel) {
   const levels = state.lamps.filter((lamp) => lamp.type === type).length;
   const level = state.choice ? state.choice.level + byLevel : 0;
   send("grasp", { type, level: level % levels });
+}
+function nextPosture() {
+  posture = (posture + 1) % state.postures.length;
+  send("posture", { object: state.postures[posture] });
 }
 function toggleGripper() { send(state?.gripper.closed ? "open" : "close"); }
 function nextPreset() { preset = (preset + 1) % state.views.length; send("preset", { view: state.views[preset] }); }
@@ -98,7 +102,7 @@ function showState(said) {
   for (const item of byId("modes").children)
     item.dataset.mode === said.mode ? item.setAttribute("aria-current", "step") : item.removeAttribute("aria-current");
   if (newMessage || performance.now() > heldUntil) say(inWords(said.message) || FIRST_WORDS, said.level, 0);
-  showJoints(); showTarget(); showLamps(); showRoute(); showAim(); showButtons(); showLatch(); showGripper(); showViews(); showPreview(); showAge();
+  showJoints(); showTarget(); showPostures(); showLamps(); showRoute(); showAim(); showButtons(); showLatch(); showGripper(); showViews(); showPreview(); showAge();
   if (said.mode !== "proposed" && playing) pausePlay();
   if (newRoute && role.role === "pilot" && !said.replay && !playing) togglePlay();
 }
@@ -219,6 +223,16 @@ function showTarget() {
   if (state.target && list.value !== state.target) list.value = state.target;
 }
 
+const KEEP = "keep this (E)";
+
+function showPostures() {
+  const list = byId("posture"), key = state.postures.join();
+  if (list.dataset.key === key) return;
+  list.dataset.key = key;
+  list.replaceChildren(make("option", { value: "", hidden: true }, "Posture W"),
+    ...[...state.postures, KEEP].map((name) => make("option", { value: name }, name.replaceAll("_", " "))));
+}
+
 function showLamps() {
   const table = byId("lamps"), types = [...new Set(state.lamps.map((lamp) => lamp.type))];
   const most = Math.max(0, ...types.map((type) => state.lamps.filter((lamp) => lamp.type === type).length));
@@ -312,7 +326,7 @@ function showButtons() {
   const mine = role.role === "pilot" && !state.replay && !state.trouble && !state.stopped, at = (...modes) => mine && modes.includes(state.mode);
   const led = mine && !state.unseen;
   for (const [id, good] of [["accept", at("proposed") && !state.route?.withdrawn], ["reject", role.role === "pilot" && state.mode === "proposed"], ["next", at("following")], ["plan", led],
-    ["together", led && at("proposed")], ["servo", led && at("manoeuvre", "choosing", "proposed") && Boolean(state.choice)], ["replan", led && Boolean(state.route)], ["back", led && Boolean(state.route)], ["stop", !state.replay],
+    ["together", led && at("proposed")], ["servo", led && at("manoeuvre", "choosing", "proposed") && Boolean(state.choice)], ["posture", led && state.mode !== "following"], ["replan", led && Boolean(state.route)], ["back", led && Boolean(state.route)], ["stop", !state.replay],
     ...["minus", "plus", "go"].map((id) => [id, at("manoeuvre", "choosing", "proposed")])]) byId(id).disabled = !good;
   for (const id of ["play", "step_back", "step_on", "scrub", "live"]) byId(id).disabled = role.role !== "pilot" || state.mode !== "proposed";
 }
@@ -380,6 +394,12 @@ byId("value").onkeydown = (event) => {
   event.target.blur();
 };
 byId("target").onchange = (event) => { send("object", { object: event.target.value }); event.target.blur(); };
+byId("posture").onchange = (event) => {
+  const name = event.target.value;
+  if (name === KEEP) send("keep"); else send("posture", { object: name });
+  event.target.value = "";
+  event.target.blur();
+};
 byId("play").onclick = togglePlay;
 byId("live").onclick = showNow;
 byId("step_back").onclick = () => stepPreview(-1);
