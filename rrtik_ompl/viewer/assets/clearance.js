@@ -17,7 +17,8 @@ function sayProof(proof) {
   document.getElementById("proof-section").hidden = !proof;
   if (!proof) return;
   const note = document.getElementById("proof-note");
-  note.textContent = proof.text;
+  const least = (proof === story.proof && proof.proven && story.clearance?.distances[story.clearance.least]) || null;
+  note.textContent = least === null ? proof.text : `${proof.text}; least clearance ${millimetres(least)}`;
   note.className = proof.proven ? "proven" : "doubtful";
 }
 

@@ -99,7 +99,7 @@ function describe(k) {
   const way = (j) => `${robot.joints[j].name} ${reading(j, from[j])} \u2192 ${withUnit(j, to[j])}`;
   if (joints.length <= 2) return joints.map(way).join(", ");
   const farthest = joints.reduce((best, j) => (Math.abs(to[j] - from[j]) > Math.abs(to[best] - from[best]) ? j : best));
-  return `${joints.length} joints, most ${way(farthest)}`;
+  return `${joints.length} joints, mostly ${way(farthest)}`;
 }
 
 function buildMoves(goTo) {

@@ -134,10 +134,7 @@ function replacePath(rows) {
 
 let pathIsOfState = true;  // whether the path that is shown is one of the state, or of what it was before
 let given = null;  // the path with which the page began: Python has judged it
-const OWN_PROOF = {  // of a path that the page has found
-  proven: false,
-  text: `found here, and free at each step of its check; ${planning?.asks ? "what rrtik proves of it stands above" : "rrtik check problem.yaml path.json proves the way between, from the files of Save problem and Save path"}`,
-};
+const OWN_PROOF = { proven: false, text: "free at each step of its check, not proven between" };  // of a path that the page has found
 
 /** Show the path of the story, and of that with which the page began what Python says of it. */
 function showPath() {
