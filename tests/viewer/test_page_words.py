@@ -1,7 +1,7 @@
 """What a page that plans says, and where: by the pointer, by the player, of clearance and of proof."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 import pytest
@@ -48,13 +48,14 @@ def browser(opened: Browser) -> Browser:
     return opened
 
 
-def held_goal(browser: Browser, x: float, y: float) -> None:
-    """Take hold of the goal, and move the pointer by so many pixels."""
+def held_goal(browser: Browser, target: Callable[[list[float]], list[float]]) -> None:
+    """Take hold of the goal, and move the pointer to where a function of its place says [px]."""
     spots = browser.ask(SPOTS % '"goal"')
     spot = spots[len(spots) // 2]
-    for kind, place in (("mousePressed", spot), ("mouseMoved", [spot[0] + x / 2, spot[1] + y / 2])):
+    wanted = target(spot)
+    halfway = [(a + b) / 2 for a, b in zip(spot, wanted, strict=True)]
+    for kind, place in (("mousePressed", spot), ("mouseMoved", halfway), ("mouseMoved", wanted)):
         browser.call("Input.dispatchMouseEvent", type=kind, x=place[0], y=place[1], button="left", buttons=1)
-    browser.call("Input.dispatchMouseEvent", type="mouseMoved", x=spot[0] + x, y=spot[1] + y, button="left", buttons=1)
 
 
 def let_go(browser: Browser) -> None:
@@ -106,7 +107,7 @@ def test_what_keeps_a_ghost_back_stands_beside_the_hand_within_the_picture_and_i
     browser: Browser,
 ) -> None:
     pane = browser.ask("(({ left, top }) => [left, top])(pane.getBoundingClientRect())")
-    held_goal(browser, -1000.0 + pane[0], -700.0 + pane[1])
+    held_goal(browser, lambda spot: [pane[0] + 3.0, pane[1] + 3.0])
     browser.ask(IDLE)
     beside = browser.ask(BESIDE_HAND)
     line = browser.ask(LINES)["plan-refusal"]
@@ -122,7 +123,7 @@ def test_what_keeps_a_ghost_back_stands_beside_the_hand_within_the_picture_and_i
 
 def test_a_goal_in_an_obstacle_says_so_beside_the_hand_and_by_the_player(browser: Browser) -> None:
     browser.ask("state.obstacles[0].pose = rowsOf(poseOf('goal')); applyObstacle(0); changed()")
-    held_goal(browser, 6.0, 0.0)
+    held_goal(browser, lambda spot: [spot[0] + 6.0, spot[1]])
     browser.ask(IDLE)
     lines = browser.ask(LINES)
     beside = browser.ask(BESIDE_HAND)

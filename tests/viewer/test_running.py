@@ -14,6 +14,7 @@ import rrtik_ompl as rrtik
 from rrtik_ompl.model.scene import ConstantVelocity, TimedPoses
 from rrtik_ompl.viewer.page import page
 from rrtik_tests.browser import Browser, planning_page
+from rrtik_tests.page_drags import SPOTS
 from rrtik_tests.programs import needs_chromium
 
 pytestmark = [
@@ -113,6 +114,22 @@ def test_a_run_by_the_button_moves_the_arm_and_stops(browser: Browser, problem: 
     np.testing.assert_allclose(
         np.reshape(browser.ask("poseNow(0)"), (4, 4)), problem.world.scene.obstacles[0].pose.homogeneous
     )
+
+
+def test_an_obstacle_is_dragged_during_a_run_and_the_heading_does_not_deny_the_path(browser: Browser) -> None:
+    browser.ask("select(2); startRun()")
+    spots = browser.ask(SPOTS % 2)
+    spot = spots[len(spots) // 2]
+    before = browser.ask("Array.from(state.obstacles[2].pose)")
+    browser.drag(spot, [spot[0] + 20.0, spot[1] - 5.0])
+    assert browser.ask("clock.running")
+    assert browser.ask("document.title").endswith("obstacles move")
+    assert browser.ask("Array.from(state.obstacles[2].pose)") != before
+    browser.ask("undo()")
+    assert "stop it" in browser.ask(REFUSAL)
+    browser.ask("document.getElementById('run-start').click()")  # stops
+    browser.ask("undo()")
+    assert browser.ask("Array.from(state.obstacles[2].pose)") == before
 
 
 def test_an_obstacle_on_stated_poses_cannot_be_dragged_and_others_can(browser: Browser) -> None:

@@ -7,6 +7,8 @@ function select(thing) {
   document.getElementById("plan-lock").checked = isLocked(thing);
   outlineThing(isLocked(thing) ? thing : null);
   placeHandles();
+  dropLabels("selected");
+  if (!isEnd(thing)) addLabel(`${nameOf(thing)}${isLocked(thing) ? " (locked)" : ""}`, "selected", originOf(poseOf(thing)), namePlace);
   showSelected();
   viewer.set_dirty();
 }
@@ -181,14 +183,28 @@ function wireControls() {
   pane.addEventListener("pointerup", endDrag, true);
   pane.addEventListener("pointercancel", endDrag, true);
   pane.addEventListener("pointerleave", leavePane, true);
+  addEventListener("keydown", pressKey);
   buildHandles();
   const render = viewer.render;
   viewer.render = () => { placeHandles(); render(); };
 }
 
+/** Escape gives up a drag, Delete removes what is selected, Ctrl+Z undoes; where a person types they are left to that. */
+function pressKey(event) {
+  if (event.target.matches?.("textarea, input:not([type=range], [type=checkbox])")) return;
+  const undoes = event.key.toLowerCase() === "z" && (event.ctrlKey || event.metaKey) && !event.shiftKey;
+  if (event.key === "Escape") giveUpDrag();
+  else if (drag !== null) return;
+  else if (undoes) undo();
+  else if (event.key === "Delete") removeSelected();
+  else return;
+  event.preventDefault();
+}
+
 function startPlanning() {
   const section = document.getElementById("plan-section");
   section.hidden = false;
+  document.getElementById("plan-keys").hidden = loading.kernels === null;
   kernels = loading.kernels;
   if (kernels === null) {
     section.querySelectorAll(".control").forEach((element) => { element.hidden = true; });
@@ -203,6 +219,7 @@ function startPlanning() {
   document.getElementById("plan-planner").append(...planners);
   given = { waypoints: story.waypoints, showClearance };
   showState();
+  showUndo();
   wireControls();
   planStatus("drag the goal (green) by its handles, or click something else and drag that: the arm finds a new path");
   if (planning.asks && !story.moves.length) changed();

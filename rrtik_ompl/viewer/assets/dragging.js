@@ -102,10 +102,32 @@ function pointerAt(event) {
   ray.setFromCamera(place, viewer.camera);
 }
 
-/** What a pointer can take hold of: ghosts, and obstacles that are not locked. */
+/** What a pointer can take hold of: ghosts, but not in a run, and obstacles that are not locked. */
 function thingsToDrag() {
   const free = [...planning.obstacles.keys()].filter((k) => !isLocked(k));
-  return [...ENDS.keys(), ...free].filter((thing) => nodeOf(thing).visible && bodyOf(thing) !== undefined);
+  const ends = clock.running ? [] : [...ENDS.keys()];
+  return [...ends, ...free].filter((thing) => nodeOf(thing).visible && bodyOf(thing) !== undefined);
+}
+
+/** What is drawn under the pointer of all obstacles and the robot: its name, and whether it is the robot; undefined where there is none. */
+function hitBody() {
+  const obstacles = story.obstacles.map(({ name, node: leaf }) => ({ name, isRobot: false, body: node("obstacles", leaf) }));
+  const bodies = [...obstacles, { name: robot.name, isRobot: true, body: node("robot") }].filter(({ body }) => body.visible);
+  const hits = bodies.flatMap((each) => ray.intersectObject(each.body, true).slice(0, 1).map(({ distance }) => ({ ...each, distance })));
+  return hits.sort((a, b) => a.distance - b.distance)[0];
+}
+
+/** A click that selects nothing says why: what is locked is selected, to be unlocked. */
+function clickElsewhere() {
+  const found = hitBody();
+  if (!found) return;
+  const { name, isRobot } = found;
+  const k = numberOf(name);
+  if (isRobot) planRefusal(`${name} itself follows the path: drag its start or its goal`, { mild: true });
+  else if (k >= 0 && isMovable(k)) {
+    select(k);
+    planRefusal(`${name} is locked: it moves once "locked" below is off`, { mild: true });
+  } else planRefusal(`${name} stays: boxes, balls, cylinders and capsules without a stated course can be moved here`, { mild: true });
 }
 
 function hitThing() {
@@ -118,13 +140,16 @@ function hitThing() {
 let drag = null;
 let pressed = null;  // where a click may select something
 
-/** What a drag of a handle, or else in the plane of the picture, does to the pose where it began. */
-function dragBy(handle, point) {
+/** What a drag of a handle, or else in the plane of the picture or of a planar arm, does to the pose where it began. */
+function dragBy(handle, hitPoint) {
   const from = poseOf(selected);
   const centre = originOf(from);
   const none = new THREE.Vector3();
-  if (!handle) {
-    const away = viewer.camera.getWorldDirection(new THREE.Vector3());
+  if (!handle || handle.userData.kind === "knob") {
+    const point = hitPoint ?? fromWorld(centre);
+    const view = viewer.camera.getWorldDirection(new THREE.Vector3());
+    const up = fromWorld(AXES[2]);
+    const away = story.planar && Math.abs(view.dot(up)) > EDGE_ON ? up : view;  // a planar arm stays in its plane
     const plane = new THREE.Plane().setFromNormalAndCoplanarPoint(away, point);
     return () => {
       const spot = ray.ray.intersectPlane(plane, new THREE.Vector3());
@@ -147,11 +172,11 @@ function dragBy(handle, point) {
 }
 
 function startDrag(event) {
-  if (event.button !== 0 || !event.isPrimary || clock.running) return;
+  if (event.button !== 0 || !event.isPrimary) return;
   pointerAt(event);
   const handle = hitHandle();
   const found = handle ? null : hitThing();
-  pressed = found && { thing: found.thing, hit: found.hit, x: event.clientX, y: event.clientY };
+  pressed = handle ? null : { thing: found?.thing, hit: found?.hit, x: event.clientX, y: event.clientY };
   if (!handle && found?.thing !== selected) return;
   event.stopPropagation();
   event.preventDefault();
@@ -181,13 +206,31 @@ function goOnDragging(event) {
 
 function endDrag(event) {
   if (pressed && clicked(pressed, event)) {
-    holdTip(pressed);
-    select(pressed.thing);
+    pointerAt(event);
+    if (pressed.thing === undefined) clickElsewhere();
+    else {
+      holdTip(pressed);
+      planRefusal("");
+      select(pressed.thing);
+    }
   }
   pressed = null;
   if (drag === null) return;
   event.stopPropagation();
+  leaveDrag();
+}
+
+/** A drag that is given up: as if it had not begun. */
+function giveUpDrag() {
+  if (drag === null) return;
+  const { begun } = drag;
+  leaveDrag();
+  if (begun) undo();
+}
+
+function leaveDrag() {
   drag = null;
+  pressed = null;
   if (farEnd) planRefusal(document.getElementById("plan-refusal").textContent, { mild: true });  // the ghost stands where it can be
   farEnd = null;
   dropLabels("reach");
@@ -209,7 +252,7 @@ function hover(event) {
   looking = true;
   requestAnimationFrame(() => {
     looking = false;
-    if (drag !== null || clock.running) return;
+    if (drag !== null) return;
     pointerAt(event);
     const handle = hitHandle();
     const found = handle ? null : hitThing();

@@ -160,12 +160,20 @@ function remember() {
   const { textContent: text, className } = document.getElementById("plan-state");
   past.push({ state: copyOf(state), shown: pathIsOfState ? { story: { waypoints, moves, times, contacts }, text, bad: className === "bad" } : null });
   if (past.length > UNDO_STEPS) past.shift();
+  showUndo();
 }
+
+const showUndo = () => { document.getElementById("plan-undo").disabled = past.length === 0; };
 
 /** The state before the last change, with the same path. */
 function undo() {
   if (past.length === 0) return;
+  if (clock.running) {
+    planRefusal("the run goes on: stop it, then undo");
+    return;
+  }
   const { state: before, shown } = past.pop();
+  showUndo();
   state = before;
   state.obstacles.forEach((_, k) => applyObstacle(k));
   showState();

@@ -115,6 +115,7 @@ function newPath() {
   scrub.max = total;
   addTicks();
   if (!run && !story.timed) buildMoves(goTo);
+  for (const control of [scrub, ...document.querySelectorAll("#buttons button")]) control.disabled = story.moves.length === 0;
   if (story.moves.length) show(Math.min(now, total));
   else showStill();
   labelPath();
