@@ -3,6 +3,7 @@
 const TURN_PER_PIXEL = 0.01;  // [rad], with the shift key or a ring that is seen from its edge
 const GHOSTS_FIRST = 0.05;  // of the picture's size: so much nearer a ghost counts than it is
 const CLICK_PIXELS = 4;  // a pointer that moves less clicks
+const FREE_STEPS = 20;  // of the way back from the nearest pose that an arm can take, until it is free there
 const OUT_OF_REACH = "#8a949e";  // colour of a ghost that cannot follow
 let selected = "goal";
 let held = planning?.tips[0] ?? robot?.tip;  // the tip by which a ghost is moved
@@ -48,9 +49,16 @@ function placeEnd(end, wanted) {
   const pose = [e[0], e[4], e[8], e[1], e[5], e[9], e[2], e[6], e[10], e[12], e[13], e[14]];
   const q = held.ik === undefined ? null : kernels.reach(pose, state[end], held);
   const near = q === null ? nearestReach(held, wanted, state[end]) : { q, out: false, text: "" };
-  state[end] = near.q;
+  state[end] = near.text ? freeToward(near.q, state[end]) : near.q;
   farEnd = near.out ? end : null;
-  return near.text && `${end}: ${near.text}`;
+  const there = near.text && !kernels.free(near.q) ? `; there ${kernels.blame(near.q)}` : "";
+  return near.text && `${end}: ${near.text}${there}`;
+}
+
+/** The nearest free joint values to some on the straight way from others: a ghost that cannot follow need not collide as well. */
+function freeToward(to, from) {
+  const shares = [...Array(FREE_STEPS + 1).keys()].map((k) => k / FREE_STEPS);
+  return shares.map((share) => to.map((value, j) => value + share * (from[j] - value))).find((q) => kernels.free(q)) ?? to;
 }
 
 function moveObstacle(k, shift, turn) {
