@@ -29,12 +29,12 @@ server.scene.add_spline_catmull_rom("/trail", tips, thickness=0.006, color=(31, 
 clock = server.gui.add_slider("time [s]", min=0.0, max=motion.duration, step=0.001, initial_value=0.0)
 
 
-@clock.on_update
 def show(_: object) -> None:
     """Draw the arm as it is at the time of the slider."""
     arm.display(robot.pinocchio_configuration(motion(clock.value).positions[None])[0])
 
 
+clock.on_update(show)
 while __name__ == "__main__":  # plays again and again, until Ctrl-C
     clock.value = time.monotonic() % motion.duration
     time.sleep(1 / 30)

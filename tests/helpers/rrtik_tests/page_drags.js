@@ -38,7 +38,7 @@ window.drags = (() => {
 
   /** The camera of the first view, or one that is given: the same pixel is the same place in each page. */
   function look(given) {
-    Object.assign(pane.style, { position: "fixed", inset: 0, zIndex: 1000 });
+    Object.assign(pane.parentElement.style, { position: "fixed", inset: 0, zIndex: 1000 });
     viewer.set_3d_pane_size();
     lookFrom(viewpoint);
     const { camera, controls } = viewer;

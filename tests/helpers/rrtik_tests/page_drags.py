@@ -95,7 +95,7 @@ class DragPage:
     def __init__(self, browser: Browser, beside: "DragPage | None" = None) -> None:
         self.browser = browser
         browser.ask(SCRIPT)
-        self.first = browser.ask(f"drags.begin({json.dumps(None if beside is None else beside.first)})")
+        self.first: dict[str, Any] = browser.ask(f"drags.begin({json.dumps(None if beside is None else beside.first)})")
         self.handles: bool = self.first["handles"]
 
     @property
