@@ -9,7 +9,7 @@ import pytest
 import rrtik_ompl as rrtik
 from rrtik_ompl.viewer.page import page
 from rrtik_tests.browser import Browser, planning_page
-from rrtik_tests.page_drags import DragPage
+from rrtik_tests.page_drags import IDLE, RESET, SPOTS, begin
 from rrtik_tests.programs import needs_chromium
 
 pytestmark = [pytest.mark.kernels, needs_chromium]
@@ -26,7 +26,6 @@ BESIDE_HAND = """(() => {
   return { text: label.textContent, inside: across && inner.top >= outer.top && inner.bottom <= outer.bottom };
 })()"""
 PLACES = 201
-SAYS = "drags.says()"
 
 
 @pytest.fixture(scope="module")
@@ -38,20 +37,21 @@ def problem() -> rrtik.Problem:
 def opened(tmp_path_factory: pytest.TempPathFactory, problem: rrtik.Problem) -> Iterator[Browser]:
     text = page(problem, rrtik.plan(problem, seed=1).path)
     with planning_page(text, tmp_path_factory.mktemp("words")) as browser:
-        DragPage(browser)
+        begin(browser)
         yield browser
 
 
 @pytest.fixture
 def browser(opened: Browser) -> Browser:
-    opened.ask("drags.reset()")
-    opened.ask(SAYS)
+    opened.ask(RESET)
+    opened.ask(IDLE)
     return opened
 
 
 def held_goal(browser: Browser, target: Callable[[list[float]], list[float]]) -> None:
     """Take hold of the goal, and move the pointer to where a function of its place says [px]."""
-    spot = browser.ask("drags.aim('goal', [0, 0], 1)")["press"]
+    spots = browser.ask(SPOTS % '"goal"')
+    spot = spots[len(spots) // 2]
     wanted = target(spot)
     halfway = [(a + b) / 2 for a, b in zip(spot, wanted, strict=True)]
     for kind, place in (("mousePressed", spot), ("mouseMoved", halfway), ("mouseMoved", wanted)):
@@ -60,12 +60,12 @@ def held_goal(browser: Browser, target: Callable[[list[float]], list[float]]) ->
 
 def let_go(browser: Browser) -> None:
     browser.call("Input.dispatchMouseEvent", type="mouseReleased", x=1, y=1, button="left", buttons=0, clickCount=1)
-    browser.ask(SAYS)
+    browser.ask(IDLE)
 
 
 def test_the_clearance_that_is_said_is_not_more_than_there_is(browser: Browser, problem: rrtik.Problem) -> None:
     browser.ask("state.goal = state.start.map((value) => value + 0.1); changed()")
-    said = browser.ask(SAYS)
+    said = browser.ask(IDLE)
     told = re.search(r"at least ([\d.]+) mm clear at each of 201 places", said["text"])
     assert told is not None, said["text"]
     rows = np.array(said["waypoints"])
@@ -77,7 +77,7 @@ def test_the_clearance_that_is_said_is_not_more_than_there_is(browser: Browser, 
 
 def test_a_lower_bound_below_nothing_is_not_called_a_clearance(browser: Browser) -> None:
     browser.ask("kernels.nearest = (q) => ({ metres: -0.002, pair: null }); changed()")
-    said = browser.ask(SAYS)["text"]
+    said = browser.ask(IDLE)["text"]
     browser.ask("delete kernels.nearest")
     assert "free but close: nearer than the covers can measure" in said
     assert "-" not in said
@@ -87,7 +87,7 @@ def test_a_path_of_the_page_is_not_called_proven_until_undo_gives_back_the_one_t
     browser.ask("shortening += 1; replacePath(given.waypoints)")
     assert browser.ask(LINES)["proof-note"] == {"text": "every move is proven free", "kind": "proven"}
     browser.ask("remember(); moveSelected(new THREE.Vector3(-0.05, 0.05, 0), 0)")
-    browser.ask(SAYS)
+    browser.ask(IDLE)
     own = browser.ask(LINES)["proof-note"]
     assert own["kind"] == "doubtful"
     assert "rrtik check problem.yaml path.json proves" in own["text"]
@@ -108,7 +108,7 @@ def test_what_keeps_a_ghost_back_stands_beside_the_hand_within_the_picture_and_i
 ) -> None:
     pane = browser.ask("(({ left, top }) => [left, top])(pane.getBoundingClientRect())")
     held_goal(browser, lambda spot: [pane[0] + 3.0, pane[1] + 3.0])
-    browser.ask(SAYS)
+    browser.ask(IDLE)
     beside = browser.ask(BESIDE_HAND)
     line = browser.ask(LINES)["plan-refusal"]
     let_go(browser)
@@ -124,7 +124,7 @@ def test_what_keeps_a_ghost_back_stands_beside_the_hand_within_the_picture_and_i
 def test_a_goal_in_an_obstacle_says_so_beside_the_hand_and_by_the_player(browser: Browser) -> None:
     browser.ask("state.obstacles[0].pose = rowsOf(poseOf('goal')); applyObstacle(0); changed()")
     held_goal(browser, lambda spot: [spot[0] + 6.0, spot[1]])
-    browser.ask(SAYS)
+    browser.ask(IDLE)
     lines = browser.ask(LINES)
     beside = browser.ask(BESIDE_HAND)
     let_go(browser)
@@ -136,7 +136,7 @@ def test_a_goal_in_an_obstacle_says_so_beside_the_hand_and_by_the_player(browser
 
 def test_a_turn_that_few_joints_cannot_keep_is_no_fault(browser: Browser) -> None:
     browser.ask("placeSelected(movedPose(poseOf('goal'), new THREE.Vector3(), 1.0, AXES[1]))")  # out of the plane
-    browser.ask(SAYS)
+    browser.ask(IDLE)
     line = browser.ask(LINES)["plan-refusal"]
     assert line["text"].startswith("goal: turned by")
     assert line["kind"] == "mild"

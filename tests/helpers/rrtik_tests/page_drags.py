@@ -26,6 +26,18 @@ LENGTHS = 0.02, 0.4  # of a drag, beside the size of what is shown
 PIXELS = 10.0, 120.0  # of a drag of a handle
 NEAR = 1e-3, np.deg2rad(0.1)  # so near, a tip is where the pointer has asked for it: [m], [rad]
 ENDS = "start", "goal"
+RESET = "drags.reset()"
+IDLE = "drags.says()"  # once the page has done what its state asks for
+# Places where a press takes hold of a thing itself; in any page.
+SPOTS = """(() => {
+  const r = pane.getBoundingClientRect();
+  const places = [];
+  for (let x = r.left + 4; x < r.right; x += 9) for (let y = r.top + 4; y < r.bottom; y += 9) {
+    pointerAt({ clientX: x, clientY: y });
+    if (hitThing()?.thing === %s && !hitHandle()) places.push([x, y]);
+  }
+  return places;
+})()"""
 GOOD = "proven", "word"
 NOT_THERE = "not in the picture"  # where a drag would begin or end
 
@@ -106,11 +118,11 @@ class DragPage:
 
     def reset(self) -> None:
         """Give the page its first state."""
-        self.browser.ask("drags.reset()")
+        self.browser.ask(RESET)
 
     def says(self) -> dict[str, Any]:
         """What the page says, once it has done what its state asks for."""
-        said: dict[str, Any] = self.browser.ask("drags.says()")
+        said: dict[str, Any] = self.browser.ask(IDLE)
         return said
 
     def says_in(self, other: dict[str, Any]) -> dict[str, Any]:
@@ -156,6 +168,11 @@ class DragPage:
         shift = [length * np.cos(wanted.angle), length * np.sin(wanted.angle)]
         thing = "" if by_handle else f"{json.dumps(wanted.thing)}, "
         return f"drags.{'aimHandle' if by_handle else 'aim'}({thing}{json.dumps(shift)}, {wanted.seed})"
+
+
+def begin(browser: Browser) -> DragPage:
+    """Prepare the page in a browser, which can plan."""
+    return DragPage(browser)
 
 
 def outcome(problem: rrtik.Problem, said: dict[str, Any], *, titled: bool = True) -> str:
