@@ -73,7 +73,11 @@ def first_picture(
         finer: How much finer it is drawn at first: 1 takes half of the time, and edges have steps.
     """
     width, height = (round(finer * side) for side in size)
-    away = UP if subject.robot is not None and subject.robot.planar else overview(groups_to_see(subject), subject.scene)
+    away = (
+        UP
+        if subject.robot is not None and subject.robot.planar
+        else overview(groups_to_see(subject), subject.scene, frame)
+    )
     T_camera_world, focal = _camera(frame, away, width, height)
 
     colors = _background(width, height)

@@ -67,7 +67,7 @@ def story_of(subject: Subject, frame: Frame, title: str, name: str = "") -> dict
         "run": None if subject.run is None or robot is None else run_story(subject.run, robot, subject.scene, frame),
         "fingers": None if subject.fingers is None else subject.fingers.story(),
         "frame": {"low": _numbers(frame.low), "high": _numbers(frame.high), "points": _numbers(frame.points)},
-        "overview": _numbers(overview(groups_to_see(subject), subject.scene)),
+        "overview": _numbers(overview(groups_to_see(subject), subject.scene, frame)),
         "planar": robot is not None and robot.planar,
         "grid": grid_cell(frame.size),
         "colors": _colors(),
@@ -226,14 +226,14 @@ def _contact(contact: PathContact, robot: Robot, scene: Scene) -> dict[str, Any]
 def groups_to_see(subject: Subject) -> list[Matrix]:
     """Return what the first view should not hide, arrays of shape (m, 3).
 
-    These are the positions of joints and tip at each waypoint, the tip at the end, and first and last places of what a
-    task moves.
+    These are the positions of joints and tip at each waypoint, the tip at the start and at the end, and first and last
+    places of what a task moves.
     """
     if subject.robot is None:
         return []
     frames = subject.robot.joint_frames(subject.waypoints)[:, 1:, :3, 3].reshape(-1, 3)
     tips = subject.robot.fk_batch(subject.waypoints)[:, :3, 3]
-    groups = [np.concatenate([frames, tips])]
+    groups = [np.concatenate([frames, tips]), tips[:1]]
 
     if subject.end is not None:
         groups.append(subject.robot.fk_batch(subject.end[None])[:, :3, 3])

@@ -131,11 +131,13 @@ def test_the_camera_takes_in_arm_and_obstacles_but_not_all_of_a_huge_floor() -> 
 
 def test_the_camera_looks_from_where_no_obstacle_stands_in_the_way() -> None:
     points = np.array([[0.0, 0.0, 0.5]])
-    free = overview([points], Scene())
+    frame = frame_around(np.array([[-0.5, -0.5, 0.0], [0.5, 0.5, 1.0]]), Scene())
+    free = overview([points], Scene(), frame)
     wall = Obstacle("wall", Box([0.1, 4.0, 4.0]), pose([0.5 * np.sign(free[0]), 0.0, 0.5]))
-    around = overview([points], Scene((wall,)))
-    assert behind(points, free, wall).all()
-    assert not behind(points, around, wall).any()
+    around = overview([points], Scene((wall,)), frame)
+    assert behind(points, 3.0 * free, wall).all()
+    assert not behind(points, 3.0 * around, wall).any()
+    assert not behind(points, 0.4 * free, wall).any()  # the eye is on this side of the wall
     assert around[2] > 0.0
 
 

@@ -7,6 +7,7 @@ function sayOpinion(text, verdict = "") {
   line.hidden = text === "";
   line.textContent = text;
   line.className = `control ${verdict}`;
+  if (text) sayProof({ text, proven: verdict === "proven" });  // over the picture, too
 }
 
 /** Ask about the path that is shown, once nothing has changed for a while. */

@@ -26,6 +26,7 @@ DIRECTIONS = np.array([[x, y, z] for x in (-1, 0, 1) for y in (-1, 0, 1) for z i
 DEFAULT_AZIMUTH = np.deg2rad(-50.0)  # the viewer stands in front of the arm (x), on its right
 ELEVATIONS = np.deg2rad([27.0, 42.0])
 TURNS = np.deg2rad([0, 30, -30, 60, -60, 90, -90, 120, -120, 150, -150, 180])  # tried in this order
+EYE_DISTANCE = 1.8  # of the camera from what it shows, in sizes of that, at the angle of view of the page
 # A turn by 90 degrees from the default azimuth must reduce the share of hidden points by this much.
 TURN_COST = 0.04
 
@@ -112,7 +113,7 @@ def obstacle_corners(obstacle: Obstacle) -> Matrix:
     return placed
 
 
-def overview(groups: Sequence[Matrix], scene: Scene) -> Vector:
+def overview(groups: Sequence[Matrix], scene: Scene, frame: Frame) -> Vector:
     """Return the best first viewpoint: a unit vector from the scene towards the viewer, shape (3,).
 
     Several directions are compared by the share of points that obstacles hide, plus a cost for turning away from the
@@ -121,6 +122,7 @@ def overview(groups: Sequence[Matrix], scene: Scene) -> Vector:
     Args:
         groups: Points that should be visible, arrays of shape (m, 3) [m].
         scene: Each obstacle hides what lies behind the box around it.
+        frame: What the camera shows: it stands about `EYE_DISTANCE` sizes of that away.
     """
     obstacles = [o for o in scene.obstacles if o.shape.bounded]
     points = np.concatenate([np.empty((0, 3)), *groups])
@@ -131,9 +133,10 @@ def overview(groups: Sequence[Matrix], scene: Scene) -> Vector:
     for elevation in ELEVATIONS:
         for turn in TURNS:
             away = direction(float(turn), float(elevation))
+            eye = frame.centre + EYE_DISTANCE * frame.size * away
             hidden = np.zeros(len(points), dtype=bool)
             for obstacle in obstacles:
-                hidden |= behind(points, away, obstacle)
+                hidden |= behind(points, eye, obstacle)
 
             extra = TURN_COST * (abs(turn) / (0.5 * np.pi) + (elevation > ELEVATIONS[0]))
             cost = float(weights @ hidden) / max(len(groups), 1) + float(extra)
@@ -151,19 +154,19 @@ def direction(turn: float, elevation: float) -> Vector:
     return np.array([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)])
 
 
-def behind(points: Matrix, away: Vector, obstacle: Obstacle) -> Mask:
-    """Check which points, shape (m, 3), are hidden from a distant viewer by the box around an obstacle, shape (m,)."""
+def behind(points: Matrix, eye: Vector, obstacle: Obstacle) -> Mask:
+    """Check which points, shape (m, 3), are hidden from an eye by the box around an obstacle, shape (m,)."""
     corners = look_of_shape(obstacle.shape).corners
     rotation = obstacle.pose.rotation.T
     local = (points - obstacle.pose.translation) @ rotation.T
 
-    # Slab method: a ray is inside the box where it is inside all three pairs of planes.
-    ray = rotation @ away
+    # Slab method: the way from a point (0) to the eye (1) is in the box where it is inside all three pairs of planes.
+    ray = (eye - obstacle.pose.translation) @ rotation.T - local
     ray = np.where(np.abs(ray) < 1e-12, 1e-12, ray)
     to_low = (corners.min(axis=0) - local) / ray
     to_high = (corners.max(axis=0) - local) / ray
     enter = np.minimum(to_low, to_high).max(axis=1)
     leave = np.maximum(to_low, to_high).min(axis=1)
 
-    hit: Mask = (leave >= enter) & (leave > 1e-9)
+    hit: Mask = (leave >= enter) & (leave > 1e-9) & (enter < 1.0)
     return hit
