@@ -631,7 +631,7 @@ def _notes_of(done: Done) -> tuple[str, ...]:
         notes += [f"{branch.step} stands on a contact: {each}" for each in stood_on.get(id(branch), ())]
         if branch.before is not None and branch.step is not None and isinstance(branch.step.stage, Attach):
             stage = branch.step.stage
-            distance = _far_gap(branch.before.after.world, branch.q, stage.object, stage.link)
+            distance = _far_gap(branch.before.after.bare, branch.q, stage.object, stage.link)
             if distance > FAR:
                 text = f"'{stage.object}' is {1e3 * distance:.0f} mm away from '{stage.link}' when it is attached"
                 notes.append(f"{branch.step}: {text}")

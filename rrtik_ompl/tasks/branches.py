@@ -216,7 +216,7 @@ class Expander:
             reason: Reason = str(error)
 
         if choices is None or not len(choices.rows):
-            arriving = branch.after.arriving(may_touch(branch.after.world, branch.rest[1:]))
+            arriving = branch.after.arriving(may_touch(branch.after.bare, branch.rest[1:]))
             if arriving is not branch.after:
                 choices = self._choices(branch, arriving, stage)
         if choices is None:
@@ -256,16 +256,20 @@ class Expander:
     def _branches_of_choices(self, choices: Choices, rows: Matrix) -> Iterator[Branch]:
         """Yield a branch for each of some configurations of a goal, shape (k, dof)."""
         branch = choices.branch
-        for q in rows:
+        ways = weighted_difference(branch.setting.robot, rows.reshape(-1, len(branch.q)), branch.q)
+        for q, length in zip(rows, np.linalg.norm(ways, axis=1).tolist(), strict=True):
             arriving = self._arriving(branch, q) if choices.arrives or branch.after.scene.contacts else ()
             setting = branch.after.arriving(arriving)
-            lasting = tuple(each for each in branch.after.scene.contacts if not parted(setting.world, q, each))
+            lasting = tuple(each for each in branch.after.scene.contacts if not parted(setting.bare, q, each))
             setting_left = setting.with_contacts_only(lasting)
-            yield _following_branch(branch, branch.rest[0], setting, q, setting_left=setting_left, arriving=arriving)
+            step = branch.rest[0]
+            yield _following_branch(
+                branch, step, setting, q, length=length, setting_left=setting_left, arriving=arriving
+            )
 
     def _arriving(self, branch: Branch, q: Vector) -> tuple[Touching, ...]:
         """Return the contacts of things that are taken or set down at the end of a motion to q, shape (dof,)."""
-        return arrival(branch.after.world, branch.rest[1:], q).contacts
+        return arrival(branch.after.bare, branch.rest[1:], q).contacts
 
     def _after_line(self, branch: Branch, step: Step, stage: Straight) -> Iterator[Branch]:
         """Yield the branch at the end of a straight line of the tip; if it is not reached, the reason is noted."""
@@ -346,9 +350,7 @@ class Expander:
 def _without_parted(setting: Setting, q: Vector) -> Setting:
     """Return a setting without the contacts of things that are apart at q, shape (dof,), as fingers have let go."""
     lasting = tuple(
-        each
-        for each in setting.scene.contacts
-        if each.pair in setting.grasp_pairs or not parted(setting.world, q, each)
+        each for each in setting.scene.contacts if each.pair in setting.grasp_pairs or not parted(setting.bare, q, each)
     )
     return setting.with_contacts_only(lasting)
 
@@ -392,18 +394,17 @@ def _following_branch(
     q: Vector,
     path: JointPath | None = None,
     *,
+    length: float = 0.0,
     setting_left: Setting | None = None,
     arriving: tuple[Touching, ...] = (),
     contacts: tuple[MotionContact, ...] = (),
 ) -> Branch:
     """Return the branch that continues another one by a step.
 
-    It takes over the rest of the steps, the choices and the effort, and adds the length of the path (or of the
-    straight motion to ``q``) to the cost.
+    It takes over the rest of the steps, the choices and the effort, and adds the weighted length of the path, or that
+    of the straight motion to ``q`` if the path has yet to be planned, to the cost.
     """
-    cost = branch.cost
-    if path is not None or q is not branch.q:
-        cost += weighted_length(setting.robot, np.array([branch.q, q]) if path is None else path.waypoints)
+    cost = branch.cost + (length if path is None else weighted_length(setting.robot, path.waypoints))
 
     return Branch(
         setting,

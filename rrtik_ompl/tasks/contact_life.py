@@ -19,6 +19,7 @@ import numpy as np
 import pinocchio as pin
 
 from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.base.copies import changed
 from rrtik_ompl.geometry.collision.bodies import DISTANCE_TOLERANCE, Body, deepest_contact, usually_apart
 from rrtik_ompl.geometry.collision.body_arrays import body_arrays
 from rrtik_ompl.geometry.collision.distances import signed_gap
@@ -122,7 +123,7 @@ def with_contacts(scene: Scene, contacts: Iterable[Touching]) -> Scene:
     """Return a scene with further contacts; of several contacts of one pair the last new one counts."""
     contact_of_pair = {contact.pair: contact for contact in contacts}
     unchanged = tuple(old for old in scene.contacts if old.pair not in contact_of_pair)
-    return replace(scene, contacts=(*unchanged, *contact_of_pair.values()))
+    return changed(scene, contacts=(*unchanged, *contact_of_pair.values()))
 
 
 def touching_at(world: World, q: Vector, name: str) -> list[Nearness]:
@@ -299,7 +300,7 @@ def world_from(world: World, contacts: Iterable[MotionContact], number: int, wor
     stood_on = tuple(contacts)
     known_pairs = {each.touching.pair for each in stood_on}
     others = tuple(contact for contact in world.scene.contacts if contact.pair not in known_pairs)
-    scene = replace(world.scene, contacts=(*others, *contacts_from(stood_on, number)))
+    scene = changed(world.scene, contacts=(*others, *contacts_from(stood_on, number)))
     if worlds is None:
         return form_of(world, scene=scene)
     return form_of(worlds.of(world.robot, scene), constraints=world.settings.constraints)

@@ -60,7 +60,7 @@ def finger_motion(before: Setting, after: Setting, q: Vector, things_taken: Sequ
         things_taken: Names of things that are attached before the arm moves on: fingers may press on these.
     """
     bodies_before = before.world.bodies
-    bodies_after = after.world.bodies
+    bodies_after = after.bare.bodies
     both = zip(bodies_before, bodies_after, strict=True)
     moving = {k for k, (a, b) in enumerate(both) if a.joint > 0 and not _same_pose(a.placement, b.placement)}
     if not moving:
@@ -101,7 +101,7 @@ def _pressed_in(before: Setting, after: Setting, q: Vector, moving: set[int], th
         things_taken: Names of things that are attached next.
     """
     bodies_before = before.world.bodies
-    bodies_after = after.world.bodies
+    bodies_after = after.bare.bodies
     names_held = {item.name for item in after.scene.attached} | set(things_taken)
     numbers_held = [k for k in range(len(bodies_after)) if bodies_after[k].name in names_held and k not in moving]
     frames = after.robot.joint_frames(q[None])[0]

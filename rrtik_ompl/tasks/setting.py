@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
@@ -12,6 +11,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from rrtik_ompl.base.arrays import Vector
+from rrtik_ompl.base.copies import changed
 from rrtik_ompl.base.errors import InputError, listed
 from rrtik_ompl.base.kept import kept_with
 from rrtik_ompl.description.catalog import robot_from_entry
@@ -68,6 +68,14 @@ class Setting:
         """Return the world of the robot in the scene, with the other settings of the first world of the task."""
         return self.worlds.of(self.robot, self.scene)
 
+    @cached_property
+    def bare(self) -> World:
+        """Return the world without contacts, to ask where bodies are: those of the world are in the same places.
+
+        Most settings are asked for no more, and worlds with contacts take time to make.
+        """
+        return self.worlds.bare(self.robot, self.scene) if self.scene.contacts else self.world
+
     def with_contacts(self, contacts: Iterable[Touching]) -> Setting:
         """Return the same setting with further contacts; a new contact replaces an old one of the same pair."""
         new = tuple(contacts)
@@ -84,7 +92,7 @@ class Setting:
 
     def with_contacts_only(self, contacts: tuple[Touching, ...]) -> Setting:
         """Return the same setting with exactly these contacts."""
-        return self if contacts == self.scene.contacts else self.with_scene(replace(self.scene, contacts=contacts))
+        return self if contacts == self.scene.contacts else self.with_scene(changed(self.scene, contacts=contacts))
 
     def after(self, stage: Attach | Detach | Gripper, q: Vector) -> Setting:
         """Return the setting after a stage that the arm does at a configuration.
@@ -112,9 +120,9 @@ class Setting:
         grasp_pairs = self.grasp_pairs | {frozenset((stage.object, other)) for other in others}
         setting = Setting(self.worlds, self.robot, scene, grasp_pairs)
 
-        bodies = setting.world.bodies
+        bodies = setting.bare.bodies
         contacts = {frozenset((stage.object, other)): allowed(bodies, stage.object, other) for other in sorted(others)}
-        touching = touching_at(setting.world, q, stage.object)
+        touching = touching_at(setting.bare, q, stage.object)
         contacts |= {
             each.pair: each.going_on()
             for each in touching
@@ -125,7 +133,7 @@ class Setting:
     def _detached(self, stage: Detach, q: Vector) -> Setting:
         """Return the setting after an object is detached, with contacts for what it touches."""
         obstacle_names = frozenset(self.scene.names)
-        for near in touching_at(self.world, q, stage.object):
+        for near in touching_at(self.bare, q, stage.object):
             if near.second in obstacle_names and near.too_deep:
                 raise InputError(left_inside(near))
 
@@ -133,7 +141,7 @@ class Setting:
         pose = _settled(self.robot.fk(q, attached.link) * attached.pose)
         grasp_pairs = frozenset(pair for pair in self.grasp_pairs if stage.object not in pair)
         setting = Setting(self.worlds, self.robot, self.scene.detaching(stage.object, pose), grasp_pairs)
-        touching = touching_at(setting.world, q, stage.object)
+        touching = touching_at(setting.bare, q, stage.object)
         return setting.with_contacts(each.going_on() for each in touching if each.distance >= -EXTRA_DEPTH)
 
 

@@ -59,6 +59,14 @@ class Worlds:
 
     def of(self, robot: Robot, scene: Scene) -> World:
         """Return the world of a robot in a scene."""
+        return self._known(robot, scene).with_contacts(scene.contacts)
+
+    def bare(self, robot: Robot, scene: Scene) -> World:
+        """Return the world of a robot in a scene without its contacts."""
+        return self._known(robot, scene).world
+
+    def _known(self, robot: Robot, scene: Scene) -> Known:
+        """Return the world without contacts; it is made, or taken over, if there is none yet."""
         kind = _kind(robot, scene)
         places = _places(scene)
         if (kind, places) not in self._made:
@@ -67,7 +75,7 @@ class Worlds:
             if known is None:
                 known = Known(kind, form_of(self._first, robot=robot, scene=scene if not scene.contacts else bare))
             self._made[kind, places] = known
-        return self._made[kind, places].with_contacts(scene.contacts)
+        return self._made[kind, places]
 
     def left(self) -> list[Known]:
         """Return what the next task may take over, the latest last: not the world that somebody has given."""

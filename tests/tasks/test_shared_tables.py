@@ -9,6 +9,7 @@ import rrtik_ompl as rrtik
 from rrtik_ompl.ik import goal_configurations
 from rrtik_ompl.kernels import FastWorld
 from rrtik_ompl.kernels.tables import packing
+from rrtik_ompl.tasks.setting import Setting
 from rrtik_ompl.world import proof
 
 pytestmark = pytest.mark.kernels
@@ -103,3 +104,18 @@ def test_a_world_in_contact_stays_as_it_is_where_the_one_without_contacts_is_mov
     assert not aside.prover.route(path.waypoints).proven  # the cup is on the table
     assert not blocked.prover.route(path.waypoints).proven
     assert world.prover.route(path.waypoints).proven
+
+
+def test_where_bodies_are_is_asked_of_the_world_without_contacts(resting):
+    world, _ = resting
+    setting = Setting.of(world)
+    assert setting.world is world
+    bare = setting.bare
+    assert bare.scene.contacts == ()
+    assert bare.scene.obstacles == world.scene.obstacles
+    assert bare.pairs == world.pairs
+    for body, other in zip(world.bodies, bare.bodies, strict=True):
+        assert (body.name, body.joint, body.placement) == (other.name, other.joint, other.placement)
+        assert body.geometry is other.geometry
+        assert not other.contacts
+    assert setting.with_contacts_only(()).bare is bare
