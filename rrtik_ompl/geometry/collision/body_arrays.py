@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from weakref import WeakValueDictionary
@@ -52,8 +52,8 @@ class BodyArrays:
         margin = self.margins[np.where(self.obstacles[second], second, first)]
         separation: Vector = np.where(both_stand, 0.0, margin + self.paddings[first] + self.paddings[second])
 
-        for row in np.flatnonzero(self.in_contact(pairs)):
-            separation[row] = min(separation[row], self.contacts[_ordered(pairs[row])])
+        for rows, distance in self._contacts_among(pairs):
+            separation[rows] = np.minimum(separation[rows], distance)
         return separation
 
     def least_gaps(self, pairs: NDArray[np.int64], frames: NDArray[np.float64]) -> Vector:
@@ -79,15 +79,19 @@ class BodyArrays:
 
     def in_contact(self, pairs: NDArray[np.int64]) -> Mask:
         """Return a mask, shape (k,), of the pairs, shape (k, 2), whose bodies are in contact."""
-        in_contact: Mask = np.asarray(self.touching[pairs].all(axis=1))
-        for row in np.flatnonzero(in_contact):
-            in_contact[row] = _ordered(pairs[row]) in self.contacts
+        in_contact: Mask = np.zeros(len(pairs), dtype=bool)
+        for rows, _ in self._contacts_among(pairs):
+            in_contact[rows] = True
         return in_contact
 
-
-def _ordered(pair: NDArray[np.int64]) -> tuple[int, int]:
-    first, second = pair.tolist()
-    return min(first, second), max(first, second)
+    def _contacts_among(self, pairs: NDArray[np.int64]) -> Iterator[tuple[NDArray[np.int64], float]]:
+        """Yield the rows of pairs, shape (k, 2), that are of each contact, and its least allowed distance [m]."""
+        touching = np.flatnonzero(self.touching[pairs].all(axis=1))
+        if not len(touching):
+            return
+        first, second = pairs[touching].T
+        for (i, j), distance in self.contacts.items():
+            yield touching[((first == i) & (second == j)) | ((first == j) & (second == i))], distance
 
 
 def _contacts(bodies: Sequence[Body]) -> dict[tuple[int, int], float]:

@@ -126,13 +126,13 @@ class ProofPairs:
             same_thread: Whether it is for the thread of this table alone. Both then compute in the same place what no
                 proof finds there from an earlier one; stamps tell each whether it has made a frame or a chord itself.
         """
-        computed = REMEMBERED if same_thread else COMPUTED
-        own = {name: np.zeros_like(getattr(self.table, name)) for name in computed}
+        copied: list[str] = []
         if self.clouds:  # points that are compared stand among the solids
-            own |= {name: getattr(self.table, name) for name in ("solids", "corners")}
+            copied += ["solids", "corners"]
         if placing:
-            own |= {name: getattr(self.table, name) for name in PLACED}
-        table = with_own_arrays(self.table, **own)
+            copied += PLACED
+        blank = REMEMBERED if same_thread else COMPUTED
+        table = with_own_arrays(self.table, blank, **{name: getattr(self.table, name) for name in copied})
         table.log_room = 0  # which the thread of this one may just have given to a log of its own
         return replace(self, table=table, margins=self.margins.copy(), kept=(float("nan"), ROOM))
 

@@ -12,7 +12,7 @@ were. Tests check it after each kernel.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any, TypeAlias, TypeVar
@@ -38,14 +38,18 @@ def aligned(array: NDArray[Any]) -> NDArray[Any]:
     return _placed(array)[0]
 
 
-def _placed(array: NDArray[Any]) -> tuple[NDArray[Any], int]:
-    """What :func:`aligned` makes, and its address, which numpy takes long to give."""
-    memory = np.empty(array.nbytes + 3 * ALIGNMENT, dtype=np.uint8)
+def _placed(array: NDArray[Any], *, blank: bool = False) -> tuple[NDArray[Any], int]:
+    """What :func:`aligned` makes, and its address, which numpy takes long to give; ``blank``: zeros in its place.
+
+    The system gives zeros when a page is first used, so that large ones that are hardly used cost nothing.
+    """
+    memory = (np.zeros if blank else np.empty)(array.nbytes + 3 * ALIGNMENT, dtype=np.uint8)
     begin = int(memory.ctypes.data)
     start = ALIGNMENT + -begin % ALIGNMENT
     memory[:start] = memory[start + array.nbytes :] = GUARD
     copy: NDArray[Any] = np.ndarray(array.size, array.dtype, memory, start)
-    copy[:] = array.ravel()
+    if not blank:
+        copy[:] = array.ravel()
 
     return copy, begin + start
 
@@ -150,9 +154,13 @@ def sizes_of(kind: type[Record], **fields: float) -> TablePlan:
     return TablePlan({kind.places[name]: int(fields[name]) for name in arrays}, numbers)
 
 
-def with_own_arrays(shared: R, **own: NDArray[Any]) -> R:
-    """A table of the same fields for another thread: its arrays and tables are shared, but for copies of ``own``."""
-    placed = {shared.places[name]: _placed(array) for name, array in own.items()}
+def with_own_arrays(shared: R, blank: Iterable[str] = (), **own: NDArray[Any]) -> R:
+    """A table of the same fields for another thread: its arrays and tables are shared, but for copies of ``own``.
+
+    Of the arrays named in ``blank`` it has its own, too, in which there are zeros.
+    """
+    placed = {shared.places[name]: _placed(getattr(shared, name), blank=True) for name in blank}
+    placed |= {shared.places[name]: _placed(array) for name, array in own.items()}
     header = aligned(shared.memory.header)
     for place, (_, address) in placed.items():
         header[place] = address
