@@ -57,6 +57,8 @@ class Kind:
 
 
 # The first row whose words a file says is its kind: a problem with a section "run" is a scenario.
+PLY_FACES = "element face"
+PLY_HEAD = 4096  # [bytes]
 KINDS = MappingProxyType(
     {
         "Certificate": Kind(
@@ -176,6 +178,7 @@ KINDS = MappingProxyType(
             "a mesh",
             "model.shapes:Mesh",
             "description.shapes.mesh:read_mesh",
+            words=(PLY_FACES,),
             endings=(".stl", ".obj", ".dae", ".glb", ".gltf"),
             also=("Scene",),
         ),
@@ -308,6 +311,11 @@ def _words(path: Path, ending: str) -> Mapping[str, object]:
         return {"points" if first.startswith("time,") else "waypoints": None}
     if ending == ".npz":
         return dict.fromkeys(NamedArrays(path).names)
+    if ending == ".ply":
+        from rrtik_ompl.files.point_files import is_ply_mesh  # few files need it
+
+        with open(path, "rb") as stream:
+            return {PLY_FACES: None} if is_ply_mesh(stream.read(PLY_HEAD)) else {}
     if ending == ".json":
         document = _json(path)
     elif ending in (".yaml", ".yml"):

@@ -42,7 +42,9 @@ def claimed(text: str, what: str) -> int:
     return int(text)
 
 
-def records(data: bytes, offset: int, kind: np.dtype[Any], count: int, what: str) -> NDArray[Any]:
+def records(
+    data: bytes, offset: int, kind: np.dtype[Any], count: int, what: str, things: str = "points"
+) -> NDArray[Any]:
     """Return ``count`` records of a file from a byte offset on, shape (count,), without copying.
 
     Raises:
@@ -50,7 +52,7 @@ def records(data: bytes, offset: int, kind: np.dtype[Any], count: int, what: str
     """
     most = max(0, len(data) - offset) // max(1, kind.itemsize)
     if count > most:
-        raise InputError(f"{what}: its header claims {count} points, but the file has room for {most}; save it again")
+        raise InputError(f"{what}: its header claims {count} {things}, but the file has room for {most}; save it again")
     return np.frombuffer(data, dtype=kind, count=count, offset=offset)
 
 
@@ -152,16 +154,7 @@ def ply_points(data: bytes, what: str) -> NDArray[Any]:
     Raises:
         InputError: If it is not a PLY file, or has no points.
     """
-    head, found, _ = data.partition(PLY_END)
-    if not data.startswith(b"ply") or not found:
-        raise InputError(f"{what}: not a PLY file: no header from 'ply' to 'end_header'; export it again")
-
-    begin = data.find(b"\n", len(head)) + 1
-    lines = [line.split() for line in head.decode("ascii", "replace").splitlines()]
-    order = next((line[1] for line in lines if line[0:1] == ["format"] and len(line) > 1), "")
-    if order not in PLY_ORDERS:
-        raise InputError(f"{what}: format '{order}' of a PLY file is unknown; have {', '.join(PLY_ORDERS)}")
-
+    lines, order, begin = _ply_head(data, what)
     fields, claim, before = _vertex(lines, what)
     names = [line[2] for line in fields]
     count = claimed(claim, what)
@@ -185,6 +178,24 @@ def ply_points(data: bytes, what: str) -> NDArray[Any]:
     return coordinates(records(data, begin, np.dtype(kinds), count, what))
 
 
+def _ply_head(data: bytes, what: str) -> tuple[list[list[str]], str, int]:
+    """Return the words of each line of the header of a PLY file, its format, and where its body begins [bytes].
+
+    Raises:
+        InputError: If it is not a PLY file, or of an unknown format.
+    """
+    head, found, _ = data.partition(PLY_END)
+    if not data.startswith(b"ply") or not found:
+        raise InputError(f"{what}: not a PLY file: no header from 'ply' to 'end_header'; export it again")
+
+    begin = data.find(b"\n", len(head)) + 1
+    lines = [line.split() for line in head.decode("ascii", "replace").splitlines()]
+    order = next((line[1] for line in lines if line[0:1] == ["format"] and len(line) > 1), "")
+    if order not in PLY_ORDERS:
+        raise InputError(f"{what}: format '{order}' of a PLY file is unknown; have {', '.join(PLY_ORDERS)}")
+    return lines, order, begin
+
+
 def _vertex(lines: list[list[str]], what: str) -> tuple[list[list[str]], str, list[tuple[int, list[list[str]]]]]:
     """Parse the element ``vertex`` of the header of a PLY file.
 
@@ -196,11 +207,7 @@ def _vertex(lines: list[list[str]], what: str) -> tuple[list[list[str]], str, li
         The properties, each as the words "property", type and name; the number of points as text; the elements that
         stand before them, each as its number and its properties.
     """
-    elements = [k for k, line in enumerate(lines) if line[0:1] == ["element"] and len(line) == 3]
-    parts = [
-        (lines[k], [line for line in lines[k + 1 : end] if line[0:1] == ["property"]])
-        for k, end in zip(elements, [*elements[1:], len(lines)], strict=True)
-    ]
+    parts = _elements(lines)
     names = [head[1] for head, _ in parts]
     if "vertex" not in names:
         raise InputError(f"{what}: a PLY file of points needs an element 'vertex'; it has {', '.join(names) or 'none'}")
@@ -215,6 +222,76 @@ def _vertex(lines: list[list[str]], what: str) -> tuple[list[list[str]], str, li
     if missing := [axis for axis in AXES if names.count(axis) != 1]:
         raise InputError(f"{what}: 'vertex' needs one property '{missing[0]}'; it has {', '.join(names) or 'none'}")
     return fields, head[2], before
+
+
+def _elements(lines: list[list[str]]) -> list[tuple[list[str], list[list[str]]]]:
+    """Return the elements that the header of a PLY file states: the words of each, and those of its properties."""
+    elements = [k for k, line in enumerate(lines) if line[0:1] == ["element"] and len(line) == 3]
+    return [
+        (lines[k], [line for line in lines[k + 1 : end] if line[0:1] == ["property"]])
+        for k, end in zip(elements, [*elements[1:], len(lines)], strict=True)
+    ]
+
+
+def ply_mesh(data: bytes, what: str) -> tuple[NDArray[Any], list[NDArray[Any]]]:
+    """Read the vertices, shape (n, 3), and the vertex numbers of each face of a PLY file of bytes.
+
+    Raises:
+        InputError: If it is not such a file, is cut off, or has no vertices.
+    """
+    lines, order, place = _ply_head(data, what)
+    parts = _elements(lines)
+    kinds = {word for _, own in parts for line in own for word in line[1:-1] if word != "list"}
+    if order == "ascii" or not kinds <= PLY_TYPES.keys():
+        raise InputError(f"{what}: not a PLY file of bytes, or with a property of an unknown type; export it again")
+
+    _vertex(lines, what)
+    points = np.empty((0, 3))
+    polygons: list[NDArray[Any]] = []
+    for (_, name, claim), own in parts:
+        number = claimed(claim, what)
+        if any(line[1] == "list" for line in own):
+            rows, place = _list_rows(data, place, own, PLY_ORDERS[order], number, what)
+            polygons += rows if name == "face" else []
+            continue
+
+        kind = np.dtype([(line[-1], PLY_ORDERS[order] + PLY_TYPES[line[1]]) for line in own])
+        found = records(data, place, kind, number, what)
+        place += number * kind.itemsize
+        if name == "vertex":
+            points = coordinates(found)
+    return points, polygons
+
+
+def _list_rows(
+    data: bytes, place: int, properties: list[list[str]], order: str, number: int, what: str
+) -> tuple[list[NDArray[Any]], int]:
+    """Return the first list of each row of an element of a PLY file, and where the element ends [bytes].
+
+    Args:
+        data: The file.
+        place: Where the element begins [bytes].
+        properties: The words of each of its properties.
+        order: Its order of bytes, as numpy writes it.
+        number: Its rows.
+        what: Name of the file, for messages.
+    """
+    rows = []
+    for _ in range(number):
+        lists = []
+        for line in properties:
+            kind = np.dtype(order + PLY_TYPES[line[-2]])
+            count = 1
+            if line[1] == "list":
+                length = np.dtype(order + PLY_TYPES[line[2]])
+                count = int(records(data, place, length, 1, what, "lists")[0])
+                place += length.itemsize
+                lists.append(records(data, place, kind, max(count, 0), what, "numbers"))
+            place += count * kind.itemsize
+        if place > len(data):
+            raise InputError(f"{what}: it is cut off; save it again")
+        rows.append(lists[0])
+    return rows, place
 
 
 def pcd_points(data: bytes, what: str) -> NDArray[Any]:

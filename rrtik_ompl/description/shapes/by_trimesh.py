@@ -29,9 +29,13 @@ def meshes_in(path: Path) -> list[Trimesh]:
         with interruptible():
             import trimesh
 
-            return list(trimesh.load_scene(str(path), process=False).dump())
+            found = trimesh.load_scene(str(path), process=False).dump()
+            return [each for each in found if isinstance(each, trimesh.Trimesh)]  # others are lines or points
     except Exception as error:  # whatever it meets with in a damaged file
-        raise InputError(f"{path}: trimesh cannot read it") from error
+        kind = path.suffix.lower().removeprefix(".").upper()
+        raise InputError(
+            f"{path}: not a usable mesh: it is damaged, cut off, or no {kind} file that trimesh reads; export it again"
+        ) from error
 
 
 def triangles_of(mesh: Trimesh) -> Triangles:

@@ -22,10 +22,12 @@ from rrtik_ompl.base.errors import EmptyMeshError, InputError, MeshWarning
 from rrtik_ompl.description.package_path import MESH_SUFFIXES
 from rrtik_ompl.description.shapes.by_trimesh import joined, meshes_in, triangles_of
 from rrtik_ompl.files.notice import tell_once
+from rrtik_ompl.files.point_files import ply_mesh
 from rrtik_ompl.files.text import file_name, read_bytes
 from rrtik_ompl.geometry.collision.solids import bvh, mesh_arrays
 from rrtik_ompl.model.shapes import Mesh
 from rrtik_ompl.model.shapes.mesh import open_edges_told
+from rrtik_ompl.model.shapes.surfaces import Triangles
 
 MAX_BYTES = 256 * 1024 * 1024
 LONG_BYTES = 20e6  # size of a file above which the user is told to wait
@@ -36,10 +38,11 @@ _WHERE = ("From file:", "in function:", "at line:", "Could not load resource", "
 _BINARY_TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("rest", "<u2")])
 _CORNER = re.compile(rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)", re.IGNORECASE)
 _VERTEX = re.compile(rb"^([ \t]*v[ \t]+)(\S+)[ \t]+(\S+)[ \t]+(\S+)", re.MULTILINE)
-_OF_SEVERAL = (".obj", ".dae", ".glb", ".gltf")  # kinds of files that may hold several parts
+_BY_TRIMESH = (".ply", ".glb", ".gltf")  # assimp reads beyond the end of a PLY that is cut off
+_OF_SEVERAL = (".obj", ".dae")  # kinds of files that may hold several parts
+_TEXT = re.compile(rb"ply\s+format ascii\b")
+_FACES = re.compile(rb"ply\b(?:(?!\nend_header\b)[\s\S])*?\nelement face (\d+)")
 _PART = re.compile(rb"^[ \t]*(usemtl|mtllib|g|o)\b.*$", re.MULTILINE)
-# Begins a PLY that assimp does not read.
-_FACES_FIRST = re.compile(rb"ply\b(?:(?!\nelement vertex\b|\nend_header\b)[\s\S])*?\nelement face\b")
 # Matches in a DAE what is no number in a list of whole numbers; assimp reads it for ever, until the memory is full.
 _NO_INDEX = re.compile(rb"<(?:p|h|v|vcount)(?:\s[^>]*)?>[\s0-9-]*[^\s0-9<-]")
 # Matches nan, inf, and numbers that overflow float32 (in which assimp reads), in a text file.
@@ -123,7 +126,7 @@ def load_surface(path: Path, scale: Vector) -> coal.BVHModelBase:
         raise InputError(f"{path}: not a usable mesh: a list of indices holds what is no number; export it again")
 
     scale = scale * stated_unit(path, data)
-    surface = _by_trimesh(path, scale) if kind == ".ply" and _FACES_FIRST.match(data) else _by_assimp(path, scale)
+    surface = _by_trimesh(path, scale) if kind in _BY_TRIMESH else _by_assimp(path, scale)
     if kind in _OF_SEVERAL and _unused(surface):
         surface = _of_one_part(data, scale) if kind == ".obj" else _by_trimesh(path, scale)
     size = np.abs(bounded_array(surface.vertices(), (None, 3), f"{path}: vertices")).max(axis=0) / np.abs(scale)
@@ -162,8 +165,29 @@ def _of_one_part(data: bytes, scale: Vector) -> coal.BVHModelBase:
 
 
 def _by_trimesh(path: Path, scale: Vector) -> coal.BVHModelBase:
-    """Read a PLY whose faces stand before its vertices, or a file of several parts."""
-    return bvh(*joined([triangles_of(mesh) for mesh in meshes_in(path)], scale))
+    """Read a PLY, or a file of several parts."""
+    data = read_bytes(path, MAX_BYTES)
+    if path.suffix.lower() == ".ply" and not _TEXT.match(data):
+        pieces = [_of_ply(data, path)]
+    else:
+        pieces = [triangles_of(mesh) for mesh in meshes_in(path)]
+    if not any(len(piece.faces) for piece in pieces):
+        raise EmptyMeshError(f"{path}: not a usable mesh: no triangles in it; {AGAIN}")
+
+    vertices, faces = joined(pieces, scale)
+    stated = _FACES.match(data)
+    if stated and len(faces) < int(stated[1]):
+        raise InputError(f"{path}: not a usable mesh: {len(faces)} of {int(stated[1])} faces are there; is it cut off?")
+    if faces.min() < 0 or faces.max() >= len(vertices):
+        raise InputError(f"{path}: not a usable mesh: a triangle names a vertex that is not there; {AGAIN}")
+    return bvh(vertices, faces)
+
+
+def _of_ply(data: bytes, path: Path) -> Triangles:
+    """Read a PLY of bytes, of which assimp reads beyond the end, and trimesh no faces of several numbers of corners."""
+    points, polygons = ply_mesh(data, f"{path}: not a usable mesh")
+    faces = [polygon[[0, k, k + 1]] for polygon in polygons for k in range(1, len(polygon) - 1)]
+    return Triangles(points.astype(np.float64), np.array(faces, dtype=np.int64).reshape(-1, 3))
 
 
 def _by_assimp_from(data: bytes, scale: Vector) -> coal.BVHModelBase:

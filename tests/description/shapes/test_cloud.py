@@ -111,7 +111,7 @@ BAD = {
     "words.ply": ((PLY.format("ascii", XYZ) + "a b c\n").encode(), "not rows of numbers"),
     "faces.ply": (
         (PLY.format("ascii", XYZ).replace("vertex", "face") + text()).encode(),
-        "needs an element 'vertex'; it has face",
+        "a mesh, not a point cloud",
     ),
     "huge.pcd": (PLAIN_PCD.format("binary").replace("POINTS 3", "POINTS 1000000000").encode() + bytes(36), "claims"),
     "headless.pcd": (b"x y z\n", "no line DATA"),

@@ -6,6 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
+import trimesh
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -14,6 +15,7 @@ from rrtik_ompl.description.catalog import load_robot
 from rrtik_ompl.description.shapes import mesh as mesh_files
 from rrtik_ompl.description.urdf import robot_from_urdf_text
 from rrtik_ompl.files import notice
+from rrtik_ompl.files.kinds import load
 from rrtik_ompl.geometry.collision.shape_table import pieces
 from rrtik_ompl.geometry.collision.solids import bvh, closed_if_mended, is_closed, mesh_arrays, robot_solids
 from rrtik_ompl.model.scene import Obstacle, Scene
@@ -56,6 +58,22 @@ def obj(faces=FACES):
     return ("\n".join(rows) + "\n").encode()
 
 
+def ply_head(order, faces, count=4):
+    points = "".join(f"property float {axis}\n" for axis in "xyz")
+    head = f"ply\nformat {order} 1.0\nelement vertex {count}\n{points}element face {len(faces)}\n"
+    return (head + "property list uchar int vertex_indices\nend_header\n").encode()
+
+
+def ply(faces=FACES):
+    body = b"".join(b"\3" + np.asarray(face, dtype="<i4").tobytes() for face in faces)
+    return ply_head("binary_little_endian", faces) + CORNERS.astype("<f4").tobytes() + body
+
+
+def ply_text(faces=FACES):
+    rows = [*CORNERS.tolist(), *([3, *face] for face in np.asarray(faces).tolist())]
+    return ply_head("ascii", faces) + "".join(" ".join(map(str, row)) + "\n" for row in rows).encode()
+
+
 def dae(unit="1"):
     return COLLADA.replace("UNIT", unit).encode()
 
@@ -71,7 +89,27 @@ GOOD = {
     "part.obj": obj(),
     "part.OBJ": obj(),
     "part.dae": dae(),
+    "part.ply": ply(),
+    "text.ply": ply_text(),
+    "part.glb": trimesh.Trimesh(CORNERS, FACES, process=False).export(file_type="glb"),
 }
+
+
+@pytest.mark.parametrize("order", ["<", ">"])
+def test_a_ply_of_bytes_may_have_faces_of_several_numbers_of_corners(tmp_path, order):
+    quads = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7], [1, 7, 3]]
+    kind = {"<": "binary_little_endian", ">": "binary_big_endian"}[order]
+    head = ply_head(kind, quads, 8).replace(b"end_header", b"property float weight\nend_header")
+    rows = [
+        bytes([len(face)]) + np.array(face, f"{order}i4").tobytes() + np.float32(0.5).astype(f"{order}f4").tobytes()
+        for face in quads
+    ]
+    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 2) for z in (0, 3)], f"{order}f4")
+    (tmp_path / "box.ply").write_bytes(head + corners.tobytes() + b"".join(rows))
+    mesh = Mesh.load(tmp_path / "box.ply")
+    assert mesh.closed
+    assert len(mesh.triangles) == 12
+    assert trimesh.Trimesh(mesh.vertices, mesh.triangles).volume == pytest.approx(6.0)
 
 
 @pytest.mark.parametrize("name", GOOD)
@@ -340,6 +378,14 @@ BROKEN = {
     "units.dae": (dae("centimetre"), "unit 'centimetre' is no number"),
     "page.dae": (b"<html><body>404</body></html>", "not a usable mesh"),
     "part.ply": (b"ply\n", "a point cloud, not a mesh"),
+    "cut.ply": (ply()[:-3], "has room for"),
+    "long_face.ply": (ply()[:-13] + b"\x2d" + ply()[-12:], "has room for"),
+    "none.ply": (ply(faces=[]), "a point cloud, not a mesh"),
+    "index.ply": (ply(faces=[[0, 1, 9]]), "a triangle names a vertex that is not there"),
+    "negative.ply": (ply(faces=[[0, 1, -2]]), "a triangle names a vertex that is not there"),
+    "index_text.ply": (ply_text(faces=[[0, 1, 9]]), "a triangle names a vertex that is not there"),
+    "negative_text.ply": (ply_text(faces=[[0, 1, -2]]), "a triangle names a vertex that is not there"),
+    "cut_text.ply": (ply_text()[:-8], "3 of 4 faces are there; is it cut off"),
     "cut.glb": (b"glTF\2\0\0\0", "damaged, cut off, or no GLB file"),
     "cut_off.stl": (stl_text()[:-60], "is it cut off"),
     "words_for_numbers.stl": (stl_text().replace(b"vertex 1.0", b"vertex one", 1), "not of three numbers"),
@@ -356,6 +402,11 @@ def test_a_broken_mesh_is_one_line_and_silent(tmp_path, capfd, name):
     assert name in str(caught.value)
     assert "\n" not in str(caught.value)
     assert capfd.readouterr() == ("", "")
+
+
+def test_a_ply_with_faces_is_a_mesh_to_whoever_asks(tmp_path):
+    (tmp_path / "part.ply").write_bytes(ply())
+    assert isinstance(load(tmp_path / "part.ply"), Mesh)
 
 
 def test_a_missing_file_and_a_folder_are_named(tmp_path):
@@ -416,9 +467,9 @@ def test_numbers_that_are_not_finite_are_refused_before_c_sees_them(tmp_path, ca
     file.write_bytes(stl_text().replace(b"vertex 1.0 0.0 0.0", f"vertex {number} 0 0".encode()))
     urdf = f"""<robot name="arm"><link name="a"><collision><geometry><mesh filename="{file}"/></geometry></collision>
         </link><link name="b"/><joint name="j" type="continuous"><parent link="a"/><child link="b"/></joint></robot>"""
-    for load in (lambda: Mesh.load(file), lambda: robot_from_urdf_text(urdf)):
+    for read in (lambda: Mesh.load(file), lambda: robot_from_urdf_text(urdf)):
         with pytest.raises(InputError, match=r"not finite|check units"):
-            load()
+            read()
     assert capfd.readouterr().err == ""
 
 
