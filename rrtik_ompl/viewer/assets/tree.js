@@ -5,7 +5,7 @@ const GROUPS = {  // in this order; films hide them by these names
 };
 const UNFOLDED = ["ghosts", "obstacles", "trails", "search", "contacts", "marks"];
 const FEW_COURSES = 3;  // more are a heap, and hidden at first
-const LONG_LIST = 8;  // groups with more rows are folded at first
+const LONG_LIST = 12;  // groups with more rows are folded at first
 const things = [];
 
 /** A row of the tree; `show` is called with whether the thing is to be seen. */
