@@ -34,6 +34,8 @@ from rrtik_ompl.viewer.task_story import TASK
 PLAY_SPEED = np.deg2rad(30.0)  # [rad/s]; speed of the joint that travels farthest in a move
 PLAY_SECONDS = (3.0, 60.0)  # shortest and longest playing time of a whole path
 DIGITS = 9
+SEEN_ROWS = 60  # largest number of waypoints of which the first view shows as much as it can
+LINK_SHARES = (1 / 3, 2 / 3, 1.0)  # of the way from each joint to the next one, where a link should be seen
 OWN_JOINTS = 3  # least number of joints of a branch that can be dragged; shorter branches are fingers
 
 
@@ -226,14 +228,17 @@ def _contact(contact: PathContact, robot: Robot, scene: Scene) -> dict[str, Any]
 def groups_to_see(subject: Subject) -> list[Matrix]:
     """Return what the first view should not hide, arrays of shape (m, 3).
 
-    These are the positions of joints and tip at each waypoint, the tip at the start and at the end, and first and last
+    These are points of the links and of the tip along the path, the tip at the start and at the end, and first and last
     places of what a task moves.
     """
     if subject.robot is None:
         return []
-    frames = subject.robot.joint_frames(subject.waypoints)[:, 1:, :3, 3].reshape(-1, 3)
-    tips = subject.robot.fk_batch(subject.waypoints)[:, :3, 3]
-    groups = [np.concatenate([frames, tips]), tips[:1]]
+    rows = subject.waypoints[:: -(-len(subject.waypoints) // SEEN_ROWS)]
+    joints = subject.robot.joint_frames(rows)[:, :, :3, 3]
+    before = joints[:, list(subject.robot.model.parents[1:])]
+    links = np.concatenate([before + share * (joints[:, 1:] - before) for share in LINK_SHARES]).reshape(-1, 3)
+    tips = subject.robot.fk_batch(rows)[:, :3, 3]
+    groups = [np.concatenate([links, tips]), tips[:1]]
 
     if subject.end is not None:
         groups.append(subject.robot.fk_batch(subject.end[None])[:, :3, 3])

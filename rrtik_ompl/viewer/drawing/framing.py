@@ -28,7 +28,7 @@ ELEVATIONS = np.deg2rad([27.0, 42.0])
 TURNS = np.deg2rad([0, 30, -30, 60, -60, 90, -90, 120, -120, 150, -150, 180])  # tried in this order
 EYE_DISTANCE = 1.8  # of the camera from what it shows, in sizes of that, at the angle of view of the page
 # A turn by 90 degrees from the default azimuth must reduce the share of hidden points by this much.
-TURN_COST = 0.04
+TURN_COST = 0.025
 
 
 @dataclass(frozen=True, slots=True, eq=False)
