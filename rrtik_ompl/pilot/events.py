@@ -213,6 +213,22 @@ class StepToGrasp:
     then: Then
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class StepAlongTool:
+    """A step of the tip along the axis of the tool shall be computed; the answer is the joint rates, shape (dof,).
+
+    Attributes:
+        world: World in which the tip moves.
+        speed: Speed along the z axis of the tool [m/s]; below 0 it is drawn back.
+        begins: Whether this is the first step, which decides on which line the tip moves.
+    """
+
+    world: World
+    speed: float
+    begins: bool
+    then: Then
+
+
 @dataclass(frozen=True, slots=True)
 class Acknowledge:
     """The pilot has acknowledged the fault: the arm may be driven again."""
@@ -242,7 +258,18 @@ class WriteAnswer:
 
 
 Effect: TypeAlias = (
-    Stop | SetPoint | Grip | Read | ReadMaster | FindRoute | StepToGrasp | Acknowledge | Give | Write | WriteAnswer
+    Stop
+    | SetPoint
+    | Grip
+    | Read
+    | ReadMaster
+    | FindRoute
+    | StepToGrasp
+    | StepAlongTool
+    | Acknowledge
+    | Give
+    | Write
+    | WriteAnswer
 )
 
 

@@ -13,7 +13,7 @@ command is refused.
 | `together` | refused | refused | proposed | refused |
 | `accept`: the rest is free | refused | refused | following | refused |
 | `accept`, `next`: the rest is not free | refused | refused | proposed, withdrawn | proposed, withdrawn |
-| `jog`, `go`, `move`, `servo`, `lead`, `keep` | | | | refused |
+| `jog`, `go`, `move`, `servo`, `tool`, `lead`, `keep` | | | | refused |
 | `close` on something loose, `open` with something | manoeuvre | manoeuvre | manoeuvre | refused |
 | `next`, `settle` | refused | refused | refused | |
 | `stop`, `halt`, `stand` | | | | proposed |

@@ -25,7 +25,7 @@ from rrtik_ompl.pilot.devices.line_arm import LineArm
 from rrtik_ompl.pilot.events import Answer, Level, alarm
 from rrtik_ompl.pilot.interlock import LATE_SECONDS, UNSEEN_SECONDS, Knowledge, Sight
 from rrtik_ompl.pilot.machine import handle
-from rrtik_ompl.pilot.motion.leading import GraspServo
+from rrtik_ompl.pilot.motion.leading import GraspServo, ToolLine
 from rrtik_ompl.pilot.motion.supervisor import Supervisor
 from rrtik_ompl.pilot.record import Record
 from rrtik_ompl.pilot.routes.follower import Follower, Progress, Track
@@ -101,6 +101,7 @@ class Session:
         self.state = State(Surroundings(problem.world, structure), q, q, kept={BEGIN: q})
 
         self._grasp_servo = GraspServo(problem.robot)
+        self._tool_line = ToolLine(problem.robot)
         self._record = record or Record(None)
         self._alive_at = -np.inf  # time of the last line that only says that the session goes on [s]
         self._read_by_arm = isinstance(arm, LineArm)  # its own thread passes its readings to the supervisor
@@ -213,6 +214,8 @@ class Session:
             case events.StepToGrasp(world, goal, seconds, begins, then):
                 step = self._grasp_servo.step(self.state.q, world, goal, seconds, begins=begins)
                 return events.Reply(then, step)
+            case events.StepAlongTool(world, speed, begins, then):
+                return events.Reply(then, self._tool_line.step(self.state.q, world, speed, begins=begins))
             case events.Acknowledge():
                 self.supervisor.acknowledge()
             case events.Give(verb):

@@ -21,6 +21,7 @@ ARGUMENTS = {
     "next": {"press": 1},
     "servo": {"press": 1},
     "lead": {"press": 1},
+    "tool": {"direction": -1.0, "press": 1},
     "move": {"target": float(PROBLEM.start[0]) + 0.3},
     "select": {"joint": 0},
     "speed": {"share": 0.5},

@@ -15,7 +15,7 @@ from rrtik_tests.pilot_session import ALWAYS, GUIDED, MOVING, PLACE, PRESENT, se
 
 FOLDER = Path(rrtik_ompl.pilot.__file__).parent
 IN_ONE_MODE = {"accept": (PROPOSED,), "together": (PROPOSED,), "next": (FOLLOWING,), "settle": (FOLLOWING,)}
-NOT_ON_A_ROUTE = ("jog", "go", "move", "servo", "lead", "close", "open", "lift", "posture", "keep")
+NOT_ON_A_ROUTE = ("jog", "go", "move", "servo", "lead", "close", "open", "lift", "posture", "keep", "tool")
 
 
 def given(verb, time=0.0, **arguments):

@@ -12,7 +12,8 @@ from rrtik_tests.pilot_hands import PAD
 CUT_OFF = """
 [...document.querySelectorAll("#joints th, #joints td, #depth dd, .hands > *, .buttons button, #stop, header > *")]
   .filter((each) => each.offsetParent)
-  .filter((each) => each.getBoundingClientRect().right > innerWidth || each.scrollWidth > each.clientWidth + 1)
+  .filter((each) => each.scrollWidth > each.clientWidth + 1
+    || each.getBoundingClientRect().right > each.closest("section, header").getBoundingClientRect().right)
   .map((each) => each.outerHTML)
 """
 
@@ -108,6 +109,20 @@ def test_space_stops_although_the_arrow_is_still_held(page, running):
     page.key_up("ArrowRight")
 
 
+def test_what_is_held_to_move_the_arm_is_44_pixels_or_larger_and_moves_the_tool(page, running):
+    page.size(1280, 720)
+    sizes = page.ask(
+        "['minus', 'plus', 'go', 'next', 'servo', 'tool_in', 'tool_out'].map((id) => byId(id).getBoundingClientRect())"
+        ".map((box) => Math.min(box.width, box.height))"
+    )
+    assert min(sizes) >= 44
+    session = running.opened.engine.session
+    begin = session.robot.fk(session.q)
+    page.hold("s", "state.message === 'the tool moves along its axis' && Math.abs(state.joints[1].value - 19) > 0.5")
+    page.wait("!state.driving")
+    assert begin.actInv(session.robot.fk(session.q)).translation[2] < -0.005  # back
+
+
 def test_who_watches_may_stop_the_arm_and_the_button_is_large(page):
     page.press("h")  # no other page: nobody to hand over to, the arm stands still
     page.ask("send('hand_over')")
@@ -118,6 +133,8 @@ def test_who_watches_may_stop_the_arm_and_the_button_is_large(page):
     page.press("t")
     page.wait("role.role === 'pilot'")
     page.wait("!byId('reset').hidden")
+    page.press("2")  # the longest name of a joint
+    page.wait("state.selected === 1")
     for width, height in ((800, 600), (1280, 720), (3840, 2160)):
         page.size(width, height)
         box = page.ask(

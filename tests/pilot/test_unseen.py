@@ -34,7 +34,7 @@ from rrtik_tests.pilot_session import (
 
 PANEL = replace(VALVE, name="panel_mark", solids=(), grasps=())
 PANEL_PLACE = pin.SE3(np.eye(3), np.array([1.4, 0.4, 0.3]))
-HAND = ("jog", "go", "lead")
+HAND = ("jog", "go", "lead", "tool")
 MOVES = "base_motion: {drift: [0.001, 0, 0]}"
 
 
@@ -117,7 +117,11 @@ def test_only_hands_move_an_arm_whose_surroundings_are_out_of_view():
     follower = made.follower
     made.master = SimulatedArm(ROBOT, PROBLEM.start - 0.04)
     time = see_nothing(made, 0.2, UNSEEN_SECONDS + 1.0)
-    arguments = {"jog": {"direction": 1.0}, "move": {"target": float(PROBLEM.start[0]) + 0.3}}
+    arguments = {
+        "jog": {"direction": 1.0},
+        "tool": {"direction": -1.0},
+        "move": {"target": float(PROBLEM.start[0]) + 0.3},
+    }
     for mode, verb in product((MANOEUVRE, PROPOSED, FOLLOWING), sorted({*PRESENT, *ALWAYS} & {*MOVING, *GUIDED})):
         arm._q = PROBLEM.start.copy()
         arm._goal = None

@@ -21,6 +21,7 @@ from rrtik_ompl.pilot.state import HOLD_SECONDS, LEASH_SECONDS, LEAST_LEASH_SECO
 
 # If the arm has come no nearer to the end of a move for this long, it will not get there.
 STUCK_SECONDS = 0.8
+MIN_SECONDS = 1e-3  # joints that are nearer to their set points than this, as time, are there
 MIN_SPEED = 0.05  # least share of the joints' rates
 
 
@@ -268,7 +269,7 @@ def pace(means: Means, state: State) -> float:
 
 
 def lead_to(means: Means, state: State, point: Vector, share: float) -> State:
-    """Send all joints towards a set point, which may be ahead of the arm by its `leash` at most.
+    """Send all joints towards a set point, so that they would arrive together; it is ahead by its `leash` at most.
 
     Args:
         means: What the session works with.
@@ -278,7 +279,10 @@ def lead_to(means: Means, state: State, point: Vector, share: float) -> State:
     """
     before = state if state.drive.joint is None else state.at_rest()
     led = replace(before, drive=before.drive.led(state.time))
-    return led.do(SetPoint(point, share * means.rates))
+
+    to_go = np.abs(point - state.q)
+    seconds = float((to_go / (share * means.rates)).max())
+    return led.do(SetPoint(point, to_go / max(seconds, MIN_SECONDS)))
 
 
 def _drive(means: Means, state: State, joint: int, goal: float, share: float, at_goal: Answer) -> State:

@@ -1,4 +1,4 @@
-"""Held commands that move all joints at once: visual servoing to a grasp, and following a master arm.
+"""Held commands that move all joints at once: servoing to a grasp, motion along the tool, following a master arm.
 
 Source: [1, ch. 2.2 and 6] (visual servoing, position control).
 """
@@ -17,7 +17,7 @@ from rrtik_ompl.base.units import joint_unit, reading
 from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.motion.following.servo import Servo
 from rrtik_ompl.motion.following.visual_servo import ServoStep, VisualServo
-from rrtik_ompl.pilot.events import ReadMaster, StepToGrasp, news
+from rrtik_ompl.pilot.events import ReadMaster, StepAlongTool, StepToGrasp, news
 from rrtik_ompl.pilot.interlock import BY_HAND, ON_A_ROUTE, Verb
 from rrtik_ompl.pilot.motion.held import begins, lead_to, pace
 from rrtik_ompl.pilot.queries import unseen_for, world_by_hand
@@ -31,6 +31,9 @@ ALIGNED = np.deg2rad(5.0)
 AHEAD = 3.0  # a master that is farther ahead than this multiple of `ALIGNED` leads no more
 ALIGNED_SLIDING = 0.01  # [m]; the same for a sliding joint
 MAX_STEP_SECONDS = 0.2  # longest time step between two renewals
+TOOL_SPEED = 0.1  # [m/s]; along the tool at full speed, if no joint is at its rate before that
+RETURN_RATE = 2.0  # [1/s]; how fast the tip returns to the line on which it shall move
+LEAST_SHARE = 0.005  # of the joints' rates; an arm that would be slower stands
 WHY_NOT = {  # reasons by the state of a `ServoStep`
     "lost": "{} is not in view",
     "jumped": "{} has jumped",
@@ -63,6 +66,39 @@ class GraspServo:
             self._visual.go_on_with(Servo(world))
         self._world = world
         return self._visual.step(q, goal, seconds)
+
+
+class ToolLine:
+    """Motion of the tip along the axis that the tool had when the command was pressed, without turning."""
+
+    def __init__(self, robot: Robot) -> None:
+        self._robot = robot
+        self._servo: Servo | None = None
+        self._world: World | None = None
+        self._begin = pin.SE3.Identity()
+
+    def step(self, q: Vector, world: World, speed: float, *, begins: bool) -> Vector:
+        """Return joint rates that are proven free for `LEASH_SECONDS`, shape (dof,); zeros if there are none.
+
+        Args:
+            q: Present configuration, shape (dof,).
+            world: Robot and surroundings.
+            speed: Speed along the axis [m/s].
+            begins: Whether the line begins at q.
+        """
+        tip = self._robot.fk(q)
+        if begins:
+            self._begin = tip
+        if self._servo is None or world is not self._world:
+            self._servo = Servo(world)
+        self._world = world
+
+        axis = self._begin.rotation[:, 2]
+        offset = self._begin.translation - tip.translation
+        to_line = offset - (offset @ axis) * axis
+        turn = pin.log3(self._begin.rotation @ tip.rotation.T)
+        twist = np.concatenate([speed * axis + RETURN_RATE * to_line, RETURN_RATE * turn])
+        return self._servo.step(q, twist, LEASH_SECONDS)
 
 
 def servo(means: Means, state: State, press: float) -> State:
@@ -111,6 +147,32 @@ def _stepped(means: Means, state: State, step: ServoStep) -> State:
     return led.say(news(f"servoing: {remaining} to the grasp"))
 
 
+def along_tool(means: Means, state: State, direction: float, press: float) -> State:
+    """Move the tip straight along the axis of the tool, forwards or back, while the command is held.
+
+    Near obstacles it becomes slower, and it ends before it touches one.
+
+    Args:
+        means: What the session works with.
+        state: Present state.
+        direction: Share of the speed from -1 to 1; 0 ends the drive.
+        press: Number of the press that this command belongs to.
+    """
+    pressed, anew = begins(state, "tool", press)
+    if direction == 0.0:
+        return pressed.at_rest().say(news("released"))
+    speed = float(np.clip(direction, -1.0, 1.0)) * TOOL_SPEED * state.speed
+    return pressed.do(StepAlongTool(world_by_hand(state), speed, anew, _along))
+
+
+def _along(means: Means, state: State, rates: Vector) -> State:
+    share = float((np.abs(rates) / means.rates).max())
+    if share < LEAST_SHARE:
+        raise InputError("the tool goes no farther this way: a limit, an obstacle or a singular posture is in the way")
+    led = _led(means, state, state.q + rates * (LEASH_SECONDS / max(share / pace(means, state), 1.0)))
+    return led.say(news("the tool moves along its axis"))
+
+
 def lead(_: Means, state: State, press: float) -> State:
     """Follow the joints of the master arm while the command is held."""
     pressed, anew = begins(state, "lead", press)
@@ -154,5 +216,6 @@ def _check_aligned(robot: Robot, errors: Vector, times: float = 1.0) -> None:
 
 VERBS = {
     "servo": Verb(servo, present=True, held=True, guided=True, modes=BY_HAND, otherwise=ON_A_ROUTE),
+    "tool": Verb(along_tool, present=True, held=True, modes=BY_HAND, otherwise=ON_A_ROUTE),
     "lead": Verb(lead, present=True, held=True, modes=BY_HAND, otherwise=ON_A_ROUTE),
 }

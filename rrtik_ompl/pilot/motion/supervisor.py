@@ -57,6 +57,7 @@ MIN_LEAD_SHARE = 0.25
 # Whatever is sent, a joint goes no farther than this, as time at its rate, beyond the reading before the last one that
 # has shown it moving: so far does an arm go whose readings stand still from then on, until that is named.
 UNCONFIRMED_SECONDS = 0.095
+ROUNDING = 1e-9  # [rad or m]
 
 
 def slack_of(robot: Robot) -> Vector:
@@ -245,8 +246,9 @@ class Supervisor:
 
         It is near enough that an arm which moves while its readings stand still stops by itself within
         `UNCONFIRMED_SECONDS` of motion. It advances no faster than the joint shall move: an arm that is too fast gains
-        nothing by it. It never goes back for these reasons: readings that come late stand still at times while an
-        honest arm is on its way, and one that has overshot would hunt.
+        nothing by it. No joint is sent back for these reasons: readings that come late stand still at times while an
+        honest arm is on its way, and one that has overshot would hunt. It is on the straight motion to the wanted one,
+        which was checked.
         """
         step = np.abs(self._confirmed_step)
         reach = np.maximum(UNCONFIRMED_SECONDS * self._rates - step, LEAST_LEASH_SECONDS * self._rates)
@@ -257,7 +259,12 @@ class Supervisor:
         sent = self._set_point
         low = np.maximum(q - reach, np.minimum(q, sent) - advance)
         high = np.minimum(q + reach, np.maximum(q, sent) + advance)
-        return np.clip(wanted, np.minimum(low, sent), np.maximum(high, sent))
+
+        to_go = wanted - q
+        room = np.where(to_go > 0.0, np.maximum(high, sent) - q, q - np.minimum(low, sent))
+        is_limited = np.abs(to_go) > room + ROUNDING
+        share = np.divide(room, np.abs(to_go), out=np.ones_like(q), where=is_limited).min()
+        return np.where(share < 1.0, q + share * to_go, wanted)
 
     def _amount_in_words(self, joint: int, value: float) -> str:
         return amount(value, prismatic=bool(self._prismatic[joint]))

@@ -33,7 +33,7 @@ PLACE = pin.SE3(ROBOT.fk(PROBLEM.goal.q).rotation, np.array([1.30, 0.17, 0.09]))
 
 
 # What a command needs, as it was reviewed: the table of the verbs must say the same.
-MOVING = ("jog", "go", "next", "servo", "lead")  # held: the arm moves only as long as they are renewed
+MOVING = ("jog", "go", "next", "servo", "lead", "tool")  # held: the arm moves only as long as they are renewed
 PRESENT = (*MOVING, "move", "plan", "replan", "accept", "back", "close", "open", "lift", "together",
            "posture", "keep")  # fmt: skip
 GUIDED = ("plan", "replan", "accept", "back", "together", "lift", "next", "servo", "posture")

@@ -12,7 +12,7 @@ const PAD_TAPPED = new Map([
 const PAD_ENABLED = new Map([  // only while the shoulder button is held, too
   [9, () => (isLatched() ? send("reset") : nextObject())], [10, () => toggleGripper()],
 ]);
-const PAD_WORDS = "gamepad: LB held enables · left stick drives the joint · A held: next move · B: STOP · X plan · Y accept · "
+const PAD_WORDS = "gamepad: LB held enables · left stick drives the joint · right stick up, down: the tool along its axis · A held: next move · B: STOP · X plan · Y accept · "
   + "RB held: joint to its value · RT held with LB: the last centimetres by sight · D-pad: joint, speed · LT type · "
   + "RT without LB: level · left stick pressed: gripper · Start with LB: reset after STOP · right stick pressed: lift";
 let padBefore = [], padWasThere = false;
@@ -25,6 +25,12 @@ const isDown = (pad, number) => Boolean(pad && pad.buttons[number]?.pressed);
 function stick() {
   const pad = firstPad(), pushed = pad && padArmed && isDown(pad, ENABLE) ? pad.axes[0] : 0, size = Math.abs(pushed);
   return size < DEAD_ZONE ? null : ["jog", { direction: Math.sign(pushed) * Math.min((size - DEAD_ZONE) / (1 - DEAD_ZONE), 1) }];
+}
+
+// The right stick, up and down, moves the tool along its axis.
+function toolStick() {
+  const pad = firstPad(), pushed = pad && padArmed && isDown(pad, ENABLE) ? -pad.axes[3] : 0, size = Math.abs(pushed);
+  return size < DEAD_ZONE ? null : ["tool", { direction: Math.sign(pushed) * Math.min((size - DEAD_ZONE) / (1 - DEAD_ZONE), 1) }];
 }
 
 function readPad() {
@@ -41,6 +47,7 @@ function readPad() {
   for (const [number, act] of PAD_TAPPED) if (tapped(number) && state && !(now[ENABLE] && (PAD_HELD.has(number) || PAD_ENABLED.has(number)))) { letGo(); act(); }
   for (const [number, act] of PAD_ENABLED) if (tapped(number) && now[ENABLE] && state) { letGo(); act(); }
   if (stick()) hold("stick", stick); else letGo("stick");
+  if (toolStick()) hold("tool stick", toolStick); else letGo("tool stick");
   padBefore = now;
 }
 
@@ -48,7 +55,7 @@ function readPad() {
 function arm(pad, now) {
   if (!now[ENABLE]) padArmed = false;
   else if (padBefore.length && !padBefore[ENABLE]) {
-    padArmed = Math.abs(pad.axes[0]) < DEAD_ZONE;
+    padArmed = [0, 3].every((axis) => Math.abs(pad.axes[axis]) < DEAD_ZONE);
     if (!padArmed) say(NEUTRAL_WORDS, "refusal");
   }
 }

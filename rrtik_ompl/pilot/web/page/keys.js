@@ -20,6 +20,7 @@ const KEYS = [
   ["N", ["n"], "hold: make the next move", null, () => ["next", {}]],
   ["J", ["j"], "the route with all joints at once, or as a list", () => send("together")],
   ["F", ["f"], "hold: the last centimetres to the grasp, by sight", null, () => ["servo", {}]],
+  ["D S", ["d", "s"], "hold: the tool forward along its axis, back", null, (key) => ["tool", { direction: key === "d" ? 1 : -1 }]],
   ["K", ["k"], "hold: follow the master arm", null, () => ["lead", {}]],
   ["W", ["w"], "plan a route to the next posture: stowed, as at the begin, ...", () => nextPosture()],
   ["E", ["e"], "keep this posture", () => send("keep")],

@@ -149,7 +149,7 @@ function showJoints() {
   if (body.children.length !== state.joints.length) body.replaceChildren(...state.joints.map(jointRow));
   state.joints.forEach((joint, k) => showJoint(body.children[k], joint, k));
   const { name, unit } = state.joints[state.selected];
-  set(byId("step_size"), `${inWords(name)} · speed ${fixed(100 * state.speed, 0)} %`);
+  set(byId("step_size"), `${inWords(name)} · ${fixed(100 * state.speed, 0)} %`);
   set(byId("unit"), unit === "m" ? "m" : "°");
   showRoom(unit);
 }
@@ -229,7 +229,7 @@ function showPostures() {
   const list = byId("posture"), key = state.postures.join();
   if (list.dataset.key === key) return;
   list.dataset.key = key;
-  list.replaceChildren(make("option", { value: "", hidden: true }, "Posture W"),
+  list.replaceChildren(make("option", { value: "", hidden: true }, "Pose W"),
     ...[...state.postures, KEEP].map((name) => make("option", { value: name }, name.replaceAll("_", " "))));
 }
 
@@ -256,7 +256,14 @@ function showLamps() {
   const words = !state.lamps.length ? state.hint || "No object with grasps in view."
     : !lamp ? "Choose with G (type) and L (level)."
     : `${lamp.type} level ${lamp.level + 1}: ${state.fault || "approach, grasp and lift can be reached"}`;
-  set(byId("reason"), inWords(words));
+  set(byId("reason"), shortened(inWords(words)));
+  byId("reason").title = inWords(words);
+}
+
+// In two lines: degrees to a tenth, and what joint is beyond its limits without "the arm could reach the goal, but".
+function shortened(words) {
+  return words.replace(/grasp: the arm could reach the goal, but joint '([^']*)' is/, "$1")
+    .replaceAll(/(-?\d+\.\d)\d+/g, "$1").replaceAll(" deg", "\u00b0");
 }
 
 function lampButton(lamp) {
@@ -327,7 +334,7 @@ function showButtons() {
   const led = mine && !state.unseen;
   for (const [id, good] of [["accept", at("proposed") && !state.route?.withdrawn], ["reject", role.role === "pilot" && state.mode === "proposed"], ["next", at("following")], ["plan", led],
     ["together", led && at("proposed")], ["servo", led && at("manoeuvre", "choosing", "proposed") && Boolean(state.choice)], ["posture", led && state.mode !== "following"], ["replan", led && Boolean(state.route)], ["back", led && Boolean(state.route)], ["stop", !state.replay],
-    ...["minus", "plus", "go"].map((id) => [id, at("manoeuvre", "choosing", "proposed")])]) byId(id).disabled = !good;
+    ...["minus", "plus", "go", "tool_in", "tool_out"].map((id) => [id, at("manoeuvre", "choosing", "proposed")])]) byId(id).disabled = !good;
   for (const id of ["play", "step_back", "step_on", "scrub", "live"]) byId(id).disabled = role.role !== "pilot" || state.mode !== "proposed";
 }
 
@@ -382,6 +389,8 @@ holdButton(byId("next"), () => ["next", {}]);
 holdButton(byId("servo"), () => ["servo", {}]);
 byId("together").onclick = () => send("together");
 holdButton(byId("go"), () => ["go", {}]);
+holdButton(byId("tool_in"), () => ["tool", { direction: 1 }]);
+holdButton(byId("tool_out"), () => ["tool", { direction: -1 }]);
 holdButton(byId("minus"), () => ["jog", { direction: -1 }]);
 holdButton(byId("plus"), () => ["jog", { direction: 1 }]);
 byId("value").onkeydown = (event) => {
