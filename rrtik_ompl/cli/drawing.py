@@ -177,11 +177,16 @@ def play(
 
     A live page on 127.0.0.1, until Ctrl-C.
     """
-    from rrtik_ompl import JointPath, load_problem
+    from rrtik_ompl import JointGoal, JointPath, load_problem, plan
     from rrtik_ompl.viewer import play as serve
 
     question = load_problem(problem)
-    route = None if path is None else JointPath.load(path, question.world.robot)
+    if path is not None:
+        route = JointPath.load(path, question.world.robot)
+    elif question.constraints or isinstance(question.goal, JointGoal):
+        route = None  # the page refuses the first, and plans to the second by itself
+    else:
+        route = plan(question, seed=0).path
     serve(question, route, port=port, on_ready=lambda url: say(f"open {url} in a browser; Ctrl-C ends"))
     return FOUND
 

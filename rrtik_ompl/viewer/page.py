@@ -151,10 +151,7 @@ def page_and_picture(
     told["plan"] = None if still else _planning(shown, subject, frame)
 
     if asks and (not told["plan"] or told["plan"]["courses"]):
-        raise InputError(
-            f"{subject.name}: its page cannot plan: give a path or a goal of joint values, no path constraints and "
-            "no obstacles that move; or use rrtik show"
-        )
+        raise InputError(f"{subject.name}: its page cannot plan: {_why_not(shown, subject)}; rrtik show draws it")
     if told["plan"]:
         told["plan"]["asks"] = asks
 
@@ -190,6 +187,17 @@ def _planning(shown: Showable, subject: Subject, frame: Frame) -> dict[str, Any]
     one_joint = subject.is_path and bool(single_joint(subject.waypoints))
     found = page_planner(shown, subject.end, BOX_SHARE * frame.arm, whole=frame.size, one_joint=one_joint)
     return None if found is None else found | play_pace(shown.robot, frame.arm)
+
+
+def _why_not(shown: Showable, subject: Subject) -> str:
+    """Return why a page cannot plan and let each path be proven."""
+    if getattr(shown, "constraints", ()):
+        return "it has path constraints, for which the page has no kernels"
+    if isinstance(shown, Problem) and any(each.motion is not None for each in shown.world.scene.obstacles):
+        return "it has obstacles that move"
+    if subject.end is None:
+        return "its goal is not of joint values; give a path to it"
+    return "kernels check no joints of such ranges, or there are no kernels"
 
 
 def _title(subject: Subject) -> str:

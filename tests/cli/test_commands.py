@@ -9,6 +9,7 @@ import subprocess
 import sys
 from contextlib import suppress
 
+import numpy as np
 import pytest
 
 from rrtik_ompl.cli.app import run
@@ -408,3 +409,24 @@ def test_nothing_is_printed_on_standard_error_when_it_is_no_terminal():
     )
     assert done.returncode == 0
     assert done.stderr == ""
+
+
+def test_play_of_a_goal_that_is_a_pose_begins_with_a_path_to_it(monkeypatch):
+    served = []
+    monkeypatch.setattr("rrtik_ompl.viewer.play", lambda problem, path, **options: served.append((problem, path)))
+    assert run(["play", "ur5_table"]) == 0
+    ((problem, path),) = served
+    assert path.violations(problem.world) == ()
+    np.testing.assert_array_equal(path.start, problem.start)
+    reached = problem.robot.fk(path.end)
+    wanted = problem.goal.pose
+    assert np.linalg.norm(reached.translation - wanted.translation) < 0.002
+
+
+@pytest.mark.parametrize(
+    ("problem", "reason"), [("ur5_upright", "path constraints"), ("replan_ur5", "obstacles that move")]
+)
+def test_play_says_why_the_page_of_a_problem_cannot_plan(capsys, problem, reason):
+    code, _, err = rrtik(capsys, "play", problem)
+    assert code == 2
+    assert re.search(rf"{problem}: its page cannot plan: it has {reason}", err)

@@ -1,6 +1,7 @@
 """Acts of a person in a page that plans: clicks on what stays, the ball in the middle, keys, buttons without use."""
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -152,3 +153,47 @@ def test_buttons_of_the_player_rest_while_there_is_no_path(browser: Browser) -> 
     assert browser.ask(rest) == [True] * 5
     browser.ask("replacePath([state.start, state.goal])")
     assert browser.ask(rest) == [False] * 5
+
+
+def test_what_is_added_leaves_both_ends_free_and_is_in_the_tree(browser: Browser) -> None:
+    rows = "things.filter(({ group }) => group === 'obstacles').map(({ text }) => text)"
+    assert browser.ask(rows) == ["ball", "wall", "wedge"]
+    for shape in ("box", "sphere", "cylinder", "capsule"):
+        browser.ask(f"addShape('{shape}')")
+        browser.ask(IDLE)
+        assert browser.ask("[...ENDS.keys()].every((end) => kernels.free(state[end]))")
+    assert browser.ask(rows) == ["ball", "wall", "wedge", "box 1", "sphere 1", "cylinder 1", "capsule 1"]
+    assert "7 obstacles" in browser.ask("document.getElementById('subtitle').textContent")
+    browser.ask("select(numberOf('ball')); removeSelected()")
+    assert browser.ask(rows) == ["wall", "wedge", "box 1", "sphere 1", "cylinder 1", "capsule 1"]
+    browser.ask("undo()")
+    assert browser.ask(rows)[:3] == ["ball", "wall", "wedge"]
+
+
+def test_the_joint_space_stays_for_other_goals_and_goes_with_other_obstacles(browser: Browser) -> None:
+    hidden = "document.getElementById('joint-space-section').hidden"
+    dot = "['cx', 'cy'].map((name) => document.querySelector('#joint-space .goal').getAttribute(name))"
+    assert browser.ask(hidden) is False
+    before = browser.ask(dot)
+    browser.ask("moveSelected(new THREE.Vector3(-0.05, 0.05, 0), 0)")
+    browser.ask(IDLE)
+    assert browser.ask(hidden) is False
+    assert browser.ask(dot) != before
+    assert browser.ask("document.querySelector('#joint-space .route').getAttribute('d').includes('L')")
+    browser.ask("select(numberOf('ball')); remember(); moveSelected(new THREE.Vector3(-0.05, 0.05, 0), 0)")
+    browser.ask(IDLE)
+    assert browser.ask(hidden) is True
+    browser.ask("undo()")
+    assert browser.ask(hidden) is False
+
+
+def test_sliders_make_room_for_the_moves_of_a_first_path(tmp_path: Path) -> None:
+    problem = rrtik.load_problem("planar3_boxes")
+    goal = rrtik.plan(problem, seed=1).path.end
+    with planning_page(page(rrtik.Problem(problem.world, problem.start, goal)), tmp_path) as browser:
+        sliders = "document.querySelectorAll('#joints input').length"
+        assert browser.ask(sliders) == problem.robot.dof
+        browser.ask("changed()")
+        browser.wait("story.moves.length > 0")
+        assert browser.ask(sliders) == 0
+        assert browser.ask("document.querySelectorAll('#joints tr').length") == problem.robot.dof + 1

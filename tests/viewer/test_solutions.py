@@ -45,3 +45,10 @@ def test_on_a_page_that_plans_the_solution_becomes_the_goal_and_the_arm_stands_t
         browser.wait("story.moves.length > 0")
         assert browser.ask("Array.from(state.goal)") == pytest.approx(q[3])
         assert browser.ask(SHOWN) == degrees(q[3])
+        marked = "document.querySelector('#solutions tr.moving td').textContent.trim()"
+        assert browser.ask(marked) == "4"
+        browser.ask(CLICK % 2)
+        browser.wait(f"{marked} === '2'")
+        browser.ask("undo()")
+        assert browser.ask(marked) == "4"
+        assert browser.ask("document.getElementById('plan-goal').value") == "3"

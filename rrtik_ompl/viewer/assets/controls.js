@@ -97,6 +97,7 @@ function placeFields() {
 
 /** The controls as the state says. */
 function showState() {
+  showProblem();
   document.getElementById("plan-planner").value = state.planner;
   document.getElementById("plan-seed").value = state.seed;
   fillSelection();
@@ -108,13 +109,31 @@ function fillSelection() {
   select(things.includes(selected) ? selected : "goal");
 }
 
+const PLACES_AROUND = 8;  // that are tried for a new obstacle, at each of so many distances
+const FARTHER = 0.06;  // of the picture's size, from one distance to the next
+
+/** A new obstacle stands beside the middle of the way, where both ends stay free if there is such a place. */
+function putWhereEndsStayFree(k) {
+  const sizes = planning.obstacles[k].first.sizes.slice();
+  const middle = tipPosition(state.goal.map((value, j) => 0.5 * (value + state.start[j])));
+  const put = ({ x, y, z }) => {
+    state.obstacles[k] = { pose: [1, 0, 0, x, 0, 1, 0, y, 0, 0, 1, z, 0, 0, 0, 1], shown: true, sizes };
+    applyObstacle(k);
+    return [...ENDS.keys()].every((end) => kernels.free(state[end]));
+  };
+  for (let n = 0; n < PLACES_AROUND * PLACES_AROUND; n += 1) {
+    const angle = (2 * Math.PI * n) / PLACES_AROUND;
+    const away = FARTHER * size * Math.floor(n / PLACES_AROUND);
+    if (put(new THREE.Vector3(Math.cos(angle), Math.sin(angle), 0).multiplyScalar(away).add(middle))) return;
+  }
+  put(middle);
+}
+
 function addShape(shape) {
   const k = planning.obstacles.findIndex((obstacle, n) => obstacle.spare && obstacle.shape === shape && !state.obstacles[n].shown);
   if (k < 0) return planRefusal(`this page has no room for another ${shape}`);
   remember();
-  const tip = tipPosition(state.goal.map((value, j) => 0.5 * (value + state.start[j])));
-  state.obstacles[k] = { pose: [1, 0, 0, tip.x, 0, 1, 0, tip.y, 0, 0, 1, tip.z, 0, 0, 0, 1], shown: true, sizes: planning.obstacles[k].first.sizes.slice() };
-  applyObstacle(k);
+  putWhereEndsStayFree(k);
   selected = k;
   fillSelection();
   return changed();
@@ -221,6 +240,7 @@ function startPlanning() {
   showState();
   showUndo();
   wireControls();
+  showProblem();
   planStatus("drag the goal (green) by its handles, or click something else and drag that: the arm finds a new path");
   if (planning.asks && !story.moves.length) changed();
   else askOpinion();

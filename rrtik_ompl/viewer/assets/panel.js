@@ -22,16 +22,21 @@ function withUnit(j, value) {
 const count = (number, noun) => `${number} ${noun}${number === 1 ? "" : "s"}`;
 
 document.getElementById("title").textContent = story.title;
-document.getElementById("subtitle").textContent = [
-  robot ? `robot ${robot.name}, ${count(robot.joints.length, "joint")}` : "",
-  count(story.obstacles.length, "obstacle"),
-  story.goal ? `goal: ${story.goal}` : "",
-].filter((text) => text).join("  \u00b7  ");
+
+/** The line below the heading. */
+function saySubtitle(obstacles, goal) {
+  document.getElementById("subtitle").textContent = [
+    robot ? `robot ${robot.name}, ${count(robot.joints.length, "joint")}` : "",
+    robot || obstacles ? count(obstacles, "obstacle") : "",
+    goal ? `goal: ${goal}` : "",
+  ].filter((text) => text).join("  \u00b7  ");
+}
+saySubtitle(story.obstacles.length, story.goal);
 
 // What search.js does, in pages of a planner's search and of two joints.
 const growing = [];  // trees as they grow
 let onPosture = () => {};
-let dropSearch = () => {};
+let showSearchOf = () => {};
 let showShare = (share) => { if (total > 0) show(total * share); };  // of a film
 
 // Joints -----------------------------------------------------------------------------------------------------------
@@ -71,7 +76,8 @@ function buildJoints() {
   const header = make("tr", {}, ...heads.map((textContent, k) => make("th", { textContent, className: k % 3 ? "number" : "" })));
   const table = document.getElementById("joints");
   table.classList.toggle("still", story.moves.length === 0);
-  table.append(header, ...robot.joints.map(addJointRow));
+  jointRows.length = 0;
+  table.replaceChildren(header, ...robot.joints.map(addJointRow));
 }
 
 function showJoints(q, move, moving) {

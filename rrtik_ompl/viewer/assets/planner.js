@@ -31,6 +31,7 @@ const planRefusal = (text, { mild = false } = {}) => {
 
 // The picture ------------------------------------------------------------------------------------------------------
 function moveGhost(end, q, free) {
+  if (story[`${end}_ghost`]) story[`${end}_ghost`] = q;
   const name = ENDS.get(end);
   const color = !free ? "#c2185b" : farEnd === end ? OUT_OF_REACH : story.colors[end];
   if (!viewer.scene_tree.find([...ROOT, name]).object.children.length) addGhost(name, color, q);
@@ -143,8 +144,8 @@ function showPath() {
   sayTitle(story.moves.length ? `path of ${count(story.moves.length, "move")}` : "no path");
   if (!judged) {
     dropBefore();
-    dropSearch();
   }
+  showSearchOf({ first: judged, sameObstacles: planning.obstacles.every((_, k) => isAtFirst(k)) });
   document.getElementById("clearance-section").hidden = !(judged && story.clearance);
   sayProof(judged ? story.proof : story.moves.length ? OWN_PROOF : null);
   showClearance = judged ? given.showClearance : () => {};
@@ -154,6 +155,35 @@ function showPath() {
 }
 
 // The state --------------------------------------------------------------------------------------------------------
+/** Whether an obstacle is as in the beginning: one that the page can add is not there. */
+function isAtFirst(k) {
+  const { spare, first } = planning.obstacles[k];
+  const { pose, sizes, shown } = state.obstacles[k];
+  return shown ? !spare && sameNumbers(pose, first.pose) && sameNumbers(sizes, first.sizes) : Boolean(spare);
+}
+
+obstaclesNow = () => {
+  const removed = planning.obstacles.filter(({ spare }, k) => !spare && !state.obstacles[k].shown).map(({ name }) => name);
+  const added = planning.obstacles.filter(({ spare }, k) => spare && state.obstacles[k].shown);
+  return [...story.obstacles.filter(({ name }) => !removed.includes(name)), ...added.map((each) => ({ ...each, color: drawnColor(each) }))];
+};
+goalNow = () => (sameNumbers(state.goal, planning.goal) ? story.goal : "joint values");
+
+let listed = "";  // names of the obstacles in the tree
+/** Heading, tree, goal and table of solutions say what the problem is now. */
+function showProblem() {
+  const obstacles = obstaclesNow();
+  const names = obstacles.map(({ name }) => name).join("\n");
+  if (listed && names !== listed) buildTree();
+  listed = names;
+  saySubtitle(obstacles.length, goalNow());
+  applyEyes("goal");
+  if (story.ghosts.length > 1) {
+    const k = markSolution(state.goal);
+    document.getElementById("plan-goal").value = k < 0 ? "" : k;
+  }
+}
+
 /** Keep the state and the path that is shown for it, if there is one by now. */
 function remember() {
   const { waypoints, moves, times, contacts } = story;
@@ -223,6 +253,7 @@ function changed() {
 function plan() {
   shortening += 1;
   pathIsOfState = false;
+  showProblem();
   const begin = performance.now();
   const blocked = [...ENDS.keys()].filter((end) => !showFree(end));
   viewer.set_dirty();

@@ -113,6 +113,8 @@ function newPath() {
     viewer.set_3d_pane_size();
   }
   scrub.max = total;
+  const hadSliders = document.getElementById("joints").classList.contains("still");
+  if (story.moves.length && hadSliders) buildJoints();
   addTicks();
   if (!run && !story.timed) buildMoves(goTo);
   for (const control of [scrub, ...document.querySelectorAll("#buttons button")]) control.disabled = story.moves.length === 0;

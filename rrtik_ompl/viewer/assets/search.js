@@ -160,10 +160,14 @@ function buildJointSpace() {
 
   const grown = growing.filter(({ edges }) => edges).map((part) => ({ ...part, element: put("path", { class: "tree", stroke: part.color }) }));
   const route = put("path", { class: "route" });
-  const dot = (kind, q) => { const [cx, cy] = at(q); return put("circle", { class: kind, cx, cy, r: PLOT_DOT }); };
-  if (story.start_ghost) dot("start", story.start_ghost);
-  if (story.goal_ghost) dot("goal", story.goal_ghost);
-  const here = dot("here", story.waypoints[0]);
+  const moveDot = (dot, q) => {
+    const [cx, cy] = at(q);
+    dot.setAttribute("cx", cx);
+    dot.setAttribute("cy", cy);
+  };
+  const newDot = (kind) => put("circle", { class: kind, r: PLOT_DOT });
+  const ends = ["start", "goal"].filter((end) => story[`${end}_ghost`]).map((end) => [newDot(end), `${end}_ghost`]);
+  const here = newDot("here");
 
   drawJointSpace = () => grown.forEach(({ edges, steps, element }) => {
     const rows = found.tree.vertices;
@@ -171,9 +175,8 @@ function buildJointSpace() {
   });
   return (q) => {
     route.setAttribute("d", line(story.waypoints));
-    const [cx, cy] = at(q);
-    here.setAttribute("cx", cx);
-    here.setAttribute("cy", cy);
+    ends.forEach(([dot, end]) => moveDot(dot, story[end]));
+    moveDot(here, q);
   };
 }
 
@@ -193,12 +196,15 @@ if (found.tree) {
   };
 }
 
-/** Of another problem than the one that was searched nothing is shown. */
-dropSearch = () => {
-  stopGrowing();
-  growing.forEach(({ leaf }) => viewer.delete_path([...ROOT, leaf]));
-  for (const id of ["search-section", "joint-space-section"]) document.getElementById(id).hidden = true;
-  growing.length = 0;
-  onPosture = () => {};
+/** The trees are shown with the path that they found, the joint space with each path among the same obstacles. */
+const grownTrees = [...growing];
+showSearchOf = ({ first, sameObstacles }) => {
+  document.getElementById("joint-space-section").hidden = !found.joints || !sameObstacles;
+  if (!found.tree || first === (growing.length > 0)) return;
+  if (!first) stopGrowing();
+  growing.splice(0, growing.length, ...(first ? grownTrees : []));
+  grownTrees.forEach(({ leaf }) => setVisible([leaf], first));
+  document.getElementById("search-section").hidden = !first;
+  document.querySelectorAll("#joint-space .tree").forEach((tree) => { tree.style.display = first ? "" : "none"; });
   buildTree();
 };

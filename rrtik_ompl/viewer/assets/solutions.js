@@ -1,13 +1,24 @@
 // Solutions of inverse kinematics: a table beside the picture; a click brings the arm to one, which is the goal of a page that plans.
+const SAME_SOLUTION = 1e-6;  // [rad or m]; a goal is put inside the limits, from where rounding left it
+
+/** Mark the solution at a configuration, or none where it is no solution; its number, -1 for none. */
+function markSolution(q) {
+  const found = story.ghosts.findIndex((ghost) => ghost.q.every((value, j) => Math.abs(value - q[j]) < SAME_SOLUTION));
+  document.querySelectorAll("#solutions tr").forEach((row, n) => row.classList.toggle("moving", n === found + 1 && n > 0));
+  return found;
+}
+
 function showSolution(k) {
-  document.querySelectorAll("#solutions tr").forEach((row, n) => row.classList.toggle("moving", n === k + 1));
   const { q } = story.ghosts[k];
   if (story.plan) {
     const list = document.getElementById("plan-goal");
     now = Infinity;  // a new path is shown at its end
     list.value = k;
     list.dispatchEvent(new Event("change"));
-  } else standAt(q);
+  } else {
+    standAt(q);
+    markSolution(q);
+  }
 }
 
 function buildSolutions() {

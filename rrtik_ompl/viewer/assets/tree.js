@@ -7,6 +7,8 @@ const UNFOLDED = ["ghosts", "obstacles", "trails", "search", "contacts", "marks"
 const FEW_COURSES = 3;  // more are a heap, and hidden at first
 const LONG_LIST = 12;  // groups with more rows are folded at first
 const things = [];
+let obstaclesNow = () => story.obstacles;  // pages that plan add some, and remove others
+let goalNow = () => story.goal;  // in words; what is dragged has another one
 
 /** A row of the tree; `show` is called with whether the thing is to be seen. */
 function addThing(group, text, show, { color = null, opacity = 1, on = true } = {}) {
@@ -94,9 +96,9 @@ function listThings() {
   drawnGhosts.forEach(({ name, color }) => addThing("ghosts", name, toggles(name), { color, opacity: 0.6 }));
   addTrails();
   growing.forEach(({ name, color, leaf }) => addThing("search", name, toggles(leaf), { color }));
-  if (story.goal && story.goal !== "joint values") addThing("goal", story.goal, toggles("goal"), { color: colors.goal });
+  if (story.goal && story.goal !== "joint values") addThing("goal", story.goal, (on) => setVisible(["goal"], on && goalNow() === story.goal), { color: colors.goal });
   if (node("constraints").children.length) addThing("goal", "path constraints", toggles("constraints"));
-  for (const { name, node: leaf, color } of story.obstacles) {
+  for (const { name, node: leaf, color } of obstaclesNow()) {
     addThing("obstacles", name, (on) => setSeen(["obstacles", leaf], on), { color });
   }
   const courses = node("later").children.length;
