@@ -20,7 +20,6 @@ ON_SCREEN = """(([x, y, z]) => {
 })(%s)"""
 REFUSAL = "document.getElementById('plan-refusal').textContent"
 CTRL = 2
-BALL, WALL, WEDGE = range(3)
 
 
 @pytest.fixture(scope="module")
@@ -43,7 +42,7 @@ def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
 def browser(opened: Browser) -> Browser:
     opened.ask(RESET)
     opened.ask(IDLE)
-    opened.ask("showUndo()")
+    opened.ask("showUndo(); showProblem()")
     return opened
 
 
