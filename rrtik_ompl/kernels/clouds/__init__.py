@@ -1,1 +1,1 @@
-"""Clouds of points in kernels: the tree that they walk, and which of its points are near."""
+"""Clouds of points in kernels: the tree that they walk, which of its points are near, and depth pictures."""
