@@ -24,7 +24,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tests" / "helpers"
 HostileArm: Any = import_module("rrtik_tests.hostile_arm").HostileArm
 SimulatedArm: Any = import_module("rrtik_ompl.pilot.devices.arm").SimulatedArm
 
-WAYS = ("jog", "go", "next", "together", "servo", "lead")
+WAYS = ("jog", "go", "next", "together", "servo", "lead", "tool")
 ERRS = {
     "other": "moves other joints",
     "reverse": "goes the wrong way",
@@ -104,6 +104,8 @@ def _ready(session: Session, way: str) -> tuple[str, dict[str, float], Any]:
     session.see([seen], 0.0)
     session.command("grasp", 0.0, type="aslant", level=1)
 
+    if way == "tool":
+        return "tool", {"direction": -1.0}, seen
     if way == "jog":
         return "jog", {"direction": 1.0}, seen
     if way == "go":

@@ -28,6 +28,9 @@ def state_document(session: Session) -> dict[str, Any]:
         "mode": session.mode,
         "message": session.message,
         "level": session.level.value,
+        "alarms": [
+            {"at": round(time, 2), "age": round(session.time - time, 1), "text": text} for time, text in state.alarms
+        ],
         "fault_of_arm": known.fault,
         "stopped": state.stopped,
         "picture_age": None if not np.isfinite(age) else round(age, 3),

@@ -10,7 +10,7 @@ import pinocchio as pin
 
 from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.model.robot import Robot
-from rrtik_ompl.pilot.events import Answer, Effect, Stop, news
+from rrtik_ompl.pilot.events import Answer, Effect, Level, Stop, news
 from rrtik_ompl.pilot.feasibility import FeasibilityCache
 from rrtik_ompl.pilot.interlock import MANOEUVRE, Sight
 from rrtik_ompl.pilot.routes.follower import MADE, Follower, Progress, Track
@@ -28,6 +28,7 @@ MIN_CHANGE = 1e-4  # [rad or m]; smaller changes of a reading are noise
 LEASH_SECONDS = 0.1  # largest lead of a set point over the arm, as time at the present speed
 # It may always be this far ahead, as time at the joint's rate: arms that stick, or whose encoders are coarse, need it.
 LEAST_LEASH_SECONDS = 0.05
+MAX_ALARMS = 12  # that are listed
 HOLD_SECONDS = 0.25  # a drive ends if it is not renewed within this time
 # Duration of the motion that the first command of a press asks for: a short tap moves the arm this far.
 FIRST_SECONDS = 0.04
@@ -267,6 +268,7 @@ class State:
         target: Name of the chosen object; None if none is chosen.
         choice: Type and level of the chosen grasp; None if none is chosen.
         answer: The last message to the pilot, and its level.
+        alarms: The last alarms, each with its time [s], the newest at the end.
         sight: What the page of the pilot had shown when the last command was given; None without a page.
         pictures: What the pictures have shown.
         check: Comparison of camera and joints.
@@ -298,6 +300,7 @@ class State:
     target: str | None = None
     choice: tuple[str, int] | None = None
     answer: Answer = field(default_factory=lambda: news(""))
+    alarms: tuple[tuple[float, str], ...] = ()
     sight: Sight | None = None
     pictures: Pictures = field(default_factory=Pictures)
     check: ArmCheck = field(default_factory=ArmCheck)
@@ -329,8 +332,12 @@ class State:
         return replace(self, due=(*self.due, *effects))
 
     def say(self, answer: Answer | None) -> State:
-        """Return the state with a message to the pilot; None keeps the last one."""
-        return self if answer is None else replace(self, answer=answer)
+        """Return the state with a message to the pilot; None keeps the last one. New alarms are also listed."""
+        if answer is None:
+            return self
+        is_new = answer.level is Level.ALARM and answer != self.answer
+        alarms = (*self.alarms, (self.time, answer.text))[-MAX_ALARMS:] if is_new else self.alarms
+        return replace(self, answer=answer, alarms=alarms)
 
     def at_rest(self) -> State:
         """Return the state without a drive; the arm is stopped if it was driven."""

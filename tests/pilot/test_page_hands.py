@@ -5,9 +5,11 @@ import time
 import numpy as np
 import pytest
 
+from rrtik_ompl.pilot.devices.arm import DEFAULT_RATE
 from rrtik_ompl.pilot.setup import SessionOptions
 from rrtik_tests.browser import Running
 from rrtik_tests.pilot_hands import PAD
+from rrtik_tests.pilot_session import drive_at
 
 CUT_OFF = """
 [...document.querySelectorAll("#joints th, #joints td, #depth dd, .hands > *, .buttons button, #stop, header > *")]
@@ -36,6 +38,7 @@ def page(tab, running):
     session = running.opened.engine.session
     session.arm.stop()
     session.arm._q[:] = session.means.problem.start
+    drive_at(session, DEFAULT_RATE)  # a supervisor that has not seen the arm leap there
     tab.call("Page.reload")
     time.sleep(0.3)
     tab.wait("state && state.lamps.length === 6 && role.role === 'pilot' && !state.trouble && picture")
@@ -121,6 +124,18 @@ def test_what_is_held_to_move_the_arm_is_44_pixels_or_larger_and_moves_the_tool(
     page.hold("s", "state.message === 'the tool moves along its axis' && Math.abs(state.joints[1].value - 19) > 0.5")
     page.wait("!state.driving")
     assert begin.actInv(session.robot.fk(session.q)).translation[2] < -0.005  # back
+
+
+def test_alarms_are_listed_with_the_time_of_day_until_they_are_read(page, running):
+    session = running.opened.engine.session
+    said = len(session.state.alarms)
+    running.server.commands.put((0, {"name": "halt"}))
+    page.wait(f"state.alarms.length > {said} && byId('alarms_open').className === 'bad'")
+    page.press("q")
+    page.wait("!byId('alarms').hidden && byId('alarms_open').className === ''")
+    assert page.ask("/^\\d\\d:\\d\\d:\\d\\d  the pilot has left/.test(byId('alarms').firstChild.textContent)")
+    page.press("q")
+    page.wait("byId('alarms').hidden")
 
 
 def test_who_watches_may_stop_the_arm_and_the_button_is_large(page):

@@ -11,9 +11,11 @@ from rrtik_ompl.base.poses import pose
 from rrtik_ompl.model.scene import Obstacle
 from rrtik_ompl.model.shapes import Box
 from rrtik_ompl.pilot.devices.arm import SimulatedArm
+from rrtik_ompl.pilot.events import alarm, news
 from rrtik_ompl.pilot.interlock import CHOOSING, FOLLOWING, MANOEUVRE, PROPOSED
 from rrtik_ompl.pilot.record import Record, read_record
 from rrtik_ompl.pilot.session import Session
+from rrtik_ompl.pilot.state import MAX_ALARMS
 from rrtik_ompl.sensing.markers.marker_map import MarkedObject, MountedMarker
 from rrtik_ompl.sensing.scene_from_view import SeenObject
 from rrtik_tests.pilot_session import PLACE, PROBLEM, ROBOT, VALVE, arrived, follow, hold, session
@@ -175,3 +177,14 @@ def test_a_record_repeats_the_session(tmp_path):
         list(read_record(tmp_path / "bad.jsonl"))
     with pytest.raises(InputError, match="missing"):
         list(read_record(tmp_path / "missing.jsonl"))
+
+
+def test_alarms_are_kept_once_each_with_their_time():
+    made, _ = session()
+    for number in range(20):
+        made.see([], float(number))
+        made.say(alarm(f"fault {number}"))
+        made.say(alarm(f"fault {number}"))
+        made.say(news("all is well"))
+    assert len(made.state.alarms) == MAX_ALARMS
+    assert made.state.alarms[-1] == (19.0, "fault 19")

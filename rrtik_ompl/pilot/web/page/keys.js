@@ -37,12 +37,13 @@ const KEYS = [
   ["V", ["v"], "look from the next side", () => nextPreset()],
   ["T", ["t"], "take over, when no pilot is there", () => send("take")],
   ["H", ["h"], "hand over to a page that watches", () => send("hand_over")],
+  ["Q", ["q"], "the alarms and when they were", () => toggleAlarms()],
   ["Z", ["z"], "pause a record", () => send("pause")],
   ["?", ["?"], "these keys", () => toggleHelp()],
 ];
 const ACTIONS = new Map(KEYS.flatMap(([, keys, , act]) => (act ? keys : []).map((key) => [key, act])));
 const HELD = new Map(KEYS.filter((entry) => entry[4]).flatMap(([, keys, , , make]) => keys.map((key) => [key, make])));
-const LOOKING = new Set(["v", "+", "=", "-", "x", "[", "]", "PageUp", "PageDown", "0"]);  // while a key is held
+const LOOKING = new Set(["q", "v", "+", "=", "-", "x", "[", "]", "PageUp", "PageDown", "0"]);  // while a key is held
 const TURNS = { ArrowLeft: [-0.12, 0], ArrowRight: [0.12, 0], ArrowUp: [0, 0.08], ArrowDown: [0, -0.08] };
 const SCRUBBING = new Set(["ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown", "Home", "End", "PageUp", "PageDown"]);
 const REPEATED = new Set(["[", "]", "+", "=", "-"]);

@@ -102,7 +102,7 @@ function showState(said) {
   for (const item of byId("modes").children)
     item.dataset.mode === said.mode ? item.setAttribute("aria-current", "step") : item.removeAttribute("aria-current");
   if (newMessage || performance.now() > heldUntil) say(inWords(said.message) || FIRST_WORDS, said.level, 0);
-  showJoints(); showTarget(); showPostures(); showLamps(); showRoute(); showAim(); showButtons(); showLatch(); showGripper(); showViews(); showPreview(); showAge();
+  showJoints(); showTarget(); showPostures(); showLamps(); showRoute(); showAim(); showButtons(); showLatch(); showAlarms(); showGripper(); showViews(); showPreview(); showAge();
   if (said.mode !== "proposed" && playing) pausePlay();
   if (newRoute && role.role === "pilot" && !said.replay && !playing) togglePlay();
 }
@@ -344,6 +344,29 @@ function showLatch() {
   byId("latch").hidden = !isLatched();
   byId("reset").hidden = !isLatched() || role.role !== "pilot" || state.replay;
 }
+
+// The list is the server's, so that a page which comes later has it, too; which of them were read is the page's.
+let alarmsRead = null;  // time of the newest one
+
+function showAlarms() {
+  const list = byId("alarms"), button = byId("alarms_open"), count = state.alarms.length;
+  const newest = count ? state.alarms[count - 1].at : null;
+  if (!list.hidden) alarmsRead = newest;
+  button.hidden = !count;
+  button.classList.toggle("bad", newest !== alarmsRead);
+  set(button.firstChild, count === 1 ? "1 alarm" : `${count} alarms`);
+  const lines = state.alarms.map(({ age, text }) => `${new Date(Date.now() - 1000 * age).toTimeString().slice(0, 8)}  ${inWords(text)}`).reverse();
+  if (list.children.length !== count) list.replaceChildren(...lines.map(() => make("li")));
+  if (!list.hidden) lines.forEach((line, k) => set(list.children[k], line));
+}
+
+function toggleAlarms() {
+  if (!state?.alarms.length) return;
+  byId("alarms").hidden = !byId("alarms").hidden;
+  byId("alarms_open").setAttribute("aria-expanded", String(!byId("alarms").hidden));
+  showAlarms();
+}
+byId("alarms_open").onclick = toggleAlarms;
 
 function showGripper() {
   const { closed, holds } = state.gripper;
