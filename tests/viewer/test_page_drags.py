@@ -1,6 +1,7 @@
 """Hands in a page that plans: what follows the pointer, how near a ghost comes, and what undo gives back."""
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -43,6 +44,23 @@ def opened(tmp_path_factory: pytest.TempPathFactory, problem: rrtik.Problem) -> 
     text = page(problem, rrtik.plan(problem, seed=1).path)
     with planning_page(text, tmp_path_factory.mktemp("drags")) as browser:
         yield DragPage(browser)
+
+
+@needs_chromium
+def test_the_triangles_of_a_ghost_are_drawn_once_for_its_depth_and_once_for_its_glass(
+    problem: rrtik.Problem, tmp_path: Path
+) -> None:
+    with planning_page(page(problem, rrtik.plan(problem, seed=1).path), tmp_path) as browser:
+        counts = browser.ask("""["start ghost", "goal ghost", "robot"].map((name) => {
+          const drawn = () => { viewer.render(); return viewer.renderer.info.render.triangles; };
+          handles.visible = handsHidden = true;
+          drawn();  // shadows, too
+          const all = drawn();
+          node(name).traverse((item) => { if (item.isMesh) item.layers.disable(0); });
+          return all - drawn();
+        })""")
+    assert counts[0] == counts[1] > 0
+    assert counts[0] <= 2 * counts[2]
 
 
 @needs_chromium

@@ -203,9 +203,17 @@ function tintGlass(glass, color) {
   return glass;
 }
 
+// three.js draws what is transparent and has two sides twice, and looks for its programs anew each time. Of a ghost the nearest
+// surface alone is seen: it is called transparent when things are put in order, and opaque while it is drawn, with the same blending.
+const DRAWN_ONCE = {
+  onBeforeRender: (...[, , , , material]) => { material.transparent = false; },
+  onAfterRender: (...[, , , , material]) => { material.transparent = true; },
+};
+const GLASS = { blending: THREE.CustomBlending, blendSrcAlpha: THREE.OneFactor, blendDstAlpha: THREE.OneMinusSrcAlphaFactor };
+
 function addGhost(name, color, q) {
   const depth = new THREE.MeshBasicMaterial({ colorWrite: false, transparent: true });
-  const glass = tintGlass(new THREE.MeshLambertMaterial({ transparent: true, opacity: 0.55, depthWrite: false }), color);
+  const glass = tintGlass(new THREE.MeshLambertMaterial({ transparent: true, opacity: 0.55, depthWrite: false, ...GLASS }), color);
   const ghost = new THREE.Group();
   ghostCount += 1;
   [depth, glass].forEach((material, pass) => {
@@ -213,7 +221,7 @@ function addGhost(name, color, q) {
     const copy = node("robot").clone(true);
     const tipFrame = copy.getObjectByName("tip frame");
     if (tipFrame) tipFrame.parent.remove(tipFrame);
-    copy.traverse((item) => { if (item.isMesh) Object.assign(item, { material, renderOrder: pass + 1, castShadow: false }); });
+    copy.traverse((item) => { if (item.isMesh) Object.assign(item, { material, renderOrder: pass + 1, castShadow: false, ...DRAWN_ONCE }); });
     setPosture(copy, q);
     ghost.add(copy);
   });
