@@ -125,7 +125,10 @@ def test_what_keeps_a_ghost_back_stands_beside_the_hand_within_the_picture_and_i
 
 def test_a_goal_in_an_obstacle_says_so_beside_the_hand_and_by_the_player(browser: Browser) -> None:
     browser.ask("state.obstacles[0].pose = rowsOf(poseOf('goal')); applyObstacle(0); changed()")
-    held_goal(browser, lambda spot: [spot[0] + 6.0, spot[1]])
+    browser.ask(IDLE)
+    browser.ask("viewer.render()")  # a press meets what is where it is drawn
+    held_goal(browser, lambda spot: [spot[0] + 12.0, spot[1]])
+    browser.wait("labels.some(({ kind }) => kind === 'reach')", 20.0)
     browser.ask(IDLE)
     lines = browser.ask(LINES)
     beside = browser.ask(BESIDE_HAND)
