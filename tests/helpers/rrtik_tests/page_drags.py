@@ -24,7 +24,7 @@ SCRIPT = Path(__file__).with_suffix(".js").read_text(encoding="utf-8")
 STEPS = 3  # of the pointer in a drag
 LENGTHS = 0.02, 0.4  # of a drag, beside the size of what is shown
 PIXELS = 10.0, 120.0  # of a drag of a handle
-NEAR = 1e-3, np.deg2rad(0.1)  # so near, a tip is where the pointer has asked for it: [m], [rad]
+NEAR = 2e-4, np.deg2rad(0.1)  # so near, a tip is where the pointer has it: of the size of what is shown, [rad]
 ENDS = "start", "goal"
 RESET = "drags.reset()"
 IDLE = "drags.says()"  # once the page has done what its state asks for
@@ -150,7 +150,7 @@ class DragPage:
         followed = None
         if wanted.thing in ENDS and not wanted.by_handle:
             gap = self.browser.ask(f"drags.gap({json.dumps(wanted.thing)}, {spot['way']})")
-            followed = bool(gap[0] < NEAR[0] and gap[1] < NEAR[1])
+            followed = bool(gap[0] < NEAR[0] * self.first["size"] and gap[1] < NEAR[1])
         text = f"{said['text']} {said['refusal']}".strip()
         return Drag(wanted, outcome(problem, said, titled=self.handles), text, followed, said)
 
