@@ -55,7 +55,9 @@ TAKERS = {  # what takes a motion and a robot: how it is called
     "time_parameterize in a world": lambda names, task, file: rrtik.time_parameterize(
         path(names), LIMITS, blend=0.05, world=task.world
     ),
-    "film": lambda names, task, file: rrtik.film(task, file.with_suffix(".gif"), path(names), rate=5, size="160x120"),
+    "film": lambda names, task, file: rrtik.film(
+        task, file.with_suffix(".gif"), path(names), rate=5, seconds=0.4, size="160x120"
+    ),
     "picture": lambda names, task, file: rrtik.picture(task, file.with_suffix(".png"), path(names), size="160x120"),
     "view of a path before": lambda names, task, file: subject_of(task, path(NAMES), path(names)),
     "view of a trajectory": lambda names, task, file: subject_of(task, motion(names)),
