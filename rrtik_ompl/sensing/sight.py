@@ -25,6 +25,7 @@ from rrtik_ompl.sensing.markers.corner_pose import (
 from rrtik_ompl.sensing.markers.detection import SeenMarker, find_markers
 from rrtik_ompl.sensing.markers.marker_map import MarkedObject, MarkerMap, MountedMarker
 
+_GREEN_ENOUGH = 0.5  # least share of the mean of the brightest channel
 MIN_SIDE_PIXELS = 12.0  # two pixels for each cell of the coarsest dictionaries
 MAX_REPROJECTION_ERROR = 2.0  # [pixels]; a larger error of the corners means a wrong map or a wrong number
 # The same as a share of a single marker's side: bent sheets deviate by this much, and their covariance shows it.
@@ -62,7 +63,9 @@ class Sighting:
 
 
 def as_gray(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Convert a picture, (height, width) or (height, width, 3 or 4; blue, green, red), to grey values.
+    """Return the grey values of a picture, (height, width) or (height, width, 3 or 4; blue, green, red).
+
+    They are those of green light alone, unless there is little of it.
 
     Raises:
         InputError: If the array is not such a picture.
@@ -72,6 +75,11 @@ def as_gray(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
         raise InputError(f"a picture has 8 bits and 1, 3 or 4 channels; got {array.dtype} of shape {array.shape}")
     if array.ndim == 2:
         return np.ascontiguousarray(array)
+
+    # A lens shows red and blue light at other places than green, so the sum of all has fringes.
+    brightness = array[:: max(len(array) // 64, 1), :, :3].mean(axis=(0, 1))
+    if brightness[1] >= _GREEN_ENOUGH * brightness.max():
+        return np.ascontiguousarray(array[:, :, 1])
 
     import cv2
 

@@ -8,9 +8,11 @@ from hypothesis import strategies as st
 
 from rrtik_bench.sensing.synthetic_camera import clean_picture, marker_print, photograph, published_camera
 from rrtik_ompl.base.errors import InputError, UnknownNameError
+from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.markers.corner_pose import pose_of_square, square_corners
 from rrtik_ompl.sensing.markers.detection import dictionaries_seen, find_markers
 from rrtik_ompl.sensing.markers.dictionaries import DICTIONARIES, marker_cells
+from rrtik_ompl.sensing.sight import as_gray
 from rrtik_tests.marker_views import CAMERA, SIDE, facing, picture_of
 
 
@@ -69,6 +71,29 @@ def test_near_markers_lie_where_they_are_within_what_is_said():
         assert middle @ np.linalg.solve(spread, middle) < 16.0
         found = pose_of_square(CAMERA, marker.corners, SIDE, spread=marker.spread)
         assert np.linalg.norm(found.T_camera_object.translation - T.translation) < 4.0 * found.position_sigma
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_marker_that_fills_the_picture_lies_where_it_is_within_what_is_said(seed):
+    camera = Camera([[900.0, 0.0, 319.5], [0.0, 900.0, 239.5], [0.0, 0.0, 1.0]], 640, 480)
+    T = facing([0.4, 0.3 - 0.2 * seed, 0.1], [0.002, -0.001, 0.2 + 0.01 * seed])
+    clean = clean_picture(camera, [(T, marker_print(marker_cells("4x4_50", 7), SIDE))], rays=6)
+    (marker,) = find_markers(photograph(clean, np.random.default_rng(seed)), "4x4_50")
+    true = camera.project(square_corners(SIDE) @ T.rotation.T + T.translation)
+    error = (marker.corners - true).ravel()
+    assert marker.side > 300.0
+    assert np.sqrt(np.mean(error**2)) < 0.1  # [pixels]
+    assert error @ np.linalg.solve(marker.spread, error) < 20.1  # 99 % of a chi-squared variable of eight numbers
+
+
+def test_a_fringe_of_colour_moves_no_marker():
+    T = facing([0.4, 0.2, 0.1], [0.1, -0.1, 1.0])
+    green = picture_of([(7, T)])
+    red, blue = (np.roll(green, shift, axis=1) for shift in (1, -2))
+    (alone,) = find_markers(as_gray(green), "4x4_50")
+    (marker,) = find_markers(as_gray(np.dstack([blue, green, red])), "4x4_50")
+    assert (marker.corners == alone.corners).all()
+    assert (as_gray(np.dstack([0 * green, green // 8, green])) > green // 8).any()  # red light alone is enough, too
 
 
 def test_a_marker_seen_from_the_front_is_ambiguous_and_a_tilted_one_is_not():

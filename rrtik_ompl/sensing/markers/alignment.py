@@ -28,7 +28,7 @@ MAX_CELL_ERROR = 0.3
 _MAX_CORNER_SHIFT = 0.25  # share of a side; the detector sometimes returns inner edges instead of outer ones
 # Range of pixels per cell in the ideal picture. It should be near the cell's size in the camera's picture, because
 # coarser sampling shifts the corners.
-_CELL_PIXELS = (3, 26)
+_CELL_PIXELS = (3, 64)
 # The same for a piece of a chessboard, whose few edges must suffice to estimate the tone.
 _SQUARE_PIXELS = (3, 80)
 _RIM_CELLS = 0.5  # width of the white rim that is used; farther out the background blurs into it

@@ -24,7 +24,8 @@ Pixels = NDArray[np.float32]
 FLOOR = 0.02  # [pixels]; error in a picture without noise, by sampling, rounding, and the shape of the blur
 # [pixels]; possible displacement of the whole marker, multiplied by the share of samples that are clipped at white.
 CUT_SHIFT = 0.12
-_FEW = 48  # sufficient number of samples along a side
+# Samples along a side from which on only some of them are used; edges fall between the samples where they are few.
+_FEW = 320
 _TINY = 1e-6  # relative regularisation: parameters that the marker cannot determine stay 0
 _BLOCKS = 4  # along a side
 _ALIKE = np.kron(np.ones((4, 4)), np.eye(2))  # covariance pattern of a common displacement of all four corners
