@@ -207,10 +207,13 @@ def fill(report: Report, dragged: dict[str, Dragged]) -> None:
 
 def cells(beside: Beside) -> list[str]:
     """Numbers of the table of both checkouts."""
-    followed, asked, solved, paths = (
-        f"{here} / {there}" for here, there in (beside.followed, beside.asked, beside.solved, beside.paths)
-    )
-    return [f"{beside.made[0]}", followed, asked, f"{beside.states}", solved, paths]
+
+    def both(counts: list[int]) -> str:
+        here, there = counts
+        return f"{here} / {there}"
+
+    asked = [both(beside.followed), both(beside.asked)]
+    return [f"{beside.made[0]}", *asked, f"{beside.states}", both(beside.solved), both(beside.paths)]
 
 
 def main(

@@ -56,9 +56,10 @@ class Kind:
     command: str = ""
 
 
-# The first row whose words a file says is its kind: a problem with a section "run" is a scenario.
 PLY_FACES = "element face"
 PLY_HEAD = 4096  # [bytes]
+
+# The first row whose words a file says is its kind: a problem with a section "run" is a scenario.
 KINDS = MappingProxyType(
     {
         "Certificate": Kind(

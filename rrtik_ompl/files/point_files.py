@@ -145,7 +145,13 @@ def coordinates(rows: NDArray[Any]) -> NDArray[Any]:
 
 def is_ply_mesh(data: bytes) -> bool:
     """Check whether the header of a PLY file announces faces, so that its points are not all there is."""
-    return re.search(rb"\nelement face 0*[1-9]", data.partition(PLY_END)[0]) is not None
+    return stated_faces(data) > 0
+
+
+def stated_faces(data: bytes) -> int:
+    """Return how many faces the header of a PLY file states; 0 if it states none."""
+    stated = re.search(rb"\nelement face (\d+)", data.partition(PLY_END)[0])
+    return 0 if stated is None else int(stated[1])
 
 
 def ply_points(data: bytes, what: str) -> NDArray[Any]:

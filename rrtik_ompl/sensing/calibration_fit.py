@@ -121,7 +121,9 @@ def refined(views: Sequence[View], camera: Camera, poses: Sequence[pin.SE3], fre
         new_cost = np.inf if moved is None else _cost(views, moved, turned, prior)
         if moved is not None and new_cost < cost:
             gain = (cost - new_cost) / cost
-            camera, poses, cost = moved, turned, new_cost
+            camera = moved
+            poses = turned
+            cost = new_cost
             damping *= 0.1
             if gain < _CONVERGED:
                 break

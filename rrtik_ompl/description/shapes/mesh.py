@@ -22,7 +22,7 @@ from rrtik_ompl.base.errors import EmptyMeshError, InputError, MeshWarning
 from rrtik_ompl.description.package_path import MESH_SUFFIXES
 from rrtik_ompl.description.shapes.by_trimesh import joined, meshes_in, triangles_of
 from rrtik_ompl.files.notice import tell_once
-from rrtik_ompl.files.point_files import ply_mesh
+from rrtik_ompl.files.point_files import ply_mesh, stated_faces
 from rrtik_ompl.files.text import file_name, read_bytes
 from rrtik_ompl.geometry.collision.solids import bvh, mesh_arrays
 from rrtik_ompl.model.shapes import Mesh
@@ -41,7 +41,6 @@ _VERTEX = re.compile(rb"^([ \t]*v[ \t]+)(\S+)[ \t]+(\S+)[ \t]+(\S+)", re.MULTILI
 _BY_TRIMESH = (".ply", ".glb", ".gltf")  # assimp reads beyond the end of a PLY that is cut off
 _OF_SEVERAL = (".obj", ".dae")  # kinds of files that may hold several parts
 _TEXT = re.compile(rb"ply\s+format ascii\b")
-_FACES = re.compile(rb"ply\b(?:(?!\nend_header\b)[\s\S])*?\nelement face (\d+)")
 _PART = re.compile(rb"^[ \t]*(usemtl|mtllib|g|o)\b.*$", re.MULTILINE)
 # Matches in a DAE what is no number in a list of whole numbers; assimp reads it for ever, until the memory is full.
 _NO_INDEX = re.compile(rb"<(?:p|h|v|vcount)(?:\s[^>]*)?>[\s0-9-]*[^\s0-9<-]")
@@ -126,9 +125,9 @@ def load_surface(path: Path, scale: Vector) -> coal.BVHModelBase:
         raise InputError(f"{path}: not a usable mesh: a list of indices holds what is no number; export it again")
 
     scale = scale * stated_unit(path, data)
-    surface = _by_trimesh(path, scale) if kind in _BY_TRIMESH else _by_assimp(path, scale)
+    surface = _by_trimesh(path, data, scale) if kind in _BY_TRIMESH else _by_assimp(path, scale)
     if kind in _OF_SEVERAL and _unused(surface):
-        surface = _of_one_part(data, scale) if kind == ".obj" else _by_trimesh(path, scale)
+        surface = _of_one_part(data, scale) if kind == ".obj" else _by_trimesh(path, data, scale)
     size = np.abs(bounded_array(surface.vertices(), (None, 3), f"{path}: vertices")).max(axis=0) / np.abs(scale)
     coarse = float((np.spacing(size.astype(np.float32)) * np.abs(scale)).max())
     extent = float((np.ptp(surface.vertices(), axis=0)).max())
@@ -164,10 +163,10 @@ def _of_one_part(data: bytes, scale: Vector) -> coal.BVHModelBase:
     return _by_assimp_from(_PART.sub(b"", data), scale)
 
 
-def _by_trimesh(path: Path, scale: Vector) -> coal.BVHModelBase:
-    """Read a PLY, or a file of several parts."""
-    data = read_bytes(path, MAX_BYTES)
-    if path.suffix.lower() == ".ply" and not _TEXT.match(data):
+def _by_trimesh(path: Path, data: bytes, scale: Vector) -> coal.BVHModelBase:
+    """Read a PLY, or a file of several parts, whose bytes are given, too."""
+    is_ply = path.suffix.lower() == ".ply"
+    if is_ply and not _TEXT.match(data):
         pieces = [_of_ply(data, path)]
     else:
         pieces = [triangles_of(mesh) for mesh in meshes_in(path)]
@@ -175,9 +174,9 @@ def _by_trimesh(path: Path, scale: Vector) -> coal.BVHModelBase:
         raise EmptyMeshError(f"{path}: not a usable mesh: no triangles in it; {AGAIN}")
 
     vertices, faces = joined(pieces, scale)
-    stated = _FACES.match(data)
-    if stated and len(faces) < int(stated[1]):
-        raise InputError(f"{path}: not a usable mesh: {len(faces)} of {int(stated[1])} faces are there; is it cut off?")
+    stated = stated_faces(data) if is_ply else 0
+    if len(faces) < stated:
+        raise InputError(f"{path}: not a usable mesh: {len(faces)} of {stated} faces are there; is it cut off?")
     if faces.min() < 0 or faces.max() >= len(vertices):
         raise InputError(f"{path}: not a usable mesh: a triangle names a vertex that is not there; {AGAIN}")
     return bvh(vertices, faces)

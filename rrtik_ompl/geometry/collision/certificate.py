@@ -275,7 +275,8 @@ def fixed_contact(bodies: tuple[Body, ...], pairs: tuple[tuple[int, int], ...]) 
         return None
     inside = Containment(bodies, meeting)
     for i, j in meeting[::-1]:
-        one, other = bodies[i], bodies[j]
+        one = bodies[i]
+        other = bodies[j]
         ends = (one.geometry, one.placement.homogeneous, other.geometry, other.placement.homogeneous)
         apart = distance(*ends, kept_apart(one, other), 2.0 * DISTANCE_TOLERANCE) is not None
         if not apart or inside.holds((i, j), np.eye(4)[None]):

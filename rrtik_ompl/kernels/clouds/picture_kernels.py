@@ -42,11 +42,20 @@ def find_cells(
         keys: The answer, room for ``count`` numbers.
         measured: Gets the number of pixels with a valid depth.
     """
-    scale, nearest, farthest = float32(numbers[0]), float32(numbers[1]), float32(numbers[2])
-    start_x, start_y, start_z = float32(numbers[3]), float32(numbers[4]), float32(numbers[5])
-    end_x, end_y, end_z = float32(numbers[6]), float32(numbers[7]), float32(numbers[8])
-    across, up = int(numbers[6]), int(numbers[7])
-    along_x, along_y, along_z = directions, row_at(directions, count, 1), row_at(directions, count, 2)
+    scale = float32(numbers[0])
+    nearest = float32(numbers[1])
+    farthest = float32(numbers[2])
+    start_x = float32(numbers[3])
+    start_y = float32(numbers[4])
+    start_z = float32(numbers[5])
+    end_x = float32(numbers[6])
+    end_y = float32(numbers[7])
+    end_z = float32(numbers[8])
+    across = int(numbers[6])
+    up = int(numbers[7])
+    along_x = directions
+    along_y = row_at(directions, count, 1)
+    along_z = row_at(directions, count, 2)
 
     valid = 0
     found = 0
@@ -77,7 +86,9 @@ def find_cells(
 @kernel
 def in_a_box(grid: Doubles, boxes: Doubles, count: int, x: float, y: float, z: float) -> bool:
     """Whether a point, in cubes of a grid whose lowest corner and side are given, is in one of some boxes."""
-    px, py, pz = grid[0] + grid[3] * x, grid[1] + grid[3] * y, grid[2] + grid[3] * z
+    px = grid[0] + grid[3] * x
+    py = grid[1] + grid[3] * y
+    pz = grid[2] + grid[3] * z
     for number in range(count):
         box = row_at(boxes, BOX_SIZE, number)
         inside = True

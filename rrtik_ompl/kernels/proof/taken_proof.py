@@ -51,7 +51,8 @@ class TakenProof:
             packed = self.packed
             if packed is None or self._bare is not bare:
                 packed = bare.for_thread(same_thread=True).with_contacts(bodies)
-                self.packed, self._bare = packed, bare
+                self.packed = packed
+                self._bare = bare
         return packed
 
     def for_thread(self, bodies: Sequence[Body]) -> TakenProof:

@@ -20,9 +20,11 @@ SERIES = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#8c
 AXES = ("#d64545", "#3a9d3a", "#3a6fd8")  # x, y, z, as of the handles; away from trail and goal
 BACKGROUND_TOP = "#f4f7f9"
 BACKGROUND_BOTTOM = "#d8e0e8"
-GRID_MIDDLE, GRID = "#a9b5c1", "#bfc9d3"
+GRID_MIDDLE = "#a9b5c1"
+GRID = "#bfc9d3"
 BACKGROUND_TOP_DARK, BACKGROUND_BOTTOM_DARK = "#2b3541", "#171d24"  # used if the system prefers dark pages
-GRID_MIDDLE_DARK, GRID_DARK = "#4d5965", "#38434f"
+GRID_MIDDLE_DARK = "#4d5965"
+GRID_DARK = "#38434f"
 
 
 def number(color: str) -> int:

@@ -22,9 +22,12 @@ class SluggishArm(SimulatedArm):
 
     def __init__(self, late=0.0, grain=0.0, stick=0.0, slow=1.0):
         super().__init__(ROBOT, PROBLEM.start)
-        self._late, self._grain, self._stick = late, np.radians(grain), np.radians(stick)
+        self._late = late
+        self._grain = np.radians(grain)
+        self._stick = np.radians(stick)
         self._rates = slow * self._rates
-        self._time, self._past = 0.0, deque([(0.0, self._q.copy())])
+        self._time = 0.0
+        self._past = deque([(0.0, self._q.copy())])
         self._moves = np.zeros(ROBOT.dof, dtype=bool)
 
     def advance(self, seconds):
