@@ -20,7 +20,7 @@ from rrtik_ompl.cli.check import check
 from rrtik_ompl.cli.demos import demos
 from rrtik_ompl.cli.drawing import checker, overlay, play, show
 from rrtik_ompl.cli.ik import inverse_kinematics
-from rrtik_ompl.cli.markers import markers
+from rrtik_ompl.cli.marker_places import markers
 from rrtik_ompl.cli.motion import list_moves, time_path
 from rrtik_ompl.cli.pilot import pilot
 from rrtik_ompl.cli.plan import plan

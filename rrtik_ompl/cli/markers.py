@@ -16,6 +16,7 @@ from rrtik_ompl.cli import FOUND
 from rrtik_ompl.cli.terminal import plural, progress, say
 from rrtik_ompl.cli.trust import with_trust
 from rrtik_ompl.files.text import check_target
+from rrtik_ompl.sensing.cameras.models import Model
 
 if TYPE_CHECKING:
     from rrtik_ompl.sensing.calibration import Board, Calibration
@@ -30,14 +31,6 @@ Dictionary = Annotated[
 ]
 BOARD_MARKER = 0.73  # default side of a board's markers, as a share of a chess square
 PICTURES, SCENES = (".png", ".jpg"), (".yaml", ".yml")
-
-
-class Model(str, Enum):
-    """The lens models (`sensing.cameras.lenses`)."""
-
-    brown = "brown"
-    rational = "rational"
-    fisheye = "fisheye"
 
 
 class Kind(str, Enum):

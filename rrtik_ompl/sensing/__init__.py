@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from rrtik_ompl.sensing.cameras.pan_tilt_zoom import PanTiltZoom as PanTiltZoom
     from rrtik_ompl.sensing.depth import cloud_from_depth as cloud_from_depth
     from rrtik_ompl.sensing.depth import cloud_from_depths as cloud_from_depths
+    from rrtik_ompl.sensing.mapping import map_markers as map_markers
     from rrtik_ompl.sensing.markers.marker_map import MarkerMap as MarkerMap
     from rrtik_ompl.sensing.rig import Rig as Rig
     from rrtik_ompl.sensing.rig import detect_in_rig as detect_in_rig
@@ -33,6 +34,7 @@ else:
             "cloud_from_depth",
             "cloud_from_depths",
         ),
+        "sensing.mapping": ("map_markers",),
         "sensing.markers.marker_map": ("MarkerMap",),
         "sensing.rig": (
             "Rig",

@@ -171,7 +171,7 @@ def sighting(camera: Camera, thing: MarkedObject, seen: Sequence[SeenMarker]) ->
     sharp_markers = [marker for marker in used_markers if marker.likeness >= MIN_LIKENESS]
     sigma = ALIGNED_SIGMA if sharp_markers else ROUGH_SIGMA
     used_markers = [
-        _straightened(camera, marker, mounted[marker.number].side) for marker in sharp_markers
+        straightened(camera, marker, mounted[marker.number].side) for marker in sharp_markers
     ] or used_markers
 
     if len(used_markers) == 1:
@@ -183,7 +183,7 @@ def sighting(camera: Camera, thing: MarkedObject, seen: Sequence[SeenMarker]) ->
             if any(marker.spread is None for marker in used_markers)
             else block_diag(*(marker.spread for marker in used_markers))
         )
-        shifts = _side_shifts([mounted[marker.number] for marker in used_markers])
+        shifts = _map_shifts([mounted[marker.number] for marker in used_markers])
         pose = pose_of_points(
             camera, np.vstack([marker.corners for marker in used_markers]), points, sigma, spread, shifts
         )
@@ -191,7 +191,7 @@ def sighting(camera: Camera, thing: MarkedObject, seen: Sequence[SeenMarker]) ->
     return Sighting(thing, pose, seen_on_object, _refusal(pose, used_markers))
 
 
-def _straightened(camera: Camera, marker: SeenMarker, side: float) -> SeenMarker:
+def straightened(camera: Camera, marker: SeenMarker, side: float) -> SeenMarker:
     """Correct the corners of a marker for the lens distortion within it; half of the correction counts as uncertain."""
     bend = lens_bend(camera, marker.corners, side)
     if marker.spread is None or not bend.any():
@@ -213,17 +213,26 @@ def _of_one(camera: Camera, marker: SeenMarker, mounted: MountedMarker, sigma: f
     rotation_lever = np.eye(6)
     rotation_lever[:3, 3:] = -pin.skew(origin_from_marker)
 
+    covariance = marker_pose.covariance
+    if mounted.covariance is not None:
+        # An error of the marker's place on the object, in the axes of the camera, turns and moves the object's origin.
+        axes = np.kron(np.eye(2), object_pose.rotation)
+        covariance = covariance + axes @ mounted.covariance @ axes.T
+
     return CornerPose(
         object_pose,
         other_object_pose,
         marker_pose.error,
         marker_pose.other_error,
-        rotation_lever @ marker_pose.covariance @ rotation_lever.T,
+        rotation_lever @ covariance @ rotation_lever.T,
     )
 
 
-def _side_shifts(markers: Sequence[MountedMarker]) -> list[Matrix]:
-    """Return the displacements of all corners by one sigma of each marker's side, shape (4 markers, 3) each [m]."""
+def _map_shifts(markers: Sequence[MountedMarker]) -> list[Matrix]:
+    """Return the displacements of all corners on the object by each uncertain number of the map, by one sigma.
+
+    These are the side of each marker, and what its pose's covariance says; shape (4 markers, 3) each [m].
+    """
     shifts = []
     for k, marker in enumerate(markers):
         if marker.side_sigma > 0.0:
@@ -231,6 +240,14 @@ def _side_shifts(markers: Sequence[MountedMarker]) -> list[Matrix]:
             from_centre = marker.corners - marker.T_object_marker.translation
             shift[4 * k : 4 * k + 4] = from_centre * marker.side_sigma / marker.side
             shifts.append(shift)
+
+        if marker.covariance is not None:
+            from_centre = marker.corners - marker.T_object_marker.translation
+            variances, axes = np.linalg.eigh(marker.covariance)
+            for direction in (axes * np.sqrt(np.maximum(variances, 0.0))).T:
+                shift = np.zeros((4 * len(markers), 3))
+                shift[4 * k : 4 * k + 4] = direction[:3] + np.cross(direction[3:], from_centre)
+                shifts.append(shift)
 
     return shifts
 

@@ -16,6 +16,7 @@ from rrtik_ompl.motion.trajectory import Trajectory
 from rrtik_ompl.pilot.overlay.film import ArmInPictures
 from rrtik_ompl.pilot.setup import SessionOptions
 from rrtik_ompl.pilot.web.server import PilotServer
+from rrtik_ompl.sensing.mapping import map_markers
 from rrtik_ompl.sensing.markers.sheets import print_board, print_markers
 from rrtik_ompl.sensing.sensor import Sensor
 from rrtik_ompl.viewer.film import film
@@ -47,6 +48,7 @@ WRAPPED = {
     "convert": [],
     "markers print": [print_markers, print_board],
     "markers calibrate": [],
+    "markers map": [map_markers],
     "markers sense": [Sensor],
 }
 
@@ -152,6 +154,12 @@ OF_COMMANDS = {  # arguments without an option, and options without an argument,
         "problems": "the folder of load_suite()",
     },
     "markers print": {"kind": "which of two functions"},
+    "markers map": {
+        **dict.fromkeys(("camera_file", "into"), "a file"),
+        "object": "its name in the file",
+        "known": "distances that are compared with what is found",
+        "every": "how much of the film",
+    },
     "markers sense": {
         **dict.fromkeys(("camera_file", "rig", "map", "task", "grasp", "picture"), "a file, or what is written to it"),
         "frames": "how much of the film",
@@ -184,6 +192,7 @@ OTHER_DEFAULTS = {  # defaults that differ, and why
     ("ik --trajectory", "position_tolerance"): "None: the goal's own",
     ("ik --trajectory", "orientation_tolerance"): "None: the goal's own",
     ("markers print", "marker"): "None: 0.73 of a square, which is 22 mm of 30",
+    ("markers map", "sides"): "none, as a word",
     ("markers sense", "smooth"): "None: but for a folder",
 }
 

@@ -68,6 +68,7 @@ BAD = {  # commands that find nothing, or that are wrong
     "convert": ["convert none.json none.csv"],
     "markers print": ["markers print sheet.pdf --numbers x"],
     "markers calibrate": ["markers calibrate none --out camera.yaml"],
+    "markers map": ["markers map none --camera-file none.yaml --out map.yaml"],
     "markers sense": ["markers sense none.png --map none.yaml"],
 }
 UNTRIED = {  # commands of which no good end is tried, and why
@@ -76,6 +77,7 @@ UNTRIED = {  # commands of which no good end is tried, and why
     "warmup": "compiles for minutes",
     "overlay": "draws photographs; it prints one line",
     "markers calibrate": "needs photographs",
+    "markers map": "needs photographs",
     "markers sense": "needs photographs",
 }
 MARKERS = [f"markers {each.name}" for each in markers.registered_commands]

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.sensing.cameras.models import Model
 
 ORIGIN = np.zeros(3)
 PINHOLE = np.eye(3)
@@ -176,8 +177,8 @@ def _radial(coefficients: Vector) -> np.poly1d:
 
 LENSES: MappingProxyType[str, Lens] = MappingProxyType(
     {
-        "brown": PolynomialLens("k1", "k2", "p1", "p2", "k3"),
-        "rational": PolynomialLens("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"),
-        "fisheye": FisheyeLens(),
+        Model.brown.value: PolynomialLens("k1", "k2", "p1", "p2", "k3"),
+        Model.rational.value: PolynomialLens("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"),
+        Model.fisheye.value: FisheyeLens(),
     }
 )

@@ -7,9 +7,11 @@ from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
+import numpy as np
 import pinocchio as pin
+from numpy.typing import ArrayLike
 
-from rrtik_ompl.base.arrays import Matrix, finite_number, frozen, not_negative
+from rrtik_ompl.base.arrays import Matrix, finite_array, finite_number, frozen, not_negative
 from rrtik_ompl.base.copies import set_fields
 from rrtik_ompl.base.errors import InputError, UnknownNameError, listed, require
 from rrtik_ompl.base.poses import PoseLike, rigid
@@ -18,6 +20,24 @@ from rrtik_ompl.model.scene import Obstacle
 from rrtik_ompl.sensing.markers.corner_pose import square_corners
 
 ROLES = ("base", "arm", "target", "obstacle")
+_ROUNDED = 1e-6  # relative error of covariances that are written to files
+
+
+def covariance_of_pose(values: ArrayLike, what: str) -> Matrix:
+    """Check and copy the covariance of a pose, shape (6, 6); ``what`` names it in messages.
+
+    Raises:
+        InputError: If it is not symmetric, or has a negative eigenvalue.
+    """
+    given = finite_array(values, (6, 6), what)
+    covariance = 0.5 * (given + given.T)
+    # Positions and rotations have different units, so what is compared is the correlations.
+    scale = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+    correlations = covariance / np.outer(scale, scale)
+    uneven = np.abs(given - given.T) / np.outer(scale, scale)
+    if uneven.max() > _ROUNDED or np.linalg.eigvalsh(correlations)[0] < -_ROUNDED:
+        raise InputError(f"{what} must be symmetric and without negative eigenvalues")
+    return frozen(covariance)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,12 +51,15 @@ class MountedMarker:
         side: Side of its black square [m].
         T_object_marker: Its pose.
         side_sigma: Standard deviation of the side [m].
+        covariance: Covariance of its pose: of (position [m], small rotation about the axes of the object [rad]), shape
+            (6, 6); None if the pose is known.
     """
 
     number: int
     side: float
     T_object_marker: pin.SE3 = field(default_factory=pin.SE3.Identity)
     side_sigma: float = 0.0
+    covariance: Matrix | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "T_object_marker", rigid(self.T_object_marker, f"marker {self.number}: its pose"))
@@ -48,6 +71,9 @@ class MountedMarker:
             raise InputError(
                 f"marker {self.number}: side_sigma must be 0 or more and below side, got {self.side_sigma:g}"
             )
+        if self.covariance is not None:
+            covariance = covariance_of_pose(self.covariance, f"marker {self.number}: covariance")
+            object.__setattr__(self, "covariance", covariance)
 
     @property
     def corners(self) -> Matrix:

@@ -1,18 +1,23 @@
-"""Read marker maps from YAML files: markers on objects, solids, and grasps."""
+"""Read marker maps from YAML files: markers on objects, solids, and grasps; write markers into them."""
 
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pinocchio as pin
 
-from rrtik_ompl.files.pose_entry import PoseEntry
+from rrtik_ompl.base.errors import InputError, UnknownNameError
+from rrtik_ompl.files.pose_entry import PoseEntry, pose_data
 from rrtik_ompl.files.sections import (
     FLAG,
     LENGTH,
     NAME,
     NOT_NEGATIVE,
+    NUMBER,
     VERSION,
     Choice,
     Listed,
@@ -21,7 +26,8 @@ from rrtik_ompl.files.sections import (
     key,
     parse,
 )
-from rrtik_ompl.files.strict_yaml import YamlDocument, read_yaml
+from rrtik_ompl.files.strict_yaml import YamlDocument, read_yaml, write_yaml
+from rrtik_ompl.files.text import file_name
 from rrtik_ompl.model.scene import Obstacle
 from rrtik_ompl.problem_files.scene import SolidEntry
 from rrtik_ompl.sensing.markers.marker_map import GraspType, MarkedObject, MarkerMap, MountedMarker
@@ -34,11 +40,17 @@ class MarkerEntry(Section):
     side = key(LENGTH, "of the black square [m]; measure the print")
     side_sigma = key(NOT_NEGATIVE, "standard deviation of the side [m]", default=0.0)
     pose = key(PoseEntry, "in the frame of the object; its origin if absent", default=None)
+    covariance = key(
+        Listed(Listed(NUMBER, 6, 6), 6, 6),
+        "of this pose: of position [m] and small rotation about the axes of the object [rad], in rows; known if absent",
+        default=None,
+    )
 
     def build(self) -> MountedMarker:
         """Return the marker."""
         place = pin.SE3.Identity() if self.pose is None else self.pose.build()
-        return MountedMarker(self.id, self.side, place, self.side_sigma)
+        covariance = None if self.covariance is None else np.array(self.covariance)
+        return MountedMarker(self.id, self.side, place, self.side_sigma, covariance)
 
 
 class GraspEntry(Section):
@@ -105,3 +117,64 @@ def read_marker_map(file: str | os.PathLike[str]) -> MarkerMap:
     """
     document = read_yaml(file)
     return parse(document, MarkerMapFile).build(document)
+
+
+def write_markers(
+    file: str | os.PathLike[str], dictionary: str, markers: Sequence[MountedMarker], name: str = "markers"
+) -> None:
+    """Write a marker map with one object, which is the base of the arm.
+
+    Raises:
+        InputError: If the file cannot be written.
+    """
+    only = {"name": name, "role": "base", "markers": [_marker_data(marker) for marker in markers]}
+    write_yaml(file, {"version": 1, "dictionary": dictionary, "objects": [only]})
+
+
+def write_into(
+    file: str | os.PathLike[str],
+    map_file: str | os.PathLike[str],
+    *,
+    name: str = "",
+    markers: Sequence[MountedMarker] = (),
+    T_base_camera: pin.SE3 | None = None,
+) -> None:
+    """Write a copy of a marker map with other markers on an object, or with another pose of the camera.
+
+    Args:
+        file: The file to write, in the same folder if the map names files of meshes.
+        map_file: The map.
+        name: Name of the object.
+        markers: Its markers, in its frame; those that it has stay if there are none.
+        T_base_camera: Pose of the camera; as it is if None.
+
+    Raises:
+        InputError: If there is no such object, the map cannot be read, or the file cannot be written.
+    """
+    document = read_yaml(map_file)
+    parse(document, MarkerMapFile)
+    data: dict[str, Any] = dict(document.data)
+    files = any("mesh" in solid or "file" in solid for each in data["objects"] for solid in each.get("solids") or [])
+    if files and file_name(file).resolve().parent != document.path.resolve().parent:
+        raise InputError(f"{file}: the map names files beside it; write to the folder {document.path.parent}")
+
+    if T_base_camera is not None:
+        data["camera_pose"] = pose_data(T_base_camera)
+    if markers:
+        names = [each["name"] for each in data["objects"]]
+        if name not in names:
+            raise UnknownNameError("object", name, names, where=str(map_file))
+        changed = dict(data["objects"][names.index(name)])
+        changed["markers"] = [_marker_data(marker) for marker in markers]
+        data["objects"] = [changed if each["name"] == name else each for each in data["objects"]]
+    write_yaml(file, data)
+
+
+def _marker_data(marker: MountedMarker) -> dict[str, Any]:
+    data: dict[str, Any] = {"id": marker.number, "side": marker.side}
+    if marker.side_sigma:
+        data["side_sigma"] = marker.side_sigma
+    data["pose"] = pose_data(marker.T_object_marker)
+    if marker.covariance is not None:
+        data["covariance"] = marker.covariance.tolist()
+    return data
