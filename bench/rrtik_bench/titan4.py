@@ -12,6 +12,7 @@ from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.ik.analytic.analytic_solver import wrapped
 from rrtik_ompl.ik.analytic.closed_form import form_of, solutions
 from rrtik_ompl.model.robot import Robot
+from rrtik_robots.titan4.singular_samples import singular_configurations
 
 SOURCE = "[1, ch. 3, app. A to C]"
 A1, A2, A3, A4, D6 = 0.122, 0.851, 0.483, 0.127, 0.339  # [m]; no lengths are printed: drawings and the headline reach
@@ -27,6 +28,7 @@ RANKS = {  # as claimed: each family that is active costs one degree of freedom
     "elbow, shoulder and wrist": 3,
 }
 RANK_TOLERANCE = 1e-9
+BESIDE = tuple(10.0**power for power in range(-12, -3))  # [rad]
 LOST = "families together cost one degree of freedom, as each alone does"
 FREE = "psi or theta1 is free: the nearest value that the arm can reach"
 LENGTHS = "no lengths are printed; a1 to a4 measured from the vendor's drawing, d6 fitted to the headline reach"
@@ -114,6 +116,32 @@ def singular_families(quick: bool) -> list[Row]:
     return rows
 
 
+def beside_singular(quick: bool) -> list[Row]:
+    """Poses of postures that are singular but for a little, where the digits of a closed form are lost."""
+    robot, rng, count = rrtik.load_robot("titan4"), np.random.default_rng(6), 20 if quick else 100
+    rows = []
+    for case in ("wrist", "elbow wrist", "shoulder", "shoulder wrist", "all psi"):
+        worst, found = 0.0, 0
+        for away in BESIDE:
+            for pose in robot.fk_batch(_beside(robot, case, away, count, rng)):
+                answer = rrtik.solve_ik(robot, rrtik.PoseGoal(pin.SE3(pose)), method="closed-form")
+                found += answer.found
+                worst = max(worst, float(answer.residuals.max())) if answer.found else np.nan
+        told = f"{found} of {count * len(BESIDE)}, worst residual {worst:.0e}"
+        name = f"{case}: {BESIDE[0]:g} to {BESIDE[-1]:g} rad beside"
+        rows.append(judged(name, "not treated", told, worst, small(1e-9), "branches led to the pose inside the limits"))
+    return rows
+
+
+def _beside(robot: Robot, case: str, away: float, count: int, rng: np.random.Generator) -> Matrix:
+    """Postures inside the limits, shape (count, 6), up to ``away`` [rad] off those of a singular case in each joint."""
+    kept = np.empty((0, robot.dof))
+    while len(kept) < count:
+        Q = singular_configurations(case, 2_000, rng) + rng.uniform(-away, away, (2_000, robot.dof))
+        kept = np.vstack([kept, Q[robot.within_limits(Q, 0.0)]])
+    return kept[:count]
+
+
 def _inside_limits(robot: Robot, case: str, count: int) -> Row:
     """Singular poses of postures inside the limits, by `solve_ik`."""
     rng, kept = np.random.default_rng(4), np.empty((0, robot.dof))
@@ -195,5 +223,6 @@ TABLES = (
     Table("titan4-size", "Reach and envelope", "[1, ch. 3]", sizes, 2, 1),
     Table("titan4-branches", "Closed form: eight branches", SOURCE, branches, 1, 1),
     Table("titan4-singular-poses", "Closed form: singular families", SOURCE, singular_families, 1, 1),
+    Table("titan4-beside-singular", "Closed form: beside singular families", SOURCE, beside_singular, 20, 2),
     Table("titan4-singularities", "Determinant and ranks", SOURCE, singularities, 1, 1),
 )

@@ -16,7 +16,7 @@ from rrtik_ompl.base.errors import NotFoundError, require
 from rrtik_ompl.description.joint_weights import weighted_difference
 from rrtik_ompl.ik.analytic.branches import tip_residuals
 from rrtik_ompl.ik.analytic.closed_form import branches_of, check_poses, form_of, has_closed_form
-from rrtik_ompl.ik.method_interface import mid_range_configuration
+from rrtik_ompl.ik.method_interface import EXACT, mid_range_configuration
 from rrtik_ompl.ik.methods import load_kernels
 from rrtik_ompl.ik.numeric.descent import Search
 from rrtik_ompl.ik.solve import SECONDS, chosen_method, free_of_collision, solve_ik
@@ -194,6 +194,7 @@ def _solved(
         method = chosen_method(robot, (PoseGoal(targets[0]),), asked)
     if method == "closed-form" and form_of(robot).kind == "pose":
         _by_closed_form(robot, targets, near, world, q, residuals)
+        q[residuals.max(axis=1) > EXACT] = np.nan  # alone they are led nearer
     elif method == "numeric":
         _by_search(robot, targets, near, world, budget, q, residuals)
 
@@ -226,8 +227,11 @@ def _by_closed_form(
     best = np.argmin(np.where(valid, distance, np.inf), axis=1)
 
     done = np.flatnonzero(valid.any(axis=1))
-    q[done] = robot.clamp(found.branches[done, best[done]])
+    nearest = found.branches[done, best[done]]
+    q[done] = robot.clamp(nearest)
     residuals[done] = np.asarray(found.residuals)[done, best[done]]
+    moved = done[(q[done] != nearest).any(axis=1)]
+    residuals[moved] = tip_residuals(robot, q[moved].T[:, None], targets[moved])[:, 0].T
 
 
 def _by_search(

@@ -22,6 +22,7 @@ from rrtik_ompl.model.robot import Robot
 from rrtik_ompl.world.world import World
 
 SAME_POSTURE = 1e-3  # [rad] or [m]: solutions of a numeric method this near to each other count as one
+EXACT = 1e-10  # [m, rad]: a tip that misses a pose by less is at the pose itself, not only within its tolerances
 SLACK_SHARE = 0.4  # of the smaller tolerance: a target this near to a singular one is solved as if it were singular
 
 

@@ -1,7 +1,8 @@
 """`solve_ik` for the usual case, a pose without a world: one call of a kernel, in memory that is kept between calls.
 
 The kernel places the tip by forward kinematics, so that what it answers is verified. It leaves to the long way what it
-does not know: poses that are no rigid motions, and singular ones.
+does not know: poses that are no rigid motions, and singular ones; and where its closed form comes only within the
+tolerances of a pose, the long way comes nearer.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from rrtik_ompl.ik.analytic.branches import UNBOUNDED_ANGLE, tip_fault
 from rrtik_ompl.ik.analytic.closed_form import form_of, has_closed_form
 from rrtik_ompl.ik.analytic.parallel_arm import parallel_arm
 from rrtik_ompl.ik.kernel_tables import call_table, seeded_limb_of
-from rrtik_ompl.ik.method_interface import SLACK_SHARE, IkResult, mid_range_configuration
+from rrtik_ompl.ik.method_interface import EXACT, SLACK_SHARE, IkResult, mid_range_configuration
 from rrtik_ompl.ik.numeric.descent import PATIENCE, STEPS
 from rrtik_ompl.ik.residual import SHARE
 from rrtik_ompl.kernels.ik import ik_layout
@@ -107,6 +108,9 @@ def solve_one_pose(
         spare.append(call)
         return None
     count = answer % STEPS_UNIT
+    if count and arm.knows_all and max(call.numbers[count * robot.dof : count * (robot.dof + 2)]) > EXACT:
+        spare.append(call)
+        return None
     if count:
         data = call.answers[: count * arm.stride].tobytes()
         spare.append(call)
@@ -214,6 +218,7 @@ class _Call:
         pose: T_world_tip, shape (4, 4).
         near: Configuration near which solutions are wanted, shape (dof,).
         answers: Bytes that the kernel writes.
+        numbers: The same as numbers.
         tolerances: Of the goal [m, rad].
     """
 
@@ -231,7 +236,8 @@ class _Call:
         self.address = table.address
         self.pose = table.pose.reshape(MATRIX_SIDE, MATRIX_SIDE)
         self.near: Vector = table.near
-        self.answers = memoryview(table.rows.data).cast("B")
+        self.numbers = memoryview(table.rows.data)
+        self.answers = self.numbers.cast("B")
         self.tolerances = (0.0, 0.0)
         table.aim[FREE_TURN] = NO_TURN
 

@@ -3,6 +3,7 @@
 from types import MappingProxyType
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from rrtik_ompl.base.arrays import TAU
@@ -68,6 +69,37 @@ def test_single_poses_are_answered_by_the_closed_form_alone(titan, case):
             assert result.method == "closed-form"
             assert titan.within_limits(result.solutions, 0.0).all()
             assert goal.satisfied(titan, result.solutions).all()
+
+
+def tip_by_pinocchio(robot, q):
+    data = robot.model.createData()
+    pin.framesForwardKinematics(robot.model, data, robot.pinocchio_configuration(q[None])[0])
+    return data.oMf[robot.model.getFrameId(robot.tip)].homogeneous
+
+
+def beside(robot, case, away, count, seed):
+    """Configurations so far beside singular ones of a case, inside the limits."""
+    rng = np.random.default_rng(seed)
+    found = np.zeros((0, 6))
+    while len(found) < count:
+        Q = singular_configurations(case, 2_000, rng) + rng.uniform(-away, away, (2_000, 6))
+        found = np.vstack([found, Q[robot.within_limits(Q, 0.0)]])
+    return found[:count]
+
+
+@pytest.mark.parametrize("away", [1e-11, 1e-9, 1e-8, 1e-6, 1e-5, 1e-4])
+@pytest.mark.parametrize("case", ["wrist", "elbow wrist", "shoulder wrist", "all psi"])
+def test_beside_singular_postures_the_tip_is_at_the_pose_itself(titan, case, away):
+    poses = titan.fk_batch(beside(titan, case, away, 40, seed=11))
+    for pose in poses:
+        result = solve_ik(titan, PoseGoal(pose))
+        assert result.method == "closed-form"
+        assert titan.within_limits(result.solutions, 0.0).all()
+        np.testing.assert_allclose(tip_by_pinocchio(titan, result.solutions[0]), pose, rtol=0, atol=1e-9)
+
+    batch = solve_ik_many(titan, poses)
+    np.testing.assert_allclose(titan.fk_batch(batch.q), poses, rtol=0, atol=1e-9)
+    assert batch.residuals.max() < 1e-9
 
 
 def test_the_example_that_was_blamed_on_a_limit_is_solved(titan):
