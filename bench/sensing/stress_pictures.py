@@ -6,7 +6,7 @@ light falls on it, the lens blurs light, and the sensor codes it by sRGB's curve
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import cv2
@@ -14,7 +14,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from rrtik_ompl.base.arrays import Matrix
+from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.markers.dictionaries import marker_cells
 
@@ -47,6 +47,12 @@ class Trouble:
         jpeg: Quality of a compression.
         ink: How far black has spread [m].
         bent: Radius of the sheet [m]; 0: flat.
+        vignetting: Share of the light that is lost in the corners of the picture.
+        chromatic: Share by which the picture in red light is larger than that in blue; the picture has three channels.
+        filmic: The sensor codes light by a curve with a toe and a shoulder in place of that of sRGB.
+        sharpened: Share of the detail of two pixels that is added after coding.
+        speed: Of all markers along a random direction [m/s]; truth is where they are when the middle row is taken.
+        readout: Time from the first row to the last [s].
     """
 
     linear: bool = False
@@ -64,6 +70,12 @@ class Trouble:
     jpeg: int | None = None
     ink: float = 0.0
     bent: float = 0.0
+    vignetting: float = 0.0
+    chromatic: float = 0.0
+    filmic: bool = False
+    sharpened: float = 0.0
+    speed: float = 0.0
+    readout: float = 0.0
 
 
 def taken(
@@ -74,13 +86,51 @@ def taken(
     rng: np.random.Generator,
     *,
     side: float = SIDE,
+    rays: int = RAYS,
 ) -> NDArray[np.uint8]:
-    """The grey picture of markers at ``T_camera_marker``, each with its number. Shape (height, width)."""
+    """The picture of markers at ``T_camera_marker``, each with its number, by ``rays`` along a side of a photosite.
+
+    It is grey, shape (height, width), or with chromatic aberration has a channel for blue, green and red.
+    """
+    if trouble.chromatic > 0.0:
+        colours = [_larger(camera, share * trouble.chromatic) for share in (-0.5, 0.0, 0.5)]
+        alike = replace(trouble, chromatic=0.0, jpeg=None)
+        seed = int(rng.integers(2**32))
+        channels = []
+        for number, each in enumerate(colours):
+            # The same scene in each colour, but noise of its own.
+            light = _light(each, markers, dictionary, alike, np.random.default_rng(seed), side, rays)
+            channels.append(_coded(light, alike, np.random.default_rng([seed, number])))
+        return _packed(np.dstack(channels), trouble.jpeg)
+    return _packed(_coded(_light(camera, markers, dictionary, trouble, rng, side, rays), trouble, rng), trouble.jpeg)
+
+
+def _larger(camera: Camera, share: float) -> Camera:
+    """The camera with a picture that is larger by a share."""
+    matrix = camera.matrix * np.array([[1.0 + share, 1.0, 1.0], [1.0, 1.0 + share, 1.0], [1.0, 1.0, 1.0]])
+    return replace(camera, matrix=matrix)
+
+
+def _light(
+    camera: Camera,
+    markers: list[tuple[Any, int]],
+    dictionary: str,
+    trouble: Trouble,
+    rng: np.random.Generator,
+    side: float,
+    rays: int,
+) -> Light:
+    """The light on the sensor."""
     light = np.full((camera.height, camera.width), WALL, dtype=np.float32)
     light += _blurred(rng.normal(0.0, 1.5, light.shape).astype(np.float32), 12.0)
     light = np.clip(light, 0.05, 0.9)
+    # How far all markers move while the picture is taken [m].
+    travel = np.zeros(3)
+    if trouble.speed > 0.0:
+        way = rng.standard_normal(3)
+        travel = trouble.speed * trouble.readout * way / np.linalg.norm(way)
     for T, number in markers:
-        _draw(light, camera, T, _sheet(dictionary, number, side, trouble.ink), side, trouble, rng)
+        _draw(light, camera, T, _sheet(dictionary, number, side, trouble.ink), side, trouble, rng, (rays, travel))
     light *= np.float32(trouble.light)
     if trouble.haze < 1.0:
         passed = np.float32(trouble.haze ** np.linalg.norm(markers[0][0].translation))
@@ -91,7 +141,15 @@ def taken(
     light = _blurred(light, trouble.blur)
     if trouble.motion[1] > 0.0:
         light = _moved(light, rng.uniform(*trouble.motion), rng.uniform(0.0, np.pi))
-    return _coded(light, trouble, rng)
+    if trouble.vignetting > 0.0:
+        light *= _falling_off(camera, trouble.vignetting)
+    return light
+
+
+def _falling_off(camera: Camera, lost: float) -> Light:
+    """The share of the light that arrives, which falls with the square of the distance from the middle."""
+    down, across = np.mgrid[-1.0 : 1.0 : camera.height * 1j, -1.0 : 1.0 : camera.width * 1j]
+    return np.asarray(1.0 - lost * 0.5 * (down**2 + across**2), dtype=np.float32)
 
 
 def with_clear_marker(
@@ -149,30 +207,48 @@ def _sheet(dictionary: str, number: int, side: float, ink: float) -> Light:
 
 
 def _draw(
-    light: Light, camera: Camera, T: Any, sheet: Light, side: float, trouble: Trouble, rng: np.random.Generator
+    light: Light,
+    camera: Camera,
+    T: Any,
+    sheet: Light,
+    side: float,
+    trouble: Trouble,
+    rng: np.random.Generator,
+    taking: tuple[int, Vector],
 ) -> None:
+    rays, travel = taking
     cells = len(sheet) // FINE
     half = 0.5 * side * cells / (cells - 2)
     outline = np.array([[x, y, 0.0] for x in (-half, half) for y in (-half, half)]) @ T.rotation.T + T.translation
-    pixels = camera.project(outline)
+    pixels = camera.project(np.vstack([outline + share * travel for share in (-0.5, 0.0, 0.5)]))
     low = np.clip(np.floor(pixels.min(axis=0)).astype(int) - 4, 0, [camera.width, camera.height])
     high = np.clip(np.ceil(pixels.max(axis=0)).astype(int) + 5, 0, [camera.width, camera.height])
     if (high <= low).any():
         return
-    within = (np.arange(RAYS) + 0.5) / RAYS - 0.5
-    u, v = np.meshgrid((np.arange(low[0], high[0])[:, None] + within).ravel(),
-                       (np.arange(low[1], high[1])[:, None] + within).ravel())  # fmt: skip
-    x, y = _on_sheet(_undistorted(camera, u, v), T, trouble.bent)
+    # Rays through the corners of photosites; within one, where they meet the sheet is linear to 0.001 pixels.
+    u, v = np.meshgrid(np.arange(low[0], high[0] + 1) - 0.5, np.arange(low[1], high[1] + 1) - 0.5)
+    late = (v - 0.5 * (camera.height - 1)) / (camera.height - 1)
+    at_corners = _on_sheet(_undistorted(camera, u, v), T, trouble.bent, late[None] * travel[:, None, None])
+    x, y = (_between(each, rays) for each in at_corners)
     hit = (np.abs(x) < half) & (np.abs(y) < half)
     column, row = (x + half) / (2 * half) * len(sheet), (half - y) / (2 * half) * len(sheet)
     at = (column - 0.5).astype(np.float32), (row - 0.5).astype(np.float32)
     plain = np.asarray(cv2.remap(sheet, *at, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE), dtype=np.float32)
     grey = _lit(plain, x / side, y / side, trouble, rng)
-    shape = (high[1] - low[1], RAYS, high[0] - low[0], RAYS)
+    shape = (high[1] - low[1], rays, high[0] - low[0], rays)
     share = hit.reshape(shape).mean(axis=(1, 3), dtype=np.float32)
     seen = np.where(hit, grey, 0.0).reshape(shape).mean(axis=(1, 3), dtype=np.float32)
     place = light[low[1] : high[1], low[0] : high[0]]
     place[:] = seen + (1.0 - share) * place
+
+
+def _between(corners: Matrix, rays: int) -> Light:
+    """Values at so many places along each side of every photosite from those at its corners."""
+    share = (np.arange(rays, dtype=np.float32) + np.float32(0.5)) / np.float32(rays)
+    start = corners.astype(np.float32)
+    across = (start[:, :-1, None] + share * np.diff(start, axis=1)[:, :, None]).reshape(len(start), -1)
+    down = (across[:-1, None] + share[:, None] * np.diff(across, axis=0)[:, None]).reshape(-1, across.shape[1])
+    return np.asarray(down, dtype=np.float32)
 
 
 def _undistorted(camera: Camera, u: Matrix, v: Matrix) -> tuple[Matrix, Matrix]:
@@ -190,9 +266,19 @@ def _undistorted(camera: Camera, u: Matrix, v: Matrix) -> tuple[Matrix, Matrix]:
     return x, y
 
 
-def _on_sheet(directions: tuple[Matrix, Matrix], T: Any, radius: float) -> tuple[Matrix, Matrix]:
-    """Where rays meet the sheet, in its own flat coordinates [m]; it is bent away from the camera about its y axis."""
-    turn, origin = T.rotation.T, -T.rotation.T @ T.translation
+def _on_sheet(
+    directions: tuple[Matrix, Matrix], T: Any, radius: float, moved: NDArray[np.floating[Any]]
+) -> tuple[Matrix, Matrix]:
+    """Where rays meet the sheet, in its own flat coordinates [m]; it is bent away from the camera about its y axis.
+
+    Args:
+        directions: Of the rays, x and y on the plane z = 1.
+        T: Pose of the sheet.
+        radius: Of the bend [m]; 0 for none.
+        moved: How far the sheet is from that pose when each ray is taken, shape (3, ...) [m].
+    """
+    turn = T.rotation.T
+    origin = -np.tensordot(turn, T.translation.reshape(3, 1, 1) + moved, 1)
     d = [turn[k, 0] * directions[0] + turn[k, 1] * directions[1] + turn[k, 2] for k in range(3)]
     along = -origin[2] / d[2]
     for _ in range(8 if radius else 0):
@@ -202,7 +288,7 @@ def _on_sheet(directions: tuple[Matrix, Matrix], T: Any, radius: float) -> tuple
     return (radius * np.arcsin(np.clip(x / radius, -1.0, 1.0)) if radius else x), y
 
 
-def _lit(grey: Light, x: Matrix, y: Matrix, trouble: Trouble, rng: np.random.Generator) -> Light:
+def _lit(grey: Light, x: Light, y: Light, trouble: Trouble, rng: np.random.Generator) -> Light:
     """The sheet under its light, and what hangs before it; x and y in sides of the marker."""
     way, edge = rng.uniform(0.0, 2.0 * np.pi), rng.uniform(-0.25, 0.25)
     across = np.cos(way) * x + np.sin(way) * y
@@ -246,14 +332,25 @@ def _moved(light: Light, length: float, way: float) -> Light:
 
 def _coded(light: Light, trouble: Trouble, rng: np.random.Generator) -> NDArray[np.uint8]:
     value = np.clip(light.astype(np.float64), 0.0, 1.0)
-    if not trouble.linear:
+    if trouble.filmic:  # an S on top of the square root
+        root = np.sqrt(value)
+        value = 0.6 * root + 0.4 * root * root * (3.0 - 2.0 * root)
+    elif not trouble.linear:
         value = np.where(value <= 0.0031308, 12.92 * value, 1.055 * value ** (1.0 / 2.4) - 0.055)
     value = value + trouble.noise * rng.standard_normal(value.shape)
+    if trouble.sharpened > 0.0:
+        value += trouble.sharpened * (value - cv2.GaussianBlur(value, (0, 0), 2.0))
     taken: NDArray[np.uint8] = np.clip(np.rint(255.0 * value), 0, 255).astype(np.uint8)
-    if trouble.jpeg is None:
+    return taken
+
+
+def _packed(taken: NDArray[np.uint8], quality: int | None) -> NDArray[np.uint8]:
+    """The picture after a compression."""
+    if quality is None:
         return taken
-    packed = cv2.imencode(".jpg", taken, [cv2.IMWRITE_JPEG_QUALITY, trouble.jpeg])[1]
-    return np.asarray(cv2.imdecode(packed, cv2.IMREAD_GRAYSCALE), dtype=np.uint8)
+    packed = cv2.imencode(".jpg", taken, [cv2.IMWRITE_JPEG_QUALITY, quality])[1]
+    how = cv2.IMREAD_GRAYSCALE if taken.ndim == 2 else cv2.IMREAD_COLOR
+    return np.asarray(cv2.imdecode(packed, how), dtype=np.uint8)
 
 
 def facing(rng: np.random.Generator, camera: Camera, distance: tuple[float, float], tilt: tuple[float, float]) -> Any:

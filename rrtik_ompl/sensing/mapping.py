@@ -20,7 +20,7 @@ from rrtik_ompl.sensing.markers.alignment import MIN_LIKENESS
 from rrtik_ompl.sensing.markers.corner_pose import pose_of_square, square_corners
 from rrtik_ompl.sensing.markers.detection import SeenMarker, find_markers
 from rrtik_ompl.sensing.markers.marker_map import MarkedObject, MarkerMap, MountedMarker
-from rrtik_ompl.sensing.sight import MIN_SIDE_PIXELS, as_gray, check_size, straightened
+from rrtik_ompl.sensing.sight import MIN_SIDE_PIXELS, as_gray, check_size
 
 SIDE_SIGMA = 0.0003  # [m]; standard deviation of a side that is measured with a ruler
 MIN_PICTURES = 2  # in which a marker has to be seen
@@ -215,14 +215,13 @@ def _looks(
     """Return the markers in a picture that are sharp and large enough."""
     check_size(picture.pixels, camera, picture.name)
     looks = []
-    for seen in find_markers(as_gray(picture.pixels), dictionary, tone=camera.tone):
+    for seen in find_markers(as_gray(picture.pixels), dictionary, tone=camera.tone, camera=camera):
         if seen.spread is None or seen.likeness < MIN_LIKENESS or seen.side < MIN_SIDE_PIXELS:
             continue
         own = sides.get(seen.number, side)
-        straight = straightened(camera, seen, own)
-        pose = pose_of_square(camera, straight.corners, own, spread=straight.spread)
+        pose = pose_of_square(camera, seen.corners, own, spread=seen.spread)
         poses = (pose.T_camera_object,) if pose.other is None else (pose.T_camera_object, pose.other)
-        looks.append(_Look(index, straight, poses))
+        looks.append(_Look(index, seen, poses))
     return looks
 
 

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
-from rrtik_ompl.base.arrays import Matrix, frozen
+from rrtik_ompl.base.arrays import Matrix
 from rrtik_ompl.base.errors import InputError, require
 from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.markers.alignment import MIN_LIKENESS
@@ -18,7 +18,6 @@ from rrtik_ompl.sensing.markers.corner_pose import (
     ALIGNED_SIGMA,
     ROUGH_SIGMA,
     CornerPose,
-    lens_bend,
     pose_of_points,
     pose_of_square,
 )
@@ -136,6 +135,7 @@ def detect_objects(
         before=last_markers,
         near=near,
         turn=turn,
+        camera=camera,
     )
 
     sightings = (sighting(camera, marked_object, markers_seen) for marked_object in marker_map.objects)
@@ -170,19 +170,13 @@ def sighting(camera: Camera, thing: MarkedObject, seen: Sequence[SeenMarker]) ->
     used_markers = [marker for marker in seen_on_object if marker.side >= MIN_SIDE_PIXELS] or list(seen_on_object)
     sharp_markers = [marker for marker in used_markers if marker.likeness >= MIN_LIKENESS]
     sigma = ALIGNED_SIGMA if sharp_markers else ROUGH_SIGMA
-    used_markers = [
-        straightened(camera, marker, mounted[marker.number].side) for marker in sharp_markers
-    ] or used_markers
+    used_markers = sharp_markers or used_markers
 
     if len(used_markers) == 1:
         pose = _of_one(camera, used_markers[0], mounted[used_markers[0].number], sigma)
     else:
         points = np.vstack([mounted[marker.number].corners for marker in used_markers])
-        spread = (
-            None
-            if any(marker.spread is None for marker in used_markers)
-            else block_diag(*(marker.spread for marker in used_markers))
-        )
+        spread = _joint_spread(used_markers)
         shifts = _map_shifts([mounted[marker.number] for marker in used_markers])
         pose = pose_of_points(
             camera, np.vstack([marker.corners for marker in used_markers]), points, sigma, spread, shifts
@@ -191,13 +185,23 @@ def sighting(camera: Camera, thing: MarkedObject, seen: Sequence[SeenMarker]) ->
     return Sighting(thing, pose, seen_on_object, _refusal(pose, used_markers))
 
 
-def straightened(camera: Camera, marker: SeenMarker, side: float) -> SeenMarker:
-    """Correct the corners of a marker for the lens distortion within it; half of the correction counts as uncertain."""
-    bend = lens_bend(camera, marker.corners, side)
-    if marker.spread is None or not bend.any():
-        return marker
-    doubt = float((0.5 * bend.ravel()) @ (0.5 * bend.ravel())) / 8.0
-    return replace(marker, corners=frozen(marker.corners - bend), spread=frozen(marker.spread + doubt * np.eye(8)))
+def _joint_spread(markers: Sequence[SeenMarker]) -> Matrix | None:
+    """Return the covariance of the corners of all markers, shape (8 m, 8 m) [pixels^2]; None if it is not known.
+
+    What all markers of a picture share does not become less by their number.
+    """
+    spreads = [marker.spread for marker in markers if marker.spread is not None]
+    if len(spreads) < len(markers):
+        return None
+
+    spread: Matrix = block_diag(*spreads)
+    shared = [marker.common for marker in markers if marker.common is not None]
+    if len(shared) < len(markers):
+        return spread
+
+    common = np.vstack(shared)
+    between_markers = 1.0 - np.kron(np.eye(len(markers)), np.ones((8, 8)))
+    return spread + between_markers * (common @ common.T)
 
 
 def _of_one(camera: Camera, marker: SeenMarker, mounted: MountedMarker, sigma: float) -> CornerPose:

@@ -218,7 +218,7 @@ def test_uncertain_places_are_part_of_a_pose():
         [("4x4_50", k, SIDE, VIEWS[1].inverse() * PLACES[0] * places[0].inverse() * T) for k, T in enumerate(places)],
         np.random.default_rng(0),
     )
-    seen = find_markers(as_gray(shot), "4x4_50", wanted=(0, 1))
+    seen = find_markers(as_gray(shot), "4x4_50", wanted=(0, 1), camera=CAMERA)
 
     rng = np.random.default_rng(1)
     for count in (1, 2):

@@ -6,6 +6,7 @@ import os
 from dataclasses import dataclass
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from rrtik_ompl.base.arrays import Matrix, Vector, finite_array, finite_number, frozen
@@ -15,6 +16,7 @@ from rrtik_ompl.files.kinds import read, write
 from rrtik_ompl.sensing.cameras.lenses import LENSES
 
 MOST_MISSED = 0.01  # pixels by which a ray may miss its pixel
+_NEAREST_DEPTH = 1e-3  # of a direction of length 1, in the view of a pinhole to the middle of all
 _ROUNDED = 1e-6  # error of correlations that are written to files
 
 
@@ -144,6 +146,18 @@ class Camera:
         """Return the directions that pixels show, shape (m, 3): of any length, and wrong where there is no ray."""
         places = (np.asarray(pixels, dtype=np.float64) - self.matrix[:2, 2]) / self._focal
         return LENSES[self.lens].directions(places, self.distortion)
+
+    def seen_by_pinhole(self, pixels: Matrix) -> tuple[Matrix, Matrix]:
+        """Return a view from the camera's place to the middle of pixels, and what a pinhole that looks there sees.
+
+        Returns:
+            ``R_camera_view``, and the pixels' rays on the plane z = 1 of the view, shape (m, 2).
+        """
+        directions = self.directions(pixels)
+        directions /= np.linalg.norm(directions, axis=1)[:, None]
+        view: Matrix = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), directions.mean(axis=0)).matrix()
+        turned = directions @ view
+        return view, turned[:, :2] / np.maximum(turned[:, 2:], _NEAREST_DEPTH)
 
     def rays(self, pixels: ArrayLike) -> Matrix:
         """Return where the rays of pixels, shape (m, 2), meet the plane z = 1 of the camera frame, shape (m, 2).

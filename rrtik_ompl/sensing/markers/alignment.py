@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Matrix, Vector
+from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.markers.corner_spread import corner_spread
 from rrtik_ompl.sensing.markers.lighting import LINEAR, SRGB, TONES, likenesses, shown
 
@@ -69,12 +70,14 @@ class Aligned(NamedTuple):
         likeness: Correlation of the ideal marker with the picture, from 0 to 1.
         spread: Covariance of the corners' eight coordinates, shape (8, 8) [pixels^2]; None if they were not aligned.
         look: Blur and tone; None if the corners were not aligned.
+        common: The part of ``spread`` that all markers of the picture share (`corner_spread`).
     """
 
     corners: Matrix
     likeness: float
     spread: Matrix | None
     look: Look | None
+    common: Matrix | None = None
 
 
 def aligned_corners(
@@ -84,6 +87,7 @@ def aligned_corners(
     tone: float | None = None,
     before: Look | None = None,
     spoilt: int = 0,
+    camera: Camera | None = None,
 ) -> Aligned:
     """Refine the corners of a detected marker, and estimate their covariance.
 
@@ -94,6 +98,7 @@ def aligned_corners(
         tone: Tone of the picture; None to use the one with which the marker fits best.
         before: Look of the marker in the previous picture; a search that starts there is three times as fast.
         spoilt: Number of cells that may look as they should not, because the code can tell its markers without them.
+        camera: Camera of the picture, whose lens bends the sides of the marker; None if it does not matter.
 
     Returns:
         The aligned marker; its likeness is at most that of the worst cell, if that one is too unlike. With a likeness
@@ -113,8 +118,8 @@ def aligned_corners(
     if likeness < MIN_LIKENESS:
         return Aligned(corners, likeness, None, None)
 
-    corners, spread = corner_spread(fit.model, fit.seen, square, moved_corners)
-    return Aligned(corners + low, fit.likeness, spread, fit.look)
+    refined, spread, common = corner_spread(fit.model, fit.seen, square, moved_corners + low, camera)
+    return Aligned(refined, fit.likeness, spread, fit.look, common)
 
 
 def look_of(gray: NDArray[np.uint8], corners: Matrix, framed: NDArray[np.uint8]) -> Look | None:

@@ -4,9 +4,6 @@ A single square seen almost from the front has two poses that explain its pictur
 Bartoli, 2014 [51]): both are returned. With strong perspective, or by chance, only one of them is a minimum of the
 error. Then the second one is the closed-form solution, because the true pose may lie in the long valley between it and
 the minimum. The covariance follows from first-order propagation of the errors of the corners.
-
-A homography keeps straight lines straight, a distorting lens does not: corners that were aligned by a homography are
-corrected by `lens_bend`.
 """
 
 from __future__ import annotations
@@ -17,6 +14,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 import pinocchio as pin
+from scipy.special import chdtri
 
 from rrtik_ompl.base.arrays import Matrix, frozen
 from rrtik_ompl.sensing.cameras.camera import Camera
@@ -26,16 +24,12 @@ MIN_ERROR_RATIO = 6.0
 CHANCE_ERROR = 0.015  # [pixels]; smaller errors of four corners occur by chance
 ALIGNED_SIGMA = 0.02  # [pixels]; error of an aligned corner: a quarter is noise of 1 %, the rest lens and blur
 ROUGH_SIGMA = 0.2  # [pixels]; error of a corner that was not aligned, which blur pulls inwards
-# Sum of squared deviations of a square that is explained by chance; a larger sum scales the covariance up.
-MAX_SURPRISE = 6.0
+# Probability of honest deviations that are so large that they scale the covariance up.
+SURPRISING = 0.05
 MAX_DISTANCE = 1e4  # [m]
 # [rad]; minima closer than this are the same. Distinct ones differ by at least 0.03.
 MIN_BRANCH_ANGLE = 1e-3
 _MAX_STEPS = 40
-_NEAREST_DEPTH = 1e-3  # of a direction of length 1, in the view of a pinhole to the middle of all
-_PLACES = 9  # sample points along each side of the marker with its rim for the effect of the lens
-_OF_HOMOGRAPHIES = 8  # number of columns of `_motions` that are homographies; the others are bends
-_RIM = 1.1  # size of the marker with its rim, as a multiple of the side
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -167,70 +161,13 @@ def pose_of_points(
     )
 
 
-def lens_bend(camera: Camera, corners: Matrix, side: float) -> Matrix:
-    """Return the error of the corners of an aligned marker caused by lens distortion [pixels], shape (4, 2).
-
-    The distortion within the marker is not a homography. It is expressed as a sum of the small motions that alignment
-    fits (`corner_spread`): only the part of homographies moves the corners, while the bends are fitted separately.
-
-    Args:
-        camera: Camera of the picture.
-        corners: Corners of the marker, shape (4, 2) [pixels].
-        side: Side of the marker [m].
-    """
-    if camera.is_pinhole:
-        return np.zeros((4, 2))
-
-    at = pose_of_square(camera, corners, side).T_camera_object
-    row = 0.5 * _RIM * side * np.linspace(-1.0, 1.0, _PLACES)
-    x, y = (each.ravel() for each in np.meshgrid(row, row))
-    flat = np.c_[x, y]
-
-    square = square_corners(side)
-    pixels = camera.project(np.c_[flat, np.zeros(len(flat))] @ at.rotation.T + at.translation)
-
-    homography, _ = cv2.findHomography(flat, pixels, 0)
-    back = cv2.perspectiveTransform(np.ascontiguousarray(pixels)[:, None], np.linalg.inv(homography))[:, 0]
-
-    # Express the deviation of the lens from a homography as small motions on the marker.
-    scale = 0.5 * side
-    shift, *_ = np.linalg.lstsq(np.vstack(_motions(flat / scale)), (back - flat).T.ravel(), rcond=None)
-
-    # Alignment fits the bends separately, so only the motions of homographies displace its corners.
-    on_marker = square[:, :2] / scale
-    moved = square[:, :2] + np.stack([part[:, :_OF_HOMOGRAPHIES] @ shift[:_OF_HOMOGRAPHIES]
-                                      for part in _motions(on_marker)], axis=1)  # fmt: skip
-
-    straight = cv2.perspectiveTransform(moved[:, None].copy(), homography)[:, 0]
-    return np.asarray(straight - camera.project(square @ at.rotation.T + at.translation), dtype=np.float64)
-
-
-def _motions(places: Matrix) -> tuple[Matrix, Matrix]:
-    """Return a basis of small motions of a plane: eight of homographies, then four bends.
-
-    Args:
-        places: Points of the plane, shape (m, 2).
-
-    Returns:
-        The x and the y components of each motion at each point, shape (m, 12) each.
-    """
-    u, v = places.T
-    none = np.zeros(len(u))
-    one = np.ones(len(u))
-
-    along = [one, u, v, none, none, none, u * u, u * v, v * v, none, u * u, u * v]
-    across = [none, none, none, one, u, v, u * v, v * v, none, u * u, -u * v, -v * v]
-
-    return np.stack(along, axis=1), np.stack(across, axis=1)
-
-
 def _guesses(camera: Camera, points: Matrix, pixels: Matrix, method: int = cv2.SOLVEPNP_SQPNP) -> list[pin.SE3]:
     """Return closed-form poses that explain the pixels, best first; implausible ones are left out."""
     view = np.eye(3)
     intrinsics = camera.matrix, camera.distortion
     if camera.lens == "fisheye":
         # OpenCV's closed forms know no fisheye, and pinholes that look elsewhere do not see all of what it sees.
-        view, pixels = _seen_by_pinhole(camera, pixels)
+        view, pixels = camera.seen_by_pinhole(pixels)
         intrinsics = np.eye(3), np.zeros(5)
 
     object_points = np.ascontiguousarray(points)
@@ -239,19 +176,6 @@ def _guesses(camera: Camera, points: Matrix, pixels: Matrix, method: int = cv2.S
     poses = [pin.SE3(cv2.Rodrigues(r)[0], t.ravel()) for r, t in zip(turns, shifts, strict=True)]
     plausible = [T for T in poses if _plausible(T, method == cv2.SOLVEPNP_IPPE_SQUARE)]
     return [pin.SE3(view, np.zeros(3)) * T for T in plausible]
-
-
-def _seen_by_pinhole(camera: Camera, pixels: Matrix) -> tuple[Matrix, Matrix]:
-    """Return a view from the camera's place to the middle of pixels, and what a pinhole that looks there sees.
-
-    Returns:
-        ``R_camera_view``, and the pixels' rays on the plane z = 1 of the view, shape (m, 2).
-    """
-    directions = camera.directions(pixels)
-    directions /= np.linalg.norm(directions, axis=1)[:, None]
-    view: Matrix = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), directions.mean(axis=0)).matrix()
-    turned = directions @ view
-    return view, turned[:, :2] / np.maximum(turned[:, 2:], _NEAREST_DEPTH)
 
 
 def _plausible(pose: pin.SE3, facing: bool) -> bool:
@@ -320,7 +244,7 @@ def _covariance(
 ) -> tuple[Matrix, float]:
     """Return the covariance of a pose, and its normalised sum of squared residuals.
 
-    The part due to the pixels is scaled up if the residuals are larger than they should be (`MAX_SURPRISE`).
+    The part due to the pixels is scaled up if the residuals are larger than they should be (`SURPRISING`).
 
     Args:
         camera: Camera of the picture.
@@ -344,11 +268,12 @@ def _covariance(
         residuals @ weighted[:, 0] - normal_rows[:, 0] @ np.linalg.solve(normal_rows[:, 1:], normal_rows[:, 0])
     )
 
+    degrees = 2 * len(points) - 6
     covariance = (
-        max(squares / MAX_SURPRISE, 1.0) * (pseudo_inverse @ of_pixels @ pseudo_inverse.T)
+        max(squares / float(chdtri(degrees, SURPRISING)), 1.0) * (pseudo_inverse @ of_pixels @ pseudo_inverse.T)
         + pseudo_inverse @ of_points @ pseudo_inverse.T
     )
-    return frozen(covariance), max(squares, 0.0) / (2 * len(points) - 6)
+    return frozen(covariance), max(squares, 0.0) / degrees
 
 
 def _strain(camera: Camera, points: Matrix, pixels: Matrix, pose: pin.SE3, covariances: tuple[Matrix, Matrix]) -> float:

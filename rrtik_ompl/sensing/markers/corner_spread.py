@@ -2,9 +2,13 @@
 
 The residuals are not noise but structure: sheets are bent, ink has spread, something moved, and neighbouring samples
 have similar errors. So the marker is divided into blocks, each block is left out once, and the resulting movements of
-the corners show how far the blocks contradict each other (the jackknife, [68]). The white noise of the samples is
-added. Spread ink, anisotropic blur, and a bent sheet are fitted together with the corners; the size of the bends adds
-to the uncertainty of the corners.
+the corners show how far the blocks contradict each other (the jackknife, [68]). Sixteen blocks say little of eight
+numbers, so their covariance is averaged with that of white noise, scaled to the same size. Spread ink, anisotropic
+blur, sharpening, and a bent sheet are fitted together with the corners; bends beyond their own uncertainty add to that
+of the corners.
+
+What moves all blocks alike they cannot show: a wrong tone or sharpened edges move the outline, a fringe of colour the
+whole marker, by the more the larger the residuals are. All markers of a picture share these causes.
 """
 
 from __future__ import annotations
@@ -17,37 +21,53 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Matrix, Vector, frozen
+from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.markers.lighting import CUT_OFF
 
 Pixels = NDArray[np.float32]
 
-FLOOR = 0.02  # [pixels]; error in a picture without noise, by sampling, rounding, and the shape of the blur
+FLOOR = 0.002  # [pixels]; error in a picture without noise, by rounding
+# Standard deviations of an outline that is too large, and of a marker that is displaced as a whole, for residuals that
+# are as large as the contrast [pixels]. Measured on pictures with tone curves, sharpening, fringes of colour, and JPEG.
+OUTLINE, DISPLACED = 0.8, 0.5
+_FEW_BLOCKS = 1.2  # factor of the covariance, because it is known from few blocks
+_SHARPENED = 2.0  # radius of the detail that cameras sharpen [pixels]
 # [pixels]; possible displacement of the whole marker, multiplied by the share of samples that are clipped at white.
 CUT_SHIFT = 0.12
 # Samples along a side from which on only some of them are used; edges fall between the samples where they are few.
 _FEW = 320
 _TINY = 1e-6  # relative regularisation: parameters that the marker cannot determine stay 0
 _BLOCKS = 4  # along a side
-_ALIKE = np.kron(np.ones((4, 4)), np.eye(2))  # covariance pattern of a common displacement of all four corners
+_ALIKE = np.tile(np.eye(2), (4, 1))  # displacements of all four corners together, along x and along y
 _BENDS = slice(14, 18)  # columns of the bends
 _STEP = 0.05  # step of a corner for finite differences [pixels]
 
 
-def corner_spread(model: Pixels, seen: Pixels, square: Matrix, corners: Matrix) -> tuple[Matrix, Matrix]:
+def corner_spread(
+    model: Pixels, seen: Pixels, square: Matrix, corners: Matrix, camera: Camera | None = None
+) -> tuple[Matrix, Matrix, Matrix]:
     """Refine the corners of an aligned marker by a linear fit, and return their covariance.
+
+    Alignment keeps straight lines straight, which a lens does not: what it displaces within the marker is known and
+    left out of the fit.
 
     Args:
         model: The ideal marker, blurred and lit as in the picture.
         seen: The picture in the frame of the model, of the same shape.
         square: Corners of the marker in the model, shape (4, 2).
         corners: Corners in the picture, shape (4, 2).
+        camera: Camera of the picture; None if its lens does not matter.
 
     Returns:
-        The corners, shape (4, 2) [pixels], and the covariance of their eight coordinates, shape (8, 8) [pixels^2].
+        The corners, shape (4, 2) [pixels], the covariance of their eight coordinates, shape (8, 8) [pixels^2], and the
+        part of it that all markers of the picture share: displacements by one standard deviation of each cause, shape
+        (8, 3) [pixels].
     """
     step = max(len(model) // _FEW, 1)
     columns = _columns(model, square, corners, step)
     values = seen[::step, ::step].ravel().astype(np.float64)
+    if camera is not None and not camera.is_pinhole:
+        values += _bent_by_lens(camera, model, square, corners, step)
     shape = columns.shape[:2]
     columns = columns.reshape(len(values), -1)
     # Samples within one pixel have the same error.
@@ -63,21 +83,33 @@ def corner_spread(model: Pixels, seen: Pixels, square: Matrix, corners: Matrix) 
     variance = samples_per_pixel * float(residuals @ residuals) / max(len(values) - len(normal), 1)
 
     jackknife = _jackknife_covariance(shape, columns, residuals, normal)
-    # Bends may displace the corners by their own size.
-    bend_variance = float(solution[_BENDS] @ solution[_BENDS]) * _area(corners) / _area(square)
-    # Clipping shifts all blocks alike, which the jackknife cannot detect.
-    cut_off_shift = CUT_SHIFT * float((values >= CUT_OFF).mean())
-    spread = jackknife + variance * inverse[:8, :8] + (bend_variance + FLOOR**2) * np.eye(8) + cut_off_shift**2 * _ALIKE
+    white = variance * inverse[:8, :8]
+    scale = max(float(np.trace(np.linalg.solve(white, jackknife))) / 8.0, 1.0)
 
-    return corners + solution[:8].reshape(4, 2), frozen(spread)
+    # Bends may displace the corners by their own size.
+    by_chance = scale * variance * float(np.trace(inverse[_BENDS, _BENDS]))
+    bends = max(float(solution[_BENDS] @ solution[_BENDS]) - by_chance, 0.0) * _area(corners) / _area(square)
+    own = 0.5 * _FEW_BLOCKS * (jackknife + scale * white) + (bends + FLOOR**2) * np.eye(8)
+
+    # Clipping, tone, halos and colour shift all blocks alike, which the jackknife cannot detect.
+    unlike = float(np.std(residuals)) / max(float(np.ptp(model)), 1.0)
+    displaced = np.hypot(CUT_SHIFT * float((values >= CUT_OFF).mean()), DISPLACED * unlike)
+    outwards = (corners - corners.mean(axis=0)).ravel()
+    outwards *= 2.0 / np.linalg.norm(outwards)  # corners move by one pixel in the mean
+    common = np.column_stack([OUTLINE * unlike * outwards, displaced * _ALIKE])
+
+    return corners + solution[:8].reshape(4, 2), frozen(own + common @ common.T), frozen(common)
 
 
 def _columns(model: Pixels, square: Matrix, corners: Matrix, step: int) -> Matrix:
     """Return the Jacobian of the grey values of the marker with respect to all fitted numbers, shape (h, w, k).
 
-    The columns are eight coordinates of corners, then brightness, contrast, spread of ink, three of blur, and four
-    bends. Only one sample in ``step`` along each side is used.
+    The columns are eight coordinates of corners, then brightness, contrast, spread of ink, three of blur, four bends,
+    and sharpening. Only one sample in ``step`` along each side is used.
     """
+    radius = _SHARPENED * float(np.sqrt(_area(square) / _area(corners)))
+    detail = (model - cv2.GaussianBlur(model, (0, 0), radius))[::step, ::step]
+
     across = _slope(model, 1, 0)
     down = _slope(model, 0, 1)
     blurs = [_slope(across, 1, 0), _slope(across, 0, 1), _slope(down, 0, 1)]
@@ -96,7 +128,24 @@ def _columns(model: Pixels, square: Matrix, corners: Matrix, step: int) -> Matri
     # Motions of second order that are no homographies, whose own ones are (u u, u v) and (u v, v v).
     bends = [across * v * v, down * u * u, across * u * u - down * u * v, across * u * v - down * v * v]
     light_and_bends = [np.ones(model.shape), model, np.hypot(across, down), *blurs, *bends]
-    return np.dstack([_slopes(across, down, (x, y), square, corners), *light_and_bends])
+    return np.dstack([_slopes(across, down, (x, y), square, corners), *light_and_bends, detail])
+
+
+def _bent_by_lens(camera: Camera, model: Pixels, square: Matrix, corners: Matrix, step: int) -> Vector:
+    """Return how much brighter the samples would be if the lens kept straight lines straight, shape (h w,)."""
+    across, down = (_slope(model, *way)[::step, ::step].ravel() for way in ((1, 0), (0, 1)))
+    samples = np.stack([each.ravel() for each in _sample_places(*model[::step, ::step].shape, step)], axis=1)
+
+    view, on_plane = camera.seen_by_pinhole(corners)
+    to_plane, to_picture = _perspectives(np.stack([square, square]), np.stack([on_plane, corners]))
+    pixels = camera.project(np.column_stack([_moved(to_plane, samples), np.ones(len(samples))]) @ view.T)
+    shift = _moved(np.linalg.inv(to_picture), pixels) - samples
+    return np.asarray(across * shift[:, 0] + down * shift[:, 1], dtype=np.float64)
+
+
+def _moved(homography: Matrix, points: Matrix) -> Matrix:
+    moved = points @ homography[:, :2].T + homography[:, 2]
+    return np.asarray(moved[:, :2] / moved[:, 2:], dtype=np.float64)
 
 
 def _slope(picture: NDArray[np.floating[Any]], across: int, down: int) -> Matrix:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import LARGEST, Matrix, finite_number, frozen, whole_number
 from rrtik_ompl.base.errors import InputError, require
+from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.markers.alignment import Look, aligned_corners, mean_side
 from rrtik_ompl.sensing.markers.chessboard import SMALLEST_SIDE
 from rrtik_ompl.sensing.markers.dictionaries import DICTIONARIES, marker_cells, spare_bits, table_of
@@ -30,6 +31,8 @@ class SeenMarker:
             aligned; NaN if alignment was not requested.
         spread: Covariance of the corners, shape (8, 8) [pixels^2]; None if they are not aligned.
         look: Blur and tone of the picture at this marker; None if they are not known.
+        common: The part of ``spread`` by causes that all markers of a picture share, such as its sharpening:
+            displacements of the corners by one standard deviation of each, shape (8, k) [pixels]; None for none.
     """
 
     dictionary: str
@@ -38,6 +41,7 @@ class SeenMarker:
     likeness: float
     spread: Matrix | None = None
     look: Look | None = None
+    common: Matrix | None = None
 
     @property
     def side(self) -> float:
@@ -55,6 +59,7 @@ def find_markers(
     before: Sequence[SeenMarker] = (),
     near: bool = False,
     turn: int = 0,
+    camera: Camera | None = None,
 ) -> tuple[SeenMarker, ...]:
     """Detect the markers of a dictionary in a grey picture, sorted by their numbers.
 
@@ -69,6 +74,7 @@ def find_markers(
         near: The picture is the next of a film: search only near those places, unless a marker is no longer there, and
             closely only in the part of the picture whose turn it is.
         turn: Number of the picture in the film.
+        camera: Camera of the picture, whose lens bends the sides of markers; None if it does not matter.
     """
     last_looks = {marker.number: marker.look for marker in before}
     places = {marker.number: marker.corners for marker in before}
@@ -80,8 +86,10 @@ def find_markers(
             continue
 
         cells = marker_cells(dictionary, number)
-        fit = aligned_corners(gray, rough, cells, tone, last_looks.get(number), spare_bits(dictionary))
-        markers.append(SeenMarker(dictionary, number, frozen(fit.corners), fit.likeness, fit.spread, fit.look))
+        fit = aligned_corners(gray, rough, cells, tone, last_looks.get(number), spare_bits(dictionary), camera)
+        markers.append(
+            SeenMarker(dictionary, number, frozen(fit.corners), fit.likeness, fit.spread, fit.look, fit.common)
+        )
 
     return tuple(markers)
 
