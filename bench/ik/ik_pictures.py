@@ -32,6 +32,7 @@ WIDTH = 760  # of the pictures [px]
 
 
 def photograph(page: Path, picture: Path) -> None:
+    """Draw a page, and write the picture WIDTH pixels wide."""
     browser = next((found for found in map(shutil.which, BROWSERS) if found), None)
     if browser is None:
         raise SystemExit(f"none of {', '.join(BROWSERS)} is on PATH: the pages cannot be drawn")

@@ -1,4 +1,4 @@
-"""The README's film, `panda_shelf.gif`, and its sheet of arms, `arms.png`. Needs Chromium."""
+"""The README's film `panda_shelf.gif`, its sheet of arms `arms.png` and its page `titan4_sdu.png`. Needs Chromium."""
 
 from __future__ import annotations
 
@@ -11,7 +11,9 @@ import numpy as np
 from typer import Option
 
 import rrtik_ompl as rrtik
+from bench.ik.ik_pictures import photograph
 from bench.shared.run import REPORTS
+from rrtik_ompl.viewer import view
 from rrtik_ompl.viewer.film import film, picture
 
 SEED = 1
@@ -42,8 +44,19 @@ def sheet(file: Path) -> None:
     cv2.imwrite(str(file), np.vstack(rows), [cv2.IMWRITE_PNG_COMPRESSION, 9])
 
 
+def moves(picture: Path) -> None:
+    """The page of an arm that is driven one joint at a time, with the list of its moves."""
+    problem = rrtik.load_problem("titan4_sdu")
+    plan = rrtik.plan(problem, "bicrdt", seed=SEED)
+    with tempfile.TemporaryDirectory() as folder:
+        page = Path(folder, "titan4_sdu.html")
+        view(plan, html=page)
+        photograph(page, picture)
+
+
 def main(folder: Annotated[Path, Option(help="Of the pictures.")] = REPORTS) -> None:
-    """Draw both."""
+    """Draw all three."""
     problem, path = planned(ARMS[0])
     film(problem, folder / "panda_shelf.gif", path, seconds=3.5, rate=10.0)
     sheet(folder / "arms.png")
+    moves(folder / "titan4_sdu.png")
