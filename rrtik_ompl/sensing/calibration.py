@@ -254,14 +254,16 @@ def _tone(views: Sequence[tuple[NDArray[np.uint8], Matrix]], board: Board) -> fl
         pieces = [(gray, *piece) for gray, pixels in views for piece in board.pieces(gray, pixels)]
         looks = [look_of(*each) for each in pieces if np.ptp(each[1], axis=0).max() >= MIN_TONE_SIDE]
     else:
-        looks = _looks_of_markers([gray for gray, _ in views], dictionary_of(board))
+        looks = _looks_of_markers([gray for gray, _ in views], board)
 
     tones = [each.tone for each in looks if each is not None]
     return round(float(np.median(tones)), 3) if len(tones) >= TONE_LOOKS else None
 
 
-def _looks_of_markers(grays: Sequence[NDArray[np.uint8]], dictionary: str | None) -> list[Look | None]:
+def _looks_of_markers(grays: Sequence[NDArray[np.uint8]], board: cv2.aruco.CharucoBoard) -> list[Look | None]:
+    dictionary = dictionary_of(board)
     if dictionary is None:
         return []
-    seen = [marker for gray in grays for marker in find_markers(gray, dictionary, wanted=())]
+    numbers = [int(number) for number in np.ravel(board.getIds())]
+    seen = [marker for gray in grays for marker in find_markers(gray, dictionary, wanted=numbers)]
     return [each.look for each in seen if each.side >= MIN_TONE_SIDE]

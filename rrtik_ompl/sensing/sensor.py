@@ -115,7 +115,8 @@ class Sensor:
             camera: Camera of the pictures; or a rig of several that take pictures at the same time, whose poses are in
                 the frame of the first.
             marker_map: The map of all objects.
-            smooth: Whether to smooth poses over time and reject outliers.
+            smooth: Whether to smooth poses over time and reject outliers. Otherwise each picture is searched
+                thoroughly by itself, as photographs deserve, however long that takes.
             sigmas: Number of standard deviations of their poses that the margins of obstacles cover; 0 for no margins.
 
         Raises:
@@ -170,7 +171,15 @@ class Sensor:
 
         near = bool(self._trackers) and self._count % WHOLE_EVERY != 0
         last = tuple(self._last.values())
-        return detect_objects(picture.pixels, self.camera, self.marker_map, before=last, near=near, turn=self._count)
+        return detect_objects(
+            picture.pixels,
+            self.camera,
+            self.marker_map,
+            before=last,
+            near=near,
+            turn=self._count,
+            thorough=not self._trackers,
+        )
 
     def why_nothing(self, source: str) -> str:
         """Return one line on why no object was found in the last picture without one, with a remedy.

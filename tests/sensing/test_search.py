@@ -72,9 +72,9 @@ def searched(monkeypatch):
     sizes = []
     detected = searching._detected
 
-    def counted(gray, *how):
+    def counted(gray, *how, **kinds):
         sizes.append(gray.size)
-        return detected(gray, *how)
+        return detected(gray, *how, **kinds)
 
     monkeypatch.setattr(searching, "_detected", counted)
     return sizes
@@ -84,7 +84,8 @@ def searched(monkeypatch):
 def test_in_a_picture_of_nothing_but_noise_there_is_no_close_search(searched, size):
     noise = np.clip(np.random.default_rng(0).normal(110.0, 4.0, size[::-1]), 0, 255).astype(np.uint8)
     assert find_markers(noise, FAMILY, wanted=[5]) == ()
-    assert searched == [noise.size]
+    assert len(searched) == 1
+    assert searched[0] <= noise.size
 
 
 @pytest.mark.parametrize(("near", "most"), [(False, searching.BUDGET), (True, searching.FILM_BUDGET)])

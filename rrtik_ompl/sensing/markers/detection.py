@@ -16,7 +16,7 @@ from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.markers.alignment import Look, aligned_corners, mean_side
 from rrtik_ompl.sensing.markers.chessboard import SMALLEST_SIDE
 from rrtik_ompl.sensing.markers.dictionaries import DICTIONARIES, marker_cells, spare_bits, table_of
-from rrtik_ompl.sensing.markers.search import quick, search
+from rrtik_ompl.sensing.markers.search import Codes, quick, search
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,6 +60,7 @@ def find_markers(
     near: bool = False,
     turn: int = 0,
     camera: Camera | None = None,
+    thorough: bool = False,
 ) -> tuple[SeenMarker, ...]:
     """Detect the markers of a dictionary in a grey picture, sorted by their numbers.
 
@@ -68,19 +69,23 @@ def find_markers(
         dictionary: One of `DICTIONARIES`.
         align: Refine the corners (`aligned_corners`); otherwise they are those of the detector.
         tone: Tone of the picture (`markers.lighting`); None to use, for each marker, the one with which it fits best.
-        wanted: Numbers of the markers that are searched for closely (`markers.search`) if they are missing; None for
-            all of the dictionary.
+        wanted: Numbers of the markers that are searched for; None for all of the dictionary. As long as one of them is
+            missing, the picture is searched more closely (`markers.search`).
         before: Markers of earlier pictures of a film, where they were seen last, which makes their alignment faster.
         near: The picture is the next of a film: search only near those places, unless a marker is no longer there, and
             closely only in the part of the picture whose turn it is.
         turn: Number of the picture in the film.
         camera: Camera of the picture, whose lens bends the sides of markers; None if it does not matter.
+        thorough: Search all of a large picture closely, as a single photograph deserves, however long it takes: some
+            seconds for 12 million pixels.
     """
     last_looks = {marker.number: marker.look for marker in before}
     places = {marker.number: marker.corners for marker in before}
     markers: list[SeenMarker] = []
 
-    for number, rough in search(gray, dictionary, wanted=wanted, places=places, near=near, turn=turn):
+    for number, rough in search(
+        gray, dictionary, wanted=wanted, places=places, near=near, turn=turn, thorough=thorough
+    ):
         if not align:
             markers.append(SeenMarker(dictionary, number, frozen(rough), np.nan))
             continue
@@ -96,7 +101,7 @@ def find_markers(
 
 def dictionaries_seen(gray: NDArray[np.uint8]) -> tuple[str, ...]:
     """Return the dictionaries that have markers in a picture, for the error message if the expected one has none."""
-    return tuple(name for name in DICTIONARIES if quick(gray, name))
+    return tuple(name for name in DICTIONARIES if quick(gray, Codes(name)))
 
 
 def charuco_board(columns: int, rows: int, square: float, marker: float, dictionary: str) -> cv2.aruco.CharucoBoard:
