@@ -10,7 +10,7 @@ import typer
 
 from rrtik_ompl.base.errors import InputError
 from rrtik_ompl.cli import FOUND
-from rrtik_ompl.cli.markers import SCENES, Dictionary
+from rrtik_ompl.cli.markers import DEFAULT_DICTIONARY, SCENES, Dictionary
 from rrtik_ompl.cli.markers import markers as markers
 from rrtik_ompl.cli.terminal import progress, say
 from rrtik_ompl.files.text import check_target
@@ -36,7 +36,7 @@ def map_places(
     side_sigma_mm: Annotated[
         float, typer.Option(help="Standard deviation of each side [mm]; a ruler's is 0.3.", min=0.0)
     ] = 0.3,
-    dictionary: Dictionary = "4x4_50",
+    dictionary: Dictionary = DEFAULT_DICTIONARY,
     reference: Annotated[
         int | None, typer.Option(help="Marker in whose frame all is; the smallest number if left out.")
     ] = None,

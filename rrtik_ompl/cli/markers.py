@@ -27,8 +27,12 @@ if TYPE_CHECKING:
 markers = typer.Typer(help="Print markers, calibrate cameras, find marked objects.")
 
 Dictionary = Annotated[
-    str, typer.Option(help="4x4_50 is found farthest away, aruco_mip_36h12 confused least; apriltag_36h11.")
+    str,
+    typer.Option(
+        help="Of the markers: 4x4_50 is found farthest away, apriltag_36h11 and aruco_mip_36h12 confused least."
+    ),
 ]
+DEFAULT_DICTIONARY = "apriltag_36h11"
 BOARD_MARKER = 0.73  # default side of a board's markers, as a share of a chess square
 PICTURES, SCENES = (".png", ".jpg"), (".yaml", ".yml")
 
@@ -52,7 +56,7 @@ def print_sheet(
     ] = None,
     columns: Annotated[int, typer.Option(help="Chess squares of a board across.")] = 6,
     rows: Annotated[int, typer.Option(help="Chess squares of a board down.")] = 8,
-    dictionary: Dictionary = "4x4_50",
+    dictionary: Dictionary = DEFAULT_DICTIONARY,
     paper: Annotated[str, typer.Option(help="a4, a3 or letter.")] = "a4",
 ) -> int:
     """Write sheets of markers, or a calibration board.
@@ -87,7 +91,7 @@ def calibrate_camera(
     marker_mm: Annotated[
         float | None, typer.Option(help="Side of a marker as printed [mm]; 0.73 of a square if left out.")
     ] = None,
-    dictionary: Dictionary = "4x4_50",
+    dictionary: Dictionary = DEFAULT_DICTIONARY,
     chessboard: Annotated[bool, typer.Option("--chessboard", help="The board has no markers.")] = False,
     model: Annotated[
         Model, typer.Option(help="Of the lens: brown (k1, k2, p1, p2), rational (eight numbers), or fisheye.")

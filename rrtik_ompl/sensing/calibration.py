@@ -240,7 +240,9 @@ def _size(shape: tuple[int, ...]) -> str:
 
 
 def _too_few(count: int) -> str:
-    return f"{count} corners of the board seen, {MIN_CORNERS} are needed: too small, blurred, or another board"
+    return (
+        f"{count} corners of the board seen, {MIN_CORNERS} are needed: too small, blurred, another board or dictionary"
+    )
 
 
 def _tone(views: Sequence[tuple[NDArray[np.uint8], Matrix]], board: Board) -> float | None:

@@ -103,7 +103,7 @@ def print_board(
     rows: int = 8,
     square: float = 0.030,
     marker: float = 0.022,
-    dictionary: str = "4x4_50",
+    dictionary: str = "apriltag_36h11",
     paper: str = "a4",
     dots_per_inch: int = 600,
 ) -> None:

@@ -1,0 +1,100 @@
+"""Photographs without markers: what each dictionary finds in them, and what is accepted.
+
+Needs folders of photographs that show no marker, as the clones of github.com/BIDS/BSDS500 (500 photographs) and of
+github.com/openMVG/ImageDataset_SceauxCastle (11 large ones).
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import cv2
+import numpy as np
+from typer import Argument, Option
+
+from bench.shared.parts import Parts
+from bench.shared.run import Run
+from rrtik_bench.report.page import Report
+from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.sensing.cameras.pictures import read_picture
+from rrtik_ompl.sensing.markers.alignment import MIN_LIKENESS
+from rrtik_ompl.sensing.markers.detection import find_markers
+from rrtik_ompl.sensing.markers.dictionaries import DICTIONARIES, table_of
+from rrtik_ompl.sensing.sight import MIN_SIDE_PIXELS, as_gray
+
+SEED = 43_000
+WIDTH, HEIGHT = 320, 240  # [pixels]; of a crop
+PIXELS_PER_CROP = 120_000  # of the photograph
+MARKERS = 50  # in a map
+LEAST_PICTURES, LEAST_PHOTOGRAPHS = 1000, 150
+# Those with the same first markers find the less, the more markers they have, as fewer bits are corrected.
+STRICTER = {f"{bits}x{bits}_{size}": f"{bits}x{bits}_50" for bits in (4, 5, 6, 7) for size in (100, 250, 1000)}
+HEADS = ("dictionary", "markers in the map", "squares whose bits are a marker's", "largest likeness", "accepted")
+INTRO = (
+    f"Crops of {WIDTH} x {HEIGHT} pixels at random places of photographs without markers, each searched for the first "
+    f"{MARKERS} markers of a dictionary (all, if it has fewer), at the settings of `detect_objects`; none is there, so "
+    "that every search goes to its end. Accepted: likeness and size suffice for the pose of an object. "
+    "Dictionaries of one size have the same first markers, and the one of 50 corrects most bits: what the others "
+    "find, it finds, too."
+)
+
+
+def crops_of(file: str) -> dict[str, list[float]]:
+    """Likenesses of all that the dictionaries find in crops of a photograph; -1 in place of one that is too small."""
+    cv2.setNumThreads(1)
+    gray = as_gray(read_picture(file))
+    height, width = gray.shape
+    rng = np.random.default_rng([SEED, height, width, int(gray.sum())])
+
+    found: dict[str, list[float]] = {"pictures": []}
+    for _ in range(max(round(gray.size / PIXELS_PER_CROP), 1)):
+        x, y = int(rng.integers(width - WIDTH + 1)), int(rng.integers(height - HEIGHT + 1))
+        crop = np.ascontiguousarray(gray[y : y + HEIGHT, x : x + WIDTH])
+        found["pictures"].append(float(crop.std()))
+        for name in DICTIONARIES:
+            if name not in STRICTER:
+                likenesses = [
+                    marker.likeness if marker.side >= MIN_SIDE_PIXELS else -1.0
+                    for marker in find_markers(crop, name, wanted=range(count_of(name)))
+                ]
+                found.setdefault(name, []).extend(likenesses)
+    return found
+
+
+def count_of(name: str) -> int:
+    """Markers of a dictionary that are in the map."""
+    return min(len(table_of(name).bytesList), MARKERS)
+
+
+def main(
+    run: Run,
+    parts: Parts,
+    photographs: Annotated[
+        list[Path], Argument(help="Folders of photographs without markers.", exists=True, file_okay=False)
+    ],
+    *,
+    step: Annotated[int, Option(help="Take every so manieth photograph.")] = 1,
+) -> Report:
+    """Search all photographs."""
+    files = sorted(str(file) for folder in photographs for file in folder.rglob("*") if file.suffix.lower() == ".jpg")
+    files = [file for file in files if min(read_picture(file).shape[:2]) >= HEIGHT][::step]
+    if not files:
+        raise InputError("the folders have no photograph (.jpg) that is large enough")
+    results = parts(crops_of, [(file,) for file in files])
+    pictures = sum(len(result["pictures"]) for result in results)
+
+    report = run.report("False markers", intro=INTRO)
+    report.bar("photographs", f">= {LEAST_PHOTOGRAPHS}", str(len(files)), len(files) >= LEAST_PHOTOGRAPHS)
+    report.bar("pictures without markers", f">= {LEAST_PICTURES}", str(pictures), pictures >= LEAST_PICTURES)
+
+    rows = []
+    for name in DICTIONARIES:
+        likenesses = np.array([each for result in results for each in result.get(STRICTER.get(name, name), [])])
+        accepted = int((likenesses >= MIN_LIKENESS).sum())
+        at_most = "at most " if name in STRICTER else ""
+        largest = f"{likenesses.max():.2f}" if (likenesses >= 0.0).any() else "-"
+        report.bar(f"{name}: accepted", "0", f"{at_most}{accepted}", accepted == 0)
+        rows.append([name, str(count_of(name)), f"{at_most}{len(likenesses)}", largest, f"{at_most}{accepted}"])
+    report.table("Dictionaries", HEADS, rows)
+    return report
