@@ -97,7 +97,8 @@ def camera_of(condition: Condition) -> Camera:
     matrix = CAMERA.matrix.copy()
     matrix[[0, 1], [0, 1]] *= scale
     matrix[[0, 1], [2, 2]] = scale * (matrix[[0, 1], [2, 2]] + 0.5) - 0.5
-    return replace(CAMERA, matrix=matrix, width=condition.size[0], height=condition.size[1])
+    size = {"width": condition.size[0], "height": condition.size[1]}
+    return replace(CAMERA, matrix=matrix, readout=condition.trouble.readout, **size)
 
 
 def photographed(condition: Condition, camera: Camera, rng: np.random.Generator) -> tuple[Any, NDArray[np.uint8]]:
@@ -129,7 +130,8 @@ def _covered(places: list[Any], camera: Camera) -> bool:
 def map_of(condition: Condition) -> MarkerMap:
     """The map of the object."""
     markers = tuple(MountedMarker(n, SIDE, T) for n, T in zip(NUMBERS, condition.places, strict=False))
-    return MarkerMap(DICTIONARY, (MarkedObject("thing", "target", markers),), pose([0, 0, 0]))
+    thing = MarkedObject("thing", "target", markers, speed=condition.trouble.speed)
+    return MarkerMap(DICTIONARY, (thing,), pose([0, 0, 0]))
 
 
 @dataclass(frozen=True)

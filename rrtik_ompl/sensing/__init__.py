@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from rrtik_ompl.sensing.rig import detect_in_rig as detect_in_rig
     from rrtik_ompl.sensing.rig_file import pictures_together as pictures_together
     from rrtik_ompl.sensing.scene_feed import scenes_of_pictures as scenes_of_pictures
+    from rrtik_ompl.sensing.scene_from_view import relative_pose as relative_pose
     from rrtik_ompl.sensing.sensor import Sensor as Sensor
     from rrtik_ompl.sensing.sight import detect_objects as detect_objects
     from rrtik_ompl.world.robot_points import without_robot as without_robot
@@ -42,6 +43,7 @@ else:
         ),
         "sensing.rig_file": ("pictures_together",),
         "sensing.scene_feed": ("scenes_of_pictures",),
+        "sensing.scene_from_view": ("relative_pose",),
         "sensing.sensor": ("Sensor",),
         "sensing.sight": ("detect_objects",),
         "world.robot_points": ("without_robot",),

@@ -75,6 +75,7 @@ class CameraEntry(Section):
         "how light is coded as grey: 0 linear, 1 sRGB; estimated in each picture if absent",
         default=None,
     )
+    readout = key(NOT_NEGATIVE, "time from the first row to the last one [s]; 0 for a global shutter", default=0.0)
     view_errors_px = key(NUMBERS, "of each photograph that was used", default=None)
 
     def build(self) -> Camera:
@@ -91,6 +92,7 @@ class CameraEntry(Section):
             tone=self.tone,
             lens=self.lens,
             correlation=self.correlation,
+            readout=self.readout,
         )
 
 
@@ -142,6 +144,8 @@ def write_camera(camera: Camera | Calibration, file: str | os.PathLike[str]) -> 
         data["correlation"] = lens.correlation.tolist()
     if lens.tone is not None:
         data["tone"] = lens.tone
+    if lens.readout > 0.0:
+        data["readout"] = lens.readout
 
     if isinstance(camera, Calibration):
         data["error_px"] = camera.error

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from rrtik_ompl.base.arrays import Matrix, finite_array, frozen
 from rrtik_ompl.base.copies import as_value
-from rrtik_ompl.base.errors import InputError
+from rrtik_ompl.base.errors import InputError, require
 from rrtik_ompl.base.poses import pose, rigid
 from rrtik_ompl.geometry.collision.shape_table import farthest
 from rrtik_ompl.model.goal import PoseGoal
@@ -227,6 +227,30 @@ def place_in_base(T_base_camera: pin.SE3, base_covariance: Matrix, sight: Sighti
 
     axes = np.kron(np.eye(2), turn)
     return pose, axes @ spread @ axes.T
+
+
+def relative_pose(first: Sighting, second: Sighting) -> tuple[pin.SE3, Matrix]:
+    """Return the pose of one seen object in the frame of another, such as that of a part beside its socket.
+
+    The errors of both poses count as independent. What they share, such as a wrong focal length, displaces both alike,
+    so the covariance is too large rather than too small.
+
+    Args:
+        first: The object in whose frame the pose is.
+        second: The other object, seen by the same camera at the same time.
+
+    Returns:
+        ``T_first_second``, and the covariance of position [m] and small rotation [rad] about the axes of the first
+        object, shape (6, 6).
+
+    Raises:
+        InputError: If the pose of one of them is refused.
+    """
+    for each in (first, second):
+        require(each, Sighting, "sighting of a relative pose", "use detect_objects(...)")
+        if each.refused:
+            raise InputError(f"object '{each.object.name}': {each.refused}")
+    return place_in_base(first.pose.T_camera_object.inverse(), first.pose.covariance, second)
 
 
 def checked_sigmas(value: float) -> float:

@@ -10,7 +10,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
-from rrtik_ompl.base.arrays import Matrix
+from rrtik_ompl.base.arrays import Matrix, Vector
 from rrtik_ompl.base.errors import InputError, require
 from rrtik_ompl.sensing.cameras.camera import Camera
 from rrtik_ompl.sensing.markers.alignment import MIN_LIKENESS
@@ -163,8 +163,8 @@ def check_size(picture: NDArray[np.uint8], camera: Camera, name: str = "the pict
 def sighting(camera: Camera, thing: MarkedObject, seen: Sequence[SeenMarker]) -> Sighting | None:
     """Compute the sighting of one object from the markers in view; None if none of them is on it.
 
-    Only sharp and sufficiently large markers are used, as long as there are any. A single marker may have two poses;
-    several markers give one.
+    Only sharp and sufficiently large markers are used, as long as there are any. A single marker, or several in a
+    plane, may have two poses.
     """
     mounted = {marker.number: marker for marker in thing.markers}
     seen_on_object = tuple(marker for marker in seen if marker.number in mounted)
@@ -176,15 +176,16 @@ def sighting(camera: Camera, thing: MarkedObject, seen: Sequence[SeenMarker]) ->
     sigma = ALIGNED_SIGMA if sharp_markers else ROUGH_SIGMA
     used_markers = sharp_markers or used_markers
 
+    pixels = np.vstack([marker.corners for marker in used_markers])
+    shifts = _motion_shifts(camera.lateness(pixels), thing.speed)
     if len(used_markers) == 1:
-        pose = _of_one(camera, used_markers[0], mounted[used_markers[0].number], sigma)
+        pose = _of_one(camera, used_markers[0], mounted[used_markers[0].number], sigma, shifts)
     else:
         points = np.vstack([mounted[marker.number].corners for marker in used_markers])
         spread = _joint_spread(used_markers)
-        shifts = _map_shifts([mounted[marker.number] for marker in used_markers])
-        pose = pose_of_points(
-            camera, np.vstack([marker.corners for marker in used_markers]), points, sigma, spread, shifts
-        )
+        moving = len(shifts) > 0
+        shifts += _map_shifts([mounted[marker.number] for marker in used_markers])
+        pose = pose_of_points(camera, pixels, points, sigma, spread, shifts, moving)
 
     return Sighting(thing, pose, seen_on_object, _refusal(pose, used_markers))
 
@@ -208,9 +209,23 @@ def _joint_spread(markers: Sequence[SeenMarker]) -> Matrix | None:
     return spread + between_markers * (common @ common.T)
 
 
-def _of_one(camera: Camera, marker: SeenMarker, mounted: MountedMarker, sigma: float) -> CornerPose:
+def _motion_shifts(lateness: Vector, speed: float) -> list[Matrix]:
+    """Return the displacements of corners that are taken late [s] along each axis, by one sigma, shape (4 m, 3) [m].
+
+    The direction of the motion is not known. The pose is that of the time of the middle row.
+    """
+    if speed == 0.0 or not lateness.any():
+        return []
+    return [np.outer(speed / np.sqrt(3.0) * lateness, axis) for axis in np.eye(3)]
+
+
+def _of_one(
+    camera: Camera, marker: SeenMarker, mounted: MountedMarker, sigma: float, shifts: Sequence[Matrix]
+) -> CornerPose:
     """Compute the pose of an object from its only visible marker."""
-    marker_pose = pose_of_square(camera, marker.corners, mounted.side, sigma, marker.spread, mounted.side_sigma)
+    marker_pose = pose_of_square(
+        camera, marker.corners, mounted.side, sigma, marker.spread, mounted.side_sigma, shifts, len(shifts) > 0
+    )
     T_marker_object = mounted.T_object_marker.inverse()
 
     object_pose = marker_pose.T_camera_object * T_marker_object

@@ -11,7 +11,7 @@ from rrtik_ompl.base.lazy import public_values
 
 FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
 # Names whose use needs more than a few lines, which the pages show.
-WITHOUT = {"ompl.MotionChecker", "ompl.check_planner", "sensing.detect_in_rig"}
+WITHOUT = {"ompl.MotionChecker", "ompl.check_planner", "sensing.detect_in_rig", "sensing.relative_pose"}
 PUBLIC = {name: value for name, value in public_values(rrtik).items() if not inspect.ismodule(value)}
 
 

@@ -166,3 +166,26 @@ def test_what_the_markers_of_a_picture_share_does_not_become_less_by_their_numbe
             squares[name].append(off @ np.linalg.solve(pose_found.covariance, off))
     assert 4.8 < np.mean(squares["shared"]) < 7.2  # honest: 6
     assert np.mean(squares["independent"]) > 9.0
+
+
+def test_two_markers_in_a_plane_have_the_two_poses_of_a_plane():
+    """Small ones far away: where the nearest pose is turned, two are nearly always said to fit: the other is right."""
+    rng = np.random.default_rng(2)
+    markers = tuple(MountedMarker(k, 0.04, pose([x, 0.0, 0.0])) for k, x in enumerate((-0.026, 0.026)))
+    panel = MarkedObject("panel", "target", markers)
+    turned, flagged = 0, 0
+    for _ in range(200):
+        T = facing(rng.uniform(-0.3, 0.3, 3), [*rng.uniform(-0.1, 0.1, 2), rng.uniform(1.2, 1.8)])
+        seen = []
+        for marker in markers:
+            true = CAMERA.project(marker.corners @ T.rotation.T + T.translation)
+            pixels = true + 0.15 * rng.standard_normal((4, 2))
+            seen.append(SeenMarker("4x4_50", marker.number, pixels, 1.0, 56.0 * SPREAD))
+        found = sighting(CAMERA, panel, seen).pose
+        wrong = np.linalg.norm(pin.log3(found.T_camera_object.rotation.T @ T.rotation)) > 4.0 * found.rotation_sigma
+        if wrong:
+            turned += 1
+            other = np.inf if found.other is None else np.linalg.norm(pin.log3(found.other.rotation.T @ T.rotation))
+            flagged += found.ambiguous and other < 4.0 * found.rotation_sigma
+    assert turned > 5
+    assert flagged >= 0.9 * turned

@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from rrtik_ompl.base.arrays import Matrix, Vector, finite_array, finite_number, frozen
+from rrtik_ompl.base.arrays import Matrix, Vector, finite_array, finite_number, frozen, not_negative
 from rrtik_ompl.base.copies import as_value, set_fields
 from rrtik_ompl.base.errors import InputError, UnknownNameError
 from rrtik_ompl.files.kinds import read, write
@@ -35,6 +35,7 @@ class Camera:
         tone: How the camera codes light as grey values (`markers.lighting`); None to estimate it for each marker.
         lens: The lens model: "brown", "rational" or "fisheye".
         correlation: Correlations of the errors whose standard deviations are ``sigmas``, shape (4 + k, 4 + k).
+        readout: Time from the first row of a picture to the last one [s]; 0 for all rows at once (global shutter).
 
     Example:
         >>> camera = rrtik.sensing.Camera([[600.0, 0.0, 320.0], [0.0, 600.0, 240.0], [0.0, 0.0, 1.0]], 640, 480)
@@ -50,6 +51,7 @@ class Camera:
     tone: float | None
     lens: str
     correlation: Matrix
+    readout: float
 
     __reduce__ = as_value
 
@@ -64,6 +66,7 @@ class Camera:
         tone: float | None = None,
         lens: str = "brown",
         correlation: ArrayLike | None = None,
+        readout: float = 0.0,
     ) -> None:
         """Check and copy the intrinsics.
 
@@ -76,11 +79,12 @@ class Camera:
             tone: See `Camera`.
             lens: See `Camera`.
             correlation: None if the errors are independent.
+            readout: See `Camera`.
 
         Raises:
             InputError: If the matrix is not that of a pinhole, a number is not finite, the size is not positive, there
-                is no such lens model, it has another number of coefficients, a standard deviation is negative, or the
-                correlations are none.
+                is no such lens model, it has another number of coefficients, a standard deviation or the readout
+                is negative, or the correlations are none.
         """
         given = finite_array(matrix, (3, 3), "camera matrix")
         expected = [[given[0, 0], 0.0, given[0, 2]], [0.0, given[1, 1], given[1, 2]], [0.0, 0.0, 1.0]]
@@ -110,6 +114,7 @@ class Camera:
             tone=None if tone is None else finite_number(tone, "camera tone"),
             lens=lens,
             correlation=frozen(np.eye(4 + count) if correlation is None else _correlations(correlation, 4 + count)),
+            readout=not_negative(readout, "camera readout"),
         )
 
     def save(self, file: str | os.PathLike[str]) -> None:
@@ -216,6 +221,10 @@ class Camera:
         """Return the covariance of the pixels of points that results from `sigmas`, shape (2 m, 2 m) [pixels^2]."""
         each = self.own_slopes(points) * self.sigmas
         return np.asarray(each @ self.correlation @ each.T, dtype=np.float64)
+
+    def lateness(self, pixels: Matrix) -> Vector:
+        """Return how much later than the middle row the rows of pixels, shape (m, 2), are taken, shape (m,) [s]."""
+        return np.asarray(self.readout * ((pixels[:, 1] + 0.5) / self.height - 0.5), dtype=np.float64)
 
     @property
     def _focal(self) -> Vector:

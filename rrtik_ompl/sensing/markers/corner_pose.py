@@ -16,7 +16,7 @@ import numpy as np
 import pinocchio as pin
 from scipy.special import chdtri
 
-from rrtik_ompl.base.arrays import Matrix, frozen
+from rrtik_ompl.base.arrays import Matrix, Vector, frozen
 from rrtik_ompl.sensing.cameras.camera import Camera
 
 # A smaller ratio of the two errors is ambiguous: this covers 27 % of near-frontal views, and all wrong choices.
@@ -29,6 +29,7 @@ SURPRISING = 0.05
 MAX_DISTANCE = 1e4  # [m]
 # [rad]; minima closer than this are the same. Distinct ones differ by at least 0.03.
 MIN_BRANCH_ANGLE = 1e-3
+_FLAT = 1e-6  # extent of points in a plane across it, as a share of that along it
 _MAX_STEPS = 40
 
 
@@ -38,7 +39,7 @@ class CornerPose:
 
     Attributes:
         T_camera_object: The pose with the least error.
-        other: The second pose of a single square; None if there is none.
+        other: The second pose of a single square, or of points in a plane; None if there is none.
         error: Root mean square distance of the points from their pixels [pixels].
         other_error: That of the second pose; infinite if there is none.
         covariance: Covariance of (position [m], small rotation about the axes of the camera [rad]), shape (6, 6).
@@ -90,6 +91,8 @@ def pose_of_square(
     sigma: float = ALIGNED_SIGMA,
     spread: Matrix | None = None,
     side_sigma: float = 0.0,
+    shifts: Sequence[Matrix] = (),
+    moving: bool = False,
 ) -> CornerPose:
     """Compute the pose of one marker from its four corners.
 
@@ -103,34 +106,26 @@ def pose_of_square(
         sigma: Standard deviation of a corner [pixels].
         spread: Covariance of the corners, used instead of ``sigma``, shape (8, 8) [pixels^2].
         side_sigma: Standard deviation of the side [m].
+        shifts: Further possible displacements of the corners, as in `pose_of_points`.
+        moving: As in `pose_of_points`.
     """
     points = square_corners(side)
-    shifts = [points * side_sigma / side] if side_sigma else []
+    shifts = [*shifts, points * side_sigma / side] if side_sigma else shifts
 
     # For an exactly frontal marker the closed form may give NaN or a marker that faces away. Then SQPnP is used.
     guesses = _guesses(camera, points, pixels, cv2.SOLVEPNP_IPPE_SQUARE) or _guesses(camera, points, pixels)
 
-    refined = [_levenberg(camera, points, pixels, guess) for guess in guesses]
-    errors = [_error(camera, points, pixels, pose) for pose in refined]
-    best_index = int(np.argmin(errors))
-    best_pose = refined[best_index]
-    error = errors[best_index]
-
-    other = None
-    other_error = np.inf
-    if len(guesses) > 1:
-        is_one_minimum = turn_between(best_pose, refined[1 - best_index]) < MIN_BRANCH_ANGLE
-        other = (
-            max(guesses, key=lambda guess: turn_between(best_pose, guess))
-            if is_one_minimum
-            else refined[1 - best_index]
-        )
-        other_error = _error(camera, points, pixels, other)
+    best_pose, other, valley = _branches(camera, points, pixels, guesses)
+    other = valley if other is None else other
+    error = _error(camera, points, pixels, best_pose)
+    other_error = np.inf if other is None else _error(camera, points, pixels, other)
 
     covariances = _pixel_covariance(len(points), sigma, spread), _point_covariance(camera, points, best_pose, shifts)
-    return CornerPose(
-        best_pose, other, error, other_error, *_covariance(camera, points, pixels, best_pose, covariances)
-    )
+    if moving:
+        best_pose = _levenberg(camera, points, pixels, best_pose, covariances[0] + covariances[1])
+        other = None if other is None else _levenberg(camera, points, pixels, other, covariances[0] + covariances[1])
+    covariance, surprise = _covariance(camera, points, pixels, best_pose, covariances, moving)
+    return CornerPose(best_pose, other, error, other_error, covariance, surprise)
 
 
 def pose_of_points(
@@ -140,8 +135,9 @@ def pose_of_points(
     sigma: float = ALIGNED_SIGMA,
     spread: Matrix | None = None,
     shifts: Sequence[Matrix] = (),
+    moving: bool = False,
 ) -> CornerPose:
-    """Compute the pose of an object from at least four known points on it.
+    """Compute the pose of an object from at least four known points on it; points in a plane may have two.
 
     Args:
         camera: Camera of the picture.
@@ -151,14 +147,40 @@ def pose_of_points(
         spread: Covariance of the pixels, used instead of ``sigma``, shape (2 m, 2 m) [pixels^2].
         shifts: Possible displacements of the points on the object, one standard deviation for each independent cause,
             shape (m, 3) each [m].
+        moving: Whether the displacements are large beside the error of the pixels, as with a rolling shutter: then the
+            points are weighted by the inverse of their covariance, so that the pose does not bend to the motion.
     """
-    best = _levenberg(camera, points, pixels, _guesses(camera, points, pixels)[0])
-    error = _error(camera, points, pixels, best)
+    guesses = _guesses(camera, points, pixels, cv2.SOLVEPNP_IPPE) if _in_a_plane(points) else []
+    best, other, _ = _branches(camera, points, pixels, guesses or _guesses(camera, points, pixels)[:1])
+    error, other_error = (np.inf if T is None else _error(camera, points, pixels, T) for T in (best, other))
     covariances = _pixel_covariance(len(points), sigma, spread), _point_covariance(camera, points, best, shifts)
-    covariance, surprise = _covariance(camera, points, pixels, best, covariances)
-    return CornerPose(
-        best, None, error, np.inf, covariance, surprise, _strain(camera, points, pixels, best, covariances)
-    )
+    if moving:
+        best = _levenberg(camera, points, pixels, best, covariances[0] + covariances[1])
+        other = None if other is None else _levenberg(camera, points, pixels, other, covariances[0] + covariances[1])
+    covariance, surprise = _covariance(camera, points, pixels, best, covariances, moving)
+    strain = _strain(camera, points, pixels, best, covariances)
+    return CornerPose(best, other, error, other_error, covariance, surprise, strain)
+
+
+def _in_a_plane(points: Matrix) -> bool:
+    extents = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    return bool(extents[2] < _FLAT * extents[0])
+
+
+def _branches(
+    camera: Camera, points: Matrix, pixels: Matrix, guesses: Sequence[pin.SE3]
+) -> tuple[pin.SE3, pin.SE3 | None, pin.SE3 | None]:
+    """Return the minimum with the least error, the other one, and, if both are one, the guess that is farther away."""
+    refined = [_levenberg(camera, points, pixels, guess) for guess in guesses]
+    best_index = int(np.argmin([_error(camera, points, pixels, pose) for pose in refined]))
+    best = refined[best_index]
+    if len(guesses) < 2:
+        return best, None, None
+
+    other = refined[1 - best_index]
+    if turn_between(best, other) < MIN_BRANCH_ANGLE:
+        return best, None, max(guesses, key=lambda guess: turn_between(best, guess))
+    return best, other, None
 
 
 def _guesses(camera: Camera, points: Matrix, pixels: Matrix, method: int = cv2.SOLVEPNP_SQPNP) -> list[pin.SE3]:
@@ -185,32 +207,38 @@ def _plausible(pose: pin.SE3, facing: bool) -> bool:
     return not facing or float(pose.rotation[:, 2] @ pose.translation) < 0.0
 
 
-def _levenberg(camera: Camera, points: Matrix, pixels: Matrix, pose: pin.SE3) -> pin.SE3:
+def _levenberg(
+    camera: Camera, points: Matrix, pixels: Matrix, pose: pin.SE3, covariance: Matrix | None = None
+) -> pin.SE3:
     """Refine a pose to the nearby minimum of the reprojection error by Levenberg-Marquardt.
 
-    Rotations are updated about the axes of the camera; steps that increase the error are rejected.
+    Rotations are updated about the axes of the camera; steps that increase the error are rejected. With a covariance of
+    the pixels, shape (2 m, 2 m), the errors are weighted by its inverse.
     """
+    whitening = np.eye(pixels.size) if covariance is None else np.linalg.inv(np.linalg.cholesky(covariance))
+
+    def residuals_at(T: pin.SE3) -> Vector:
+        return np.asarray(whitening @ (pixels - camera.project(points @ T.rotation.T + T.translation)).ravel())
+
     damping = 1e-6
-    error = _error(camera, points, pixels, pose)
+    residuals = residuals_at(pose)
 
     for _ in range(_MAX_STEPS):
-        in_camera_axes = points @ pose.rotation.T
-        jacobian = camera.jacobian(in_camera_axes, pose.translation)
-        residuals = (pixels - camera.project(in_camera_axes + pose.translation)).ravel()
+        jacobian = whitening @ camera.jacobian(points @ pose.rotation.T, pose.translation)
         normal = jacobian.T @ jacobian
         step = np.linalg.solve(normal + damping * np.diag(normal.diagonal()), jacobian.T @ residuals)
         candidate = pin.SE3(pin.exp3(step[3:]) @ pose.rotation, pose.translation + step[:3])
 
-        candidate_error = _error(camera, points, pixels, candidate)
-        gain = error - candidate_error
-        if gain > 0.0:
+        new_residuals = residuals_at(candidate)
+        error, new_error = (float(np.linalg.norm(each)) for each in (residuals, new_residuals))
+        if new_error < error:
             pose = candidate
-            error = candidate_error
+            residuals = new_residuals
             damping = 0.1 * damping
         else:
             damping *= 100.0
 
-        if abs(gain) <= 1e-9 * error or damping > 1e3:
+        if abs(error - new_error) <= 1e-9 * error or damping > 1e3:
             break
 
     return pose
@@ -240,7 +268,12 @@ def _point_covariance(camera: Camera, points: Matrix, pose: pin.SE3, shifts: Seq
 
 
 def _covariance(
-    camera: Camera, points: Matrix, pixels: Matrix, pose: pin.SE3, covariances: tuple[Matrix, Matrix]
+    camera: Camera,
+    points: Matrix,
+    pixels: Matrix,
+    pose: pin.SE3,
+    covariances: tuple[Matrix, Matrix],
+    weighted: bool,
 ) -> tuple[Matrix, float]:
     """Return the covariance of a pose, and its normalised sum of squared residuals.
 
@@ -252,6 +285,7 @@ def _covariance(
         pixels: Shape (m, 2).
         pose: ``T_camera_object``.
         covariances: Of the pixels and of the points, as covariances of pixels, shape (2 m, 2 m) each.
+        weighted: Whether the points were weighted by the inverse of their sum.
 
     Returns:
         Covariance of (position [m], rotation [rad]), shape (6, 6), and the ``surprise`` of `CornerPose`.
@@ -262,11 +296,14 @@ def _covariance(
     pseudo_inverse = np.linalg.pinv(jacobian)
     residuals = (camera.project(in_camera_axes + pose.translation) - pixels).ravel()
 
-    weighted = np.linalg.solve(of_pixels + of_points, np.c_[residuals, jacobian])
-    normal_rows = jacobian.T @ weighted  # normal equations of the weighted least-squares pose near this one
+    scaled = np.linalg.solve(of_pixels + of_points, np.c_[residuals, jacobian])
+    normal_rows = jacobian.T @ scaled  # normal equations of the weighted least-squares pose near this one
     squares = float(
-        residuals @ weighted[:, 0] - normal_rows[:, 0] @ np.linalg.solve(normal_rows[:, 1:], normal_rows[:, 0])
+        residuals @ scaled[:, 0] - normal_rows[:, 0] @ np.linalg.solve(normal_rows[:, 1:], normal_rows[:, 0])
     )
+
+    if weighted:
+        pseudo_inverse = np.linalg.solve(normal_rows[:, 1:], scaled[:, 1:].T)
 
     degrees = 2 * len(points) - 6
     covariance = (

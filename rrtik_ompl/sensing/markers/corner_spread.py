@@ -30,7 +30,9 @@ FLOOR = 0.002  # [pixels]; error in a picture without noise, by rounding
 # Standard deviations of an outline that is too large, and of a marker that is displaced as a whole, for residuals that
 # are as large as the contrast [pixels]. Measured on pictures with tone curves, sharpening, fringes of colour, and JPEG.
 OUTLINE, DISPLACED = 0.8, 0.5
-_FEW_BLOCKS = 1.2  # factor of the covariance, because it is known from few blocks
+# Standard deviation of the corners for a blur along one direction, as a share of that of the blur: something moved, and
+# the ideal marker is blurred to all sides.
+SMEARED = 0.04
 _SHARPENED = 2.0  # radius of the detail that cameras sharpen [pixels]
 # [pixels]; possible displacement of the whole marker, multiplied by the share of samples that are clipped at white.
 CUT_SHIFT = 0.12
@@ -39,6 +41,7 @@ _FEW = 320
 _TINY = 1e-6  # relative regularisation: parameters that the marker cannot determine stay 0
 _BLOCKS = 4  # along a side
 _ALIKE = np.tile(np.eye(2), (4, 1))  # displacements of all four corners together, along x and along y
+_BLURS = slice(11, 14)  # columns of the blur
 _BENDS = slice(14, 18)  # columns of the bends
 _STEP = 0.05  # step of a corner for finite differences [pixels]
 
@@ -89,7 +92,9 @@ def corner_spread(
     # Bends may displace the corners by their own size.
     by_chance = scale * variance * float(np.trace(inverse[_BENDS, _BENDS]))
     bends = max(float(solution[_BENDS] @ solution[_BENDS]) - by_chance, 0.0) * _area(corners) / _area(square)
-    own = 0.5 * _FEW_BLOCKS * (jackknife + scale * white) + (bends + FLOOR**2) * np.eye(8)
+    along, oblique, across = solution[_BLURS] * [2.0, 1.0, 2.0] * _area(corners) / _area(square)
+    smeared = SMEARED**2 * float(np.hypot(0.5 * (along - across), oblique))
+    own = 0.5 * (jackknife + scale * white) + (bends + smeared + FLOOR**2) * np.eye(8)
 
     # Clipping, tone, halos and colour shift all blocks alike, which the jackknife cannot detect.
     unlike = float(np.std(residuals)) / max(float(np.ptp(model)), 1.0)

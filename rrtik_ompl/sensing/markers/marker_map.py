@@ -123,6 +123,7 @@ class MarkedObject:
         solids: Its solids, with poses ``T_object_solid``.
         grasps: Its grasp types.
         loose: Whether a gripper can carry it away.
+        speed: Speed at which it may move beside the camera [m/s]: the rows of a rolling shutter see it at other places.
     """
 
     name: str
@@ -131,11 +132,13 @@ class MarkedObject:
     solids: tuple[Obstacle, ...] = ()
     grasps: tuple[GraspType, ...] = ()
     loose: bool = False
+    speed: float = 0.0
 
     def __post_init__(self) -> None:
         for word in ("markers", "solids", "grasps"):
             object.__setattr__(self, word, listed(getattr(self, word), f"{word} of object '{self.name}'"))
 
+        object.__setattr__(self, "speed", not_negative(self.speed, f"object '{self.name}': speed"))
         require(self.role, str, f"role of object '{self.name}'", f"use one of {', '.join(ROLES)}")
         if self.role not in ROLES:
             raise UnknownNameError("role of an object", self.role, ROLES, where=self.name)

@@ -75,13 +75,14 @@ class ObjectEntry(Section):
     solids = key(Listed(SolidEntry), "with poses in the frame of the object", default=[])
     grasps = key(Listed(GraspEntry), default=[])
     loose = key(FLAG, "whether a gripper can carry it away", default=False)
+    speed = key(NOT_NEGATIVE, "at which it may move beside the camera, for rolling shutters [m/s]", default=0.0)
 
     def build(self, folder: Path) -> MarkedObject:
         """Return the object; files of meshes are relative to ``folder``."""
         solids = [Obstacle(each.name, each.build_shape(folder), each.build_pose()) for each in self.solids]
         grasps = [each.build() for each in self.grasps]
         markers = tuple(each.build() for each in self.markers)
-        return MarkedObject(self.name, self.role, markers, tuple(solids), tuple(grasps), self.loose)
+        return MarkedObject(self.name, self.role, markers, tuple(solids), tuple(grasps), self.loose, self.speed)
 
 
 class MarkerMapFile(Section):
