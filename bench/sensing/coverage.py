@@ -97,8 +97,8 @@ def camera_of(condition: Condition) -> Camera:
     matrix = CAMERA.matrix.copy()
     matrix[[0, 1], [0, 1]] *= scale
     matrix[[0, 1], [2, 2]] = scale * (matrix[[0, 1], [2, 2]] + 0.5) - 0.5
-    size = {"width": condition.size[0], "height": condition.size[1]}
-    return replace(CAMERA, matrix=matrix, readout=condition.trouble.readout, **size)
+    width, height = condition.size
+    return replace(CAMERA, matrix=matrix, width=width, height=height, readout=condition.trouble.readout)
 
 
 def photographed(condition: Condition, camera: Camera, rng: np.random.Generator) -> tuple[Any, NDArray[np.uint8]]:
